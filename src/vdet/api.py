@@ -43,7 +43,7 @@ from vdet.run.steps import Step, StepContext
 from vdet.run.video import RunTotals, VideoJob, check_job, open_video, run_video
 from vdet.track.factory import TrackerKind, make_tracker
 from vdet.track.track import FrameTracks, Track, VideoTracker
-from vdet.traffic.counter import count_file, count_frames
+from vdet.traffic.counting import count_file, count_frames
 from vdet.traffic.counts import Counts, Event
 
 __all__ = (

@@ -26,7 +26,7 @@ from vdet.run.video import VideoJob, check_job, run_video
 from vdet.synthetic.random_scenes import busy_road, demo_scene
 from vdet.synthetic.render import write_clip
 from vdet.synthetic.truth import write_truth
-from vdet.traffic.counter import count_file
+from vdet.traffic.counting import count_file
 
 ROADS = 6
 """Drawn roads that the linear model learns from."""

@@ -32,6 +32,7 @@ _BUILT_IN: dict[str, dict[str, str]] = {
         "crops": "vdet.run.sinks.folders:CROPS",
         "page": "vdet.run.sinks.folders:PAGE",
         "counts": "vdet.run.sinks.data:COUNTS",
+        "flows": "vdet.run.sinks.data:FLOWS",
     },
     STEPS: {
         "lanes": "vdet.run.steps:lane_step",

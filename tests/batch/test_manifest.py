@@ -33,6 +33,7 @@ def test_a_record_is_there_as_soon_as_it_is_added(tmp_path: Path) -> None:
         "height": 3,
         "frames": 2,
         "tracks": 1,
+        "begin": None,
         "warnings": [],
         "error": None,
         "digest": None,

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -40,7 +41,7 @@ def options(folder: Path) -> tuple[str | Path, ...]:
 
 def events_of(path: Path) -> list[tuple[str, ...]]:
     with path.open() as file:
-        keys = ("frame", "name", "direction", "id", "score", "stitched")
+        keys = ("frame", "name", "direction", "id", "score", "vehicle")
         return [tuple(row[key] for key in keys) for row in csv.DictReader(file)]
 
 
@@ -57,6 +58,33 @@ def test_counting_a_file_of_tracks_gives_what_the_run_gave(
     result = run("count", tracks, *lines, "--counts", again, *rate)
     assert (result.code, result.err) == (0, "")
     assert events_of(again) == events_of(live) != []
+
+
+def test_flows_have_clock_times_live_and_from_tracks(
+    run: Run, folder: Path, tmp_path: Path
+) -> None:
+    clip = tmp_path / "v_20260501_065959.mp4"
+    clip.write_bytes((folder / "red.mp4").read_bytes())
+    tracks = tmp_path / "v_20260501_065959.jsonl"
+    lines = ("--lines", folder / "lines.yaml", "--interval", "5min")
+    found = {}
+    for name in ("live", "again"):
+        out = tmp_path / f"{name}.csv"
+        asked = ("--flows", out, "--flows", out.with_suffix(".json"), *lines)
+        if name == "live":
+            wanted = ("--no-video", "--tracks", tracks, *asked)
+            result = run("detect-video", clip, *wanted, *options(folder))
+        else:
+            result = run("count", tracks, *asked)
+        assert result.code == 0, result.err
+        assert re.search(r"begins 2026-05-01 06:59:59.* \(from its name\)", result.err)
+        found[name] = out.read_text(), json.loads(out.with_suffix(".json").read_text())
+    assert found["live"] == found["again"]
+    rows = list(csv.DictReader(found["live"][0].splitlines()))
+    assert [(row["start"][:16], row["from"], row["to"], row["count"]) for row in rows] == [
+        ("2026-05-01 06:55", "gate", "yard", "0"), ("2026-05-01 07:00", "gate", "yard", "1"),
+    ]  # fmt: skip
+    assert "from  to gate  to yard  to none" in result.out
 
 
 def write_tracks(path: Path, *, shift: int = 0) -> Path:
@@ -86,7 +114,10 @@ def test_several_files_are_counted_each_and_together(
     assert "all files" in result.out
     whole = json.loads(out.read_text())
     assert list(whole["videos"]) == [str(file) for file in files]
-    assert whole["totals"][0] == {"name": "gate", "direction": "out", "count": 2, "classes": {}}
+    assert whole["totals"][0] == {
+        "start": None, "end": None, "name": "gate", "direction": "out", "class": "vehicle",
+        "count": 2,
+    }  # fmt: skip
 
 
 def test_shares_need_the_size_of_the_frames(run: Run, tmp_path: Path) -> None:
@@ -111,7 +142,7 @@ def test_shares_need_the_size_of_the_frames(run: Run, tmp_path: Path) -> None:
             2,
             "'big' is not two numbers",
         ),
-        (["t.csv", "--lines", "l.yaml", "--counts", "c.txt"], 2, "written as .csv, .json"),
+        (["t.csv", "--lines", "l.yaml", "--counts", "c.txt"], 1, "written as .csv, .json"),
         (["t.csv", "--lines", "l.yaml", "--counts", "t.csv"], 1, "is the input itself"),
         (["t.txt", "--lines", "l.yaml"], 1, "has no times; give the frames per second"),
         (["none.csv", "--lines", "l.yaml"], 1, "none.csv"),
@@ -119,6 +150,15 @@ def test_shares_need_the_size_of_the_frames(run: Run, tmp_path: Path) -> None:
             ["t.csv", "--lines", "short.yaml"],
             1,
             "short.yaml:1:1: counts: gate: is shorter than 1 %",
+        ),
+        (["t.csv", "--lines", "l.yaml", "--interval", "5min"], 2, "goes with --counts or --flows"),
+        (["t.csv", "--lines", "l.yaml", "--interval", "7min"], 2, "'7min' is no part of a day"),
+        (["t.csv", "--lines", "l.yaml", "--begin", "now"], 2, "'now' is not a time"),
+        (["t.csv", "--lines", "l.yaml", "--begin", "%Y%m%d"], 1, "t.csv: its name has no time"),
+        (
+            ["t.csv", "t.csv", "--lines", "l.yaml", "--begin", "2026-05-01 07:00"],
+            2,
+            "one time is no time for several videos",
         ),
         (["back.csv", "--lines", "l.yaml"], 1, "back.csv:3: frame 1 is at 0.04 s; times must be"),
     ],
@@ -152,7 +192,8 @@ def test_each_video_of_a_batch_has_its_counts_and_all_have_a_total(
     clips.mkdir(parents=True)
     for name in "ab":
         (clips / f"{name}.mp4").write_bytes((folder / "red.mp4").read_bytes())
-    wanted = ("--no-video", "--counts", ".counts.csv", "--lines", folder / "lines.yaml")
+    outputs = ("--counts", ".counts.csv", "--flows", ".flows.matrix.csv")
+    wanted = ("--no-video", *outputs, "--lines", folder / "lines.yaml")
     out = tmp_path / "found"
     result = run("detect-video", clips.parent, "-d", out, *wanted, "--jobs", "1", *options(folder))
     assert result.code == 0, result.err
@@ -161,6 +202,9 @@ def test_each_video_of_a_batch_has_its_counts_and_all_have_a_total(
     with (out / "all.counts.csv").open() as file:
         videos = [row["video"] for row in csv.DictReader(file)]
     assert videos == ["day/a"] * len(own) + ["day/b"] * len(own)
+    heading, *rows = (out / "all.flows.matrix.csv").read_text().splitlines()
+    assert heading == "video,from,gate,yard,(none)"
+    assert rows == ["day/a,gate,0,1,0", "day/a,yard,0,0,0", "day/b,gate,0,1,0", "day/b,yard,0,0,0"]
 
 
 class TestRegions:

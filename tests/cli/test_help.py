@@ -124,7 +124,7 @@ def test_one_option_means_the_same_in_every_command() -> None:
     """Options of one name have one help, but for examples and for what is the command's own."""
     own = {
         *("--output", "--until", "--model", "--stages", "--json", "--jobs", "--truth"),
-        *("--rate", "--counts", "--page"),
+        *("--rate", "--counts", "--flows", "--page"),
     }
     texts: dict[str, set[str]] = {}
     for _, option, text in OPTIONS:

@@ -9,7 +9,7 @@ from vdet.boxes import Box
 from vdet.config.places import CountSettings, LineSettings, ZoneSettings
 from vdet.polygons import Point
 from vdet.track.track import FrameTracks, State, Track
-from vdet.traffic.counter import count_frames
+from vdet.traffic.counting import count_frames
 from vdet.traffic.counts import Counts, Event
 
 WIDTH, HEIGHT = 1280, 720

@@ -25,7 +25,7 @@ class TestDirections:
         (event,) = events(frames(through((0, 600, 300), (4, 600, 501))))
         assert event.time == pytest.approx(4 * 100 / 201, abs=0.005)
         assert (event.frame, event.name, event.id) == (50, "line", 1)
-        assert (event.score, event.stitched, event.seconds) == (0.9, False, None)
+        assert (event.score, event.vehicle, event.seconds) == (0.9, 1, None)
 
 
 class TestFlicker:

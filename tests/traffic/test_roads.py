@@ -12,7 +12,7 @@ from vdet.config.places import CountSettings, LineSettings
 from vdet.config.schema import MotionTrackerSettings
 from vdet.track.motion.tracker import MotionTracker
 from vdet.track.track import FrameTracks, Track
-from vdet.traffic.counter import count_frames
+from vdet.traffic.counting import count_frames
 
 RATE, SECONDS = 25, 8
 SLIGHT = Noise(sides=0.02, missed=0.05, false=0.02, surest=0.3)

@@ -33,7 +33,7 @@ class TestNewIds:
         old = frames(through((0, 600, 300), (1.9, 600, 395)), seconds=2)
         new = numbered(frames(through((2.1, 600, 405), (4, 600, 500))), 2)
         (event,) = events(joined(old, new))
-        assert (event.id, event.direction, event.stitched) == (2, "here", True)
+        assert (event.id, event.direction, event.vehicle) == (2, "here", 1)
         assert 1.9 < event.time < 2.1
 
     def test_a_new_id_elsewhere_or_later_is_another_vehicle(self) -> None:
@@ -50,7 +50,7 @@ class TestNewIds:
         edge = LineSettings(name="line", start=(900, 400), end=(1280, 400), left="away", right="in")
         found = events(joined(out, in_), edge)
         assert [(event.id, event.direction) for event in found] == [(1, "in"), (2, "away")]
-        assert not any(event.stitched for event in found)
+        assert {event.vehicle for event in found} == {1, 2}
 
     def test_stop_and_go_with_a_new_id_every_second(self) -> None:
         """A queue that rocks on the line while the tracker gives it new ids, and then moves on."""

@@ -65,7 +65,7 @@ def test_the_whole_frame_is_a_zone_without_a_border() -> None:
 def test_stays_follow_from_the_events() -> None:
     later = through((1, 200, 420), (9, 1000, 420))
     last = through((5.5, 900, 380), (9, 450, 380))
-    (stay,) = counts(frames(ACROSS, later, last, seconds=9), ZONE).zones
+    (stay,) = counts(frames(ACROSS, later, last, seconds=9), ZONE).zone_use()
     assert stay.most == 2
-    assert stay.longest == pytest.approx(4, abs=0.01)
-    assert stay.mean == pytest.approx((4 + 4 + 9 - (5.5 + 3.5 * 100 / 450)) / 3, abs=0.01)
+    assert stay.longest_stay == pytest.approx(4, abs=0.01)
+    assert stay.mean_stay == pytest.approx((4 + 4 + 9 - (5.5 + 3.5 * 100 / 450)) / 3, abs=0.01)

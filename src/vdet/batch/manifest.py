@@ -35,6 +35,8 @@ class Record:
         Size of the upright picture, pixels.
     frames, tracks
         Number of frames read, and of tracks shown.
+    begin
+        When the video was recorded, and where that is known from, if it is.
     error
         None if all went well; else there are no outputs, and of the numbers only the seconds.
     digest
@@ -56,6 +58,7 @@ class Record:
     height: int | None = None
     frames: int | None = None
     tracks: int | None = None
+    begin: str | None = None
     warnings: tuple[str, ...] = ()
     error: str | None = None
     digest: str | None = None

@@ -23,7 +23,7 @@ from vdet.version import __version__
 _SEARCH = {"input", "detector", "tracker", "regions", "steps"}
 """The sections of the settings that tracks depend on."""
 
-_READ_BY = {"tracks": set[str](), "counts": {"counts"}, "crops": set[str]()}
+_READ_BY = {"tracks": set[str](), "counts": {"counts"}, "flows": {"counts"}, "crops": set[str]()}
 """The sections that a sink reads too. Another sink may read all but `train` and `labels`."""
 
 
@@ -75,6 +75,7 @@ class Work:
         shown = settings.model_copy(update={"detector": settings.detector.showing_all()})
         wanted = (
             *(f"vdet {__version__}", sha256, job.start, job.end, job.frames, job.lanes),
+            *(job.begin, job.interval),
             _digest_of(mask),
             shown.model_dump_json(include=_sections(sinks, with_lanes=job.lanes is not None)),
         )
@@ -161,6 +162,7 @@ def _run(job: VideoJob, work: Work) -> dict[str, Any]:
         "height": totals.height,
         "frames": totals.frames,
         "tracks": totals.tracks,
+        "begin": str(totals.clock) if totals.clock else None,
         "sizes": {path: size for path, (size, _) in states.items()},
         "times": {path: changed for path, (_, changed) in states.items()},
     }

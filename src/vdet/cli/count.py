@@ -1,6 +1,7 @@
 """`vdet count`: count the vehicles of track files at lines and in zones."""
 
-from collections.abc import Mapping
+import logging
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -8,25 +9,24 @@ import click
 
 from vdet.cli import options
 from vdet.cli.command import command
-from vdet.cli.messages import print_lines, progress_steps
+from vdet.cli.counting import Counting, counting_options
+from vdet.cli.messages import is_quiet, print_lines, print_message, progress_steps
 from vdet.cli.options import option
-from vdet.files import check_output, staged
+from vdet.files import OutputFiles, output_errors
 
 if TYPE_CHECKING:
     from vdet.traffic.counts import Counts
 
+log = logging.getLogger("vdet")
+
 
 @command(
     "vdet count tracks.jsonl --lines lines.yaml",
+    "vdet count tracks.jsonl --lines lines.yaml --flows flows.csv --interval 15min",
     "vdet count found/*.csv --lines lines.yaml --counts counts.json",
 )
 @click.argument("tracks", nargs=-1, required=True, type=options.PATH, metavar="TRACKS...")
-@option(
-    "--counts FILE",
-    "Write the counts: .csv has the events, .json also all totals. Those of several TRACKS go "
-    "into one file.",
-    name="target",
-)
+@counting_options()
 @option(
     "--size WIDTHxHEIGHT",
     "Size of the frames of the video, pixels.",
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 @options.overwrite_option
 def count(
     tracks: tuple[Path, ...],
-    target: Path | None,
+    counting: Counting,
     size: tuple[int, int] | None,
     rate: float | None,
     choice: options.SettingsChoice,
@@ -52,43 +52,62 @@ def count(
     """Count the vehicles of track files at lines and in zones.
 
     TRACKS are files of vdet detect-video --tracks. Nothing is detected again, and the counts are
-    the same as those of detect-video --counts.
+    the same as those of detect-video --counts. Where the clocks of TRACKS say that one follows
+    another, a vehicle that both of them show counts once.
     """
     settings = choice.read()
     if not settings.counts:
         raise click.UsageError("there is nothing to count at; give --lines FILE")
-    from vdet.traffic.counter import count_file
-    from vdet.traffic.counts import write_counts
-    from vdet.traffic.tables import SUFFIXES
+    counting.check(settings, several=len(tracks) > 1)
+    from vdet.run.sinks.protocol import check_sinks
+    from vdet.traffic.count_files import write_counts, write_flows
+    from vdet.traffic.counting import count_files
 
-    if target is not None:
-        if target.suffix.lower() not in SUFFIXES:
-            raise click.UsageError(f"--counts: counts are written as {', '.join(SUFFIXES)}")
-        check_output(target, overwrite=overwrite, inputs=[*tracks, *choice.inputs(settings)])
-    videos = {}
+    outputs = options.as_outputs(options.wanted_outputs())
+    check_sinks(outputs, overwrite=overwrite, inputs=[*tracks, *choice.inputs(settings)])
     with progress_steps(" files") as steps:
         advance = steps("", len(tracks) if len(tracks) > 1 else None)
-        for path in tracks:
-            videos[str(path)] = count_file(path, settings.counts, size, rate)
-            advance(1)
-    if target is not None:
-        with staged(target, overwrite=overwrite) as temporary:
-            write_counts(temporary, videos if len(videos) > 1 else videos[str(tracks[0])])
-    print_lines(*_table(videos))
+        videos = count_files(
+            tracks, settings.counts, size, rate, begin=counting.begin, advance=advance
+        )
+    for name, counts in videos.items():
+        if counts.clock and not is_quiet():
+            print_message(f"{name}: begins {counts.clock}")
+        for warning in counts.warnings:
+            log.warning("%s: %s", name, warning)
+    with OutputFiles(overwrite=overwrite) as files:
+        for output in outputs:
+            write = {"counts": write_counts, "flows": write_flows}[output.sink]
+            with output_errors(output.path):
+                write(files.stage(output.path), videos, counting.interval)
+    print_lines(*_totals(videos), *_matrix(list(videos.values())))
 
 
-def _table(videos: "Mapping[str, Counts]") -> list[str]:
+def _totals(videos: "Mapping[str, Counts]") -> list[str]:
     """Return the totals of each file, and of all where there are several."""
     from vdet.evaluate.output import table
     from vdet.pages.render import counted
-    from vdet.traffic.counts import sum_totals
+    from vdet.traffic.counts import direction_totals
 
     totals = {name: counts.totals for name, counts in videos.items()}
     if len(videos) > 1:
-        totals["all files"] = sum_totals(each for some in totals.values() for each in some)
+        totals["all files"] = direction_totals(list(videos.values()))
     rows = []
     for name, each in totals.items():
         for total in each:
             classes = ", ".join(counted(number, kind) for kind, number in total.classes.items())
             rows.append((name, total.name, total.direction, str(total.count), classes))
     return table(("file", "name", "direction", "count", "classes"), rows)
+
+
+def _matrix(videos: "Sequence[Counts]") -> list[str]:
+    """Return the flows between lines and zones over all files; nothing where there is only one."""
+    from vdet.evaluate.output import table
+    from vdet.traffic.count_files import flow_matrix
+    from vdet.traffic.counts import flow_table
+
+    matrix = flow_matrix(videos, flow_table(videos))
+    if len(matrix) < 2:
+        return []
+    rows = [(name, *map(str, row.values())) for name, row in matrix.items()]
+    return ["", *table(("from", *(f"to {name}" for name in matrix), "to none"), rows)]

@@ -15,6 +15,7 @@ import click
 
 from vdet.cli import options
 from vdet.cli.command import command
+from vdet.cli.counting import Counting, counting_options
 from vdet.cli.messages import counted, is_quiet, print_lines, print_message, progress_steps
 from vdet.cli.options import option
 from vdet.errors import failure_code
@@ -73,7 +74,7 @@ _batch_options = options.bundle(
     "vdet detect-video in.mp4 out.mp4 --tracks out.csv",
     "vdet detect-video in.mp4 --no-video --tracks - --start 1:30 --end 2:00",
     "vdet detect-video in.mp4 --no-video --stages stages --at 12.5",
-    "vdet detect-video in.mp4 --no-video --lines lines.yaml --counts counts.csv",
+    "vdet detect-video in.mp4 --no-video --lines lines.yaml --flows flows.csv --interval 15min",
     "vdet detect-video clips/ -d found --tracks .jsonl --skip-existing",
 )
 @click.argument("clips", nargs=-1, required=True, type=options.PATH, metavar="IN [OUT] | CLIP...")
@@ -98,11 +99,7 @@ _batch_options = options.bundle(
     "Write page.html into DIR: a page on the vehicles of the video. With -d, give an ending "
     "such as .page. A page that links all videos is then written too.",
 )
-@options.output_option(
-    "--counts FILE",
-    "Write which vehicles cross the lines and visit the zones of --lines: .csv has the events, "
-    ".json also all totals. With -d, give only the ending, as in .counts.csv. Can be repeated.",
-)
+@counting_options(" With -d, give only the ending, as in .counts.csv.")
 @options.sink_option
 @options.start_option
 @options.end_option
@@ -140,6 +137,7 @@ def detect_video(
     stride: int | None,
     threads: int | None,
     at: Fraction | None,
+    counting: Counting,
     lanes: bool,
     camera: Path | None,
     choice: options.SettingsChoice,
@@ -168,8 +166,7 @@ def detect_video(
         raise click.UsageError("nothing would be written; give an output, such as --tracks")
     request = options.read_lanes(lanes, camera)
     settings = choice.read(*([f"detector.stride={stride}"] if stride else []))
-    if not settings.counts and any(sink == "counts" for sink, _ in wanted):
-        raise click.UsageError("--counts needs lines or zones; give --lines FILE")
+    counting.check(settings, several=batch.folder is not None)
     from vdet.batch.task import Work
     from vdet.regions import check_mask
     from vdet.run.video import VideoJob
@@ -178,6 +175,7 @@ def detect_video(
     inputs = (*choice.inputs(settings, settings.detector), *([camera] if camera else []))
     part = start, end, frames, at or Fraction(0)
     job = VideoJob(source, (), *part, request, inputs, overwrite)
+    job = replace(job, begin=counting.begin, interval=counting.interval)
     if batch.folder is None:
         job = replace(job, outputs=options.as_outputs(wanted), threads=threads)
         _process_one(job, settings, choice)
@@ -222,6 +220,8 @@ def _process_one(
         rate = totals.frames / totals.seconds
         found = f"{counted(totals.frames, 'frame')}, {counted(totals.tracks, 'track')}"
         print_message(f"{job.source}: {found}, {totals.seconds:.1f} s, {rate:.1f} frames/s")
+        if totals.clock and settings.counts:
+            print_message(f"{job.source}: begins {totals.clock}")
 
 
 def _read_suffixes(wanted: Sequence[options.Wanted], *, no_video: bool) -> "list[OutputSuffix]":
@@ -304,7 +304,7 @@ def _run(plan: "Plan", work: "Work", workers: "Workers") -> int:
     ):
         advance = steps("", len(plan.jobs))
         for job, record in results:
-            _print_result(job, record)
+            _print_result(job, record, counts=bool(work.settings.counts))
             failed += record.error is not None
             advance(1)
     if not is_quiet():
@@ -314,11 +314,12 @@ def _run(plan: "Plan", work: "Work", workers: "Workers") -> int:
     return failed
 
 
-def _print_result(job: "VideoJob", record: "Record") -> None:
+def _print_result(job: "VideoJob", record: "Record", *, counts: bool) -> None:
     for warning in record.warnings:
         log.warning("%s", warning)
     if record.error:
         log.error("%s", record.error)
     elif not is_quiet():
         found = f"{counted(record.frames, 'frame')}, {counted(record.tracks, 'track')}"
-        print_message(f"{job.source}: {found}, {record.seconds:.1f} s")
+        begin = f", begins {record.begin}" if record.begin and counts else ""
+        print_message(f"{job.source}: {found}, {record.seconds:.1f} s{begin}")

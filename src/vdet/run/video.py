@@ -25,6 +25,7 @@ from vdet.run.sinks.protocol import Output, SinkContext, check_sinks, open_sinks
 from vdet.run.steps import Step
 from vdet.run.threads import StalledError, prefetch
 from vdet.track.track import VideoTracker
+from vdet.traffic.clock import Clock, find_clock
 from vdet.workers import core_count
 
 log = logging.getLogger("vdet")
@@ -62,6 +63,10 @@ class VideoJob:
         Seconds in which the next frame must be read or written. After that the job fails, so that
         a disk or a network that hangs does not stop a batch. Reading gets the duration of the part
         before `start` in addition.
+    begin
+        When the video begins: see `find_clock`.
+    interval
+        That of tables of counts, seconds; None for the whole.
     """
 
     source: Path
@@ -76,6 +81,8 @@ class VideoJob:
     threads: int | None = None
     codec_threads: int | None = None
     timeout: float = IO_TIMEOUT
+    begin: str | None = None
+    interval: int | None = None
 
     @property
     def is_part(self) -> bool:
@@ -100,6 +107,8 @@ class RunTotals:
         Number of frames processed, and of tracks shown (ids).
     seconds
         Wall time.
+    clock
+        When the video was recorded, if that is known.
     """
 
     width: int
@@ -107,6 +116,7 @@ class RunTotals:
     frames: int
     tracks: int
     seconds: float
+    clock: Clock | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -211,7 +221,7 @@ def run_video(
     with (
         OutputFiles(overwrite=job.overwrite) as files,
         open_video(job, model, settings, tracker=tracker, steps=steps) as video,
-        open_sinks(job.outputs, _context(job, settings, files, video)) as sinks,
+        open_sinks(job.outputs, context := _context(job, settings, files, video)) as sinks,
     ):
         info = video.reader.info
         advance = progress(None if only_at else video.reader.expected)
@@ -236,19 +246,22 @@ def run_video(
         "%s: finding the vehicles took %.1f s, drawing and writing them %.1f s",
         *(job.source, seconds - writing, writing),
     )
-    return RunTotals(info.width, info.height, frames, len(ids), seconds)
+    return RunTotals(info.width, info.height, frames, len(ids), seconds, context.clock)
 
 
 def _context(
     job: VideoJob, settings: Settings, files: OutputFiles, video: OpenVideo
 ) -> SinkContext:
+    info = video.reader.info
     return SinkContext(
         files,
         settings,
-        video.reader.info,
+        info,
         is_part=job.is_part,
         at=job.at,
         codec_threads=job.codec_threads or core_count(),
+        interval=job.interval,
+        clock=find_clock(job.source, job.begin, info.tags.creation_time, float(info.start)),
         timeout=job.timeout,
         outputs=job.outputs,
         stage_pictures=stage_pictures_of(video.pipeline.detector),

@@ -17,11 +17,11 @@ The counts of a video follow from its tracks alone (`FrameTracks`), live or from
    confirmed, its earlier events count too.
 7. The class of a vehicle is that with the highest sum of scores over all its frames.
 8. A vehicle that is first seen within a second after another was last seen, and near the place
-   where that one was or would be, is taken for the same vehicle: it takes over its side and whether
-   it was counted. An event that rests on this is `stitched`. A vehicle that moves out at the edge
-   of the frame has no such successor.
-9. Only events are stored. All totals follow from them.
+   where that one was or would be, is taken for the same vehicle: its tracks have one number. A
+   vehicle that moves out at the edge of the frame has no such successor.
+9. Only events are stored. All totals, flows and stays follow from them.
 
 `borders` places lines and zones in a frame and holds what a vehicle does at one of them, `counter`
-follows the vehicles, `counts` has the events, what follows from them, and their files.
+follows the vehicles, `counts` has the events and the tables that follow from them, `clock` the
+moment at which a video begins, `count_files` writes all of it.
 """

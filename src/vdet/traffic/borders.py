@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from vdet.config.places import CountSettings
 from vdet.polygons import Point, Segment, contains, distance_to, meeting, side_of, sides
@@ -160,7 +160,6 @@ class Sighting:
     point: Point
     height: float
     score: float
-    stitched: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,7 +175,6 @@ class Change:
     where: Point
     score: float
     meets: bool
-    stitched: bool = False
 
 
 @dataclass(slots=True)
@@ -187,15 +185,12 @@ class BorderState:
     ----------
     side
         The settled side, 1 or -1; 0 before it is known.
-    stitched
-        Whether the vehicle was another track when its side was settled last.
     entered
         When it came into a zone in which it still is.
     """
 
     border: Border
     side: int = 0
-    stitched: bool = False
     entered: float | None = None
     _sign: int = 0  # of the last place that was not exactly on the border
     _beyond: int = 0  # the side on which it is beyond the band
@@ -233,7 +228,7 @@ class BorderState:
 
     def _settle(self, side: int, sighting: Sighting, *, is_far: bool) -> Change | None:
         if self.side in (side, 0):
-            self.side, self.stitched = side, False
+            self.side = side
             return None
         change, crossed = self._change, self._crossed
         if change is None or change.side != side:  # it was on the border when it was first seen
@@ -242,8 +237,7 @@ class BorderState:
             return None
         self.side = side
         self._crossed = change.where if change.meets else None
-        stitched, self.stitched = self.stitched, False
-        return replace(change, stitched=stitched)
+        return change
 
 
 def _change(before: Sighting, after: Sighting, side: int, border: Border) -> Change:

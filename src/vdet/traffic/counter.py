@@ -2,17 +2,13 @@
 
 import math
 from collections import Counter
-from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 
 import numpy as np
 
 from vdet.boxes import Box
 from vdet.config.places import CountSettings
 from vdet.detect.classes import ClassScores
-from vdet.errors import ConfigError, TruthError
-from vdet.labels.reading import read_tracks
 from vdet.polygons import Point
 from vdet.track.track import FrameTracks, Track
 from vdet.traffic.borders import (
@@ -43,9 +39,15 @@ _MOST_GROWTH = 2.0
 
 @dataclass(slots=True)
 class _Vehicle:
-    """The state of a track; `events` are those that wait for it to be confirmed."""
+    """The state of a vehicle.
+
+    `id` is that of its latest track. `key` is the same while the video of that track lasts, and
+    then another number. `events` are those that wait for the vehicle to be confirmed.
+    """
 
     id: int
+    key: int
+    number: int
     first: Sighting
     last: Sighting
     states: list[BorderState]
@@ -80,7 +82,7 @@ class _Vehicle:
         """Add an event."""
         time, score = round(at.time, 3), round(at.score, 4)
         stay = None if seconds is None else round(seconds, 3)
-        event = Event(time, at.frame, name, direction, self.id, None, score, at.stitched, stay)
+        event = Event(time, at.frame, name, direction, self.id, self.number, None, score, stay)
         self.events.append(event)
 
 
@@ -112,7 +114,7 @@ class _Ended:
         near: list[tuple[float, int, int]] = [
             (distances[row], number, first + row)
             for row in fits.tolist()
-            if (number := self._vehicles[first + row].id) not in self._taken
+            if (number := self._vehicles[first + row].number) not in self._taken
         ]
         if not near:
             return None
@@ -122,12 +124,14 @@ class _Ended:
 
 
 class VehicleCounter:
-    """Counts the vehicles of one video; make a new one for every video.
+    """Counts the vehicles of one video, or of several that follow one another.
 
     Attributes
     ----------
     lines, zones
         Places in its frames.
+    begun
+        How many vehicles have begun. The numbers of vehicles go on from that of another counter.
 
     Raises
     ------
@@ -135,7 +139,7 @@ class VehicleCounter:
         They are given for frames of another aspect ratio than `width` × `height` pixels.
     """
 
-    def __init__(self, settings: CountSettings, width: int, height: int) -> None:
+    def __init__(self, settings: CountSettings, width: int, height: int, begun: int = 0) -> None:
         self.lines, self.zones = place(settings, width, height)
         self._confirmed = settings.confirmed
         self._borders: tuple[Border, ...] = (*self.lines, *self.zones)
@@ -143,11 +147,13 @@ class VehicleCounter:
         self._vehicles: dict[int, _Vehicle] = {}
         self._counted: list[tuple[Event, ClassScores]] = []  # the class is known at the end
         self._tally: Counter[tuple[str, str]] = Counter()
-        self._now = -math.inf
+        self.begun = begun
+        self._first, self._now = math.inf, -math.inf
 
     def update(self, frame: FrameTracks) -> None:
         """Add the tracks of the next frame."""
         self._now = round(frame.time, 6)  # as files hold it
+        self._first = min(self._first, self._now)
         for vehicle in list(self._vehicles.values()):
             if self._now - vehicle.shown > REMEMBERED:
                 self._close(vehicle)
@@ -162,14 +168,22 @@ class VehicleCounter:
             height, score = float(track.box.xywh[3]), round(track.score, 4)
             self._see(track, Sighting(self._now, frame.index, (x, y), height, score), ended)
 
+    def start_video(self) -> None:
+        """Take the ids of the next frames for those of other tracks: they are of another video."""
+        for vehicle in self._vehicles.values():
+            vehicle.key = -vehicle.number
+        self._vehicles = {each.key: each for each in self._vehicles.values()}
+
     def counts(self) -> Counts:
         """Return all results; the video has ended."""
         for vehicle in list(self._vehicles.values()):
             self._close(vehicle)
         events = [replace(event, class_name=scores.best) for event, scores in self._counted]
         events.sort(key=lambda e: (e.time, e.frame, e.id, e.name))
-        keys = [(each.name, way) for each in self._borders for way in each.directions]
-        return Counts.of(events, keys, [zone.name for zone in self.zones])
+        ways = tuple((each.name, way) for each in self._borders for way in each.directions)
+        zones = tuple(zone.name for zone in self.zones)
+        first, last = (self._first, self._now) if self._first <= self._now else (0.0, 0.0)
+        return Counts(tuple(events), ways, zones, first, last)
 
     def count(self, name: str, direction: str) -> int:
         """Return how many vehicles have been counted so far in a direction of a line or zone."""
@@ -202,30 +216,24 @@ class VehicleCounter:
 
     def _begin(self, number: int, sighting: Sighting, ended: _Ended | None) -> _Vehicle:
         """Remember a new vehicle, which may go on from another that has ended."""
-        before = ended.take(sighting) if ended else None
-        if before is None:
+        vehicle = ended.take(sighting) if ended else None
+        if vehicle is None:
+            self.begun += 1
             states = [BorderState(border) for border in self._borders]
-            vehicle = _Vehicle(number, sighting, sighting, states, self._now)
+            vehicle = _Vehicle(number, number, self.begun, sighting, sighting, states)
         else:
-            vehicle = replace(
-                before,
-                id=number,
-                states=[replace(state, stitched=True) for state in before.states],
-                shown=self._now,
-                classes=ClassScores(before.classes),
-                events=[],
-            )
-            del self._vehicles[before.id]
+            del self._vehicles[vehicle.key]
+        vehicle.id, vehicle.key, vehicle.shown = number, number, self._now
         self._vehicles[number] = vehicle
         return vehicle
 
     def _ended(self, shown: set[int]) -> _Ended:
-        """Return the vehicles that have just ended; those with an id in `shown` go on."""
+        """Return the vehicles that have just ended; those with a key in `shown` go on."""
         vehicles = [
             vehicle
             for vehicle in self._vehicles.values()
             if self._now - vehicle.shown <= _GAP
-            and vehicle.id not in shown
+            and vehicle.key not in shown
             and not vehicle.is_leaving
         ]
         return _Ended(vehicles, self._now)
@@ -251,7 +259,7 @@ class VehicleCounter:
                 stay = vehicle.last.time - state.entered
                 vehicle.add(state.border.name, VANISH, vehicle.last, stay)
         self._confirm(vehicle)
-        del self._vehicles[vehicle.id]
+        del self._vehicles[vehicle.key]
 
 
 def _note(vehicle: _Vehicle, state: BorderState, change: Change) -> None:
@@ -270,52 +278,3 @@ def _touched_sides(box: Box, size: tuple[int, int]) -> complex:
     """Return at which sides of the frame a box is: -1 left or top, 1 right or bottom, 0 neither."""
     x1, y1, x2, y2 = box.pixels
     return complex((x2 >= size[0] - 1) - (x1 <= 1), (y2 >= size[1] - 1) - (y1 <= 1))
-
-
-def count_file(
-    path: Path,
-    settings: CountSettings,
-    size: tuple[int, int] | None = None,
-    rate: float | None = None,
-) -> Counts:
-    """Count the vehicles of a file of tracks at the lines and in the zones of the settings.
-
-    Parameters
-    ----------
-    size
-        Width and height of the frames, pixels; None: as the file says, else as the lines say.
-    rate
-        Frames per second, for a file without times.
-
-    Raises
-    ------
-    TruthError
-        The file cannot be used, or its times are missing or wrong.
-    ConfigError
-        The lines do not fit the frames, or the size of the frames is not known.
-    """
-    saved = read_tracks(path, rate)
-    if not saved.has_times:
-        raise TruthError(f"{path}: has no times; give the frames per second, as in --rate 25")
-    return count_frames(saved.frames, settings, size or saved.size)
-
-
-def count_frames(
-    frames: Iterable[FrameTracks], settings: CountSettings, size: tuple[int, int] | None = None
-) -> Counts:
-    """Count the vehicles in the tracks of each frame; arguments and errors as of `count_file`."""
-    size = size or settings.size
-    if not settings:
-        raise ConfigError("there is nothing to count at; give lines or zones")
-    if size is None:
-        raise ConfigError("the lines are shares of the frame; give --size, as in 1280x720")
-    counter, latest = VehicleCounter(settings, *size), -math.inf
-    for frame in frames:
-        if not latest <= frame.time < math.inf:
-            raise TruthError(
-                f"frame {frame.index}: its time is {frame.time:g} s, after {latest:g} s; give "
-                "times in seconds that never run backwards"
-            )
-        latest = frame.time
-        counter.update(frame)
-    return counter.counts()

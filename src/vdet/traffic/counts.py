@@ -1,25 +1,30 @@
-"""Events, and the totals, counts by minute and stays in zones that follow from them; their files.
+"""Events, and what follows from them: totals, flows, and the use of zones, by interval and class.
 
-A `.csv` has the events, a `.json` the events and all totals. A file over several videos has the
-same columns with `video` before them, or the counts of each video and the sum of all totals.
+Tables cover the whole video, or intervals of it. With a clock, intervals begin at round times of
+the day. Several videos have one table, with a clock in each.
 """
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, astuple, dataclass
-from itertools import accumulate
-from pathlib import Path
-from typing import Any
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from datetime import datetime, timedelta, timezone
+from itertools import accumulate, pairwise
+from typing import TypeVar
 
-from vdet.traffic.borders import APPEAR, ENTER
-from vdet.traffic.tables import VIDEO, is_json, join, write_json, write_table
+from vdet.errors import ConfigError
+from vdet.labels.formats import UNKNOWN
+from vdet.traffic.borders import APPEAR, ENTER, EXIT, VANISH
+from vdet.traffic.clock import Clock
 
-Key = tuple[str, str]
+Way = tuple[str, str]
 """Name of a line or zone, and a direction."""
 
-_IN = (ENTER, APPEAR)
-_COLUMNS = ("time", "frame", "name", "direction", "id", "class", "score", "stitched", "seconds")
-"""Columns of a `.csv`: the fields of an event in their order."""
+Moment = datetime | float | None
+"""The moment on the clock; seconds in a video without; None in several without."""
+
+_IN, _OUT = (ENTER, APPEAR), (EXIT, VANISH)
+
+R = TypeVar("R")
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,12 +44,12 @@ class Event:
         first seen inside) or vanish (it is last seen inside).
     id
         Id of the track.
+    vehicle
+        Number of the vehicle. Several tracks have one where they were taken for one vehicle.
     class_name
         Class of the vehicle; None if the detector has no classes.
     score
         Score of the track in `frame`, 0 to 1.
-    stitched
-        Whether the vehicle had another id before, without which this event would not be known.
     seconds
         How long the vehicle was in the zone, for exit and vanish; else None.
     """
@@ -54,9 +59,9 @@ class Event:
     name: str
     direction: str
     id: int
+    vehicle: int
     class_name: str | None
     score: float
-    stitched: bool
     seconds: float | None = None
 
 
@@ -71,110 +76,291 @@ class DirectionTotal:
 
 
 @dataclass(frozen=True, slots=True)
-class MinuteCount:
-    """How many vehicles were counted in a direction in one minute, from 0 at time 0."""
+class CountRow:
+    """Vehicles of a class that were counted in a direction of a line or zone, in an interval.
 
-    minute: int
+    The class is `UNKNOWN` where the detector has no classes, as in `FlowRow`.
+    """
+
+    start: Moment
+    end: Moment
     name: str
     direction: str
+    class_name: str
     count: int
 
 
 @dataclass(frozen=True, slots=True)
-class Stay:
-    """Vehicles in a zone: most at once, and how long they were there, seconds.
+class FlowRow:
+    """Vehicles of a class from one line or zone to another, in the interval of the first.
 
-    `mean` and `longest` are None where no vehicle has left or vanished.
+    `destination` is None for vehicles that were at no other.
     """
 
+    start: Moment
+    end: Moment
+    origin: str
+    destination: str | None
+    class_name: str
+    count: int
+
+
+@dataclass(frozen=True, slots=True)
+class ZoneRow:
+    """The use of a zone in an interval.
+
+    Attributes
+    ----------
+    entered, left
+        Vehicles that came in or appeared, and that left or vanished.
+    mean, most
+        Vehicles inside: the mean over the time of video in the interval, and the most at once.
+    mean_stay, longest_stay
+        Of the vehicles that left or vanished, seconds; None where none did.
+    """
+
+    start: Moment
+    end: Moment
     name: str
+    entered: int
+    left: int
+    mean: float
     most: int
-    mean: float | None
-    longest: float | None
+    mean_stay: float | None
+    longest_stay: float | None
 
 
 @dataclass(frozen=True, slots=True)
 class Counts:
-    """All results of one video."""
+    """All results of one video.
+
+    Attributes
+    ----------
+    ways
+        Each direction of each line and zone.
+    zones
+        The names of the zones.
+    first, last
+        Times of the first and the last frame, seconds.
+    clock
+        None where it is not known.
+    warnings
+        A sentence for each line that is not where it should be.
+    """
 
     events: tuple[Event, ...]
-    totals: tuple[DirectionTotal, ...]
-    minutes: tuple[MinuteCount, ...]
-    """Those with an event."""
-    zones: tuple[Stay, ...]
+    ways: tuple[Way, ...]
+    zones: tuple[str, ...]
+    first: float = 0.0
+    last: float = 0.0
+    clock: Clock | None = None
+    warnings: tuple[str, ...] = ()
 
-    @staticmethod
-    def of(events: Sequence[Event], keys: Iterable[Key], zones: Iterable[str]) -> "Counts":
-        """Sum up events; `keys` get a total even where nothing happened, `zones` are names."""
-        totals = [DirectionTotal(*key, 0, {}) for key in keys]
-        for each in events:
-            classes = {each.class_name: 1} if each.class_name else {}
-            totals.append(DirectionTotal(each.name, each.direction, 1, classes))
-        minutes = Counter((int(e.time // 60), e.name, e.direction) for e in events)
-        return Counts(
-            tuple(events),
-            sum_totals(totals),
-            tuple(MinuteCount(*key, count) for key, count in sorted(minutes.items())),
-            tuple(_stay(name, [event for event in events if event.name == name]) for name in zones),
-        )
+    @property
+    def totals(self) -> tuple[DirectionTotal, ...]:
+        """The totals over the whole video, also of directions without a vehicle."""
+        return direction_totals([self])
+
+    def table(self, interval: int | None = None) -> list[CountRow]:
+        """Return the counts by interval (seconds), as `count_table` does."""
+        return count_table([self], interval)
+
+    def flows(self, interval: int | None = None) -> list[FlowRow]:
+        """Return the flows by interval (seconds), as `flow_table` does."""
+        return flow_table([self], interval)
+
+    def zone_use(self, interval: int | None = None) -> list[ZoneRow]:
+        """Return the use of zones by interval (seconds), as `zone_table` does."""
+        return zone_table([self], interval)
 
 
-def sum_totals(totals: Iterable[DirectionTotal]) -> tuple[DirectionTotal, ...]:
-    """Return the sum of the totals of each name and direction, in the order of their first."""
-    counts: Counter[Key] = Counter()
-    classes: dict[Key, Counter[str]] = {}
-    for each in totals:
-        key = each.name, each.direction
-        counts[key] += each.count
-        classes[key] = classes.get(key, Counter()) + Counter(each.classes)
+def direction_totals(videos: Sequence[Counts]) -> tuple[DirectionTotal, ...]:
+    """Return the totals of each direction over the whole of all videos."""
+    classes: dict[Way, Counter[str]] = {way: Counter() for each in videos for way in each.ways}
+    for event in (event for each in videos for event in each.events):
+        classes[event.name, event.direction][event.class_name or ""] += 1
     return tuple(
-        DirectionTotal(*key, count, dict(sorted(classes[key].items())))
-        for key, count in counts.items()
+        DirectionTotal(*way, found.total(), {name: found[name] for name in sorted(found) if name})
+        for way, found in classes.items()
     )
 
 
-def _stay(name: str, events: Sequence[Event]) -> Stay:
-    """Return the stays in the zone of these events; who leaves makes room for who enters then."""
-    ordered = sorted(events, key=lambda event: (event.time, event.direction in _IN))
-    most = max(accumulate(1 if each.direction in _IN else -1 for each in ordered), default=0)
-    seconds = [event.seconds for event in events if event.seconds is not None]
-    mean = round(sum(seconds) / len(seconds), 3) if seconds else None
-    return Stay(name, most, mean, max(seconds, default=None))
+def count_table(videos: Sequence[Counts], interval: int | None = None) -> list[CountRow]:
+    """Return how many vehicles were counted in each interval, by direction and class.
 
+    Parameters
+    ----------
+    interval
+        Seconds; None for one interval over all.
 
-def write_counts(path: Path, counts: Counts | Mapping[str, Counts]) -> None:
-    """Write the counts of one video, or of several by their names."""
-    if isinstance(counts, Counts):
-        value: Any = _plain(counts)
-        columns: tuple[str, ...] = _COLUMNS
-        rows = list(map(_cells, counts.events))
-    else:
-        value = _joined({name: _plain(each) for name, each in counts.items()})
-        columns = (VIDEO, *_COLUMNS)
-        rows = [[name, *_cells(event)] for name, each in counts.items() for event in each.events]
-    if is_json(path):
-        write_json(path, value)
-    else:
-        write_table(path, columns, rows)
-
-
-def join_counts(outputs: Mapping[str, Path], path: Path) -> None:
-    """Write the counts of several videos into one file, from the file of each of the same form.
-
-    Errors as of `join`.
+    Raises
+    ------
+    ConfigError
+        There are intervals, and several videos of which one has no clock.
     """
-    join(outputs, path, _COLUMNS, _joined)
+    axis = _Axis(videos, interval)
+    timed = [
+        (axis.number(which, each.time), (each.name, each.direction), each.class_name)
+        for which, video in enumerate(videos)
+        for each in video.events
+    ]
+    return _rows(CountRow, axis, timed, dict.fromkeys(way for each in videos for way in each.ways))
 
 
-def _joined(videos: Mapping[str, Any]) -> dict[str, Any]:
-    totals = [DirectionTotal(**total) for each in videos.values() for total in each["totals"]]
-    return {"totals": [asdict(each) for each in sum_totals(totals)], "videos": videos}
+def flow_table(videos: Sequence[Counts], interval: int | None = None) -> list[FlowRow]:
+    """Return the flows in each interval, by class: the ways of vehicles through lines and zones.
+
+    A flow leads from the first line or zone of a vehicle to the last, which is the same one where
+    it comes back. It counts in the interval of the first. Parameters and errors as of
+    `count_table`.
+    """
+    axis = _Axis(videos, interval)
+    visits: dict[int, list[tuple[int, Event]]] = {}
+    for which, video in enumerate(videos):
+        for each in video.events:
+            if each.name not in video.zones or each.direction in _IN:
+                visits.setdefault(each.vehicle, []).append((which, each))
+    timed = []
+    for (which, first), *others in visits.values():
+        last = others[-1][-1].name if others else None
+        timed.append((axis.number(which, first.time), (first.name, last), first.class_name))
+    names = dict.fromkeys(name for each in videos for name, _ in each.ways)
+    order = {name: number for number, name in enumerate((*names, None))}
+    flows = sorted({way for _, way, _ in timed}, key=lambda way: [order[name] for name in way])
+    return _rows(FlowRow, axis, timed, flows)
 
 
-def _plain(counts: Counts) -> dict[str, Any]:
-    events = (dict(zip(_COLUMNS, astuple(event), strict=True)) for event in counts.events)
-    return asdict(counts) | {"events": list(events)}
+def zone_table(videos: Sequence[Counts], interval: int | None = None) -> list[ZoneRow]:
+    """Return the use of each zone in each interval; parameters and errors as of `count_table`."""
+    axis = _Axis(videos, interval)
+    rows = []
+    for name in dict.fromkeys(name for each in videos for name in each.zones):
+        # Who leaves makes room for who enters then.
+        events = sorted(
+            (
+                (axis.seconds(which, each.time), each.direction in _IN, each.seconds)
+                for which, video in enumerate(videos)
+                for each in video.events
+                if each.name == name
+            ),
+            key=lambda event: event[:2],
+        )
+        inside = 0
+        for number in axis.numbers:
+            here = [event for event in events if axis.number_at(event[0]) == number]
+            rows.append(_zone_row(name, axis, number, here, inside))
+            inside += sum(1 if enters else -1 for _, enters, _ in here)
+    return rows
 
 
-def _cells(event: Event) -> list[Any]:
-    return [int(value) if isinstance(value, bool) else value for value in astuple(event)]
+def _zone_row(
+    name: str,
+    axis: "_Axis",
+    number: int,
+    events: Sequence[tuple[float, bool, float | None]],
+    inside: int,
+) -> ZoneRow:
+    """Return the use in one interval, at whose start so many vehicles are inside."""
+    begin, end = axis.limits(number)
+    changes = [1 if enters else -1 for _, enters, _ in events]
+    levels = list(accumulate(changes, initial=inside))
+    times = [begin, *(time for time, _, _ in events), end]
+    used = sum(n * (b - a) for n, (a, b) in zip(levels, pairwise(times), strict=True))
+    stays = [stay for _, _, stay in events if stay is not None]
+    return ZoneRow(
+        *axis.moments(number),
+        name,
+        changes.count(1),
+        changes.count(-1),
+        round(used / axis.covered(number), 3) if end > begin else float(inside),
+        max(levels),
+        round(sum(stays) / len(stays), 3) if stays else None,
+        max(stays, default=None),
+    )
+
+
+class _Axis:
+    """The intervals of one or several videos, by their numbers.
+
+    Its seconds are those of the video, of the clock's local time since 1970, or of several videos
+    without clocks one after the other.
+    """
+
+    def __init__(self, videos: Sequence[Counts], interval: int | None) -> None:
+        self._interval = interval
+        self._origin: datetime | None = None
+        self._is_timed = True
+        self._zeros = [0.0]
+        clocks = [each.clock for each in videos if each.clock]
+        if clocks and len(clocks) == len(videos):
+            offset = clocks[0].zero.utcoffset() or timedelta()
+            self._origin = datetime(1970, 1, 1, tzinfo=timezone(offset))
+            self._zeros = [(clock.zero - self._origin).total_seconds() for clock in clocks]
+        elif len(videos) > 1:
+            if interval is not None:
+                raise ConfigError(
+                    "intervals over several videos need the time at which each begins; give "
+                    "--begin with the pattern of the times in their names, or no --interval"
+                )
+            self._is_timed = False
+            ends = accumulate(each.last - each.first for each in videos)
+            self._zeros = [end - each.last for end, each in zip(ends, videos, strict=True)]
+        self._spans = [(z + v.first, z + v.last) for z, v in zip(self._zeros, videos, strict=True)]
+        self._first = min(first for first, _ in self._spans)
+        self._last = max(last for _, last in self._spans)
+        ranges = (map(self.number_at, span) for span in self._spans)
+        self.numbers = sorted({n for first, last in ranges for n in range(first, last + 1)})
+
+    def seconds(self, which: int, time: float) -> float:
+        """Return a time in one of the videos in seconds of the axis."""
+        return self._zeros[which] + time
+
+    def number(self, which: int, time: float) -> int:
+        """Return the number of the interval of a time in one of the videos."""
+        return self.number_at(self.seconds(which, time))
+
+    def number_at(self, seconds: float) -> int:
+        """Return the number of an interval."""
+        within = min(max(seconds, self._first), self._last)  # events are interpolated
+        return 0 if self._interval is None else int(within // self._interval)
+
+    def limits(self, number: int) -> tuple[float, float]:
+        """Return the part of an interval between the first and the last frame of all videos."""
+        if self._interval is None:
+            return self._first, self._last
+        begin = number * self._interval
+        return max(begin, self._first), min(begin + self._interval, self._last)
+
+    def covered(self, number: int) -> float:
+        """Return the seconds of video in an interval."""
+        begin, end = self.limits(number)
+        return sum(max(0.0, min(end, last) - max(begin, first)) for first, last in self._spans)
+
+    def moments(self, number: int) -> tuple[Moment, Moment]:
+        """Return the start and the end of an interval."""
+        start, end = self._first, self._last
+        if self._interval is not None:
+            start, end = (float(each * self._interval) for each in (number, number + 1))
+        return self._moment(start), self._moment(end)
+
+    def _moment(self, seconds: float) -> Moment:
+        if self._origin:
+            return self._origin + timedelta(milliseconds=round(1000 * seconds))
+        return round(seconds, 3) if self._is_timed else None
+
+
+def _rows(
+    make: Callable[..., R],
+    axis: _Axis,
+    timed: Sequence[tuple[int, tuple[str, str | None], str | None]],
+    ways: Iterable[tuple[str, str | None]],
+) -> list[R]:
+    """Return a row for each interval, way and class that occurs, also where its count is 0."""
+    found = Counter((number, way, name or UNKNOWN) for number, way, name in timed)
+    classes = sorted({name for _, _, name in found}) or [UNKNOWN]
+    keys = [(way, name) for way in ways for name in classes]
+    return [
+        make(*axis.moments(number), *way, name, found[number, way, name])
+        for number in axis.numbers
+        for way, name in keys
+    ]

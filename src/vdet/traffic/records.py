@@ -11,7 +11,8 @@ from vdet.boxes import Box
 from vdet.detect.classes import ClassScores
 from vdet.polygons import Point
 from vdet.track.track import FrameTracks, State, Track
-from vdet.traffic.tables import VIDEO, is_json, join, write_json, write_table
+from vdet.traffic.clock import Clock
+from vdet.traffic.tables import VIDEO, is_json, join, plain_moment, write_json, write_table
 
 PATH_STEP = 0.01
 """Distance after which a path gets its next point, as a share of the frame's width.
@@ -20,12 +21,14 @@ Shorter moves are jitter of the boxes.
 """
 
 _COLUMNS = (
-    *("id", "class", "first", "last", "seconds", "seen", "between", "lost"),
+    *("id", "class", "clock", "first", "last", "seconds", "seen", "between", "lost"),
     *("mean_score", "best_score"),
     *("start_x", "start_y", "end_x", "end_y", "length", "length_share"),
     *("x", "y", "width", "height"),
 )
-"""Columns of a `.csv`; x, y, width and height are those of the largest box."""
+"""Columns of a `.csv`; `clock` is the moment of `first`, x, y, width and height are those of the
+largest box.
+"""
 
 
 @dataclass(slots=True)
@@ -146,9 +149,9 @@ class VehicleRecords:
             self._vehicles[track.id].seconds += self._period
 
 
-def write_records(records: Iterable[VehicleRecord], path: Path) -> None:
+def write_records(records: Iterable[VehicleRecord], path: Path, clock: Clock | None = None) -> None:
     """Write the records; the suffix of `path` chooses the format."""
-    rows = list(map(_row, records))
+    rows = [_row(each, clock) for each in records]
     if is_json(path):
         write_json(path, [_item(*row) for row in rows])
     else:
@@ -167,20 +170,21 @@ def _with_videos(videos: Mapping[str, Any]) -> list[dict[str, Any]]:
     return [{VIDEO: name, **item} for name, items in videos.items() for item in items]
 
 
-def _row(record: VehicleRecord) -> list[Any]:
+def _row(record: VehicleRecord, clock: Clock | None) -> list[Any]:
     """Return the values of a record in the order of `_COLUMNS`."""
+    begin = plain_moment(clock and clock.at(round(record.first, 3)))
     times = round(record.first, 6), round(record.last, 6), round(record.seconds, 3)
     scores = round(record.mean_score, 4), round(record.best_score, 4)
     ends = [round(value, 1) for point in (record.path[0], record.path[-1]) for value in point]
     lengths = round(record.length, 1), round(record.share, 4)
     states = [record.states[state] for state in get_args(State)]
-    known = record.id, record.class_name, *times, *states, *scores
+    known = record.id, record.class_name, begin, *times, *states, *scores
     return [*known, *ends, *lengths, *record.largest.xywh]
 
 
 def _item(*row: Any) -> dict[str, Any]:
     """Return a row as values for JSON."""
-    *ends, length, share = row[10:16]
+    *ends, length, share = row[11:17]
     path = {"start": ends[:2], "end": ends[2:], "length": length, "length_share": share}
-    largest = dict(zip(_COLUMNS[16:], row[16:], strict=True))
-    return {**dict(zip(_COLUMNS[:10], row, strict=False)), "path": path, "largest": largest}
+    largest = dict(zip(_COLUMNS[17:], row[17:], strict=True))
+    return {**dict(zip(_COLUMNS[:11], row, strict=False)), "path": path, "largest": largest}

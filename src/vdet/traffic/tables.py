@@ -3,8 +3,9 @@
 import csv
 import json
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -33,12 +34,19 @@ def write_table(path: Path, columns: Iterable[str], rows: Iterable[Iterable[Any]
     # The name of a video may be no valid text.
     with path.open("w", encoding="utf-8", errors="backslashreplace", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
-        table.writerow(columns)
-        table.writerows([_plain_text(cell) for cell in row] for row in rows)
+        table.writerow(map(_plain_text, columns))
+        table.writerows(map(_plain_text, row) for row in rows)
 
 
 def _plain_text(cell: Any) -> Any:
     return f"'{cell}" if isinstance(cell, str) and _FORMULA.match(cell) else cell
+
+
+def plain_moment(value: Any) -> Any:
+    """Return a moment as text, with its time zone; other values as they are."""
+    if not isinstance(value, datetime):
+        return value
+    return value.isoformat(" ", "milliseconds" if value.microsecond else "seconds")
 
 
 def write_json(path: Path, value: Any) -> None:
@@ -50,12 +58,13 @@ def write_json(path: Path, value: Any) -> None:
 def join(
     outputs: Mapping[str, Path],
     path: Path,
-    columns: tuple[str, ...],
+    columns: tuple[str, ...] | None,
     joined: Callable[[Mapping[str, Any]], Any],
 ) -> None:
     """Join the files of many videos, given by the names of the videos, into one of the same form.
 
-    `joined` makes the JSON of all videos from that of each.
+    `joined` makes the JSON of all videos from that of each. Tables have `columns`; None for those
+    of the first one.
 
     Raises
     ------
@@ -63,7 +72,8 @@ def join(
         One of `outputs` has another content.
     """
     if not is_json(path):
-        write_table(path, (VIDEO, *columns), _rows(outputs, columns))
+        rows = _rows(outputs, columns)
+        write_table(path, next(rows, [VIDEO]), rows)
         return
     values: dict[str, Any] = {}
     for name, each in outputs.items():
@@ -73,11 +83,18 @@ def join(
     write_json(path, joined(values))
 
 
-def _rows(outputs: Mapping[str, Path], columns: tuple[str, ...]) -> Iterator[list[str]]:
+def _rows(outputs: Mapping[str, Path], columns: tuple[str, ...] | None) -> Iterator[Sequence[str]]:
+    """Yield the heading, and the rows of all tables."""
+    if columns:
+        yield VIDEO, *columns
     for name, path in outputs.items():
         with _checked(path), path.open(encoding="utf-8", newline="") as file:
             rows = csv.reader(file, strict=True)
-            if tuple(next(rows, ())) != columns:
+            heading = tuple(next(rows, ()))
+            if columns is None:
+                columns = heading
+                yield VIDEO, *columns
+            if heading != columns:
                 raise ValueError("other columns")
             yield from ([name, *row] for row in rows)
 

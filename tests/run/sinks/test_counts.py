@@ -19,7 +19,7 @@ from vdet.run.sinks.data import COUNTS
 from vdet.run.sinks.protocol import Output
 from vdet.run.video import VideoJob
 from vdet.testing import check_sink
-from vdet.traffic.counts import join_counts
+from vdet.traffic.count_files import join_counts
 
 COUNTS_AT = CountSettings(
     size=(320, 240),
@@ -54,7 +54,8 @@ def test_a_run_counts_the_red_car(red_clip: Path, tmp_path: Path) -> None:
         ("gate", "out"), ("yard", "enter"), ("yard", "vanish"),
     ]  # fmt: skip
     assert list(rows[0]) == [
-        *("time", "frame", "name", "direction", "id", "class", "score", "stitched", "seconds"),
+        *("time", "clock", "frame", "name", "direction"),
+        *("id", "vehicle", "class", "score", "seconds"),
     ]
     assert float(rows[0]["time"]) == pytest.approx(28 / 25, abs=0.3)  # boxes are means of ten
     assert int(rows[0]["frame"]) == pytest.approx(25 * float(rows[0]["time"]), abs=1)
@@ -68,7 +69,6 @@ def test_a_run_counts_the_red_car(red_clip: Path, tmp_path: Path) -> None:
         ("gate", "out"): 1, ("gate", "in"): 0, ("yard", "enter"): 1, ("yard", "exit"): 0,
         ("yard", "appear"): 0, ("yard", "vanish"): 1,
     }  # fmt: skip
-    assert whole["minutes"][0] == {"minute": 0, "name": "gate", "direction": "out", "count": 1}
     assert whole["zones"][0]["most"] == 1
 
 
@@ -114,7 +114,8 @@ def test_a_batch_has_a_file_over_all_videos(suffix: str, red_clip: Path, tmp_pat
     else:
         whole = json.loads(text)
         assert whole["videos"]["b"] == json.loads(paths["b"].read_text())
-        assert whole["totals"][0] == {"name": "gate", "direction": "out", "count": 2, "classes": {}}
+        gate = {"name": "gate", "direction": "out", "class": "vehicle", "count": 2}
+        assert whole["totals"][0] == gate
 
 
 def test_a_page_shows_the_counts(red_clip: Path, tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""The sinks that write data: `tracks`, `json`, `vehicles` and `counts`.
+"""The sinks that write data: `tracks`, `json`, `vehicles`, `counts` and `flows`.
 
 Times are in seconds and those of the input. Pixels are those of the input frame, counted from 0,
 even where the frame is drawn undistorted, so boxes can be compared with labels of the input.
@@ -6,6 +6,9 @@ even where the frame is drawn undistorted, so boxes can be compared with labels 
 
 import json
 import sys
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, BinaryIO, Self
 
@@ -15,10 +18,20 @@ from vdet.labels.formats import SourceVideo, TrackWriter, format_for, track_suff
 from vdet.labels.records import JSON_LINES, track_record
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import STANDARD_OUTPUT, BaseSink, BatchTotal, SinkContext, SinkKind
+from vdet.traffic.count_files import (
+    COUNT_SUFFIXES,
+    FLOW_SUFFIXES,
+    Videos,
+    join_counts,
+    join_flows,
+    write_counts,
+    write_flows,
+)
 from vdet.traffic.counter import VehicleCounter
-from vdet.traffic.counts import join_counts, write_counts
 from vdet.traffic.records import VehicleRecords, join_records, write_records
 from vdet.traffic.tables import SUFFIXES
+
+WriteCounts = Callable[[Path, Videos, int | None], None]
 
 
 class TrackSink(BaseSink):
@@ -116,7 +129,7 @@ class VehicleSink(BaseSink):
 
     def finish(self) -> None:
         """Write the records."""
-        write_records(self._records.end(), self.context.files.stage(self.path))
+        write_records(self._records.end(), self.context.files.stage(self.path), self.context.clock)
 
     def write(self, result: FrameResult) -> None:
         """Add a frame."""
@@ -133,23 +146,24 @@ VEHICLES = SinkKind(
 
 
 class CountsSink(BaseSink):
-    """Writes which vehicles cross lines, and enter, leave and stay in zones.
+    """Writes which vehicles cross lines and visit zones, or their flows, at the end of the video.
 
-    `.csv` has a line for each event: `time`, `frame`, `name`, `direction`, `id`, `class`, `score`,
-    `stitched`, `seconds` (see `Event`). `.json` has the events, and the totals, the counts by
-    minute and the stays in zones that follow from them.
+    `write_table` is `write_counts` or `write_flows`; the end of the name chooses the table.
     """
 
-    def __init__(self, path: Path, context: SinkContext) -> None:
+    def __init__(self, write_table: WriteCounts, path: Path, context: SinkContext) -> None:
         super().__init__(path, context)
+        self._write_table = write_table
         self._counter: VehicleCounter | None = None
         if not context.settings.counts:
             raise OutputError(f"{path}: there is nothing to count at; give lines or zones")
 
     def finish(self) -> None:
-        """Write the counts."""
+        """Write the table."""
         if self._counter:
-            write_counts(self.context.files.stage(self.path), self._counter.counts())
+            counts = replace(self._counter.counts(), clock=self.context.clock)
+            target = self.context.files.stage(self.path)
+            self._write_table(target, {self.video.path.name: counts}, self.context.interval)
 
     def write(self, result: FrameResult) -> None:
         """Keep the counter: at the end it has the counts of all frames."""
@@ -157,5 +171,16 @@ class CountsSink(BaseSink):
 
 
 COUNTS = SinkKind(
-    CountsSink, SUFFIXES, "counts", takes="videos", total=BatchTotal("all", join_counts)
+    partial(CountsSink, write_counts),
+    COUNT_SUFFIXES,
+    "counts",
+    takes="videos",
+    total=BatchTotal("all", join_counts),
+)
+FLOWS = SinkKind(
+    partial(CountsSink, write_flows),
+    FLOW_SUFFIXES,
+    "flows",
+    takes="videos",
+    total=BatchTotal("all", join_flows),
 )

@@ -17,7 +17,7 @@ from vdet.run.result import FrameResult
 from vdet.run.sinks.drawn import PICTURE_LABEL, label_text
 from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.traffic.counter import VehicleCounter
-from vdet.traffic.counts import MinuteCount
+from vdet.traffic.counts import Event
 from vdet.traffic.overview import BestCrops, Crop, GroundHeat
 from vdet.traffic.records import VehicleRecords
 
@@ -149,7 +149,7 @@ class PageSink(BaseSink):
             still=self._heat.over(self._fullest.image) if self._fullest else None,
             player=self._player(),
             settings=render(self.context.settings),
-            counts=_by_minute(self._counter.counts().minutes) if self._counter else {},
+            counts=_by_minute(self._counter.counts().events) if self._counter else {},
         )
 
     def _player(self) -> Player | None:
@@ -162,11 +162,11 @@ class PageSink(BaseSink):
         return Player(path.name, link_to(path, self.path), bool(drawn), start)
 
 
-def _by_minute(counts: Sequence[MinuteCount]) -> dict[str, Counter[int]]:
+def _by_minute(events: Sequence[Event]) -> dict[str, Counter[int]]:
     """Return the counts of each line or zone and direction by minute."""
     minutes: dict[str, Counter[int]] = {}
-    for each in counts:
-        minutes.setdefault(f"{each.name}: {each.direction}", Counter())[each.minute] = each.count
+    for each in events:
+        minutes.setdefault(f"{each.name}: {each.direction}", Counter())[int(each.time // 60)] += 1
     return minutes
 
 

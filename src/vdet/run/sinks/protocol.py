@@ -15,6 +15,7 @@ from vdet.files import MayReplace, OutputFiles, any_file, check_output, output_e
 from vdet.media import VideoInfo
 from vdet.plugins import SINKS, load_plugin
 from vdet.run.result import FrameResult
+from vdet.traffic.clock import Clock
 
 STANDARD_OUTPUT = Path("-")
 
@@ -55,6 +56,10 @@ class SinkContext:
         The option `--at`: seconds from the first frame.
     codec_threads
         Number of threads of an encoder; None lets it choose.
+    interval
+        That of tables of counts, seconds; None for the whole.
+    clock
+        When the video begins; None where it is not known.
     timeout
         Seconds after which a write that does not end is an error.
     outputs
@@ -70,6 +75,8 @@ class SinkContext:
     is_part: bool = False
     at: Fraction = Fraction(0)
     codec_threads: int | None = None
+    interval: int | None = None
+    clock: Clock | None = None
     timeout: float | None = None
     outputs: tuple[Output, ...] = ()
     stage_pictures: StagePictures = lambda *_: {}

@@ -1,0 +1,159 @@
+"""Files of counts and of flows, of one video and of many.
+
+The ending of a name chooses the table; `.json` has all tables. Of several videos there is one table
+by interval; events have the name of their video.
+"""
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import astuple
+from pathlib import Path
+from typing import Any
+
+from vdet.traffic.counts import Counts, Event, FlowRow, count_table, flow_table, zone_table
+from vdet.traffic.tables import VIDEO, is_json, join, plain_moment, write_json, write_table
+
+_EVENTS = (
+    *("time", "clock", "frame", "name", "direction"),
+    *("id", "vehicle", "class", "score", "seconds"),
+)
+_TOTALS = ("start", "end", "name", "direction", "class", "count")
+_ZONES = (
+    *("start", "end", "name", "entered", "left"),
+    *("mean", "most", "mean_stay", "longest_stay"),
+)
+_FLOWS = ("start", "end", "from", "to", "class", "count")
+_COUNTS = {".totals": _TOTALS, ".zones": _ZONES}
+
+NOWHERE = "(none)"
+"""In tables, where a flow leads that ends at its first line or zone."""
+
+COUNT_SUFFIXES = (".csv", ".json", ".totals.csv", ".zones.csv")
+FLOW_SUFFIXES = (".csv", ".json", ".matrix.csv")
+
+Videos = Mapping[str, Counts]
+"""The counts of videos by their names."""
+
+
+def write_counts(path: Path, videos: Videos, interval: int | None = None) -> None:
+    """Write the events, or what the ending of `path` says: totals, zones, or all as JSON.
+
+    Parameters
+    ----------
+    interval
+        That of totals and zones, seconds; None for the whole.
+
+    Raises
+    ------
+    ConfigError
+        As `count_table`.
+    """
+    every = list(videos.values())
+    if is_json(path):
+        tables = {
+            "totals": _items(_TOTALS, count_table(every, interval)),
+            "zones": _items(_ZONES, zone_table(every, interval)),
+        }
+        _write_json(path, videos, interval, tables, with_events=True)
+    elif _is_table(path, ".totals"):
+        write_table(path, _TOTALS, map(_cells, count_table(every, interval)))
+    elif _is_table(path, ".zones"):
+        write_table(path, _ZONES, map(_cells, zone_table(every, interval)))
+    else:
+        alone = len(videos) == 1  # then the name is left out
+        rows = [(name, *_event(each, e)) for name, each in videos.items() for e in each.events]
+        write_table(path, (VIDEO, *_EVENTS)[alone:], [row[alone:] for row in rows])
+
+
+def write_flows(path: Path, videos: Videos, interval: int | None = None) -> None:
+    """Write the flows, or what the ending of `path` says: their matrix, or both as JSON.
+
+    Parameters and errors as of `write_counts`.
+    """
+    every = list(videos.values())
+    rows = flow_table(every, interval)
+    if is_json(path):
+        tables = {"flows": _items(_FLOWS, rows), "matrix": flow_matrix(every, rows)}
+        _write_json(path, videos, interval, tables)
+    elif _is_table(path, ".matrix"):
+        matrix = flow_matrix(every, rows)
+        write_table(
+            path, _matrix_columns(every), [(name, *row.values()) for name, row in matrix.items()]
+        )
+    else:
+        write_table(path, _FLOWS, map(_cells, rows))
+
+
+def flow_matrix(videos: Sequence[Counts], rows: Iterable[FlowRow]) -> dict[str, dict[str, int]]:
+    """Return the number of vehicles over all intervals and classes, by origin and destination."""
+    found: Counter[tuple[str, str]] = Counter()
+    for row in rows:
+        found[row.origin, row.destination or NOWHERE] += row.count
+    _, *ends = _matrix_columns(videos)
+    return {origin: {end: found[origin, end] for end in ends} for origin in ends[:-1]}
+
+
+def _matrix_columns(videos: Iterable[Counts]) -> tuple[str, ...]:
+    return ("from", *dict.fromkeys(name for each in videos for name, _ in each.ways), NOWHERE)
+
+
+def join_counts(outputs: Mapping[str, Path], path: Path) -> None:
+    """Write the counts of the videos of a batch into one file, from the file of each.
+
+    A row gets the name of its video. Errors as of `join`.
+    """
+    columns = next((c for kind, c in _COUNTS.items() if _is_table(path, kind)), _EVENTS)
+    join(outputs, path, columns, lambda videos: _joined("totals", _TOTALS[2:-1], videos))
+
+
+def join_flows(outputs: Mapping[str, Path], path: Path) -> None:
+    """Write the flows of the videos of a batch into one file, as `join_counts` does."""
+    columns = None if _is_table(path, ".matrix") else _FLOWS
+    join(outputs, path, columns, lambda videos: _joined("flows", _FLOWS[2:-1], videos))
+
+
+def _joined(table: str, keys: Sequence[str], videos: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the JSON of many videos, with the sum of the rows of a table over all of them."""
+    counts: Counter[tuple[str, ...]] = Counter()
+    for row in (row for each in videos.values() for row in each[table]):
+        counts[tuple(row[key] for key in keys)] += row["count"]
+    rows = [dict(zip(keys, key, strict=True)) | {"count": n} for key, n in counts.items()]
+    return {table: rows, "videos": videos}
+
+
+def _write_json(
+    path: Path,
+    videos: Videos,
+    interval: int | None,
+    tables: Mapping[str, Any],
+    *,
+    with_events: bool = False,
+) -> None:
+    facts: dict[str, Any] = {}
+    for name, each in videos.items():
+        begin = plain_moment(each.clock and each.clock.at(each.first))
+        facts[name] = {"begin": begin, "warnings": list(each.warnings)}
+        if with_events:
+            facts[name]["events"] = [
+                dict(zip(_EVENTS, _event(each, event), strict=True)) for event in each.events
+            ]
+    alone = facts.popitem()[1] if len(facts) == 1 else {"videos": facts}
+    write_json(path, {"interval": interval, **tables, **alone})
+
+
+def _is_table(path: Path, kind: str) -> bool:
+    return path.name.lower().endswith(f"{kind}.csv")
+
+
+def _event(video: Counts, event: Event) -> list[Any]:
+    time, *others = astuple(event)
+    return [time, plain_moment(video.clock and video.clock.at(time)), *others]
+
+
+def _items(columns: Sequence[str], rows: Iterable[Any]) -> list[dict[str, Any]]:
+    return [dict(zip(columns, map(plain_moment, astuple(row)), strict=True)) for row in rows]
+
+
+def _cells(row: Any) -> list[Any]:
+    cells = list(map(plain_moment, astuple(row)))
+    return [NOWHERE if n == 3 and cell is None else cell for n, cell in enumerate(cells)]

@@ -1,0 +1,183 @@
+"""Counting in saved tracks: of one video, or of many that may follow one another in time."""
+
+import math
+from bisect import bisect_left
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from vdet.config.places import CountSettings
+from vdet.errors import ConfigError, TruthError
+from vdet.labels.reading import read_tracks
+from vdet.progress import Advance
+from vdet.track.track import FrameTracks
+from vdet.traffic.clock import Clock, find_clock
+from vdet.traffic.counter import VehicleCounter
+from vdet.traffic.counts import Counts, Event
+
+_SEAM = 2.0
+"""Largest difference, in seconds, of the end of a video and the start of one that goes on from it:
+clocks of names and of containers have whole seconds."""
+_STEP = 0.04
+"""Seconds that are taken for the time from the last frame before a seam to the first one after."""
+
+
+def count_file(
+    path: Path,
+    settings: CountSettings,
+    size: tuple[int, int] | None = None,
+    rate: float | None = None,
+) -> Counts:
+    """Count the vehicles of a file of tracks; arguments and errors as of `count_files`."""
+    return count_files([path], settings, size, rate)[str(path)]
+
+
+def count_files(
+    paths: Sequence[Path],
+    settings: CountSettings,
+    size: tuple[int, int] | None = None,
+    rate: float | None = None,
+    *,
+    begin: str | None = None,
+    advance: Advance = lambda _: None,
+) -> dict[str, Counts]:
+    """Count the vehicles of files of tracks at the lines and in the zones of the settings.
+
+    A file that follows the one before, by their clocks, is counted together with it: a vehicle on
+    both sides of the seam is one vehicle. Others are counted one by one.
+
+    Parameters
+    ----------
+    size
+        Width and height of the frames, pixels; None: as the file says, else as the lines say.
+    rate
+        Frames per second, for a file without times.
+    begin
+        As of `find_clock`.
+    advance
+        Called after each file with 1.
+
+    Returns
+    -------
+    The counts of each file. The numbers of vehicles differ in all of them.
+
+    Raises
+    ------
+    TruthError
+        A file cannot be used, or its times are missing or wrong.
+    ConfigError
+        The lines do not fit the frames, the size of the frames is not known, or there is no time as
+        `begin` says.
+    """
+    counted: dict[str, Counts] = {}
+    group: _Group | None = None
+    for path in paths:
+        saved = read_tracks(path, rate)
+        if not saved.has_times:
+            raise TruthError(f"{path}: has no times; give the frames per second, as in --rate 25")
+        clock = find_clock(path, begin, start=saved.times.get(0, 0.0))
+        place = _size(settings, size or saved.size)
+        frames = saved.frames
+        if group is None or not group.goes_on(place, clock, frames):
+            counted |= group.counts() if group else {}
+            group = _Group(settings, place, group.begun if group else 0)
+        group.add(str(path), clock, frames)
+        advance(1)
+    return counted | (group.counts() if group else {})
+
+
+def count_frames(
+    frames: Iterable[FrameTracks], settings: CountSettings, size: tuple[int, int] | None = None
+) -> Counts:
+    """Count the vehicles in the tracks of each frame; arguments and errors as of `count_files`."""
+    group = _Group(settings, _size(settings, size))
+    group.add("", None, tuple(frames))
+    return group.counts()[""]
+
+
+def _size(settings: CountSettings, size: tuple[int, int] | None) -> tuple[int, int]:
+    if not settings:
+        raise ConfigError("there is nothing to count at; give lines or zones")
+    if size := size or settings.size:
+        return size
+    raise ConfigError("the lines are shares of the frame; give --size, as in 1280x720")
+
+
+@dataclass(frozen=True, slots=True)
+class _Video:
+    """A video of a group.
+
+    `first` and `last` are the times of its frames; `shift` turns them into those of the group.
+    """
+
+    name: str
+    clock: Clock | None
+    first: float
+    last: float
+    shift: float
+
+    @property
+    def end(self) -> float:
+        """When it ends in the group, seconds."""
+        return self.last + self.shift
+
+
+class _Group:
+    """Videos that follow one another, with one counter."""
+
+    def __init__(self, settings: CountSettings, size: tuple[int, int], begun: int = 0) -> None:
+        self._size = size
+        self._counter = VehicleCounter(settings, *size, begun=begun)
+        self._videos: list[_Video] = []
+
+    @property
+    def begun(self) -> int:
+        """How many vehicles have begun in it and before it."""
+        return self._counter.begun
+
+    def goes_on(
+        self, size: tuple[int, int], clock: Clock | None, frames: Sequence[FrameTracks]
+    ) -> bool:
+        """Return whether a video follows the last one."""
+        before = self._videos[-1]
+        if not (clock and before.clock and frames and size == self._size):
+            return False
+        gap = clock.at(frames[0].time) - before.clock.at(before.last)
+        return gap.total_seconds() >= -_SEAM
+
+    def add(self, name: str, clock: Clock | None, frames: Sequence[FrameTracks]) -> None:
+        """Count in the next video."""
+        first, shift = frames[0].time if frames else 0.0, 0.0
+        if self._videos:
+            begin, before = self._videos[0], self._videos[-1]
+            if clock and begin.clock:
+                shift = (clock.zero - begin.clock.zero).total_seconds()
+            if first + shift - before.end < _SEAM:
+                shift = before.end + _STEP - first
+            self._counter.start_video()
+        latest = -math.inf
+        for frame in frames:
+            if not latest <= frame.time < math.inf:
+                raise TruthError(
+                    f"frame {frame.index}: its time is {frame.time:g} s, after {latest:g} s; give "
+                    "times in seconds that never run backwards"
+                )
+            latest = frame.time
+            self._counter.update(replace(frame, time=latest + shift) if shift else frame)
+        self._videos.append(_Video(name, clock, first, max(first, latest), shift))
+
+    def counts(self) -> dict[str, Counts]:
+        """Return the counts of each video, with its own times; the last one has ended."""
+        whole = self._counter.counts()
+        events: list[list[Event]] = [[] for _ in self._videos]
+        ends = [video.end for video in self._videos[:-1]]
+        for event in whole.events:
+            number = bisect_left(ends, event.time)
+            time = round(event.time - self._videos[number].shift, 3)
+            events[number].append(replace(event, time=time))
+        return {
+            video.name: replace(
+                whole, events=tuple(own), first=video.first, last=video.last, clock=video.clock
+            )
+            for video, own in zip(self._videos, events, strict=True)
+        }

@@ -1,0 +1,198 @@
+"""Flows from one line or zone to another, and tables by interval."""
+
+import csv
+import json
+from collections.abc import Iterable
+from dataclasses import replace
+from datetime import datetime, timedelta
+from pathlib import Path
+
+import pytest
+
+from traffic.scenes import ZONE, counts, frames, joined, numbered, through
+from vdet.config.places import LineSettings
+from vdet.errors import ConfigError
+from vdet.track.track import FrameTracks
+from vdet.traffic.clock import Clock
+from vdet.traffic.count_files import write_counts, write_flows
+from vdet.traffic.counts import Counts, flow_table, zone_table
+
+WEST = LineSettings(name="west", start=(200, 200), end=(200, 600))
+EAST = LineSettings(name="east", start=(1000, 200), end=(1000, 600))
+SOUTH = LineSettings(name="=south", start=(400, 550), end=(800, 550))
+
+GOES_EAST = through((0, 100, 400), (10, 1100, 400))  # west at 1 s, the zone at 3 s, east at 9 s
+TURNS_SOUTH = through((0, 100, 400), (5, 600, 400), (8, 600, 700))
+TURNS_BACK = through((0, 100, 400), (3, 400, 350), (6, 100, 300))
+BEGINS = datetime.fromisoformat("2026-05-01 07:04:57+02:00")
+
+
+def crossing(*shapes: LineSettings) -> Counts:
+    video = frames(GOES_EAST, TURNS_SOUTH, TURNS_BACK)
+    return counts(video, *(shapes or (WEST, EAST, SOUTH)))
+
+
+def at(counted: Counts, begin: datetime = BEGINS) -> Counts:
+    return replace(counted, clock=Clock(begin, "as given"))
+
+
+def named(video: Iterable[FrameTracks], name: str) -> list[FrameTracks]:
+    return [
+        replace(each, tracks=tuple(replace(t, class_name=name) for t in each.tracks))
+        for each in video
+    ]
+
+
+def test_a_flow_leads_from_the_first_line_of_a_vehicle_to_the_last() -> None:
+    rows = crossing().flows()
+    assert [(row.origin, row.destination, row.count) for row in rows] == [
+        ("west", "west", 1), ("west", "east", 1), ("west", "=south", 1),
+    ]  # fmt: skip
+    assert {(row.start, row.end, row.class_name) for row in rows} == {(0, 10, "vehicle")}
+
+
+def test_a_vehicle_that_is_at_one_line_only_goes_nowhere() -> None:
+    (row,) = crossing(EAST).flows()
+    assert (row.origin, row.destination, row.count) == ("east", None, 1)
+
+
+def test_a_zone_is_a_place_that_is_visited() -> None:
+    to_zone = through((0, 100, 400), (5, 600, 400), (10, 620, 400))
+    found = counts(frames(GOES_EAST, to_zone), WEST, EAST, ZONE).flows()
+    assert [(row.origin, row.destination) for row in found] == [("west", "east"), ("west", "zone")]
+    (alone,) = counts(frames(GOES_EAST), ZONE).flows()
+    assert (alone.origin, alone.destination) == ("zone", None), "leaving it is no second visit"
+
+
+def test_two_tracks_that_were_taken_for_one_vehicle_have_one_flow_and_class() -> None:
+    old = named(frames(through((0, 100, 400), (3.9, 490, 400)), seconds=4), "car")
+    new = numbered(frames(through((4.1, 510, 400), (10, 1100, 400))), 2)
+    (row,) = counts(joined(old, named(new, "truck")), WEST, EAST).flows()
+    assert (row.origin, row.destination, row.class_name) == ("west", "east", "truck")
+
+
+def test_intervals_begin_at_round_times_of_the_clock_and_of_the_video_without_one() -> None:
+    counted = crossing(EAST)
+    rows = counted.flows(5)
+    assert [(row.start, row.end, row.count) for row in rows] == [(0, 5, 0), (5, 10, 1), (10, 15, 0)]
+    rows = at(counted).flows(300)
+    first = datetime.fromisoformat("2026-05-01 07:00+02:00")
+    assert [(row.start, row.count) for row in rows] == [
+        (first, 0), (first + timedelta(minutes=5), 1),
+    ]  # fmt: skip
+
+
+def test_a_flow_counts_in_the_interval_of_its_first_line() -> None:
+    rows = at(crossing(WEST, EAST)).flows(300)
+    assert [row.count for row in rows if row.destination == "east"] == [1, 0]
+
+
+def test_there_is_a_row_for_each_interval_direction_and_class() -> None:
+    cars = named(frames(GOES_EAST), "car")
+    truck = named(numbered(frames(TURNS_BACK), 2), "truck")
+    rows = counts(joined(cars, truck), WEST).table(5)
+    assert [(row.start, row.direction, row.class_name, row.count) for row in rows[:8]] == [
+        (0, "left", "car", 1), (0, "left", "truck", 1),
+        (0, "right", "car", 0), (0, "right", "truck", 0),
+        (5, "left", "car", 0), (5, "left", "truck", 0),
+        (5, "right", "car", 0), (5, "right", "truck", 1),
+    ]  # fmt: skip
+
+
+def test_zones_have_entries_exits_and_occupancy_by_interval() -> None:
+    stays = through((0, 100, 400), (4, 500, 400), (10, 520, 400))
+    rows = counts(frames(GOES_EAST, stays), ZONE).zone_use(5)
+    assert [(row.start, row.entered, row.left, row.most) for row in rows] == [
+        (0, 2, 0, 2), (5, 0, 1, 2), (10, 0, 1, 1),
+    ]  # fmt: skip
+    assert [row.mean for row in rows] == pytest.approx([4 / 5, (2 * 2 + 3) / 5, 1], abs=0.02)
+    assert rows[1].mean_stay == rows[1].longest_stay == pytest.approx(4, abs=0.02)
+
+
+class TestSeveralVideos:
+    def test_they_have_one_table_by_the_clock(self) -> None:
+        first = at(crossing(EAST))
+        again = counts(numbered(frames(GOES_EAST), 1), EAST)
+        event = replace(again.events[0], vehicle=9)
+        second = at(replace(again, events=(event,)), BEGINS + timedelta(minutes=10))
+        rows = flow_table([first, second], 300)
+        assert [row.count for row in rows] == [0, 1, 0, 1]
+        assert [row.start.minute for row in rows if isinstance(row.start, datetime)] == [
+            0,
+            5,
+            10,
+            15,
+        ]
+
+    def test_without_clocks_they_have_totals_but_no_intervals(self) -> None:
+        several = [crossing(EAST), replace(crossing(EAST), events=())]
+        (row,) = flow_table(several)
+        assert (row.start, row.end, row.count) == (None, None, 1)
+        with pytest.raises(ConfigError, match=r"give --begin with the pattern"):
+            flow_table(several, 300)
+
+    def test_the_use_of_a_zone_is_a_mean_over_the_time_of_video(self) -> None:
+        first = at(counts(frames(GOES_EAST), ZONE))
+        second = at(replace(first, events=()), BEGINS + timedelta(hours=1))
+        (row,) = zone_table([first, second])
+        assert row.mean == pytest.approx(4 / 20, abs=0.01)
+
+
+class TestFiles:
+    @staticmethod
+    def table(path: Path) -> list[dict[str, str]]:
+        with path.open(encoding="utf-8") as file:
+            return list(csv.DictReader(file))
+
+    def test_the_table_of_flows_is_tidy_and_has_no_formulas(self, tmp_path: Path) -> None:
+        write_flows(tmp_path / "f.csv", {"v": at(crossing())}, 900)
+        assert self.table(tmp_path / "f.csv")[-1] == {
+            "start": "2026-05-01 07:00:00+02:00", "end": "2026-05-01 07:15:00+02:00",
+            "from": "west", "to": "'=south", "class": "vehicle", "count": "1",
+        }  # fmt: skip
+        write_flows(tmp_path / "g.csv", {"v": crossing(EAST)})
+        assert [row["to"] for row in self.table(tmp_path / "g.csv")] == ["(none)"]
+
+    def test_the_matrix_has_every_name_in_both_ways(self, tmp_path: Path) -> None:
+        write_flows(tmp_path / "f.matrix.csv", {"v": crossing()}, 5)
+        assert (tmp_path / "f.matrix.csv").read_text() == (
+            "from,west,east,'=south,(none)\n"
+            "west,1,1,1,0\n"
+            "east,0,0,0,0\n"
+            "'=south,0,0,0,0\n"
+        )  # fmt: skip
+
+    def test_json_has_flows_matrix_and_the_beginning(self, tmp_path: Path) -> None:
+        write_flows(tmp_path / "f.json", {"v": at(crossing(EAST))})
+        whole = json.loads((tmp_path / "f.json").read_text())
+        assert whole == {
+            "interval": None,
+            "flows": [
+                {
+                    "start": "2026-05-01 07:04:57+02:00", "end": "2026-05-01 07:05:07+02:00",
+                    "from": "east", "to": None, "class": "vehicle", "count": 1,
+                },
+            ],
+            "matrix": {"east": {"east": 0, "(none)": 1}},
+            "begin": "2026-05-01 07:04:57+02:00",
+            "warnings": [],
+        }  # fmt: skip
+
+    def test_counts_have_tables_of_totals_and_of_zones(self, tmp_path: Path) -> None:
+        counted = {"v": counts(frames(GOES_EAST), WEST, ZONE)}
+        write_counts(tmp_path / "c.totals.csv", counted, 5)
+        rows = self.table(tmp_path / "c.totals.csv")
+        assert list(rows[0]) == ["start", "end", "name", "direction", "class", "count"]
+        assert sum(int(row["count"]) for row in rows) == 3
+        write_counts(tmp_path / "c.zones.csv", counted, 5)
+        row, *_ = self.table(tmp_path / "c.zones.csv")
+        assert row == {
+            "start": "0.0", "end": "5.0", "name": "zone", "entered": "1", "left": "0",
+            "mean": "0.4", "most": "1", "mean_stay": "", "longest_stay": "",
+        }  # fmt: skip
+
+    def test_events_have_clock_times(self, tmp_path: Path) -> None:
+        write_counts(tmp_path / "c.csv", {"v": at(crossing(EAST))})
+        (row,) = self.table(tmp_path / "c.csv")
+        assert row["time"].startswith("9.0")
+        assert row["clock"].startswith("2026-05-01 07:05:06")
