@@ -6,7 +6,7 @@ from traffic.scenes import HEIGHT, WIDTH, Path, frames, through
 from vdet.config.places import CountSettings, LineSettings
 from vdet.polygons import side_of
 from vdet.track.track import FrameTracks
-from vdet.traffic.counter import count_frames
+from vdet.traffic.counting import count_frames
 from vdet.traffic.records import VehicleRecords
 from vdet.traffic.suggestions import SuggestedLine, suggest_lines
 
