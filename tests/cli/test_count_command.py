@@ -104,6 +104,19 @@ def test_it_prints_the_totals(run: Run, folder: Path, tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["t.csv"]
 
 
+def test_a_line_in_the_wrong_place_is_reported(run: Run, folder: Path, tmp_path: Path) -> None:
+    lines = tmp_path / "lines.yaml"
+    lines.write_text(LINES.replace("[100, 0], end: [100, 240]", "[0, 50], end: [320, 50]"))
+    out = tmp_path / "c.json"
+    result = run("count", write_tracks(tmp_path / "t.csv"), "--lines", lines, "--counts", out)
+    assert "t.csv: gate: no path crosses this line; move it" in result.err
+    (warning,) = json.loads(out.read_text())["warnings"]
+    assert warning == "gate: no path crosses this line; move it"
+    wanted = ("--no-video", "--flows", tmp_path / "f.csv", "--lines", lines)
+    result = run("detect-video", folder / "red.mp4", *wanted, *options(folder))
+    assert result.err.count("gate: no path crosses this line") == 1
+
+
 def test_several_files_are_counted_each_and_together(
     run: Run, folder: Path, tmp_path: Path
 ) -> None:

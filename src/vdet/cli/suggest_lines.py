@@ -31,7 +31,8 @@ def suggest_lines(
     """Propose lines across the main streams of a clip.
 
     CLIP is a video, or with --tracks-from also a picture of its frames. Each stream gets a line
-    where it comes in and one where it goes out. Look at them with vdet paths, then rename and move them.
+    where it comes in and one where it goes out. Look at them with vdet paths, then rename and move
+    them.
     """
     from vdet.traffic.suggestions import suggest_lines as suggest
 

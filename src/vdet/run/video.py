@@ -26,6 +26,7 @@ from vdet.run.steps import Step
 from vdet.run.threads import StalledError, prefetch
 from vdet.track.track import VideoTracker
 from vdet.traffic.clock import Clock, find_clock
+from vdet.traffic.counter import VehicleCounter
 from vdet.workers import core_count
 
 log = logging.getLogger("vdet")
@@ -226,6 +227,7 @@ def run_video(
         info = video.reader.info
         advance = progress(None if only_at else video.reader.expected)
         frames, writing, last, ids = 0, 0.0, None, set[int]()
+        counter: VehicleCounter | None = None
         for result in video.results:
             written = time.perf_counter()
             for sink in sinks:
@@ -233,6 +235,7 @@ def run_video(
             writing += time.perf_counter() - written
             ids.update(track.id for track in result.tracks)
             frames += 1
+            counter = result.counter
             advance(1)
             if result.searched:
                 last = result.frame.time - info.start
@@ -241,6 +244,8 @@ def run_video(
         if last is None or (job.shows_at and last < job.at):
             when = "in the times given" if last is None else f"at {float(job.at):.2f} s or later"
             raise _no_frame(job, f"no frame is read {when}", video.reader.length)
+        for warning in counter.counts().warnings if counter else ():
+            log.warning("%s: %s", job.source, warning)
     seconds = time.perf_counter() - began
     log.info(
         "%s: finding the vehicles took %.1f s, drawing and writing them %.1f s",

@@ -43,6 +43,11 @@ class PlacedLine:
     end: Point
     reach: Segment
 
+    @property
+    def length(self) -> float:
+        """Pixels."""
+        return math.dist(self.start, self.end)
+
     def distance(self, point: Point) -> float:
         """Return the distance from the line, also from beyond its ends; positive on the left."""
         return side_of(self.end, self.start, point)
@@ -198,6 +203,11 @@ class BorderState:
     _far: int = 0  # the side on which it was seen one height away last, until that is confirmed
     _change: Change | None = None  # the last time at which it was over the border
     _crossed: Point | None = None  # where it last crossed and was counted
+
+    @property
+    def has_crossed(self) -> bool:
+        """Whether the vehicle was counted here."""
+        return self._crossed is not None
 
     def see(self, sighting: Sighting, before: Sighting, band: float) -> Change | None:
         """Add the next sighting; return the change of the settled side, if there is one.

@@ -24,6 +24,7 @@ from vdet.traffic.borders import (
     Zone,
     place,
 )
+from vdet.traffic.checks import is_missed_at, line_warnings
 from vdet.traffic.counts import Counts, Event
 
 REMEMBERED = 10.0
@@ -149,6 +150,9 @@ class VehicleCounter:
         self._tally: Counter[tuple[str, str]] = Counter()
         self.begun = begun
         self._first, self._now = math.inf, -math.inf
+        self._is_used = False  # a vehicle was there
+        self._missed: Counter[str] = Counter()  # tracks that begin or end at a line, by its name
+        self._heights: dict[str, list[float]] = {line.name: [] for line in self.lines}
 
     def update(self, frame: FrameTracks) -> None:
         """Add the tracks of the next frame."""
@@ -183,7 +187,9 @@ class VehicleCounter:
         ways = tuple((each.name, way) for each in self._borders for way in each.directions)
         zones = tuple(zone.name for zone in self.zones)
         first, last = (self._first, self._now) if self._first <= self._now else (0.0, 0.0)
-        return Counts(tuple(events), ways, zones, first, last)
+        lines = self.lines if self._is_used else ()
+        warnings = tuple(line_warnings(lines, events, self._missed, self._heights))
+        return Counts(tuple(events), ways, zones, first, last, warnings=warnings)
 
     def count(self, name: str, direction: str) -> int:
         """Return how many vehicles have been counted so far in a direction of a line or zone."""
@@ -207,7 +213,7 @@ class VehicleCounter:
             before = state.side
             change = state.see(sighting, vehicle.last, band)
             if change is not None:
-                _note(vehicle, state, change)
+                self._note(vehicle, state, change)
             elif before == 0 and state.side > 0 and isinstance(state.border, Zone):
                 state.entered = vehicle.first.time
                 vehicle.add(state.border.name, APPEAR, vehicle.first)
@@ -254,24 +260,38 @@ class VehicleCounter:
         """End a vehicle that is not shown any more."""
         for state in vehicle.states:
             if (change := state.end(vehicle.last)) is not None:
-                _note(vehicle, state, change)
+                self._note(vehicle, state, change)
             if state.entered is not None:
                 stay = vehicle.last.time - state.entered
                 vehicle.add(state.border.name, VANISH, vehicle.last, stay)
         self._confirm(vehicle)
+        self._look_for_misses(vehicle)
         del self._vehicles[vehicle.key]
 
+    def _note(self, vehicle: _Vehicle, state: BorderState, change: Change) -> None:
+        """Note the event of a change, if the path meets the border."""
+        if not change.meets:
+            return
+        border, seconds = state.border, None
+        if isinstance(border, Zone):
+            entered, state.entered = state.entered, change.time if change.side > 0 else None
+            if change.side < 0:
+                seconds = 0.0 if entered is None else change.time - entered
+        else:
+            self._heights[border.name].append(vehicle.last.height)
+        vehicle.add(border.name, border.directions[change.side < 0], change, seconds)
 
-def _note(vehicle: _Vehicle, state: BorderState, change: Change) -> None:
-    """Note the event of a change, if the path meets the border."""
-    if not change.meets:
-        return
-    border, seconds = state.border, None
-    if isinstance(border, Zone):
-        entered, state.entered = state.entered, change.time if change.side > 0 else None
-        if change.side < 0:
-            seconds = 0.0 if entered is None else change.time - entered
-    vehicle.add(border.name, border.directions[change.side < 0], change, seconds)
+    def _look_for_misses(self, vehicle: _Vehicle) -> None:
+        """Note at which lines a vehicle begins or ends, but for the ends of the video."""
+        ends = [
+            *([vehicle.first] if vehicle.first.time > self._first else []),
+            *([vehicle.last] if vehicle.shown < self._now else []),
+        ]
+        if self._is_confirmed(vehicle):
+            self._is_used = True
+            self._missed.update(
+                state.border.name for state in vehicle.states if is_missed_at(state, ends)
+            )
 
 
 def _touched_sides(box: Box, size: tuple[int, int]) -> complex:

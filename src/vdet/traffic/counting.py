@@ -177,7 +177,12 @@ class _Group:
             events[number].append(replace(event, time=time))
         return {
             video.name: replace(
-                whole, events=tuple(own), first=video.first, last=video.last, clock=video.clock
+                whole,
+                events=tuple(own),
+                first=video.first,
+                last=video.last,
+                clock=video.clock,
+                warnings=whole.warnings if video is self._videos[0] else (),
             )
             for video, own in zip(self._videos, events, strict=True)
         }

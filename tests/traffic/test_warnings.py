@@ -1,0 +1,66 @@
+"""Lines that are not where they should be."""
+
+import pytest
+
+from traffic.scenes import LINE, counts, frames, through
+from vdet.config.places import LineSettings
+
+DOWN = through((1, 600, 300), (5, 600, 500))
+
+
+def warnings(*paths: object, line: LineSettings = LINE) -> tuple[str, ...]:
+    return counts(frames(*paths), line).warnings  # type: ignore[arg-type]
+
+
+def test_a_line_across_the_way_is_fine() -> None:
+    assert warnings(DOWN) == ()
+
+
+def test_without_vehicles_there_is_nothing_to_say() -> None:
+    assert warnings() == ()
+
+
+def test_a_line_that_no_path_crosses() -> None:
+    assert warnings(through((1, 600, 300), (5, 600, 340))) == (
+        "line: no path crosses this line; move it",
+    )
+
+
+@pytest.mark.parametrize(
+    "path", [through((1, 600, 405), (5, 600, 700)), through((1, 600, 100), (5, 600, 380))]
+)
+def test_a_line_at_which_tracks_begin_or_end(path: object) -> None:
+    (found,) = warnings(DOWN, path)
+    assert found.startswith("line: tracks that begin or end at this line and are not counted: 1;")
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        through((0, 600, 405), (5, 600, 700)),
+        through((5, 600, 100), (10, 600, 380)),
+        through((1, 1100, 405), (5, 1100, 700)),
+        through((1, 600, 385), (5, 600, 700)),
+    ],
+    ids=["at the start of the video", "at its end", "beyond the line", "and is counted"],
+)
+def test_other_ends_of_tracks_are_fine(path: object) -> None:
+    assert warnings(DOWN, path) == ()
+
+
+def test_a_line_that_runs_along_the_way() -> None:
+    along = through((1, 300, 330), (3, 500, 470), (5, 700, 330), (7, 900, 470))
+    (found,) = warnings(DOWN, along)
+    assert found.startswith("line: paths that cross this line more than once: 1;")
+
+
+def test_a_few_among_many_are_no_fault_of_the_line() -> None:
+    many = [through((1, 250 + 20 * n, 300), (5, 250 + 20 * n, 500)) for n in range(30)]
+    assert warnings(*many, through((1, 600, 405), (5, 600, 700))) == ()
+
+
+def test_a_line_that_is_shorter_than_a_vehicle() -> None:
+    short = LineSettings(name="line", start=(580, 400), end=(620, 400))
+    assert warnings(DOWN, line=short) == (
+        "line: this line is shorter than a vehicle; make it longer",
+    )
