@@ -18,6 +18,7 @@ from vdet.workers import (
     ThisProcess,
     WorkerKilledError,
     Workers,
+    core_count,
     make_workers,
 )
 
@@ -62,6 +63,30 @@ def test_an_error_of_the_function_is_raised(workers: Workers) -> None:
 def test_fewer_than_one_process_are_refused() -> None:
     with pytest.raises(ConfigError, match="jobs: is -1; give 1 or more"):
         make_workers(-1)
+
+
+@pytest.mark.parametrize(
+    ("files", "cores"),
+    [
+        ({"cpu.max": "max 100000"}, 8),
+        ({"cpu.max": "250000 100000"}, 3),
+        ({"cpu/cpu.cfs_quota_us": "100000", "cpu/cpu.cfs_period_us": "100000"}, 1),
+        ({"cpu/cpu.cfs_quota_us": "-1", "cpu/cpu.cfs_period_us": "100000"}, 8),
+        ({}, 8),
+    ],
+)
+def test_a_control_group_limits_the_cores(
+    files: dict[str, str], cores: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: set(range(8)), raising=False)
+    quotas = (("cpu.max",), ("cpu/cpu.cfs_quota_us", "cpu/cpu.cfs_period_us"))
+    monkeypatch.setattr(
+        "vdet.workers.QUOTAS", [[tmp_path / name for name in names] for names in quotas]
+    )
+    (tmp_path / "cpu").mkdir()
+    for name, text in files.items():
+        (tmp_path / name).write_text(f"{text}\n")
+    assert core_count() == cores
 
 
 def test_one_local_process_is_another_one_and_does_one_item_at_a_time() -> None:

@@ -20,6 +20,22 @@ PICTURE_FORMATS = "vdet.picture_formats"
 COMMANDS = "vdet.commands"
 
 _BUILT_IN: dict[str, dict[str, str]] = {
+    COMMANDS: {
+        "calibrate": "vdet.cli.calibrate:calibrate",
+        "config": "vdet.cli.config:config",
+        "count": "vdet.cli.count:count",
+        "demo": "vdet.cli.demo:demo",
+        "detect-image": "vdet.cli.detect_image:detect_image",
+        "detect-video": "vdet.cli.detect_video:detect_video",
+        "doctor": "vdet.cli.doctor:doctor",
+        "eval": "vdet.cli.evaluate:eval_group",
+        "info": "vdet.cli.info:info",
+        "mine": "vdet.cli.mine:mine",
+        "paths": "vdet.cli.paths:paths",
+        "suggest-lines": "vdet.cli.suggest_lines:suggest_lines",
+        "train": "vdet.cli.train:train",
+        "train-net": "vdet.cli.train_net:train_net",
+    },
     DETECTORS: {"svm": "vdet.detect.svm.kind:SVM", "net": "vdet.detect.onnx.detector:NET"},
     TRACKERS: {"motion": "vdet.track.factory:MOTION", "rules": "vdet.track.factory:RULES"},
     SINKS: {

@@ -10,7 +10,6 @@ import contextlib
 import os
 import platform
 import re
-import secrets
 import shutil
 from pathlib import Path
 
@@ -31,7 +30,7 @@ _FOLDER_FLAGS = os.O_RDONLY | os.O_NOFOLLOW | os.O_DIRECTORY
 def create_folder(parent: Path, cleanup: contextlib.ExitStack) -> Path:
     """Make an empty folder in `parent` and return it; `cleanup` unlocks and removes it."""
     while True:
-        candidate = parent / f".vdet-{_HOST}-{secrets.token_hex(8)}"
+        candidate = parent / f".vdet-{_HOST}-{os.urandom(8).hex()}"
         # An interrupt may come as soon as the folder is there.
         cleanup.callback(shutil.rmtree, candidate, ignore_errors=True)
         candidate.mkdir(0o700)  # what is private stays so while it is written

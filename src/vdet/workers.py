@@ -7,6 +7,7 @@ ends them), and end when their parent has ended.
 import contextlib
 import itertools
 import logging
+import math
 import os
 import signal
 import sys
@@ -17,6 +18,7 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, wait
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from vdet.errors import INTERRUPTED, ClusterError, check_positive
@@ -38,6 +40,13 @@ ENVIRONMENT = {
     "MKL_NUM_THREADS": "1",
     "PYTHONSAFEPATH": "1",  # no module is imported from the current folder
 }
+
+_GROUPS = Path("/sys/fs/cgroup")
+QUOTAS = (
+    (_GROUPS / "cpu.max",),
+    (_GROUPS / "cpu/cpu.cfs_quota_us", _GROUPS / "cpu/cpu.cfs_period_us"),
+)
+"""The files of quota and period of this process's control group: version 2, version 1."""
 
 TASKS_PER_MESSAGE = 1000  # to the scheduler; it begins while the next ones are on their way
 
@@ -69,9 +78,14 @@ class Workers(Protocol):
 
 def core_count() -> int:
     """Return how many cores this process may use: its affinity and its control group limit them."""
-    from joblib import cpu_count
-
-    return int(cpu_count())
+    has_affinity = hasattr(os, "sched_getaffinity")
+    cores = len(os.sched_getaffinity(0)) if has_affinity else os.cpu_count() or 1
+    for files in QUOTAS:
+        with contextlib.suppress(OSError, ValueError):  # ValueError: "max", no limit
+            quota, period = map(int, " ".join(map(Path.read_text, files)).split())
+            if quota > 0:
+                cores = min(cores, math.ceil(quota / period))
+    return cores
 
 
 def limit_library_threads() -> None:

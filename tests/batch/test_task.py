@@ -1,14 +1,18 @@
 """One file of a batch."""
 
 import logging
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from red_cars import HEIGHT, SETTINGS, WIDTH, red_finder
 from running import names, write_drive
 from vdet.batch.task import Work, process_file, record_of_killed, result_digest
+from vdet.detect.factory import load_detector
+from vdet.detect.protocol import DetectorModel
 from vdet.detect.svm.model import save_model
 from vdet.run.sinks.protocol import Output
 from vdet.run.video import VideoJob, run_video
@@ -49,6 +53,22 @@ def test_the_record_says_what_was_done_and_folders_are_made(
     assert record.sizes == {str(path): path.stat().st_size for path in paths}
     assert record.times == {str(path): path.stat().st_mtime_ns for path in paths}
     assert record.digest == result_digest(work.digest, job.source)
+
+
+def test_the_detector_is_loaded_once_for_all_files(
+    job: VideoJob, work: Work, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    loaded: list[object] = []
+
+    def load(*arguments: Any) -> DetectorModel:
+        loaded.append(arguments)
+        return load_detector(*arguments)
+
+    monkeypatch.setattr("vdet.batch.task.load_detector", load)
+    again = replace(job, overwrite=True)
+    for sha256 in ("a", "a", "b"):
+        assert process_file(again, work=replace(work, model_sha256=sha256)).error is None
+    assert loaded == [(SETTINGS.detector, work.model)] * 2
 
 
 def test_only_warnings_about_this_file_are_recorded(

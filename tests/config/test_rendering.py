@@ -12,7 +12,7 @@ from pydantic.fields import FieldInfo
 from seed import SEED
 from vdet.config.document import parse_document
 from vdet.config.loading import load_settings
-from vdet.config.rendering import render
+from vdet.config.rendering import explanations, render
 from vdet.config.schema import MotionTrackerSettings, Section, Settings, SvmSettings, TrainSettings
 from vdet.config.svm import (
     FeatureSettings,
@@ -44,12 +44,16 @@ def fields_of(section: Section, prefix: str = "") -> Iterator[tuple[str, FieldIn
             yield prefix + name, field
 
 
-def items_of(section: Section) -> Iterator[tuple[str, FieldInfo]]:
-    """Give the keys of the items of lists."""
+def sections_of(section: Section) -> Iterator[type[Section]]:
+    """Give the sections with keys: those in a section, and the items of its lists."""
+    for _, value in section:
+        if isinstance(value, Section):
+            yield type(value)
+            yield from sections_of(value)
     for _, field in fields_of(section):
         for kind in get_args(field.annotation):
             if isinstance(kind, type) and issubclass(kind, Section):
-                yield from kind.model_fields.items()
+                yield kind
 
 
 RULES = Settings(tracker=RulesTrackerSettings())
@@ -155,10 +159,13 @@ def test_every_setting_is_printed(settings: Settings) -> None:
 def test_the_explanation_of_every_key_is_printed_as_a_comment(settings: Settings) -> None:
     lines = [line.strip() for line in render(settings).splitlines()]
     text = " ".join(" ".join(line.lstrip("# ") for line in lines if "# " in line).split())
-    for key, field in [*fields_of(settings), *items_of(settings)]:
-        words = " ".join((field.description or "").split())
-        assert words.endswith("."), key
-        assert words in text, key
+    for section in sections_of(settings):
+        found = explanations(section)
+        for key, field in section.model_fields.items():
+            words = " ".join(found.get(key, "").split())
+            if not isinstance(field.default, Section):
+                assert words.endswith("."), key
+                assert words in text, key
 
 
 def test_there_are_few_settings() -> None:

@@ -3,18 +3,21 @@
 import hashlib
 import logging
 import os
+import pickle
 import time
 import traceback
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Self
 
 from vdet.batch.manifest import Record
 from vdet.config.schema import Settings
 from vdet.detect.factory import load_detector, model_file
+from vdet.detect.protocol import DetectorModel
 from vdet.errors import in_one_line
 from vdet.run.sinks.protocol import output_state
 from vdet.run.video import VideoJob, run_video
@@ -154,7 +157,8 @@ def record_of_killed(job: VideoJob, work: Work) -> Record:
 def _run(job: VideoJob, work: Work) -> dict[str, Any]:
     """Run a job, and return what its record says about the result."""
     job = replace(job, threads=work.threads, codec_threads=work.threads)
-    model = load_detector(work.settings.detector, work.model)
+    chosen = pickle.dumps((work.settings.detector, work.model))  # settings may be unhashable
+    model = _kept_detector(chosen, work.model_sha256)
     totals = run_video(job, model, work.settings)
     states = {str(each.path.absolute()): output_state(each) or (0, 0) for each in job.outputs}
     return {
@@ -166,6 +170,12 @@ def _run(job: VideoJob, work: Work) -> dict[str, Any]:
         "sizes": {path: size for path, (size, _) in states.items()},
         "times": {path: changed for path, (_, changed) in states.items()},
     }
+
+
+@lru_cache(maxsize=1)
+def _kept_detector(chosen: bytes, _sha256: str | None) -> DetectorModel:
+    """Load a detector, which this process keeps for the next videos; the file may not change."""
+    return load_detector(*pickle.loads(chosen))
 
 
 def _record(job: VideoJob, work: Work) -> Record:

@@ -8,7 +8,7 @@ import click
 
 from vdet.cli.messages import set_up_logs
 from vdet.errors import ConfigError
-from vdet.plugins import COMMANDS, load_plugin, plugin_names
+from vdet.plugins import COMMANDS, built_in_names, load_plugin, plugin_names
 
 _OTHERS = "What is processed"
 
@@ -61,11 +61,14 @@ def command(*examples: str) -> Callable[[Callable[..., Any]], Command]:
 
 
 class Program(click.Group):
-    """The program; other packages register commands as entry points (`vdet.plugins`)."""
+    """The program; a command is imported when it is run, or to list its summary.
+
+    Other packages register commands as entry points (`vdet.plugins`).
+    """
 
     def list_commands(self, _: click.Context) -> list[str]:
         """Return the names of all commands in alphabetical order."""
-        return sorted({*self.commands, *plugin_names(COMMANDS)})
+        return sorted(plugin_names(COMMANDS))
 
     def get_command(self, _: click.Context, name: str) -> click.Command | None:
         """Return a command, None if there is none of that name.
@@ -75,8 +78,9 @@ class Program(click.Group):
         ConfigError
             It belongs to another package, and cannot be loaded.
         """
-        if name in self.commands or name not in plugin_names(COMMANDS):
-            return self.commands.get(name)
+        if name not in built_in_names(COMMANDS) and name not in plugin_names(COMMANDS):
+            self.commands = {own: load_plugin(COMMANDS, own) for own in built_in_names(COMMANDS)}
+            return None  # click suggests one of `commands`
         command = load_plugin(COMMANDS, name)
         if not isinstance(command, click.Command):
             raise ConfigError(f"{name}: is not a click command; repair or reinstall that package")
@@ -84,7 +88,7 @@ class Program(click.Group):
 
     def format_commands(self, _: click.Context, formatter: click.HelpFormatter) -> None:
         """Write all names with their summaries; commands of other packages are not imported."""
-        own = {name: command.short_help or "" for name, command in self.commands.items()}
+        own = {name: load_plugin(COMMANDS, name).short_help for name in built_in_names(COMMANDS)}
         others = dict.fromkeys(plugin_names(COMMANDS), "Added by an installed package.")
         with formatter.section("Commands"):
             formatter.write_dl(sorted((others | own).items()))

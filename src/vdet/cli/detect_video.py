@@ -167,7 +167,6 @@ def detect_video(
     request = options.read_lanes(lanes, camera)
     settings = choice.read(*([f"detector.stride={stride}"] if stride else []))
     counting.check(settings, several=batch.folder is not None)
-    from vdet.batch.task import Work
     from vdet.regions import check_mask
     from vdet.run.video import VideoJob
 
@@ -180,6 +179,8 @@ def detect_video(
         job = replace(job, outputs=options.as_outputs(wanted), threads=threads)
         _process_one(job, settings, choice)
         return 0
+    from vdet.batch.task import Work
+
     suffixes = _read_suffixes(wanted, no_video=no_video)
     sinks = {each.sink for each in suffixes}
     work = Work.of(job, sinks, settings, choice.model_path, threads)

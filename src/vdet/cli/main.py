@@ -8,32 +8,14 @@ from typing import NoReturn
 
 import click
 
-from vdet.cli.calibrate import calibrate
 from vdet.cli.command import Program, verbosity_options
-from vdet.cli.config import config
-from vdet.cli.count import count
-from vdet.cli.demo import demo
-from vdet.cli.detect_image import detect_image
-from vdet.cli.detect_video import detect_video
-from vdet.cli.doctor import doctor
-from vdet.cli.evaluate import eval_group
-from vdet.cli.info import info
 from vdet.cli.messages import print_lines, set_up_logs
-from vdet.cli.mine import mine
-from vdet.cli.paths import paths
-from vdet.cli.suggest_lines import suggest_lines
-from vdet.cli.train import train
-from vdet.cli.train_net import train_net
 from vdet.errors import INTERRUPTED, ConfigError, VdetError, in_one_line
 from vdet.files import escaped
 from vdet.version import __version__
 
 cli = Program(
     "vdet",
-    [
-        *(calibrate, config, count, demo, detect_image, detect_video, doctor, eval_group, info),
-        *(mine, paths, suggest_lines, train, train_net),
-    ],
     help="Find and follow vehicles in road video on an ordinary CPU.",
     params=verbosity_options(),
     context_settings={"help_option_names": ["-h", "--help"]},

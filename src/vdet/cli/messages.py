@@ -1,6 +1,7 @@
 """Standard error: lines, log records and progress bars that do not disturb one another."""
 
 import logging
+import sys
 import threading
 import warnings
 from collections.abc import Iterator
@@ -43,6 +44,9 @@ def is_quiet() -> bool:
 
 def print_message(*lines: str, err: bool = True) -> None:
     """Print lines, by default on standard error; a progress bar moves below them."""
+    if "tqdm" not in sys.modules:  # then there is no bar
+        print_lines(*lines, err=err)
+        return
     from tqdm import tqdm
 
     with tqdm.external_write_mode():

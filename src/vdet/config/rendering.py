@@ -1,7 +1,11 @@
 """Settings → YAML text with a comment on every key, as `vdet config` prints it."""
 
+import ast
+import contextlib
+import inspect
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from itertools import pairwise
 from typing import get_args
 
 import yaml
@@ -22,7 +26,28 @@ def render(settings: Settings) -> str:
     return "\n".join([HEADING, *_section(settings, "")]) + "\n"
 
 
+def explanations(section: type[Section]) -> Mapping[str, str]:
+    """Return what each key of a section means.
+
+    It is the description of its field, or else the text below the field in the source. That is read
+    here, and not by pydantic: parsing all sections would take a third of the start of a command.
+    """
+    found: dict[str, str] = {}
+    for each in reversed(section.__mro__):
+        if not issubclass(each, Section):
+            continue
+        with contextlib.suppress(OSError):  # its source is not there
+            (kind,) = ast.parse(textwrap.dedent(inspect.getsource(each))).body
+            for field, text in pairwise(kind.body if isinstance(kind, ast.ClassDef) else ()):
+                match field, text:
+                    case ast.AnnAssign(ast.Name(name)), ast.Expr(ast.Constant(str(words))):
+                        found[name] = inspect.cleandoc(words)
+    described = {name: field.description for name, field in section.model_fields.items()}
+    return found | {name: text for name, text in described.items() if text}
+
+
 def _section(section: Section, indent: str) -> Iterator[str]:
+    texts = explanations(type(section))
     for name, field in type(section).model_fields.items():
         value = getattr(section, name)
         if isinstance(value, Section):
@@ -32,7 +57,7 @@ def _section(section: Section, indent: str) -> Iterator[str]:
             yield f"{indent}{name}:"
             yield from _section(value, indent + "  ")
             continue
-        yield from _comment(field.description or "", indent)
+        yield from _comment(texts.get(name, ""), indent)
         if item := _item_section(field):
             yield from _item_keys(item, indent)
         # An item of a list says only what it has.
@@ -45,10 +70,11 @@ def _section(section: Section, indent: str) -> Iterator[str]:
 def _item_keys(item: type[Section], indent: str) -> Iterator[str]:
     what = _first_line(item)
     yield from _comment(f"Each item is {what[:1].lower()}{what[1:]}", indent)
-    for name, field in item.model_fields.items():
+    texts = explanations(item)
+    for name in item.model_fields:
         key, rest = f"{indent}#   ", f"{indent}#     "
         yield from textwrap.wrap(
-            f"{name}: {field.description}", WIDTH, initial_indent=key, subsequent_indent=rest
+            f"{name}: {texts.get(name, '')}", WIDTH, initial_indent=key, subsequent_indent=rest
         )
 
 

@@ -142,6 +142,10 @@ class Road:
     undistorter: Undistorter
     """Moves boxes and points of the original frame to `view.image`."""
 
+    def record(self) -> dict[str, Any] | None:
+        """Return the lane as plain values for JSON: see `lane_record`."""
+        return lane_record(self.lane)
+
     def cuts(self, box: Box) -> bool:
         """Return whether the left, right or lower edge of the original frame cuts its box."""
         height, width = self.view.image.shape[:2]

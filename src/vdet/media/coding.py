@@ -5,16 +5,17 @@ BT.2087 (primaries).
 """
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-import av
 import cv2
 import numpy as np
 import numpy.typing as npt
-from av.video.reformatter import ColorRange
 
 from vdet.boxes import Float64Array
 from vdet.media.images import Image
+
+if TYPE_CHECKING:
+    import av
 
 Layers = tuple[Image, Image, Image]
 """Luma, blue and red chroma, uint8 each; chroma may be of half the size of luma."""
@@ -50,8 +51,10 @@ class Coding:
     full_range: bool = False
 
     @classmethod
-    def of(cls, picture: av.VideoFrame) -> "Coding | None":
+    def of(cls, picture: "av.VideoFrame") -> "Coding | None":
         """Return the coding of a decoded 4:2:0 picture; None for other pixel formats."""
+        from av.video.reformatter import ColorRange
+
         matrix = _MATRICES.get(picture.colorspace)
         is_flipped = any(plane.line_size < 0 for plane in picture.planes)  # rows from below
         if picture.format.name not in _PLANAR or matrix is None or is_flipped:

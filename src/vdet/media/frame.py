@@ -4,15 +4,16 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
-import av
 import cv2
 import numpy as np
-from av.video.reformatter import ColorRange
 
 from vdet.media.coding import Coding, Layers
 from vdet.media.images import Image, Orientation, split_channels
+
+if TYPE_CHECKING:
+    import av
 
 
 class Planes:
@@ -28,7 +29,7 @@ class Planes:
         Whether nothing else uses the picture, so that it may be changed and encoded.
     """
 
-    def __init__(self, picture: av.VideoFrame, coding: Coding, *, is_own: bool = False) -> None:
+    def __init__(self, picture: "av.VideoFrame", coding: Coding, *, is_own: bool = False) -> None:
         self.picture = picture
         self.coding = coding
         self.is_own = is_own
@@ -56,6 +57,9 @@ class Planes:
 
     @classmethod
     def _own(cls, width: int, height: int, coding: Coding, layers: Layers) -> "Planes":
+        import av
+        from av.video.reformatter import ColorRange
+
         picture = av.VideoFrame(width, height, "yuv420p")
         picture.colorspace = 1 if coding.matrix == "bt709" else 6  # ITU-T H.273
         picture.color_range = ColorRange.JPEG if coding.full_range else ColorRange.MPEG
@@ -93,7 +97,7 @@ class Planes:
         return self.luma, self.blue, self.red
 
 
-def _plane(picture: av.VideoFrame, number: int) -> Image:
+def _plane(picture: "av.VideoFrame", number: int) -> Image:
     plane = picture.planes[number]
     values = np.frombuffer(cast(bytes, plane), np.uint8)  # it is not typed as such
     rows = values[: plane.line_size * plane.height].reshape(plane.height, plane.line_size)
@@ -133,7 +137,7 @@ class Picture:
         return self.pixels.to_image() if isinstance(self.pixels, Planes) else self.pixels
 
 
-def bgr_of(picture: av.VideoFrame) -> Image:
+def bgr_of(picture: "av.VideoFrame") -> Image:
     """Return a decoded picture as BGR uint8 `(H, W, 3)`.
 
     Colour matrix and range are those of its tags; without tags, BT.601 and limited.

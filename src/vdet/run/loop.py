@@ -9,13 +9,12 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 from statistics import fmean
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from vdet.boxes import NO_BOXES, Boxes
 from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel, VideoDetector
 from vdet.errors import ConfigError, ImageError, VdetError
-from vdet.lanes.road import LaneRequest
 from vdet.media import Frame, VideoInfo
 from vdet.media.images import Image
 from vdet.run.result import FrameResult
@@ -24,7 +23,10 @@ from vdet.run.threads import map_ordered
 from vdet.track.factory import make_tracker, timed
 from vdet.track.track import TimedTracker, Track, VideoTracker
 
-FIRST_FRAMES = 5
+if TYPE_CHECKING:
+    from vdet.lanes.road import LaneRequest
+
+FIRST_FRAMES = 2
 """Number of frames that `DetectorModel.for_video` gets."""
 
 _MOST_WAITING = 60
@@ -187,7 +189,7 @@ def build(
     *,
     tracker: VideoTracker | None = None,
     steps: Sequence[Step] = (),
-    lanes: LaneRequest | None = None,
+    lanes: "LaneRequest | None" = None,
 ) -> Pipeline:
     """Make the pipeline of a video, or of one still picture.
 

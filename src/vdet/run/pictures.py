@@ -5,19 +5,22 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from vdet.boxes import Boxes
 from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel, stage_pictures_of
 from vdet.errors import ImageError
 from vdet.files import OutputFiles
-from vdet.lanes.road import LaneRequest
 from vdet.media import Frame, Picture
 from vdet.media.images import PICTURE_SUFFIXES, Image, is_picture_name, read_image
 from vdet.progress import Progress, no_progress
 from vdet.run.loop import build, named_errors
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output, Sink, SinkContext, check_sinks, open_sinks
+
+if TYPE_CHECKING:
+    from vdet.lanes.road import LaneRequest
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +102,7 @@ def run_pictures(
     shared: Sequence[Output],
     model: DetectorModel,
     settings: Settings,
-    lanes: LaneRequest | None = None,
+    lanes: "LaneRequest | None" = None,
     *,
     overwrite: bool = False,
     progress: Progress = no_progress,
@@ -133,7 +136,7 @@ def run_picture(
     job: PictureJob,
     model: DetectorModel,
     settings: Settings,
-    lanes: LaneRequest | None = None,
+    lanes: "LaneRequest | None" = None,
     *,
     shared: Sequence[Sink] = (),
     overwrite: bool = False,
@@ -159,7 +162,7 @@ def detect_picture(
     image: Image,
     model: DetectorModel,
     settings: Settings,
-    lanes: LaneRequest | None = None,
+    lanes: "LaneRequest | None" = None,
 ) -> FrameResult:
     """Search a picture, BGR uint8 `(H, W, 3)`; threads may call this at once.
 

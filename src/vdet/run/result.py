@@ -2,12 +2,15 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from vdet.boxes import Boxes
-from vdet.lanes.road import Road, lane_record
 from vdet.media import Frame
 from vdet.track.track import FrameTracks, Track
-from vdet.traffic.counter import VehicleCounter
+
+if TYPE_CHECKING:
+    from vdet.lanes.road import Road
+    from vdet.traffic.counter import VehicleCounter
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,12 +39,12 @@ class FrameResult:
     frame: Frame
     detections: Boxes
     tracks: tuple[Track, ...]
-    road: Road | None = None
+    road: "Road | None" = None
     searched: bool = True
-    counter: VehicleCounter | None = None
+    counter: "VehicleCounter | None" = None
 
     @property
     def frame_tracks(self) -> FrameTracks:
         """The tracks with the number and the time of the frame, and its lane if there is one."""
-        facts = {"lane": lane_record(self.road.lane)} if self.road else {}
+        facts = {"lane": self.road.record()} if self.road else {}
         return FrameTracks(self.frame.index, float(self.frame.time), self.tracks, facts)

@@ -7,17 +7,19 @@ settings do not ask for it.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from vdet.config.schema import Settings
 from vdet.errors import ConfigError
-from vdet.lanes.road import FrameView, LaneRequest, Road, RoadFinder
 from vdet.media import Frame, VideoInfo
 from vdet.plugins import STEPS, built_in_names, load_plugin
-from vdet.regions import Regions, lay_regions
 from vdet.run.result import FrameResult
 from vdet.track.track import Track
-from vdet.traffic.counter import VehicleCounter
+
+if TYPE_CHECKING:
+    from vdet.lanes.road import FrameView, LaneRequest, Road, RoadFinder
+    from vdet.regions import Regions
+    from vdet.traffic.counter import VehicleCounter
 
 
 class Step(Protocol):
@@ -56,7 +58,7 @@ class StepContext:
     width: int
     height: int
     video: VideoInfo | None = None
-    lanes: LaneRequest | None = None
+    lanes: "LaneRequest | None" = None
 
 
 StepKind = Callable[[StepContext], Step | None]
@@ -81,7 +83,7 @@ def make_steps(context: StepContext, others: Sequence[Step] = ()) -> list[Step]:
 class LaneStep:
     """Finds the lane, and the distance and the lane of each vehicle."""
 
-    def __init__(self, roads: RoadFinder, foot: float) -> None:
+    def __init__(self, roads: "RoadFinder", foot: float) -> None:
         self._roads = roads
         self._foot = foot
         self._views: dict[int, FrameView] = {}
@@ -97,7 +99,7 @@ class LaneStep:
         return replace(result, road=road, tracks=with_positions(result.tracks, road, self._foot))
 
 
-def with_positions(tracks: Sequence[Track], road: Road, foot: float) -> tuple[Track, ...]:
+def with_positions(tracks: Sequence[Track], road: "Road", foot: float) -> tuple[Track, ...]:
     """Return the tracks of a frame with the `distance` and the `lane` of their feet.
 
     Both are None without a lane, for a vehicle whose lower edge the frame cuts off, and where
@@ -120,7 +122,7 @@ def with_positions(tracks: Sequence[Track], road: Road, foot: float) -> tuple[Tr
 class RegionStep:
     """Removes detections and vehicles that stand outside the regions."""
 
-    def __init__(self, regions: Regions) -> None:
+    def __init__(self, regions: "Regions") -> None:
         self._regions = regions
 
     def apply(self, result: FrameResult) -> FrameResult:
@@ -134,7 +136,7 @@ class RegionStep:
 class CountStep:
     """Counts the vehicles that are shown, at the lines and in the zones."""
 
-    def __init__(self, counter: VehicleCounter) -> None:
+    def __init__(self, counter: "VehicleCounter") -> None:
         self._counter = counter
 
     def apply(self, result: FrameResult) -> FrameResult:
@@ -147,6 +149,8 @@ def lane_step(context: StepContext) -> Step | None:
     """Make a `LaneStep` if lanes are looked for."""
     if context.lanes is None:
         return None
+    from vdet.lanes.road import RoadFinder
+
     settings = context.settings
     roads = RoadFinder(context.lanes, settings.lanes, context.width, context.height)
     return LaneStep(roads, settings.detector.foot)
@@ -154,6 +158,10 @@ def lane_step(context: StepContext) -> Step | None:
 
 def region_step(context: StepContext) -> Step | None:
     """Make a `RegionStep` if there are regions."""
+    if not context.settings.regions:
+        return None
+    from vdet.regions import lay_regions
+
     regions = lay_regions(context.settings.regions, context.width, context.height)
     return RegionStep(regions) if regions else None
 
@@ -163,6 +171,8 @@ def count_step(context: StepContext) -> Step | None:
     counts = context.settings.counts
     if not counts or context.video is None:
         return None
+    from vdet.traffic.counter import VehicleCounter
+
     try:
         return CountStep(VehicleCounter(counts, context.width, context.height))
     except ConfigError as error:

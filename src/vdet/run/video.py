@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from vdet.boxes import NO_BOXES
 from vdet.config.schema import Settings
@@ -16,7 +16,6 @@ from vdet.detect.factory import as_model
 from vdet.detect.protocol import DetectorModel, stage_pictures_of
 from vdet.errors import FrameSizeError, VideoError
 from vdet.files import OutputFiles
-from vdet.lanes.road import LaneRequest
 from vdet.media import VideoReader
 from vdet.progress import Progress, no_progress
 from vdet.run.loop import Pipeline, build, named_errors, peek
@@ -28,6 +27,9 @@ from vdet.track.track import VideoTracker
 from vdet.traffic.clock import Clock, find_clock
 from vdet.traffic.counter import VehicleCounter
 from vdet.workers import core_count
+
+if TYPE_CHECKING:
+    from vdet.lanes.road import LaneRequest
 
 log = logging.getLogger("vdet")
 
@@ -76,7 +78,7 @@ class VideoJob:
     end: Fraction | None = None
     frames: int | None = None
     at: Fraction = Fraction(0)
-    lanes: LaneRequest | None = None
+    lanes: "LaneRequest | None" = None
     inputs: tuple[Path, ...] = ()
     overwrite: bool = False
     threads: int | None = None

@@ -10,8 +10,6 @@ from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
 from vdet.config.tracker import RulesTrackerSettings
 from vdet.media import Picture
 from vdet.plugins import TRACKERS, load_plugin
-from vdet.track.motion.tracker import MotionTracker
-from vdet.track.rules.tracker import RulesTracker
 from vdet.track.track import State, TimedTracker, Track, VideoTracker
 
 
@@ -96,9 +94,17 @@ def _moved(track: Track, end: Track, share: float) -> Track:
     return replace(track, box=box, whole_foot=(x, y), state=state)
 
 
+def _make_motion(settings: MotionTrackerSettings, width: int, height: int) -> VideoTracker:
+    from vdet.track.motion.tracker import MotionTracker
+
+    return MotionTracker(settings, width, height)
+
+
 def _make_rules(settings: RulesTrackerSettings, width: int, height: int) -> VideoTracker:  # noqa: ARG001
+    from vdet.track.rules.tracker import RulesTracker
+
     return RulesTracker(scale_lengths(settings, height / REFERENCE_HEIGHT))
 
 
-MOTION = TrackerKind(MotionTrackerSettings, MotionTracker)
+MOTION = TrackerKind(MotionTrackerSettings, _make_motion)
 RULES = TrackerKind(RulesTrackerSettings, _make_rules)

@@ -6,6 +6,8 @@ import pytest
 from vdet.config.schema import NetworkSettings
 from vdet.detect.factory import load_detector
 from vdet.detect.onnx.detector import SHIPPED
+from vdet.detect.onnx.recognition import recognize
+from vdet.detect.onnx.session import Session
 from vdet.testing import check_detector
 
 MOST_BYTES = 1_500_000
@@ -14,6 +16,11 @@ SIZES = [(1280, 720), (640, 480), (1242, 375), (270, 480), (64, 64)]
 
 def test_it_is_small() -> None:
     assert SHIPPED.stat().st_size <= MOST_BYTES
+
+
+def test_its_header_tells_its_form_and_it_need_not_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr(Session, "run")
+    assert recognize(Session(SHIPPED)).name == "vdet"
 
 
 @pytest.mark.parametrize(("width", "height"), SIZES)

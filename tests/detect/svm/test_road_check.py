@@ -49,6 +49,15 @@ def test_a_model_that_misses_most_vehicles_warns_once(caplog: pytest.LogCaptureF
     assert len(caplog.records) == 1
 
 
+def test_each_video_is_judged_for_itself_and_pictures_together() -> None:
+    check = RoadCheck(lambda: Finds(boxes(*CARS)))
+    model = SvmModel(red_finder(), SvmSettings(), check)
+    image = PICTURE.image
+    checks = [model.for_video(200, 100, [image] * count)._check for count in (1, 1, 2, 2)]
+    assert [each is check for each in checks] == [True, True, False, False]
+    assert checks[2] is not checks[3]
+
+
 @pytest.mark.parametrize(
     "found",
     [

@@ -42,6 +42,8 @@ def our_cells(
     `cells` are those of the input, from `cell_centers`.
     """
     table = outputs[0][0]
+    if len(table) != len(cells[1]):
+        raise ValueError("not one row for each cell")
     logits = score.slope * table[:, 0] + score.offset
     rows = np.flatnonzero(logits >= math.log(least / (1 - least)))
     centers, strides = cells

@@ -132,12 +132,10 @@ def recognize(session: Session, names: Sequence[str] = ()) -> Recognized:
     """
     header = read_header(session)
     if header is not None:
-        found = _ours(session, header, 1, 1)
-        outputs = found.outputs_for_grey()
-        cells = len(cell_centers(found.form.width, found.form.height)[1])
-        if [each.shape for each in outputs] != [(1, cells, 5 + len(header.classes))]:
-            raise _unknown(session, f"it has a header of vdet, but gives {_shapes(outputs)}")
-        return found
+        shapes = session.output_shapes
+        if [shape[2:] for shape in shapes] != [[5 + len(header.classes)]]:
+            raise _unknown(session, f"it has a header of vdet, but gives {shapes}")
+        return _ours(session, header, 1, 1)
     has_sizes = any(slot.name == _SIZES for slot in session.inputs)
     if len(session.inputs) != 1 + has_sizes:
         raise _unknown(session, f"it has {len(session.inputs)} inputs")

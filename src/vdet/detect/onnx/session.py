@@ -43,6 +43,8 @@ class Session:
     ----------
     inputs
         Each has a `name`, a `shape` and a `type`, one of `TYPES`.
+    output_shapes
+        As the file declares them; a length that depends on the input is a name.
 
     Raises
     ------
@@ -67,7 +69,9 @@ class Session:
             )
             self.metadata: Mapping[str, str] = self._session.get_modelmeta().custom_metadata_map
             self.inputs = self._session.get_inputs()
-            self.output_names = [each.name for each in self._session.get_outputs()]
+            outputs = self._session.get_outputs()
+            self.output_names = [each.name for each in outputs]
+            self.output_shapes = [each.shape for each in outputs]
         except Exception as error:  # onnxruntime raises kinds of its own, and plain ones
             raise ModelError(f"{path}: onnxruntime cannot load it: {_in_words(error)}") from error
         for each in self.inputs:

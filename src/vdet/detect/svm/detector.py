@@ -48,11 +48,13 @@ class SvmModel:
     check: RoadCheck | None = None
 
     def for_video(self, width: int, height: int, images: Sequence[Image]) -> "SvmDetector":
-        """Return a detector for frames of one size; `images` show where the horizon is."""
+        """Return a detector for frames of one size; `images` show where the horizon is.
+
+        Still pictures share the check; each video has its own.
+        """
         horizon = self._horizon(images)
-        return SvmDetector(
-            self.model, self.settings, width, height, horizon=horizon, check=self.check
-        )
+        check = self.check.restarted() if self.check and len(images) > 1 else self.check
+        return SvmDetector(self.model, self.settings, width, height, horizon=horizon, check=check)
 
     def _horizon(self, images: Sequence[Image]) -> float:
         """Return the row of the horizon, share of the height, and report it."""

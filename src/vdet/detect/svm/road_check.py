@@ -38,6 +38,10 @@ class RoadCheck:
         self._seen = self._both = self._all = 0
         self._has_warned = False
 
+    def restarted(self) -> "RoadCheck":
+        """Return a check with the same detector that has seen nothing yet."""
+        return RoadCheck(self._load_other)
+
     def compare(self, picture: Picture, found: Boxes) -> None:
         """Compare what is found in the next picture or frame with what the other detector finds.
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -24,8 +24,6 @@ from vdet.draw.boxes import (
 )
 from vdet.draw.paint import Color, Surface, draw_lines
 from vdet.errors import OutputError
-from vdet.lanes.drawing import draw_lane
-from vdet.lanes.road import Road
 from vdet.media import Frame, Picture, VideoInfo, VideoWriter
 from vdet.media.images import PICTURE_SUFFIXES, encode_image
 from vdet.media.writer import VIDEO_SUFFIXES, may_replace_video
@@ -34,7 +32,10 @@ from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import BaseSink, SinkContext, SinkKind
 from vdet.run.threads import write_async
 from vdet.track.track import Track
-from vdet.traffic.counter import VehicleCounter
+
+if TYPE_CHECKING:
+    from vdet.lanes.road import Road
+    from vdet.traffic.counter import VehicleCounter
 
 PICTURE_LABEL = ("score",)
 FINISH_RATE = 5_000_000
@@ -69,6 +70,8 @@ class Overlay:
         else:
             surface = image = road.view.image.copy()
             if road.lane:
+                from vdet.lanes.drawing import draw_lane
+
                 draw_lane(image, road.lane)
         shown = _placed(self._shown(result), road, surface)
         if result.counter and self._settings.counts.drawn:
@@ -143,7 +146,7 @@ def _class_number(name: str | None) -> int:
     return zlib.crc32(name.encode()) if name else 0
 
 
-def _placed(tracks: Sequence[Track], road: Road | None, surface: Surface) -> list[Track]:
+def _placed(tracks: Sequence[Track], road: "Road | None", surface: Surface) -> list[Track]:
     """Return where the vehicles lie in the picture; those outside it are left out."""
     height, width = surface.shape[:2]
     placed = []
@@ -157,7 +160,7 @@ def _placed(tracks: Sequence[Track], road: Road | None, surface: Surface) -> lis
     return placed
 
 
-def draw_running_counts(surface: Surface, counter: VehicleCounter, road: Road | None) -> None:
+def draw_running_counts(surface: Surface, counter: "VehicleCounter", road: "Road | None") -> None:
     """Draw the lines and zones, and what is counted so far; vehicles are drawn over them.
 
     In an undistorted picture they lie on the same places of the road.
@@ -173,7 +176,7 @@ def draw_running_counts(surface: Surface, counter: VehicleCounter, road: Road | 
         draw_line(surface, start, end, (left, right))
 
 
-def _on_road(points: Sequence[Point], road: Road | None) -> list[Point]:
+def _on_road(points: Sequence[Point], road: "Road | None") -> list[Point]:
     """Return where points of the frame lie in the picture that is drawn into."""
     if road is None:
         return list(points)
