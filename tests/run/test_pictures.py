@@ -145,11 +145,13 @@ class TestSeveral:
     def names(self, folder: Path) -> list[str]:
         return sorted(path.name for path in folder.iterdir() if len(path.stem) > 1)
 
+    @pytest.mark.parametrize("threads", [1, 3])
     def test_a_picture_that_cannot_be_read_does_not_stop_the_others(
-        self, jobs: list[PictureJob], tmp_path: Path
+        self, jobs: list[PictureJob], tmp_path: Path, threads: int
     ) -> None:
         shared = [Output("json", tmp_path / "boxes.json")]
-        (failure,) = run_pictures(jobs, shared, model_for(SETTINGS), SETTINGS)
+        model = model_for(SETTINGS)
+        (failure,) = run_pictures(jobs, shared, model, SETTINGS, threads=threads)
         assert "b.png: is not a picture" in str(failure)
         assert self.names(tmp_path) == ["boxes.json", "out-a.png", "out-c.png"]
         items = json.loads((tmp_path / "boxes.json").read_text())

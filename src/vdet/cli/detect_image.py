@@ -56,6 +56,7 @@ def detect_image(
     from vdet.regions import check_mask
     from vdet.run.pictures import find_images, plan_pictures, run_pictures
     from vdet.run.sinks.protocol import check_sinks
+    from vdet.workers import core_count
 
     check_mask(settings.regions)
     model = choice.load_detector(settings.detector)
@@ -73,6 +74,7 @@ def detect_image(
             settings,
             request,
             overwrite=overwrite,
+            threads=core_count(),
             progress=partial(steps, ""),
             on_result=_print_vehicles if is_printed else lambda _: None,
         )

@@ -139,34 +139,46 @@ class Pipeline:
         """
         with closing(self._searched(frames, source, threads)) as results:
             for result in _delayed(results, self.look_ahead):
-                shown = tuple(self.tracker.at(float(result.frame.time)))
-                complete = replace(result, tracks=shown)
-                for step in self.steps:
-                    complete = step.apply(complete)
-                yield complete
+                yield self.complete(result)
 
     def _searched(
         self, frames: Iterable[Frame], source: Path, threads: int
     ) -> Generator[FrameResult]:
         """Search the frames and update the tracker; yield the results, without tracks."""
-        detector = self.detector
-        prepared = [step for step in self.steps if isinstance(step, ParallelStep)]
-
-        def search(chosen: tuple[Frame, bool]) -> Any:
-            frame, is_searched = chosen
-            for step in prepared:
-                step.prepare(frame)
-            if not is_searched:
-                return None
-            return detector.search(frame.picture, None if self.is_still else frame.index)
-
         chosen = self.rate.choose(frames)
-        with map_ordered(search, chosen, threads, is_work=lambda each: each[1]) as results:
+        with map_ordered(self.search, chosen, threads, is_work=lambda each: each[1]) as results:
             for (frame, searched), candidates in results:
-                detections = detector.detect(candidates) if searched else NO_BOXES
-                if searched:
-                    self.tracker.observe(detections, float(frame.time), frame.picture)
-                yield FrameResult(source, frame, detections, (), searched=searched)
+                yield self.observe(frame, candidates, source, searched=searched)
+
+    def search(self, chosen: tuple[Frame, bool]) -> Any:
+        """Do what needs one frame alone, and search it or not; return the candidates.
+
+        Several threads may call this at once.
+        """
+        frame, searched = chosen
+        for step in self.steps:
+            if isinstance(step, ParallelStep):
+                step.prepare(frame)
+        if not searched:
+            return None
+        return self.detector.search(frame.picture, None if self.is_still else frame.index)
+
+    def observe(
+        self, frame: Frame, candidates: Any, source: Path, *, searched: bool = True
+    ) -> FrameResult:
+        """Return the result of the next frame, without tracks; the tracker follows into it."""
+        if not searched:
+            return FrameResult(source, frame, NO_BOXES, (), searched=False)
+        detections = self.detector.detect(candidates)
+        self.tracker.observe(detections, float(frame.time), frame.picture)
+        return FrameResult(source, frame, detections, ())
+
+    def complete(self, result: FrameResult) -> FrameResult:
+        """Return the next result with its tracks, after all steps."""
+        complete = replace(result, tracks=tuple(self.tracker.at(float(result.frame.time))))
+        for step in self.steps:
+            complete = step.apply(complete)
+        return complete
 
 
 def _delayed(results: Iterable[FrameResult], seconds: Fraction) -> Iterator[FrameResult]:

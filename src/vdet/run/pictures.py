@@ -18,6 +18,7 @@ from vdet.progress import Progress, no_progress
 from vdet.run.loop import build, named_errors
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output, Sink, SinkContext, check_sinks, open_sinks
+from vdet.run.threads import map_ordered
 
 if TYPE_CHECKING:
     from vdet.lanes.road import LaneRequest
@@ -105,26 +106,42 @@ def run_pictures(
     lanes: "LaneRequest | None" = None,
     *,
     overwrite: bool = False,
+    threads: int = 1,
     progress: Progress = no_progress,
     on_result: Callable[[FrameResult], object] = lambda _: None,
 ) -> list[ImageError]:
     """Search pictures; return the errors of those that cannot be read or searched.
 
-    The outputs of one picture appear together. The `shared` outputs, which get the results of all
-    pictures, appear at the end. `progress` gets the number of pictures, and then each; `on_result`
-    gets the result of each.
+    `threads` pictures are read and searched at once. The outputs of one picture appear together.
+    The `shared` outputs, which get the results of all pictures in their order, appear at the end.
+    `progress` gets the number of pictures, and then each; `on_result` gets the result of each.
 
     Raises
     ------
     OutputError
         An output cannot be written.
     """
+
+    def search(job: PictureJob) -> Callable[[], FrameResult] | ImageError:
+        try:
+            return _searched(job.source, read_image(job.source), model, settings, lanes)
+        except ImageError as error:
+            return error
+
     failures: list[ImageError] = []
-    with _open_sinks(shared, model, settings, overwrite=overwrite) as sinks:
+    with (
+        _open_sinks(shared, model, settings, overwrite=overwrite) as sinks,
+        map_ordered(search, jobs, threads) as results,
+    ):
         advance = progress(len(jobs))
-        for job in jobs:
+        for job, searched in results:
             try:
-                result = run_picture(job, model, settings, lanes, shared=sinks, overwrite=overwrite)
+                if isinstance(searched, ImageError):
+                    raise searched
+                result = searched()
+                with _open_sinks(job.outputs, model, settings, overwrite=overwrite) as own:
+                    for sink in (*own, *sinks):
+                        sink.write(result)
                 on_result(result)
             except ImageError as error:
                 failures.append(error)
@@ -136,12 +153,10 @@ def run_picture(
     job: PictureJob,
     model: DetectorModel,
     settings: Settings,
-    lanes: "LaneRequest | None" = None,
     *,
-    shared: Sequence[Sink] = (),
     overwrite: bool = False,
 ) -> FrameResult:
-    """Search a picture, write its outputs together, and give the result to the shared sinks.
+    """Search a picture, and write its outputs together.
 
     Raises
     ------
@@ -150,11 +165,12 @@ def run_picture(
     OutputError
         An output cannot be written.
     """
-    result = detect_picture(job.source, read_image(job.source), model, settings, lanes)
-    with _open_sinks(job.outputs, model, settings, overwrite=overwrite) as own:
-        for sink in (*own, *shared):
-            sink.write(result)
-    return result
+    results: list[FrameResult] = []
+    for error in run_pictures(
+        [job], (), model, settings, overwrite=overwrite, on_result=results.append
+    ):
+        raise error
+    return results[0]
 
 
 def detect_picture(
@@ -174,10 +190,31 @@ def detect_picture(
     ImageError
         The picture cannot be searched.
     """
+    return _searched(source, image, model, settings, lanes)()
+
+
+def _searched(
+    source: Path,
+    image: Image,
+    model: DetectorModel,
+    settings: Settings,
+    lanes: "LaneRequest | None",
+) -> Callable[[], FrameResult]:
+    """Search a picture; return a function that returns the result.
+
+    Threads may call this at once. The functions are called in the order of the pictures: detectors
+    may remember what they have seen.
+    """
+    frame = Frame(0, Fraction(0), Picture(image))
     with named_errors(source, ImageError):
         pipeline = build(model, settings, None, [image], lanes=lanes)
-        (result,) = pipeline.follow([Frame(0, Fraction(0), Picture(image))], source)
-    return result
+        candidates = pipeline.search((frame, True))
+
+    def finish() -> FrameResult:
+        with named_errors(source, ImageError):
+            return pipeline.complete(pipeline.observe(frame, candidates, source))
+
+    return finish
 
 
 @contextmanager
