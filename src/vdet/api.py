@@ -32,6 +32,7 @@ from vdet.errors import VdetError, check_positive
 from vdet.evaluate.scores import Scores
 from vdet.evaluate.video import score_files
 from vdet.lanes.camera import load_camera
+from vdet.lanes.ground import GroundRequest, load_ground
 from vdet.lanes.road import LaneRequest
 from vdet.media import Frame, Picture
 from vdet.media.images import Image
@@ -104,12 +105,7 @@ class Detector:
 
         Each picture is searched for itself; `follow` uses what consecutive frames have in common.
 
-        Raises
-        ------
-        ImageError
-            The picture cannot be searched, for instance because it is too small.
-        ValueError
-            It is no BGR uint8 array.
+        Raises `ImageError` if it is too small to be searched, `ValueError` if it is no such array.
         """
         if image.dtype != "uint8" or image.ndim != 3 or image.shape[2] != 3:
             raise ValueError(
@@ -199,12 +195,7 @@ def follow(
     threads
         Threads of the search; the results do not depend on it.
 
-    Raises
-    ------
-    VideoError
-        The video cannot be read or searched.
-    ConfigError
-        A number is less than 1.
+    Raises `VideoError` if the video cannot be read or searched.
     """
     check_positive(frames=frames, threads=threads)
     settings, loaded, tracker = _resolved(settings, model, detector, tracker)
@@ -231,6 +222,7 @@ def detect_video(
     at: Seconds = 0,
     lanes: bool = False,
     camera: PathName | None = None,
+    ground: PathName | None = None,
     threads: int | None = None,
     overwrite: bool = False,
     progress: Callable[[int, int | None], object] | None = None,
@@ -250,6 +242,8 @@ def detect_video(
         Other outputs, one path or several, by the name of their sink.
     at
         The moment of the output "stages", seconds from the first frame.
+    ground
+        The file of the ground, for the speeds of vehicles.
     threads
         Threads of the search; None for one a core.
     overwrite
@@ -263,8 +257,10 @@ def detect_video(
     settings, loaded, tracker = _resolved(settings, model, detector, tracker)
     wanted = _outputs({"video": video, "tracks": tracks, **(outputs or {})})
     part = _exact(start), _exact(end), frames, Fraction(str(at))
-    request, inputs = _lanes(lanes, camera), _inputs(model, camera, settings.regions.mask)
-    job = VideoJob(Path(source), wanted, *part, request, inputs, overwrite, threads)
+    request, inputs = _lanes(lanes, camera), _inputs(model, camera, ground, settings.regions.mask)
+    job = VideoJob(
+        Path(source), wanted, *part, request, inputs, overwrite, threads, ground=_ground(ground)
+    )
     check_job(job)
     reported = reporting(progress) if progress else no_progress
     return run_video(job, loaded, settings, tracker=tracker, steps=steps, progress=reported)
@@ -303,6 +299,7 @@ def count_tracks(
     size: tuple[int, int] | None = None,
     rate: float | None = None,
     settings: Settings | None = None,
+    ground: PathName | None = None,
 ) -> Counts:
     """Count the vehicles of a video at lines and in zones, from its tracks.
 
@@ -318,13 +315,15 @@ def count_tracks(
         Width and height of the frames, pixels; None: as the tracks or the lines say.
     rate
         Frames per second, for a file of tracks without times.
+    ground
+        The file of the ground, for the speeds at events.
     """
     counts = (settings or Settings()).counts
     if lines is not None:
         counts = load_layers(places={"counts": Path(lines)}).counts
     if isinstance(tracks, str | PathLike):
-        return count_file(Path(tracks), counts, size, rate)
-    return count_frames(tracks, counts, size)
+        return count_file(Path(tracks), counts, size, rate, _ground(ground))
+    return count_frames(tracks, counts, size, _ground(ground))
 
 
 def evaluate_tracks(
@@ -339,10 +338,7 @@ def evaluate_tracks(
     rate
         Frames per second of the video, where the files do not say it.
 
-    Raises
-    ------
-    TruthError
-        A file cannot be used.
+    Raises `TruthError` if a file cannot be used.
     """
     return score_files(Path(tracks), Path(truth), until=until, rate=rate).total
 
@@ -389,6 +385,10 @@ def _lanes(lanes: bool, camera: PathName | None) -> LaneRequest | None:
     if camera is not None:
         return LaneRequest(load_camera(Path(camera)))
     return LaneRequest() if lanes else None
+
+
+def _ground(file: PathName | None) -> GroundRequest | None:
+    return None if file is None else load_ground(Path(file))
 
 
 def _exact(seconds: Seconds | None) -> Fraction | None:

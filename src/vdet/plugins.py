@@ -29,6 +29,7 @@ _BUILT_IN: dict[str, dict[str, str]] = {
         "detect-video": "vdet.cli.detect_video:detect_video",
         "doctor": "vdet.cli.doctor:doctor",
         "eval": "vdet.cli.evaluate:eval_group",
+        "ground": "vdet.cli.ground:ground",
         "info": "vdet.cli.info:info",
         "mine": "vdet.cli.mine:mine",
         "paths": "vdet.cli.paths:paths",
@@ -53,6 +54,7 @@ _BUILT_IN: dict[str, dict[str, str]] = {
     STEPS: {
         "lanes": "vdet.run.steps:lane_step",
         "regions": "vdet.run.steps:region_step",
+        "speeds": "vdet.run.steps:speed_step",
         "counts": "vdet.run.steps:count_step",
     },
     FORMATS: {

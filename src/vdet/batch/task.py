@@ -78,7 +78,7 @@ class Work:
         shown = settings.model_copy(update={"detector": settings.detector.showing_all()})
         wanted = (
             *(f"vdet {__version__}", sha256, job.start, job.end, job.frames, job.lanes),
-            *(job.begin, job.interval),
+            *(job.begin, job.interval, job.ground),
             _digest_of(mask),
             shown.model_dump_json(include=_sections(sinks, with_lanes=job.lanes is not None)),
         )

@@ -39,7 +39,7 @@ log = logging.getLogger("vdet")
     options.RATE,
     show_default="from the times in TRACKS",
 )
-@options.settings_options("counts.confirmed=0.5", options.lines_option)
+@options.settings_options("counts.confirmed=0.5", options.lines_option, options.ground_option)
 @options.overwrite_option
 def count(
     tracks: tuple[Path, ...],
@@ -68,7 +68,13 @@ def count(
     with progress_steps(" files") as steps:
         advance = steps("", len(tracks) if len(tracks) > 1 else None)
         videos = count_files(
-            tracks, settings.counts, size, rate, begin=counting.begin, advance=advance
+            tracks,
+            settings.counts,
+            size,
+            rate,
+            begin=counting.begin,
+            ground=choice.ground(),
+            advance=advance,
         )
     for name, counts in videos.items():
         if counts.clock and not is_quiet():

@@ -125,7 +125,11 @@ _batch_options = options.bundle(
 @_batch_options
 @options.lane_options
 @options.settings_options(
-    "output.crf=18", options.regions_option, options.lines_option, options.model_option
+    "output.crf=18",
+    options.regions_option,
+    options.lines_option,
+    options.ground_option,
+    options.model_option,
 )
 @options.overwrite_option
 def detect_video(
@@ -173,7 +177,7 @@ def detect_video(
     check_mask(settings.regions)
     inputs = (*choice.inputs(settings, settings.detector), *([camera] if camera else []))
     part = start, end, frames, at or Fraction(0)
-    job = VideoJob(source, (), *part, request, inputs, overwrite)
+    job = VideoJob(source, (), *part, request, inputs, overwrite, ground=choice.ground())
     job = replace(job, begin=counting.begin, interval=counting.interval)
     if batch.folder is None:
         job = replace(job, outputs=options.as_outputs(wanted), threads=threads)

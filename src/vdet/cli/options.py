@@ -20,6 +20,7 @@ from vdet.errors import ConfigError, OutputError
 if TYPE_CHECKING:
     from vdet.config.schema import DetectorSettings, Settings
     from vdet.detect.protocol import DetectorModel
+    from vdet.lanes.ground import GroundRequest
     from vdet.lanes.road import LaneRequest
     from vdet.run.sinks.protocol import Output
 
@@ -150,6 +151,11 @@ regions_option = option(
     "Search only these regions of the frame: polygons (.yaml), or a mask, which is a picture with "
     "the regions in white.",
 )
+ground_option = option(
+    "--ground FILE",
+    "Measure metres and speeds by this file (.yaml): points of the road in pixels and in metres.",
+    name="ground_file",
+)
 lines_option = option("--lines FILE", "Count at the lines and zones of this file (.yaml).")
 
 
@@ -178,6 +184,7 @@ class SettingsChoice:
     model_path: Path | None = None
     regions: Path | None = None
     lines: Path | None = None
+    ground_file: Path | None = None
 
     def read(self, *more: str, detector: str | None = None) -> "Settings":
         """Read them; `more` are further assignments.
@@ -193,6 +200,14 @@ class SettingsChoice:
         named = {"regions": self.regions, "counts": self.lines}
         places = {name: file for name, file in named.items() if file}
         return load_settings(path, (*self.assignments, *more), places, detector=detector)
+
+    def ground(self) -> "GroundRequest | None":
+        """Read the file of the ground; None without one. Raises `ConfigError`."""
+        if self.ground_file is None:
+            return None
+        from vdet.lanes.ground import load_ground
+
+        return load_ground(self.ground_file)
 
     def load_detector(self, settings: "DetectorSettings") -> "DetectorModel":
         """Load the detector.
@@ -215,7 +230,7 @@ class SettingsChoice:
 
         config = self.config_name and find_config(self.config_name)
         model = detector and model_file(detector, self.model_path)
-        named = (config, self.regions, self.lines, settings.regions.mask, model)
+        named = (config, self.regions, self.lines, self.ground_file, settings.regions.mask, model)
         return [Path(each) for each in named if each]
 
     def read_for_whole_frames(self, *more: str, detector: str | None = None) -> "Settings":
@@ -317,11 +332,13 @@ def as_outputs(wanted: Iterable[Wanted]) -> tuple["Output", ...]:
     return tuple(Output(sink, path) for sink, path in wanted)
 
 
+camera_option = option("--camera FILE", "Undistort with this file, which vdet calibrate wrote.")
+
+
 def lane_options(command: F) -> F:
     """Add `--lanes` and `--camera FILE`, for `read_lanes`."""
-    text = "Undistort for --lanes with this file, which vdet calibrate wrote."
     add_lanes = option("--lanes", "Find the lane too, and draw it into undistorted frames.")
-    return add_lanes(option("--camera FILE", text)(command))
+    return add_lanes(camera_option(command))
 
 
 def read_lanes(lanes: bool, camera: Path | None) -> "LaneRequest | None":

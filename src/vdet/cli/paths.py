@@ -22,7 +22,9 @@ from vdet.files import check_output
 @options.output_file_option("Picture to write, .jpg or .png.")
 @option("--no-paths", "Search nothing: draw only the grid, and the lines and zones of --lines.")
 @watch_options
-@options.settings_options("detector.stride=2", options.lines_option, options.model_option)
+@options.settings_options(
+    "detector.stride=2", options.lines_option, options.ground_option, options.model_option
+)
 @options.overwrite_option
 def paths(
     clip: Path,
@@ -36,11 +38,12 @@ def paths(
 
     CLIP is a video or a picture. The paths are coloured by direction: they begin at a dot and end
     at a tip. The grid has pixel coordinates as lines.yaml takes them. With --lines, the lines and
-    zones of a file are drawn too, with the sides of the lines. In a picture nothing is searched.
+    zones of a file are drawn too, with the sides of the lines. With --ground, the grid is in metres
+    on the road. In a picture nothing is searched.
     """
     from vdet.media.images import PICTURE_SUFFIXES, is_picture_name, write_image
     from vdet.traffic.borders import place
-    from vdet.traffic.paths import draw_grid, draw_paths, draw_places
+    from vdet.traffic.paths import draw_grid, draw_ground, draw_paths, draw_places
 
     settings = choice.read()
     options.check_suffix(output, ".jpg", *sorted(PICTURE_SUFFIXES), what="pictures")
@@ -52,8 +55,12 @@ def paths(
         lines, zones = place(settings.counts, width, height)
     except ConfigError as error:
         raise ConfigError(f"{clip}: counts.{error}") from error
+    ground = choice.ground()
     is_still = is_picture_name(clip) and "%" not in clip.name
-    draw_grid(image)
+    if ground:
+        draw_ground(image, ground.ground(width, height))
+    else:
+        draw_grid(image)
     found = ""
     if not no_paths and (watched.tracks or not is_still):
         records = watched.records(clip, width, settings, choice)

@@ -2,13 +2,14 @@
 
 import re
 import reprlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import yaml
+from pydantic import TypeAdapter, ValidationError
 
 from vdet.errors import ConfigError
 from vdet.files import printable, read_whole
@@ -18,6 +19,8 @@ MAX_BYTES = 100_000
 MAX_INTEGER_BITS = 64
 MAX_MISTAKES = 20
 """Most mistakes of one file that are shown; the others are counted."""
+
+T = TypeVar("T")
 
 Key = tuple[str | int, ...]
 """Path to a value from the root: `("search", "windows", 0, "size")`."""
@@ -97,6 +100,30 @@ def read_document(path: Path) -> Document:
     except UnicodeDecodeError as error:
         raise ConfigError(f"{path}: is not UTF-8 text; that is no settings file") from error
     return parse_document(text, str(path))
+
+
+def read_values(path: Path, kind: type[T], mistakes: Mapping[str, str]) -> T:
+    """Read a YAML file as a value of a class that pydantic checks.
+
+    `mistakes` are messages by pydantic's type of the mistake.
+
+    Raises
+    ------
+    ConfigError
+        As of `read_document`; or the values are wrong, with one line for each mistake.
+    """
+    document = read_document(path)
+    try:
+        return TypeAdapter(kind).validate_python(document.values)
+    except ValidationError as error:
+        lines = []
+        for detail in error.errors():
+            key = tuple(detail["loc"])
+            said = detail["msg"].removeprefix("Value error, ").removeprefix("Input ")
+            named = f"{format_key(key)}: " if key else ""
+            text = mistakes.get(detail["type"], said)
+            lines.append(f"{document.place_of(key)}: {named}{text}")
+        raise config_error(lines, len(lines)) from error
 
 
 def parse_document(text: str, name: str) -> Document:

@@ -7,12 +7,12 @@ from typing import Annotated
 import cv2
 import numpy as np
 import yaml
-from pydantic import ConfigDict, Field, TypeAdapter, ValidationError, field_validator
+from pydantic import ConfigDict, Field, field_validator
 from pydantic.dataclasses import dataclass
 from pydantic_core.core_schema import ValidationInfo
 
 from vdet.boxes import Box, Float64Array
-from vdet.config.document import config_error, format_key, read_document
+from vdet.config.document import read_values
 from vdet.errors import ConfigError
 from vdet.files import staged
 from vdet.media.images import Image
@@ -121,6 +121,15 @@ class Undistorter:
         moved = cv2.undistortPoints(points[:, None], matrix, distortion, P=matrix)
         return np.asarray(moved, np.float64).reshape(-1, 2)
 
+    def distorted(self, points: Float64Array) -> Float64Array:
+        """Return where pixels `(n, 2)` of the undistorted frame lie in the frame, `(n, 2)`."""
+        if not self._camera:
+            return points
+        rays = np.column_stack([points, np.ones(len(points))]) @ np.linalg.inv(self._matrix).T
+        zero = np.zeros(3)
+        moved, _ = cv2.projectPoints(rays, zero, zero, self._matrix, self._distortion)
+        return np.asarray(moved, np.float64).reshape(-1, 2)
+
     def box(self, box: Box) -> Box:
         """Return the box around the content of `box` in the undistorted frame, in whole pixels.
 
@@ -154,14 +163,4 @@ def load_camera(path: Path) -> CalibratedCamera:
     ConfigError
         The file cannot be read, is not YAML, or is not a camera file; one line for each mistake.
     """
-    document = read_document(path)
-    try:
-        return TypeAdapter(CalibratedCamera).validate_python(document.values)
-    except ValidationError as error:
-        lines = []
-        for detail in error.errors():
-            key = tuple(detail["loc"])
-            said = detail["msg"].removeprefix("Value error, ").removeprefix("Input ")
-            text = _MISTAKES.get(detail["type"], said)
-            lines.append(f"{document.place_of(key)}: {format_key(key)}: {text}")
-        raise config_error(lines, len(lines)) from error
+    return read_values(path, CalibratedCamera, _MISTAKES)

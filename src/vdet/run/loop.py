@@ -24,6 +24,7 @@ from vdet.track.factory import make_tracker, timed
 from vdet.track.track import TimedTracker, Track, VideoTracker
 
 if TYPE_CHECKING:
+    from vdet.lanes.ground import GroundRequest
     from vdet.lanes.road import LaneRequest
 
 FIRST_FRAMES = 2
@@ -202,6 +203,7 @@ def build(
     tracker: VideoTracker | None = None,
     steps: Sequence[Step] = (),
     lanes: "LaneRequest | None" = None,
+    ground: "GroundRequest | None" = None,
 ) -> Pipeline:
     """Make the pipeline of a video, or of one still picture.
 
@@ -218,17 +220,19 @@ def build(
         Steps in addition to those of the settings.
     lanes
         If given, the lane is found too, and the distance and the lane of each vehicle.
+    ground
+        If given, the speeds of the vehicles are measured.
 
     Raises
     ------
     FrameSizeError
         Frames of this size are too small to be searched.
     ConfigError, ImageError
-        The regions, the lines or the camera do not fit the frames.
+        The regions, the lines, the ground or the camera do not fit the frames.
     """
     height, width = (video.height, video.width) if video else images[0].shape[:2]
     detector = model.for_video(width, height, images)
-    made = make_steps(StepContext(settings, width, height, video, lanes), steps)
+    made = make_steps(StepContext(settings, width, height, video, lanes, ground), steps)
     if video is None:
         return Pipeline(detector, timed(StillTracker()), made, is_still=True)
     followed_by = timed(tracker) if tracker else make_tracker(settings, width, height)

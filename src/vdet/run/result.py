@@ -11,6 +11,7 @@ from vdet.track.track import FrameTracks, Track
 if TYPE_CHECKING:
     from vdet.lanes.road import Road
     from vdet.traffic.counter import VehicleCounter
+    from vdet.traffic.speeds import SpeedMeter
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +34,8 @@ class FrameResult:
     counter
         It has counted up to this frame; None if there are no lines and zones. All results of a
         video share it.
+    speeds
+        It has measured up to this frame; None without a ground. All results of a video share it.
     """
 
     source: Path
@@ -42,6 +45,7 @@ class FrameResult:
     road: "Road | None" = None
     searched: bool = True
     counter: "VehicleCounter | None" = None
+    speeds: "SpeedMeter | None" = None
 
     @property
     def frame_tracks(self) -> FrameTracks:

@@ -17,9 +17,11 @@ from vdet.run.result import FrameResult
 from vdet.track.track import Track
 
 if TYPE_CHECKING:
+    from vdet.lanes.ground import GroundRequest
     from vdet.lanes.road import FrameView, LaneRequest, Road, RoadFinder
     from vdet.regions import Regions
     from vdet.traffic.counter import VehicleCounter
+    from vdet.traffic.speeds import SpeedMeter
 
 
 class Step(Protocol):
@@ -52,6 +54,8 @@ class StepContext:
         None for a still picture.
     lanes
         None if lanes are not looked for.
+    ground
+        None if no speeds are measured.
     """
 
     settings: Settings
@@ -59,6 +63,7 @@ class StepContext:
     height: int
     video: VideoInfo | None = None
     lanes: "LaneRequest | None" = None
+    ground: "GroundRequest | None" = None
 
 
 StepKind = Callable[[StepContext], Step | None]
@@ -133,6 +138,18 @@ class RegionStep:
         return replace(result, detections=detections, tracks=tracks)
 
 
+class SpeedStep:
+    """Measures the speeds of the vehicles that are shown."""
+
+    def __init__(self, speeds: "SpeedMeter") -> None:
+        self._speeds = speeds
+
+    def apply(self, result: FrameResult) -> FrameResult:
+        """Measure in the next frame, and add the meter."""
+        self._speeds.add(result.frame_tracks)
+        return replace(result, speeds=self._speeds)
+
+
 class CountStep:
     """Counts the vehicles that are shown, at the lines and in the zones."""
 
@@ -164,6 +181,16 @@ def region_step(context: StepContext) -> Step | None:
 
     regions = lay_regions(context.settings.regions, context.width, context.height)
     return RegionStep(regions) if regions else None
+
+
+def speed_step(context: StepContext) -> Step | None:
+    """Make a `SpeedStep` if the ground is known; a still picture has no speeds."""
+    if context.ground is None or context.video is None:
+        return None
+    from vdet.traffic.speeds import SpeedMeter
+
+    size = context.width, context.height
+    return SpeedStep(SpeedMeter(context.ground.ground(*size), *size))
 
 
 def count_step(context: StepContext) -> Step | None:

@@ -29,6 +29,7 @@ from vdet.traffic.counter import VehicleCounter
 from vdet.workers import core_count
 
 if TYPE_CHECKING:
+    from vdet.lanes.ground import GroundRequest
     from vdet.lanes.road import LaneRequest
 
 log = logging.getLogger("vdet")
@@ -54,6 +55,8 @@ class VideoJob:
         frames from 2 s before it are processed.
     lanes
         If given, the lane is found too, and everything is drawn on undistorted frames.
+    ground
+        If given, the speeds of the vehicles are measured.
     inputs
         Other files that are read, such as settings; outputs never replace them.
     overwrite
@@ -86,6 +89,7 @@ class VideoJob:
     timeout: float = IO_TIMEOUT
     begin: str | None = None
     interval: int | None = None
+    ground: "GroundRequest | None" = None
 
     @property
     def is_part(self) -> bool:
@@ -159,7 +163,12 @@ def open_video(
                 raise _no_frame(job, f"{float(latest):.2f} s is beyond its end", reader.length)
             images, frames = peek(read)
             make = partial(
-                build, settings=settings, video=reader.info, images=images, lanes=job.lanes
+                build,
+                settings=settings,
+                video=reader.info,
+                images=images,
+                lanes=job.lanes,
+                ground=job.ground,
             )
             try:
                 pipeline = make(model, tracker=tracker, steps=steps)

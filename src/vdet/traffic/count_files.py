@@ -16,6 +16,7 @@ from vdet.traffic.tables import VIDEO, is_json, join, plain_moment, write_json, 
 _EVENTS = (
     *("time", "clock", "frame", "name", "direction"),
     *("id", "vehicle", "class", "score", "seconds"),
+    *("speed", "speed_sd", "mean_speed"),
 )
 _TOTALS = ("start", "end", "name", "direction", "class", "count")
 _ZONES = (

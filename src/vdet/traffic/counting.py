@@ -9,11 +9,13 @@ from pathlib import Path
 from vdet.config.places import CountSettings
 from vdet.errors import ConfigError, TruthError
 from vdet.labels.reading import read_tracks
+from vdet.lanes.ground import GroundRequest
 from vdet.progress import Advance
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Clock, find_clock
 from vdet.traffic.counter import VehicleCounter
 from vdet.traffic.counts import Counts, Event
+from vdet.traffic.speeds import SpeedMeter, with_speeds
 
 _SEAM = 2.0
 """Largest difference, in seconds, of the end of a video and the start of one that goes on from it:
@@ -27,9 +29,10 @@ def count_file(
     settings: CountSettings,
     size: tuple[int, int] | None = None,
     rate: float | None = None,
+    ground: GroundRequest | None = None,
 ) -> Counts:
     """Count the vehicles of a file of tracks; arguments and errors as of `count_files`."""
-    return count_files([path], settings, size, rate)[str(path)]
+    return count_files([path], settings, size, rate, ground=ground)[str(path)]
 
 
 def count_files(
@@ -39,6 +42,7 @@ def count_files(
     rate: float | None = None,
     *,
     begin: str | None = None,
+    ground: GroundRequest | None = None,
     advance: Advance = lambda _: None,
 ) -> dict[str, Counts]:
     """Count the vehicles of files of tracks at the lines and in the zones of the settings.
@@ -54,6 +58,8 @@ def count_files(
         Frames per second, for a file without times.
     begin
         As of `find_clock`.
+    ground
+        If given, the speeds of the vehicles are measured.
     advance
         Called after each file with 1.
 
@@ -70,6 +76,7 @@ def count_files(
         `begin` says.
     """
     counted: dict[str, Counts] = {}
+    meters: dict[str, SpeedMeter | None] = {}
     group: _Group | None = None
     for path in paths:
         saved = read_tracks(path, rate)
@@ -82,17 +89,34 @@ def count_files(
             counted |= group.counts() if group else {}
             group = _Group(settings, place, group.begun if group else 0)
         group.add(str(path), clock, frames)
+        meters[str(path)] = _meter(frames, ground, place)
         advance(1)
-    return counted | (group.counts() if group else {})
+    counted |= group.counts() if group else {}
+    return {name: with_speeds(counts, meters[name]) for name, counts in counted.items()}
 
 
 def count_frames(
-    frames: Iterable[FrameTracks], settings: CountSettings, size: tuple[int, int] | None = None
+    frames: Iterable[FrameTracks],
+    settings: CountSettings,
+    size: tuple[int, int] | None = None,
+    ground: GroundRequest | None = None,
 ) -> Counts:
     """Count the vehicles in the tracks of each frame; arguments and errors as of `count_files`."""
-    group = _Group(settings, _size(settings, size))
-    group.add("", None, tuple(frames))
-    return group.counts()[""]
+    place, every = _size(settings, size), tuple(frames)
+    group = _Group(settings, place)
+    group.add("", None, every)
+    return with_speeds(group.counts()[""], _meter(every, ground, place))
+
+
+def _meter(
+    frames: Iterable[FrameTracks], ground: GroundRequest | None, size: tuple[int, int]
+) -> SpeedMeter | None:
+    if ground is None:
+        return None
+    meter = SpeedMeter(ground.ground(*size), *size)
+    for frame in frames:
+        meter.add(frame)
+    return meter
 
 
 def _size(settings: CountSettings, size: tuple[int, int] | None) -> tuple[int, int]:

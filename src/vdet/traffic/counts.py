@@ -52,6 +52,11 @@ class Event:
         Score of the track in `frame`, 0 to 1.
     seconds
         How long the vehicle was in the zone, for exit and vanish; else None.
+    speed, speed_sd
+        Speed at `time`, and its standard deviation, km/h; None where it is not known.
+    mean_speed
+        Mean speed since the event before of the same track, from the places at both events alone,
+        km/h; None where it is not known.
     """
 
     time: float
@@ -63,6 +68,9 @@ class Event:
     class_name: str | None
     score: float
     seconds: float | None = None
+    speed: float | None = None
+    speed_sd: float | None = None
+    mean_speed: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

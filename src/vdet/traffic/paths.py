@@ -6,8 +6,9 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from vdet.draw.boxes import BLACK, WHITE, draw_label, draw_line, draw_zone, line_width
+from vdet.draw.boxes import BLACK, LINE, WHITE, draw_label, draw_line, draw_zone, line_width
 from vdet.draw.paint import Color, draw_arrow, draw_lines
+from vdet.lanes.ground import Ground
 from vdet.media.images import Image
 from vdet.polygons import Point
 from vdet.traffic.borders import PlacedLine, Zone
@@ -18,6 +19,8 @@ _MOST_LINES = 14
 """Largest number of grid lines across the frame."""
 _GRID = 0.3
 """Opacity of the grid."""
+_GRID_POINTS = 40
+"""Number of points of a line of the grid in metres."""
 _LEAST = 0.03
 """Length of the shortest path that is drawn, as a share of the frame's width."""
 _TIP = 0.02
@@ -69,6 +72,25 @@ def draw_grid(image: Image) -> None:
         draw_label(image, str(x), (x, 0), BLACK)
     for y in range(step, height, step):
         draw_label(image, str(y), (0, y), BLACK)
+
+
+def draw_ground(image: Image, ground: Ground) -> None:
+    """Draw lines at round numbers of metres over the calibrated area, with the metres at its edge.
+
+    The area is outlined.
+    """
+    draw_lines(image, ground.pixels(ground.area), LINE, line_width(image), closed=True)
+    lowest, highest = ground.area.min(axis=0), ground.area.max(axis=0)
+    step = next(step for step in (1, 2, 5, 10, 20, 50, 1e9) if ground.length / step <= _MOST_LINES)
+    for axis in (0, 1):
+        along = np.linspace(lowest[1 - axis], highest[1 - axis], _GRID_POINTS)
+        for at in np.arange(math.ceil(lowest[axis] / step) * step, highest[axis] + 1e-6, step):
+            points = np.empty((_GRID_POINTS, 2))
+            points[:, axis], points[:, 1 - axis] = at, along
+            pixels = ground.pixels(points)
+            draw_lines(image, pixels, WHITE, 1)
+            x, y = pixels[0].tolist()
+            draw_label(image, f"{at:g} m", (x, y), BLACK)
 
 
 def draw_places(image: Image, lines: Sequence[PlacedLine], zones: Sequence[Zone]) -> None:

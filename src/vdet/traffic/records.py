@@ -12,6 +12,7 @@ from vdet.detect.classes import ClassScores
 from vdet.polygons import Point
 from vdet.track.track import FrameTracks, State, Track
 from vdet.traffic.clock import Clock
+from vdet.traffic.speeds import KMH, SpeedMeter, Speeds
 from vdet.traffic.tables import VIDEO, is_json, join, plain_moment, write_json, write_table
 
 PATH_STEP = 0.01
@@ -25,9 +26,10 @@ _COLUMNS = (
     *("mean_score", "best_score"),
     *("start_x", "start_y", "end_x", "end_y", "length", "length_share"),
     *("x", "y", "width", "height"),
+    *("metres", "speed", "speed_85", "speed_sd"),
 )
 """Columns of a `.csv`; `clock` is the moment of `first`, x, y, width and height are those of the
-largest box.
+largest box, speeds are km/h.
 """
 
 
@@ -55,6 +57,8 @@ class VehicleRecord:
     path
         Where it stood (`Track.foot`): the first point, a point after each step, and the last point.
         Frames in which it was lost do not count, unless it was in all.
+    speeds
+        None where they are not known.
     """
 
     id: int
@@ -68,6 +72,7 @@ class VehicleRecord:
     sum_of_scores: float = 0.0
     classes: ClassScores = field(default_factory=ClassScores)
     path: list[Point] = field(default_factory=list)
+    speeds: Speeds | None = None
 
     @property
     def class_name(self) -> str | None:
@@ -139,9 +144,11 @@ class VehicleRecords:
             self._vehicles[track.id].add(track, frame.time)
         self._latest = frame
 
-    def end(self) -> tuple[VehicleRecord, ...]:
-        """Return the records by id; call it once, after the last frame."""
+    def end(self, meter: SpeedMeter | None = None) -> tuple[VehicleRecord, ...]:
+        """Return the records by id, with the speeds of a meter; call it once, at the end."""
         self._show()
+        for number, speeds in (meter.speeds() if meter else {}).items():
+            self._vehicles[number].speeds = speeds
         return tuple(record for _, record in sorted(self._vehicles.items()))
 
     def _show(self) -> None:
@@ -179,12 +186,22 @@ def _row(record: VehicleRecord, clock: Clock | None) -> list[Any]:
     lengths = round(record.length, 1), round(record.share, 4)
     states = [record.states[state] for state in get_args(State)]
     known = record.id, record.class_name, begin, *times, *states, *scores
-    return [*known, *ends, *lengths, *record.largest.xywh]
+    return [*known, *ends, *lengths, *record.largest.xywh, *_speeds(record.speeds)]
+
+
+def _speeds(speeds: Speeds | None) -> list[float | None]:
+    """Return the metres, the median, the 85th percentile and the standard deviation, km/h."""
+    if speeds is None:
+        return [None] * 4
+    known = speeds.quantile(0.5), speeds.quantile(0.85), speeds.deviation
+    return [round(speeds.metres, 1), *(round(KMH * value, 1) for value in known)]
 
 
 def _item(*row: Any) -> dict[str, Any]:
     """Return a row as values for JSON."""
     *ends, length, share = row[11:17]
     path = {"start": ends[:2], "end": ends[2:], "length": length, "length_share": share}
-    largest = dict(zip(_COLUMNS[17:], row[17:], strict=True))
-    return {**dict(zip(_COLUMNS[:11], row, strict=False)), "path": path, "largest": largest}
+    largest = dict(zip(_COLUMNS[17:21], row[17:21], strict=True))
+    known = dict(zip(_COLUMNS[:11], row, strict=False))
+    speeds = dict(zip(_COLUMNS[21:], row[21:], strict=True))
+    return {**known, "path": path, "largest": largest, **speeds}

@@ -29,6 +29,7 @@ from vdet.traffic.count_files import (
 )
 from vdet.traffic.counter import VehicleCounter
 from vdet.traffic.records import VehicleRecords, join_records, write_records
+from vdet.traffic.speeds import SpeedMeter, with_speeds
 from vdet.traffic.tables import SUFFIXES
 
 WriteCounts = Callable[[Path, Videos, int | None], None]
@@ -126,13 +127,16 @@ class VehicleSink(BaseSink):
     def __init__(self, path: Path, context: SinkContext) -> None:
         super().__init__(path, context)
         self._records = VehicleRecords(self.video.width)
+        self._speeds: SpeedMeter | None = None
 
     def finish(self) -> None:
         """Write the records."""
-        write_records(self._records.end(), self.context.files.stage(self.path), self.context.clock)
+        records = self._records.end(self._speeds)
+        write_records(records, self.context.files.stage(self.path), self.context.clock)
 
     def write(self, result: FrameResult) -> None:
         """Add a frame."""
+        self._speeds = result.speeds
         self._records.add(result.frame_tracks)
 
 
@@ -155,19 +159,21 @@ class CountsSink(BaseSink):
         super().__init__(path, context)
         self._write_table = write_table
         self._counter: VehicleCounter | None = None
+        self._speeds: SpeedMeter | None = None
         if not context.settings.counts:
             raise OutputError(f"{path}: there is nothing to count at; give lines or zones")
 
     def finish(self) -> None:
         """Write the table."""
         if self._counter:
-            counts = replace(self._counter.counts(), clock=self.context.clock)
+            counts = with_speeds(self._counter.counts(), self._speeds)
+            counts = replace(counts, clock=self.context.clock)
             target = self.context.files.stage(self.path)
             self._write_table(target, {self.video.path.name: counts}, self.context.interval)
 
     def write(self, result: FrameResult) -> None:
         """Keep the counter: at the end it has the counts of all frames."""
-        self._counter = result.counter
+        self._counter, self._speeds = result.counter, result.speeds
 
 
 COUNTS = SinkKind(

@@ -1,0 +1,194 @@
+"""The road plane of a camera: from pixels to metres, fitted to points whose metres are known.
+
+The plane is taken as flat. A homography (Hartley and Zisserman 2004, ch. 4) is fitted so that the
+squared distances in pixels are smallest, because pixels are what is read off a picture.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import cv2
+import numpy as np
+from pydantic import Field
+
+from vdet.boxes import Float64Array
+from vdet.config.document import read_values
+from vdet.config.places import Coordinate, Place, PlacedSection
+from vdet.config.section import Section
+from vdet.errors import ConfigError
+from vdet.lanes.camera import CalibratedCamera, Undistorter, load_camera
+
+_THIN = 0.01
+"""Width of points that count as one line, as a share of their length."""
+_MOST_ERROR = 0.03
+"""Largest error of the fit, as a share of the length of the area."""
+_MISTAKES = {"missing": "is missing", "extra_forbidden": "is not a key of files of the ground"}
+
+
+class GroundPoint(Section):
+    """A point of the road."""
+
+    pixel: Place
+    """Where it is in the frame, x and y; whole numbers are the middles of pixels."""
+    metres: tuple[Coordinate, Coordinate]
+    """Where it is on the road, x and y in metres from any point, at right angles."""
+
+
+class GroundPoints(PlacedSection):
+    """A file of the ground: points of the road in pixels and in metres."""
+
+    points: Annotated[tuple[GroundPoint, ...], Field(max_length=100)]
+    """Four points or more, around the part of the road in which speeds are measured."""
+    camera: str | None = None
+    """The camera file of `vdet calibrate`, for a lens that distorts; null for one that does not."""
+
+
+def load_ground(path: Path) -> "GroundRequest":
+    """Read a file of the ground, and the camera that it names, beside it.
+
+    Raises
+    ------
+    ConfigError
+        A file cannot be read, or has a mistake; one line for each.
+    """
+    points = read_values(path, GroundPoints, _MISTAKES)
+    camera = load_camera(path.parent / points.camera) if points.camera else None
+    return GroundRequest(str(path), points, camera)
+
+
+@dataclass(frozen=True, slots=True)
+class GroundRequest:
+    """Ask for metres: the points of a file, and the camera that it names."""
+
+    name: str
+    points: GroundPoints
+    camera: CalibratedCamera | None = None
+
+    def ground(self, width: int, height: int) -> "Ground":
+        """Fit the road plane for frames of `width` × `height` pixels.
+
+        Raises
+        ------
+        ConfigError
+            The points do not fix a plane, do not fit together, or are for frames of another shape.
+        """
+        try:
+            scales = self.points.scales(width, height)
+            pixels = np.array([each.pixel for each in self.points.points], np.float64)
+            metres = np.array([each.metres for each in self.points.points], np.float64)
+            undistorter = Undistorter(self.camera, width, height)
+            return fit_ground(pixels.reshape(-1, 2) * scales, metres.reshape(-1, 2), undistorter)
+        except ConfigError as error:
+            raise ConfigError(f"{self.name}: {error}") from error
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ground:
+    """The road plane in frames of one size.
+
+    Attributes
+    ----------
+    to_metres
+        Homography `(3, 3)` from pixels of the undistorted frame, positive below the horizon.
+    area
+        Corners of the calibrated area in order around it, metres `(n, 2)`.
+    error, pixel_error
+        Root mean square distance of the points from the fit, metres and pixels.
+    row
+        Metres that a row of pixels makes at the points, the median.
+    """
+
+    to_metres: Float64Array
+    area: Float64Array
+    error: float
+    pixel_error: float
+    row: float
+    undistorter: Undistorter
+
+    @property
+    def length(self) -> float:
+        """The largest distance in the calibrated area, metres."""
+        return _length(self.area)
+
+    @property
+    def scale_error(self) -> float:
+        """Relative standard deviation of lengths, where a point is off by a pixel at least."""
+        return self.row * max(self.pixel_error, 1.0) / self.length
+
+    def place(self, pixels: Float64Array) -> Float64Array:
+        """Return where on the road points `(n, 2)` of the frame are, metres `(n, 2)`.
+
+        Whole numbers of pixels are the edges of pixels, as in boxes. NaN above the horizon, and
+        farther from the calibrated area than its own length.
+        """
+        metres = _mapped(self.to_metres, self.undistorter.points(pixels - 0.5))
+        along = np.roll(self.area, -1, axis=0) - self.area
+        outward = np.column_stack([along[:, 1], -along[:, 0]]) / np.hypot(*along.T)[:, None]
+        outside = (metres[:, None] - self.area) * outward
+        beyond = outside.sum(axis=2).max(axis=1)
+        return np.where((beyond <= self.length)[:, None], metres, np.nan)
+
+    def pixels(self, metres: Float64Array) -> Float64Array:
+        """Return where in the frame places `(n, 2)` are; NaN for those behind the camera."""
+        back = np.asarray(np.linalg.inv(self.to_metres), np.float64)
+        return self.undistorter.distorted(_mapped(back, metres)) + 0.5
+
+
+def fit_ground(pixels: Float64Array, metres: Float64Array, undistorter: Undistorter) -> Ground:
+    """Fit the plane to points in pixels of the frame and in metres, `(n, 2)` each.
+
+    Raises
+    ------
+    ConfigError
+        There are fewer than four points, all or all but one lie on a line, the horizon runs between
+        them, or they do not fit together.
+    """
+    if len(pixels) < 4:
+        raise ConfigError(f"points: {len(pixels)} are given; give four or more")
+    straight = undistorter.points(pixels)
+    for points, unit in ((straight, "pixel"), (metres, "metres")):
+        if any(_is_thin(np.delete(points, row, axis=0)) for row in range(len(points))):
+            raise ConfigError(
+                f"points: all of them, or all but one, lie on a line ({unit}); give points around "
+                "the road, such as four corners"
+            )
+    to_pixels, _ = cv2.findHomography(metres, straight)
+    inverse = np.linalg.inv(to_pixels) if to_pixels is not None else np.zeros((3, 3))
+    depths = straight @ inverse[2, :2] + inverse[2, 2]
+    if not (np.all(depths > 0) or np.all(depths < 0)):
+        raise ConfigError(
+            "points: the horizon would run between them; two may be exchanged, or a number is wrong"
+        )
+    to_metres = np.asarray(inverse * np.sign(depths[0]), np.float64)
+    off = np.hypot(*(_mapped(to_metres, straight) - metres).T)
+    back = np.asarray(np.linalg.inv(to_metres), np.float64)
+    pixel_off = np.hypot(*(_mapped(back, metres) - straight).T)
+    area = cv2.convexHull(metres.astype(np.float32))[:, 0].astype(np.float64)
+    area = area[:: 1 if cv2.contourArea(area.astype(np.float32), oriented=True) > 0 else -1]
+    error, pixel_error = (float(np.sqrt(np.mean(each**2))) for each in (off, pixel_off))
+    if error > _MOST_ERROR * _length(area):
+        worst = int(np.argmax(pixel_off))
+        raise ConfigError(
+            f"points[{worst}]: does not fit the others: it lies {off[worst]:.1f} m from where they "
+            "say; check its numbers"
+        )
+    rows = _mapped(to_metres, straight + np.array((0, 1))) - _mapped(to_metres, straight)
+    row = float(np.median(np.hypot(*rows.T)))
+    return Ground(to_metres, area, error, pixel_error, row, undistorter)
+
+
+def _mapped(matrix: Float64Array, points: Float64Array) -> Float64Array:
+    """Apply a homography to points `(n, 2)`; NaN where its last row is not positive."""
+    depths = points @ matrix[2, :2] + matrix[2, 2]
+    depths = np.where(depths > 0, depths, np.nan)
+    return np.asarray((points @ matrix[:2, :2].T + matrix[:2, 2]) / depths[:, None], np.float64)
+
+
+def _is_thin(points: Float64Array) -> bool:
+    lengths = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return bool(lengths[1] <= _THIN * lengths[0])
+
+
+def _length(points: Float64Array) -> float:
+    return float(np.max(np.hypot(*(points[:, None] - points).transpose(2, 0, 1))))

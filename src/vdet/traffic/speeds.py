@@ -1,0 +1,306 @@
+"""The speed of each vehicle on the road plane.
+
+1. A vehicle is at the foot of its box. From there the plane gives its place in metres.
+2. The foot is its nearest point. Its middle is half its extent farther away, which depends on where
+   it heads; its length follows from the width of its box.
+3. Velocity is the slope of a straight line, fitted by weighted least squares to the places of
+   `WINDOW` seconds (Cleveland 1979 without the robust steps). Places weigh as exactly as a row of
+   pixels is there. Places far off the line are dropped, and the line is fitted again.
+4. The standard deviation has two parts. One follows from the scatter about the lines; neighbouring
+   places err alike, so they count as fewer. The other holds for the whole vehicle: the box may end
+   too low or too high, and the plane is as exact as the pixels it was fitted to.
+"""
+
+import math
+from array import array
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vdet.boxes import Float64Array
+from vdet.lanes.ground import Ground
+from vdet.track.track import FrameTracks
+from vdet.traffic.counts import Counts
+
+WINDOW = 1.0
+"""Seconds of a path that give one velocity."""
+LEAST = 0.5
+"""Least seconds of a path that give a speed."""
+KMH = 3.6
+"""km/h in 1 m/s."""
+
+_EDGE = 0.005
+"""A box that ends this near to the frame's edge is cut off, as a share of the frame's side."""
+_SLIMNESS = 0.4
+"""Width of a vehicle as a share of its length."""
+_LENGTHS = 1.5, 20.0
+"""Lengths of vehicles, metres."""
+_OUTLIERS = 0.1, 4.0
+"""Distances of a place from the line up to which it is kept: in heights of the box, and in median
+distances; the larger one counts."""
+_FOOT_ERROR = 0.03
+"""Standard deviation of the height at which a box ends, as a share of its height."""
+_MOST_ALIKE = 0.9
+"""Largest correlation of neighbouring places that is believed."""
+_MOVES = 1.0
+"""Least speed of a vehicle that heads somewhere, m/s."""
+_LEAST_WAY = 1.0
+"""Shortest way that a relative error is taken of, metres."""
+_GONE = 10.0
+"""Seconds after which a vehicle that is not shown has ended."""
+_SPACING = 0.2
+"""Least seconds between the speeds that are kept."""
+_AROUND = np.array([(0, 0), (0, 1), (1, 0)])
+"""Offsets to a pixel, the one above it and the one to its left."""
+_COLUMNS = 5  # of what is known of a vehicle in a frame
+_NOTHING = 1e-9
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Speeds:
+    """Where a vehicle is in metres, and how fast, at each of its `times`, float64 `(n,)` each.
+
+    Attributes
+    ----------
+    places
+        `(n, 2)`, as measured, metres.
+    speeds, deviations
+        Smoothed, and the standard deviation from the scatter of the places, m/s.
+    common
+        Relative standard deviation that all speeds of the vehicle share.
+    """
+
+    times: Float64Array
+    places: Float64Array
+    speeds: Float64Array
+    deviations: Float64Array
+    common: float
+
+    @property
+    def metres(self) -> float:
+        """The length of the way."""
+        return float(self._ways.sum())
+
+    def quantile(self, share: float) -> float:
+        """Return the speed below which the vehicle covers this share of its way, m/s."""
+        order = np.argsort(self.speeds)
+        gone = np.cumsum(self._ways[order])
+        if not gone[-1]:
+            return 0.0
+        return float(self.speeds[order][np.searchsorted(gone, share * gone[-1])])
+
+    @property
+    def deviation(self) -> float:
+        """The standard deviation of the median speed, m/s."""
+        windows = max(1.0, (self.times[-1] - self.times[0]) / WINDOW)
+        scatter = np.median(self.deviations) / np.sqrt(windows)
+        return float(np.hypot(scatter, self.common * self.quantile(0.5)))
+
+    def at(self, time: float) -> tuple[float, float] | None:
+        """Return the speed and its standard deviation at a time, m/s; None where it is unknown."""
+        if not self.times[0] <= time <= self.times[-1]:
+            return None
+        speed, scatter = (
+            float(np.interp(time, self.times, each)) for each in (self.speeds, self.deviations)
+        )
+        return speed, float(np.hypot(scatter, self.common * speed))
+
+    def between(self, first: float, last: float) -> tuple[float, float] | None:
+        """Return the metres from the place at a time to that at a later one, and the mean speed.
+
+        It rests on two places alone, so it checks what is smoothed. None where one is unknown.
+        """
+        if not self.times[0] <= first < last <= self.times[-1]:
+            return None
+        ends = [np.interp((first, last), self.times, each) for each in self.places.T]
+        metres = float(np.hypot(*np.diff(ends)[:, 0]))
+        return metres, metres / (last - first)
+
+    @property
+    def _ways(self) -> Float64Array:
+        """Metres covered at each time: half of those to the times before and after it."""
+        steps = np.diff(self.times, prepend=self.times[0], append=self.times[-1])
+        return np.asarray(self.speeds * (steps[:-1] + steps[1:]) / 2, np.float64)
+
+
+class SpeedMeter:
+    """Measures the speeds of the vehicles of one video, from frame to frame.
+
+    Parameters
+    ----------
+    width, height
+        Size of the frames, pixels.
+    """
+
+    def __init__(self, ground: Ground, width: int, height: int) -> None:
+        self._ground = ground
+        self._sides = _EDGE * width, (1 - _EDGE) * width, (1 - _EDGE) * height
+        self._rows: dict[int, array[float]] = {}
+        self._known: dict[int, Speeds | None] = {}
+
+    def add(self, frame: FrameTracks) -> None:
+        """Add the next frame. Vehicles that are lost, or cut off by the frame, are left out."""
+        left, right, bottom = self._sides
+        for track in frame.tracks:
+            box = track.box
+            if track.state != "lost" and left < box.x1 and box.x2 < right and box.y2 < bottom:
+                row = frame.time, *track.foot, box.width, box.height
+                self._rows.setdefault(track.id, array("d")).extend(row)
+        for number, rows in list(self._rows.items()):
+            if frame.time - rows[-_COLUMNS] > _GONE:
+                self._close(number)
+
+    def speeds(self) -> dict[int, Speeds]:
+        """Return the speeds of the vehicles by their ids, where they are known; the video ended."""
+        for number in list(self._rows):
+            self._close(number)
+        return {number: speeds for number, speeds in self._known.items() if speeds}
+
+    def _close(self, number: int) -> None:
+        rows = np.array(self._rows.pop(number)).reshape(-1, _COLUMNS)
+        self._known[number] = measure(self._ground, rows) or self._known.get(number)
+
+
+def with_speeds(counts: Counts, meter: SpeedMeter | None) -> Counts:
+    """Return the counts of a video with the speeds of its vehicles at their events."""
+    known = meter.speeds() if meter else {}
+    latest: dict[int, float] = {}
+    events = []
+    for event in counts.events:
+        values: list[float | None] = [None] * 3
+        if speeds := known.get(event.id):
+            before = latest.get(event.id, math.inf)
+            _, mean = speeds.between(before, event.time) or (None, None)
+            values = [*(speeds.at(event.time) or (None, None)), mean]
+        latest[event.id] = event.time
+        speed, deviation, mean = map(_kmh, values)
+        events.append(replace(event, speed=speed, speed_sd=deviation, mean_speed=mean))
+    return replace(counts, events=tuple(events))
+
+
+def _kmh(speed: float | None) -> float | None:
+    return None if speed is None else round(KMH * speed, 1)
+
+
+def measure(ground: Ground, rows: Float64Array) -> Speeds | None:
+    """Return the speeds of a vehicle; None where too little of its way is in the calibrated area.
+
+    `rows` are time, x and y of the foot, width and height of the box, `(n, 5)`.
+    """
+    for offset in _AROUND:
+        rows = rows[np.isfinite(ground.place(rows[:, 1:3] - offset)).all(axis=1)]
+    if len(rows) < 3 or rows[-1, 0] - rows[0, 0] < LEAST:
+        return None
+    seen = _Sight.of(ground, rows)
+    line = _Line.of(rows[:, 0], seen.places, seen.weights)
+    off = seen.off(line)
+    rows = rows[off <= max(_OUTLIERS[0], _OUTLIERS[1] * float(np.median(off)))]
+    seen = _Sight.of(ground, rows)
+    line = _Line.of(rows[:, 0], seen.places, seen.weights)
+    middles = seen.middles(rows[:, 0], line.velocities)
+    line = _Line.of(rows[:, 0], middles, seen.weights)
+    speeds = np.hypot(*line.velocities.T)
+    at = np.arange(rows[0, 0], rows[-1, 0] + _SPACING, _SPACING)
+    thin = np.unique(np.minimum(np.searchsorted(rows[:, 0], at), len(rows) - 1))
+    common = _common(ground, rows)
+    return Speeds(rows[thin, 0], middles[thin], speeds[thin], line.deviations[thin], common)
+
+
+def _common(ground: Ground, rows: Float64Array) -> float:
+    """Return the relative standard deviation of all speeds of a vehicle.
+
+    A box that ends too low moves the first and the last place; the difference is a wrong way.
+    """
+    first, last = rows[[0, -1], 1:3]
+    low = [(0, _FOOT_ERROR * height) for height in rows[[0, -1], 4]]
+    places = ground.place(np.array([first, last, first + low[0], last + low[1]]))
+    way, moved = places[1] - places[0], places[3] - places[2]
+    length = max(float(np.hypot(*way)), _LEAST_WAY)
+    box = float(np.hypot(*(moved - way))) / length
+    return math.hypot(0.0 if math.isnan(box) else box, ground.scale_error)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Sight:
+    """How a vehicle is seen: its `places` in metres, and what pixels are there.
+
+    `depth` points across the rows of pixels, away from the camera, with length 1. `away` is the way
+    along a column that is 1 m deep. Both are `(n, 2)`. `widths` are those of the box in metres,
+    `weights` those of the places.
+    """
+
+    places: Float64Array
+    depth: Float64Array
+    away: Float64Array
+    widths: Float64Array
+    weights: Float64Array
+
+    @classmethod
+    def of(cls, ground: Ground, rows: Float64Array) -> "_Sight":
+        feet = rows[:, 1:3]
+        places = ground.place(feet)
+        away, beside = (ground.place(feet - offset) - places for offset in _AROUND[1:])
+        pixel = np.hypot(*beside.T)
+        depth = np.column_stack([-beside[:, 1], beside[:, 0]]) / pixel[:, None]
+        row = np.sum(depth * away, axis=1)[:, None]
+        weights = 1 / (np.abs(row[:, 0]) * rows[:, 4]) ** 2
+        return cls(places, depth * np.sign(row), away / np.abs(row), pixel * rows[:, 3], weights)
+
+    def off(self, line: "_Line") -> Float64Array:
+        """Return how far places are from a line, in heights of the box."""
+        return np.asarray(np.hypot(*(self.places - line.fitted).T) * np.sqrt(self.weights))
+
+    def middles(self, times: Float64Array, velocities: Float64Array) -> Float64Array:
+        """Return the middles of the vehicle on the road, `(n, 2)`.
+
+        While it stands, it heads where it moves before or after.
+        """
+        speeds = np.hypot(*velocities.T)
+        moves = speeds >= _MOVES
+        if not moves.any():
+            return self.places
+        along = np.abs(np.sum(velocities * self.depth, axis=1))[moves] / speeds[moves]
+        along = np.interp(times, times[moves], along)
+        across = np.sqrt(np.maximum(0, 1 - along**2))
+        lengths = self.widths / (across + _SLIMNESS * along)
+        length = np.clip(np.median(lengths), *_LENGTHS)
+        extent = length * (along + _SLIMNESS * across)
+        return np.asarray(self.places + self.away * extent[:, None] / 2)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Line:
+    """Straight lines through the places of a window around each time.
+
+    `velocities` are m/s and `fitted` metres, `(n, 2)`; `deviations` of the speeds are `(n,)`.
+    """
+
+    velocities: Float64Array
+    fitted: Float64Array
+    deviations: Float64Array
+
+    @classmethod
+    def of(cls, times: Float64Array, places: Float64Array, weights: Float64Array) -> "_Line":
+        t, origin = times - times[0], places.mean(axis=0)
+        starts = np.clip(t - WINDOW / 2, 0, max(0.0, t[-1] - WINDOW))
+        first = np.searchsorted(t, starts - _NOTHING)
+        end = np.searchsorted(t, starts + WINDOW + _NOTHING)
+
+        def total(values: Float64Array) -> Float64Array:
+            sums = np.concatenate([[0], np.cumsum(values)])
+            return np.asarray(sums[end] - sums[first])
+
+        weight = total(weights)
+        middle = total(weights * t) / weight
+        spread = np.maximum(total(weights * t**2) - weight * middle**2, _NOTHING)
+        velocities, fitted = np.empty_like(places), np.empty_like(places)
+        for axis, x in enumerate((places - origin).T):
+            mean = total(weights * x) / weight
+            velocities[:, axis] = (total(weights * t * x) - weight * middle * mean) / spread
+            fitted[:, axis] = origin[axis] + mean + velocities[:, axis] * (t - middle)
+        heading = velocities / np.maximum(np.hypot(*velocities.T), _NOTHING)[:, None]
+        off = np.sum((places - fitted) * heading, axis=1) * np.sqrt(weights)
+        alike = np.sum(off[1:] * off[:-1]) / max(float(np.sum(off**2)), _NOTHING)
+        alike = float(np.clip(alike, 0, _MOST_ALIKE))
+        variance = np.mean(off**2) * (1 + alike) / (1 - alike)
+        return cls(velocities, fitted, np.sqrt(variance / spread))

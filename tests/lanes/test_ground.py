@@ -1,0 +1,137 @@
+"""The road plane: from points in pixels and metres, and what is refused."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lanes.poles import CORNERS, HEIGHT, WIDTH, seen
+from vdet.boxes import Float64Array
+from vdet.errors import ConfigError
+from vdet.lanes.camera import CalibratedCamera, Undistorter, save_camera
+from vdet.lanes.ground import Ground, fit_ground, load_ground
+
+PLAIN = Undistorter(None, WIDTH, HEIGHT)
+EDGE = 0.5
+"""Whole numbers are middles of pixels in a file, and edges of pixels in boxes."""
+CAMERA = CalibratedCamera(
+    WIDTH, HEIGHT, ((1000, 0, 640), (0, 1000, 360), (0, 0, 1)), (-0.25, 0.05, 0, 0, 0), 0.2
+)
+
+
+def fitted(metres: Float64Array = CORNERS, pixels: Float64Array | None = None) -> Ground:
+    return fit_ground(seen(metres) if pixels is None else pixels, metres, PLAIN)
+
+
+def test_places_on_the_road_have_their_metres() -> None:
+    places = np.array([(0.0, 20.0), (-4.0, 45.0), (3.0, 15.0)])
+    ground = fitted()
+    assert ground.place(seen(places) + EDGE) == pytest.approx(places, abs=1e-3)
+    assert ground.pixels(places) == pytest.approx(seen(places) + EDGE, abs=1e-3)
+
+
+def test_errors_of_many_points_are_levelled() -> None:
+    rng = np.random.default_rng(3)
+    metres = np.array([(x, z) for x in (-6.0, 0.0, 6.0) for z in (14.0, 20.0, 30.0, 50.0)])
+    ground = fitted(metres, seen(metres) + rng.normal(0, 1, (12, 2)))
+    assert 0.5 < ground.pixel_error < 1.5
+    assert 0 < ground.error < 0.5
+    places = np.array([(0.0, 20.0), (2.0, 40.0)])
+    assert ground.place(seen(places) + EDGE) == pytest.approx(places, abs=0.5)
+
+
+def test_a_place_above_the_horizon_is_not_known() -> None:
+    assert np.isnan(fitted().place(np.array([(640.0, 20.0)]))).all()
+
+
+@pytest.mark.parametrize(("beyond", "known"), [(30.0, True), (45.0, False)])
+def test_a_place_is_known_up_to_one_length_beyond_the_area(beyond: float, known: bool) -> None:
+    ground = fitted()
+    assert ground.length == pytest.approx(np.hypot(12, 36), abs=0.01)
+    place = ground.place(seen(np.array([(0.0, 50.0 + beyond)])) + EDGE)
+    assert np.isfinite(place).all() == known
+
+
+def test_the_order_of_the_points_does_not_matter() -> None:
+    for order in ([0, 2, 1, 3], [3, 2, 1, 0]):
+        ground = fitted(CORNERS[order])
+        assert np.isfinite(ground.place(seen(np.array([(0.0, 25.0)])))).all()
+
+
+@pytest.mark.parametrize(
+    ("metres", "pixels", "message"),
+    [
+        (CORNERS[:3], seen(CORNERS[:3]), "points: 3 are given; give four or more"),
+        (CORNERS * (0, 1), seen(CORNERS * (0, 1)), "lie on a line (pixel)"),
+        (np.array([(0, 14), (0, 20), (0, 30), (5, 30)]), None, "or all but one, lie on a line"),
+        (CORNERS * (0, 1), seen(CORNERS), "lie on a line (metres)"),
+        (CORNERS, seen(CORNERS)[[0, 2, 1, 3]], "the horizon would run between them"),
+    ],
+)
+def test_points_that_fix_no_plane_are_refused_in_words(
+    metres: Float64Array, pixels: Float64Array | None, message: str
+) -> None:
+    with pytest.raises(ConfigError) as error:
+        fitted(np.asarray(metres, np.float64), pixels)
+    assert message in str(error.value)
+
+
+def test_a_point_that_does_not_fit_the_others_is_named() -> None:
+    metres = np.vstack([CORNERS, [(0.0, 30.0), (3.0, 20.0)]])
+    wrong = metres.copy()
+    wrong[4] = 5.0, 30.0
+    with pytest.raises(ConfigError, match=r"points\[4\]: does not fit the others"):
+        fitted(wrong, seen(metres))
+
+
+def written(folder: Path, *lines: str) -> Path:
+    points = [
+        f"  - {{pixel: [{x:.3f}, {y:.3f}], metres: [{right}, {ahead}]}}"
+        for (x, y), (right, ahead) in zip(seen(CORNERS), CORNERS, strict=True)
+    ]
+    path = folder / "ground.yaml"
+    path.write_text("\n".join(lines or (f"size: [{WIDTH}, {HEIGHT}]", "points:", *points)))
+    return path
+
+
+def test_a_file_is_for_frames_of_any_size_and_the_same_shape(tmp_path: Path) -> None:
+    request = load_ground(written(tmp_path))
+    place = np.array([(2.0, 30.0)])
+    half = request.ground(WIDTH // 2, HEIGHT // 2)
+    assert half.place(seen(place) / 2 + EDGE) == pytest.approx(place, abs=0.01)
+    with pytest.raises(ConfigError, match=r"ground\.yaml: size: .* another shape"):
+        request.ground(640, 640)
+
+
+def test_a_lens_that_distorts_is_corrected(tmp_path: Path) -> None:
+    save_camera(CAMERA, tmp_path / "camera.yaml")
+    path = written(tmp_path)
+    lens = Undistorter(CAMERA, WIDTH, HEIGHT)
+    points = [
+        f"  - {{pixel: [{x:.3f}, {y:.3f}], metres: [{right}, {ahead}]}}"
+        for (x, y), (right, ahead) in zip(lens.distorted(seen(CORNERS)), CORNERS, strict=True)
+    ]
+    path.write_text(
+        "\n".join([f"size: [{WIDTH}, {HEIGHT}]", "camera: camera.yaml", "points:", *points])
+    )
+    place = np.array([(2.0, 30.0)])
+    ground = load_ground(path).ground(WIDTH, HEIGHT)
+    assert ground.place(lens.distorted(seen(place)) + EDGE) == pytest.approx(place, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        (("points: 3",), "ground.yaml:1:1: points: should be a valid tuple"),
+        (("size: [1280, 720]",), "points: is missing"),
+        (("points: [{pixel: [1, 2]}]",), "points[0].metres: is missing"),
+        (("point: []", "points: []"), "point: is not a key of files of the ground"),
+        (("camera: none.yaml", "points: []"), "none.yaml: cannot be read"),
+    ],
+)
+def test_a_mistake_in_a_file_is_named_with_its_place(
+    tmp_path: Path, lines: tuple[str, ...], message: str
+) -> None:
+    with pytest.raises(ConfigError) as error:
+        load_ground(written(tmp_path, *lines))
+    assert message in str(error.value)
