@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 
 from vdet.pages.charts import (
     clock,
+    histogram,
+    interval_plot,
     level_plot,
-    minute_plot,
     number_axis,
     pack,
     time_axis,
@@ -37,24 +38,49 @@ def test_axes_have_round_numbers() -> None:
 
 
 def test_a_level_has_a_bar_for_each_step_in_which_something_is_shown() -> None:
-    plot = level_plot([(40, 160), (80, 160), (90, 99)], 0, 160, "levels")
+    plot = level_plot([(40, 160), (80, 160), (90, 99)], time_axis(0, 160), "levels")
     heights = {round(bar.left): bar.high for bar in plot.bars}
     assert [heights.get(second, 0) for second in (39, 40, 80, 90, 99)] == [0, 1, 2, 3, 2]
     assert plot.y.high == 3
-    assert level_plot([], 0, 0, "nothing").bars == []
+    assert level_plot([], time_axis(0, 0), "nothing").bars == []
 
 
-def test_the_series_of_a_minute_are_stacked_and_named_with_their_sums() -> None:
+def test_the_series_of_an_interval_are_stacked_and_named_with_their_sums() -> None:
     series = {"in": Counter({1: 3, 2: 1}), "out": Counter({2: 2})}
-    plot = minute_plot(series, time_axis(60, 240), "counts")
+    plot = interval_plot(series, time_axis(60, 240), 60, "counts")
     assert [(bar.low, bar.high) for bar in plot.bars] == [(0, 3), (0, 1), (1, 3)]
     assert plot.bars[0].color == plot.bars[1].color != plot.bars[2].color
     assert [name for name, _ in plot.legend] == ["in: 4", "out: 2"]
 
 
+def test_times_without_frames_are_marked() -> None:
+    plot = level_plot([(0, 10), (12, 20)], time_axis(0, 20), "levels", [(10, 12)])
+    [gap] = [bar for bar in plot.bars if bar.title]
+    assert (gap.left, gap.right, gap.high) == (10, 12, plot.y.high)
+    assert [name for name, _ in plot.legend] == ["no frames in the video"]
+
+
+def test_a_time_axis_may_show_the_time_of_the_day() -> None:
+    seven = 7 * 3600 + 30.0
+    assert time_axis(0, 120, seven).ticks == [
+        (0, "07:00:30"), (30, "07:01"), (60, "07:01:30"), (90, "07:02"), (120, "07:02:30"),
+    ]  # fmt: skip
+    late = [text for _, text in time_axis(0, 120, 86370).ticks]
+    assert late == ["23:59:30", "00:00", "00:00:30", "00:01", "00:01:30"]
+
+
+def test_a_histogram_has_a_bar_for_each_class_with_a_value() -> None:
+    plot = histogram([31.0, 34.9, 35.0, 52.0], 5, "speeds", "km/h")
+    assert [(bar.left, bar.right, bar.high) for bar in plot.bars] == [
+        (30, 35, 2), (35, 40, 1), (50, 55, 1),
+    ]  # fmt: skip
+    assert plot.bars[0].title == "30 to 35 km/h"
+
+
 def test_a_jump_of_the_clock_costs_nothing() -> None:
     late = 10**12  # minutes
-    plot = minute_plot({"in": Counter({1: 3, late: 1})}, time_axis(0, 60 * late), "counts")
+    series = {"in": Counter({1: 3, late: 1})}
+    plot = interval_plot(series, time_axis(0, 60 * late), 60, "counts")
     assert len(plot.bars) == 2
 
 

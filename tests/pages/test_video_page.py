@@ -1,10 +1,10 @@
 """The page of a video, and the page over many."""
 
 import re
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
@@ -18,12 +18,15 @@ from vdet.errors import OutputError
 from vdet.pages.render import jpeg_uri, link_to
 from vdet.pages.video import Player, VideoPage, read_facts, write_index
 from vdet.track.track import FrameTracks
+from vdet.traffic.counts import Counts, Event
 from vdet.traffic.records import VehicleRecord
+from vdet.traffic.speeds import Speeds
 
 NASTY = "<img src=x onerror=alert(1)>&lt;\"'#?%41 javascript:.mp4"
 STILL = np.full((HEIGHT, WIDTH, 3), 90, np.uint8)
 FOLDER = Path("found/a.page")
 VIDEO = Player("a.mp4", "../a.mp4", is_drawn=True, start=0.0)
+BOX = Box.sized(5, 5, 30, 30)
 TRUCK = replace(track(2, Box.sized(5, 5, 30.123456, 29.9)), class_name="truck")
 
 
@@ -45,11 +48,20 @@ def page(
         records=TWO,
         thumbnails={1: (1.25, jpeg_uri(STILL))},
         poster=STILL,
-        still=STILL,
         player=player,
         settings="output:\n  crf: 25\n",
-        counts={},
     )
+
+
+def counted(*events: tuple[Any, ...]) -> Counts:
+    """Return counts of events: name, direction, time, vehicle and speed."""
+    made = [
+        Event(time, 25 * time, name, way, vehicle, vehicle, None, 0.9, speed=speed)
+        for number, event in enumerate(events, start=10)
+        for name, way, time, *more in [event]
+        for vehicle, speed in [(*more, *(number, None)[len(more) :])]
+    ]
+    return Counts(tuple(made), tuple(dict.fromkeys((e.name, e.direction) for e in made)), ())
 
 
 def player_of(name: str) -> Player:
@@ -102,16 +114,45 @@ class TestVideoPage:
         if player is None:
             assert all(each.startswith("data:") for each in made.addresses())
 
-    def test_counts_are_shown_by_minute_where_there_are_any(self) -> None:
-        made = seen(
-            replace(page(end=130), counts={"north in": Counter({0: 3}), NASTY: Counter({0: 1})})
-        )
+    def test_counts_are_shown_by_interval_where_there_are_any(self) -> None:
+        counts = counted(*(("north", "in", at) for at in (1, 2, 3)), (NASTY, "in", 1))
+        made = seen(replace(page(), counts=counts, interval=1))
         assert "At lines and zones" in made.text
-        assert "north in: 3" in made.text
-        assert f"{NASTY}: 1" in made.text
+        assert "north: in: 3" in made.text
+        assert f"{NASTY}: in: 1" in made.text
+        assert "At lines and zones" not in seen(replace(page(), counts=counts)).text
+
+    def test_flows_have_a_row_and_an_arrow_each(self) -> None:
+        counts = counted(("north", "in", 1, 1), ("south", "out", 2, 1), ("north", "in", 1, 2))
+        made = seen(replace(page(), counts=counts))
+        assert re.search(r"from\s*to\s*vehicles\s*north\s*south\s*1\s*north\s*–\s*1", made.text)
+        assert made.all("img", alt="an arrow for each flow over a frame of the video")
+        assert "Flows" not in seen(page()).text
+
+    def test_speeds_are_shown_where_they_are_known(self) -> None:
+        times = np.arange(5.0)
+        fast = Speeds(times, np.zeros((5, 2)), np.full(5, 10.0), np.full(5, 0.1), 0.01)
+        counts = counted(("north", "in", 1, 1, 36.0), ("north", "in", 2, 2, 40.0))
+        made = seen(replace(page(), records=[replace(TWO[0], speeds=fast)], counts=counts))
+        assert "Vehicles by their median speed" in made.text
+        assert "35 to 40 km/h" in made.text
+        assert "36 ± 0" in made.text
+        assert re.search(r"north\s*in\s*2\s*38\s*39", made.text)
+        assert "median speed" not in seen(page()).text
+
+    def test_a_vehicle_that_was_lost_has_a_gap_in_its_bar(self) -> None:
+        states = ("seen", "seen", "lost", "lost", "between", "seen")
+        frames = [frame(n, track(1, BOX, state=state)) for n, state in enumerate(states)]
+        found = replace(page(), records=records(*frames))
+        assert [(span.first, span.last) for span in found.timeline.spans] == [
+            (0, 0.04), (0.16, 0.2),
+        ]  # fmt: skip
+
+    def test_gaps_of_the_video_are_named(self) -> None:
+        assert "There are no frames from 0:01 to 0:02" in seen(replace(page(), gaps=[(1, 2)])).text
 
     def test_a_video_without_vehicles_has_a_page_too(self) -> None:
-        empty = replace(page(), records=(), thumbnails={}, poster=None, still=None)
+        empty = replace(page(), records=(), thumbnails={}, poster=None)
         made = seen(empty)
         assert "No vehicle was shown." in made.text
         assert "0vehicles" in made.text
@@ -143,13 +184,13 @@ class TestVideoPage:
 
 class TestFacts:
     def test_they_are_read_back(self, tmp_path: Path) -> None:
-        counts = {"</script><b>": Counter({0: 7, 2: 1})}
+        counts = counted(*[("</script><b>", "in", 1)] * 8)
         html = replace(page(), counts=counts).html()
         assert Elements(html).all("b", id="x") == []
         (tmp_path / "page.html").write_text(html, encoding="utf-8")
         facts = read_facts(tmp_path / "page.html")
         assert (facts.frames, facts.vehicles, facts.most) == (52, 2, 1)
-        assert facts.counts == {"</script><b>": 8}
+        assert facts.counts == {"</script><b>: in": 8}
 
     @pytest.mark.parametrize(
         "text", ["", "<html></html>", '<script type="application/json" id="vdet">{</script>']

@@ -7,7 +7,7 @@ from vdet.boxes import Box
 from vdet.media import Picture
 from vdet.media.images import Image
 from vdet.track.track import Track
-from vdet.traffic.overview import BestCrops, Crop, GroundHeat
+from vdet.traffic.overview import BestCrops, Crop
 
 ROAD = np.arange(HEIGHT * WIDTH * 3, dtype=np.uint64).reshape(HEIGHT, WIDTH, 3).astype(np.uint8)
 PICTURE = Picture(ROAD)
@@ -57,26 +57,3 @@ def test_a_vehicle_that_is_gone_is_given_back_and_again_if_it_comes_back_better(
     assert best.add(frame(4), PICTURE) == [], "the first one is better"
     best.add(frame(5, track(1, box(60))), PICTURE)
     assert [crop.image.shape[0] for crop in best.end()] == [72]
-
-
-STILL = np.full((HEIGHT, WIDTH, 3), (20, 90, 30), np.uint8)
-PLACE = Box.sized(200, 100, 60, 80)
-
-
-def heat(*boxes: Box, still: Image = STILL) -> Image:
-    made = GroundHeat(WIDTH, HEIGHT)
-    for index, box in enumerate(boxes):
-        made.add(frame(index, track(1, box)))
-    return made.over(still)
-
-
-def color(picture: Image) -> Image:
-    """Return how much colour each pixel has."""
-    return np.asarray(np.ptp(picture, axis=2), np.uint8)
-
-
-def test_the_ground_under_a_vehicle_has_colour_and_nothing_else() -> None:
-    seen = color(heat(PLACE))
-    assert seen[PLACE.pixels[3] - 10, 230] > 60
-    assert seen[PLACE.pixels[1] + 20, 230] < 10, "the roof is not where it stands"
-    assert seen[:, :180].max() < 10

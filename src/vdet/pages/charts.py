@@ -7,13 +7,14 @@ read at any width.
 import heapq
 import math
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from vdet.boxes import Float64Array
 from vdet.draw.boxes import color_of, text_color
+from vdet.draw.paint import Color
 
 FILL, BAD, SOFT = "var(--fill)", "var(--bad)", "var(--soft)"
 """Colours of the style: what is right, what is wrong, and what is less important."""
@@ -110,8 +111,9 @@ class Timeline:
         return max([len(self.names), *(span.row + 1 for span in self.spans)])
 
 
-Minutes = Mapping[str, Counter[int]]
-"""How often something happened in each minute, by its name; minute n begins at second 60 n."""
+Series = dict[str, Counter[int]]
+"""How often something happened in each interval, by its name; intervals are numbered from time 0.
+"""
 
 
 def color(number: int) -> str:
@@ -122,8 +124,12 @@ def color(number: int) -> str:
 def vehicle_colors(number: int) -> tuple[str, str]:
     """Return the colour that the box of a vehicle has in the video, and that of text on it."""
     bgr = color_of(number)
-    fill, ink = ("#{:02x}{:02x}{:02x}".format(*each[::-1]) for each in (bgr, text_color(bgr)))
-    return fill, ink
+    return hex_color(bgr), hex_color(text_color(bgr))
+
+
+def hex_color(bgr: Color) -> str:
+    """Return a colour as CSS has it."""
+    return "#{:02x}{:02x}{:02x}".format(*bgr[::-1])
 
 
 def clock(seconds: float) -> str:
@@ -137,12 +143,18 @@ def clock(seconds: float) -> str:
     return sign + text + (f".{tenth}" if tenth else "")
 
 
-def time_axis(start: float, end: float) -> Axis:
-    """Return an axis of times in seconds."""
-    length = max(end - start, _NOTHING)
+def time_axis(start: float, end: float, zero: float | None = None) -> Axis:
+    """Return an axis of times in seconds; `zero` is the second of the day at time 0, if known."""
+    length, since = max(end - start, _NOTHING), zero or 0.0
     step = next((step for step in _TIMES if length / step <= _TICKS), length / _TICKS)
-    numbers = range(math.ceil(start / step), math.floor(end / step) + 1)
-    return Axis(start, end, [(number * step, clock(number * step)) for number in numbers])
+    numbers = range(math.ceil((start + since) / step), math.floor((end + since) / step) + 1)
+    label = clock if zero is None else _day_time
+    return Axis(start, end, [(number * step - since, label(number * step)) for number in numbers])
+
+
+def _day_time(seconds: float) -> str:
+    minutes, rest = divmod(round(seconds) % 86400, 60)
+    return f"{minutes // 60:02}:{minutes % 60:02}" + (f":{rest:02}" if rest else "")
 
 
 def number_axis(
@@ -169,8 +181,17 @@ def curve(xs: Float64Array, ys: Float64Array, color: str) -> Line:
     return Line(list(zip(xs[rows].tolist(), ys[rows].tolist(), strict=True)), color)
 
 
-def level_plot(spans: Sequence[tuple[float, float]], start: float, end: float, title: str) -> Plot:
-    """Return how many of the spans, each from its first to its last time, there are at once."""
+def level_plot(
+    spans: Sequence[tuple[float, float]],
+    x: Axis,
+    title: str,
+    gaps: Sequence[tuple[float, float]] = (),
+) -> Plot:
+    """Return how many of the spans, each from its first to its last time, there are at once.
+
+    `gaps` are times without frames.
+    """
+    start, end = x.low, x.high
     edges = np.linspace(start, end, _STEPS + 1)
     middles = (edges[:-1] + edges[1:]) / 2
     firsts, lasts = np.sort(np.array(spans, np.float64).reshape(-1, 2), axis=0).T
@@ -181,24 +202,49 @@ def level_plot(spans: Sequence[tuple[float, float]], start: float, end: float, t
         for at, level in zip(edges.tolist(), levels.tolist(), strict=False)
         if level
     ]
-    return Plot(title, time_axis(start, end), _counts(levels.max()), bars)
+    y = _counts(levels.max())
+    bars += [
+        Bar(*gap, 0, y.high, SOFT, f"no frames: {' to '.join(map(clock, gap))}") for gap in gaps
+    ]
+    legend = [("no frames in the video", SOFT)] if gaps else []
+    return Plot(title, x, y, bars, legend=legend)
 
 
-def minute_plot(series: Minutes, x: Axis, title: str) -> Plot:
-    """Return a bar for each minute with an event, in which the series are stacked; and a legend."""
+def interval_plot(series: Series, x: Axis, interval: int, title: str) -> Plot:
+    """Return a bar for each interval with an event, in which the series are stacked; and a legend.
+
+    `interval` is in seconds.
+    """
     bars = []
-    for minute in sorted(set().union(*series.values())):
+    for at in sorted(set().union(*series.values())):
         below = 0
         for number, (name, counts) in enumerate(series.items()):
-            if count := counts[minute]:
-                tip = f"{clock(60 * minute)}: {count} {name}"
-                place = 60 * (minute + 0.1), 60 * (minute + 0.9), below, below + count
+            if count := counts[at]:
+                tip = f"{clock(interval * at)}: {count} {name}"
+                place = interval * (at + 0.1), interval * (at + 0.9), below, below + count
                 bars.append(Bar(*place, color(number), tip))
                 below += count
     sums = [f"{name}: {counts.total()}" for name, counts in series.items()]
     legend = [(text, color(number)) for number, text in enumerate(sums)]
     most = max((bar.high for bar in bars), default=0)
     return Plot(title, x, _counts(most), bars, legend=legend)
+
+
+def histogram(values: Sequence[float], step: float, title: str, unit: str) -> Plot:
+    """Return how many values lie in each class of width `step`."""
+    counts = Counter(int(value // step) for value in values)
+    low, high = step * min(counts), step * (max(counts) + 1)
+    bars = [
+        Bar(
+            step * n,
+            step * (n + 1),
+            0,
+            counts[n],
+            title=f"{step * n:g} to {step * (n + 1):g} {unit}",
+        )
+        for n in sorted(counts)
+    ]
+    return Plot(title, number_axis(low, high, unit), _counts(max(counts.values())), bars)
 
 
 def _counts(most: float) -> Axis:

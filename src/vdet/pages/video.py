@@ -13,11 +13,16 @@ from vdet.errors import OutputError
 from vdet.media import VideoInfo
 from vdet.media.images import Image
 from vdet.pages import charts
-from vdet.pages.charts import Minutes, Plot, Span, Timeline, clock
+from vdet.pages.charts import Axis, Plot, Span, Timeline, clock
 from vdet.pages.render import PAGE_NAME, jpeg_uri, link_to, named, render, write_page
+from vdet.pages.traffic import counts_by_interval, traffic_part
+from vdet.traffic.counts import Counts
+from vdet.traffic.paths import draw_paths
 from vdet.traffic.records import VehicleRecord
+from vdet.traffic.speeds import KMH
 
 _MOST_VEHICLES = 300  # that are shown one by one
+_SPEED_STEP = 5  # km/h, of the classes of speeds
 _SMALL = 200  # columns of the still in the pages over many videos
 _NO_PICTURE = "data:image/jpeg;base64,"
 _BLOCK = re.compile(r'<script type="application/json" id="vdet">(.*?)</script>', re.DOTALL)
@@ -75,12 +80,18 @@ class VideoPage:
     thumbnails
         By id, the time of a frame in seconds, and the picture of the vehicle as a data URI. A
         vehicle may have none.
-    poster, still
-        A frame, and the same with the heat over it, BGR uint8; None if there was no frame.
+    poster
+        The frame with the most vehicles, BGR uint8; None if there was no frame.
     settings
         The settings of the run as YAML.
     counts
-        Crossings and entries by minute, where lines or zones are counted.
+        None where nothing is counted.
+    interval
+        That of the counts over time, seconds.
+    gaps
+        Times without frames, from the frame before to the one after, seconds.
+    zero
+        Second of the day at time 0; None where it is not known.
     """
 
     video: VideoInfo
@@ -90,10 +101,12 @@ class VideoPage:
     records: Sequence[VehicleRecord]
     thumbnails: Mapping[int, tuple[float, str]]
     poster: Image | None
-    still: Image | None
     player: Player | None
     settings: str
-    counts: Minutes
+    counts: Counts | None = None
+    interval: int = 60
+    gaps: Sequence[tuple[float, float]] = ()
+    zero: float | None = None
 
     def html(self) -> str:
         """Return the page; it loads nothing but the video."""
@@ -102,10 +115,17 @@ class VideoPage:
             frames=self.frames,
             vehicles=len(self.records),
             most=self.most,
-            still=_NO_PICTURE if self.still is None else jpeg_uri(self.still, _SMALL),
-            counts={name: minutes.total() for name, minutes in self.counts.items()},
+            still=_NO_PICTURE if self.poster is None else jpeg_uri(self.poster, _SMALL),
+            counts=self._totals,
         )
-        return render("video.html", page=self, facts=facts.model_dump())
+        traffic = traffic_part(self.counts, self.records, self.poster) if self.counts else None
+        return render("video.html", page=self, traffic=traffic, facts=facts.model_dump())
+
+    @property
+    def _totals(self) -> dict[str, int]:
+        """The number of vehicles in each direction of a line or zone that has some."""
+        totals = self.counts.totals if self.counts else ()
+        return {f"{each.name}: {each.direction}": each.count for each in totals if each.count}
 
     @property
     def seconds(self) -> float:
@@ -133,7 +153,7 @@ class VideoPage:
             *((named(n, name), str(n)) for name, n in classes.most_common(4)),
             ("most at once", str(self.most)),
             ("mean seconds shown", f"{shown:.1f}"),
-            *((name, str(minutes.total())) for name, minutes in self.counts.items()),
+            *((name, str(count)) for name, count in self._totals.items()),
         ]
 
     @property
@@ -146,31 +166,60 @@ class VideoPage:
     def level_plot(self) -> Plot:
         """How many vehicles are shown at once."""
         title = "Number of vehicles at once"
-        return charts.level_plot(self.spans, self.start, self.end, title)
+        return charts.level_plot(self.spans, self._times, title, self.gaps)
 
     @property
     def timeline(self) -> Timeline:
         """When each vehicle is shown; those that are not there at once share a row."""
         shown = self.shown
         rows = charts.pack((record.first, record.last) for record in shown)
-        spans = list(map(_span, shown, rows))
-        return Timeline("When each vehicle is shown", charts.time_axis(self.start, self.end), spans)
+        spans = [span for each, row in zip(shown, rows, strict=True) for span in _spans(each, row)]
+        return Timeline("When each vehicle is shown", self._times, spans)
 
     @property
-    def minute_plots(self) -> list[Plot]:
-        """Vehicles, and the counts of lines and zones, by minute."""
-        came = Counter(int(record.first // 60) for record in self.records)
-        series = {"First seen": {"vehicles": came}, "At lines and zones": self.counts}
-        x = charts.time_axis(60 * (self.start // 60), 60 * math.ceil(self.end / 60))
-        return [charts.minute_plot(some, x, title) for title, some in series.items() if some]
+    def interval_plots(self) -> list[Plot]:
+        """Vehicles, and the counts of lines and zones, by interval."""
+        step = self.interval
+        came = Counter(int(record.first // step) for record in self.records)
+        counted = counts_by_interval(self.counts, step) if self.counts else {}
+        series = {"First seen": {"vehicles": came}, "At lines and zones": counted}
+        ends = step * (self.start // step), step * math.ceil(self.end / step)
+        x = charts.time_axis(*ends, self.zero)
+        return [
+            charts.interval_plot(some, x, step, title) for title, some in series.items() if some
+        ]
+
+    @property
+    def speed_plot(self) -> Plot | None:
+        """How many vehicles have which speed; None where none is known."""
+        known = [KMH * each.speeds.quantile(0.5) for each in self.records if each.speeds]
+        title = "Vehicles by their median speed"
+        return charts.histogram(known, _SPEED_STEP, title, "km/h") if known else None
+
+    @property
+    def paths(self) -> Image | None:
+        """The frame with the paths of all vehicles."""
+        if self.poster is None:
+            return None
+        drawn = self.poster.copy()
+        draw_paths(drawn, self.records)
+        return drawn
+
+    @property
+    def _times(self) -> Axis:
+        return charts.time_axis(self.start, self.end, self.zero)
 
 
-def _span(record: VehicleRecord, row: int) -> Span:
+def _spans(record: VehicleRecord, row: int) -> list[Span]:
+    """Return a bar for each time in which a vehicle is shown and not lost; the longest is named."""
     name = f" ({record.class_name})" if record.class_name else ""
     title = f"vehicle {record.id}{name}: {clock(record.first)} to {clock(record.last)}"
     fill, ink = charts.vehicle_colors(record.id)
-    label = f"#{record.id}"
-    return Span(row, record.first, record.last, title, fill, ink, label, record.first)
+    longest = max(record.followed, key=lambda span: span[1] - span[0])
+    return [
+        Span(row, *span, title, fill, ink, f"#{record.id}" if span is longest else "", span[0])
+        for span in record.followed
+    ]
 
 
 def read_facts(page: Path) -> VideoFacts:

@@ -39,6 +39,12 @@ class Clock:
     def __str__(self) -> str:
         return f"{self.zero.isoformat(' ', 'seconds')} ({self.source})"
 
+    @property
+    def second_of_day(self) -> float:
+        """The second of the day at time 0 in the video."""
+        midnight = self.zero.replace(hour=0, minute=0, second=0, microsecond=0)
+        return (self.zero - midnight).total_seconds()
+
     def at(self, seconds: float) -> datetime:
         """Return the moment of a time in the video."""
         return self.zero + timedelta(seconds=seconds)

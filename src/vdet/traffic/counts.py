@@ -225,9 +225,8 @@ def flow_table(videos: Sequence[Counts], interval: int | None = None) -> list[Fl
     axis = _Axis(videos, interval)
     visits: dict[int, list[tuple[int, Event]]] = {}
     for which, video in enumerate(videos):
-        for each in video.events:
-            if each.name not in video.zones or each.direction in _IN:
-                visits.setdefault(each.vehicle, []).append((which, each))
+        for trip in vehicle_trips(video):
+            visits.setdefault(trip[0].vehicle, []).extend((which, each) for each in trip)
     timed = []
     for (which, first), *others in visits.values():
         last = others[-1][-1].name if others else None
@@ -236,6 +235,15 @@ def flow_table(videos: Sequence[Counts], interval: int | None = None) -> list[Fl
     order = {name: number for number, name in enumerate((*names, None))}
     flows = sorted({way for _, way, _ in timed}, key=lambda way: [order[name] for name in way])
     return _rows(FlowRow, axis, timed, flows)
+
+
+def vehicle_trips(video: Counts) -> list[list[Event]]:
+    """Return the crossings of lines and the entries into zones of each vehicle, in order."""
+    trips: dict[int, list[Event]] = {}
+    for each in video.events:
+        if each.name not in video.zones or each.direction in _IN:
+            trips.setdefault(each.vehicle, []).append(each)
+    return list(trips.values())
 
 
 def zone_table(videos: Sequence[Counts], interval: int | None = None) -> list[ZoneRow]:

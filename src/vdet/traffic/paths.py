@@ -23,6 +23,8 @@ _GRID_POINTS = 40
 """Number of points of a line of the grid in metres."""
 _LEAST = 0.03
 """Length of the shortest path that is drawn, as a share of the frame's width."""
+_WIDEST = 0.012
+"""Width of the arrow of the largest flow, as a share of the frame's width."""
 _TIP = 0.02
 """Length of the tip of a path, as a share of the frame's width."""
 
@@ -35,20 +37,46 @@ def draw_paths(image: Image, records: Iterable[VehicleRecord]) -> None:
     height, width = image.shape[:2]
     thin = max(1, line_width(image) // 2)
     for record in records:
-        path, length = record.path, _TIP * width
-        if record.share < _LEAST:
+        path = _inside(record.path, image)
+        if record.share < _LEAST or len(path) < 2:
             continue
         color = direction_color(path[0], path[-1])
         draw_lines(image, path, color, thin)
         draw_lines(image, [path[0], path[0]], color, 4 * thin)
-        back = next(point for point in reversed(path) if math.dist(point, path[-1]) >= length)
-        share = length / math.dist(back, path[-1])
-        start = tuple(b + share * (a - b) for a, b in zip(back, path[-1], strict=True))
-        draw_arrow(image, (start[0], start[1]), path[-1], color, 2 * thin, tip=0.7)
+        draw_arrow(image, _tip(path, _TIP * width), path[-1], color, 2 * thin, tip=0.7)
     middle, reach = (0.07 * width, height - 0.07 * width), 0.05 * width
     for angle in np.linspace(0, 2 * math.pi, 8, endpoint=False).tolist():
         end = middle[0] + reach * math.cos(angle), middle[1] + reach * math.sin(angle)
         draw_arrow(image, middle, end, direction_color(middle, end), 2 * thin, tip=0.3)
+
+
+def draw_flows(image: Image, flows: Sequence[tuple[Sequence[Point], int, Color]]) -> None:
+    """Draw an arrow along the path of each flow, as wide as its count says, with the count."""
+    most = max((count for _, count, _ in flows), default=1)
+    ends = []
+    for whole, count, color in sorted(flows, key=lambda flow: -flow[1]):
+        if len(path := _inside(whole, image)) > 1:
+            width = max(2, round(_WIDEST * image.shape[1] * count / most))
+            draw_lines(image, path, color, width)
+            tip = _tip(path, 3 * width)
+            draw_arrow(image, tip, path[-1], color, width, tip=1)
+            ends.append((str(count), path[len(path) // 2], color))
+    for text, (x, y), color in ends:
+        draw_label(image, text, (x, y), color)
+
+
+def _inside(path: Sequence[Point], image: Image) -> list[Point]:
+    """Return the points of a path that lie in the picture."""
+    height, width = image.shape[:2]
+    return [(x, y) for x, y in path if 0 <= x < width and 0 <= y < height]
+
+
+def _tip(path: Sequence[Point], length: float) -> Point:
+    """Return where the tip of a path begins: so far before its end."""
+    end = path[-1]
+    back = next((point for point in reversed(path) if math.dist(point, end) >= length), path[0])
+    share = length / max(length, math.dist(back, end))
+    return end[0] + share * (back[0] - end[0]), end[1] + share * (back[1] - end[1])
 
 
 def direction_color(start: Point, end: Point) -> Color:

@@ -57,6 +57,8 @@ class VehicleRecord:
     path
         Where it stood (`Track.foot`): the first point, a point after each step, and the last point.
         Frames in which it was lost do not count, unless it was in all.
+    followed
+        From when to when it is shown without being lost, seconds; all of it, if it always is.
     speeds
         None where they are not known.
     """
@@ -72,6 +74,7 @@ class VehicleRecord:
     sum_of_scores: float = 0.0
     classes: ClassScores = field(default_factory=ClassScores)
     path: list[Point] = field(default_factory=list)
+    followed: list[tuple[float, float]] = field(default_factory=list)
     speeds: Speeds | None = None
 
     @property
@@ -94,8 +97,8 @@ class VehicleRecord:
         """Length of the path as a share of the frame's width."""
         return self.length / self.frame_width
 
-    def add(self, track: Track, time: float) -> None:
-        """Add the next frame that shows it."""
+    def add(self, track: Track, time: float, before: float | None = None) -> None:
+        """Add the next frame that shows it; `before` is the time of the frame before."""
         self.last = time
         self.sum_of_scores += track.score
         self.best_score = max(self.best_score, track.score)
@@ -104,8 +107,12 @@ class VehicleRecord:
         only_lost = self.states.total() == self.states["lost"]
         if track.state != "lost" and only_lost:
             self.path.clear()
+            self.followed.clear()
         if track.state != "lost" or only_lost:
             self._go_to(track.foot)
+            goes_on = bool(self.followed) and self.followed[-1][1] == before
+            first = self.followed.pop()[0] if goes_on else time
+            self.followed.append((first, time))
         self.states[track.state] += 1
 
     def _go_to(self, point: Point) -> None:
@@ -133,15 +140,17 @@ class VehicleRecords:
 
     def add(self, frame: FrameTracks) -> None:
         """Add the next frame. Frames without a vehicle may be left out."""
+        before = None
         if self._latest:
             frames = max(1, frame.index - self._latest.index)
+            before = self._latest.time if frames == 1 else None
             self._period = (frame.time - self._latest.time) / frames
             self._show()
         for track in frame.tracks:
             if track.id not in self._vehicles:
                 first = VehicleRecord(track.id, self._width, frame.time, frame.time, track.box)
                 self._vehicles[track.id] = first
-            self._vehicles[track.id].add(track, frame.time)
+            self._vehicles[track.id].add(track, frame.time, before)
         self._latest = frame
 
     def end(self, meter: SpeedMeter | None = None) -> tuple[VehicleRecord, ...]:

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from pages.html import Elements
-from red_cars import CAR, road
+from red_cars import CAR, SETTINGS, road
 from run.red_runs import COUNT, outputs, result_of, run_red, video_info, write
 from running import names
-from vdet.media.images import Image, decode_image
+from vdet.config.places import RegionsSettings
+from vdet.media.images import Image, decode_image, write_image
 from vdet.pages.video import read_facts
 from vdet.run.sinks.protocol import Output
 from vdet.run.video import VideoJob
@@ -82,3 +83,22 @@ def test_a_page_is_replaced_only_where_that_is_asked_for(red_clip: Path, tmp_pat
     run_red(replace(job, frames=5, overwrite=True))
     assert (tmp_path / "page.html").read_text() != before
     assert names(tmp_path) == ["notes.txt", "page.html"]
+
+
+def test_the_folders_of_a_mask_are_nobodys_business(red_clip: Path, tmp_path: Path) -> None:
+    mask = tmp_path / "secret" / "mask.png"
+    mask.parent.mkdir()
+    write_image(mask, np.full_like(road(), 255))
+    regions = RegionsSettings(mask=str(mask))
+    settings = SETTINGS.model_copy(update={"regions": regions})
+    run_red(VideoJob(red_clip, outputs(page=tmp_path / "page")), settings)
+    text = page_of(tmp_path / "page").text
+    assert "mask: mask.png" in text
+    assert "secret" not in text
+
+
+def test_times_without_frames_are_named(tmp_path: Path) -> None:
+    times = (Fraction(0), Fraction(1, 25), Fraction(5), Fraction(126, 25))
+    results = [result_of(CAR, index=n, time=time) for n, time in enumerate(times)]
+    write(Output("page", tmp_path / "page"), results)
+    assert "There are no frames from 0:00 to 0:05." in page_of(tmp_path / "page").text

@@ -1,8 +1,6 @@
 """The sinks that fill a folder: `stages` of one frame, `crops` of vehicles, and the `page`."""
 
 import re
-from collections import Counter
-from collections.abc import Sequence
 from pathlib import Path
 
 from vdet.config.rendering import render
@@ -17,12 +15,13 @@ from vdet.run.result import FrameResult
 from vdet.run.sinks.drawn import PICTURE_LABEL, label_text
 from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.traffic.counter import VehicleCounter
-from vdet.traffic.counts import Event
-from vdet.traffic.overview import BestCrops, Crop, GroundHeat
+from vdet.traffic.overview import BestCrops, Crop
 from vdet.traffic.records import VehicleRecords
+from vdet.traffic.speeds import SpeedMeter, with_speeds
 
 _BOXES = "boxes"
 _CROP_NAME = re.compile(r"vehicle-\d{4,}-at--?\d+\.\d{3}s\.(jpg|png)")
+_GAP = 1.0  # least seconds between two frames that the page calls a gap
 _THUMBNAIL = 200  # longer side of the picture of a vehicle, pixels
 
 
@@ -106,9 +105,10 @@ class PageSink(BaseSink):
         video = self.video
         self._records = VehicleRecords(video.width)
         self._crops = BestCrops()
-        self._heat = GroundHeat(video.width, video.height)
         self._thumbnails: dict[int, tuple[float, str]] = {}
         self._counter: VehicleCounter | None = None
+        self._speeds: SpeedMeter | None = None
+        self._gaps: list[tuple[float, float]] = []
         self._fullest: Picture | None = None
         self._most = 0
         self._frames = 0
@@ -124,13 +124,14 @@ class PageSink(BaseSink):
         frame, picture = result.frame_tracks, result.frame.picture
         if not self._frames:
             self._start = frame.time
+        elif frame.time - self._last > _GAP:
+            self._gaps.append((self._last, frame.time))
         self._frames += 1
         self._last = frame.time
         if self._fullest is None or len(frame.tracks) > self._most:
             self._fullest, self._most = picture, len(frame.tracks)
         self._records.add(frame)
-        self._heat.add(frame)
-        self._counter = result.counter
+        self._counter, self._speeds = result.counter, result.speeds
         self._keep(self._crops.add(frame, picture))
 
     def _keep(self, crops: list[Crop]) -> None:
@@ -138,18 +139,26 @@ class PageSink(BaseSink):
             self._thumbnails[crop.id] = crop.time, jpeg_uri(crop.image, _THUMBNAIL)
 
     def _page(self) -> VideoPage:
+        settings, clock = self.context.settings, self.context.clock
+        if settings.regions.mask:  # its folders are nobody's business
+            mask = {"mask": Path(settings.regions.mask).name}
+            regions = settings.regions.model_copy(update=mask)
+            settings = settings.model_copy(update={"regions": regions})
+        counts = with_speeds(self._counter.counts(), self._speeds) if self._counter else None
         return VideoPage(
             video=self.video,
             frames=self._frames,
             start=self._start,
             end=self._last + float(1 / self.video.rate),
-            records=self._records.end(),
+            records=self._records.end(self._speeds),
             thumbnails=self._thumbnails,
             poster=self._fullest.image if self._fullest else None,
-            still=self._heat.over(self._fullest.image) if self._fullest else None,
             player=self._player(),
-            settings=render(self.context.settings),
-            counts=_by_minute(self._counter.counts().events) if self._counter else {},
+            settings=render(settings),
+            counts=counts,
+            interval=self.context.interval or 60,
+            gaps=self._gaps,
+            zero=clock.second_of_day if clock else None,
         )
 
     def _player(self) -> Player | None:
@@ -160,14 +169,6 @@ class PageSink(BaseSink):
             return None
         path, start = (drawn[0], self._start) if drawn else (source, float(self.video.start))
         return Player(path.name, link_to(path, self.path), bool(drawn), start)
-
-
-def _by_minute(events: Sequence[Event]) -> dict[str, Counter[int]]:
-    """Return the counts of each line or zone and direction by minute."""
-    minutes: dict[str, Counter[int]] = {}
-    for each in events:
-        minutes.setdefault(f"{each.name}: {each.direction}", Counter())[int(each.time // 60)] += 1
-    return minutes
 
 
 PAGE = SinkKind(
