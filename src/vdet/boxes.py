@@ -75,8 +75,13 @@ class Box:
     @property
     def pixels(self) -> tuple[int, int, int, int]:
         """x1, y1, x2, y2 as whole pixels, halves up."""
-        x1, y1, x2, y2 = (math.floor(side + 0.5) for side in (self.x1, self.y1, self.x2, self.y2))
-        return x1, y1, x2, y2
+        floor = math.floor
+        return (
+            floor(self.x1 + 0.5),
+            floor(self.y1 + 0.5),
+            floor(self.x2 + 0.5),
+            floor(self.y2 + 0.5),
+        )
 
     @property
     def xywh(self) -> tuple[int, int, int, int]:

@@ -1,5 +1,3 @@
-from dataclasses import replace
-
 import pytest
 
 from evaluate.scenes import TEN, drive, video
@@ -46,7 +44,7 @@ def test_of_two_predictions_on_a_vehicle_in_a_region_the_worse_one_is_dropped() 
 
 
 def test_an_ignored_prediction_counts_only_if_it_finds_a_vehicle() -> None:
-    found = [replace(box(id_, x), ignored=True) for id_, x in ((5, 0), (6, 300))]
+    found = [box(id_, x)._replace(ignored=True) for id_, x in ((5, 0), (6, 300))]
     assert kept_tracks(video(found), video([box(1, 10)])) == [5]
 
 

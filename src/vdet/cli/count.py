@@ -1,5 +1,6 @@
 """`vdet count`: count the vehicles of track files at lines and in zones."""
 
+import gc
 import logging
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -65,17 +66,21 @@ def count(
 
     outputs = options.as_outputs(options.wanted_outputs())
     check_sinks(outputs, overwrite=overwrite, inputs=[*tracks, *choice.inputs(settings)])
-    with progress_steps(" files") as steps:
-        advance = steps("", len(tracks) if len(tracks) > 1 else None)
-        videos = count_files(
-            tracks,
-            settings.counts,
-            size,
-            rate,
-            begin=counting.begin,
-            ground=choice.ground(),
-            advance=advance,
-        )
+    gc.disable()  # it takes a third of the time, and finds nothing: boxes are in no circles
+    try:
+        with progress_steps(" files") as steps:
+            advance = steps("", len(tracks) if len(tracks) > 1 else None)
+            videos = count_files(
+                tracks,
+                settings.counts,
+                size,
+                rate,
+                begin=counting.begin,
+                ground=choice.ground(),
+                advance=advance,
+            )
+    finally:
+        gc.enable()
     for name, counts in videos.items():
         if counts.clock and not is_quiet():
             print_message(f"{name}: begins {counts.clock}")

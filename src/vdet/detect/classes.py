@@ -1,5 +1,7 @@
 """Classes of vehicles: their names in all outputs, and the words that mean them elsewhere."""
 
+from functools import lru_cache
+
 OUR_NAMES = ("car", "truck", "bus", "motorcycle", "vehicle")
 """The classes in all outputs; `vehicle` is a vehicle of unknown class."""
 
@@ -13,6 +15,7 @@ WORDS = {
 """For each of `OUR_NAMES` the words that label files and networks use."""
 
 
+@lru_cache(maxsize=1000)
 def letters(label: str) -> str:
     """Return the letters of a label: case, spaces and punctuation do not matter."""
     return "".join(letter for letter in label.casefold() if letter.isalpha())
@@ -21,6 +24,7 @@ def letters(label: str) -> str:
 _NAMES = {letters(word): name for name, words in WORDS.items() for word in words}
 
 
+@lru_cache(maxsize=1000)
 def our_name(label: str) -> str | None:
     """Return which of `OUR_NAMES` a label means; None where it means none of them."""
     return _NAMES.get(letters(label))

@@ -11,7 +11,6 @@ import io
 import json
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any, BinaryIO
@@ -209,8 +208,7 @@ def read_coco(path: Path, data: bytes) -> SavedTracks:
     if len(frames) < len(images):
         raise TruthError(f"{path}: a frame_index of images appears twice")
     labels = (
-        replace(
-            label,
+        label._replace(
             frame=image.frame_index + 1,
             id=each.track_id,
             score=each.score,

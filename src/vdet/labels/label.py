@@ -1,14 +1,14 @@
 """A labelled box from a file, and the checks that apply to every format."""
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from vdet.errors import TruthError
 from vdet.track.track import State
 
-MAX_LABELS = 500_000
-"""Largest number of boxes in one file: five hours of video with one vehicle in sight."""
+MAX_LABELS = 5_000_000
+"""Largest number of boxes in one file: four hours of video with fourteen vehicles in sight."""
 
 MAX_IN_FRAME = 1000
 """Largest number of boxes of either kind, true or predicted, in one frame."""
@@ -22,9 +22,8 @@ Corners = tuple[float, float, float, float]
 """x1, y1, x2, y2 in pixels from 0; the far sides are exclusive."""
 
 
-@dataclass(frozen=True, slots=True)
-class Label:
-    """A labelled box of a file.
+class Label(NamedTuple):
+    """A labelled box of a file; there may be millions.
 
     Attributes
     ----------

@@ -16,7 +16,7 @@ from vdet.labels.label import Label, line_error
 LIMIT = 10_000_000
 """Largest frame number, id or pixel coordinate. Larger numbers are damage, and would overflow."""
 
-MAX_BYTES = 64_000_000
+MAX_BYTES = 300_000_000
 """Largest size of a file of boxes."""
 
 _LATEST = 1e11

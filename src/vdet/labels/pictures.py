@@ -135,7 +135,7 @@ def _with_roles(picture: LabelledPicture, roles: Roles, others: Counter[str]) ->
             raise line_error(picture.file, label.place, mistake)
         count += 1
         ignored = label.ignored or role == "ignored"
-        yield replace(label, name=our_name(name) or "vehicle", ignored=ignored)
+        yield label._replace(name=our_name(name) or "vehicle", ignored=ignored)
 
 
 def pictures_below(folder: Path) -> list[Path]:

@@ -73,7 +73,7 @@ def read_truth(path: Path, roles: Roles = DEFAULT_ROLES) -> LabelledVideo:
     form = recognise(path, data)
     labels: Iterable[Label] = form.read(path, data).labels
     if form is MOT:  # in the older form, the column of the score is the flag
-        labels = (replace(each, ignored=each.score == 0 or each.ignored) for each in labels)
+        labels = (each._replace(ignored=each.score == 0 or each.ignored) for each in labels)
     return LabelledVideo.of(checked_labels(path, _with_roles(path, labels, roles)))
 
 
@@ -85,7 +85,7 @@ def _with_roles(path: Path, labels: Iterable[Label], roles: Roles) -> Iterator[L
             what = f"label {label.name!r:.40} is unknown; give it a role in labels.roles, or use "
             raise line_error(path, label.place, f"{what}one of: {roles.known}")
         if role != "other":
-            yield replace(label, score=1.0, ignored=label.ignored or role == "ignored")
+            yield label._replace(score=1.0, ignored=label.ignored or role == "ignored")
 
 
 def read_labelled_pictures(path: Path, roles: Roles = DEFAULT_ROLES) -> LabelledPictures:

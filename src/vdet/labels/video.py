@@ -85,16 +85,11 @@ class SavedTracks:
 
 
 def _track(label: Label) -> Track:
-    return Track(
-        label.id,
-        Box.sized(*Box(*label.box).xywh),
-        min(1.0, max(0.0, label.score)),
-        label.state,
-        None if label.name is None else our_name(label.name) or label.name,
-        label.foot,
-        label.distance,
-        label.lane,
-    )
+    _, box, name, _, number, score, _, state, foot, distance, lane = label
+    x1, y1, x2, y2 = Box(*box).pixels
+    whole = Box(x1, y1, max(x2, x1 + 1), max(y2, y1 + 1))
+    named = None if name is None else our_name(name) or name
+    return Track(number, whole, min(1.0, max(0.0, score)), state, named, foot, distance, lane)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

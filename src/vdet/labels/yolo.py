@@ -14,7 +14,6 @@ import json
 import re
 import zipfile
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any, BinaryIO
@@ -198,7 +197,7 @@ def _track_label(
     """Return the label of a line with a box and its id, or its score and its id."""
     label = _label(place, columns[:_COLUMNS], names, size)
     score = parse_number(columns[_COLUMNS]) if len(columns) > _COLUMNS + 1 else 1.0
-    return replace(label, frame=frame, id=parse_whole(columns[-1]), score=score)
+    return label._replace(frame=frame, id=parse_whole(columns[-1]), score=score)
 
 
 def read_yolo_pictures(folder: Path) -> Iterator[LabelledPicture]:

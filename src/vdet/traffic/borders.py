@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from vdet.config.places import CountSettings
 from vdet.polygons import Point, Segment, contains, distance_to, meeting, side_of, sides
@@ -156,8 +157,7 @@ def _snapped(value: float, length: float) -> float:
     return float(length) if length - value <= near else value
 
 
-@dataclass(frozen=True, slots=True)
-class Sighting:
+class Sighting(NamedTuple):
     """A vehicle as it is seen in a frame: where its foot is, and the height of its box, pixels."""
 
     time: float
@@ -192,11 +192,15 @@ class BorderState:
         The settled side, 1 or -1; 0 before it is known.
     entered
         When it came into a zone in which it still is.
+    clear
+        Distance from `seen_at`, where it was seen last, within which nothing changes here, pixels.
     """
 
     border: Border
     side: int = 0
     entered: float | None = None
+    clear: float = 0.0
+    seen_at: Point = (0.0, 0.0)
     _sign: int = 0  # of the last place that was not exactly on the border
     _beyond: int = 0  # the side on which it is beyond the band
     _since: float = 0.0  # when it came there
@@ -220,6 +224,9 @@ class BorderState:
         if sign and self._sign == -sign:
             self._change = _change(before, sighting, sign, self.border)
         self._sign = sign or self._sign
+        is_settled = self.side == sign == self._beyond
+        self.seen_at = sighting.point
+        self.clear = abs(distance) if is_settled and abs(distance) > band else 0.0
         is_far = abs(distance) >= sighting.height
         was_far = self._far == sign
         self._far = sign if is_far and abs(distance) > band else 0

@@ -6,7 +6,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from vdet.boxes import Box
 from vdet.config.places import CountSettings
 from vdet.detect.classes import ClassScores
 from vdet.polygons import Point
@@ -37,6 +36,8 @@ _LEAVES = 0.1
 _MOST_GROWTH = 2.0
 """Largest ratio of the heights of the last box of a track and the first one of the next."""
 
+_Pixels = tuple[int, int, int, int]
+
 
 @dataclass(slots=True)
 class _Vehicle:
@@ -53,15 +54,18 @@ class _Vehicle:
     last: Sighting
     states: list[BorderState]
     shown: float = 0.0  # when it was last shown, also by prediction
-    outward: complex = 0j  # sides of the frame that its last box touches: x and y of -1, 0 or 1
     velocity: complex = 0j  # x and y, pixels a second
+    box: _Pixels = (0, 0, 0, 0)
+    clear: float = 0.0  # distance from `looked_at` within which nothing changes at any border
+    looked_at: Point = (0.0, 0.0)
     classes: ClassScores = field(default_factory=ClassScores)
     events: list[Event] = field(default_factory=list)
 
-    @property
-    def is_leaving(self) -> bool:
-        """Whether it moves out at the edge of the frame: then its end is no loss of the tracker."""
-        return (self.velocity * self.outward.conjugate()).real > _LEAVES * self.last.height
+    def is_leaving(self, width: int, height: int) -> bool:
+        """Return whether it moves out at the edge of the frame, and so was not lost."""
+        x1, y1, x2, y2 = self.box
+        outward = complex((x2 >= width - 1) - (x1 <= 1), (y2 >= height - 1) - (y1 <= 1))
+        return (self.velocity * outward.conjugate()).real > _LEAVES * self.last.height
 
     def expected(self, time: float) -> Point:
         """Return where it would be now if it had moved on."""
@@ -73,7 +77,8 @@ class _Vehicle:
         seconds = sighting.time - self.last.time
         if seconds > 0:
             share = 1.0 if self.last is self.first else 0.5
-            way = complex(*sighting.point) - complex(*self.last.point)
+            (x, y), (last_x, last_y) = sighting.point, self.last.point
+            way = complex(x - last_x, y - last_y)
             self.velocity += share * (way / seconds - self.velocity)
         self.last = sighting
 
@@ -167,10 +172,7 @@ class VehicleCounter:
         for track in frame.tracks:
             if track.id in self._vehicles:
                 self._vehicles[track.id].shown = self._now
-            # As exactly as files of tracks hold them, so that both count alike.
-            x, y = (round(value, 2) for value in track.foot)
-            height, score = float(track.box.xywh[3]), round(track.score, 4)
-            self._see(track, Sighting(self._now, frame.index, (x, y), height, score), ended)
+            self._see(track, frame.index, ended)
 
     def start_video(self) -> None:
         """Take the ids of the next frames for those of other tracks: they are of another video."""
@@ -204,21 +206,37 @@ class VehicleCounter:
             for state in each.states
         )
 
-    def _see(self, track: Track, sighting: Sighting, ended: _Ended | None) -> None:
+    def _see(self, track: Track, frame: int, ended: _Ended | None) -> None:
+        # As exactly as files of tracks hold it, so that both count alike.
+        (x, y), box = track.foot, track.box.pixels
+        point, height = (round(x, 2), round(y, 2)), float(max(1, box[3] - box[1]))
+        sighting = Sighting(self._now, frame, point, height, track.score)
         vehicle = self._vehicles.get(track.id) or self._begin(track.id, sighting, ended)
         vehicle.classes.add(track.class_name, track.score)
-        vehicle.outward = _touched_sides(track.box, self._size)
-        band = max(BAND * sighting.height, LEAST_BAND * self._size[1])
-        for state in vehicle.states:
-            before = state.side
-            change = state.see(sighting, vehicle.last, band)
-            if change is not None:
-                self._note(vehicle, state, change)
-            elif before == 0 and state.side > 0 and isinstance(state.border, Zone):
-                state.entered = vehicle.first.time
-                vehicle.add(state.border.name, APPEAR, vehicle.first)
+        vehicle.box = box
+        band = max(BAND * height, LEAST_BAND * self._size[1])
+        if math.dist(point, vehicle.looked_at) + band >= vehicle.clear:
+            self._look(vehicle, sighting, band)
         vehicle.move(sighting)
-        self._confirm(vehicle)
+        if vehicle.events:
+            self._confirm(vehicle)
+
+    def _look(self, vehicle: _Vehicle, sighting: Sighting, band: float) -> None:
+        """Look what a vehicle does at the borders that it is near to."""
+        clear = math.inf
+        for state in vehicle.states:
+            left = state.clear - math.dist(sighting.point, state.seen_at)
+            if left <= band:
+                before = state.side
+                change = state.see(sighting, vehicle.last, band)
+                if change is not None:
+                    self._note(vehicle, state, change)
+                elif before == 0 and state.side > 0 and isinstance(state.border, Zone):
+                    state.entered = vehicle.first.time
+                    vehicle.add(state.border.name, APPEAR, vehicle.first)
+                left = state.clear
+            clear = min(clear, left)
+        vehicle.clear, vehicle.looked_at = clear, sighting.point
 
     def _begin(self, number: int, sighting: Sighting, ended: _Ended | None) -> _Vehicle:
         """Remember a new vehicle, which may go on from another that has ended."""
@@ -240,7 +258,7 @@ class VehicleCounter:
             for vehicle in self._vehicles.values()
             if self._now - vehicle.shown <= _GAP
             and vehicle.key not in shown
-            and not vehicle.is_leaving
+            and not vehicle.is_leaving(*self._size)
         ]
         return _Ended(vehicles, self._now)
 
@@ -292,9 +310,3 @@ class VehicleCounter:
             self._missed.update(
                 state.border.name for state in vehicle.states if is_missed_at(state, ends)
             )
-
-
-def _touched_sides(box: Box, size: tuple[int, int]) -> complex:
-    """Return at which sides of the frame a box is: -1 left or top, 1 right or bottom, 0 neither."""
-    x1, y1, x2, y2 = box.pixels
-    return complex((x2 >= size[0] - 1) - (x1 <= 1), (y2 >= size[1] - 1) - (y1 <= 1))
