@@ -147,7 +147,8 @@ def true_lines(drive: Drive) -> Iterator[Sample]:
     """Place the true boxes by the true lines."""
     camera = drive.scene.camera
     finder = drive.finder()
-    bare = finder.update(finder.observe(np.zeros((camera.height, camera.width, 3), np.uint8)))
+    black = np.zeros((camera.height, camera.width, 3), np.uint8)
+    bare = finder.update(finder.observe(Picture(black)))
     for index in COUNTED:
         scene = drive.at(index)
         pitch = (scene.camera.horizon - camera.horizon) / (camera.focal * camera.above_ground)
@@ -161,7 +162,7 @@ def found_lines(drive: Drive) -> Iterator[Sample]:
     for index, image in enumerate(drive.images()):
         scene = drive.at(index)
         vehicles = [each.box for each in true_boxes(scene, index)]
-        road = finder.update(finder.observe(image), vehicles)
+        road = finder.update(finder.observe(Picture(image)), vehicles)
         if index in COUNTED:
             yield from by_true_boxes(scene, index, road)
 

@@ -19,6 +19,7 @@ from vdet.draw.paint import (
     draw_arrow,
     draw_lines,
     fill,
+    shade,
     write_text,
 )
 from vdet.media.coding import Coding
@@ -56,7 +57,7 @@ AREAS: dict[str, Draw] = {
     "fill, odd corners": lambda surface: fill(surface, Box.sized(31, 41, 120, 77), RED),
     "fill, over the last corner": lambda surface: fill(surface, Box.sized(251, 201, 120, 77), RED),
     "blend": lambda surface: blend(surface, triangle(), (76, 50), RED),
-    "blend, half": lambda surface: blend(surface, triangle(), (77, 50), RED, 0.5),
+    "shade": lambda surface: shade(surface, CORNERS.tolist(), RED, 0.5),
 }
 """Drawings with hardly an edge."""
 STROKES: dict[str, Draw] = {

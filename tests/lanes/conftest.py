@@ -8,6 +8,7 @@ from benchmarks.drawn_traffic import lane_view
 from vdet.config.schema import LaneSettings
 from vdet.lanes.camera import CalibratedCamera
 from vdet.lanes.road import Lane, LaneRequest, RoadFinder
+from vdet.media import Picture
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.render import Renderer
 from vdet.synthetic.scene import Carriageway, LaneLine, Light, Scene
@@ -63,7 +64,7 @@ def drive(
         for scene in scenes:
             renderer = Renderer(scene)
             images = [renderer.image(index) for index in range(scene.frames)]
-            lanes += [finder.update(finder.observe(image)).lane for image in images]
+            lanes += [finder.update(finder.observe(Picture(image))).lane for image in images]
         return lanes
 
     return find

@@ -8,6 +8,7 @@ import pytest
 from benchmarks.drawn_traffic import lane_view, traffic_scene, true_places
 
 from vdet.lanes.road import LaneRequest, Road, RoadFinder
+from vdet.media import Picture
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.render import Renderer
 from vdet.synthetic.scene import Scene, SceneVehicle, Waypoint
@@ -89,7 +90,7 @@ def test_with_the_lines_that_are_found_distances_are_right(
     pitches = []
     for index in range(FRAMES):
         vehicles = [each.box for each in true_boxes(scene, index)]
-        road = finder.update(finder.observe(renderer.image(index)), vehicles)
+        road = finder.update(finder.observe(Picture(renderer.image(index))), vehicles)
         placed += placed_in(scene, index, road) if index >= SETTLED else []
         pitches += [road.curves.pitch] if road.curves else []
     assert len(placed) > 2 * FRAMES

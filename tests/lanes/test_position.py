@@ -15,6 +15,7 @@ from vdet.lanes.camera import CalibratedCamera, Undistorter
 from vdet.lanes.curves import LaneCurves
 from vdet.lanes.road import LaneRequest, Road, RoadFinder, RoadPosition, position_on_road
 from vdet.lanes.top_view import TopView
+from vdet.media import Picture
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.render import render
 from vdet.synthetic.scene import Scene
@@ -98,7 +99,7 @@ def road(
     """A bend of 600 m radius, without a lens."""
     scene = make_road(curvature=1 / 600, size=(640, 480), frames=1)
     finder = RoadFinder(LaneRequest(), settings_for(scene.camera), 640, 480)
-    return finder.update(finder.observe(render(scene, 0)))
+    return finder.update(finder.observe(Picture(render(scene, 0))))
 
 
 def test_a_foot_is_at_the_edge_of_a_pixel_as_boxes_are(road: Road) -> None:

@@ -8,7 +8,7 @@ import pytest
 from vdet.config.schema import LaneSettings
 from vdet.lanes.calibration import Calibration, calibrate
 from vdet.lanes.road import Lane, LaneRequest, RoadFinder
-from vdet.media import VideoReader
+from vdet.media import Picture, VideoReader
 from vdet.media.images import read_image
 
 pytestmark = pytest.mark.realdata
@@ -44,7 +44,7 @@ def finder(calibration: Calibration) -> RoadFinder:
 
 def lane_in(calibration: Calibration, path: Path) -> Lane:
     finder = RoadFinder(LaneRequest(calibration.camera), LaneSettings(), 1280, 720)
-    lane = finder.update(finder.observe(read_image(path))).lane
+    lane = finder.update(finder.observe(Picture(read_image(path)))).lane
     assert lane is not None, path.name
     return lane
 
@@ -68,7 +68,7 @@ def test_straight_roads_are_straight(calibration: Calibration, real_data: Path) 
 
 def test_the_lane_is_steady_on_pale_concrete(finder: RoadFinder, real_data: Path) -> None:
     with VideoReader(real_data / "test_video.mp4") as reader:
-        lanes = [finder.update(finder.observe(frame.image)).lane for frame in reader]
+        lanes = [finder.update(finder.observe(frame.picture)).lane for frame in reader]
     shown = [lane for lane in lanes if lane]
     assert len(shown) == len(lanes) == 38
     for before, lane in pairwise(shown):

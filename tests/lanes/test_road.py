@@ -11,6 +11,7 @@ import pytest
 from vdet.boxes import Float64Array
 from vdet.config.schema import LaneSettings
 from vdet.lanes.road import CARRY, Lane, LaneRequest, RoadFinder
+from vdet.media import Picture
 from vdet.media.images import Image
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.render import render
@@ -130,7 +131,7 @@ def test_a_pitching_camera_keeps_the_lane_and_its_width(
     finder = RoadFinder(LaneRequest(), settings_for(camera), camera.width, camera.height)
     for shift in (0, 3, 6, 8, 4, -3, -6, -3):  # pixels by which the horizon moves
         pitched = replace(camera, horizon=camera.horizon + shift)
-        view = finder.observe(render(replace(scene, camera=pitched), 0))
+        view = finder.observe(Picture(render(replace(scene, camera=pitched), 0)))
         check(finder.update(view).lane, pitched)
 
 
@@ -160,11 +161,11 @@ def room() -> Image:
 def test_a_picture_without_a_lane_has_none(draw: Callable[[], Image]) -> None:
     finder = RoadFinder(LaneRequest(), LaneSettings(), 1280, 720)
     for _ in range(3):
-        assert finder.update(finder.observe(draw())).lane is None
+        assert finder.update(finder.observe(Picture(draw()))).lane is None
 
 
 @pytest.mark.parametrize("size", [(16, 16), (64, 36), (50, 400)])
 def test_unusual_frame_sizes_raise_no_error(size: tuple[int, int]) -> None:
     image = np.random.default_rng(0).integers(0, 256, (size[1], size[0], 3), dtype=np.uint8)
     finder = RoadFinder(LaneRequest(), LaneSettings(), *size)
-    assert finder.update(finder.observe(image)).lane is None
+    assert finder.update(finder.observe(Picture(image))).lane is None

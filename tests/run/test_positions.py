@@ -90,7 +90,7 @@ def test_vehicles_of_a_picture_have_their_distance_and_lane() -> None:
 @pytest.fixture(scope="module")
 def road() -> Road:
     finder = roads()
-    return finder.update(finder.observe(render(replace(SCENE, vehicles=()), 0)))
+    return finder.update(finder.observe(Picture(render(replace(SCENE, vehicles=()), 0))))
 
 
 def track_at(box: Box) -> Track:

@@ -228,7 +228,7 @@ class TestMapOrdered:
         seen: list[int] = []
         items = recording(range(1, 100), seen)
         with map_ordered(str, items, 2, is_work=lambda item: item % every == 0) as pairs:
-            assert next(pairs) == (1, "1")
+            assert next(pairs) == (1, "1" if every == 1 else None)
         assert len(seen) == taken
 
 

@@ -25,6 +25,8 @@ Surface = Image | Planes
 _FONT = cv2.FONT_HERSHEY_DUPLEX
 _SHIFT = 4
 """Bits of the fraction of a pixel that OpenCV draws with."""
+_HALF = 127
+"""A pixel of chroma of which more than this, of 255, is covered counts as covered."""
 _FARTHEST = 2**15
 """Pixels from the picture's corner; OpenCV takes no coordinates much larger."""
 
@@ -97,14 +99,18 @@ def shade(surface: Surface, corners: Sequence[Point], color: Color, opacity: flo
     points = np.rint(np.array(corners)).astype(np.int32)
     x1, y1, x2, y2 = _visible(surface, Box.sized(*cv2.boundingRect(points)))
     mask = np.zeros((y2 - y1, x2 - x1), np.uint8)
-    if mask.size:
-        cv2.fillPoly(mask, [points], 255, offset=(-x1, -y1))
-        blend(surface, mask, (x1, y1), color, opacity)
+    if not mask.size:
+        return
+    cv2.fillPoly(mask, [points], 255, offset=(-x1, -y1))
+    for layer, value, halved in _layers(surface, color):
+        part = _part(layer, (x1, y1, x2, y2), halved)
+        covered = _halved(mask, x1, y1) if halved else mask
+        table = np.arange(256)[:, None] * (1 - opacity) + np.array(value) * opacity
+        mixed = cv2.LUT(part, np.rint(table).astype(np.uint8)[None])
+        cv2.copyTo(mixed, (covered > _HALF).view(np.uint8), part)
 
 
-def blend(
-    surface: Surface, mask: Image, corner: tuple[int, int], color: Color, opacity: float = 1.0
-) -> None:
+def blend(surface: Surface, mask: Image, corner: tuple[int, int], color: Color) -> None:
     """Mix a colour into the pixels of a mask.
 
     Parameters
@@ -119,9 +125,7 @@ def blend(
     for layer, value, halved in _layers(surface, color):
         part = _part(layer, (x, y, x + width, y + height), halved)
         covered = _halved(mask, x, y) if halved else mask
-        shares = covered.reshape(part.shape[:2] + (1,) * (part.ndim - 2)) * np.float32(
-            opacity / 255
-        )
+        shares = covered.reshape(part.shape[:2] + (1,) * (part.ndim - 2)) * np.float32(1 / 255)
         part[:] = np.rint(part + (np.array(value, np.float32) - part) * shares)
 
 

@@ -15,10 +15,13 @@ from vdet.boxes import Box, Float64Array
 from vdet.config.document import read_values
 from vdet.errors import ConfigError
 from vdet.files import staged
+from vdet.media import Picture, Planes
 from vdet.media.images import Image
 
 _ASPECT_TOLERANCE = 0.005  # accepts 854×480 for 1280×720
-_GRID_POINTS = 16  # along each side of a box
+_SIDE_POINTS = np.linspace(0, 1, 16)
+_OUTLINE = np.array([(x, y) for x in _SIDE_POINTS for y in _SIDE_POINTS if {x, y} & {0, 1}])
+"""Points on the sides of a box of side 1, `(n, 2)`."""
 
 _MISTAKES = {
     "missing": "is missing; `vdet calibrate` writes camera files",
@@ -85,11 +88,23 @@ class CalibratedCamera:
         return np.array([(fx * across, 0, x), (0, fy * down, y), last])
 
 
+Maps = tuple[cv2.typing.MatLike, cv2.typing.MatLike]
+"""Where each pixel comes from, as OpenCV takes it."""
+
+
+def warped(layer: Image, maps: Maps, outside: int = 0, target: Image | None = None) -> Image:
+    """Return a layer of a picture with its pixels moved; it is `outside` beyond its sides.
+
+    The memory of `target` is used where it is given.
+    """
+    border = cv2.BORDER_CONSTANT, (outside,)
+    return np.asarray(cv2.remap(layer, *maps, cv2.INTER_LINEAR, target, *border), np.uint8)
+
+
 class Undistorter:
     """Removes the lens distortion of one camera from frames of one size.
 
     Focal lengths, principal point and frame size stay the same. Without a camera, nothing changes.
-    Threads may share an undistorter.
 
     Raises
     ------
@@ -99,19 +114,49 @@ class Undistorter:
 
     def __init__(self, camera: CalibratedCamera | None, width: int, height: int) -> None:
         self._camera = camera
+        self._maps: dict[tuple[int, ...], Maps] = {}
         if camera:
             self._size = width, height
             self._matrix = camera.matrix_for(width, height)
             self._distortion = np.array(camera.distortion)
-            self._maps = cv2.initUndistortRectifyMap(
-                self._matrix, self._distortion, np.eye(3), self._matrix, self._size, cv2.CV_16SC2
-            )
 
-    def image(self, image: Image) -> Image:
-        """Return the undistorted frame, BGR uint8 `(H, W, 3)`; black outside the camera's view."""
+    def copy(self, picture: Picture) -> Image | Planes:
+        """Return an undistorted copy of a frame, BGR or planes as it is.
+
+        It is black outside the camera's view.
+        """
         if not self._camera:
-            return image
-        return np.asarray(cv2.remap(image, *self._maps, cv2.INTER_LINEAR), np.uint8)
+            return picture.pixels.copy()
+        planes = picture.planes
+        if planes is None:
+            return self._undistorted(picture.image, 0)
+        black = 0 if planes.coding.full_range else 16
+        straight = Planes.blank(*self._size, planes.coding)
+        for source, target, outside in zip(
+            planes.layers, straight.layers, (black, 128, 128), strict=True
+        ):
+            self._undistorted(source, outside, target)
+        return straight
+
+    def _undistorted(self, image: Image, outside: int, target: Image | None = None) -> Image:
+        """Return an undistorted layer of a frame, which may have another size; or fill `target`."""
+        height, width = size = image.shape[:2]
+        if size not in self._maps:
+            assert self._camera
+            matrix = self._camera.matrix_for(width, height)
+            self._maps[size] = cv2.initUndistortRectifyMap(
+                matrix, self._distortion, np.eye(3), matrix, (width, height), cv2.CV_16SC2
+            )
+        return warped(image, self._maps[size], outside, target)
+
+    def distorted(self, points: Float64Array) -> Float64Array:
+        """Return where pixels `(n, 2)` of the undistorted frame lie in the frame, `(n, 2)`."""
+        if not self._camera:
+            return points
+        ahead = (np.column_stack([points, np.ones(len(points))])) @ np.linalg.inv(self._matrix).T
+        still = np.zeros(3)
+        seen, _ = cv2.projectPoints(ahead, still, still, self._matrix, self._distortion)
+        return np.asarray(seen, np.float64).reshape(-1, 2)
 
     def points(self, points: Float64Array) -> Float64Array:
         """Return where pixels `(n, 2)` of the frame lie in the undistorted frame, `(n, 2)`."""
@@ -137,9 +182,8 @@ class Undistorter:
         """
         if not self._camera:
             return box
-        x = np.linspace(box.x1 - 0.5, box.x2 - 0.5, _GRID_POINTS)
-        y = np.linspace(box.y1 - 0.5, box.y2 - 0.5, _GRID_POINTS)
-        moved = self.points(np.stack(np.meshgrid(x, y), axis=2).reshape(-1, 2))
+        size = box.x2 - box.x1, box.y2 - box.y1
+        moved = self.points(_OUTLINE * size + (box.x1 - 0.5, box.y1 - 0.5))
         left, top = np.rint(moved.min(axis=0) + 0.5).astype(int).tolist()
         right, bottom = np.rint(moved.max(axis=0) + 0.5).astype(int).tolist()
         return Box(left, top, right, bottom).clipped(*self._size)

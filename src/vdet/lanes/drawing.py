@@ -5,8 +5,9 @@ import numpy as np
 
 from vdet.boxes import Float64Array
 from vdet.draw.boxes import draw_label, line_width
-from vdet.draw.paint import Color, draw_lines, shade
+from vdet.draw.paint import Color, Surface, draw_lines, shade
 from vdet.lanes.road import Lane, Road
+from vdet.media import Picture
 from vdet.media.images import Image
 
 AREA: Color = (80, 200, 60)
@@ -15,12 +16,12 @@ _OPACITY = 0.3
 _SCALE = 2  # top views are small, so their pictures are enlarged
 
 
-def draw_lane(image: Image, lane: Lane) -> None:
+def draw_lane(surface: Surface, lane: Lane) -> None:
     """Draw the lane's area and lines into an undistorted frame, and write its numbers."""
-    _draw_area(image, lane.left, lane.right)
+    _draw_area(surface, lane.left, lane.right)
     first, second = lane_text(lane)
-    tag = draw_label(image, first, (0, 0), AREA)
-    draw_label(image, second, (0, 2 * tag.height), AREA)
+    tag = draw_label(surface, first, (0, 0), AREA)
+    draw_label(surface, second, (0, 2 * tag.height), AREA)
 
 
 def lane_text(lane: Lane) -> tuple[str, str]:
@@ -40,7 +41,7 @@ def stage_pictures(road: Road) -> dict[str, Image]:
     `road` is the undistorted frame with the outline of the top view, `above` the top view, `mask`
     its paint (what vehicles hide is grey), and `fit` the top view with the lane.
     """
-    frame = road.view.image.copy()
+    frame = Picture(road.undistorted()).image
     draw_lines(frame, road.top_view.outline, LINE, line_width(frame), closed=True)
     above, fit = _enlarge(road.view.top), _enlarge(road.view.top)
     if lane := road.lane:
@@ -50,11 +51,11 @@ def stage_pictures(road: Road) -> dict[str, Image]:
     return {"road": frame, "above": above, "mask": _enlarge(mask), "fit": fit}
 
 
-def _draw_area(image: Image, left: Float64Array, right: Float64Array) -> None:
+def _draw_area(surface: Surface, left: Float64Array, right: Float64Array) -> None:
     """Tint the area between two lines, pixels `(n, 2)`, and draw the lines."""
-    shade(image, [(x, y) for x, y in [*left.tolist(), *right[::-1].tolist()]], AREA, _OPACITY)
+    shade(surface, [(x, y) for x, y in [*left.tolist(), *right[::-1].tolist()]], AREA, _OPACITY)
     for line in (left, right):
-        draw_lines(image, line, LINE, line_width(image))
+        draw_lines(surface, line, LINE, line_width(surface))
 
 
 def _enlarge(picture: Image) -> Image:

@@ -46,6 +46,8 @@ _REACH = 0.35
 """Distance to the road on the left and right with which a pixel is compared, metres."""
 _RISE, _LEAST_RISE = 0.10, 10.0
 """Least rise in lightness from the road to paint: share of the road's, and of 0 to 255."""
+_LEAST_RISES = np.maximum(np.arange(256) * np.float32(_RISE), _LEAST_RISE).astype(np.uint8)
+"""The least rise in whole values, by the lightness of the road."""
 _YELLOW = 9.0
 """Least rise in b of CIELAB from the road to yellow paint, of 0 to 255."""
 _BASE = 15.0
@@ -65,17 +67,17 @@ def paint_mask(top: Image) -> Image:
     lightness, yellow = (np.asarray(cv2.extractChannel(smooth, i), np.uint8) for i in (0, 2))
     road = _larger_side(lightness, reach)
     rise = cv2.subtract(lightness, road)  # saturates at 0
-    least = np.maximum(road * np.float32(_RISE), _LEAST_RISE)
     tint = cv2.subtract(yellow, _larger_side(yellow, reach))
-    paint = (rise > least) | (tint > _YELLOW)
-    return np.where(paint, np.uint8(PAINT), np.uint8(0))
+    paint = np.asarray(cv2.compare(rise, cv2.LUT(road, _LEAST_RISES), cv2.CMP_GT), np.uint8)
+    paint[tint > _YELLOW] = PAINT
+    return paint
 
 
 def _larger_side(channel: Image, reach: int) -> Image:
     """Return the larger of the values `reach` columns to the left and to the right."""
     padded = cv2.copyMakeBorder(channel, 0, 0, reach, reach, cv2.BORDER_CONSTANT, value=(255,))
     columns = channel.shape[1]
-    return np.maximum(padded[:, :columns], padded[:, 2 * reach :])
+    return np.asarray(cv2.max(padded[:, :columns], padded[:, 2 * reach :]), np.uint8)
 
 
 def hide(mask: Image, top_view: TopView, boxes: Iterable[Box]) -> Image:
@@ -105,10 +107,11 @@ def paint_along(mask: Image, top_view: TopView, x: Float64Array, margin: float) 
     middles = np.clip(np.rint(top_view.columns(x)), -half - 1, mask.shape[1] + half).astype(np.intp)
     padded = cv2.copyMakeBorder(mask, 0, 0, 2 * half + 1, 2 * half + 1, cv2.BORDER_CONSTANT)
     columns = (middles + 2 * half + 1)[:, None] + around
-    near = np.take_along_axis(padded, columns, axis=1)
+    columns += np.arange(len(mask))[:, None] * padded.shape[1]
+    near = np.asarray(padded, np.uint8).ravel()[columns]
     visible = (near != HIDDEN).all(axis=1)
     band = near == PAINT
-    counts = band.sum(axis=1) * visible
+    counts = np.count_nonzero(band, axis=1) * visible
     rows = np.flatnonzero(counts)
     middle = middles[rows] + (band[rows] @ around) / counts[rows]
     x = top_view.laterals[0] + middle / ACROSS

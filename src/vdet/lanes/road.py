@@ -9,14 +9,16 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
+import cv2
 import numpy as np
 
 from vdet.boxes import Box, Float64Array
 from vdet.config.schema import LaneSettings
-from vdet.lanes.camera import CalibratedCamera, Undistorter
+from vdet.lanes.camera import CalibratedCamera, Maps, Undistorter, warped
 from vdet.lanes.curves import Equations, FrameFit, LaneCurves, add_earlier, fit_near, fit_new, solve
 from vdet.lanes.paint import hide, paint_mask
 from vdet.lanes.top_view import TopView
+from vdet.media import Picture, Planes
 from vdet.media.images import Image
 
 CARRY = 12
@@ -120,8 +122,8 @@ def position_on_road(
 class FrameView:
     """One frame, prepared for the lane search."""
 
-    image: Image
-    """The undistorted frame, BGR uint8 `(H, W, 3)`; the frame itself if there is no camera."""
+    picture: Picture
+    """The frame itself."""
     top: Image
     """The road from above, BGR uint8 `(rows, columns, 3)`."""
     mask: Image
@@ -140,7 +142,11 @@ class Road:
     """The lines of `lane` on the ground; None if there is no lane."""
     top_view: TopView
     undistorter: Undistorter
-    """Moves boxes and points of the original frame to `view.image`."""
+    """Moves boxes and points of the original frame to the undistorted one."""
+
+    def undistorted(self) -> Image | Planes:
+        """Return an undistorted copy of the frame: BGR or planes, as the frame is."""
+        return self.undistorter.copy(self.view.picture)
 
     def record(self) -> dict[str, Any] | None:
         """Return the lane as plain values for JSON: see `lane_record`."""
@@ -148,7 +154,7 @@ class Road:
 
     def cuts(self, box: Box) -> bool:
         """Return whether the left, right or lower edge of the original frame cuts its box."""
-        height, width = self.view.image.shape[:2]
+        height, width = self.view.picture.height, self.view.picture.width
         beside = box.x1 <= _EDGE * width or box.x2 >= (1 - _EDGE) * width
         return bool(beside or box.y2 >= (1 - _EDGE) * height)
 
@@ -177,7 +183,7 @@ class _LaneState:
 
 
 class RoadFinder:
-    """Undistorts the frames of one video, `width` × `height` pixels, and finds the lane in them.
+    """Warps the frames of one video, `width` × `height` pixels, and finds the lane in them.
 
     Several threads may call `observe` at the same time. `update` must get the results one by one,
     in the order of the frames.
@@ -194,12 +200,24 @@ class RoadFinder:
         self._undistorter = Undistorter(request.camera, width, height)
         self._top_view = TopView(settings, width, height)
         self._state: _LaneState | None = None
+        shown = self._top_view.pixels()
+        seen = self._undistorter.distorted(shown.reshape(-1, 2)).reshape(shown.shape)
+        self._maps: list[Maps] = [
+            cv2.convertMaps(places[..., 0], places[..., 1], cv2.CV_16SC2)
+            for places in np.array([seen, (seen + 0.5) / 2 - 0.5], np.float32)
+        ]
+        """Where the pixels of the top view lie in the frame, and in its chroma."""
 
-    def observe(self, image: Image) -> FrameView:
-        """Undistort a frame, BGR uint8 `(H, W, 3)`, and mark the paint in its top view."""
-        undistorted = self._undistorter.image(image)
-        top = self._top_view.image(undistorted)
-        return FrameView(undistorted, top, paint_mask(top))
+    def observe(self, picture: Picture) -> FrameView:
+        """Mark the paint in the top view of a frame, which is made without undistorting it all."""
+        of_frame, of_chroma = self._maps
+        if planes := picture.planes:
+            luma = warped(planes.luma, of_frame)
+            blue, red = (warped(each, of_chroma, outside=128) for each in planes.layers[1:])
+            top = planes.coding.to_bgr((luma, blue, red))
+        else:
+            top = warped(picture.image, of_frame)
+        return FrameView(picture, top, paint_mask(top))
 
     def update(self, view: FrameView, vehicles: Iterable[Box] = ()) -> Road:
         """Return the road in the next frame.

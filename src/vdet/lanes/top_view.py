@@ -10,7 +10,6 @@ import numpy as np
 
 from vdet.boxes import Float64Array
 from vdet.config.schema import LaneSettings
-from vdet.media.images import Image
 
 ACROSS = 30.0
 """Pixels per metre, across the road."""
@@ -54,11 +53,11 @@ class TopView:
         self._warp = self._to_frame @ [[1 / ACROSS, 0, x], [0, -1 / ALONG, z], [0, 0, 1]]
         """From `(column, row, 1)` of the top view to pixels of the undistorted frame."""
 
-    def image(self, frame: Image) -> Image:
-        """Warp an undistorted frame, uint8 `(H, W, 3)`, to the top view, `(rows, columns, 3)`."""
-        size = (len(self.laterals), len(self.distances))
-        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-        return np.asarray(cv2.warpPerspective(frame, self._warp, size, flags=flags), np.uint8)
+    def pixels(self) -> Float64Array:
+        """Return the pixels of the undistorted frame, `(rows, columns, 2)`, that it shows."""
+        rows, columns = np.mgrid[: len(self.distances), : len(self.laterals)]
+        shown = _transform(self._warp, np.column_stack([columns.ravel(), rows.ravel()]))
+        return shown.reshape(*rows.shape, 2)
 
     def ground_to_frame(self, x: Float64Array, z: Float64Array) -> Float64Array:
         """Return the pixels `(n, 2)` in the undistorted frame of ground points, metres `(n,)`."""

@@ -53,25 +53,28 @@ class Planes:
             np.asarray(cv2.resize(each, half, interpolation=cv2.INTER_AREA), np.uint8)
             for each in chroma
         )
-        return cls._own(width, height, coding, (luma, blue, red))
+        return cls.blank(width, height, coding)._filled((luma, blue, red))
 
     @classmethod
-    def _own(cls, width: int, height: int, coding: Coding, layers: Layers) -> "Planes":
+    def blank(cls, width: int, height: int, coding: Coding) -> "Planes":
+        """Return planes of their own, with any values; `width` × `height` pixels."""
         import av
         from av.video.reformatter import ColorRange
 
         picture = av.VideoFrame(width, height, "yuv420p")
         picture.colorspace = 1 if coding.matrix == "bt709" else 6  # ITU-T H.273
         picture.color_range = ColorRange.JPEG if coding.full_range else ColorRange.MPEG
-        planes = cls(picture, coding, is_own=True)
-        for target, source in zip(planes.layers, layers, strict=True):
+        return cls(picture, coding, is_own=True)
+
+    def _filled(self, layers: Layers) -> "Planes":
+        for target, source in zip(self.layers, layers, strict=True):
             target[:] = source
-        return planes
+        return self
 
     def copy(self) -> "Planes":
         """Return a copy that may be changed."""
         height, width = self.shape
-        return self._own(width, height, self.coding, self.layers)
+        return self.blank(width, height, self.coding)._filled(self.layers)
 
     def to_image(self) -> Image:
         """Return the picture as BGR uint8 `(H, W, 3)`; a value of chroma counts for 2 × 2 pixels.

@@ -147,7 +147,10 @@ class Pipeline:
     ) -> Generator[FrameResult]:
         """Search the frames and update the tracker; yield the results, without tracks."""
         chosen = self.rate.choose(frames)
-        with map_ordered(self.search, chosen, threads, is_work=lambda each: each[1]) as results:
+        in_all = any(isinstance(step, ParallelStep) for step in self.steps)
+        with map_ordered(
+            self.search, chosen, threads, is_work=lambda each: each[1] or in_all
+        ) as results:
             for (frame, searched), candidates in results:
                 yield self.observe(frame, candidates, source, searched=searched)
 

@@ -94,8 +94,8 @@ class LaneStep:
         self._views: dict[int, FrameView] = {}
 
     def prepare(self, frame: Frame) -> None:
-        """Undistort a frame and mark its paint."""
-        self._views[frame.index] = self._roads.observe(frame.image)
+        """Mark the paint of a frame."""
+        self._views[frame.index] = self._roads.observe(frame.picture)
 
     def apply(self, result: FrameResult) -> FrameResult:
         """Add the road, and where the vehicles are on it."""

@@ -155,24 +155,24 @@ def map_ordered(
     """Pair items with the results of `function`, computed in parallel, in their order.
 
     Items are taken until there is one for each thread and one more. Those for which `is_work` is
-    false take no time and do not count, but at most `_AHEAD` items are taken for each thread.
+    false get None and do not count, but at most `_AHEAD` items are taken for each thread.
     """
-    running: deque[tuple[T, Future[R]]] = deque()
+    running: deque[tuple[T, Future[R] | None]] = deque()
 
     with ThreadPoolExecutor(threads, thread_name_prefix="vdet-search") as pool:
 
-        def pairs() -> Iterator[tuple[T, R]]:
+        def pairs() -> Iterator[tuple[T, Any]]:
             work = 0
             for item in items:
-                running.append((item, pool.submit(function, item)))
-                work += is_work(item)
+                running.append((item, pool.submit(function, item) if is_work(item) else None))
+                work += running[-1][1] is not None
                 while work > threads or len(running) > _AHEAD * threads:
                     first, future = running.popleft()
-                    work -= is_work(first)
-                    yield first, future.result()
+                    work -= future is not None
+                    yield first, future and future.result()
             while running:
                 first, future = running.popleft()
-                yield first, future.result()
+                yield first, future and future.result()
 
         try:
             yield pairs()

@@ -54,7 +54,7 @@ def shown(overlay: Overlay, result: FrameResult) -> Image:
 
 def road_seen(camera: CalibratedCamera | None) -> Road:
     finder = RoadFinder(LaneRequest(camera), LaneSettings(), WIDTH, HEIGHT)
-    return finder.update(finder.observe(road(CAR)))
+    return finder.update(finder.observe(Picture(road(CAR))))
 
 
 def test_without_lanes_vehicles_are_drawn_where_they_are() -> None:
@@ -79,7 +79,7 @@ def test_lost_vehicles_are_drawn_dashed() -> None:
 def test_with_lanes_vehicles_are_drawn_where_undistortion_puts_them() -> None:
     undistorted = road_seen(LENS)
     assert undistorted.undistorter.box(CAR) != CAR
-    expected = undistorted.view.image.copy()
+    expected = Picture(undistorted.undistorted()).image
     draw_box(expected, undistorted.undistorter.box(CAR), color_of(1), "#1")
     drawn = drawn_on(result_of(CAR, found=undistorted))
     np.testing.assert_array_equal(drawn, expected)

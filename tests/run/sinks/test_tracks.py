@@ -15,6 +15,7 @@ from vdet.boxes import Box
 from vdet.config.schema import LaneSettings
 from vdet.errors import OutputError
 from vdet.lanes.road import Lane, LaneRequest, Road, RoadFinder, lane_record
+from vdet.media import Picture
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output
 from vdet.track.track import Track
@@ -95,7 +96,7 @@ def test_standard_output_gets_each_frame_at_once(monkeypatch: pytest.MonkeyPatch
 def road(lane: Lane | None) -> Road:
     image = np.zeros((36, 64, 3), np.uint8)
     finder = RoadFinder(LaneRequest(), LaneSettings(), 64, 36)
-    return replace(finder.update(finder.observe(image)), lane=lane)
+    return replace(finder.update(finder.observe(Picture(image))), lane=lane)
 
 
 def written_with_lanes(path: Path) -> str:

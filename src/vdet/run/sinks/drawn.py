@@ -65,14 +65,11 @@ class Overlay:
         are drawn where they lie in it.
         """
         road = result.road
-        if road is None:
-            surface: Surface = result.frame.picture.pixels.copy()
-        else:
-            surface = image = road.view.image.copy()
-            if road.lane:
-                from vdet.lanes.drawing import draw_lane
+        surface = road.undistorted() if road else result.frame.picture.pixels.copy()
+        if road and road.lane:
+            from vdet.lanes.drawing import draw_lane
 
-                draw_lane(image, road.lane)
+            draw_lane(surface, road.lane)
         shown = _placed(self._shown(result), road, surface)
         if result.counter and self._settings.counts.drawn:
             draw_running_counts(surface, result.counter, road)
