@@ -3,7 +3,7 @@
 import colorsys
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -120,6 +120,7 @@ def _lay_out(
     return Box.sized(x, y, tag_width, tag_height), (x + margin, y + margin + height), scale
 
 
+@cache
 def text_color(background: Color) -> Color:
     """Return black or white: the one with the higher contrast ratio (WCAG 2.1) on a background."""
     shares = np.array(background) / 255
@@ -131,10 +132,10 @@ def text_color(background: Color) -> Color:
 def _sides(box: Box, width: int) -> Iterator[Box]:
     """Give the four sides of an outline just inside a box; those of a small box overlap."""
     across, down = min(width, box.width), min(width, box.height)
-    yield replace(box, y2=box.y1 + down)
-    yield replace(box, y1=box.y2 - down)
-    yield replace(box, x2=box.x1 + across)
-    yield replace(box, x1=box.x2 - across)
+    yield Box(box.x1, box.y1, box.x2, box.y1 + down)
+    yield Box(box.x1, box.y2 - down, box.x2, box.y2)
+    yield Box(box.x1, box.y1, box.x1 + across, box.y2)
+    yield Box(box.x2 - across, box.y1, box.x2, box.y2)
 
 
 def _dashes(side: Box, dash: int) -> Iterator[Box]:

@@ -4,7 +4,7 @@ On planes, colours are drawn at half the resolution, as 4:2:0 has it.
 """
 
 from collections.abc import Iterator, Sequence
-from functools import cache
+from functools import cache, lru_cache
 
 import cv2
 import numpy as np
@@ -77,11 +77,17 @@ def write_text(
     `scale` is the size as OpenCV counts it.
     """
     x1, y1, x2, y2 = _visible(surface, within)
-    mask = np.zeros((y2 - y1, x2 - x1), np.uint8)
-    if mask.size:
+    if x1 < x2 and y1 < y2:
         place = round(origin[0]) - x1, round(origin[1]) - y1
-        cv2.putText(mask, text, place, _FONT, scale, 255, _stroke(scale), cv2.LINE_AA)
-        blend(surface, mask, (x1, y1), color)
+        blend(surface, _text_mask(text, place, scale, (y2 - y1, x2 - x1)), (x1, y1), color)
+
+
+@lru_cache(maxsize=256)
+def _text_mask(text: str, place: tuple[int, int], scale: float, shape: tuple[int, int]) -> Image:
+    """Return how much of each pixel a text covers; labels often stay for many frames."""
+    mask = np.zeros(shape, np.uint8)
+    cv2.putText(mask, text, place, _FONT, scale, 255, _stroke(scale), cv2.LINE_AA)
+    return mask
 
 
 def text_size(text: str, scale: float) -> tuple[int, int, int]:
@@ -122,9 +128,10 @@ def blend(surface: Surface, mask: Image, corner: tuple[int, int], color: Color) 
     """
     x, y = corner
     height, width = mask.shape
+    small = _halved(mask, x, y) if isinstance(surface, Planes) else mask
     for layer, value, halved in _layers(surface, color):
         part = _part(layer, (x, y, x + width, y + height), halved)
-        covered = _halved(mask, x, y) if halved else mask
+        covered = small if halved else mask
         shares = covered.reshape(part.shape[:2] + (1,) * (part.ndim - 2)) * np.float32(1 / 255)
         part[:] = np.rint(part + (np.array(value, np.float32) - part) * shares)
 
@@ -141,7 +148,9 @@ def _halved(mask: Image, x: int, y: int) -> Image:
 def _visible(surface: Surface, box: Box) -> tuple[int, int, int, int]:
     """Return the sides of the part of a box that lies in the surface."""
     height, width = surface.shape[:2]
-    return box.clipped(width, height).pixels
+    x1, y1, x2, y2 = box.pixels
+    x1, y1 = max(0, x1), max(0, y1)
+    return x1, y1, max(x1, min(x2, width)), max(y1, min(y2, height))
 
 
 def _layers(surface: Surface, color: Color) -> Iterator[_Layer]:

@@ -127,7 +127,7 @@ class Damage:
     def _is_late(self, time: int | None) -> bool:
         if time is None or self._last is None:
             return False
-        return time <= self._last <= time + _MAX_LATE * self.period
+        return 0 <= self._last - time <= _MAX_LATE * self.period
 
     def _step_to(self, time: int) -> None:
         if self._last is None:
