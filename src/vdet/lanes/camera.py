@@ -149,15 +149,6 @@ class Undistorter:
             )
         return warped(image, self._maps[size], outside, target)
 
-    def distorted(self, points: Float64Array) -> Float64Array:
-        """Return where pixels `(n, 2)` of the undistorted frame lie in the frame, `(n, 2)`."""
-        if not self._camera:
-            return points
-        ahead = (np.column_stack([points, np.ones(len(points))])) @ np.linalg.inv(self._matrix).T
-        still = np.zeros(3)
-        seen, _ = cv2.projectPoints(ahead, still, still, self._matrix, self._distortion)
-        return np.asarray(seen, np.float64).reshape(-1, 2)
-
     def points(self, points: Float64Array) -> Float64Array:
         """Return where pixels `(n, 2)` of the frame lie in the undistorted frame, `(n, 2)`."""
         if not self._camera:

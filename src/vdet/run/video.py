@@ -25,12 +25,12 @@ from vdet.run.steps import Step
 from vdet.run.threads import StalledError, prefetch
 from vdet.track.track import VideoTracker
 from vdet.traffic.clock import Clock, find_clock
-from vdet.traffic.counter import VehicleCounter
 from vdet.workers import core_count
 
 if TYPE_CHECKING:
     from vdet.lanes.ground import GroundRequest
     from vdet.lanes.road import LaneRequest
+    from vdet.traffic.counter import VehicleCounter
 
 log = logging.getLogger("vdet")
 
