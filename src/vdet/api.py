@@ -237,7 +237,7 @@ def detect_video(
         The video with the vehicles drawn in: .mp4, .mov or .mkv.
     tracks
         Every shown box, in one file or several: .txt (MOTChallenge), .csv, .jsonl, .coco.json, .xml
-        (CVAT), .kitti.txt or .yolo.zip.
+        (CVAT), .kitti.txt, .yolo.zip or .ottrk.
     outputs
         Other outputs, one path or several, by the name of their sink.
     at

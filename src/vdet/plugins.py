@@ -65,6 +65,7 @@ _BUILT_IN: dict[str, dict[str, str]] = {
         "cvat": "vdet.labels.cvat:CVAT",
         "kitti": "vdet.labels.kitti:KITTI",
         "yolo": "vdet.labels.yolo:YOLO",
+        "ottrk": "vdet.labels.ottrk:OTTRK",
     },
     PICTURE_FORMATS: {
         "kitti": "vdet.labels.kitti:KITTI_PICTURES",

@@ -18,6 +18,7 @@ from vdet.labels.cvat import CVAT
 from vdet.labels.formats import Format, track_formats
 from vdet.labels.kitti import KITTI
 from vdet.labels.mot import MOT
+from vdet.labels.ottrk import OTTRK
 from vdet.labels.records import CSV, JSON_LINES
 from vdet.labels.video import SavedTracks
 from vdet.labels.yolo import YOLO
@@ -25,10 +26,10 @@ from vdet.track.track import FrameTracks, State, Track
 
 WHOLE = {CSV, JSON_LINES}
 """Formats that keep all that is known of a track."""
-TIMED = WHOLE | {COCO}
+TIMED = WHOLE | {COCO, OTTRK}
 LISTING = {JSON_LINES, COCO, YOLO}
-SCORED = {MOT, CSV, JSON_LINES, COCO, KITTI}
-SIZED = {COCO, CVAT, YOLO}
+SCORED = {MOT, CSV, JSON_LINES, COCO, KITTI, OTTRK}
+SIZED = {COCO, CVAT, YOLO, OTTRK}
 MARKING = WHOLE | {COCO, CVAT}
 """Formats that keep which vehicles are lost."""
 
@@ -82,10 +83,13 @@ def kept(form: Format, track: Track) -> Track:
     }
     whole = form in WHOLE
     marks_lost = form in MARKING and track.state == "lost"
+    state: State = track.state if whole else "lost" if marks_lost else "seen"
+    if form is OTTRK and track.state != "seen":
+        state = "between"
     return replace(
         track,
         score=track.score if form in SCORED else 1.0,
-        state=track.state if whole else "lost" if marks_lost else "seen",
+        state=state,
         class_name=names.get(form, track.class_name or "vehicle"),
         whole_foot=track.whole_foot if whole else None,
         distance=track.distance if whole else None,

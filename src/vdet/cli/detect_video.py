@@ -82,7 +82,7 @@ _batch_options = options.bundle(
 @options.output_option(
     "--tracks FILE",
     "Write the boxes of every frame: .txt (MOTChallenge), .csv, .jsonl, .coco.json, .xml "
-    "(CVAT), .kitti.txt or .yolo.zip. With -, they go to standard output as .jsonl. With -d, "
+    "(CVAT), .kitti.txt, .yolo.zip or .ottrk. With -, they go to standard output as .jsonl. With -d, "
     "give only the ending. Can be repeated.",
 )
 @options.output_option(

@@ -7,6 +7,7 @@ Formats of tracks are registered in the group `vdet.formats`, those of labelled 
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime
 from pathlib import Path
 from typing import BinaryIO
 
@@ -34,12 +35,15 @@ class SourceVideo:
         Size of the upright frames, pixels.
     frames
         Number of frames of the video, if only a part of it is read and the number is known.
+    begin
+        The moment of time 0 in the video, if that is known.
     """
 
     name: str
     width: int
     height: int
     frames: int | None = None
+    begin: datetime | None = None
 
 
 Lines = Callable[[FrameTracks], Iterable[str]]

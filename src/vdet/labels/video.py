@@ -4,6 +4,7 @@ import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -30,12 +31,15 @@ class SavedTracks:
         Seconds of each frame with a time in the file; empty if the format has no times.
     size
         Width and height of the frames in pixels; None if the file does not contain them.
+    begin
+        The moment of time 0, if the file has it.
     """
 
     labels: tuple[Label, ...]
     listed: tuple[int, ...] = ()
     times: Mapping[int, float] = field(default_factory=dict)
     size: tuple[int, int] | None = None
+    begin: datetime | None = None
 
     @property
     def frame_count(self) -> int | None:

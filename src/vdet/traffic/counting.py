@@ -82,7 +82,10 @@ def count_files(
         saved = read_tracks(path, rate)
         if not saved.has_times:
             raise TruthError(f"{path}: has no times; give the frames per second, as in --rate 25")
-        clock = find_clock(path, begin, start=saved.times.get(0, 0.0))
+        created, start = None, saved.times.get(0, 0.0)
+        if saved.begin:
+            created, start = saved.begin.isoformat(), 0.0
+        clock = find_clock(path, begin, created, start)
         place = _size(settings, size or saved.size)
         frames = saved.frames
         if group is None or not group.goes_on(place, clock, frames):

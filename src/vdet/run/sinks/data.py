@@ -62,7 +62,8 @@ class TrackSink(BaseSink):
         source = None
         if video is not None:  # a whole video has the frames that are read
             frames = video.frames if self.context.is_part else None
-            source = SourceVideo(video.path.name, video.width, video.height, frames)
+            begin = self.context.clock.zero if self.context.clock else None
+            source = SourceVideo(video.path.name, video.width, video.height, frames, begin)
         self._file = self.context.files.stage(self.path).open("wb")
         self._writer = form.write(self._file, source)
         return self

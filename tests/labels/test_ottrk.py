@@ -1,0 +1,84 @@
+"""Tracks of OTVision, in the versions that OTAnalytics knows."""
+
+import bz2
+import json
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from labels.saving import VIDEO, car, frame, read_back, written
+from vdet.boxes import Box
+from vdet.errors import TruthError
+from vdet.labels.ottrk import OTTRK, read_ottrk
+from vdet.track.track import FrameTracks
+
+BEGIN = datetime(2026, 5, 1, 5, tzinfo=UTC)
+FRAMES = [frame(index, car(1, Box.sized(10 * index, 20, 30, 40))) for index in range(3)]
+
+
+def document(frames: list[FrameTracks]) -> Any:
+    return json.loads(bz2.decompress(written(OTTRK, frames)))
+
+
+def packed(value: Any) -> bytes:
+    return bz2.compress(json.dumps(value).encode())
+
+
+def test_a_detection_has_all_that_otanalytics_reads() -> None:
+    first, *_, last = document(FRAMES)["data"]["detections"]
+    assert {key: first[key] for key in ("class", "x", "y", "w", "h", "frame", "occurrence")} == {
+        "class": "car", "x": 0, "y": 20, "w": 30, "h": 40, "frame": 1, "occurrence": "0.000000",
+    }  # fmt: skip
+    assert (first["first"], first["finished"], first["track-id"]) == (True, False, 1)
+    assert (last["first"], last["finished"], last["interpolated-detection"]) == (False, True, False)
+
+
+def test_the_metadata_describe_the_video() -> None:
+    metadata = document(FRAMES)["metadata"]
+    assert (metadata["otdet_version"], metadata["ottrk_version"]) == ("1.2", "1.1")
+    assert metadata["video"] == {
+        "filename": "road & rail", "filetype": ".mp4", "width": 1280, "height": 720,
+        "recorded_fps": 25, "number_of_frames": 3, "recorded_start_date": "0.000000",
+        "length": "0:00:00",
+    }  # fmt: skip
+    assert metadata["detection"]["model"]["classes"] == {"0": "car"}
+    assert {"tracking_run_id", "frame_group"} <= metadata["tracking"].keys()
+
+
+def test_the_clock_is_kept(tmp_path: Path) -> None:
+    path = tmp_path / "t.ottrk"
+    with path.open("wb") as file:
+        writer = OTTRK.write(file, replace(VIDEO, begin=BEGIN))
+        for each in FRAMES:
+            writer.write(each)
+        writer.end()
+    saved = read_ottrk(path, path.read_bytes())
+    assert saved.begin == BEGIN
+    assert saved.times == pytest.approx({0: 0, 1: 0.04, 2: 0.08})
+
+
+def test_boxes_of_the_first_version_have_their_middle_and_times_as_text(tmp_path: Path) -> None:
+    value = document(FRAMES)
+    value["metadata"]["otdet_version"] = "1.0"
+    value["metadata"]["video"]["recorded_start_date"] = "2020-01-01 00:00:00.000000"
+    for number, row in enumerate(value["data"]["detections"]):
+        row["occurrence"] = f"2020-01-01 00:00:00.{40_000 * number:06}"
+    saved = read_back(OTTRK, tmp_path, packed(value))
+    assert saved.labels[0].box == (-15, 0, 15, 40)
+    assert saved.times == pytest.approx({0: 0, 1: 0.04, 2: 0.08})
+
+
+def test_what_is_no_such_file_is_refused(tmp_path: Path) -> None:
+    value = document(FRAMES)
+    del value["data"]["detections"][1]["w"]
+    for data, message in (
+        (b"{}", "Invalid data stream"),
+        (written(OTTRK, FRAMES)[:-9], "is cut off"),
+        (packed({"data": {}}), "metadata: Field required"),
+        (packed(value), r"data\.detections\.1\.w: Field required"),
+    ):
+        with pytest.raises(TruthError, match=rf"is not OTVision's tracks: {message}"):
+            read_back(OTTRK, tmp_path, data)
