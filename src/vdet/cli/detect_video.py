@@ -82,8 +82,8 @@ _batch_options = options.bundle(
 @options.output_option(
     "--tracks FILE",
     "Write the boxes of every frame: .txt (MOTChallenge), .csv, .jsonl, .coco.json, .xml "
-    "(CVAT), .kitti.txt, .yolo.zip or .ottrk. With -, they go to standard output as .jsonl. With -d, "
-    "give only the ending. Can be repeated.",
+    "(CVAT), .kitti.txt, .yolo.zip or .ottrk. With -, they go to standard output as .jsonl. With "
+    "-d, give only the ending. Can be repeated.",
 )
 @options.output_option(
     "--vehicles FILE",

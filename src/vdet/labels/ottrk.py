@@ -6,12 +6,12 @@ and their middle before; times are seconds since 1970 from version 1.2 on, and t
 
 import bz2
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 from pathlib import Path, PurePath
 from typing import Annotated, Any, BinaryIO
 
-from pydantic import BaseModel, BeforeValidator, Field
+from pydantic import AliasPath, BaseModel, BeforeValidator, Field
 
 from vdet.errors import TruthError
 from vdet.labels.formats import UNKNOWN, Format, SourceVideo, best_classes
@@ -27,8 +27,8 @@ _COLUMNS = (
     *("class", "confidence", "x", "y", "w", "h", "frame", "occurrence", "input_file_path"),
     *("interpolated-detection", "first", "finished", "track-id"),
 )
-_CENTRED = (1, 0)
-"""Last version of detections whose boxes have their middle."""
+_CENTRED = ("0.", "1.0")
+"""Versions of detections whose boxes have their middle."""
 
 
 def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) -> None:
@@ -100,24 +100,17 @@ class _Box(BaseModel):
     id: Index = Field(alias="track-id")
 
 
-class _Video(BaseModel):
-    width: Index | None = None
-    height: Index | None = None
-    begin: _Time = Field(alias="recorded_start_date")
-
-
-class _Metadata(BaseModel):
-    version: str = Field(alias="otdet_version", pattern=r"^\d{1,4}\.\d{1,4}")
-    video: _Video
-
-
-class _Data(BaseModel):
-    detections: list[_Box]
+_VIDEO = "metadata", "video"
 
 
 class _Document(BaseModel):
-    metadata: _Metadata
-    data: _Data
+    version: str = Field(
+        validation_alias=AliasPath("metadata", "otdet_version"), pattern=r"^\d{1,4}\.\d"
+    )
+    width: Index = Field(0, validation_alias=AliasPath(*_VIDEO, "width"))
+    height: Index = Field(0, validation_alias=AliasPath(*_VIDEO, "height"))
+    begin: _Time = Field(validation_alias=AliasPath(*_VIDEO, "recorded_start_date"))
+    boxes: list[_Box] = Field(validation_alias=AliasPath("data", "detections"))
 
 
 def read_ottrk(path: Path, data: bytes) -> SavedTracks:
@@ -129,27 +122,13 @@ def read_ottrk(path: Path, data: bytes) -> SavedTracks:
             raise ValueError(f"is cut off, or larger than {MAX_BYTES:,} bytes")
         document = _Document.model_validate_json(text)
     except (OSError, ValueError) as error:  # also a ValidationError
-        what = first_mistake(ValueError(error) if isinstance(error, OSError) else error)
+        what = error if isinstance(error, OSError) else first_mistake(error)
         raise TruthError(f"{path}: is not OTVision's tracks: {what}") from error
-    video = document.metadata.video
-    times = {
-        box.frame - 1: (f"detections.{number}", box.occurrence - video.begin)
-        for number, box in enumerate(document.data.detections)
-    }
-    return SavedTracks(
-        tuple(limited(path, _labels(document))),
-        times=checked_times(path, times),
-        size=(video.width, video.height) if video.width and video.height else None,
-        begin=datetime.fromtimestamp(video.begin, UTC),
-    )
-
-
-def _labels(document: _Document) -> Iterator[Label]:
-    major, minor, *_ = map(int, document.metadata.version.split(".")[:2])
-    share = 0.5 if (major, minor) <= _CENTRED else 0.0
-    for number, box in enumerate(document.data.detections):
-        yield Label(
-            f"detections.{number}",
+    share = 0.5 if document.version.startswith(_CENTRED) else 0.0
+    places = [f"data.detections.{number}" for number in range(len(document.boxes))]
+    labels = (
+        Label(
+            place,
             from_size(box.x - share * box.w, box.y - share * box.h, box.w, box.h),
             box.name,
             box.frame,
@@ -157,6 +136,21 @@ def _labels(document: _Document) -> Iterator[Label]:
             box.confidence,
             state="between" if box.is_interpolated else "seen",
         )
+        for place, box in zip(places, document.boxes, strict=True)
+    )
+    times = {
+        box.frame - 1: (place, box.occurrence - document.begin)
+        for place, box in zip(places, document.boxes, strict=True)
+    }
+    size = document.width, document.height
+    begin = datetime.fromtimestamp(document.begin, UTC)
+    return SavedTracks(
+        tuple(limited(path, labels)),
+        (),
+        checked_times(path, times),
+        size if all(size) else None,
+        begin,
+    )
 
 
 OTTRK = Format("OTVision tracks", ".ottrk", read_ottrk, whole=_write)
