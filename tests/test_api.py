@@ -225,9 +225,11 @@ def test_detect_video_takes_what_the_command_takes(red_clip: Path, tmp_path: Pat
         frames=6,
         at=0.2,
         lanes=True,
+        begin="2026-05-01 07:00+02:00",
         progress=lambda done, total: seen.append((done, total)),
     )
     assert (totals.frames, totals.tracks) == (6, 1)
+    assert str(totals.clock) == "2026-05-01 07:00:00+02:00 (as given)"
     assert seen == [(number, 6) for number in range(1, 7)]
     records = [json.loads(line) for line in (tmp_path / "a.jsonl").read_text().splitlines()]
     assert [len(each["tracks"]) for each in records] == [1, 0] * 3

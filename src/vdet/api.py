@@ -18,6 +18,7 @@ A name is that of a kind of detector or tracker, also of another package.
 import math
 import os
 from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from os import PathLike
 from pathlib import Path
@@ -223,6 +224,8 @@ def detect_video(
     lanes: bool = False,
     camera: PathName | None = None,
     ground: PathName | None = None,
+    begin: str | None = None,
+    interval: int | None = None,
     threads: int | None = None,
     overwrite: bool = False,
     progress: Callable[[int, int | None], object] | None = None,
@@ -244,8 +247,8 @@ def detect_video(
         The moment of the output "stages", seconds from the first frame.
     ground
         The file of the ground, for the speeds of vehicles.
-    threads
-        Threads of the search; None for one a core.
+    begin, interval
+        When the video begins (as `--begin`), and the seconds of intervals of counts and flows.
     overwrite
         Replace outputs that are there already.
     progress
@@ -258,9 +261,8 @@ def detect_video(
     wanted = _outputs({"video": video, "tracks": tracks, **(outputs or {})})
     part = _exact(start), _exact(end), frames, Fraction(str(at))
     request, inputs = _lanes(lanes, camera), _inputs(model, camera, ground, settings.regions.mask)
-    job = VideoJob(
-        Path(source), wanted, *part, request, inputs, overwrite, threads, ground=_ground(ground)
-    )
+    job = VideoJob(Path(source), wanted, *part, request, inputs, overwrite, threads)
+    job = replace(job, begin=begin, interval=interval, ground=_ground(ground))
     check_job(job)
     reported = reporting(progress) if progress else no_progress
     return run_video(job, loaded, settings, tracker=tracker, steps=steps, progress=reported)
@@ -278,12 +280,7 @@ def detect_image(
 ) -> Boxes:
     """Find the vehicles in a picture file, and write the outputs that are asked for.
 
-    Parameters
-    ----------
-    picture
-        The picture with the vehicles drawn in.
-
-    The others are those of `detect_video`.
+    `picture` is the file with the vehicles drawn in; the others are those of `detect_video`.
     """
     settings, loaded, _ = _resolved(settings, model, detector, None)
     job = PictureJob(Path(source), _outputs({"picture": picture, **(outputs or {})}))

@@ -95,12 +95,13 @@ def count(
 
 
 def _totals(videos: "Mapping[str, Counts]") -> list[str]:
-    """Return the totals of each file, and of all where there are several."""
+    """Return the totals of all files, and of each where one has no clock."""
     from vdet.evaluate.output import table
     from vdet.pages.render import counted
     from vdet.traffic.counts import direction_totals
 
-    totals = {name: counts.totals for name, counts in videos.items()}
+    alone = len(videos) == 1 or not all(counts.clock for counts in videos.values())
+    totals = {name: counts.totals for name, counts in videos.items() if alone}
     if len(videos) > 1:
         totals["all files"] = direction_totals(list(videos.values()))
     rows = []
