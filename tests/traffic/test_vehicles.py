@@ -52,6 +52,13 @@ class TestNewIds:
         assert [(event.id, event.direction) for event in found] == [(1, "in"), (2, "away")]
         assert {event.vehicle for event in found} == {1, 2}
 
+    def test_one_that_would_be_outside_by_now_is_not_the_one_that_comes_in_beside_it(self) -> None:
+        out = frames(through((0, 600, 300), (2, 600, 690)), seconds=2)
+        in_ = numbered(frames(through((2.3, 640, 690), (4, 640, 300)), seconds=4), 2)
+        found = events(joined(out, in_))
+        assert [(event.id, event.direction) for event in found] == [(1, "here"), (2, "away")]
+        assert {event.vehicle for event in found} == {1, 2}
+
     def test_stop_and_go_with_a_new_id_every_second(self) -> None:
         """A queue that rocks on the line while the tracker gives it new ids, and then moves on."""
         video = []

@@ -95,12 +95,19 @@ class _Vehicle:
 class _Ended:
     """Vehicles that may go on under a new id: those that have just ended inside the frame.
 
-    Each has two rows, for the place where it was last and for that where it would be now. They are
-    ordered by x, so that a new vehicle is compared only with those near it.
+    One that would be outside it now has left: who comes in there is another. Each has two rows, for
+    the place where it was last and for that where it would be now. They are ordered by x, so that a
+    new vehicle is compared only with those near it.
     """
 
-    def __init__(self, vehicles: list[_Vehicle], now: float) -> None:
-        rows = [(at, each) for each in vehicles for at in (each.last.point, each.expected(now))]
+    def __init__(self, vehicles: list[_Vehicle], now: float, size: tuple[int, int]) -> None:
+        rows = [
+            (at, each)
+            for each in vehicles
+            for x, y in [each.expected(now)]
+            if 0 <= x <= size[0] and 0 <= y <= size[1]
+            for at in (each.last.point, (x, y))
+        ]
         rows.sort(key=lambda row: row[0])
         self._vehicles = [each for _, each in rows]
         self._places = np.array([at for at, _ in rows], np.float64).reshape(-1, 2)
@@ -260,7 +267,7 @@ class VehicleCounter:
             and vehicle.key not in shown
             and not vehicle.is_leaving(*self._size)
         ]
-        return _Ended(vehicles, self._now)
+        return _Ended(vehicles, self._now, self._size)
 
     def _is_confirmed(self, vehicle: _Vehicle) -> bool:
         seen = round(vehicle.last.time - vehicle.first.time, TIME_DIGITS)

@@ -69,6 +69,23 @@ def test_a_newly_confirmed_vehicle_near_a_lost_one_takes_its_id() -> None:
     assert new.id == 7
 
 
+def driving(made: Vehicle, down: float) -> Vehicle:
+    """Let a vehicle be seen once more, so far lower."""
+    made.predict(0.04)
+    made.see(
+        Observation(made.state.box + np.array((0, down, 0, down)), 1.0), Look(0.04, 0.04, SIZE)
+    )
+    return made
+
+
+@pytest.mark.parametrize(("down", "number"), [(9, 7), (-9, None)])
+def test_one_that_drives_the_other_way_takes_no_id(down: float, number: int | None) -> None:
+    lost, new = driving(vehicle(number=7), 9), driving(vehicle(moved(60)), down)
+    lost.unseen, new.begin = 0.4, 0.5
+    take_over_ids([lost, new])
+    assert new.id == number
+
+
 @pytest.mark.parametrize(
     "new",
     [

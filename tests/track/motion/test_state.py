@@ -94,3 +94,16 @@ def test_entering_gives_the_velocity_of_the_inner_edge_and_no_growth() -> None:
         state = state.predicted(FRAME, 1.0).corrected(box, 0.1, SIZE)
     assert state.mean[0, 1] == pytest.approx(-5 / FRAME, abs=0.5 / FRAME)
     assert state.mean[2, 1] == 0
+
+
+@pytest.mark.parametrize("speed", [-1.0, 1.0])
+def test_a_vehicle_that_drives_evenly_along_the_road_is_predicted_without_lag(speed: float) -> None:
+    """Its place and size change by 1 / distance: in the picture it slows down, or speeds up."""
+
+    def seen(number: int) -> Float64Array:
+        distance = (1.0 if speed > 0 else 2.6) + speed * FRAME * number
+        size, x, y = 60 / distance, 800 + 300 / distance, 600 + 400 / distance
+        return sized(x - size / 2, y - size, size, size)
+
+    state = after([seen(number) for number in range(38)])
+    assert state.box == pytest.approx(seen(38), abs=0.05 * (state.box[2] - state.box[0]))

@@ -27,6 +27,9 @@ WIDEST_BUFFER = 0.5
 _REACH = 1.5
 """How far from its expected place a lost vehicle may turn up, in sizes of the vehicle."""
 
+_OPPOSED = 0.1
+"""Product of two opposed velocities, in sizes a second, from which on they are of two vehicles."""
+
 _GROWTH = 3.0
 """How much larger or smaller its box may be then, as an area."""
 
@@ -200,8 +203,13 @@ def _comes_out(vehicle: Vehicle, nearer: Vehicle, hidden: Sequence[Vehicle]) -> 
 
 
 def _may_be(lost: Vehicle, new: Vehicle) -> bool:
-    """Return whether a vehicle that is seen again may be the lost one: later, and near by."""
-    return lost.history.last_seen < new.begin and _distance(lost, new) < _REACH
+    """Return whether a vehicle that is seen again may be the lost one: later, and near by.
+
+    One that drives the other way is not: it comes in where the lost one went out.
+    """
+    turned = float(lost.history.last_velocity @ new.history.last_velocity) < -_OPPOSED
+    is_later = lost.history.last_seen < new.begin
+    return is_later and not turned and _distance(lost, new) < _REACH
 
 
 def _distance(one: Vehicle, other: Vehicle) -> float:

@@ -82,7 +82,17 @@ class History:
     @property
     def last_seen(self) -> float:
         """Time of the latest detection."""
-        return next(each.time for each in reversed(self._moments) if each.score is not None)
+        return self._latest.time
+
+    @property
+    def last_velocity(self) -> Float64Array:
+        """Velocity at the latest detection, x and y in sizes of the vehicle a second."""
+        mean = self._latest.state.mean
+        return np.asarray(mean[:2, 1] / np.exp(mean[2:, 0]))
+
+    @property
+    def _latest(self) -> Moment:
+        return next(each for each in reversed(self._moments) if each.score is not None)
 
     def add(self, moment: Moment) -> None:
         """Add the next moment."""

@@ -16,6 +16,8 @@ import numpy as np
 
 from vdet.boxes import Float64Array
 
+_MOST_NEARER = 0.3
+"""Largest change of the distance in a step that is believed, as a share of it."""
 BORDER = 0.005
 """A box that ends this near to the frame's side, as a share of the frame, touches it."""
 
@@ -55,11 +57,20 @@ class MotionState:
         return np.sqrt(self.covariance[:2, 0, 0])
 
     def predicted(self, seconds: float, acceleration: float) -> "MotionState":
-        """Go on by `seconds`; `acceleration` is the deviation of the velocity after one second."""
+        """Go on by `seconds`; `acceleration` is the deviation of the velocity after one second.
+
+        What moves evenly on the road comes near as its size grows, and ever faster in the picture:
+        with a distance of Z, size and place change by 1 / Z and velocity by 1 / Z².
+        """
         step = np.array([[1.0, seconds], [0.0, 1.0]])
+        nearer = float(np.clip(np.mean(self.mean[2:, 1]) * seconds, -_MOST_NEARER, _MOST_NEARER))
+        growth = 1 / (1 - nearer)
+        mean = self.mean @ step.T
+        mean[:2, 0] += self.mean[:2, 1] * seconds * (growth - 1)
+        mean[:2, 1] *= growth**2
         drift = np.array([[seconds**3 / 3, seconds**2 / 2], [seconds**2 / 2, seconds]])
         covariance = step @ self.covariance @ step.T + acceleration**2 * drift
-        return MotionState(self.mean @ step.T, covariance)
+        return MotionState(mean, covariance)
 
     def gain_from(self, expected: "MotionState", seconds: float) -> Float64Array:
         """Return how a correction of the state `seconds` later corrects this one, `(4, 2, 2)`.
