@@ -168,7 +168,7 @@ def read_csv(path: Path, data: bytes) -> SavedTracks:
 
 def _csv_labels(path: Path, text: str, times: _Times) -> Iterator[Label]:
     """Yield the label of every row, and put the time of its frame into `times`."""
-    table = csv.reader(io.StringIO(text, newline=""), strict=True, skipinitialspace=True)
+    table = csv.reader(parsing.text_file(text, ""), strict=True, skipinitialspace=True)
     try:
         names = next(table, [])
         if any(names.count(name) != 1 for name in _NEEDED):
