@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vdet.boxes import Float64Array
+from vdet.boxes import BoolArray, Float64Array
 from vdet.lanes.ground import Ground
 from vdet.track.track import FrameTracks
 from vdet.traffic.counts import Counts
@@ -187,23 +187,20 @@ def measure(ground: Ground, rows: Float64Array) -> Speeds | None:
 
     `rows` are time, x and y of the foot, width and height of the box, `(n, 5)`.
     """
-    for offset in _AROUND:
-        rows = rows[np.isfinite(ground.place(rows[:, 1:3] - offset)).all(axis=1)]
-    if len(rows) < 3 or rows[-1, 0] - rows[0, 0] < LEAST:
+    seen = _Sight.of(ground, rows)
+    seen = seen.only(np.isfinite(seen.weights))
+    if len(seen.rows) < 3 or seen.times[-1] - seen.times[0] < LEAST:
         return None
-    seen = _Sight.of(ground, rows)
-    line = _Line.of(rows[:, 0], seen.places, seen.weights)
-    off = seen.off(line)
-    rows = rows[off <= max(_OUTLIERS[0], _OUTLIERS[1] * float(np.median(off)))]
-    seen = _Sight.of(ground, rows)
-    line = _Line.of(rows[:, 0], seen.places, seen.weights)
-    middles = seen.middles(rows[:, 0], line.velocities)
-    line = _Line.of(rows[:, 0], middles, seen.weights)
+    off = seen.off(_Line.of(seen.times, seen.places, seen.weights))
+    seen = seen.only(off <= max(_OUTLIERS[0], _OUTLIERS[1] * float(np.median(off))))
+    line = _Line.of(seen.times, seen.places, seen.weights)
+    middles = seen.middles(line.velocities)
+    line = _Line.of(seen.times, middles, seen.weights)
     speeds = np.hypot(*line.velocities.T)
-    at = np.arange(rows[0, 0], rows[-1, 0] + _SPACING, _SPACING)
-    thin = np.unique(np.minimum(np.searchsorted(rows[:, 0], at), len(rows) - 1))
-    common = _common(ground, rows)
-    return Speeds(rows[thin, 0], middles[thin], speeds[thin], line.deviations[thin], common)
+    at = np.arange(seen.times[0], seen.times[-1] + _SPACING, _SPACING)
+    thin = np.unique(np.minimum(np.searchsorted(seen.times, at), len(speeds) - 1))
+    common = _common(ground, seen.rows)
+    return Speeds(seen.times[thin], middles[thin], speeds[thin], line.deviations[thin], common)
 
 
 def _common(ground: Ground, rows: Float64Array) -> float:
@@ -229,6 +226,7 @@ class _Sight:
     `weights` those of the places.
     """
 
+    rows: Float64Array
     places: Float64Array
     depth: Float64Array
     away: Float64Array
@@ -237,20 +235,32 @@ class _Sight:
 
     @classmethod
     def of(cls, ground: Ground, rows: Float64Array) -> "_Sight":
-        feet = rows[:, 1:3]
-        places = ground.place(feet)
-        away, beside = (ground.place(feet - offset) - places for offset in _AROUND[1:])
+        """Return the sight of all `rows` of `measure`; weights are NaN where it is not known."""
+        around = rows[:, 1:3] - _AROUND[:, np.newaxis]
+        places, above, left = ground.place(around.reshape(-1, 2)).reshape(around.shape)
+        away, beside = above - places, left - places
         pixel = np.hypot(*beside.T)
         depth = np.column_stack([-beside[:, 1], beside[:, 0]]) / pixel[:, None]
         row = np.sum(depth * away, axis=1)[:, None]
         weights = 1 / (np.abs(row[:, 0]) * rows[:, 4]) ** 2
-        return cls(places, depth * np.sign(row), away / np.abs(row), pixel * rows[:, 3], weights)
+        away, depth = away / np.abs(row), depth * np.sign(row)
+        return cls(rows, places, depth, away, pixel * rows[:, 3], weights)
+
+    @property
+    def times(self) -> Float64Array:
+        """The time of each row."""
+        return self.rows[:, 0]
+
+    def only(self, which: BoolArray) -> "_Sight":
+        """Return some of the rows."""
+        each = (self.rows, self.places, self.depth, self.away, self.widths, self.weights)
+        return _Sight(*(values[which] for values in each))
 
     def off(self, line: "_Line") -> Float64Array:
         """Return how far places are from a line, in heights of the box."""
         return np.asarray(np.hypot(*(self.places - line.fitted).T) * np.sqrt(self.weights))
 
-    def middles(self, times: Float64Array, velocities: Float64Array) -> Float64Array:
+    def middles(self, velocities: Float64Array) -> Float64Array:
         """Return the middles of the vehicle on the road, `(n, 2)`.
 
         While it stands, it heads where it moves before or after.
@@ -260,7 +270,7 @@ class _Sight:
         if not moves.any():
             return self.places
         along = np.abs(np.sum(velocities * self.depth, axis=1))[moves] / speeds[moves]
-        along = np.interp(times, times[moves], along)
+        along = np.interp(self.times, self.times[moves], along)
         across = np.sqrt(np.maximum(0, 1 - along**2))
         lengths = self.widths / (across + _SLIMNESS * along)
         length = np.clip(np.median(lengths), *_LENGTHS)
