@@ -11,6 +11,7 @@ from conftest import Run
 from lanes.poles import CORNERS, HEIGHT, WIDTH, seen
 from running import write_drive
 from vdet.boxes import Float64Array
+from vdet.lanes.camera import CalibratedCamera, Undistorter, save_camera
 from vdet.lanes.ground import load_ground
 from vdet.media.images import write_image
 
@@ -141,6 +142,20 @@ def test_the_plane_follows_from_the_lane_of_the_settings(run: Run) -> None:
     places = ground.place(corners + 0.5)
     assert float(np.hypot(*(places[1] - places[0]))) == pytest.approx(3.7, rel=0.01)
     assert float(places[2][1] - places[0][1]) == pytest.approx(37, rel=0.01)
+
+
+def test_the_camera_of_a_lens_is_named_in_the_file(run: Run) -> None:
+    matrix = ((1000.0, 0.0, 640.0), (0.0, 1000.0, 360.0), (0.0, 0.0, 1.0))
+    camera = CalibratedCamera(WIDTH, HEIGHT, matrix, (-0.2, 0.0, 0.0, 0.0, 0.0), 0.2)
+    save_camera(camera, Path("my: camera.yaml"))
+    result = run("ground", "frame.png", "--lane", "--camera", "my: camera.yaml", "-o", "new.yaml")
+    assert result.code == 0, result.err
+    request = load_ground(Path("new.yaml"))
+    assert request.camera == camera
+    lens = Undistorter(camera, WIDTH, HEIGHT)
+    corners = np.array([(0.2086, 0.93), (0.7898, 0.93)]) * (WIDTH, HEIGHT)
+    places = request.ground(WIDTH, HEIGHT).place(lens.distorted(corners) + 0.5)
+    assert float(np.hypot(*(places[1] - places[0]))) == pytest.approx(3.7, rel=0.01)
 
 
 def test_the_grid_in_metres_is_drawn(run: Run) -> None:

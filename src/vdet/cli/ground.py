@@ -67,7 +67,7 @@ def ground(
     plane is fitted to CLIP and written: with --length from two streams of vehicles that cross at a
     right angle, or from one stream and --camera, and with --lane from the settings of the lane.
     """
-    from vdet.lanes.ground import load_ground
+    import yaml
 
     if source.suffix.lower() in _YAML:
         if output or length or lane:
@@ -80,19 +80,19 @@ def ground(
     settings = choice.read()
     check_output(output, overwrite=overwrite, inputs=[source, *choice.inputs(settings)])
     pixels, metres, size, how = _fit(source, length, watched, camera, choice)
-    text = [
-        f"# The road plane of {escaped(source.name)}, written by vdet ground:",
-        f"# {how}.",
-        "# Look at it: vdet paths CLIP --no-paths --ground THIS_FILE -o grid.jpg",
-        f"size: [{size[0]}, {size[1]}]",
-        *([f"camera: {camera.absolute()}"] if camera else []),
-        "points:",
-    ]
-    for (x, y), (right, ahead) in zip(pixels.tolist(), metres.tolist(), strict=True):
-        text.append(f"  - {{pixel: [{x:.2f}, {y:.2f}], metres: [{right:.3f}, {ahead:.3f}]}}")
+    pairs = zip(pixels.round(2).tolist(), metres.round(3).tolist(), strict=True)
+    values = {
+        "size": list(size),
+        **({"camera": str(camera.absolute())} if camera else {}),
+        "points": [{"pixel": pixel, "metres": place} for pixel, place in pairs],
+    }
+    heading = (
+        f"# The road plane of {escaped(source.name)}, written by vdet ground: {how}.\n"
+        "# Look at it: vdet paths CLIP --no-paths --ground THIS_FILE -o grid.jpg\n"
+    )
+    text = yaml.safe_dump(values, sort_keys=False, default_flow_style=None)
     with staged(output, overwrite=overwrite) as temporary:
-        temporary.write_text("\n".join(text) + "\n", encoding="utf-8")
-    load_ground(output)
+        temporary.write_text(heading + text, encoding="utf-8", errors="backslashreplace")
     print_lines(f"{output}: {how}", _described(output))
 
 
@@ -116,12 +116,8 @@ def _fit(
     undistorter = Undistorter(lens, width, height)
     if length is None:
         pixels, metres = TopView(settings.lanes, width, height).corners
-        return (
-            undistorter.distorted(pixels),
-            metres,
-            (width, height),
-            "from the lane of the settings",
-        )
+        how = "from the lane of the settings"
+        return undistorter.distorted(pixels), metres, (width, height), how
     records = watched.records(clip, width, settings, choice)
     focal = float(lens.matrix_for(width, height)[0, 0]) if lens else None
     paths = [undistorter.points(np.array(each.path, np.float64)) for each in records]
