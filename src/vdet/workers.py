@@ -41,6 +41,8 @@ ENVIRONMENT = {
     "PYTHONSAFEPATH": "1",  # no module is imported from the current folder
 }
 
+_M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3  # of malloc.h
+
 _GROUPS = Path("/sys/fs/cgroup")
 QUOTAS = (
     (_GROUPS / "cpu.max",),
@@ -95,6 +97,20 @@ def limit_library_threads() -> None:
 
     cv2.setNumThreads(1)
     threadpool_limits(1)
+
+
+def return_freed_memory() -> None:
+    """Let glibc return large blocks that are freed, such as frames, to the system.
+
+    It would raise its own limit to 32 MB, and keep frames in the gaps between others. With another
+    C library nothing is done.
+    """
+    import ctypes
+
+    with contextlib.suppress(AttributeError, OSError, TypeError):
+        set_limit = ctypes.CDLL(None).mallopt
+        set_limit(_M_MMAP_THRESHOLD, 1_000_000)  # bytes of a block with pages of its own
+        set_limit(_M_TRIM_THRESHOLD, 16_000_000)  # free bytes at the end of the heap
 
 
 def make_workers(jobs: int | None = None, scheduler: str | None = None) -> Workers:

@@ -19,7 +19,7 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 JOIN_TIMEOUT = 2.0  # seconds that a thread gets to end
-_DEPTH = 4  # items between two threads
+_DEPTH = 2  # items between two threads
 _END = object()  # what follows the last item
 _AHEAD = 8
 """Largest number of items that `map_ordered` takes ahead for each thread."""

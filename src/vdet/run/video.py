@@ -25,7 +25,7 @@ from vdet.run.steps import Step
 from vdet.run.threads import StalledError, prefetch
 from vdet.track.track import VideoTracker
 from vdet.traffic.clock import Clock, find_clock
-from vdet.workers import core_count
+from vdet.workers import core_count, return_freed_memory
 
 if TYPE_CHECKING:
     from vdet.lanes.ground import GroundRequest
@@ -227,6 +227,7 @@ def run_video(
     No output is left after an error.
     """
     began = time.perf_counter()
+    return_freed_memory()
     only_at = job.shows_at and all(sink_kind(each.sink).one_frame for each in job.outputs)
     if only_at and job.frames is None:
         job = replace(job, start=max(job.at - LEAD, job.start or Fraction(0)))
