@@ -74,13 +74,12 @@ class _Vehicle:
 
     def move(self, sighting: Sighting) -> None:
         """Move to the place of the next sighting."""
-        seconds = sighting.time - self.last.time
+        last, self.last = self.last, sighting
+        seconds = sighting.time - last.time
         if seconds > 0:
-            share = 1.0 if self.last is self.first else 0.5
-            (x, y), (last_x, last_y) = sighting.point, self.last.point
-            way = complex(x - last_x, y - last_y)
-            self.velocity += share * (way / seconds - self.velocity)
-        self.last = sighting
+            (x, y), (last_x, last_y) = sighting.point, last.point
+            change = complex(x - last_x, y - last_y) / seconds - self.velocity
+            self.velocity += change if last is self.first else 0.5 * change
 
     def add(
         self, name: str, direction: str, at: Sighting | Change, seconds: float | None = None
@@ -177,8 +176,6 @@ class VehicleCounter:
         if any(track.id not in self._vehicles for track in frame.tracks):
             ended = self._ended({track.id for track in frame.tracks})
         for track in frame.tracks:
-            if track.id in self._vehicles:
-                self._vehicles[track.id].shown = self._now
             self._see(track, frame.index, ended)
 
     def start_video(self) -> None:
@@ -220,7 +217,7 @@ class VehicleCounter:
         sighting = Sighting(self._now, frame, point, height, track.score)
         vehicle = self._vehicles.get(track.id) or self._begin(track.id, sighting, ended)
         vehicle.classes.add(track.class_name, track.score)
-        vehicle.box = box
+        vehicle.box, vehicle.shown = box, self._now
         band = max(BAND * height, LEAST_BAND * self._size[1])
         if math.dist(point, vehicle.looked_at) + band >= vehicle.clear:
             self._look(vehicle, sighting, band)
@@ -254,7 +251,7 @@ class VehicleCounter:
             vehicle = _Vehicle(number, number, self.begun, sighting, sighting, states)
         else:
             del self._vehicles[vehicle.key]
-        vehicle.id, vehicle.key, vehicle.shown = number, number, self._now
+        vehicle.id = vehicle.key = number
         self._vehicles[number] = vehicle
         return vehicle
 
