@@ -1,6 +1,7 @@
 """Interleaved timing: each task runs once a round, so that a slow moment affects all of them."""
 
 import random
+import resource
 import statistics
 import time
 from collections.abc import Callable, Mapping
@@ -9,16 +10,29 @@ Task = Callable[[], object]
 
 
 def measure(tasks: Mapping[str, Task], rounds: int) -> dict[str, float]:
-    """Run all tasks once to warm up, then `rounds` times; return the median seconds.
+    """Return the median seconds of wall time of each task: see `measure_both`."""
+    return {name: wall for name, (wall, _) in measure_both(tasks, rounds).items()}
 
-    The order changes from round to round: a task may slow down the one that follows it.
+
+def measure_both(tasks: Mapping[str, Task], rounds: int) -> dict[str, tuple[float, float]]:
+    """Run all tasks once to warm up, then `rounds` times.
+
+    Return the median seconds of wall time and of processor time, with that of child processes. The
+    order changes from round to round: a task may slow down the one that follows it.
     """
-    times: dict[str, list[float]] = {name: [] for name in tasks}
+    walls: dict[str, list[float]] = {name: [] for name in tasks}
+    busy: dict[str, list[float]] = {name: [] for name in tasks}
     order = random.Random(0)
     for number in range(rounds + 1):
         for name in order.sample(list(tasks), len(tasks)):
-            began = time.perf_counter()
+            began, worked = time.perf_counter(), _processor_time()
             tasks[name]()
             if number:
-                times[name].append(time.perf_counter() - began)
-    return {name: statistics.median(values) for name, values in times.items()}
+                walls[name].append(time.perf_counter() - began)
+                busy[name].append(_processor_time() - worked)
+    return {name: (statistics.median(walls[name]), statistics.median(busy[name])) for name in tasks}
+
+
+def _processor_time() -> float:
+    children = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return time.process_time() + children.ru_utime + children.ru_stime

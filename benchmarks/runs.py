@@ -1,16 +1,12 @@
 """Whole runs of detect-video: wall time with and without outputs and lanes, and peak memory."""
 
-import itertools
 import subprocess
 import sys
-import time
 from functools import partial
 from pathlib import Path
 
-import av
-from av.video.frame import PictureType
-
-from benchmarks.rounds import Task, measure
+from benchmarks.plain import transcode
+from benchmarks.rounds import Task, measure_both
 from vdet.config.places import (
     CountSettings,
     LineSettings,
@@ -18,13 +14,14 @@ from vdet.config.places import (
     RegionsSettings,
     ZoneSettings,
 )
-from vdet.config.schema import DrawSettings, OutputSettings, Settings, SvmSettings
+from vdet.config.schema import DrawSettings, Settings, SvmSettings
 from vdet.config.section import Section
 from vdet.detect.factory import load_detector
 from vdet.detect.protocol import DetectorModel
 from vdet.lanes.camera import CalibratedCamera
 from vdet.lanes.road import LaneRequest
 from vdet.media import VideoReader
+from vdet.media.images import write_image
 from vdet.run.sinks.protocol import Output
 from vdet.run.video import VideoJob, run_video
 
@@ -54,8 +51,8 @@ ANSWERS: dict[str, Section] = {
 """A region that leaves nothing out, three lines and two zones, and trails."""
 
 
-def run_times(path: Path, folder: Path, rounds: int) -> dict[str, float]:
-    """Return the seconds that the first `FRAMES` frames take.
+def run_times(path: Path, folder: Path, rounds: int) -> dict[str, tuple[float, float]]:
+    """Return the seconds of wall time and of processor time of the first `FRAMES` frames.
 
     Keys: `transcode` (decoded, and encoded with the same settings), `detect` (vehicles detected,
     drawn and written), `detect with lanes`, `detect with svm`, `detect with answers` (`ANSWERS`,
@@ -78,7 +75,7 @@ def run_times(path: Path, folder: Path, rounds: int) -> dict[str, float]:
         run_video(job, detector, settings)
 
     tasks: dict[str, Task] = {
-        "transcode": partial(_transcode, path, folder / "transcoded.mp4", default.output),
+        "transcode": partial(transcode, path, folder / "transcoded.mp4", FRAMES),
         "detect": partial(detect, model),
         "detect with lanes": partial(detect, model, lanes=LaneRequest(CAMERA)),
         "detect with svm": partial(detect, linear, settings=svm),
@@ -86,21 +83,38 @@ def run_times(path: Path, folder: Path, rounds: int) -> dict[str, float]:
         "detect only": partial(detect, model, ()),
         "detect only with svm": partial(detect, linear, (), svm),
     }
-    return measure(tasks, rounds)
+    return measure_both(tasks, rounds)
 
 
-def _transcode(path: Path, out: Path, settings: OutputSettings) -> None:
-    """Encode the planes of a video as they are decoded."""
-    options = {"preset": settings.preset, "crf": str(settings.crf)}
-    with av.open(str(path)) as source, av.open(str(out), "w") as target:
-        stream = source.streams.video[0]
-        stream.thread_type = "AUTO"
-        encoder = target.add_stream("libx264", rate=stream.average_rate, options=options)
-        encoder.width, encoder.height = stream.width, stream.height
-        for frame in itertools.islice(source.decode(stream), FRAMES):
-            frame.pict_type = PictureType.NONE  # the encoder chooses its own
-            target.mux(encoder.encode(frame))
-        target.mux(encoder.encode())
+IMPORTS = "import numpy, cv2, av"
+
+
+def start_times(path: Path, folder: Path, rounds: int) -> dict[str, tuple[float, float]]:
+    """Return the seconds of wall time and of processor time of whole programs.
+
+    Keys: `imports` (Python with `IMPORTS`), `help`, `picture` (vehicles in one picture), `second`
+    (one second of a video), `plain second` (decoded and encoded by PyAV alone).
+    """
+    picture = folder / "picture.jpg"
+    with VideoReader(path, frames=1) as reader:
+        write_image(picture, next(iter(reader)).image)
+    plain = (
+        "from pathlib import Path; from benchmarks.plain import transcode; "
+        f"transcode(Path({str(path)!r}), Path({str(folder / 'plain.mp4')!r}), 25)"
+    )
+    video = ["detect-video", str(path), str(folder / "short.mp4"), "--end", "1", "--overwrite"]
+    commands = {
+        "imports": ["-c", IMPORTS],
+        "help": ["-m", "vdet", "--help"],
+        "picture": ["-m", "vdet", "detect-image", str(picture)],
+        "second": ["-m", "vdet", "--quiet", *video],
+        "plain second": ["-c", plain],
+    }
+    tasks: dict[str, Task] = {
+        name: partial(subprocess.run, [sys.executable, *each], check=True, capture_output=True)
+        for name, each in commands.items()
+    }
+    return measure_both(tasks, rounds)
 
 
 def seconds_of_video(path: Path) -> float:
@@ -125,13 +139,3 @@ def peak_memory(path: Path, folder: Path, *options: str) -> float:
     command = [sys.executable, "-c", code, "--quiet", *arguments]
     result = subprocess.run(command, capture_output=True, text=True, check=True)
     return int(result.stdout.split()[-1]) / 1024
-
-
-def seconds_of_program(path: Path, folder: Path, seconds: float) -> float:
-    """Return how long the whole program takes for the first seconds of a video."""
-    options = ["--end", str(seconds), "--overwrite"]
-    arguments = ["detect-video", str(path), str(folder / "short.mp4"), *options]
-    command = [sys.executable, "-m", "vdet", "--quiet", *arguments]
-    began = time.perf_counter()
-    subprocess.run(command, check=True)
-    return time.perf_counter() - began
