@@ -59,6 +59,16 @@ class TestNewIds:
         assert [(event.id, event.direction) for event in found] == [(1, "here"), (2, "away")]
         assert {event.vehicle for event in found} == {1, 2}
 
+    def test_a_track_that_comes_back_the_other_way_is_another_vehicle(self) -> None:
+        lost = [(2.0, 3.0)]
+        turned = through((0, 600, 300), (2, 600, 500), (3, 620, 510), (6, 620, 300), gone=lost)
+        same = through((0, 600, 300), (2, 600, 380), (3, 600, 420), (6, 600, 520), gone=lost)
+        assert [(e.direction, e.vehicle) for e in events(frames(turned))] == [
+            ("here", 1),
+            ("away", 2),
+        ]
+        assert [(e.direction, e.vehicle) for e in events(frames(same))] == [("here", 1)]
+
     def test_stop_and_go_with_a_new_id_every_second(self) -> None:
         """A queue that rocks on the line while the tracker gives it new ids, and then moves on."""
         video = []

@@ -18,7 +18,8 @@ The counts of a video follow from its tracks alone (`FrameTracks`), live or from
 7. The class of a vehicle is that with the highest sum of scores over all its frames.
 8. A vehicle that is first seen within a second after another was last seen, and near the place
    where that one was or would be, is taken for the same vehicle: its tracks have one number. A
-   vehicle that moves out at the edge of the frame has no such successor.
+   vehicle that moves out at the edge of the frame has no such successor. A track that was not
+   shown for half a second and then drives the other way goes on as another vehicle.
 9. Only events are stored. All totals, flows and stays follow from them.
 
 `borders` places lines and zones in a frame and holds what a vehicle does at one of them, `counter`

@@ -33,6 +33,12 @@ _GAP = 1.0
 """Longest time between the end of a track and the start of one that continues it, seconds."""
 _LEAVES = 0.1
 """Lowest speed of a vehicle that leaves the frame, in heights of its box per second."""
+_OUT_OF_SIGHT = 0.5
+"""Seconds that a vehicle is not shown before it is looked at whether it is the same one."""
+_JUDGED = 1.0
+"""Seconds after which that is clear."""
+_TURNED, _OPPOSITE = 0.15, 0.3
+"""Way back after which it is another one: in heights of its box, and as a share of all its way."""
 _MOST_GROWTH = 2.0
 """Largest ratio of the heights of the last box of a track and the first one of the next."""
 
@@ -60,6 +66,21 @@ class _Vehicle:
     looked_at: Point = (0.0, 0.0)
     classes: ClassScores = field(default_factory=ClassScores)
     events: list[Event] = field(default_factory=list)
+    back: Sighting | None = None  # the first one after it was out of sight, until it is judged
+    before: complex = 0j  # its velocity before that
+    again: float = 0.0  # when it came back, once that is judged
+
+    def is_another(self, sighting: Sighting) -> bool:
+        """Return whether it drives the other way than before it was out of sight."""
+        if sighting.time - self.last.time > _OUT_OF_SIGHT:
+            self.back, self.before = sighting, self.velocity
+        if self.back is None or sighting.time - self.back.time < _JUDGED:
+            return False
+        way, speed = complex(*sighting.point) - complex(*self.back.point), abs(self.before)
+        self.again, self.back = self.back.time, None
+        onward = (way * self.before.conjugate()).real / max(speed, 1e-9)
+        back = max(_TURNED * sighting.height, _OPPOSITE * abs(way))
+        return speed > _LEAVES * sighting.height and onward < -back
 
     def is_leaving(self, width: int, height: int) -> bool:
         """Return whether it moves out at the edge of the frame, and so was not lost."""
@@ -216,6 +237,8 @@ class VehicleCounter:
         point, height = (round(x, 2), round(y, 2)), float(max(1, box[3] - box[1]))
         sighting = Sighting(self._now, frame, point, height, track.score)
         vehicle = self._vehicles.get(track.id) or self._begin(track.id, sighting, ended)
+        if vehicle.is_another(sighting):
+            vehicle = self._split(vehicle, sighting)
         vehicle.classes.add(track.class_name, track.score)
         vehicle.box, vehicle.shown = box, self._now
         band = max(BAND * height, LEAST_BAND * self._size[1])
@@ -224,6 +247,18 @@ class VehicleCounter:
         vehicle.move(sighting)
         if vehicle.events:
             self._confirm(vehicle)
+
+    def _split(self, vehicle: _Vehicle, sighting: Sighting) -> _Vehicle:
+        """End a vehicle; what its track did since it came back is done by another one."""
+        self._close(vehicle)
+        new = self._begin(vehicle.id, sighting, None)
+        self._counted = [
+            (replace(event, vehicle=new.number), classes)
+            if event.vehicle == vehicle.number and event.time >= vehicle.again
+            else (event, classes)
+            for event, classes in self._counted
+        ]
+        return new
 
     def _look(self, vehicle: _Vehicle, sighting: Sighting, band: float) -> None:
         """Look what a vehicle does at the borders that it is near to."""
