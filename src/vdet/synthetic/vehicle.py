@@ -14,7 +14,7 @@ import numpy as np
 from vdet.boxes import Float64Array
 from vdet.draw.paint import Color
 from vdet.media.images import Image
-from vdet.synthetic.camera import PinholeCamera, beyond_near, fill, mixed, shaded
+from vdet.synthetic.camera import NEAR, PinholeCamera, beyond_near, fill, mixed, shaded
 from vdet.synthetic.scene import Body, Scene, SceneVehicle, Waypoint
 
 _SHADOW: Color = (34, 32, 32)
@@ -49,12 +49,18 @@ def outlines(
     position = vehicle.position(time)
     if position is None:
         return []
-    visible = []
-    for corners, color in _facets(vehicle.body, vehicle.color):
-        pixels = camera.project(beyond_near(_placed(corners, position)))
-        if len(pixels) and cv2.contourArea(pixels.astype(np.float32), oriented=True) > 0:
-            visible.append((pixels, color))
-    return visible
+    facets = _facets(vehicle.body, vehicle.color)
+    ends = np.cumsum([len(corners) for corners, _ in facets])[:-1]
+    placed = _placed(np.concatenate([corners for corners, _ in facets]), position)
+    if placed[:, 2].min() >= NEAR:
+        pixels = np.split(camera.project(placed), ends)
+    else:
+        pixels = [camera.project(beyond_near(corners)) for corners in np.split(placed, ends)]
+    return [
+        (outline, color)
+        for outline, (_, color) in zip(pixels, facets, strict=True)
+        if len(outline) and cv2.contourArea(outline.astype(np.float32), oriented=True) > 0
+    ]
 
 
 def draw_vehicle(image: Image, vehicle: SceneVehicle, scene: Scene, time: float) -> None:
@@ -79,7 +85,7 @@ def _placed(corners: Float64Array, position: Waypoint) -> Float64Array:
     return np.asarray(corners @ turn + (position.lateral, 0.0, position.ahead))
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=512)
 def _facets(body: Body, color: Color) -> list[_Facet]:
     """Return the facets of a vehicle in painting order; of two that overlap, one is hidden."""
     lower = _underside(body) + _lower_body(body, color) + _wheels(body, color)

@@ -16,6 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from vdet.boxes import BoolArray, Float64Array, area, coverage, iou, visible
+from vdet.track.motion.appearance import differences
 from vdet.track.motion.assignment import assign
 from vdet.track.motion.vehicle import Vehicle
 
@@ -29,6 +30,20 @@ _REACH = 1.5
 
 _OPPOSED = 0.1
 """Product of two opposed velocities, in sizes a second, from which on they are of two vehicles."""
+
+MOST_UNLIKE = 1.2
+"""Largest difference of the appearances of a lost vehicle and of one that may be it."""
+
+_BESIDE = 0.4
+"""Seconds for which two tracks may follow one vehicle before the first is lost.
+
+A vehicle may drive away from its track while detections of its parts still hold it.
+"""
+
+_BESIDE_REACH = 1.0
+_BESIDE_UNLIKE = 0.6
+"""As `_REACH` and `MOST_UNLIKE`, for two tracks that were there at the same time."""
+
 
 _GROWTH = 3.0
 """How much larger or smaller its box may be then, as an area."""
@@ -48,6 +63,10 @@ _LEVEL_OVERLAP = 0.3
 
 _ALIKE = 0.5
 """Intersection over union from which on two boxes are of one vehicle, level or not."""
+
+_APART = 0.5
+"""Seconds after which two tracks that both see their vehicles show two, also where they are level.
+"""
 
 CLEAR = 0.8
 """A detection on a nearer vehicle that scores less than this share of its score is a part of it."""
@@ -157,7 +176,7 @@ def take_over_ids(vehicles: Sequence[Vehicle]) -> list[Vehicle]:
         lost = [v for v in left if v.confirmed and v.unseen and _may_be(v, new)]
         if lost:
             nearest = min(lost, key=lambda vehicle: _distance(vehicle, new))
-            new.continue_from(nearest)
+            new.take_over(nearest)
             left.remove(nearest)
     return left
 
@@ -165,8 +184,8 @@ def take_over_ids(vehicles: Sequence[Vehicle]) -> list[Vehicle]:
 def without_duplicates(vehicles: Sequence[Vehicle], size: tuple[int, int]) -> list[Vehicle]:
     """Leave one track for each vehicle: the one with the highest score, or else the oldest one.
 
-    It takes the lowest id of those dropped. A track that is not confirmed replaces no other one; it
-    stays beside it while its score is higher.
+    It keeps the id that was not lost for longer. A track that is not confirmed replaces no other
+    one; it stays beside it while its score is higher.
     """
     kept: list[Vehicle] = []
     hidden = [vehicle for vehicle in vehicles if vehicle.hidden]
@@ -177,7 +196,7 @@ def without_duplicates(vehicles: Sequence[Vehicle], size: tuple[int, int]) -> li
         if same is None:
             kept.append(vehicle)
         elif vehicle.confirmed:
-            same.continue_from(vehicle)
+            same.merge(vehicle)
     return [vehicle for vehicle in vehicles if vehicle in kept]
 
 
@@ -190,6 +209,8 @@ def _are_same(
     """
     one, two = visible(np.stack([vehicle.state.box, other.state.box]), size)
     is_weaker = vehicle.confirmed or vehicle.scores.value <= other.scores.value
+    if min(vehicle.age, other.age) > _APART:
+        return bool(iou(one, two) > _ALIKE)
     if is_weaker and is_same(one, two):
         return True
     may_be_part = not vehicle.confirmed and is_part(one, two)
@@ -203,13 +224,19 @@ def _comes_out(vehicle: Vehicle, nearer: Vehicle, hidden: Sequence[Vehicle]) -> 
 
 
 def _may_be(lost: Vehicle, new: Vehicle) -> bool:
-    """Return whether a vehicle that is seen again may be the lost one: later, and near by.
+    """Return whether a vehicle that is seen again may be the lost one.
 
-    One that drives the other way is not: it comes in where the lost one went out.
+    It is near, looks like it, does not drive the other way, and was not there before.
     """
     turned = float(lost.history.last_velocity @ new.history.last_velocity) < -_OPPOSED
-    is_later = lost.history.last_seen < new.begin
-    return is_later and not turned and _distance(lost, new) < _REACH
+    beside = lost.history.last_seen - new.begin
+    reach, unlike = (_REACH, MOST_UNLIKE) if beside < 0 else (_BESIDE_REACH, _BESIDE_UNLIKE)
+    return (
+        beside < _BESIDE
+        and not turned
+        and bool(differences(lost.appearance, new.appearance) < unlike)
+        and _distance(lost, new) < reach
+    )
 
 
 def _distance(one: Vehicle, other: Vehicle) -> float:

@@ -94,6 +94,11 @@ class History:
     def _latest(self) -> Moment:
         return next(each for each in reversed(self._moments) if each.score is not None)
 
+    @property
+    def latest(self) -> float:
+        """Time of the latest moment."""
+        return self._moments[-1].time
+
     def add(self, moment: Moment) -> None:
         """Add the next moment."""
         self._moments.append(moment)

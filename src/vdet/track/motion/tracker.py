@@ -8,7 +8,9 @@ import numpy as np
 from vdet.boxes import BoolArray, Box, Boxes, Float64Array, are_nested, visible
 from vdet.config.schema import MotionTrackerSettings
 from vdet.media import Picture
+from vdet.track.motion.appearance import appearances, differences
 from vdet.track.motion.association import (
+    MOST_UNLIKE,
     are_hidden,
     are_parts,
     buffered_iou,
@@ -51,12 +53,12 @@ class MotionTracker:
         self.observe(detections, time, picture)
         return self.at(time)
 
-    def observe(self, detections: Boxes, time: float, picture: Picture | None = None) -> None:  # noqa: ARG002
+    def observe(self, detections: Boxes, time: float, picture: Picture | None = None) -> None:
         """Follow the vehicles into the next frame; as `TimedTracker.observe`.
 
         The part of a detection outside the frame does not count.
         """
-        observations = self._observations(detections)
+        observations = self._observations(detections, picture)
         seconds = FIRST_STEP if self._time is None else time - self._time
         self._time, look = time, Look(time, seconds, self._size)
         self._predict(seconds)
@@ -127,11 +129,12 @@ class MotionTracker:
         for vehicle in self._vehicles:
             vehicle.history.forget(before)
 
-    def _observations(self, detections: Boxes) -> list[Observation]:
+    def _observations(self, detections: Boxes, picture: Picture | None) -> list[Observation]:
         boxes = visible(detections.sides, self._size)
+        seen = appearances(picture, boxes)
         return [
-            Observation(box, each.score, each.class_name)
-            for box, each in zip(boxes, detections, strict=True)
+            Observation(box, each.score, each.class_name, appearance)
+            for box, each, appearance in zip(boxes, detections, seen, strict=True)
             if _least_side(box) >= 1
         ]
 
@@ -158,11 +161,19 @@ class MotionTracker:
         buffers = np.reshape([v.state.deviation for v in self._vehicles], (-1, 2))
         values = buffered_iou(expected, buffers, boxes)
         values[values < _OVERLAP] = 0
+        unlike = self._differences(observations)
+        values *= np.exp(-(unlike**2))
+        values[lost] *= unlike[lost] < MOST_UNLIKE
         weak = [number for number, o in enumerate(observations) if not self._adds_evidence(o)]
         values[np.ix_(lost, weak)] = 0  # weak detections must not re-identify lost tracks
         parts = are_parts(boxes, np.array([observation.score for observation in observations]))
         values[np.ix_(self._hidden(expected), parts)] = 0  # parts of the vehicle that hides it
         return pair(values, [present, lost, new])
+
+    def _differences(self, observations: Sequence[Observation]) -> Float64Array:
+        """Return how much the appearances of vehicles and observations differ, `(n, m)`."""
+        known = np.reshape([vehicle.appearance for vehicle in self._vehicles], (-1, 1, 2, 3))
+        return differences(known, np.reshape([o.appearance for o in observations], (-1, 2, 3)))
 
     def _adds_evidence(self, observation: Observation) -> bool:
         """Return whether such a detection, repeated in each frame, would make a vehicle."""

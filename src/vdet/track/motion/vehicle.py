@@ -6,11 +6,12 @@ It is measured in seconds of detections with score 1, so that it does not depend
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from vdet.boxes import Float64Array
 from vdet.config.schema import MotionTrackerSettings
 from vdet.detect.classes import ClassScores
+from vdet.track.motion.appearance import unknown_appearance
 from vdet.track.motion.history import SCORE_TIME, History, Moment
 from vdet.track.motion.state import MotionState, side_cut
 
@@ -22,6 +23,9 @@ _SLOWING_TIME = 0.8
 
 _SETTLING_TIME = 0.4
 """The same of the change of its size, from the first miss on: growth soon adds up to a lot."""
+
+_APPEARANCE_TIME = 0.3
+"""Seconds over which the appearance of the detections is averaged."""
 
 _NOISE = 0.12
 """Standard deviation of the sides of a detection with score 1, as a share of the vehicle's size."""
@@ -38,11 +42,16 @@ _LEAST_SCORE = 0.05
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Observation:
-    """A detection inside the frame: `box` is x1, y1, x2, y2 in pixels, float64 `(4,)`."""
+    """A detection inside the frame.
+
+    `box` is x1, y1, x2, y2 in pixels, float64 `(4,)`; `appearance` is `(2, 3)`, see
+    `appearances`.
+    """
 
     box: Float64Array
     score: float
     class_name: str | None = None
+    appearance: Float64Array = field(default_factory=unknown_appearance)
 
     @property
     def noise(self) -> float:
@@ -114,13 +123,18 @@ class Vehicle:
         Where it was in the latest frames.
     begin
         Time of its first detection, seconds.
+    since
+        Time of the detection since which it has not been lost, seconds.
+    appearance
+        Mean appearance of its latest detections, `(2, 3)`.
     """
 
     def __init__(self, first: Observation, look: Look, settings: MotionTrackerSettings) -> None:
         self._settings = settings
         self.state = MotionState.at_rest(first.box, first.noise, _VELOCITY)
         entering = side_cut(first.box, look.size)
-        self.begin = look.time
+        self.begin = self.since = look.time
+        self.appearance = first.appearance
         self.history = History([Moment(look.time, self.state, first.score, entering=entering)])
         self._gain: Float64Array | None = None
         self.evidence = self.unseen = self.hidden = 0.0
@@ -134,6 +148,11 @@ class Vehicle:
     def is_present(self) -> bool:
         """Whether it is known and was seen lately."""
         return self.confirmed and self.evidence > 0 and self.unseen <= self._settings.carried
+
+    @property
+    def age(self) -> float:
+        """Seconds since its first detection."""
+        return self.history.latest - self.begin
 
     @property
     def is_over(self) -> bool:
@@ -158,7 +177,11 @@ class Vehicle:
         entering = side_cut(box, look.size)
         moment = Moment(look.time, self.state, score, expected.mean, self._gain, entering)
         self.history.add(moment)
+        if not self.is_present:
+            self.since = look.time
         self.unseen = self.hidden = 0.0
+        kept = math.exp(-look.seconds / _APPEARANCE_TIME)
+        self.appearance = kept * self.appearance + (1 - kept) * observation.appearance
         self._add(observation, look.seconds)
 
     def miss(self, look: Look) -> None:
@@ -171,12 +194,21 @@ class Vehicle:
         self.history.add(Moment(look.time, self.state, None, self.state.mean, self._gain))
         self._weigh(0.0, seconds)
 
-    def continue_from(self, other: "Vehicle") -> None:
+    def take_over(self, other: "Vehicle") -> None:
         """Go on with the id and the history of another track of the same vehicle."""
-        ids = [each.id for each in (self, other) if each.id is not None]
-        self.id = min(ids, default=None)
+        self.id = self.id if other.id is None else other.id
         self.begin = min(self.begin, other.begin)
         self.history.join(other.history)
+
+    def merge(self, other: "Vehicle") -> None:
+        """Take over the history of another track that follows the same vehicle now.
+
+        The id is that of the track that was not lost for longer.
+        """
+        ids = [(each.since, each.id) for each in (self, other) if each.id is not None]
+        self.take_over(other)
+        self.id = min(ids)[1] if ids else None
+        self.since = min(self.since, other.since)
 
     def _add(self, observation: Observation, seconds: float) -> None:
         self._weigh(observation.score, seconds)

@@ -1,0 +1,140 @@
+"""Thirty drawn crowds: how well ids hold in dense traffic. `python -m benchmarks.crowds`.
+
+Fifteen roads are seen from a windscreen, fifteen from a pole; the network finds the vehicles.
+"""
+
+import math
+from dataclasses import astuple, replace
+from fractions import Fraction
+from pathlib import Path
+from statistics import fmean
+
+import numpy as np
+
+from vdet.boxes import Box
+from vdet.config.schema import Settings
+from vdet.detect.factory import load_detector
+from vdet.detect.protocol import DetectorModel
+from vdet.evaluate.scores import Scores
+from vdet.evaluate.video import score_video
+from vdet.labels.label import Label
+from vdet.labels.video import LabelledVideo
+from vdet.media import Picture, Planes, VideoInfo
+from vdet.media.coding import Coding
+from vdet.run.loop import build, peek
+from vdet.synthetic.camera import PinholeCamera
+from vdet.synthetic.random_scenes import (
+    LANE_WIDTH,
+    LORRY,
+    empty_road,
+    random_body,
+    random_paint,
+)
+from vdet.synthetic.render import frames
+from vdet.synthetic.scene import Scene, SceneVehicle, Waypoint
+from vdet.synthetic.truth import must_be_found, true_boxes
+from vdet.workers import limit_library_threads
+
+SCENES = range(30)
+_SECONDS = 6
+_LORRIES = 0.15  # share of vehicles
+_SPACE = 0.9, 2.5
+"""Least and most room between two vehicles of a lane, in lengths of the one in front."""
+
+
+def crowd(number: int) -> Scene:
+    """Return one of the scenes: even numbers from a windscreen, odd ones from a pole."""
+    rng = np.random.default_rng((7, number))
+    if number % 2 == 0:
+        camera, lanes, lane, own = PinholeCamera.dashboard(960, 540), 5, 3, 14.0
+        first, last = -40.0, 90.0
+    else:
+        camera = PinholeCamera.pole(960, 540, rng.uniform(6, 12))
+        lanes, lane, own = 6, int(rng.integers(1, 5)), 0.0
+        first, last = 5.0, 110.0
+    scene = empty_road(rng, camera, lane=lane, lanes=lanes, seed=number)
+    vehicles: list[SceneVehicle] = []
+    for place in range(lanes):
+        is_oncoming = place < lanes // 2
+        speed = rng.uniform(4, 14) * (-1 if is_oncoming else 1) - own
+        lateral = (place - lane) * LANE_WIDTH
+        reach = abs(speed) * _SECONDS
+        ahead = first - reach
+        while ahead < last + reach:
+            body = LORRY if rng.random() < _LORRIES else random_body(rng)
+            ahead += body.length * (1 + rng.uniform(*_SPACE))
+            near = abs(lateral) < 1 and ahead < 12 and number % 2 == 0
+            end = ahead + speed * _SECONDS
+            if near or (lane == place and number % 2 == 0 and min(ahead, end) < 8):
+                continue  # it would drive into the camera
+            change = rng.normal(0, 0.06) * reach
+            way = _way(rng, ahead, change, speed, lateral, is_oncoming=is_oncoming)
+            vehicles.append(SceneVehicle(len(vehicles) + 1, way, random_paint(rng), body))
+    rate = Fraction(25)
+    return replace(
+        scene, vehicles=tuple(vehicles), speed=own, rate=rate, frames=int(_SECONDS * rate)
+    )
+
+
+def _way(
+    rng: np.random.Generator,
+    ahead: float,
+    change: float,
+    speed: float,
+    lateral: float,
+    *,
+    is_oncoming: bool,
+) -> tuple[Waypoint, ...]:
+    """Return the waypoints of a vehicle that changes its speed a little half-way."""
+    heading = math.pi if is_oncoming else 0.0
+    middle = ahead + speed * _SECONDS / 2 + change
+    ways = ((0.0, ahead), (_SECONDS / 2, middle), (float(_SECONDS), middle + speed * _SECONDS / 2))
+    return tuple(Waypoint(t, z, lateral + rng.normal(0, 0.15), heading) for t, z in ways)
+
+
+def truth(scene: Scene) -> LabelledVideo:
+    """Return the true boxes of a scene; vehicles that do not count are ignored."""
+    return LabelledVideo.of(
+        _row(index, each.id, each.box, ignored=not must_be_found(each, scene.camera.height))
+        for index in range(scene.frames)
+        for each in true_boxes(scene, index)
+    )
+
+
+def _row(index: int, number: int, box: Box, *, ignored: bool = False) -> Label:
+    return Label(0, astuple(box), frame=index + 1, id=number, ignored=ignored)
+
+
+def scores_of(scene: Scene, model: DetectorModel, settings: Settings) -> Scores:
+    """Find and follow the vehicles of a scene, and compare them with its truth."""
+    camera, rate = scene.camera, scene.rate
+    video = VideoInfo(Path("crowd.mp4"), camera.width, camera.height, rate, 1 / rate)
+    drawn = (
+        replace(frame, picture=Picture(Planes.of_image(frame.image, Coding())))
+        for frame in frames(scene)
+    )
+    images, clip = peek(drawn)
+    shown = LabelledVideo.of(
+        _row(result.frame.index, track.id, track.box)
+        for result in build(model, settings, video, images).follow(clip)
+        for track in result.tracks
+    )
+    return score_video(f"crowd {scene.seed}", shown, truth(scene)).scores
+
+
+def main() -> None:
+    """Print the metrics of both cameras."""
+    limit_library_threads()
+    settings = Settings()
+    model = load_detector(settings.detector)
+    print("camera      scenes   F1     IDF1   HOTA   id switches   fragmentations")
+    for camera, numbers in (("windscreen", SCENES[::2]), ("pole", SCENES[1::2])):
+        scores = [scores_of(crowd(number), model, settings) for number in numbers]
+        means = (fmean(getattr(each, name) for each in scores) for name in ("f1", "idf1", "hota"))
+        sums = sum(s.id_switches for s in scores), sum(s.fragmentations for s in scores)
+        row = "   ".join(f"{mean:.3f}" for mean in means)
+        print(f"{camera:<12}{len(scores):4}   {row}{sums[0]:12}{sums[1]:17}")
+
+
+if __name__ == "__main__":
+    main()
