@@ -4,7 +4,13 @@ from evaluate.scenes import TEN, drive, video
 from labels.saving import row
 from vdet.evaluate.comparison import compare
 from vdet.evaluate.scores import score
-from vdet.evaluate.timelines import FirstDetection, Stretch, mistakes, stretches
+from vdet.evaluate.timelines import (
+    FirstDetection,
+    Stretch,
+    frames_too_long,
+    mistakes,
+    stretches,
+)
 from vdet.labels.video import LabelledVideo
 
 
@@ -36,6 +42,14 @@ def test_a_vehicle_never_found_has_no_delay() -> None:
     assert scores.first_detections == (FirstDetection(8, 1, None),)
     assert scores.first_detections[0].delay is None
     assert scores.never_found == 1
+
+
+def test_a_track_that_goes_on_after_its_vehicle_is_shown_too_long() -> None:
+    truth = video(drive(8, range(1, 11)), drive(9, range(13, 20)))
+    found = video(drive(1, range(1, 16)))  # the second vehicle gets the track of the first
+    scores = score(found, truth)
+    assert frames_too_long(compare(found, truth)) == (2, 0)
+    assert scores.mean_excess == 1.0
 
 
 @pytest.mark.parametrize(("on_vehicle", "false"), [(4, 1), (5, 0), (6, 0)])

@@ -6,7 +6,7 @@ import numpy as np
 
 from vdet.evaluate.average_precision import rank_predictions
 from vdet.evaluate.comparison import Comparison, compare, counts
-from vdet.evaluate.timelines import FirstDetection, first_detections
+from vdet.evaluate.timelines import FirstDetection, first_detections, frames_too_long
 from vdet.evaluate.tracking_metrics import fragmentations, hota, id_switches, identity_matches
 from vdet.labels.video import LabelledVideo
 
@@ -62,6 +62,9 @@ class Scores(DetectionScores):
         One for every vehicle.
     mean_delay
         Mean frames until the first detection, over the vehicles that were found; None if none was.
+    mean_excess
+        Mean frames for which a vehicle is shown after its last true box, over those that were
+        found; None if none was.
     never_found
         Vehicles without any match.
     false_tracks
@@ -92,6 +95,7 @@ class Scores(DetectionScores):
     track_boxes: int
     first_detections: tuple[FirstDetection, ...]
     mean_delay: float | None
+    mean_excess: float | None
     never_found: int
     false_tracks: int
     false_tracks_per_minute: float | None
@@ -138,6 +142,7 @@ def score_comparison(comparison: Comparison) -> Scores:
     false_tracks = int(np.sum(2 * right < of_tracks))
     first = first_detections(comparison)
     delays = [each.delay for each in first if each.delay is not None]
+    excess = frames_too_long(comparison)
     switches, agreeing = id_switches(comparison), identity_matches(comparison)
     ap50, ap50_95 = rank_predictions(comparison).average_precisions()
     total, deta, assa = hota(comparison)
@@ -164,6 +169,7 @@ def score_comparison(comparison: Comparison) -> Scores:
         track_boxes=track_boxes,
         first_detections=first,
         mean_delay=sum(delays) / len(delays) if delays else None,
+        mean_excess=sum(excess) / len(excess) if excess else None,
         never_found=len(first) - len(delays),
         false_tracks=false_tracks,
         false_tracks_per_minute=(

@@ -30,7 +30,8 @@ boxes: {vehicle_boxes} true ones (vehicles: {vehicles}); {matches} found, {misse
 {alarms}
 tracks: {tracks}, {false_tracks} of them false{per_minute}; {switches}, {breaks}
 vehicles: {mostly_tracked} mostly tracked, {partly_tracked} partly, {mostly_lost} mostly lost, \
-{never_found} never found; mean time to the first detection {delay}
+{never_found} never found; first shown {delay} after they appear, on average, and \
+for {excess} after they leave
 also: MOTP {motp:.3f}, IDP {idp:.3f}, IDR {idr:.3f}, DetA {deta:.3f}, AssA {assa:.3f}"""
 
 _TILE_WIDTH, _TILE_ASPECT = 330, 1.5
@@ -75,16 +76,21 @@ def _setting(run: RunResult) -> str:
 def detail_lines(run: RunResult) -> list[str]:
     """Return which frames were compared, and the numbers that are in no table."""
     total = run.total
-    delay, rate = total.mean_delay, total.false_tracks_per_minute
+    rate = total.false_tracks_per_minute
     details = _DETAILS.format(
         **asdict(total),
         alarms=counted(total.false_positives, "false alarm"),
         switches=counted(total.id_switches, "id switch"),
         breaks=counted(total.fragmentations, "fragmentation"),
-        delay=ABSENT if delay is None else f"{delay:.1f} frames",
+        delay=_mean_frames(total.mean_delay),
+        excess=_mean_frames(total.mean_excess),
         per_minute="" if rate is None else f" ({rate:.1f} a minute)",
     )
     return [*map(_frames_line, run.clips), *details.splitlines()]
+
+
+def _mean_frames(mean: float | None) -> str:
+    return ABSENT if mean is None else f"{mean:.1f} frames"
 
 
 def _frames_line(clip: ClipResult) -> str:

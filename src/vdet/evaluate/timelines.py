@@ -74,6 +74,29 @@ def first_detections(comparison: Comparison) -> tuple[FirstDetection, ...]:
     return tuple(FirstDetection(id_, appears[row], found.get(row)) for row, id_ in ids)
 
 
+def frames_too_long(comparison: Comparison) -> tuple[int, ...]:
+    """Return for how many frames each vehicle that was found is shown after its last true box.
+
+    These are the frames in which its last track is a false alarm, until that track has a vehicle
+    again. Vehicles are in the order of `vehicle_ids`.
+    """
+    last: dict[int, int] = {}
+    last_track: dict[int, int] = {}
+    for frame in comparison.frames:
+        last.update(dict.fromkeys(frame.vehicles.tolist(), frame.number))
+        last_track.update(zip(frame.found.tolist(), frame.found_by.tolist(), strict=True))
+    extra = dict.fromkeys(last_track, 0)
+    gone = dict(last_track)
+    for frame in comparison.frames:
+        shown, used = set(frame.tracks.tolist()), set(frame.found_by.tolist())
+        for vehicle, track in list(gone.items()):
+            if frame.number > last[vehicle]:
+                extra[vehicle] += track in shown - used
+                if track in used:
+                    del gone[vehicle]
+    return tuple(extra[vehicle] for vehicle in sorted(extra))
+
+
 def stretches(comparison: Comparison) -> tuple[Stretch, ...]:
     """Return when each vehicle was found or missed, and the false alarms, by vehicle and track.
 
