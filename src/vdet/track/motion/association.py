@@ -187,33 +187,48 @@ def without_duplicates(vehicles: Sequence[Vehicle], size: tuple[int, int]) -> li
     It keeps the id that was not lost for longer. A track that is not confirmed replaces no other
     one; it stays beside it while its score is higher.
     """
-    kept: list[Vehicle] = []
+    boxes = visible(np.reshape([vehicle.state.box for vehicle in vehicles], (-1, 4)), size)
+    inside = coverage(boxes, boxes)
+    overlaps = np.maximum(inside, inside.T) > _LEVEL_OVERLAP
     hidden = [vehicle for vehicle in vehicles if vehicle.hidden]
-    # Confirmed ones come first, then those with higher scores; nearly equal ones keep their order.
-    for vehicle in sorted(vehicles, key=lambda v: (not v.confirmed, -round(v.scores.value, 2))):
-        shown = [each for each in kept if each.confirmed and not each.unseen and not vehicle.unseen]
-        same = next((each for each in shown if _are_same(vehicle, each, hidden, size)), None)
-        if same is None:
-            kept.append(vehicle)
-        elif vehicle.confirmed:
-            same.merge(vehicle)
-    return [vehicle for vehicle in vehicles if vehicle in kept]
+    kept: list[int] = []
+
+    def rank(row: int) -> tuple[bool, float]:
+        """Confirmed ones come first, then higher scores; nearly equal ones keep their order."""
+        vehicle = vehicles[row]
+        return not vehicle.confirmed, -round(vehicle.scores.value, 2)
+
+    for row in sorted(range(len(vehicles)), key=rank):
+        vehicle = vehicles[row]
+        for other in kept if not vehicle.unseen else ():
+            same = vehicles[other]
+            is_shown = overlaps[row, other] and same.confirmed and not same.unseen
+            if is_shown and _are_same(vehicle, same, boxes[row], boxes[other], hidden):
+                if vehicle.confirmed:
+                    same.merge(vehicle)
+                break
+        else:
+            kept.append(row)
+    return [vehicles[row] for row in sorted(kept)]
 
 
 def _are_same(
-    vehicle: Vehicle, other: Vehicle, hidden: Sequence[Vehicle], size: tuple[int, int]
+    vehicle: Vehicle,
+    other: Vehicle,
+    box: Float64Array,
+    other_box: Float64Array,
+    hidden: Sequence[Vehicle],
 ) -> bool:
     """Return whether a track shows the same vehicle as another one, higher in rank.
 
     One that may be a `hidden` vehicle that comes out is no part of the vehicle before it.
     """
-    one, two = visible(np.stack([vehicle.state.box, other.state.box]), size)
     is_weaker = vehicle.confirmed or vehicle.scores.value <= other.scores.value
     if min(vehicle.age, other.age) > _APART:
-        return bool(iou(one, two) > _ALIKE)
-    if is_weaker and is_same(one, two):
+        return bool(iou(box, other_box) > _ALIKE)
+    if is_weaker and is_same(box, other_box):
         return True
-    may_be_part = not vehicle.confirmed and is_part(one, two)
+    may_be_part = not vehicle.confirmed and is_part(box, other_box)
     return may_be_part and not _comes_out(vehicle, other, hidden)
 
 
