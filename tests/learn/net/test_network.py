@@ -17,6 +17,7 @@ from vdet.config.train import NetworkTrainingSettings  # noqa: E402
 from vdet.detect.onnx.detector import NetworkModel  # noqa: E402
 from vdet.detect.onnx.recognition import Header  # noqa: E402
 from vdet.errors import DataError  # noqa: E402
+from vdet.learn.net import architecture  # noqa: E402
 from vdet.learn.net.architecture import (  # noqa: E402
     Network,
     cell_centers,
@@ -24,7 +25,7 @@ from vdet.learn.net.architecture import (  # noqa: E402
     flatten,
 )
 from vdet.learn.net.assignment import Vehicles, assign  # noqa: E402
-from vdet.learn.net.export import export_network  # noqa: E402
+from vdet.learn.net.export import export_network, start_from  # noqa: E402
 from vdet.learn.net.losses import giou, paired_iou  # noqa: E402
 from vdet.learn.net.sources import CLASSES, NetSource  # noqa: E402
 from vdet.learn.net.training import train_network  # noqa: E402
@@ -126,6 +127,20 @@ def test_a_training_goes_on_from_the_weights_of_an_exported_network(
         progress=lambda _, loss: losses.append(loss),
     )  # fmt: skip
     assert losses[0] < 0.6 * trained[1][0]
+
+
+def test_a_wider_network_gives_at_first_what_its_narrower_base_gives(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    path, pictures = tmp_path / "base.onnx", torch.rand(4, 3, 64, 96) * 255
+    monkeypatch.setattr(architecture, "TRUNK", ((32, 0), (64, 2), (64, 1), (96, 1)))
+    base = Network(len(CLASSES)).eval()
+    export_network(base, Header(classes=CLASSES), path)
+    monkeypatch.setattr(architecture, "TRUNK", ((32, 0), (64, 2), (96, 1), (128, 1)))
+    wider = Network(len(CLASSES)).train()
+    start_from(wider, path, pictures)
+    expected, found = flatten(base(pictures)), flatten(wider(pictures))
+    assert torch.allclose(found, expected, atol=1e-3)
 
 
 def test_a_base_of_another_form_is_refused(tmp_path: Path) -> None:

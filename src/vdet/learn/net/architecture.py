@@ -15,7 +15,7 @@ from vdet.detect.onnx import layouts
 from vdet.detect.onnx.layouts import STRIDES
 
 STEM = 16
-TRUNK = ((32, 0), (64, 2), (96, 3), (128, 2))
+TRUNK = ((32, 0), (64, 2), (128, 3), (192, 2))
 """Width of each stage, and the number of blocks behind its first one, which halves the size."""
 
 NECK = 64

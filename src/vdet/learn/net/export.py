@@ -75,7 +75,8 @@ def start_from(network: Network, path: Path, pictures: Tensor) -> None:
     """Give a network the weights of a file that `export_network` has written.
 
     Normalisation is part of the convolutions there. Each normalisation of the network gets the
-    mean and deviation of what it sees in some pictures, and undoes itself at first.
+    mean and deviation of what it sees in some pictures, and undoes itself at first. Layers may be
+    wider than those of the file: further channels have random weights and change no output yet.
 
     Parameters
     ----------
@@ -94,10 +95,10 @@ def start_from(network: Network, path: Path, pictures: Tensor) -> None:
         if isinstance(layer, nn.Conv2d):
             weight, bias = next(folded)
             factor = 1 / 255 if layer is network.stem else 1.0
-            layer.weight.copy_(weight.reshape(layer.weight.shape) / factor)
+            _fill(layer.weight, weight / factor)
             biases.append(bias)
             if layer.bias is not None:
-                layer.bias.copy_(bias.reshape(layer.bias.shape))
+                layer.bias.copy_(bias)
         elif isinstance(layer, nn.BatchNorm2d):
             _undo(layer, inputs[0], biases[-1])
 
@@ -129,8 +130,17 @@ def _convolutions(path: Path) -> list[tuple[Tensor, Tensor]]:
     ]
 
 
+def _fill(weight: Tensor, known: Tensor) -> None:
+    """Set the weights of the first channels; these do not depend on the other channels."""
+    outputs, inputs = known.shape[:2]
+    weight[:outputs] = 0
+    weight[:outputs, :inputs] = known
+
+
 def _undo(norm: nn.BatchNorm2d, inputs: Tensor, bias: Tensor) -> None:
-    """Set a normalisation so that it changes nothing but adds a bias."""
+    """Set a normalisation so that it changes nothing in the first channels but adds their bias."""
     variance, mean = torch.var_mean(inputs, (0, 2, 3))
-    scale = {"weight": torch.sqrt(variance + norm.eps), "bias": bias + mean}
-    norm.load_state_dict({**scale, "running_mean": mean, "running_var": variance}, strict=False)
+    known = len(bias)
+    norm.weight[:known] = torch.sqrt(variance + norm.eps)[:known]
+    norm.bias[:known] = bias + mean[:known]
+    norm.load_state_dict({"running_mean": mean, "running_var": variance}, strict=False)

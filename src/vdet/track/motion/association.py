@@ -194,8 +194,7 @@ def without_duplicates(vehicles: Sequence[Vehicle], size: tuple[int, int]) -> li
     kept: list[int] = []
 
     def rank(row: int) -> tuple[bool, float]:
-        """Confirmed ones come first, then higher scores; nearly equal ones keep their order."""
-        vehicle = vehicles[row]
+        vehicle = vehicles[row]  # confirmed ones come first; nearly equal ones keep their order
         return not vehicle.confirmed, -round(vehicle.scores.value, 2)
 
     for row in sorted(range(len(vehicles)), key=rank):
