@@ -65,7 +65,7 @@ class NetworkScoreSettings(Section):
 class NetworkTrainingSettings(Section):
     """How `vdet train-net` trains the network."""
 
-    steps: int = Field(5700, ge=1, le=10_000_000)
+    steps: int = Field(4700, ge=1, le=10_000_000)
     """Number of steps."""
     batch: int = Field(16, ge=1, le=1024)
     """Number of pictures in a step."""
