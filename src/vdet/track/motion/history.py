@@ -82,16 +82,16 @@ class History:
     @property
     def last_seen(self) -> float:
         """Time of the latest detection."""
-        return self._latest.time
+        return self._last_detected.time
 
     @property
     def last_velocity(self) -> Float64Array:
         """Velocity at the latest detection, x and y in sizes of the vehicle a second."""
-        mean = self._latest.state.mean
+        mean = self._last_detected.state.mean
         return np.asarray(mean[:2, 1] / np.exp(mean[2:, 0]))
 
     @property
-    def _latest(self) -> Moment:
+    def _last_detected(self) -> Moment:
         return next(each for each in reversed(self._moments) if each.score is not None)
 
     @property

@@ -18,6 +18,7 @@ from vdet.boxes import Float64Array
 
 _MOST_NEARER = 0.3
 """Largest change of the distance in a step that is believed, as a share of it."""
+
 BORDER = 0.005
 """A box that ends this near to the frame's side, as a share of the frame, touches it."""
 
