@@ -4,24 +4,18 @@ Fifteen roads are seen from a windscreen, fifteen from a pole; the network finds
 """
 
 import math
-from dataclasses import astuple, replace
+from dataclasses import replace
 from fractions import Fraction
-from pathlib import Path
 from statistics import fmean
 
 import numpy as np
 
-from vdet.boxes import Box
+from benchmarks.drawn_traffic import as_planes, follow, shown_labels, true_labels
 from vdet.config.schema import Settings
 from vdet.detect.factory import load_detector
 from vdet.detect.protocol import DetectorModel
 from vdet.evaluate.scores import Scores
 from vdet.evaluate.video import score_video
-from vdet.labels.label import Label
-from vdet.labels.video import LabelledVideo
-from vdet.media import Picture, Planes, VideoInfo
-from vdet.media.coding import Coding
-from vdet.run.loop import build, peek
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.random_scenes import (
     LANE_WIDTH,
@@ -32,7 +26,6 @@ from vdet.synthetic.random_scenes import (
 )
 from vdet.synthetic.render import frames
 from vdet.synthetic.scene import Scene, SceneVehicle, Waypoint
-from vdet.synthetic.truth import must_be_found, true_boxes
 from vdet.workers import limit_library_threads
 
 SCENES = range(30)
@@ -92,34 +85,11 @@ def _way(
     return tuple(Waypoint(t, z, lateral + rng.normal(0, 0.15), heading) for t, z in ways)
 
 
-def truth(scene: Scene) -> LabelledVideo:
-    """Return the true boxes of a scene; vehicles that do not count are ignored."""
-    return LabelledVideo.of(
-        _row(index, each.id, each.box, ignored=not must_be_found(each, scene.camera.height))
-        for index in range(scene.frames)
-        for each in true_boxes(scene, index)
-    )
-
-
-def _row(index: int, number: int, box: Box, *, ignored: bool = False) -> Label:
-    return Label(0, astuple(box), frame=index + 1, id=number, ignored=ignored)
-
-
 def scores_of(scene: Scene, model: DetectorModel, settings: Settings) -> Scores:
     """Find and follow the vehicles of a scene, and compare them with its truth."""
-    camera, rate = scene.camera, scene.rate
-    video = VideoInfo(Path("crowd.mp4"), camera.width, camera.height, rate, 1 / rate)
-    drawn = (
-        replace(frame, picture=Picture(Planes.of_image(frame.image, Coding())))
-        for frame in frames(scene)
-    )
-    images, clip = peek(drawn)
-    shown = LabelledVideo.of(
-        _row(result.frame.index, track.id, track.box)
-        for result in build(model, settings, video, images).follow(clip)
-        for track in result.tracks
-    )
-    return score_video(f"crowd {scene.seed}", shown, truth(scene)).scores
+    results = follow(model, settings, scene, map(as_planes, frames(scene)))
+    truth = true_labels(scene, range(scene.frames))
+    return score_video(f"crowd {scene.seed}", shown_labels(results), truth).scores
 
 
 def main() -> None:

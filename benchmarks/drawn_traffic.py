@@ -1,15 +1,25 @@
-"""Drawn roads with traffic in every lane, how a lane finder sees them, and the true places."""
+"""Drawn roads with traffic in every lane: their views, what is shown of them, and the truth."""
 
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator
+from dataclasses import astuple, dataclass, replace
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 
-from vdet.config.schema import LaneSettings
+from vdet.boxes import Box
+from vdet.config.schema import LaneSettings, Settings
+from vdet.detect.protocol import DetectorModel
+from vdet.labels.label import Label
+from vdet.labels.video import LabelledVideo
+from vdet.media import Frame, Picture, Planes, VideoInfo
+from vdet.media.coding import Coding
+from vdet.run.loop import build, peek
+from vdet.run.result import FrameResult
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.random_scenes import LANE_WIDTH, empty_road, random_body, random_paint
 from vdet.synthetic.scene import LaneLine, Light, Scene, SceneVehicle, Waypoint
+from vdet.synthetic.truth import must_be_found, true_boxes
 from vdet.synthetic.vehicle import STANDS
 
 
@@ -66,6 +76,43 @@ def lane_view(
         lane_width=width,
         length=far - near,
     )
+
+
+def as_planes(frame: Frame) -> Frame:
+    """Return a frame in the form of a decoded video's."""
+    return replace(frame, picture=Picture(Planes.of_image(frame.image, Coding())))
+
+
+def follow(
+    model: DetectorModel, settings: Settings, scene: Scene, clip: Iterable[Frame]
+) -> Iterator[FrameResult]:
+    """Find and follow the vehicles in the frames of a scene; yield the result of each."""
+    camera, rate = scene.camera, scene.rate
+    video = VideoInfo(Path("clip.mp4"), camera.width, camera.height, rate, 1 / rate)
+    images, every = peek(clip)
+    return build(model, settings, video, images).follow(every)
+
+
+def shown_labels(results: Iterable[FrameResult]) -> LabelledVideo:
+    """Return the boxes that are shown."""
+    return LabelledVideo.of(
+        _label(result.frame.index, track.id, track.box)
+        for result in results
+        for track in result.tracks
+    )
+
+
+def true_labels(scene: Scene, indices: Iterable[int]) -> LabelledVideo:
+    """Return the true boxes of frames; vehicles that do not count are ignore regions."""
+    return LabelledVideo.of(
+        _label(index, each.id, each.box, ignored=not must_be_found(each, scene.camera.height))
+        for index in indices
+        for each in true_boxes(scene, index)
+    )
+
+
+def _label(index: int, number: int, box: Box, *, ignored: bool = False) -> Label:
+    return Label(0, astuple(box), frame=index + 1, id=number, ignored=ignored)
 
 
 @dataclass(frozen=True, slots=True)

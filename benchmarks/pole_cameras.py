@@ -14,10 +14,10 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from pathlib import Path
 
 import numpy as np
 
+from benchmarks.drawn_traffic import follow
 from vdet.boxes import Float64Array
 from vdet.config.places import CountSettings, LineSettings
 from vdet.config.schema import Settings
@@ -25,8 +25,6 @@ from vdet.detect.factory import load_detector
 from vdet.detect.protocol import DetectorModel
 from vdet.lanes.camera import Undistorter
 from vdet.lanes.ground import Ground, fit_ground
-from vdet.media import VideoInfo
-from vdet.run.loop import build, peek
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.random_scenes import LANE_WIDTH, LORRY, empty_road, random_body, random_paint
 from vdet.synthetic.render import frames
@@ -306,10 +304,8 @@ def _same(truth: Sequence[FrameTracks], shown: Sequence[FrameTracks]) -> dict[in
 
 def detected(scene: PoleScene, model: DetectorModel) -> list[FrameTracks]:
     """Return the tracks of the default detector in the drawn frames."""
-    info = VideoInfo(Path("clip.mp4"), WIDTH, HEIGHT, RATE, 1 / RATE)
-    first, every = peek(frames(scene.scene))
-    pipeline = build(model, Settings(), info, first)
-    return [result.frame_tracks for result in pipeline.follow(every)]
+    results = follow(model, Settings(), scene.scene, frames(scene.scene))
+    return [result.frame_tracks for result in results]
 
 
 def main() -> None:

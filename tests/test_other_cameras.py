@@ -7,30 +7,31 @@ large: several drawn cars side by side look like one to it.
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from fractions import Fraction
-from pathlib import Path
 from statistics import median
 
 import numpy as np
 import pytest
-from benchmarks.drawn_traffic import traffic_scene
+from benchmarks.drawn_traffic import (
+    as_planes,
+    follow,
+    shown_labels,
+    traffic_scene,
+    true_labels,
+)
 
-from vdet.boxes import Box, Float64Array
+from vdet.boxes import Float64Array
 from vdet.config.schema import Settings, SvmSettings
 from vdet.detect.factory import load_detector
 from vdet.detect.protocol import DetectorModel
 from vdet.detect.svm.horizon import find_horizon
 from vdet.evaluate.comparison import Comparison, compare
 from vdet.evaluate.scores import score, score_comparison
-from vdet.labels.label import Label
 from vdet.labels.video import LabelledVideo
-from vdet.media import Frame, Picture, Planes, VideoInfo
-from vdet.media.coding import Coding
-from vdet.run.loop import build, peek
+from vdet.media import Frame, Picture
+from vdet.run.loop import peek
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.render import frames
 from vdet.synthetic.scene import Light, Scene
-from vdet.synthetic.truth import must_be_found, true_boxes
 
 LINEAR = Settings(detector=SvmSettings())
 FRAMES = 30
@@ -74,36 +75,10 @@ def model() -> DetectorModel:
     return load_detector(LINEAR.detector)
 
 
-def shown(model: DetectorModel, camera: PinholeCamera, clip: Iterable[Frame]) -> LabelledVideo:
+def shown(model: DetectorModel, scene: Scene, clip: Iterable[Frame]) -> LabelledVideo:
     """Find and follow the vehicles of a clip; give the boxes shown in the scored frames."""
-    rate, clip = Fraction(25), map(as_planes, clip)
-    video = VideoInfo(Path("clip.mp4"), camera.width, camera.height, rate, 1 / rate)
-    images, clip = peek(clip)
-    return LabelledVideo.of(
-        row(result.frame.index, track.id, track.box)
-        for result in build(model, LINEAR, video, images).follow(clip)
-        for track in result.tracks
-        if result.frame.index in SCORED
-    )
-
-
-def as_planes(frame: Frame) -> Frame:
-    """Give a frame in the form of a decoded video's."""
-    return replace(frame, picture=Picture(Planes.of_image(frame.image, Coding())))
-
-
-def to_be_shown(scene: Scene) -> LabelledVideo:
-    """Give the true boxes of the scored frames; vehicles that do not count are to be ignored."""
-    return LabelledVideo.of(
-        row(index, each.id, each.box, ignored=not must_be_found(each, scene.camera.height))
-        for index in SCORED
-        for each in true_boxes(scene, index)
-    )
-
-
-def row(index: int, number: int, box: Box, *, ignored: bool = False) -> Label:
-    corners = box.x1, box.y1, box.x2, box.y2
-    return Label(0, corners, frame=index + 1, id=number, ignored=ignored)
+    results = follow(model, LINEAR, scene, map(as_planes, clip))
+    return shown_labels(result for result in results if result.frame.index in SCORED)
 
 
 def mirrored(video: LabelledVideo, width: int) -> LabelledVideo:
@@ -135,17 +110,17 @@ def test_the_horizon_is_found(case: Case) -> None:
 
 @each_camera
 def test_vehicles_near_and_far_in_every_lane_are_shown(case: Case, model: DetectorModel) -> None:
-    scores = score(shown(model, case.camera, frames(case.scene)), to_be_shown(case.scene))
+    scores = score(shown(model, case.scene, frames(case.scene)), true_labels(case.scene, SCORED))
     assert scores.f1 >= case.least_f1
     assert scores.false_positives <= case.most_false
 
 
 def straight_and_mirrored(case: Case, model: DetectorModel) -> tuple[Comparison, Comparison]:
     """Compare what is shown of a clip, and of its mirror image turned back, with the truth."""
-    camera, clip, true = case.camera, list(frames(case.scene)), to_be_shown(case.scene)
-    reflected = shown(model, camera, mirror_images(clip))
+    camera, clip, true = case.camera, list(frames(case.scene)), true_labels(case.scene, SCORED)
+    reflected = shown(model, case.scene, mirror_images(clip))
     return (
-        compare(shown(model, camera, clip), true),
+        compare(shown(model, case.scene, clip), true),
         compare(mirrored(reflected, camera.width), true),
     )
 
