@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta, timezone
-from itertools import accumulate, pairwise
+from itertools import accumulate, groupby, pairwise
 from typing import TypeVar
 
 from vdet.errors import ConfigError
@@ -261,9 +261,12 @@ def zone_table(videos: Sequence[Counts], interval: int | None = None) -> list[Zo
             ),
             key=lambda event: event[:2],
         )
+        by_number = {
+            number: list(some) for number, some in groupby(events, lambda e: axis.number_at(e[0]))
+        }
         inside = 0
         for number in axis.numbers:
-            here = [event for event in events if axis.number_at(event[0]) == number]
+            here = by_number.get(number, [])
             rows.append(_zone_row(name, axis, number, here, inside))
             inside += sum(1 if enters else -1 for _, enters, _ in here)
     return rows
