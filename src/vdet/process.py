@@ -1,6 +1,7 @@
 """The process of the program: its signals, its standard streams, the threads of its libraries."""
 
 import contextlib
+import gc
 import io
 import os
 import signal
@@ -41,6 +42,7 @@ def run() -> NoReturn:
     except SystemExit as end:
         _ignore_signals()  # the work is done: one that comes now must not change the exit code
         _exit_if_a_thread_hangs(end.code)
+        gc.freeze()  # the memory goes back as a whole: to look for what is in circles takes time
         raise
 
 

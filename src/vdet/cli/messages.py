@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from vdet.files import escaped, output_errors
-from vdet.progress import Advance, Steps
+from vdet.progress import Advance, Steps, no_steps
 
 if TYPE_CHECKING:
     from tqdm import tqdm
@@ -77,6 +77,10 @@ def set_up_logs(*, verbose: bool, quiet: bool) -> None:
     warnings.filterwarnings("ignore", module="PIL")
 
 
+def _shows_bars() -> bool:
+    return not is_quiet() and sys.stderr.isatty()
+
+
 @contextmanager
 def progress_steps(unit: str) -> Iterator[Steps]:
     """Give a function that ends the bar of the step before and starts one.
@@ -84,6 +88,9 @@ def progress_steps(unit: str) -> Iterator[Steps]:
     It takes the name of the step and its total. A step that has a name and no total shows how long
     it has taken, and disappears at its end. See `live_bar` for where there is no bar.
     """
+    if not _shows_bars():
+        yield no_steps
+        return
     with ExitStack() as stack:
 
         def start(what: str, total: int | None) -> Advance:
@@ -112,9 +119,8 @@ def live_bar(**options: Any) -> "Iterator[tqdm[Any]]":
     """
     from tqdm import tqdm
 
-    disable = True if is_quiet() else None  # None: unless standard error is a terminal
     ended = threading.Event()
-    with tqdm(disable=disable, dynamic_ncols=True, **options) as bar:
+    with tqdm(disable=not _shows_bars(), dynamic_ncols=True, **options) as bar:
 
         def repeat() -> None:
             while not ended.wait(REFRESH_INTERVAL):

@@ -192,13 +192,18 @@ class SettingsChoice:
         The model file decides which detector runs; without one it is `detector`, or the default
         where that is None. Raises `ConfigError`.
         """
+        named = {"regions": self.regions, "counts": self.lines}
+        places = {name: file for name, file in named.items() if file}
+        given = self.config_name, self.assignments, more, places, self.model_path, detector
+        if not any(given):
+            from vdet.config.schema import Settings
+
+            return Settings()
         from vdet.config.loading import find_config, kind_of_model, load_settings
 
         if self.model_path is not None:
             detector = kind_of_model(self.model_path) or detector
         path = find_config(self.config_name) if self.config_name else None
-        named = {"regions": self.regions, "counts": self.lines}
-        places = {name: file for name, file in named.items() if file}
         return load_settings(path, (*self.assignments, *more), places, detector=detector)
 
     def ground(self) -> "GroundRequest | None":
@@ -225,10 +230,13 @@ class SettingsChoice:
         self, settings: "Settings", detector: "DetectorSettings | None" = None
     ) -> list[Path]:
         """Return the files of these settings, and the model file of a detector."""
-        from vdet.config.loading import find_config
         from vdet.detect.factory import model_file
 
-        config = self.config_name and find_config(self.config_name)
+        config: Path | None = None
+        if self.config_name:
+            from vdet.config.loading import find_config
+
+            config = find_config(self.config_name)
         model = detector and model_file(detector, self.model_path)
         named = (config, self.regions, self.lines, self.ground_file, settings.regions.mask, model)
         return [Path(each) for each in named if each]

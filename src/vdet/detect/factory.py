@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 from vdet.boxes import Boxes
-from vdet.config.loading import kind_of_model
 from vdet.config.schema import DetectorSettings
 from vdet.detect.protocol import DetectorModel, VideoDetector
 from vdet.errors import ConfigError
@@ -47,7 +46,11 @@ def load_detector(settings: DetectorSettings, model: Path | None = None) -> Dete
     ModelError
         The model file cannot be used.
     """
-    kind = kind_of_model(model) if model else None
+    kind = None
+    if model:
+        from vdet.config.loading import kind_of_model  # it imports YAML
+
+        kind = kind_of_model(model)
     if kind and settings.model_suffix and kind != settings.kind:
         raise ConfigError(
             f"{model}: is a model for detector.kind: {kind}, but the settings choose "
