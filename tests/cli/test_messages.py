@@ -11,7 +11,7 @@ from tqdm import tqdm
 from conftest import Run
 from running import until, write_drive
 from vdet.cli.main import cli
-from vdet.cli.messages import counted, progress_steps
+from vdet.cli.messages import counted, is_quiet, progress_steps
 
 
 class Terminal(io.StringIO):
@@ -30,6 +30,7 @@ def terminal(monkeypatch: pytest.MonkeyPatch) -> Terminal:
             super().__init__(file=terminal, mininterval=0, **options)
 
     monkeypatch.setattr("tqdm.tqdm", Bar)
+    monkeypatch.setattr("vdet.cli.messages._shows_bars", lambda: not is_quiet())
     return terminal
 
 
