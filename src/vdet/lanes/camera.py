@@ -120,18 +120,18 @@ class Undistorter:
             self._matrix = camera.matrix_for(width, height)
             self._distortion = np.array(camera.distortion)
 
-    def copy(self, picture: Picture) -> Image | Planes:
-        """Return an undistorted copy of a frame, BGR or planes as it is.
+    def copy(self, picture: Picture, used: Planes | None = None) -> Image | Planes:
+        """Return an undistorted copy of a frame, BGR or planes as it is: see `Planes.copy`.
 
         It is black outside the camera's view.
         """
         if not self._camera:
-            return picture.pixels.copy()
+            return picture.copy(used)
         planes = picture.planes
         if planes is None:
             return self._undistorted(picture.image, 0)
         black = 0 if planes.coding.full_range else 16
-        straight = Planes.blank(*self._size, planes.coding)
+        straight = used or Planes.blank(*self._size, planes.coding)
         for source, target, outside in zip(
             planes.layers, straight.layers, (black, 128, 128), strict=True
         ):

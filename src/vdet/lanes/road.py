@@ -144,9 +144,9 @@ class Road:
     undistorter: Undistorter
     """Moves boxes and points of the original frame to the undistorted one."""
 
-    def undistorted(self) -> Image | Planes:
+    def undistorted(self, used: Planes | None = None) -> Image | Planes:
         """Return an undistorted copy of the frame: BGR or planes, as the frame is."""
-        return self.undistorter.copy(self.view.picture)
+        return self.undistorter.copy(self.view.picture, used)
 
     def record(self) -> dict[str, Any] | None:
         """Return the lane as plain values for JSON: see `lane_record`."""

@@ -71,10 +71,10 @@ class Planes:
             target[:] = source
         return self
 
-    def copy(self) -> "Planes":
-        """Return a copy that may be changed."""
+    def copy(self, used: "Planes | None" = None) -> "Planes":
+        """Return a copy that may be changed; the memory of `used`, of this size, is taken."""
         height, width = self.shape
-        return self.blank(width, height, self.coding)._filled(self.layers)
+        return (used or self.blank(width, height, self.coding))._filled(self.layers)
 
     def to_image(self) -> Image:
         """Return the picture as BGR uint8 `(H, W, 3)`; a value of chroma counts for 2 × 2 pixels.
@@ -133,6 +133,10 @@ class Picture:
     def planes(self) -> Planes | None:
         """The planes, if the picture was made from planes."""
         return self.pixels if isinstance(self.pixels, Planes) else None
+
+    def copy(self, used: Planes | None = None) -> Image | Planes:
+        """Return a copy of the pixels that may be changed: see `Planes.copy`."""
+        return self.pixels.copy(used) if isinstance(self.pixels, Planes) else self.pixels.copy()
 
     @cached_property
     def image(self) -> Image:

@@ -24,7 +24,7 @@ from vdet.draw.boxes import (
 )
 from vdet.draw.paint import Color, Surface, draw_lines
 from vdet.errors import OutputError
-from vdet.media import Frame, Picture, VideoInfo, VideoWriter
+from vdet.media import Frame, Picture, Planes, VideoInfo, VideoWriter
 from vdet.media.images import PICTURE_SUFFIXES, encode_image
 from vdet.media.writer import VIDEO_SUFFIXES, may_replace_video
 from vdet.polygons import Point
@@ -58,14 +58,16 @@ class Overlay:
         self._label = automatic if self._draw.label is None else self._draw.label
         self._trails: dict[int, list[tuple[float, Point]]] = {}  # with the time in seconds
 
-    def draw(self, result: FrameResult) -> Surface:
+    def draw(self, result: FrameResult, used: Planes | None = None) -> Surface:
         """Return a copy of the frame with its vehicles: BGR or planes, as the frame came.
+
+        The memory of `used` is taken.
 
         If lanes are searched for, it is a copy of the undistorted frame with the lane, and vehicles
         are drawn where they lie in it.
         """
         road = result.road
-        surface = road.undistorted() if road else result.frame.picture.pixels.copy()
+        surface = road.undistorted(used) if road else result.frame.picture.copy(used)
         if road and road.lane:
             from vdet.lanes.drawing import draw_lane
 
@@ -194,8 +196,15 @@ class VideoSink(BaseSink):
             whole_sound=not context.is_part,
             threads=context.codec_threads,
         )
+        self._used: list[Planes] = []  # new memory would take longer than what is copied into it
+
+        def write(frame: Frame) -> None:
+            writer.write(frame)
+            if planes := frame.picture.planes:
+                self._used.append(planes)
+
         self._encoding = write_async(
-            writer.write,
+            write,
             within=writer,
             timeout=context.timeout,
             extra=lambda: writer.size / FINISH_RATE,
@@ -208,7 +217,7 @@ class VideoSink(BaseSink):
 
     def write(self, result: FrameResult) -> None:
         """Draw the shown vehicles, and give the frame to the encoder."""
-        surface = self._overlay.draw(result)
+        surface = self._overlay.draw(result, self._used.pop() if self._used else None)
         self._encode(Frame(result.frame.index, result.frame.time, Picture(surface)))
 
 
