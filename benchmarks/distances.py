@@ -15,13 +15,13 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.drawn_traffic import TruePlace, lane_view, traffic_scene, true_places
+from vdet.boxes import Image
 from vdet.config.loading import find_config, load_settings
 from vdet.config.schema import Settings
 from vdet.detect.factory import load_detector
 from vdet.lanes.curves import LaneCurves
 from vdet.lanes.road import LaneRequest, Road, RoadFinder
 from vdet.media import Frame, Picture, VideoInfo
-from vdet.media.images import Image
 from vdet.run.loop import build, peek
 from vdet.run.steps import LaneStep, with_positions
 from vdet.synthetic.camera import PinholeCamera

@@ -32,7 +32,8 @@ from vdet.learn.svm.box_regression import extract_box_patches, fit_split_boxes
 from vdet.learn.svm.dataset import PatchFile, find_patches
 from vdet.learn.svm.extraction import LabelledVectors, extract
 from vdet.learn.svm.fitting import fit
-from vdet.media import Frame, Picture, VideoReader
+from vdet.media import Frame, Picture
+from vdet.media.reader import VideoReader
 from vdet.run.loop import Pipeline, SearchRate, peek
 from vdet.track.factory import make_tracker
 from vdet.workers import limit_library_threads, make_workers

@@ -9,7 +9,8 @@ from vdet.config.schema import Settings
 from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.kind import shipped_model
 from vdet.detect.svm.model import LinearModel, load_model
-from vdet.media import Picture, VideoReader
+from vdet.media import Picture
+from vdet.media.reader import VideoReader
 from vdet.synthetic.random_scenes import demo_scene
 from vdet.synthetic.render import write_clip
 

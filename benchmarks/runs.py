@@ -20,8 +20,8 @@ from vdet.detect.factory import load_detector
 from vdet.detect.protocol import DetectorModel
 from vdet.lanes.camera import CalibratedCamera
 from vdet.lanes.road import LaneRequest
-from vdet.media import VideoReader
 from vdet.media.images import write_image
+from vdet.media.reader import VideoReader
 from vdet.run.sinks.protocol import Output
 from vdet.run.video import VideoJob, run_video
 

@@ -9,8 +9,9 @@ from tempfile import TemporaryDirectory
 import cv2
 import numpy as np
 
-from vdet.media import VideoReader
-from vdet.media.images import Image, read_image
+from vdet.boxes import Image
+from vdet.media.images import read_image
+from vdet.media.reader import VideoReader
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.random_scenes import LANE_WIDTH, empty_road
 from vdet.synthetic.render import write_clip

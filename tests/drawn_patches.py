@@ -12,9 +12,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from vdet.boxes import Box
+from vdet.boxes import Box, Image
 from vdet.files import make_folder
-from vdet.media.images import Image, write_image
+from vdet.media.images import write_image
 from vdet.synthetic.random_scenes import busy_road
 from vdet.synthetic.render import Renderer
 from vdet.synthetic.scene import PERIOD, Scene

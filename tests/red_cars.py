@@ -9,7 +9,7 @@ import numpy as np
 
 from boxing import moved_to
 from vdet.batch.task import Work
-from vdet.boxes import NO_BOXES, Box, Boxes
+from vdet.boxes import NO_BOXES, Box, Boxes, Image
 from vdet.config.schema import Settings, SvmSettings
 from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
 from vdet.config.svm import (
@@ -27,7 +27,6 @@ from vdet.config.tracker import RulesTrackerSettings
 from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.model import LinearModel, save_model
 from vdet.media import Frame, Picture
-from vdet.media.images import Image
 
 WIDTH, HEIGHT = 320, 240
 SCALE = REFERENCE_HEIGHT / HEIGHT

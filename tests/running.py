@@ -18,7 +18,9 @@ import pytest
 from conftest import Outcome
 from red_cars import HEIGHT, WIDTH, car_at, road
 from vdet.config.schema import OutputSettings
-from vdet.media import Frame, Picture, VideoInfo, VideoReader, VideoWriter
+from vdet.media import Frame, Picture, VideoInfo
+from vdet.media.reader import VideoReader
+from vdet.media.writer import VideoWriter
 
 SOON = 300.0  # seconds; a limit for what takes a moment, on a very busy machine
 

@@ -18,9 +18,10 @@ import vdet
 from doc_pages import blocks
 from red_cars import HEIGHT, WIDTH, car_at, drive
 from running import frames_of, write_drive
+from vdet.boxes import Image
 from vdet.config.loading import load_settings
-from vdet.media import VideoReader
-from vdet.media.images import Image, write_image
+from vdet.media.images import write_image
+from vdet.media.reader import VideoReader
 from vdet.synthetic.render import render
 from vdet.synthetic.scene import Scene
 
@@ -87,7 +88,7 @@ def test_importing_vdet_has_no_side_effect() -> None:
     ],
 )
 def test_what_is_no_bgr_image_is_refused(image: Any) -> None:
-    with pytest.raises(ValueError, match="give BGR uint8 of shape"):
+    with pytest.raises(ValueError, match="give BGR uint8"):
         vdet.Detector().detect(image)
 
 

@@ -8,7 +8,7 @@ import pytest
 from conftest import Run
 from vdet.demo import check_demo
 from vdet.errors import OutputError
-from vdet.media import VideoReader
+from vdet.media.reader import VideoReader
 from vdet.synthetic.random_scenes import demo_scene
 from vdet.synthetic.scene import Scene
 

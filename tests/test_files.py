@@ -17,14 +17,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vdet.errors import ConfigError, OutputError
-from vdet.files import (
-    OutputFiles,
-    check_output,
-    printable,
-    read_whole,
-    staged,
-)
+from vdet.errors import ConfigError, OutputError, printable
+from vdet.files import OutputFiles, check_output, read_whole, staged
 from vdet.temporary import _HOST, remove_stale
 
 DIGITS = "1a2b3c4d" * 2
@@ -74,7 +68,7 @@ def test_what_appears_during_the_run_is_kept(
         path.symlink_to("none" if "dangling" in kind else tmp_path)
     else:
         path.write_text("theirs" if kind == "file" else "")
-    with pytest.raises(OutputError, match="has appeared during the run, so it is kept"), files:
+    with pytest.raises(OutputError, match="has appeared during the run; give another"), files:
         pass
     assert names(tmp_path) == ["out.txt"]
     assert path.is_symlink() == ("link" in kind)
@@ -89,7 +83,7 @@ def test_of_three_runs_to_one_output_one_succeeds(tmp_path: Path) -> None:
     with runs[1]:
         pass
     for files in (runs[0], runs[2]):
-        with pytest.raises(OutputError, match="is kept"), files:
+        with pytest.raises(OutputError, match="has appeared"), files:
             pass
     assert path.read_text() == "1"
     assert names(tmp_path) == ["out.txt"]
@@ -245,9 +239,7 @@ def test_the_message_does_not_invite_to_replace_what_may_not_be(
     (tmp_path / "out.txt").touch()
     with pytest.raises(OutputError) as caught:
         check_output(tmp_path / "out.txt", overwrite=overwrite, may_replace=lambda _: False)
-    assert "vdet did not write it, so it is kept; remove it, or give another output" in str(
-        caught.value
-    )
+    assert "vdet did not write it, so it is kept; give another output" in str(caught.value)
 
 
 def test_a_folder_that_the_work_makes_may_be_missing(tmp_path: Path) -> None:
@@ -293,7 +285,7 @@ def test_a_system_without_file_locks_is_refused_in_one_line() -> None:
     code = "import sys; sys.modules['fcntl'] = None; from vdet.__main__ import main; main()"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 1
-    assert done.stderr == "vdet: this system cannot lock files; on Windows, run vdet in WSL\n"
+    assert done.stderr == "vdet: files cannot be locked here; on Windows, use WSL\n"
 
 
 class TestFolder:

@@ -23,8 +23,9 @@ from vdet.detect.svm.kind import shipped_model
 from vdet.detect.svm.model import LinearModel, load_model
 from vdet.learn.svm.dataset import find_patches, read_patches
 from vdet.learn.svm.extraction import hold_out
-from vdet.media import Picture, VideoReader
+from vdet.media import Picture
 from vdet.media.images import read_image
+from vdet.media.reader import VideoReader
 
 pytestmark = pytest.mark.realdata
 

@@ -48,7 +48,7 @@ class TestMasks:
         ]  # fmt: skip
 
     def test_one_of_another_shape_is_refused(self, mask: str) -> None:
-        with pytest.raises(ConfigError, match="mask of 640×360 has another shape than the frames"):
+        with pytest.raises(ConfigError, match="has another shape than the frames"):
             laid(mask=mask, size=(320, 240))
 
     def test_one_that_is_no_picture_is_refused_before_any_work(self, tmp_path: Path) -> None:

@@ -12,12 +12,11 @@ import pytest
 from boxing import rounded
 from red_cars import PERSPECTIVE, SETTINGS, drive, red_finder
 from vdet.api import Tracker
-from vdet.boxes import Boxes
+from vdet.boxes import Boxes, Image
 from vdet.config.schema import MotionTrackerSettings, Settings
 from vdet.config.tracker import RulesTrackerSettings
 from vdet.detect.svm.detector import SvmModel
 from vdet.media import Picture
-from vdet.media.images import Image
 from vdet.run.sinks.protocol import SinkContext, SinkKind, sink_kind
 from vdet.testing import check_detector, check_sink, check_tracker
 from vdet.track.track import Track

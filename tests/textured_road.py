@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from vdet.boxes import Box
-from vdet.media.images import Image
+from vdet.boxes import Box, Image
 
 
 def textured_road(width: int, height: int, *boxes: Box | None) -> Image:

@@ -23,7 +23,7 @@ from fractions import Fraction
 from os import PathLike
 from pathlib import Path
 
-from vdet.boxes import Box, Boxes
+from vdet.boxes import Box, Boxes, Image
 from vdet.config.loading import find_config, kind_of_model
 from vdet.config.loading import load_settings as load_layers
 from vdet.config.schema import DetectorSettings, Settings, TrackerSettings
@@ -36,9 +36,8 @@ from vdet.lanes.camera import load_camera
 from vdet.lanes.ground import GroundRequest, load_ground
 from vdet.lanes.road import LaneRequest
 from vdet.media import Frame, Picture
-from vdet.media.images import Image
 from vdet.progress import no_progress, reporting
-from vdet.run.pictures import PictureJob, detect_picture, run_picture
+from vdet.run.pictures import PictureJob, PictureSearch, run_picture
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output, SinkContext, SinkKind, check_sinks
 from vdet.run.steps import Step, StepContext
@@ -109,10 +108,8 @@ class Detector:
         Raises `ImageError` if it is too small to be searched, `ValueError` if it is no such array.
         """
         if image.dtype != "uint8" or image.ndim != 3 or image.shape[2] != 3:
-            raise ValueError(
-                f"image: {image.dtype} of shape {image.shape}; give BGR uint8 of shape (H, W, 3)"
-            )
-        return detect_picture(Path("image"), image, self._model, self._settings).detections
+            raise ValueError(f"image: {image.dtype} {image.shape}; give BGR uint8 (H, W, 3)")
+        return PictureSearch(self._model, self._settings).detect(Path("image"), image).detections
 
 
 class Tracker:
@@ -286,7 +283,7 @@ def detect_image(
     job = PictureJob(Path(source), _outputs({"picture": picture, **(outputs or {})}))
     inputs = [job.source, *_inputs(model, settings.regions.mask)]
     check_sinks(job.outputs, overwrite=overwrite, inputs=inputs)
-    return run_picture(job, loaded, settings, overwrite=overwrite).detections
+    return run_picture(job, PictureSearch(loaded, settings), overwrite=overwrite).detections
 
 
 def count_tracks(

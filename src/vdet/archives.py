@@ -1,11 +1,11 @@
-"""Zip files from outside, listed and read with limits, so that a small file cannot do harm."""
+"""Zip files: those from outside are read with limits, so that a small file cannot do harm."""
 
 import stat
 import zipfile
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import IO
 
-from vdet.files import printable
+from vdet.errors import printable
 
 _COMPRESSIONS = frozenset({zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED})
 """Methods that can be unpacked up to a limit; zipfile unpacks the others as a whole."""
@@ -22,6 +22,15 @@ def open_archive(file: Path | IO[bytes]) -> zipfile.ZipFile:
         return zipfile.ZipFile(file)
     except Exception as error:  # zipfile raises a dozen kinds on damaged data
         raise ArchiveError("is neither a folder nor a readable zip file") from error
+
+
+def store(archive: zipfile.ZipFile, name: str, data: str | bytes) -> None:
+    """Write a member without the time and the system, so that the same data give the same file."""
+    info = zipfile.ZipInfo(name)  # of the earliest time
+    info.compress_type = archive.compression
+    info.create_system = 3  # Unix; the default depends on the system
+    info.external_attr = 0o644 << 16
+    archive.writestr(info, data)
 
 
 def list_members(file: Path | IO[bytes]) -> list[str]:

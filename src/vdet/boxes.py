@@ -1,6 +1,7 @@
 """Boxes in a picture: x1, y1, x2, y2 in pixels, x to the right, y down, far sides exclusive.
 
-Boxes are rounded only where a format is written or pixels are cut or drawn.
+Boxes are rounded only where a format is written or pixels are cut or drawn. The types of all arrays
+are here too.
 """
 
 import math
@@ -21,6 +22,7 @@ Float64Array = npt.NDArray[np.float64]
 Int32Array = npt.NDArray[np.int32]
 Int64Array = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
+Image = npt.NDArray[np.uint8]
 
 _Rows = slice | Sequence[int] | npt.NDArray[Any]
 

@@ -10,10 +10,11 @@ import numpy as np
 from vdet.config.loading import load_settings
 from vdet.config.schema import Settings
 from vdet.detect.factory import load_detector
+from vdet.detect.svm.kind import load_svm
 from vdet.detect.svm.model import save_model
 from vdet.evaluate.output import table
 from vdet.evaluate.scores import score
-from vdet.files import any_file, check_output, make_folder, staged
+from vdet.files import any_file, check_output, make_folder, write_whole
 from vdet.labels.reading import read_predictions, read_truth
 from vdet.learn.svm.choosing import Most
 from vdet.learn.svm.dataset import find_patches
@@ -102,8 +103,7 @@ def run_demo(
     steps("drawing", None)
     write_clip(folder / ROAD, scene, overwrite=overwrite)
     write_truth(folder / TRUTH, scene, overwrite=overwrite)
-    with staged(folder / LINE, overwrite=overwrite) as temporary:
-        temporary.write_text(_LINE, encoding="utf-8")
+    write_whole(folder / LINE, _LINE, overwrite=overwrite)
     settings = load_settings(places={"counts": folder / LINE})
     size = scene.camera.width, scene.camera.height
     truth, rate = read_truth(folder / TRUTH), float(scene.rate)
@@ -128,16 +128,17 @@ def run_demo(
     announce("2/4 finding the vehicles with the network …")
     by_network = find("network", _BY_NETWORK, settings, None)
     announce(f"3/4 drawing {ROADS} more roads, and training a linear model on patches of them …")
-    linear = load_settings(detector="svm")
+    linear = load_settings(assignments=["train.mine.probability=0"], detector="svm")
     sources, rng = _roads_to_learn(folder), np.random.default_rng(seed)
     make_folder(folder / "training")
     for source in sources:
         busy = busy_road(rng)
         write_clip(source.path, busy, overwrite=overwrite)
         write_truth(source.truth, busy, overwrite=overwrite)
-    mine(sources, folder / PATCHES, linear, most=_MOST, overwrite=overwrite, steps=steps)
-    model, metrics = train(find_patches([folder / PATCHES]), linear, steps=steps)
-    save_model(model, folder / MODEL, overwrite=overwrite)
+    model = load_svm(linear.svm, None)  # only the places of its windows matter
+    mine(sources, folder / PATCHES, linear, model, most=_MOST, overwrite=overwrite, steps=steps)
+    learnt, metrics = train(find_patches([folder / PATCHES]), linear, steps=steps)
+    save_model(learnt, folder / MODEL, overwrite=overwrite)
     metrics.write(folder / METRICS, overwrite=overwrite)
     announce("4/4 finding the vehicles with the linear model …")
     by_model = find(f"linear model {MODEL}", _BY_MODEL, linear, folder / MODEL)

@@ -1,4 +1,4 @@
-"""Kinds of errors; each has the exit code of the program.
+"""Kinds of errors, each with the exit code of the program; names and numbers in messages.
 
 Exit codes: 0 success, 1 an error below, 2 wrong usage (click's own), 3 some files of a batch
 failed, 130 interrupted.
@@ -8,6 +8,7 @@ and what to do about it.
 
 SOME_FAILED = 3
 INTERRUPTED = 130
+_MAX_SHOWN = 80  # characters of a name
 
 
 def failure_code(failed: int, inputs: int) -> int:
@@ -90,3 +91,24 @@ def in_one_line(error: Exception) -> str:
         return "there is too little memory; end other programs, or raise the limit (ulimit -v)"
     text = " ".join(f"{type(error).__name__}: {error}".split())
     return f"internal error, please report it ({text}); VDET_DEBUG=1 shows more"
+
+
+def escaped(text: str) -> str:
+    """Return text on one line, without characters that control a terminal."""
+    return "".join(char if char.isprintable() else ascii(char)[1:-1] for char in text)
+
+
+def printable(name: str) -> str:
+    """Return a name from outside as messages show it: escaped, and cut where it is very long."""
+    shown = escaped(name)
+    return shown if len(shown) <= _MAX_SHOWN else f"{shown[:_MAX_SHOWN]}…"
+
+
+def counted(count: int, noun: str) -> str:
+    """Return `1 car`, `6 buses`."""
+    return f"{count:,} {named(count, noun)}"
+
+
+def named(count: int, noun: str) -> str:
+    """Return the noun for a number of things: `car`, `cars`, `buses`."""
+    return noun if count == 1 else noun + ("es" if noun.endswith(("s", "x", "ch")) else "s")

@@ -15,7 +15,6 @@ from vdet.errors import OutputError, VdetError
 from vdet.temporary import create_folder, remove_stale, sync, try_to_remove
 
 _CHUNK = 1_000_000  # bytes
-_MAX_SHOWN = 80  # characters of a name
 _ASIDE = ".older"  # folder in a temporary one, for files that are replaced
 
 
@@ -83,9 +82,7 @@ def _check_replaceable(path: Path, may_replace: MayReplace) -> None:
     if not (path.is_file() or path.is_symlink()):
         raise OutputError(f"{path}: is no ordinary file, and is kept; give another output")
     if not may_replace(path):
-        raise OutputError(
-            f"{path}: vdet did not write it, so it is kept; remove it, or give another output"
-        )
+        raise OutputError(f"{path}: vdet did not write it, so it is kept; give another output")
 
 
 def make_folder(folder: Path) -> None:
@@ -252,9 +249,7 @@ def _add_name(temporary: Path, path: Path, undo: contextlib.ExitStack) -> None:
             undo.callback(try_to_remove, path)
             temporary.replace(path)
     except FileExistsError:
-        raise OutputError(
-            f"{path}: has appeared during the run, so it is kept; give another output"
-        ) from None
+        raise OutputError(f"{path}: has appeared during the run; give another output") from None
 
 
 def _remove_if_same(path: Path, status: os.stat_result) -> None:
@@ -295,6 +290,17 @@ def output_errors(path: Path) -> Iterator[None]:
         raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from error
 
 
+def write_text(path: Path, text: str) -> None:
+    """Write UTF-8; what is no valid text, as a name of a file may be, is escaped."""
+    path.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
+
+
+def write_whole(path: Path, text: str, *, overwrite: bool = False) -> None:
+    """Write text that appears at `path` as a whole. Raises `OutputError`."""
+    with staged(path, overwrite=overwrite) as temporary:
+        write_text(temporary, text)
+
+
 def print_now(text: str) -> None:
     """Write to standard output, so that an error comes here and not as Python ends."""
     sys.stdout.write(text)
@@ -308,8 +314,7 @@ def write_json(values: Any, target: str, *, overwrite: bool = False) -> None:
         with output_errors(Path("standard output")):
             print_now(text)
         return
-    with staged(Path(target), overwrite=overwrite) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_whole(Path(target), text, overwrite=overwrite)
 
 
 def read_whole(path: Path, *, most: int, what: str, error: type[VdetError]) -> bytes:
@@ -335,14 +340,3 @@ def read_whole(path: Path, *, most: int, what: str, error: type[VdetError]) -> b
     if len(data) > most:
         raise error(f"{path}: is larger than {most:,} bytes; that is no {what}")
     return bytes(data)
-
-
-def escaped(text: str) -> str:
-    """Return text on one line, without characters that control a terminal."""
-    return "".join(char if char.isprintable() else ascii(char)[1:-1] for char in text)
-
-
-def printable(name: str) -> str:
-    """Return a name from outside as messages show it: escaped, and cut where it is very long."""
-    shown = escaped(name)
-    return shown if len(shown) <= _MAX_SHOWN else f"{shown[:_MAX_SHOWN]}…"

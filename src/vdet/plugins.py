@@ -8,8 +8,7 @@ from importlib.metadata import entry_points
 from pkgutil import resolve_name
 from typing import Any
 
-from vdet.errors import ConfigError
-from vdet.files import printable
+from vdet.errors import ConfigError, printable
 
 DETECTORS = "vdet.detectors"
 TRACKERS = "vdet.trackers"
@@ -20,22 +19,13 @@ PICTURE_FORMATS = "vdet.picture_formats"
 COMMANDS = "vdet.commands"
 
 _BUILT_IN: dict[str, dict[str, str]] = {
-    COMMANDS: {
-        "calibrate": "vdet.cli.calibrate:calibrate",
-        "config": "vdet.cli.config:config",
-        "count": "vdet.cli.count:count",
-        "demo": "vdet.cli.demo:demo",
-        "detect-image": "vdet.cli.detect_image:detect_image",
-        "detect-video": "vdet.cli.detect_video:detect_video",
-        "doctor": "vdet.cli.doctor:doctor",
-        "eval": "vdet.cli.evaluate:eval_group",
-        "ground": "vdet.cli.ground:ground",
-        "info": "vdet.cli.info:info",
-        "mine": "vdet.cli.mine:mine",
-        "paths": "vdet.cli.paths:paths",
-        "suggest-lines": "vdet.cli.suggest_lines:suggest_lines",
-        "train": "vdet.cli.train:train",
-        "train-net": "vdet.cli.train_net:train_net",
+    COMMANDS: {"eval": "vdet.cli.evaluate:eval_group"}
+    | {
+        name: "vdet.cli.{0}:{0}".format(name.replace("-", "_"))
+        for name in (
+            *("calibrate", "config", "count", "demo", "detect-image", "detect-video", "doctor"),
+            *("ground", "info", "mine", "paths", "suggest-lines", "train", "train-net"),
+        )
     },
     DETECTORS: {"svm": "vdet.detect.svm.kind:SVM", "net": "vdet.detect.onnx.detector:NET"},
     TRACKERS: {"motion": "vdet.track.factory:MOTION", "rules": "vdet.track.factory:RULES"},
@@ -50,12 +40,6 @@ _BUILT_IN: dict[str, dict[str, str]] = {
         "page": "vdet.run.sinks.folders:PAGE",
         "counts": "vdet.run.sinks.data:COUNTS",
         "flows": "vdet.run.sinks.data:FLOWS",
-    },
-    STEPS: {
-        "lanes": "vdet.run.steps:lane_step",
-        "regions": "vdet.run.steps:region_step",
-        "speeds": "vdet.run.steps:speed_step",
-        "counts": "vdet.run.steps:count_step",
     },
     FORMATS: {
         "mot": "vdet.labels.mot:MOT",
@@ -102,9 +86,8 @@ def load_plugin(group: str, name: str) -> Any:
             return point.load()
         except Exception as error:  # another package's code may raise anything
             raise ConfigError(
-                f"{name}: cannot be loaded from {point.value} ({type(error).__name__}: {error}); "
-                "repair or reinstall that package"
+                f"{name}: {point.value} fails to load ({type(error).__name__}: {error}); repair it"
             ) from error
-    known = ", ".join(plugin_names(group))
+    known = ", ".join(plugin_names(group)) or "none"
     noun = group.removeprefix("vdet.").removesuffix("s").replace("_", " ")
     raise ConfigError(f"{printable(name)}: is no {noun}; known are {known}")

@@ -35,10 +35,7 @@ class Regions:
     """
 
     def __init__(self, settings: RegionsSettings, width: int, height: int) -> None:
-        try:
-            across, down = settings.scales(width, height)
-        except ConfigError as error:
-            raise ConfigError(f"regions.{error}") from error
+        across, down = settings.scales(width, height)
         self.included: dict[str, list[Point]] = {}
         self.excluded: dict[str, list[Point]] = {}
         for each in settings.polygons:
@@ -83,8 +80,7 @@ def _read_mask(path: str, width: int, height: int) -> BoolArray:
         RegionsSettings(size=(columns, rows)).scales(width, height)
     except ConfigError as error:
         raise ConfigError(
-            f"{path}: the mask of {columns}×{rows} has another shape than the frames of "
-            f"{width}×{height}; draw it over such a frame"
+            f"{path}: has another shape than the frames of {width}×{height}; draw it over one"
         ) from error
     grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
     return np.asarray(cv2.resize(grey, (width, height), interpolation=cv2.INTER_NEAREST) >= _WHITE)

@@ -18,9 +18,7 @@ from vdet.errors import UnsupportedSystemError
 try:
     import fcntl
 except ImportError as error:
-    raise UnsupportedSystemError(
-        "this system cannot lock files; on Windows, run vdet in WSL"
-    ) from error
+    raise UnsupportedSystemError("files cannot be locked here; on Windows, use WSL") from error
 
 _HOST = re.sub(r"[^a-z0-9]", "", platform.node().lower())[:16]
 _NAME = re.compile(rf"\.vdet-{_HOST}-[0-9a-f]{{16}}")

@@ -12,12 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
-from vdet.boxes import NO_BOXES, Box, Boxes, visible
+from vdet.boxes import NO_BOXES, Box, Boxes, Image, visible
 from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel, VideoDetector, stage_pictures_of
 from vdet.files import OutputFiles
 from vdet.media import Frame, Picture, VideoInfo
-from vdet.media.images import Image
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import SinkContext, SinkKind
 from vdet.run.steps import StepContext, make_steps

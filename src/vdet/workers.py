@@ -250,7 +250,7 @@ class DaskCluster:
             ended = as_completed(futures, loop=client.loop)  # type: ignore[no-untyped-call]
             del futures  # so that the workers drop each result once it was read
             while not ended.is_empty():  # type: ignore[no-untyped-call]
-                self._wait_for_next(ended, client)
+                self._wait(ended, client)
                 future = next(ended)
                 number = numbers[future.key]
                 try:
@@ -262,9 +262,7 @@ class DaskCluster:
             if lost:
                 raise WorkerKilledError(lost)
 
-    def _wait_for_next(
-        self, ended: "distributed.as_completed", client: "distributed.Client"
-    ) -> None:
+    def _wait(self, ended: "distributed.as_completed", client: "distributed.Client") -> None:
         """Wait until an item has ended; raise `ClusterError` if there is no worker for long."""
         seen = time.monotonic()
         while not ended.has_ready():  # type: ignore[no-untyped-call]
@@ -273,10 +271,7 @@ class DaskCluster:
                 if client.nthreads():  # type: ignore[no-untyped-call]
                     seen = time.monotonic()
             if time.monotonic() > seen + self.lost_timeout:
-                raise ClusterError(
-                    f"{self.address}: all workers have ended; start some with `dask worker "
-                    f"{self.address}`, and run this again"
-                )
+                raise ClusterError(f"{self.address}: all workers have ended; start others")
 
     def _result(self, future: "distributed.Future[R]") -> R:
         try:
@@ -284,9 +279,7 @@ class DaskCluster:
         except (CancelledError, OSError) as error:
             if future.status == "error":
                 raise  # an OSError of the function
-            raise ClusterError(
-                f"{self.address}: the scheduler has ended; start it again, and run this again"
-            ) from error
+            raise ClusterError(f"{self.address}: the scheduler has ended; run again") from error
 
 
 def _call_limited(function: Callable[[T], R], item: T) -> R:
@@ -318,9 +311,7 @@ def _connection(address: str, timeout: float) -> "Iterator[distributed.Client]":
         from distributed import Client
         from distributed.versions import VersionMismatchWarning
     except ImportError as error:
-        raise ClusterError(
-            "--scheduler needs Dask, which is not installed; pip install dask distributed"
-        ) from error
+        raise ClusterError("--scheduler needs Dask; pip install dask distributed") from error
     for name in ("distributed", "distributed.client"):
         logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # errors are raised
     with warnings.catch_warnings():
@@ -339,15 +330,12 @@ def _check_workers(client: "distributed.Client", address: str, timeout: float) -
     try:
         client.wait_for_workers(1, timeout=timeout)
     except TimeoutError as error:
-        raise ClusterError(
-            f"{address}: the scheduler has no worker; start some with `dask worker {address}`"
-        ) from error
+        raise ClusterError(f"{address}: has no worker; start some (dask worker)") from error
     for worker, version in client.run(_version, on_error="return").items():
         if version != __version__:
             has = f"vdet {version}" if isinstance(version, str) else f"no vdet ({version})"
             raise ClusterError(
-                f"{worker}: this worker has {has}, here is vdet {__version__}; install the "
-                "same version everywhere"
+                f"{worker}: has {has}, here is vdet {__version__}; install one version everywhere"
             )
 
 

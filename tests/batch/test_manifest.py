@@ -86,7 +86,7 @@ def test_a_second_batch_into_the_folder_is_refused(tmp_path: Path) -> None:
             pass
 
     with open_manifest(path) as add:
-        with pytest.raises(OutputError, match=r"m\.jsonl: another batch writes into this folder"):
+        with pytest.raises(OutputError, match=r"m\.jsonl: another batch writes here"):
             open_again()
         add(RECORD)
     open_again()

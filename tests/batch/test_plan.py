@@ -145,7 +145,7 @@ class TestJobs:
         record("clips/a.mp4", "out/a.csv")
         change()
         os.utime("clips/a.mp4", (0, 0))
-        with pytest.raises(BatchError, match=r"^out/a\.csv: vdet did not write it, or it was"):
+        with pytest.raises(BatchError, match=r"^out/a\.csv: is not as vdet wrote it"):
             self.tracks_alone()
 
     def tracks_alone(self) -> Plan:
@@ -270,7 +270,7 @@ class TestFolders:
     def test_one_that_is_gone_is_made_again_and_one_that_was_changed_is_kept(self) -> None:
         self.record()
         Path("out/a.stages/3-boxes.png").write_bytes(b"picture")
-        with pytest.raises(BatchError, match=r"out/a\.stages: vdet did not write it"):
+        with pytest.raises(BatchError, match=r"out/a\.stages: is not as vdet wrote it"):
             self.plan(skip_existing=True)
         Path("out/a.stages").rename("elsewhere")
         assert not self.plan(skip_existing=True).jobs[0].overwrite

@@ -171,7 +171,7 @@ def test_shares_need_the_size_of_the_frames(run: Run, tmp_path: Path) -> None:
         (
             ["t.csv", "t.csv", "--lines", "l.yaml", "--begin", "2026-05-01 07:00"],
             2,
-            "one time is no time for several videos",
+            "for several videos give a pattern",
         ),
         (["back.csv", "--lines", "l.yaml"], 1, "back.csv:3: frame 1 is at 0.04 s; times must be"),
     ],

@@ -11,8 +11,8 @@ import pytest
 from clips import write_clip as write_foreign
 from conftest import Run
 from quick import QUICK_OPTIONS
-from vdet.media import VideoReader
 from vdet.media.images import read_image
+from vdet.media.reader import VideoReader
 
 
 def _times(path: Path) -> list[Fraction]:

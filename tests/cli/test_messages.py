@@ -11,7 +11,8 @@ from tqdm import tqdm
 from conftest import Run
 from running import until, write_drive
 from vdet.cli.main import cli
-from vdet.cli.messages import counted, is_quiet, progress_steps
+from vdet.cli.messages import is_quiet, progress_steps
+from vdet.errors import counted
 
 
 class Terminal(io.StringIO):

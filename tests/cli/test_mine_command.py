@@ -14,7 +14,7 @@ from conftest import Run
 from vdet.detect.svm.model import load_model
 from vdet.labels.reading import read_truth
 from vdet.learn.svm.dataset import find_patches, read_patches
-from vdet.media import VideoReader
+from vdet.media.reader import VideoReader
 from vdet.synthetic.scene import Scene
 from vdet.synthetic.truth import write_truth
 
@@ -151,12 +151,12 @@ def _patches(path: Path) -> dict[str, bytes]:
     [
         (("--until", "3", "--from", "4"), 2, "--until must not be before --from"),
         (("--every", "0"), 2, "--every"),
-        (("--from", "10"), 1, "gt.txt: covers the frames up to 9; mine some of these"),
+        (("--from", "10"), 1, "gt.txt: ends at frame 9; begin earlier"),
         (("-o", "mined.npz"), 1, "mined.npz: patches are written as .zip; name it so"),
         (("--truth", "none.txt"), 1, "none.txt: cannot be read"),
         (("--truth", "a.txt", "--truth", "b.txt"), 2, "(videos: 1, truths: 2)"),
         (("--set", "train.mine.probability=-1"), 1, "train.mine.probability"),
-        (("--set", BELOW), 1, "road.mp4: no search window fits into a frame of 320×180 pixels"),
+        (("--set", BELOW), 1, "road.mp4: no search window fits into 320×180 pixels"),
     ],
 )
 def test_what_cannot_be_leaves_nothing_behind(

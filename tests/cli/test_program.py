@@ -111,5 +111,5 @@ def test_another_package_adds_a_command_and_a_broken_one_breaks_only_itself(
     assert run("hello").out == "hello from outside\n"
     broken = run("broken")
     assert (broken.code, broken.err.count("\n")) == (1, 1)
-    assert "broken: cannot be loaded from no_such_package:hello" in broken.err
+    assert "broken: no_such_package:hello fails to load" in broken.err
     assert run("config").code == 0

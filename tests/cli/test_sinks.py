@@ -74,7 +74,7 @@ class TestDetectVideo:
             ("tracks=a.json", "a.json: tracks are written as .txt, .csv, .jsonl, "),
             ("tracks=none/a.csv", "none/a.csv: the folder none does not exist; make it first"),
             ("tracks=old.csv", "old.csv: is there already; give --overwrite to replace it"),
-            ("picture=a.png", "a.png: the sink picture is for pictures; give another for videos"),
+            ("picture=a.png", "a.png: the sink picture is for pictures"),
             ("tracks=t.txt", "t.txt: is given for two outputs; name another file for one"),
         ],
     )
@@ -183,7 +183,7 @@ class TestDetectImage:
         write_image(twin, road())
         several = run("detect-image", twin, picture, *sink, "--overwrite")
         assert several.code == 1
-        assert "a.png: takes one picture; for several give the name of a folder" in several.err
+        assert "a.png: takes one picture; for several give a folder" in several.err
         assert (out / "a.png").read_bytes() == before
 
 

@@ -211,10 +211,10 @@ class TestOtherPackages:
     @pytest.mark.parametrize(
         ("kind", "words"),
         [
-            ("broken", r"broken: cannot be loaded from fake_vdet:NOTHING \(AttributeError: .*rep"),
-            ("missing", r"missing: cannot be loaded from no_such.* \(ModuleNotFoundError: .*rep"),
-            ("nameless", r'nameless: its settings are no section with kind = "nameless"; repair'),
-            ("odd", r'odd: its settings are no section with kind = "odd"; repair or reinstall'),
+            ("broken", r"broken: fake_vdet:NOTHING fails to load \(AttributeError: .*rep"),
+            ("missing", r"missing: no_such.* fails to load \(ModuleNotFoundError: .*rep"),
+            ("nameless", r'nameless: has no settings of kind = "nameless"; repair'),
+            ("odd", r'odd: has no settings of kind = "odd"; repair'),
         ],
     )
     def test_a_package_that_is_broken_is_named(self, kind: str, words: str) -> None:

@@ -32,8 +32,8 @@ def line(**others: Any) -> CountSettings:
         ([*SQUARE[:2], SQUARE[0]], "has 2 corners; give three or more"),
         ([SQUARE[0], SQUARE[2], SQUARE[1], SQUARE[3]], "crosses or touches itself"),
         ([[100, 100], [300, 300], [500, 500]], "crosses or touches itself"),
-        ([[100, 100], [1300, 100], [300, 300]], r"\[1300, 100\] lies outside the frame of 1280×72"),
-        ([[100, -1], [900, 100], [300, 300]], r"\[100, -1\] lies outside the frame"),
+        ([[100, 100], [1300, 100], [300, 300]], r"\[1300, 100\] lies outside 1280×72"),
+        ([[100, -1], [900, 100], [300, 300]], r"\[100, -1\] lies outside"),
         ([[100, 100, 5], [300, 100], [300, 300]], "at most 2 items"),
     ],
 )
@@ -45,7 +45,7 @@ def test_polygons_that_make_no_sense_are_refused(points: Any, message: str) -> N
 
 
 def test_shares_beyond_1_are_asked_for_a_size() -> None:
-    with pytest.raises(ValidationError, match=r"frame of 1×1; shares are 0 to 1, and for pixels g"):
+    with pytest.raises(ValidationError, match=r"outside 1×1; shares are 0 to 1, and for pixels g"):
         regions(SQUARE, size=None)
 
 
@@ -54,7 +54,7 @@ def test_shares_beyond_1_are_asked_for_a_size() -> None:
     [
         ({"start": [1280, 400]}, "start and end are one point"),
         ({"left": "up", "right": "up"}, "left and right have one name"),
-        ({"end": [1280, 721]}, "outside the frame"),
+        ({"end": [1280, 721]}, "lies outside"),
         ({"name": ""}, "at least 1 character"),
     ],
 )

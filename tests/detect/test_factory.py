@@ -34,14 +34,14 @@ class TestLinearModel:
     @pytest.mark.parametrize(
         ("settings", "file", "kinds"),
         [
-            (SvmSettings(), "their.onnx", "net, but the settings choose svm"),
-            (NetworkSettings(), "mine.npz", "svm, but the settings choose net"),
+            (SvmSettings(), "their.onnx", "net, not svm"),
+            (NetworkSettings(), "mine.npz", "svm, not net"),
         ],
     )
     def test_a_model_for_another_detector_than_that_of_the_settings_is_refused(
         self, settings: DetectorSettings, file: str, kinds: str
     ) -> None:
-        with pytest.raises(ConfigError, match=f"^{file}: is a model for detector.kind: {kinds}; "):
+        with pytest.raises(ConfigError, match=f"^{file}: is for detector.kind: {kinds}; "):
             load_detector(settings, Path(file))
 
     @pytest.mark.parametrize("name", ["svm", "seed"])
@@ -157,7 +157,5 @@ class TestAnotherPackage:
         assert model_file(settings.detector) is None
 
     def test_a_detector_that_cannot_be_loaded_is_named(self) -> None:
-        with pytest.raises(
-            ConfigError, match=r"^broken: cannot be loaded from corner_detector:NONE"
-        ):
+        with pytest.raises(ConfigError, match=r"^broken: corner_detector:NONE fails to load"):
             load_detector(DetectorSettings(kind="broken"))

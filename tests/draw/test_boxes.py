@@ -4,7 +4,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from vdet.boxes import Box
+from vdet.boxes import Box, Image
 from vdet.draw.boxes import (
     BLACK,
     GREEN,
@@ -16,7 +16,6 @@ from vdet.draw.boxes import (
     text_color,
 )
 from vdet.draw.paint import Color
-from vdet.media.images import Image
 
 HEIGHTS = [180, 240, 360, 480, 540, 720, 1080, 2160]
 

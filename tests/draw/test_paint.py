@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from vdet.boxes import Box
+from vdet.boxes import Box, Image
 from vdet.draw.boxes import BLACK, draw_box, draw_label, draw_line, draw_zone
 from vdet.draw.paint import (
     Color,
@@ -24,7 +24,6 @@ from vdet.draw.paint import (
 )
 from vdet.media.coding import Coding
 from vdet.media.frame import Planes
-from vdet.media.images import Image
 
 Mask = NDArray[np.bool_]
 WIDTH, HEIGHT = 320, 240

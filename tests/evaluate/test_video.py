@@ -15,7 +15,8 @@ from vdet.detect.factory import load_detector
 from vdet.detect.svm.detector import Candidates, SvmDetector
 from vdet.errors import TruthError
 from vdet.evaluate.video import Variant, evaluate_clip, follow_together, open_clip
-from vdet.media import Frame, Picture, VideoInfo, VideoReader
+from vdet.media import Frame, Picture, VideoInfo
+from vdet.media.reader import VideoReader
 from vdet.run.loop import build, peek
 from vdet.run.result import FrameResult
 from vdet.synthetic.scene import Scene

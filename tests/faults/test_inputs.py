@@ -111,7 +111,7 @@ def pipe(clip: Path, tmp_path: Path) -> Iterator[Pipe]:
 
 def test_an_input_that_stalls_is_given_up(pipe: Pipe, job: VideoJob, tmp_path: Path) -> None:
     stalling = replace(job, source=pipe.path, timeout=1)
-    with pytest.raises(VideoError, match=r"pipe\.ts: nothing could be read or written for 1 s"):
+    with pytest.raises(VideoError, match=r"pipe\.ts: nothing was read or written for 1 s"):
         run_video(stalling, red_model(), SETTINGS)
     assert names(tmp_path / "out") == []
     pipe.close()

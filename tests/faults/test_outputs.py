@@ -16,7 +16,8 @@ from red_cars import SETTINGS, red_model, red_work
 from running import names, until, write_drive
 from vdet.batch.task import process_file
 from vdet.errors import VideoError
-from vdet.media import Frame, VideoWriter
+from vdet.media import Frame
+from vdet.media.writer import VideoWriter
 from vdet.run.sinks.protocol import Output
 from vdet.run.video import VideoJob, run_video
 from vdet.track.motion.tracker import MotionTracker
@@ -99,7 +100,7 @@ def test_a_writer_that_hangs_at_its_end_is_given_up(
     monkeypatch.setattr(VideoWriter, "__exit__", hang)
     (tmp_path / "out").mkdir()
     few = replace(job, frames=3, timeout=1)
-    with pytest.raises(VideoError, match="nothing could be read or written for 1 s"):
+    with pytest.raises(VideoError, match="nothing was read or written for 1 s"):
         run_video(few, red_model(), SETTINGS)
     assert names(tmp_path / "out") == []
     released.set()

@@ -105,7 +105,7 @@ WICKED = BAD_NAMES | {
     "empty pictures": ALL_BROKEN,
     "a set in a set": "no pictures in vehicles/",
     "nothing": "no pictures in vehicles/",
-    "one class": "no patches of the class non-vehicles",
+    "one class": "no pictures in non-vehicles/",
 }
 """What is refused, and the words that say why."""
 

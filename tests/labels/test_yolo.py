@@ -73,8 +73,8 @@ class TestReading:
     [
         (b"PK nothing", ": is neither a folder nor a readable zip file"),
         (archive_of({"labels/f0": ""}), ": needs data.yaml with the names of the classes"),
-        (described("names: [car]"), ":data.yaml: does not say how large the frames"),
-        (described(DATA.replace("200", "0")), ":data.yaml: does not say how large"),
+        (described("names: [car]"), ":data.yaml: needs the size of the frames"),
+        (described(DATA.replace("200", "0")), ":data.yaml: needs the size of the frames"),
         (described(DATA.replace("[car, truck]", "car")), ":data.yaml: names must be"),
         (described("a: &a [b]\nc: [*a, *a]"), ":data.yaml:2:5: is not YAML: aliases"),
         (archive(labels__road=""), ": labels/road.txt has no number of a frame at its end"),

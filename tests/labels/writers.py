@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from vdet.media.images import Image, encode_image
+from vdet.boxes import Image
+from vdet.media.images import encode_image
 
 NAMES = ("car", "truck", "bus", "ignore", "person")
 

@@ -3,8 +3,8 @@
 import cv2
 import numpy as np
 
+from vdet.boxes import Image
 from vdet.lanes.camera import CalibratedCamera
-from vdet.media.images import Image
 
 PATTERN = (9, 6)
 _TEXELS = 40  # side of a square of the board, texels

@@ -44,7 +44,7 @@ def test_an_aspect_ratio_may_differ_by_rounding_only() -> None:
     camera = CalibratedCamera(1280, 720, matrix, (0, 0, 0, 0, 0), 1)
     assert camera.matrix_for(854, 480)[0, 0] == pytest.approx(767, abs=1)
     for size in ((640, 480), (720, 1280), (1320, 720)):
-        with pytest.raises(ConfigError, match=r"calibrated for 1280×720, .* another aspect ratio"):
+        with pytest.raises(ConfigError, match=r"is for 1280×720, not"):
             Undistorter(camera, *size)
 
 

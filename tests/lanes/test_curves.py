@@ -7,6 +7,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from vdet.boxes import Image
 from vdet.config.schema import LaneSettings
 from vdet.lanes.curves import (
     Equations,
@@ -19,7 +20,6 @@ from vdet.lanes.curves import (
 )
 from vdet.lanes.paint import HIDDEN, PAINT, LinePaint
 from vdet.lanes.top_view import TopView
-from vdet.media.images import Image
 
 Z = np.linspace(6, 42, 200)
 TOP_VIEW = TopView(LaneSettings(), 1280, 720)

@@ -80,7 +80,7 @@ def test_a_point_that_does_not_fit_the_others_is_named() -> None:
     metres = np.vstack([CORNERS, [(0.0, 30.0), (3.0, 20.0)]])
     wrong = metres.copy()
     wrong[4] = 5.0, 30.0
-    with pytest.raises(ConfigError, match=r"points\[4\]: does not fit the others"):
+    with pytest.raises(ConfigError, match=r"points\[4\]: lies .* m from where the others say"):
         fitted(wrong, seen(metres))
 
 

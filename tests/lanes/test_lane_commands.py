@@ -14,15 +14,17 @@ import yaml
 
 from conftest import Outcome, Run
 from red_cars import SETTINGS, red_finder
-from vdet.boxes import Box
+from vdet.boxes import Box, Image
 from vdet.config.schema import LaneSettings, OutputSettings, Settings
 from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
 from vdet.config.svm import WindowSettings
 from vdet.detect.svm.model import save_model
 from vdet.draw.boxes import color_of
 from vdet.lanes.camera import CalibratedCamera, Undistorter, save_camera
-from vdet.media import Frame, Picture, VideoInfo, VideoReader, VideoWriter
-from vdet.media.images import Image, read_image, write_image
+from vdet.media import Frame, Picture, VideoInfo
+from vdet.media.images import read_image, write_image
+from vdet.media.reader import VideoReader
+from vdet.media.writer import VideoWriter
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.render import Renderer
 from vdet.synthetic.scene import Scene
@@ -261,7 +263,7 @@ def test_a_picture_of_another_aspect_ratio_does_not_stop_the_others(
     write_image(other, read_image(files.plain)[:400])
     result = run("detect-image", other, files.picture, "-o", out, *files.lanes)
     assert result.code == 3
-    assert "other.png: the camera was calibrated for 640×480" in result.err
+    assert "other.png: camera: is for 640×480" in result.err
     assert [path.name for path in out.iterdir()] == ["frame.png"]
 
 
@@ -272,7 +274,7 @@ def test_a_video_of_another_aspect_ratio_is_refused(run: Run, files: Files, tmp_
     outputs = (tmp_path / "out.mp4", "--tracks", tmp_path / "t.csv")
     result = run("detect-video", files.clip, *outputs, *files.red, "--lanes", "--camera", wide)
     assert result.code == 1
-    assert f"{files.clip}: the camera was calibrated for 1280×720" in result.err
+    assert f"{files.clip}: camera: is for 1280×720" in result.err
     assert list(tmp_path.iterdir()) == [wide]
 
 

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from vdet.boxes import Image
 from vdet.config.schema import LaneSettings
 from vdet.lanes.drawing import draw_lane, lane_text, stage_pictures
 from vdet.lanes.road import Lane, LaneRequest, RoadFinder, lane_record
 from vdet.media import Picture
-from vdet.media.images import Image
 
 LANE = Lane(
     curvature=-1 / 812.34567,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vdet.boxes import Box, Float64Array
+from vdet.boxes import Box, Float64Array, Image
 from vdet.config.schema import LaneSettings
 from vdet.lanes.curves import LaneCurves
 from vdet.lanes.paint import (
@@ -17,7 +17,6 @@ from vdet.lanes.paint import (
     slide_windows,
 )
 from vdet.lanes.top_view import TopView
-from vdet.media.images import Image
 
 VIEW = TopView(LaneSettings(), 1280, 720)
 WHITE, YELLOW = (215, 215, 215), (60, 180, 225)

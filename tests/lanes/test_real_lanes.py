@@ -8,8 +8,9 @@ import pytest
 from vdet.config.schema import LaneSettings
 from vdet.lanes.calibration import Calibration, calibrate
 from vdet.lanes.road import Lane, LaneRequest, RoadFinder
-from vdet.media import Picture, VideoReader
+from vdet.media import Picture
 from vdet.media.images import read_image
+from vdet.media.reader import VideoReader
 
 pytestmark = pytest.mark.realdata
 

@@ -8,11 +8,10 @@ import cv2
 import numpy as np
 import pytest
 
-from vdet.boxes import Float64Array
+from vdet.boxes import Float64Array, Image
 from vdet.config.schema import LaneSettings
 from vdet.lanes.road import CARRY, Lane, LaneRequest, RoadFinder
 from vdet.media import Picture
-from vdet.media.images import Image
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.render import render
 from vdet.synthetic.scene import LaneLine, Light, Scene, Shadow

@@ -6,9 +6,9 @@ import numpy.typing as npt
 import pytest
 
 from codings import in_any_coding
+from vdet.boxes import Image
 from vdet.media import Planes
 from vdet.media.coding import Coding, Layers
-from vdet.media.images import Image
 
 
 def common(image: Image, coding: Coding) -> Layers:

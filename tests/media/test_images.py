@@ -10,15 +10,10 @@ import numpy as np
 import pytest
 from PIL import Image as pillow  # noqa: N813
 
+from vdet.boxes import Image
 from vdet.errors import ImageError
-from vdet.media import VideoReader
-from vdet.media.images import (
-    Image,
-    decode_image,
-    read_header,
-    read_image,
-    write_image,
-)
+from vdet.media.images import decode_image, read_header, read_image, write_image
+from vdet.media.reader import VideoReader
 
 PICTURE = np.random.default_rng(0).integers(0, 256, (24, 32, 3), dtype=np.uint8)
 

@@ -57,11 +57,11 @@ class TestFolder:
     @pytest.mark.parametrize(
         ("names", "words"),
         [
-            (["a.png"], "is a folder without numbered pictures; give a video file"),
-            (["1.png", "3.png", "4.png"], "picture 2 is missing, between 1 and 3"),
+            (["a.png"], "has no numbered pictures; give a video"),
+            (["1.png", "3.png", "4.png"], "picture 2 is missing; put a copy of 1"),
             (
                 ["a_01.png", "a_02.png", "b_01.png"],
-                "names of several kinds; give .*/a_%02d.png or .*/b_%02d.png",
+                "several kinds of names; give .*/a_%02d.png or .*/b_%02d.png",
             ),
         ],
     )
@@ -89,9 +89,12 @@ def test_a_name_that_is_no_pattern_is_a_file(name: str, tmp_path: Path) -> None:
     [
         ((), "there is no such file, and no picture of such a name"),
         (("img_1.png",), "no picture of such a name"),
-        (("img_01.png", "img_03.png", "img_04.png"), "picture 2 is missing, between 1 and 3"),
-        (("img_06.png", "img_09.png", "img_15.png"), "picture 12 is missing, between 9 and 15"),
-        (("img_95.png", "img_98.png", "img_101.png"), "fill them all with zeros"),
+        (("img_01.png", "img_03.png", "img_04.png"), "picture 2 is missing; put a copy of 1"),
+        (
+            ("img_06.png", "img_09.png", "img_15.png"),
+            "picture 12 is missing; put a copy of 9",
+        ),
+        (("img_95.png", "img_98.png", "img_101.png"), "fill with zeros"),
     ],
 )
 def test_no_pictures_and_a_gap_are_refused(

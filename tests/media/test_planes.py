@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from vdet.boxes import Image
 from vdet.media.coding import Coding
 from vdet.media.frame import Planes
-from vdet.media.images import Image
 
 CODINGS = [
     Coding("bt601"),

@@ -12,7 +12,8 @@ import pytest
 from numpy.typing import NDArray
 
 from vdet.config.schema import OutputSettings
-from vdet.media import VideoReader, VideoWriter
+from vdet.media.reader import VideoReader
+from vdet.media.writer import VideoWriter
 
 Number = Callable[[NDArray[np.uint8]], int]
 Writer = Callable[..., Path]

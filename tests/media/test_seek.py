@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vdet.media import Frame, VideoReader
+from vdet.media import Frame
 from vdet.media.decoder import Decoder
+from vdet.media.reader import VideoReader
 
 Writer = Callable[..., Path]
 GOPS: dict[str, Any] = {"options": {"g": "10", "bf": "2"}, "count": 60}

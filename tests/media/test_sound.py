@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from vdet.config.schema import OutputSettings
-from vdet.media import VideoReader, VideoWriter
+from vdet.media.reader import VideoReader
+from vdet.media.writer import VideoWriter
 
 Writer = Callable[..., Path]
 Warnings = Callable[[], list[str]]

@@ -14,14 +14,15 @@ import pytest
 
 import vdet
 from clips import write_clip
+from vdet.boxes import Image
 from vdet.config.schema import OutputSettings
 from vdet.errors import OutputError, VideoError
 from vdet.files import staged
-from vdet.media import ColorTags, Frame, Picture, VideoInfo, VideoReader, VideoWriter
+from vdet.media import ColorTags, Frame, Picture, VideoInfo
 from vdet.media.coding import Coding
 from vdet.media.frame import Planes, Tags
-from vdet.media.images import Image
-from vdet.media.writer import may_replace_video
+from vdet.media.reader import VideoReader
+from vdet.media.writer import VideoWriter, may_replace_video
 
 Draw = Callable[[int, int, int], Image]
 FAST = OutputSettings(preset="ultrafast")

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from pages.html import Elements
+from vdet.errors import counted
 from vdet.evaluate.tiles import Tile
+from vdet.files import write_text
 from vdet.pages.charts import Bar, Line, Plot, number_axis
-from vdet.pages.render import counted, link_to, render, write_page
+from vdet.pages.render import link_to, render
 
 NASTY = '"><script>alert("&")</script>'
 
@@ -56,5 +58,5 @@ def test_addresses_are_relative_and_quoted() -> None:
 
 
 def test_a_page_can_name_a_file_whose_name_is_no_text(tmp_path: Path) -> None:
-    write_page("<p>r\udcff.mp4", tmp_path / "page.html")
+    write_text(tmp_path / "page.html", "<p>r\udcff.mp4")
     assert (tmp_path / "page.html").read_text() == "<p>r\\udcff.mp4"

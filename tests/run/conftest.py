@@ -9,7 +9,7 @@ from red_cars import drive
 from run.red_runs import COUNT, video_info
 from vdet import plugins
 from vdet.config.schema import OutputSettings
-from vdet.media import VideoWriter
+from vdet.media.writer import VideoWriter
 from vdet.run.sinks.protocol import SinkKind
 
 Register = Callable[[str, SinkKind], None]

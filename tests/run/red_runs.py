@@ -6,14 +6,14 @@ from pathlib import Path
 from typing import Any
 
 from red_cars import CAR, HEIGHT, SETTINGS, WIDTH, red_finder, road
-from vdet.boxes import NO_BOXES, Box, Boxes
+from vdet.boxes import NO_BOXES, Box, Boxes, Image
 from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel, StagePictures
 from vdet.detect.svm.detector import SvmModel
 from vdet.files import OutputFiles
 from vdet.lanes.road import LaneRequest, Road
-from vdet.media import Frame, Picture, VideoInfo, VideoReader
-from vdet.media.images import Image
+from vdet.media import Frame, Picture, VideoInfo
+from vdet.media.reader import VideoReader
 from vdet.run.loop import build, peek
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output, SinkContext, open_sink

@@ -32,11 +32,12 @@ from run.red_runs import (
     run_red,
 )
 from running import write_drive
+from vdet.boxes import Image
 from vdet.config.schema import Settings
 from vdet.errors import VdetError, VideoError
 from vdet.media import Frame
 from vdet.media.frame import Planes
-from vdet.media.images import Image, read_image
+from vdet.media.images import read_image
 from vdet.run.loop import FIRST_FRAMES
 from vdet.run.threads import map_ordered
 from vdet.run.video import VideoJob, run_video

@@ -15,6 +15,7 @@ from vdet.errors import ImageError, OutputError
 from vdet.media.images import write_image
 from vdet.run.pictures import (
     PictureJob,
+    PictureSearch,
     find_images,
     plan_pictures,
     run_picture,
@@ -95,7 +96,7 @@ class TestPlan:
 def run_red(source: Path, settings: Settings = SETTINGS, **paths: Path) -> FrameResult:
     """Search a picture for red cars, and write outputs by the names of their sinks."""
     wanted = tuple(Output(sink, path) for sink, path in paths.items())
-    return run_picture(PictureJob(source, wanted), model_for(settings), settings)
+    return run_picture(PictureJob(source, wanted), PictureSearch(model_for(settings), settings))
 
 
 class TestRun:
@@ -151,7 +152,7 @@ class TestSeveral:
     ) -> None:
         shared = [Output("json", tmp_path / "boxes.json")]
         model = model_for(SETTINGS)
-        (failure,) = run_pictures(jobs, shared, model, SETTINGS, threads=threads)
+        (failure,) = run_pictures(jobs, shared, PictureSearch(model, SETTINGS), threads=threads)
         assert "b.png: is not a picture" in str(failure)
         assert self.names(tmp_path) == ["boxes.json", "out-a.png", "out-c.png"]
         items = json.loads((tmp_path / "boxes.json").read_text())
@@ -164,7 +165,7 @@ class TestSeveral:
         register("fails", SinkKind(Fails))
         shared = [Output("json", tmp_path / "boxes.json"), Output("fails", tmp_path / "fails.txt")]
         with pytest.raises(OutputError, match=r"fails\.txt: cannot be written: No space"):
-            run_pictures(jobs, shared, model_for(SETTINGS), SETTINGS)
+            run_pictures(jobs, shared, PictureSearch(model_for(SETTINGS), SETTINGS))
         assert self.names(tmp_path) == ["out-a.png", "out-c.png"]
 
     def test_the_outputs_of_one_picture_appear_together_or_not_at_all(
@@ -176,5 +177,5 @@ class TestSeveral:
         for outputs in ((*first.outputs, fails), (fails, *first.outputs)):
             job = replace(first, outputs=outputs)
             with pytest.raises(OutputError, match=r"fails\.txt: cannot be written: No space"):
-                run_pictures([job], (), model_for(SETTINGS), SETTINGS)
+                run_pictures([job], (), PictureSearch(model_for(SETTINGS), SETTINGS))
             assert self.names(tmp_path) == []

@@ -14,7 +14,7 @@ from vdet.boxes import Box, Boxes
 from vdet.config.schema import MotionTrackerSettings, Settings
 from vdet.lanes.road import LaneRequest, Road, RoadFinder
 from vdet.media import Frame, Picture
-from vdet.run.pictures import detect_picture
+from vdet.run.pictures import PictureSearch
 from vdet.run.result import FrameResult
 from vdet.run.steps import with_positions
 from vdet.synthetic.camera import PinholeCamera
@@ -83,7 +83,7 @@ def test_vehicles_of_a_video_have_their_distance_and_lane() -> None:
 
 def test_vehicles_of_a_picture_have_their_distance_and_lane() -> None:
     image = render(SCENE, 0)
-    result = detect_picture(Path("a.png"), image, TrueDetector(), SETTINGS, LaneRequest())
+    result = PictureSearch(TrueDetector(), SETTINGS, LaneRequest()).detect(Path("a.png"), image)
     check(result.tracks)
 
 

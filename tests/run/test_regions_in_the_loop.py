@@ -15,7 +15,7 @@ from vdet.config.places import RegionsSettings
 from vdet.config.schema import Settings
 from vdet.errors import ImageError, VideoError
 from vdet.media.images import read_image, write_image
-from vdet.run.pictures import PictureJob, detect_picture, run_picture
+from vdet.run.pictures import PictureJob, PictureSearch, run_picture
 from vdet.run.sinks.protocol import Output
 from vdet.run.video import VideoJob
 
@@ -46,7 +46,7 @@ def test_a_picture_shows_only_what_stands_in_the_region(settings: Settings) -> N
     image = road(moved_to(CAR, 20, 120), moved_to(CAR, 220, 120))
 
     def found(regions: Settings) -> list[Box]:
-        result = detect_picture(Path("a.png"), image, model_for(regions), regions)
+        result = PictureSearch(model_for(regions), regions).detect(Path("a.png"), image)
         assert [t.box for t in result.tracks] == rounded(result.detections)
         return [t.box for t in result.tracks]
 
@@ -61,7 +61,7 @@ def test_regions_for_another_shape_name_the_file(red_clip: Path, tmp_path: Path)
     with pytest.raises(VideoError, match=r"red\.mp4: regions\.size: places are given for frames"):
         run_red(VideoJob(red_clip, outputs(tracks=tmp_path / "t.csv")), settings)
     with pytest.raises(ImageError, match=r"a\.png: regions\.size"):
-        detect_picture(Path("a.png"), road(CAR), model_for(settings), settings)
+        PictureSearch(model_for(settings), settings).detect(Path("a.png"), road(CAR))
     assert list(tmp_path.iterdir()) == []
 
 
@@ -70,7 +70,7 @@ def test_the_stages_show_the_regions(tmp_path: Path) -> None:
     for name, settings in (("without", SETTINGS), ("with", within())):
         folder = tmp_path / name
         job = PictureJob(tmp_path / "road.png", (Output("stages", folder),))
-        run_picture(job, model_for(settings), settings)
+        run_picture(job, PictureSearch(model_for(settings), settings))
     assert not list((tmp_path / "without").glob("*regions*"))
     names = sorted(path.name for path in (tmp_path / "with").iterdir())
     assert names[-2:] == ["4-regions.png", "5-boxes.png"]

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vdet.media import VideoReader
+from vdet.media.reader import VideoReader
 from vdet.synthetic.render import frames, write_clip
 from vdet.synthetic.scene import Scene, SceneVehicle
 from vdet.synthetic.truth import true_boxes, write_truth

@@ -3,9 +3,8 @@
 import numpy as np
 
 from traffic.passing import HEIGHT, WIDTH, frame, track
-from vdet.boxes import Box
+from vdet.boxes import Box, Image
 from vdet.media import Picture
-from vdet.media.images import Image
 from vdet.track.track import Track
 from vdet.traffic.overview import BestCrops, Crop
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from traffic.scenes import HEIGHT, LINE, WIDTH, ZONE, Path, frames, through
+from vdet.boxes import Image
 from vdet.config.places import CountSettings
-from vdet.media.images import Image
 from vdet.polygons import Point
 from vdet.traffic.borders import place
 from vdet.traffic.paths import direction_color, draw_grid, draw_paths, draw_places

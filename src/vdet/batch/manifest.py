@@ -123,9 +123,7 @@ def open_manifest(path: Path) -> Iterator[Callable[[Record], None]]:
         descriptor = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT | _FLAGS, 0o666)
     with os.fdopen(descriptor, "r+b", buffering=0) as file:
         if not try_to_lock(descriptor):
-            raise OutputError(
-                f"{path}: another batch writes into this folder; wait for its end, or give another"
-            )
+            raise OutputError(f"{path}: another batch writes here; wait, or give another folder")
 
         def add(record: Record) -> None:
             line = json.dumps(asdict(record), allow_nan=False) + "\n"

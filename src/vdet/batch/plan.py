@@ -171,10 +171,7 @@ def _replacing_ours(job: VideoJob, written: Mapping[str, Written]) -> VideoJob:
     for output in job.outputs:
         state = output_state(output)
         if state and state[0] and written.get(os.path.realpath(output.path), ())[1:] != state:
-            raise BatchError(
-                f"{output.path}: vdet did not write it, or it was changed since; move it away, or "
-                "give --overwrite in place of --skip-existing"
-            )
+            raise BatchError(f"{output.path}: is not as vdet wrote it; remove it, or --overwrite")
     return replace(job, overwrite=any(os.path.lexists(output.path) for output in job.outputs))
 
 
@@ -182,15 +179,10 @@ def _refuse_nested(clips: Iterable[Path], sources: Iterable[InputVideo], folder:
     resolved = folder.resolve()
     for clip in clips:
         if matches_in(clip, folder):
-            raise BatchError(
-                f"{folder}: lies in the input {clip}, and its videos would be inputs of the next "
-                "run; give a folder outside"
-            )
+            raise BatchError(f"{folder}: lies in the input {clip}; give a folder outside")
     for source in sources:
         if source.path.resolve().is_relative_to(resolved):
-            raise BatchError(
-                f"{source.path}: this input lies in the output folder {folder}; give another"
-            )
+            raise BatchError(f"{source.path}: lies in the output folder {folder}; give another")
 
 
 def _identity(path: Path) -> tuple[int, int] | None:
@@ -211,8 +203,5 @@ def _refuse_shared(jobs: Iterable[VideoJob], totals: Iterable[PlannedTotal], fol
         if _identity(path) in inputs:
             raise OutputError(f"{path}: is an input itself; give another folder")
         if path in owners:
-            raise BatchError(
-                f"{owners[path]} and {maker}: both would become {path}; rename an input, give "
-                "another ending, or name a folder above both inputs"
-            )
+            raise BatchError(f"{owners[path]} and {maker}: both would become {path}; rename one")
         owners[path] = maker

@@ -7,8 +7,8 @@ import click
 
 from vdet.cli import options
 from vdet.cli.command import command
-from vdet.cli.messages import counted, print_lines, progress_steps
-from vdet.cli.options import option
+from vdet.cli.messages import print_lines, progress_steps
+from vdet.errors import counted
 from vdet.files import check_output
 
 log = logging.getLogger("vdet")
@@ -17,7 +17,7 @@ log = logging.getLogger("vdet")
 @command("vdet calibrate chessboards/ -o camera.yaml --pattern 9x6")
 @click.argument("photos", nargs=-1, required=True, type=options.PATH, metavar="PHOTO...")
 @options.output_file_option("Camera file to write, .yaml.")
-@option(
+@options.option(
     "--pattern NxM",
     "Inner corners of the board, along and across, 3 to 999.",
     options.parse_pair,

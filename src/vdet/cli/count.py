@@ -12,7 +12,6 @@ from vdet.cli import options
 from vdet.cli.command import command
 from vdet.cli.counting import Counting, counting_options
 from vdet.cli.messages import is_quiet, print_lines, print_message, progress_steps
-from vdet.cli.options import option
 from vdet.files import OutputFiles, output_errors
 
 if TYPE_CHECKING:
@@ -28,13 +27,13 @@ log = logging.getLogger("vdet")
 )
 @click.argument("tracks", nargs=-1, required=True, type=options.PATH, metavar="TRACKS...")
 @counting_options()
-@option(
+@options.option(
     "--size WIDTHxHEIGHT",
     "Size of the frames of the video, pixels.",
     options.parse_pair,
     show_default="as TRACKS say, else the size that the lines are given for",
 )
-@option(
+@options.option(
     "--rate FPS",
     "Frames per second of the video, for TRACKS without times.",
     options.RATE,
@@ -96,8 +95,8 @@ def count(
 
 def _totals(videos: "Mapping[str, Counts]") -> list[str]:
     """Return the totals of all files, and of each where one has no clock."""
+    from vdet.errors import counted
     from vdet.evaluate.output import table
-    from vdet.pages.render import counted
     from vdet.traffic.counts import direction_totals
 
     alone = len(videos) == 1 or not all(counts.clock for counts in videos.values())

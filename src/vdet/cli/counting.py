@@ -42,8 +42,7 @@ class Counting:
             raise click.UsageError("--interval goes with --counts or --flows")
         if self.begin and several and "%" not in self.begin:
             raise click.UsageError(
-                "--begin: one time is no time for several videos; give the pattern of the times in "
-                "their names, as in %Y%m%d_%H%M%S"
+                "--begin: for several videos give a pattern of their names, as in %Y%m%d_%H%M%S"
             )
 
 

@@ -9,9 +9,8 @@ import click
 
 from vdet.cli import options
 from vdet.cli.command import command
-from vdet.cli.messages import counted, print_message, progress_steps
-from vdet.cli.options import option
-from vdet.errors import failure_code
+from vdet.cli.messages import print_message, progress_steps
+from vdet.errors import counted, failure_code
 
 if TYPE_CHECKING:
     from vdet.run.result import FrameResult
@@ -26,12 +25,12 @@ log = logging.getLogger("vdet")
     "vdet detect-image road.jpg --stages stages",
 )
 @click.argument("images", nargs=-1, required=True, type=options.PATH, metavar="IMAGE...")
-@option(
+@options.option(
     "-o, --output PATH",
     "Write the picture with its boxes. For several pictures, give a folder.",
     options.PATH,
 )
-@option("--stages DIR", "Write a picture of every stage into DIR.")
+@options.option("--stages DIR", "Write a picture of every stage into DIR.")
 @options.output_option("--json FILE", "Write the boxes to FILE, or with - to standard output.")
 @options.sink_option
 @options.lane_options
@@ -54,7 +53,7 @@ def detect_image(
     request = options.read_lanes(lanes, camera)
     settings = choice.read()
     from vdet.regions import check_mask
-    from vdet.run.pictures import find_images, plan_pictures, run_pictures
+    from vdet.run.pictures import PictureSearch, find_images, plan_pictures, run_pictures
     from vdet.run.sinks.protocol import check_sinks
     from vdet.workers import core_count
 
@@ -70,9 +69,7 @@ def detect_image(
         failures = run_pictures(
             jobs,
             shared,
-            model,
-            settings,
-            request,
+            PictureSearch(model, settings, request),
             overwrite=overwrite,
             threads=core_count(),
             progress=partial(steps, ""),

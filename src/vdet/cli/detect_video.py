@@ -16,9 +16,8 @@ import click
 from vdet.cli import options
 from vdet.cli.command import command
 from vdet.cli.counting import Counting, counting_options
-from vdet.cli.messages import counted, is_quiet, print_lines, print_message, progress_steps
-from vdet.cli.options import option
-from vdet.errors import failure_code
+from vdet.cli.messages import is_quiet, print_lines, print_message, progress_steps
+from vdet.errors import counted, failure_code
 
 if TYPE_CHECKING:
     from vdet.batch.manifest import Record
@@ -48,9 +47,7 @@ class BatchOptions:
         """Raise `click.UsageError` where options do not go together."""
         others = self.jobs or self.skip_existing or self.dry_run or self.scheduler
         if self.folder is None and others:
-            raise click.UsageError(
-                "--jobs, --skip-existing, --dry-run and --scheduler go with -d DIR"
-            )
+            raise click.UsageError("--jobs, --skip-existing, --dry-run and --scheduler go with -d")
         if overwrite and self.skip_existing:
             raise click.UsageError("--overwrite and --skip-existing do not go together")
         if self.jobs and self.scheduler:
@@ -60,12 +57,12 @@ class BatchOptions:
 _batch_options = options.bundle(
     "batch",
     BatchOptions,
-    option(
+    options.option(
         "-d, --directory DIR", "Process every CLIP, and write the outputs into DIR.", name="folder"
     ),
     options.jobs_option("With -d: process N videos at once, each in its own process."),
-    option("--skip-existing", "With -d: skip videos whose outputs are all there and up to date."),
-    option("--dry-run", "With -d: list what would be written, and stop."),
+    options.option("--skip-existing", "With -d: skip videos whose outputs are all up to date."),
+    options.option("--dry-run", "With -d: list what would be written, and stop."),
     options.scheduler_option,
 )
 
@@ -78,7 +75,7 @@ _batch_options = options.bundle(
     "vdet detect-video clips/ -d found --tracks .jsonl --skip-existing",
 )
 @click.argument("clips", nargs=-1, required=True, type=options.PATH, metavar="IN [OUT] | CLIP...")
-@option("--no-video", "Write no video, only other outputs.")
+@options.option("--no-video", "Write no video, only other outputs.")
 @options.output_option(
     "--tracks FILE",
     "Write the boxes of every frame: .txt (MOTChallenge), .csv, .jsonl, .coco.json, .xml "
@@ -103,14 +100,14 @@ _batch_options = options.bundle(
 @options.sink_option
 @options.start_option
 @options.end_option
-@option("--frames N", "Process at most N frames.", options.POSITIVE)
-@option(
+@options.option("--frames N", "Process at most N frames.", options.POSITIVE)
+@options.option(
     "--stride N",
     "Search every N-th frame. In the others, the tracker moves the vehicles on. The same as "
     "--set detector.stride=N.",
     click.IntRange(1, 100),
 )
-@option(
+@options.option(
     "--threads N",
     "Search one video in N threads.",
     options.PROCESSES,
@@ -119,7 +116,7 @@ _batch_options = options.bundle(
 @options.output_option(
     "--stages DIR", "Write a picture of every stage of one frame into DIR. Goes with --at."
 )
-@option(
+@options.option(
     f"--at {options.TIME_FORM}", "Show the frame at this time with --stages.", options.parse_time
 )
 @_batch_options
@@ -209,11 +206,7 @@ def _in_and_out(clips: tuple[Path, ...], *, no_video: bool) -> tuple[Path, list[
     return source, [("video", path) for path in outputs]
 
 
-def _process_one(
-    job: "VideoJob",
-    settings: "Settings",
-    choice: options.SettingsChoice,
-) -> None:
+def _process_one(job: "VideoJob", settings: "Settings", choice: options.SettingsChoice) -> None:
     from vdet.run.video import check_job, run_video
 
     model = choice.load_detector(settings.detector)
@@ -325,6 +318,6 @@ def _print_result(job: "VideoJob", record: "Record", *, counts: bool) -> None:
     if record.error:
         log.error("%s", record.error)
     elif not is_quiet():
-        found = f"{counted(record.frames, 'frame')}, {counted(record.tracks, 'track')}"
+        found = f"{counted(record.frames or 0, 'frame')}, {counted(record.tracks or 0, 'track')}"
         begin = f", begins {record.begin}" if record.begin and counts else ""
         print_message(f"{job.source}: {found}, {record.seconds:.1f} s{begin}")

@@ -10,7 +10,6 @@ import click
 from vdet.cli import options
 from vdet.cli.command import command
 from vdet.cli.messages import progress_steps
-from vdet.cli.options import option
 from vdet.cli.results import Results, results_options
 from vdet.errors import ConfigError
 from vdet.version import __version__
@@ -21,13 +20,13 @@ from vdet.version import __version__
     "vdet eval images city/ motorway/ --model their.onnx --least-width 0.03",
 )
 @click.argument("data", nargs=-1, required=True, type=options.PATH, metavar="DATA...")
-@option(
+@options.option(
     "--score SCORE",
     "Count boxes with at least this score, 0 to 1.",
     options.SHARE,
     show_default="what vdet detect-image shows",
 )
-@option(
+@options.option(
     "--least-width SHARE",
     "Ignore vehicles narrower than this share of the picture's width, 0 to 1.",
     options.SHARE,
@@ -73,7 +72,7 @@ def images(
     "vdet eval patches patches/ --model model.npz",
 )
 @click.argument("data", nargs=-1, required=True, type=options.PATH, metavar="DATA...")
-@option(
+@options.option(
     "--model FILE",
     "Test this model on all of DATA.",
     name="model_path",
@@ -118,7 +117,7 @@ def patches(
 @click.argument("prediction", type=options.PATH, metavar="PRED")
 @click.argument("truth", type=options.PATH, metavar="TRUTH")
 @options.until_option
-@option(
+@options.option(
     "--rate FPS",
     "Frames per second, for the number of false tracks per minute.",
     options.RATE,
@@ -162,7 +161,7 @@ def tracks(
 @click.argument("videos", nargs=-1, required=True, type=options.PATH, metavar="IN...")
 @options.truth_option
 @options.until_option
-@option(
+@options.option(
     "--sweep KEY=VALUE,VALUE",
     "Compare values of one setting, for example tracker.needed=0.1,0.3. Repeated, all "
     "combinations are compared.",

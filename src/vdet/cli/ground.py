@@ -8,11 +8,10 @@ import click
 
 from vdet.cli import options
 from vdet.cli.command import command
-from vdet.cli.messages import counted, print_lines
-from vdet.cli.options import option
+from vdet.cli.messages import print_lines
 from vdet.cli.watching import Watched, watch_options
-from vdet.errors import ConfigError
-from vdet.files import check_output, escaped, staged
+from vdet.errors import ConfigError, counted, escaped
+from vdet.files import check_output, write_whole
 
 if TYPE_CHECKING:
     from vdet.boxes import Float64Array
@@ -40,14 +39,14 @@ def _parse_length(text: str) -> Known:
     "vdet ground in.mp4 --lane --camera camera.yaml -o ground.yaml",
 )
 @click.argument("source", type=options.PATH, metavar="FILE|CLIP")
-@option("-o, --output FILE", "File of the ground to write, .yaml, for --ground.")
-@option(
+@options.option("-o, --output FILE", "File of the ground to write, .yaml, for --ground.")
+@options.option(
     "--length X1,Y1,X2,Y2=METRES",
     "Fit the plane to the traffic of CLIP and to a length on the road: two points in pixels.",
     _parse_length,
 )
 @watch_options
-@option("--lane", "Fit the plane to the lane of the settings (lanes.*).")
+@options.option("--lane", "Fit the plane to the lane of the settings (lanes.*).")
 @options.camera_option
 @options.settings_options("detector.stride=2", options.model_option)
 @options.overwrite_option
@@ -91,8 +90,7 @@ def ground(
         "# Look at it: vdet paths CLIP --no-paths --ground THIS_FILE -o grid.jpg\n"
     )
     text = yaml.safe_dump(values, sort_keys=False, default_flow_style=None)
-    with staged(output, overwrite=overwrite) as temporary:
-        temporary.write_text(heading + text, encoding="utf-8", errors="backslashreplace")
+    write_whole(output, heading + text, overwrite=overwrite)
     print_lines(f"{output}: {how}", _described(output))
 
 
@@ -140,9 +138,7 @@ def _described(path: Path) -> str:
     request = load_ground(path)
     size = request.points.size
     if size is None:
-        raise ConfigError(
-            f"{path}: size: is missing; give width and height of the frames in pixels"
-        )
+        raise ConfigError(f"{path}: size: is missing; give width and height of the frames")
     fitted = request.ground(*size)
     return (
         f"{path}: {counted(len(request.points.points), 'point')}, off by {fitted.error:.2f} m "

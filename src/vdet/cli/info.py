@@ -9,7 +9,7 @@ import click
 from vdet.cli.command import command
 from vdet.cli.options import PATH
 from vdet.cli.results import Results, facts_options
-from vdet.files import printable
+from vdet.errors import printable
 
 Facts = dict[str, Any]
 """Values for JSON, by name; each is also a line of text."""
@@ -90,8 +90,8 @@ def _picture(path: Path) -> Facts:
 def _video(path: Path) -> Facts:
     from vdet.detect.svm.horizon import find_horizon
     from vdet.errors import VideoError
-    from vdet.media import VideoReader
     from vdet.media.demux import is_pipe, open_input, picture_stream
+    from vdet.media.reader import VideoReader
     from vdet.run.loop import FIRST_FRAMES
 
     if is_pipe(path):

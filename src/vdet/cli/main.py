@@ -10,8 +10,7 @@ import click
 
 from vdet.cli.command import Program, verbosity_options
 from vdet.cli.messages import print_lines, set_up_logs
-from vdet.errors import INTERRUPTED, ConfigError, VdetError, in_one_line
-from vdet.files import escaped
+from vdet.errors import INTERRUPTED, ConfigError, VdetError, escaped, in_one_line
 from vdet.version import __version__
 
 cli = Program(

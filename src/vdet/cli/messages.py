@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from vdet.files import escaped, output_errors
+from vdet.errors import escaped
+from vdet.files import output_errors
 from vdet.progress import Advance, Steps, no_steps
 
 if TYPE_CHECKING:
@@ -51,11 +52,6 @@ def print_message(*lines: str, err: bool = True) -> None:
 
     with tqdm.external_write_mode():
         print_lines(*lines, err=err)
-
-
-def counted(number: int | None, noun: str) -> str:
-    """Return a number with its noun: 1 file, 2 files."""
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 class _LogHandler(logging.Handler):

@@ -6,8 +6,8 @@ import click
 
 from vdet.cli import options
 from vdet.cli.command import command
-from vdet.cli.messages import counted, print_lines, progress_steps
-from vdet.cli.options import option
+from vdet.cli.messages import print_lines, progress_steps
+from vdet.errors import counted
 from vdet.files import check_output
 
 
@@ -18,8 +18,8 @@ from vdet.files import check_output
 @click.argument("sources", nargs=-1, required=True, type=options.PATH, metavar="SOURCE...")
 @options.truth_option
 @options.output_file_option("Zip file to write.")
-@option("--every N", "Use every N-th frame of a video.", options.POSITIVE, default=4)
-@option(
+@options.option("--every N", "Use every N-th frame of a video.", options.POSITIVE, default=4)
+@options.option(
     "--from FRAME",
     "Begin at this frame, counted from 1.",
     options.POSITIVE,

@@ -119,8 +119,7 @@ def option(
 overwrite_option = option("--overwrite", "Replace outputs that are there already.")
 scheduler_option = option(
     "--scheduler ADDRESS",
-    "Work on the Dask cluster of this scheduler, for example tcp://host:8786. All its workers must "
-    "find the files under the same names.",
+    "Work on this Dask cluster, as tcp://host:8786. Its workers must find files by their names.",
 )
 until_option = option(
     "--until FRAME",
@@ -130,8 +129,7 @@ until_option = option(
 )
 truth_option = option(
     "--truth FILE",
-    "True boxes of a video: MOTChallenge, KITTI, CVAT, COCO, YOLO, .csv or .jsonl. Repeat it for "
-    "each video, in the same order.",
+    "True boxes: MOTChallenge, KITTI, CVAT, COCO, YOLO, .csv or .jsonl. Repeat it for each video.",
     name="truths",
     multiple=True,
 )
@@ -141,15 +139,13 @@ start_option = option(
 end_option = option(f"--end {TIME_FORM}", "Stop before this time.", parse_time)
 model_option = option(
     "--model FILE",
-    "Model file of the detector: .npz from vdet train, or .onnx, a network. It decides which "
-    "detector runs.",
+    "Model of the detector: .npz from vdet train, or .onnx. It decides which detector runs.",
     name="model_path",
     show_default="the shipped one that fits the settings",
 )
 regions_option = option(
     "--regions FILE",
-    "Search only these regions of the frame: polygons (.yaml), or a mask, which is a picture with "
-    "the regions in white.",
+    "Search only these regions: polygons (.yaml), or a mask, a picture with them in white.",
 )
 ground_option = option(
     "--ground FILE",
@@ -271,20 +267,18 @@ def settings_options(example: str, *more: Callable[..., Any]) -> Callable[[F], F
     return bundle("choice", SettingsChoice, *more, config, assign)
 
 
-def _complete_configs(
-    _: click.Context, __: click.Parameter, incomplete: str
-) -> list[CompletionItem]:
+def _complete_configs(_: click.Context, __: click.Parameter, start: str) -> list[CompletionItem]:
     from vdet.config.loading import shipped_configs
 
-    names = [name for name in shipped_configs() if name.startswith(incomplete)]
-    return [*map(CompletionItem, names), CompletionItem(incomplete, type="file")]
+    names = [name for name in shipped_configs() if name.startswith(start)]
+    return [*map(CompletionItem, names), CompletionItem(start, type="file")]
 
 
-def _complete_keys(_: click.Context, __: click.Parameter, incomplete: str) -> list[str]:
+def _complete_keys(_: click.Context, __: click.Parameter, start: str) -> list[str]:
     from vdet.config.schema import Settings
 
     keys = _keys(Settings().model_dump(mode="json"))
-    return [f"{key}=" for key in keys if key.startswith(incomplete)]
+    return [f"{key}=" for key in keys if key.startswith(start)]
 
 
 def _keys(values: Mapping[str, Any], before: str = "") -> Iterator[str]:

@@ -6,10 +6,9 @@ import click
 
 from vdet.cli import options
 from vdet.cli.command import command
-from vdet.cli.messages import counted, print_lines
-from vdet.cli.options import option
+from vdet.cli.messages import print_lines
 from vdet.cli.watching import Watched, watch_options
-from vdet.errors import ConfigError
+from vdet.errors import counted
 from vdet.files import check_output
 
 
@@ -20,7 +19,7 @@ from vdet.files import check_output
 )
 @click.argument("clip", type=options.PATH, metavar="CLIP")
 @options.output_file_option("Picture to write, .jpg or .png.")
-@option("--no-paths", "Search nothing: draw only the grid, and the lines and zones of --lines.")
+@options.option("--no-paths", "Search nothing: draw only the grid, lines and zones.")
 @watch_options
 @options.settings_options(
     "detector.stride=2", options.lines_option, options.ground_option, options.model_option
@@ -51,10 +50,7 @@ def paths(
     check_output(output, overwrite=overwrite, inputs=inputs)
     image = watched.first_image(clip, settings).copy()
     height, width = image.shape[:2]
-    try:
-        lines, zones = place(settings.counts, width, height)
-    except ConfigError as error:
-        raise ConfigError(f"{clip}: counts.{error}") from error
+    lines, zones = place(settings.counts, width, height)
     ground = choice.ground()
     is_still = is_picture_name(clip) and "%" not in clip.name
     if ground:

@@ -7,7 +7,7 @@ from typing import Any
 
 from vdet.cli.messages import print_lines, progress_steps
 from vdet.cli.options import bundle, option, overwrite_option
-from vdet.files import check_output, make_folder, staged, write_json
+from vdet.files import check_output, make_folder, write_json, write_whole
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,19 +46,17 @@ class Results:
         if self.json_target is not None:
             write_json(values, self.json_target, overwrite=self.overwrite)
         if self.page is not None:
-            from vdet.pages.render import PAGE_NAME, write_page
+            from vdet.pages.render import PAGE_NAME
 
             with progress_steps("") as steps:
                 steps("writing the page", None)
-                with staged(self.page / PAGE_NAME, overwrite=self.overwrite) as temporary:
-                    write_page(make_page(), temporary)
+                write_whole(self.page / PAGE_NAME, make_page(), overwrite=self.overwrite)
             print_lines("", f"{self.page / PAGE_NAME}: the page", err=to_stderr)
 
 
 _json_option = option(
     "--json FILE",
-    "Write the results to FILE. With -, they go to standard output, and the text to standard "
-    "error.",
+    "Write the results to FILE; with -, to standard output, and the text to standard error.",
     str,
     name="json_target",
 )

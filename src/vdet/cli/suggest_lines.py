@@ -6,10 +6,10 @@ import click
 
 from vdet.cli import options
 from vdet.cli.command import command
-from vdet.cli.messages import counted, print_lines
+from vdet.cli.messages import print_lines
 from vdet.cli.watching import Watched, watch_options
-from vdet.errors import ConfigError
-from vdet.files import check_output, escaped, staged
+from vdet.errors import ConfigError, counted, escaped
+from vdet.files import check_output, write_whole
 
 
 @command(
@@ -43,9 +43,7 @@ def suggest_lines(
     records = watched.records(clip, width, settings, choice)
     lines = suggest(records, width, height)
     if not lines:
-        raise ConfigError(
-            f"{clip}: no vehicle moves far enough to propose a line; draw one by hand"
-        )
+        raise ConfigError(f"{clip}: no vehicle moves far enough; draw a line by hand")
     text = [
         f"# Lines across the main streams of {escaped(clip.name)}, proposed by vdet suggest-lines",
         f"# from {counted(len(records), 'vehicle')}. Look at them, then rename and move them:",
@@ -59,6 +57,5 @@ def suggest_lines(
         ends = f"start: [{ax:g}, {ay:g}], end: [{bx:g}, {by:g}]"
         text.append(f"  # {counted(line.vehicles, 'vehicle')}, going {line.way} in the picture")
         text.append(f"  - {{name: {line.name}, {ends}, left: along, right: against}}")
-    with staged(output, overwrite=overwrite) as temporary:
-        temporary.write_text("\n".join(text) + "\n", encoding="utf-8", errors="backslashreplace")
+    write_whole(output, "\n".join([*text, ""]), overwrite=overwrite)
     print_lines(f"{output}: {counted(len(lines), 'line')}, {counted(len(records), 'vehicle')}")

@@ -7,7 +7,6 @@ import click
 from vdet.cli import options
 from vdet.cli.command import command
 from vdet.cli.messages import live_bar, print_lines
-from vdet.cli.options import option
 from vdet.errors import DataError
 from vdet.files import check_output
 
@@ -18,7 +17,7 @@ from vdet.files import check_output
 )
 @click.argument("data", nargs=-1, type=options.PATH, metavar="[DATA]...")
 @options.output_file_option("Network to write, .onnx.")
-@option(
+@options.option(
     "--video CLIP TRUTH",
     "Learn from every fourth frame of a labelled video too. Can be repeated.",
     options.PATH,
@@ -26,7 +25,7 @@ from vdet.files import check_output
     nargs=2,
     multiple=True,
 )
-@option("--base FILE", "Start from the weights of a network that vdet train-net has written.")
+@options.option("--base FILE", "Start from the weights of a network of vdet train-net.")
 @options.settings_options("train.net.steps=4000")
 @options.overwrite_option
 def train_net(

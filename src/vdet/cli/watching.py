@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING
 
 from vdet.cli import options
 from vdet.cli.messages import progress_steps
-from vdet.cli.options import option
 
 if TYPE_CHECKING:
     from fractions import Fraction
 
+    from vdet.boxes import Image
     from vdet.config.schema import Settings
-    from vdet.media.images import Image
     from vdet.traffic.records import VehicleRecord
 
 
@@ -34,8 +33,8 @@ class Watched:
             The clip cannot be read, or has no frame at `start`.
         """
         from vdet.errors import VideoError
-        from vdet.media import VideoReader
         from vdet.media.images import is_picture_name, read_image
+        from vdet.media.reader import VideoReader
 
         if is_picture_name(clip) and "%" not in clip.name:
             return read_image(clip)
@@ -78,7 +77,7 @@ class Watched:
 watch_options = options.bundle(
     "watched",
     Watched,
-    option(
+    options.option(
         "--tracks-from FILE",
         "Take the vehicles from this file of tracks instead of searching.",
         name="tracks",

@@ -6,25 +6,8 @@ from pydantic import Field
 
 from vdet.config.section import Section, Share
 
-Searches = Annotated[
-    float | None,
-    Field(
-        gt=0,
-        le=1000,
-        description="Search at least this many frames in a second of video. The tracker predicts "
-        "where the vehicles are in the others. null: search all frames.",
-    ),
-]
-
-Foot = Annotated[
-    float,
-    Field(
-        ge=-0.5,
-        le=0.5,
-        description="Distance from the tyres down to the lower edge of a box, as a share of its "
-        "height. It corrects the distances of vehicles.",
-    ),
-]
+Searches = Annotated[float | None, Field(gt=0, le=1000)]
+Foot = Annotated[float, Field(ge=-0.5, le=0.5)]
 
 
 class DetectorSettings(Section):
@@ -38,9 +21,15 @@ class DetectorSettings(Section):
 
     kind: str
     searches: Searches = None
+    """Search at least this many frames in a second of video. The tracker predicts where the
+    vehicles are in the others. null: search all frames.
+    """
     stride: int | None = Field(None, ge=1, le=100)
     """Search every N-th frame. Overrides searches."""
     foot: Foot = 0.0
+    """Distance from the tyres down to the lower edge of a box, as a share of its height. It
+    corrects the distances of vehicles.
+    """
 
     @property
     def search_key(self) -> object:

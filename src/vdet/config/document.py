@@ -11,8 +11,8 @@ from typing import Any, TypeVar
 import yaml
 from pydantic import TypeAdapter, ValidationError
 
-from vdet.errors import ConfigError
-from vdet.files import printable, read_whole
+from vdet.errors import ConfigError, printable
+from vdet.files import read_whole
 
 MAX_BYTES = 100_000
 """Ten times the size of all settings with all their comments."""

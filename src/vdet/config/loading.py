@@ -65,10 +65,7 @@ def kind_settings(section: str, name: str) -> type[Section]:
     settings = getattr(load_plugin(GROUPS[section], name), "settings", None)
     if isinstance(settings, type) and issubclass(settings, Section) and kind_of(settings) == name:
         return settings
-    raise ConfigError(
-        f'{name}: its settings are no section with kind = "{name}"; repair or reinstall that '
-        "package"
-    )
+    raise ConfigError(f'{name}: has no settings of kind = "{name}"; repair that package')
 
 
 def kind_of(settings: type[Section]) -> object:

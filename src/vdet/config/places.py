@@ -4,7 +4,7 @@ Points are pixels of a frame of `size`, or shares of the frame where no size is 
 """
 
 from collections.abc import Iterable
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, field_validator, model_validator
 
@@ -26,7 +26,9 @@ _SAME_ASPECT = 0.01
 
 
 class PlacedSection(Section):
-    """A section with places in the frame."""
+    """A section with places in the frame; errors name its keys behind `prefix`."""
+
+    prefix: ClassVar[str] = ""
 
     size: tuple[Side, Side] | None = None
     """Width and height in pixels of the frames that the points are for. Frames of another size are
@@ -47,8 +49,8 @@ class PlacedSection(Section):
         aspect = (width / height) / (given_width / given_height)
         if abs(aspect - 1) > _SAME_ASPECT:
             raise ConfigError(
-                f"size: places are given for frames of {given_width}×{given_height}, which have "
-                f"another shape than {width}×{height}; give places for such frames"
+                f"{self.prefix}size: places are given for frames of {given_width}×{given_height}, "
+                f"which have another shape than {width}×{height}; give places for such frames"
             )
         return width / given_width, height / given_height
 
@@ -63,10 +65,7 @@ class PlacedSection(Section):
             for x, y in points:
                 if not (0 <= x <= width and 0 <= y <= height):
                     unit = "" if self.size else "; shares are 0 to 1, and for pixels give size"
-                    raise ValueError(
-                        f"{name}: the point [{x:g}, {y:g}] lies outside the frame of "
-                        f"{width}×{height}{unit}"
-                    )
+                    raise ValueError(f"{name}: [{x:g}, {y:g}] lies outside {width}×{height}{unit}")
 
 
 class PolygonSection(Section):
@@ -102,6 +101,8 @@ class RegionsSettings(PlacedSection):
     A vehicle is where the middle of its lower edge is. Without an included polygon and without a
     mask, the whole frame counts, except for excluded polygons.
     """
+
+    prefix: ClassVar[str] = "regions."
 
     polygons: tuple[RegionSettings, ...] = Field((), max_length=MOST_SHAPES)
     """Polygons."""
@@ -148,6 +149,8 @@ class ZoneSettings(PolygonSection):
 
 class CountSettings(PlacedSection):
     """Lines and zones at which vehicles are counted (`vdet.traffic` explains the rule)."""
+
+    prefix: ClassVar[str] = "counts."
 
     lines: tuple[LineSettings, ...] = Field((), max_length=MOST_SHAPES)
     """Lines."""

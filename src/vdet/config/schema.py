@@ -150,8 +150,5 @@ class Settings(Section):
     def svm(self) -> SvmSettings:
         """The settings of the linear SVM. Raises `ConfigError` where the detector is another."""
         if not isinstance(self.detector, SvmSettings):
-            raise ConfigError(
-                f"detector.kind: is {self.detector.kind}; this command works on the linear model: "
-                "leave that setting out, or give -c svm"
-            )
+            raise ConfigError(f"detector.kind: is {self.detector.kind}; this command needs -c svm")
         return self.detector

@@ -7,16 +7,7 @@ from pydantic import Field
 from vdet.config.section import Pixels, Section, Share
 
 Seconds = Annotated[float, Field(ge=0, le=1000)]
-
-LookAhead = Annotated[
-    float,
-    Field(
-        ge=0,
-        le=10,
-        description="Search this many seconds of video ahead before a frame is shown. Vehicles are "
-        "then shown from their first detection to their last. 0: show frames at once.",
-    ),
-]
+LookAhead = Annotated[float, Field(ge=0, le=10)]
 
 
 class TrackerSettings(Section):
@@ -24,6 +15,9 @@ class TrackerSettings(Section):
 
     kind: str
     look_ahead: LookAhead = 0.0
+    """Search this many seconds of video ahead before a frame is shown. Vehicles are then shown from
+    their first detection to their last. 0: show frames at once.
+    """
 
 
 class MotionTrackerSettings(TrackerSettings):

@@ -5,12 +5,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from vdet.boxes import Boxes
+from vdet.boxes import Boxes, Image
 from vdet.config.schema import DetectorSettings
 from vdet.detect.protocol import DetectorModel, VideoDetector
 from vdet.errors import ConfigError
 from vdet.media import Picture
-from vdet.media.images import Image
 from vdet.plugins import DETECTORS, load_plugin
 
 
@@ -53,8 +52,7 @@ def load_detector(settings: DetectorSettings, model: Path | None = None) -> Dete
         kind = kind_of_model(model)
     if kind and settings.model_suffix and kind != settings.kind:
         raise ConfigError(
-            f"{model}: is a model for detector.kind: {kind}, but the settings choose "
-            f"{settings.kind}; leave out -c or --set that choose it, or give another model"
+            f"{model}: is for detector.kind: {kind}, not {settings.kind}; leave one of them out"
         )
     return _kind(settings).load(settings, model)
 

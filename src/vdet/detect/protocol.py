@@ -3,9 +3,8 @@
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol, runtime_checkable
 
-from vdet.boxes import Boxes
+from vdet.boxes import Boxes, Image
 from vdet.media import Picture
-from vdet.media.images import Image
 
 
 @runtime_checkable
@@ -35,23 +34,13 @@ class VideoDetector(Protocol):
         """
 
 
-@runtime_checkable
-class StagedDetector(VideoDetector, Protocol):
-    """A detector that shows its stages."""
-
-    def stage_pictures(self, image: Image, detections: Boxes) -> dict[str, Image]:
-        """Return a picture of each stage of the detection by its name, in the order of the stages.
-
-        `detections` is what `detect` returned for this `image`.
-        """
-
-
 StagePictures = Callable[[Image, Boxes], dict[str, Image]]
+"""Takes an image and what `detect` returned for it; returns a picture of each stage by its name."""
 
 
 def stage_pictures_of(detector: VideoDetector) -> StagePictures:
-    """Return the function that makes the stage pictures of a detector, if it makes any."""
-    return detector.stage_pictures if isinstance(detector, StagedDetector) else lambda *_: {}
+    """Return the method `stage_pictures` of a detector, if it has one."""
+    return getattr(detector, "stage_pictures", lambda *_: {})
 
 
 @runtime_checkable

@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 
-from vdet.boxes import Box
+from vdet.boxes import Box, Image
 from vdet.draw.paint import (
     Color,
     Surface,
@@ -18,7 +18,6 @@ from vdet.draw.paint import (
     text_size,
     write_text,
 )
-from vdet.media.images import Image
 from vdet.polygons import Point
 from vdet.regions import Regions
 

@@ -10,10 +10,9 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from vdet.boxes import Box
+from vdet.boxes import Box, Image
 from vdet.media.coding import Coding
 from vdet.media.frame import Planes
-from vdet.media.images import Image
 from vdet.polygons import Point
 
 Color = tuple[int, int, int]

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from vdet.labels.label import MAX_IN_FRAME
 from vdet.labels.pictures import LabelledPicture, LabelledPictures
 from vdet.labels.video import LabelledVideo
 from vdet.progress import Progress, no_progress
-from vdet.run.pictures import detect_picture
+from vdet.run.pictures import PictureSearch
 from vdet.run.threads import map_ordered
 
 SIZES = (0.03, 0.06, 0.12)
@@ -61,10 +61,8 @@ class MeasuredImage:
     every: Comparison
     shown: Comparison
 
-    @staticmethod
-    def of(
-        picture: LabelledPicture, width: int, found: Boxes, counting: Counting
-    ) -> "MeasuredImage":
+    @classmethod
+    def of(cls, picture: LabelledPicture, width: int, found: Boxes, counting: Counting) -> Self:
         """Compare the detections with the labels of a picture that is `width` pixels wide."""
         least = counting.least_width * width
         regions = picture.ignored | (_widths(picture.boxes) < least)
@@ -74,7 +72,7 @@ class MeasuredImage:
         detected = _one_frame(boxes, scores, _widths(boxes) < least)
         shown = detected.where(scores >= counting.score)
         comparisons = compare(detected, truth), compare(shown, truth)
-        return MeasuredImage(picture, width, picture.boxes[regions], *comparisons)
+        return cls(picture, width, picture.boxes[regions], *comparisons)
 
 
 def _one_frame(boxes: Float64Array, scores: Float64Array, ignored: BoolArray) -> LabelledVideo:
@@ -150,14 +148,14 @@ class F1Curve:
     scores: Float64Array
     f1: Float64Array
 
-    @staticmethod
-    def of(ranked: RankedPredictions) -> "F1Curve":
+    @classmethod
+    def of(cls, ranked: RankedPredictions) -> Self:
         """Return the curve; without a point where there are no vehicles."""
         scores, count = ranked.scores, len(ranked.scores)
         f1 = 2 * np.cumsum(ranked.right[0]) / (np.arange(1, count + 1) + ranked.vehicles)
         last = np.append(scores[1:] != scores[:-1], True)[:count]  # of each score
         last &= ranked.vehicles > 0
-        return F1Curve(scores[last], f1[last])
+        return cls(scores[last], f1[last])
 
     def at(self, scores: Float64Array) -> Float64Array:
         """Return F1 where detections with at least each of these scores count."""
@@ -207,11 +205,11 @@ def evaluate_images(
         A picture cannot be read or searched; the message names it.
     """
     advance = progress(sum(len(each.pictures) for each in sets))
-    settings = Settings()  # the whole picture, and no step
+    whole = PictureSearch(model, Settings())  # the whole picture, and no step
 
     def search(labelled: LabelledPicture) -> MeasuredImage:
         image = labelled.read()
-        found = detect_picture(labelled.path, image, model, settings).detections
+        found = whole.detect(labelled.path, image).detections
         return MeasuredImage.of(labelled, image.shape[1], found, counting)
 
     sources = []

@@ -4,7 +4,8 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from typing import Any
 
-from vdet.boxes import Box
+from vdet.boxes import Box, Image
+from vdet.errors import counted, printable
 from vdet.evaluate.images import (
     SIZE_NAMES,
     ImageScores,
@@ -16,20 +17,14 @@ from vdet.evaluate.images import (
 from vdet.evaluate.output import ABSENT, RunName, Table, score_table, share, table
 from vdet.evaluate.scores import score_detections
 from vdet.evaluate.tiles import FOUND, IGNORED, TRUE, Tile, draw_tile
-from vdet.files import printable
-from vdet.media.images import Image
 from vdet.pages.charts import SOFT, Line, Plot, color, curve, number_axis
-from vdet.pages.render import counted, render
+from vdet.pages.render import render
 
 COLUMNS = (
-    *(
-        ("pictures", "images"),
-        ("vehicles", "vehicles"),
-        ("precision", "precision"),
-        ("recall", "recall"),
-    ),
-    *(("F1", "f1"), ("AP50", "ap50"), ("AP50:95", "ap50_95"), ("IoU", "mean_iou")),
-    *(("false alarms", "false_positives"), ("best F1", "best_f1"), ("at score", "best_score")),
+    *(("pictures", "images"), ("vehicles", "vehicles"), ("precision", "precision")),
+    *(("recall", "recall"), ("F1", "f1"), ("AP50", "ap50"), ("AP50:95", "ap50_95")),
+    *(("IoU", "mean_iou"), ("false alarms", "false_positives")),
+    *(("best F1", "best_f1"), ("at score", "best_score")),
 )
 """The headings of the scores, and the attribute of `ImageScores` below each."""
 

@@ -5,17 +5,17 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from vdet.boxes import Box
+from vdet.boxes import Box, Image
 from vdet.config.schema import InputSettings
+from vdet.errors import counted
 from vdet.evaluate.comparison import Comparison
 from vdet.evaluate.output import ABSENT, RunName, Table, score_table, share, table
 from vdet.evaluate.tiles import FOUND, TRUE, Tile, draw_tile
 from vdet.evaluate.timelines import Stretch
 from vdet.evaluate.video import ClipResult, RunResult, best
-from vdet.media import VideoReader
-from vdet.media.images import Image
+from vdet.media.reader import VideoReader
 from vdet.pages.charts import BAD, FILL, Span, Timeline, number_axis
-from vdet.pages.render import counted, render
+from vdet.pages.render import render
 
 COLUMNS = (
     *(("precision", "precision"), ("recall", "recall"), ("F1", "f1"), ("AP50", "ap50")),

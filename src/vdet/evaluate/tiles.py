@@ -5,9 +5,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from vdet.boxes import Box, Float64Array
+from vdet.boxes import Box, Float64Array, Image
 from vdet.draw.paint import Color
-from vdet.media.images import Image
 
 TRUE: Color = (90, 220, 60)
 FOUND: Color = (40, 120, 255)

@@ -25,7 +25,8 @@ from vdet.labels.label import Label
 from vdet.labels.reading import read_predictions, read_truth
 from vdet.labels.roles import DEFAULT_ROLES, Roles
 from vdet.labels.video import LabelledVideo
-from vdet.media import Frame, Picture, VideoInfo, VideoReader
+from vdet.media import Frame, Picture, VideoInfo
+from vdet.media.reader import VideoReader
 from vdet.progress import Progress, no_progress
 from vdet.regions import Regions, lay_regions
 from vdet.run.loop import build, named_errors, peek

@@ -18,8 +18,7 @@ from typing import Annotated, Any, BinaryIO
 from pydantic import AfterValidator, Field, TypeAdapter
 from pydantic.dataclasses import dataclass
 
-from vdet.errors import TruthError
-from vdet.files import printable
+from vdet.errors import TruthError, printable
 from vdet.labels.formats import UNKNOWN, Format, SourceVideo, best_classes
 from vdet.labels.json_stream import JsonLists
 from vdet.labels.label import Label, from_size, limited, line_error

@@ -12,8 +12,7 @@ from pathlib import Path
 from typing import BinaryIO
 from xml.sax.saxutils import escape, quoteattr
 
-from vdet.errors import TruthError
-from vdet.files import escaped
+from vdet.errors import TruthError, escaped
 from vdet.labels.formats import Format, SourceVideo, best_classes
 from vdet.labels.label import Label, limited
 from vdet.labels.parsing import archive_texts, parse_number, parse_whole, text_of

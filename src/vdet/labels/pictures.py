@@ -7,13 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from vdet.boxes import BoolArray, Float64Array
+from vdet.boxes import BoolArray, Float64Array, Image
 from vdet.detect.classes import our_name
-from vdet.errors import ImageError, TruthError
-from vdet.files import printable
+from vdet.errors import ImageError, TruthError, printable
 from vdet.labels.label import MAX_IN_FRAME, Label, line_error, mistake_in_box
 from vdet.labels.roles import DEFAULT_ROLES, Roles
-from vdet.media.images import Image, is_picture_name, read_image
+from vdet.media.images import is_picture_name, read_image
 
 MAX_PICTURES = 200_000
 """Largest number of pictures in one set."""
@@ -69,8 +68,7 @@ class LabelledPicture:
         height, width = image.shape[:2]
         if self.size not in (None, (width, height)):
             raise ImageError(
-                f"{self.path}: has {width}×{height} pixels, and its labels are for "
-                f"{self.size[0]}×{self.size[1]}; take the picture that was labelled"
+                f"{self.path}: is {width}×{height}, its labels for {self.size[0]}×{self.size[1]}"
             )
         return image
 
@@ -106,8 +104,7 @@ def checked_pictures(
         boxes += len(picture.labels)
         if len(checked) == MAX_PICTURES or boxes > MAX_BOXES:
             raise TruthError(
-                f"{name}: has more than {MAX_PICTURES:,} pictures or {MAX_BOXES:,} boxes; cut it "
-                "into parts"
+                f"{name}: has more than {MAX_PICTURES:,} pictures or {MAX_BOXES:,} boxes; cut it"
             )
         if picture.path in checked:
             raise TruthError(f"{name}: has the picture {printable(picture.path.name)} twice")

@@ -18,9 +18,9 @@ from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any, BinaryIO
 
+from vdet.archives import store
 from vdet.config.document import MAX_BYTES, parse_document
-from vdet.errors import ConfigError, ImageError, TruthError
-from vdet.files import escaped, printable
+from vdet.errors import ConfigError, ImageError, TruthError, escaped, printable
 from vdet.labels import parsing
 from vdet.labels.formats import UNKNOWN, Format, PictureFormat, SourceVideo
 from vdet.labels.label import Label, limited
@@ -47,17 +47,17 @@ def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) ->
     names = {frame.index: f"frame_{frame.index:06}" for frame in frames}
     pictures = "".join(f"images/train/{name}.png\n" for name in names.values())
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
-        _add(archive, "train.txt", pictures)
+        store(archive, "train.txt", pictures)
         for frame in frames:
             lines = "".join(_line(track, size, classes) for track in frame.tracks)
-            _add(archive, f"labels/train/{names[frame.index]}.txt", lines)
+            store(archive, f"labels/train/{names[frame.index]}.txt", lines)
         listed = "".join(
             f"  {number}: {json.dumps(escaped(name), ensure_ascii=False)}\n"
             for name, number in (classes or {UNKNOWN: 0}).items()
         )
         sides = "width: {}\nheight: {}\n".format(*size)
         parts = "train: train.txt\nval: train.txt\n"  # Ultralytics needs both
-        _add(archive, _DATA, f"path: .\n{parts}names:\n{listed}{sides}")
+        store(archive, _DATA, f"path: .\n{parts}names:\n{listed}{sides}")
 
 
 def _line(track: Track, size: Size, classes: dict[str, int]) -> str:
@@ -70,14 +70,6 @@ def _line(track: Track, size: Size, classes: dict[str, int]) -> str:
     x, y = box.center
     shares = (x / width, y / height, box.width / width, box.height / height)
     return f"{number} {' '.join(f'{share:.6f}' for share in shares)} {track.id}\n"
-
-
-def _add(archive: zipfile.ZipFile, name: str, text: str) -> None:
-    """Add a file whose date is always the same, so that equal labels give equal archives."""
-    info = zipfile.ZipInfo(name)
-    info.compress_type = zipfile.ZIP_DEFLATED
-    info.external_attr = 0o644 << 16
-    archive.writestr(info, text)
 
 
 def read_yolo(path: Path, data: bytes) -> SavedTracks:
@@ -104,10 +96,7 @@ def read_yolo(path: Path, data: bytes) -> SavedTracks:
     names = _class_names(values, where)
     size: Any = values.get("width"), values.get("height")
     if not all(isinstance(side, int) and 0 < side <= parsing.LIMIT for side in size):
-        raise TruthError(
-            f"{where}: does not say how large the frames are; add the lines 'width: 1280' and "
-            "'height: 720' with the pixels of yours"
-        )
+        raise TruthError(f"{where}: needs the size of the frames, as width: 1280, height: 720")
     frames = _frames(path, [name for name in texts if name not in described])
     labels = (
         label
@@ -150,10 +139,7 @@ def _frames(path: Path, names: Sequence[str]) -> dict[int, str]:
     for name in names:
         number = _NUMBER.search(PurePosixPath(name).stem)
         if number is None:
-            raise TruthError(
-                f"{path}: {printable(name)} has no number of a frame at its end, as in "
-                "frame_000012.txt"
-            )
+            raise TruthError(f"{path}: {printable(name)} has no number of a frame at its end")
         other = files.setdefault(int(number[1]), name)
         if other != name:
             both = f"{printable(other)} and {printable(name)}"
@@ -176,8 +162,7 @@ def _label(place: int | str, columns: Sequence[str], names: Sequence[str], size:
     count = len(columns)
     if count != _COLUMNS and (count < _POLYGON_COLUMNS or count % 2 == 0):
         raise ValueError(
-            f"YOLO has {_COLUMNS} columns between spaces, or the points of a polygon; this line "
-            f"has {count}"
+            f"YOLO has {_COLUMNS} columns, or the points of a polygon; this line has {count}"
         )
     number = parse_whole(columns[0])
     if not 0 <= number < len(names):

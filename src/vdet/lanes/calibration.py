@@ -11,10 +11,10 @@ import cv2
 import numpy as np
 from pydantic import ValidationError
 
-from vdet.boxes import Float32Array
+from vdet.boxes import Float32Array, Image
 from vdet.errors import ImageError
 from vdet.lanes.camera import CalibratedCamera
-from vdet.media.images import Image, read_image
+from vdet.media.images import read_image
 
 MIN_PHOTOS = 5
 SIZE_TOLERANCE = 2

@@ -11,12 +11,11 @@ from pydantic import ConfigDict, Field, field_validator
 from pydantic.dataclasses import dataclass
 from pydantic_core.core_schema import ValidationInfo
 
-from vdet.boxes import Box, Float64Array
+from vdet.boxes import Box, Float64Array, Image
 from vdet.config.document import read_values
 from vdet.errors import ConfigError
-from vdet.files import staged
+from vdet.files import write_whole
 from vdet.media import Picture, Planes
-from vdet.media.images import Image
 
 _ASPECT_TOLERANCE = 0.005  # accepts 854×480 for 1280×720
 _SIDE_POINTS = np.linspace(0, 1, 16)
@@ -80,8 +79,7 @@ class CalibratedCamera:
         across, down = width / self.width, height / self.height
         if abs(across / down - 1) > _ASPECT_TOLERANCE:
             raise ConfigError(
-                f"the camera was calibrated for {self.width}×{self.height}, {width}×{height} has "
-                "another aspect ratio; calibrate with photographs of that aspect ratio"
+                f"camera: is for {self.width}×{self.height}, not {width}×{height}; calibrate again"
             )
         (fx, _, cx), (_, fy, cy), last = self.matrix
         x, y = (cx + 0.5) * across - 0.5, (cy + 0.5) * down - 0.5
@@ -182,12 +180,9 @@ class Undistorter:
 
 def save_camera(camera: CalibratedCamera, path: Path, *, overwrite: bool = False) -> None:
     """Write a camera as YAML. Raises `OutputError`."""
+    heading = "# A camera, written by `vdet calibrate`; lengths are pixels of its photographs.\n"
     text = yaml.safe_dump(asdict(camera), sort_keys=False)
-    text = (
-        f"# A camera, written by `vdet calibrate`; lengths are pixels of its photographs.\n{text}"
-    )
-    with staged(path, overwrite=overwrite) as temporary:
-        temporary.write_text(text, encoding="utf-8", newline="\n")
+    write_whole(path, heading + text, overwrite=overwrite)
 
 
 def load_camera(path: Path) -> CalibratedCamera:

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vdet.boxes import Float64Array
+from vdet.boxes import Float64Array, Image
 from vdet.config.schema import LaneSettings
 from vdet.lanes.paint import (
     FINE_MARGIN,
@@ -32,7 +32,6 @@ from vdet.lanes.paint import (
     slide_windows,
 )
 from vdet.lanes.top_view import ALONG, TopView
-from vdet.media.images import Image
 
 _MIN_SCALE = 0.3  # the pitch of a real vehicle keeps the scale above this
 _PITCH = 4  # index of the pitch among the five parameters, in the order of `LaneCurves`

@@ -3,12 +3,11 @@
 import cv2
 import numpy as np
 
-from vdet.boxes import Float64Array
+from vdet.boxes import Float64Array, Image
 from vdet.draw.boxes import draw_label, line_width
 from vdet.draw.paint import Color, Surface, draw_lines, shade
 from vdet.lanes.road import Lane, Road
 from vdet.media import Picture
-from vdet.media.images import Image
 
 AREA: Color = (80, 200, 60)
 LINE: Color = (40, 60, 255)

@@ -149,17 +149,12 @@ def fit_ground(pixels: Float64Array, metres: Float64Array, undistorter: Undistor
     straight = undistorter.points(pixels)
     for points, unit in ((straight, "pixel"), (metres, "metres")):
         if any(_is_thin(np.delete(points, row, axis=0)) for row in range(len(points))):
-            raise ConfigError(
-                f"points: all of them, or all but one, lie on a line ({unit}); give points around "
-                "the road, such as four corners"
-            )
+            raise ConfigError(f"points: all, or all but one, lie on a line ({unit}); give corners")
     to_pixels, _ = cv2.findHomography(metres, straight)
     inverse = np.linalg.inv(to_pixels) if to_pixels is not None else np.zeros((3, 3))
     depths = straight @ inverse[2, :2] + inverse[2, 2]
     if not (np.all(depths > 0) or np.all(depths < 0)):
-        raise ConfigError(
-            "points: the horizon would run between them; two may be exchanged, or a number is wrong"
-        )
+        raise ConfigError("points: the horizon would run between them; two may be exchanged")
     to_metres = np.asarray(inverse * np.sign(depths[0]), np.float64)
     off = np.hypot(*(_mapped(to_metres, straight) - metres).T)
     back = np.asarray(np.linalg.inv(to_metres), np.float64)
@@ -170,8 +165,7 @@ def fit_ground(pixels: Float64Array, metres: Float64Array, undistorter: Undistor
     if error > _MOST_ERROR * _length(area):
         worst = int(np.argmax(pixel_off))
         raise ConfigError(
-            f"points[{worst}]: does not fit the others: it lies {off[worst]:.1f} m from where they "
-            "say; check its numbers"
+            f"points[{worst}]: lies {off[worst]:.1f} m from where the others say; check its numbers"
         )
     rows = _mapped(to_metres, straight + np.array((0, 1))) - _mapped(to_metres, straight)
     row = float(np.median(np.hypot(*rows.T)))

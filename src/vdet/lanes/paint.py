@@ -12,9 +12,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from vdet.boxes import Box, Float64Array
+from vdet.boxes import Box, Float64Array, Image
 from vdet.lanes.top_view import ACROSS, ALONG, TopView
-from vdet.media.images import Image
 
 LinePositions = tuple[Float64Array, Float64Array]
 """x of the left and of the right line at each row of the top view, metres, each `(rows,)`."""

@@ -12,14 +12,13 @@ from typing import Any
 import cv2
 import numpy as np
 
-from vdet.boxes import Box, Float64Array
+from vdet.boxes import Box, Float64Array, Image
 from vdet.config.schema import LaneSettings
 from vdet.lanes.camera import CalibratedCamera, Maps, Undistorter, warped
 from vdet.lanes.curves import Equations, FrameFit, LaneCurves, add_earlier, fit_near, fit_new, solve
 from vdet.lanes.paint import hide, paint_mask
 from vdet.lanes.top_view import TopView
 from vdet.media import Picture, Planes
-from vdet.media.images import Image
 
 CARRY = 12
 """Number of frames for which an unseen line is kept."""

@@ -140,9 +140,7 @@ def _straight(paths: Sequence[Float64Array], middle: Float64Array) -> _Lines:
         if width <= _STRAIGHT * length:
             rows.append((*(center - middle), *ways[0], length))
     if len(rows) < _LEAST:
-        raise ConfigError(
-            f"{len(rows)} vehicles drive straight on; take a longer clip, or give four points"
-        )
+        raise ConfigError(f"{len(rows)} vehicles drive straight on; take a longer clip")
     table = np.array(rows, np.float64)
     return _Lines(table[:, :2], table[:, 2:4], table[:, 4])
 

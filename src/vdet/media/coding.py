@@ -11,8 +11,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from vdet.boxes import Float64Array
-from vdet.media.images import Image
+from vdet.boxes import Float64Array, Image
 
 if TYPE_CHECKING:
     import av

@@ -92,8 +92,7 @@ def open_input(path: Path, frame_rate: float | None = None) -> InputContainer:
         raise VideoError(f"{path}: cannot be opened: {error.strerror}") from error
     except av.FFmpegError as error:
         raise VideoError(
-            f"{path}: is not a video, or one that was cut off while it was recorded "
-            f"({error.strerror}); give a file that plays"
+            f"{path}: is not a video, or was cut off ({error.strerror}); give a file that plays"
         ) from error
 
 
@@ -161,10 +160,7 @@ def check_mp4_index(path: Path) -> None:
     except OSError:
         return
     if claimed > max(_MAX_SAMPLES, size):
-        raise VideoError(
-            f"{path}: claims {claimed:,} samples in {size:,} bytes, so it is damaged; "
-            "give a file that plays"
-        )
+        raise VideoError(f"{path}: is damaged: {claimed:,} samples in {size:,} bytes")
 
 
 def begins_like_mp4(path: Path) -> bool:

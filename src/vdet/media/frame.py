@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, cast
 import cv2
 import numpy as np
 
+from vdet.boxes import Image
 from vdet.media.coding import Coding, Layers
-from vdet.media.images import Image, Orientation, split_channels
+from vdet.media.images import Orientation, split_channels
 
 if TYPE_CHECKING:
     import av

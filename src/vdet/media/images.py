@@ -12,14 +12,13 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from vdet.boxes import Image
 from vdet.errors import ImageError
 from vdet.files import read_whole, staged
 
 if TYPE_CHECKING:
     import av
     from PIL.Image import Image as PillowImage
-
-Image = npt.NDArray[np.uint8]
 
 MAX_PICTURE_PIXELS = 2**25
 """A picture of more pixels is not read: an 8K frame has fewer, a decompression bomb far more."""
@@ -42,11 +41,7 @@ _ORIENTATION = 274  # EXIF tag
 
 log = logging.getLogger("vdet")
 
-_TURNS = {
-    90: cv2.ROTATE_90_COUNTERCLOCKWISE,
-    180: cv2.ROTATE_180,
-    270: cv2.ROTATE_90_CLOCKWISE,
-}
+_TURNS = {90: cv2.ROTATE_90_COUNTERCLOCKWISE, 180: cv2.ROTATE_180, 270: cv2.ROTATE_90_CLOCKWISE}
 
 
 @dataclass(frozen=True, slots=True)

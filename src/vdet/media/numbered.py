@@ -9,8 +9,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
-from vdet.errors import VideoError
-from vdet.files import printable
+from vdet.errors import VideoError, printable
 from vdet.media.images import is_picture_name
 
 _PATTERN = re.compile(r"((?:[^%]|%%)*)%(?:0([1-9]\d*))?d((?:[^%]|%%)*)", re.ASCII)
@@ -74,15 +73,9 @@ def find_sequence(path: Path) -> PictureSequence | None:
     step = min((following - number for number, following in pairwise(numbers)), default=1)
     for number, following in pairwise(numbers):
         if following != number + step:
-            raise VideoError(
-                f"{path}: picture {number + step} is missing, between {number} and {following}; "
-                "put a copy of its neighbour there, or number the pictures anew"
-            )
+            raise VideoError(f"{path}: picture {number + step} is missing; put a copy of {number}")
     if step > 1 and len({len(name % number) for number in (numbers[0], numbers[-1])}) > 1:
-        raise VideoError(
-            f"{path}: the numbers rise by {step} and differ in length; fill them all with zeros "
-            "to the same length"
-        )
+        raise VideoError(f"{path}: numbers that rise by {step} need one length; fill with zeros")
     return PictureSequence(f"{_doubled(str(folder.absolute()))}/{name}", numbers[0], step)
 
 
@@ -101,13 +94,10 @@ def _only_pattern(folder: Path, names: list[str]) -> str:
     patterns = _patterns(names)
     if not patterns:
         raise VideoError(
-            f"{folder}: is a folder without numbered pictures; give a video file, or -d DIR for "
-            "the videos in it"
+            f"{folder}: has no numbered pictures; give a video, or -d DIR for those in it"
         )
     if len(patterns) > 1:
-        raise VideoError(
-            f"{folder}: holds pictures with names of several kinds; {_known(folder, names)}"
-        )
+        raise VideoError(f"{folder}: has several kinds of names; {_known(folder, names)}")
     return patterns[0]
 
 

@@ -13,13 +13,14 @@ import av
 import cv2
 import numpy as np
 
+from vdet.boxes import Image
 from vdet.config.schema import InputSettings
 from vdet.errors import VideoError
 from vdet.media.coding import HDR_TRANSFERS, Coding, StandardRange
 from vdet.media.decoder import Decoder, UncountableError
 from vdet.media.demux import MAX_PIXELS, check_size, describe, moving_streams, stated_duration
 from vdet.media.frame import Frame, Picture, Planes, VideoInfo, bgr_of
-from vdet.media.images import Image, Orientation, upright
+from vdet.media.images import Orientation, upright
 from vdet.media.numbered import ASSUMED_RATE, find_sequence
 from vdet.media.restarts import restarts_clock
 
@@ -247,8 +248,7 @@ class VideoReader:
             self._faults.insert(0, f"{damaged} of {total} frames damaged or lost")
         if damaged > math.ceil(self._tolerated * total):
             raise VideoError(
-                f"{self.info.path}: {self._faults[0]}, more than input.max_damaged "
-                f"({self._tolerated:g}) allows; raise it to take what is left"
+                f"{self.info.path}: {self._faults[0]}, more than input.max_damaged allows; raise it"
             )
         restarts = self._decoder.restarts
         if restarts:

@@ -9,8 +9,8 @@ from urllib.parse import quote
 import cv2
 import numpy as np
 
-from vdet.files import escaped
-from vdet.media.images import Image
+from vdet.boxes import Image
+from vdet.errors import counted, escaped
 from vdet.pages.charts import clock
 from vdet.version import __version__
 
@@ -39,11 +39,6 @@ def render(template: str, **values: Any) -> str:
     return environment.get_template(template).render(values, version=__version__)
 
 
-def write_page(html: str, path: Path) -> None:
-    """Write a page into a file; the name of a video in it may be no valid text."""
-    path.write_text(html, encoding="utf-8", errors="backslashreplace")
-
-
 def jpeg_uri(image: Image, most: int | None = None) -> str:
     """Return a BGR uint8 image as a data URI; its longer side gets at most `most` pixels."""
     if most and (scale := most / max(image.shape[:2])) < 1:
@@ -52,16 +47,6 @@ def jpeg_uri(image: Image, most: int | None = None) -> str:
         image = np.asarray(shrunk, np.uint8)
     _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
     return "data:image/jpeg;base64," + base64.b64encode(data.tobytes()).decode("ascii")
-
-
-def counted(count: int, noun: str) -> str:
-    """Return `1 car`, `6 buses`."""
-    return f"{count:,} {named(count, noun)}"
-
-
-def named(count: int, noun: str) -> str:
-    """Return the noun for a number of things: `car`, `cars`, `buses`."""
-    return noun if count == 1 else noun + ("es" if noun.endswith(("s", "x", "ch")) else "s")
 
 
 def link_to(path: Path, folder: Path) -> str:

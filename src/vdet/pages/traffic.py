@@ -7,8 +7,8 @@ from statistics import median
 
 import numpy as np
 
+from vdet.boxes import Image
 from vdet.draw.boxes import color_of
-from vdet.media.images import Image
 from vdet.pages.charts import Series, hex_color
 from vdet.traffic.counts import Counts, Event, vehicle_trips
 from vdet.traffic.paths import draw_flows

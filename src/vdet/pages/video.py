@@ -9,12 +9,13 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from vdet.errors import OutputError
+from vdet.boxes import Image
+from vdet.errors import OutputError, named
+from vdet.files import write_text
 from vdet.media import VideoInfo
-from vdet.media.images import Image
 from vdet.pages import charts
 from vdet.pages.charts import Axis, Plot, Span, Timeline, clock
-from vdet.pages.render import PAGE_NAME, jpeg_uri, link_to, named, render, write_page
+from vdet.pages.render import PAGE_NAME, jpeg_uri, link_to, render
 from vdet.pages.traffic import counts_by_interval, traffic_part
 from vdet.traffic.counts import Counts
 from vdet.traffic.paths import draw_paths
@@ -251,4 +252,4 @@ def write_index(outputs: Mapping[str, Path], target: Path) -> None:
     counts: Counter[str] = Counter()
     for _, _, facts in videos:
         counts.update(facts.counts)
-    write_page(render("index.html", videos=videos, counts=counts), target)
+    write_text(target, render("index.html", videos=videos, counts=counts))

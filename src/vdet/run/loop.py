@@ -11,12 +11,11 @@ from pathlib import Path
 from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
-from vdet.boxes import NO_BOXES, Boxes
+from vdet.boxes import NO_BOXES, Boxes, Image
 from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel, VideoDetector
 from vdet.errors import ConfigError, ImageError, VdetError
 from vdet.media import Frame, VideoInfo
-from vdet.media.images import Image
 from vdet.run.result import FrameResult
 from vdet.run.steps import ParallelStep, Step, StepContext, make_steps
 from vdet.run.threads import map_ordered
@@ -75,8 +74,7 @@ class SearchRate:
                 steps.append(float(frame.time - before))
                 if not 0 < steps[-1] < math.inf:
                     raise ValueError(
-                        f"frame {frame.index} is at {float(frame.time):g} s; "
-                        "give each frame a finite time, later than that of the frame before"
+                        f"frame {frame.index} at {float(frame.time):g} s is not after the last one"
                     )
                 since += steps[-1]
             before, is_searched = frame.time, self._is_due(position, since, steps)

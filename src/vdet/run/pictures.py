@@ -7,13 +7,13 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vdet.boxes import Boxes
+from vdet.boxes import Boxes, Image
 from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel, stage_pictures_of
 from vdet.errors import ImageError
 from vdet.files import OutputFiles
 from vdet.media import Frame, Picture
-from vdet.media.images import PICTURE_SUFFIXES, Image, is_picture_name, read_image
+from vdet.media.images import PICTURE_SUFFIXES, is_picture_name, read_image
 from vdet.progress import Progress, no_progress
 from vdet.run.loop import build, named_errors
 from vdet.run.result import FrameResult
@@ -98,12 +98,57 @@ def plan_pictures(
     return jobs
 
 
+@dataclass(frozen=True, slots=True)
+class PictureSearch:
+    """How pictures are searched; `lanes` is None where lanes are not looked for."""
+
+    model: DetectorModel
+    settings: Settings
+    lanes: "LaneRequest | None" = None
+
+    def detect(self, source: Path, image: Image) -> FrameResult:
+        """Search a picture, BGR uint8 `(H, W, 3)`; threads may call this at once.
+
+        Each detection becomes a track, with ids from 1. `source` is the name of the picture in
+        messages. Raises `ImageError` if it cannot be searched.
+        """
+        return self.begin(source, image)()
+
+    def begin(self, source: Path, image: Image) -> Callable[[], FrameResult]:
+        """Search a picture; return a function that returns the result.
+
+        Threads may call this at once. The functions are called in the order of the pictures:
+        detectors may remember what they have seen.
+        """
+        frame = Frame(0, Fraction(0), Picture(image))
+        with named_errors(source, ImageError):
+            pipeline = build(self.model, self.settings, None, [image], lanes=self.lanes)
+            candidates = pipeline.search((frame, True))
+
+        def finish() -> FrameResult:
+            with named_errors(source, ImageError):
+                return pipeline.complete(pipeline.observe(frame, candidates, source))
+
+        return finish
+
+    @contextmanager
+    def open_sinks(self, outputs: Sequence[Output], *, overwrite: bool) -> Iterator[list[Sink]]:
+        """Give the sinks of outputs that appear together at the end of the block."""
+
+        def stage_pictures(image: Image, detections: Boxes) -> dict[str, Image]:
+            detector = build(self.model, self.settings, None, [image]).detector
+            return stage_pictures_of(detector)(image, detections)
+
+        with OutputFiles(overwrite=overwrite) as files:
+            context = SinkContext(files, self.settings, stage_pictures=stage_pictures)
+            with open_sinks(outputs, context) as sinks:
+                yield sinks
+
+
 def run_pictures(
     jobs: Sequence[PictureJob],
     shared: Sequence[Output],
-    model: DetectorModel,
-    settings: Settings,
-    lanes: "LaneRequest | None" = None,
+    search: PictureSearch,
     *,
     overwrite: bool = False,
     threads: int = 1,
@@ -122,16 +167,16 @@ def run_pictures(
         An output cannot be written.
     """
 
-    def search(job: PictureJob) -> Callable[[], FrameResult] | ImageError:
+    def begin(job: PictureJob) -> Callable[[], FrameResult] | ImageError:
         try:
-            return _searched(job.source, read_image(job.source), model, settings, lanes)
+            return search.begin(job.source, read_image(job.source))
         except ImageError as error:
             return error
 
     failures: list[ImageError] = []
     with (
-        _open_sinks(shared, model, settings, overwrite=overwrite) as sinks,
-        map_ordered(search, jobs, threads) as results,
+        search.open_sinks(shared, overwrite=overwrite) as sinks,
+        map_ordered(begin, jobs, threads) as results,
     ):
         advance = progress(len(jobs))
         for job, searched in results:
@@ -139,7 +184,7 @@ def run_pictures(
                 if isinstance(searched, ImageError):
                     raise searched
                 result = searched()
-                with _open_sinks(job.outputs, model, settings, overwrite=overwrite) as own:
+                with search.open_sinks(job.outputs, overwrite=overwrite) as own:
                     for sink in (*own, *sinks):
                         sink.write(result)
                 on_result(result)
@@ -149,13 +194,7 @@ def run_pictures(
     return failures
 
 
-def run_picture(
-    job: PictureJob,
-    model: DetectorModel,
-    settings: Settings,
-    *,
-    overwrite: bool = False,
-) -> FrameResult:
+def run_picture(job: PictureJob, search: PictureSearch, *, overwrite: bool = False) -> FrameResult:
     """Search a picture, and write its outputs together.
 
     Raises
@@ -166,67 +205,6 @@ def run_picture(
         An output cannot be written.
     """
     results: list[FrameResult] = []
-    for error in run_pictures(
-        [job], (), model, settings, overwrite=overwrite, on_result=results.append
-    ):
+    for error in run_pictures([job], (), search, overwrite=overwrite, on_result=results.append):
         raise error
     return results[0]
-
-
-def detect_picture(
-    source: Path,
-    image: Image,
-    model: DetectorModel,
-    settings: Settings,
-    lanes: "LaneRequest | None" = None,
-) -> FrameResult:
-    """Search a picture, BGR uint8 `(H, W, 3)`; threads may call this at once.
-
-    Each detection becomes a track, with ids from 1. `source` is the name of the picture in
-    messages.
-
-    Raises
-    ------
-    ImageError
-        The picture cannot be searched.
-    """
-    return _searched(source, image, model, settings, lanes)()
-
-
-def _searched(
-    source: Path,
-    image: Image,
-    model: DetectorModel,
-    settings: Settings,
-    lanes: "LaneRequest | None",
-) -> Callable[[], FrameResult]:
-    """Search a picture; return a function that returns the result.
-
-    Threads may call this at once. The functions are called in the order of the pictures: detectors
-    may remember what they have seen.
-    """
-    frame = Frame(0, Fraction(0), Picture(image))
-    with named_errors(source, ImageError):
-        pipeline = build(model, settings, None, [image], lanes=lanes)
-        candidates = pipeline.search((frame, True))
-
-    def finish() -> FrameResult:
-        with named_errors(source, ImageError):
-            return pipeline.complete(pipeline.observe(frame, candidates, source))
-
-    return finish
-
-
-@contextmanager
-def _open_sinks(
-    outputs: Sequence[Output], model: DetectorModel, settings: Settings, *, overwrite: bool
-) -> Iterator[list[Sink]]:
-    def stage_pictures(image: Image, detections: Boxes) -> dict[str, Image]:
-        detector = build(model, settings, None, [image]).detector
-        return stage_pictures_of(detector)(image, detections)
-
-    with (
-        OutputFiles(overwrite=overwrite) as files,
-        open_sinks(outputs, SinkContext(files, settings, stage_pictures=stage_pictures)) as sinks,
-    ):
-        yield sinks

@@ -5,14 +5,13 @@ group `vdet.steps`, is a function that takes a `StepContext` and returns the ste
 settings do not ask for it.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from vdet.config.schema import Settings
-from vdet.errors import ConfigError
 from vdet.media import Frame, VideoInfo
-from vdet.plugins import STEPS, built_in_names, load_plugin
+from vdet.plugins import STEPS, load_plugin
 from vdet.run.result import FrameResult
 from vdet.track.track import Track
 
@@ -66,9 +65,6 @@ class StepContext:
     ground: "GroundRequest | None" = None
 
 
-StepKind = Callable[[StepContext], Step | None]
-
-
 def make_steps(context: StepContext, others: Sequence[Step] = ()) -> list[Step]:
     """Make the steps that the settings ask for; `others` come before the counting, at the end.
 
@@ -79,10 +75,9 @@ def make_steps(context: StepContext, others: Sequence[Step] = ()) -> list[Step]:
     ConfigError
         There is no step with a name in `settings.steps.names`.
     """
-    *before, last = built_in_names(STEPS)
-    names = *before, *context.settings.steps.names, last
-    *steps, counting = [load_plugin(STEPS, name)(context) for name in names]
-    return [step for step in (*steps, *others, counting) if step is not None]
+    chosen = [load_plugin(STEPS, name) for name in context.settings.steps.names]
+    steps = [make(context) for make in (lane_step, region_step, speed_step, *chosen)]
+    return [step for step in (*steps, *others, count_step(context)) if step is not None]
 
 
 class LaneStep:
@@ -200,7 +195,4 @@ def count_step(context: StepContext) -> Step | None:
         return None
     from vdet.traffic.counter import VehicleCounter
 
-    try:
-        return CountStep(VehicleCounter(counts, context.width, context.height))
-    except ConfigError as error:
-        raise ConfigError(f"counts.{error}") from error
+    return CountStep(VehicleCounter(counts, context.width, context.height))

@@ -16,7 +16,7 @@ from vdet.detect.factory import as_model
 from vdet.detect.protocol import DetectorModel, stage_pictures_of
 from vdet.errors import FrameSizeError, VideoError
 from vdet.files import OutputFiles
-from vdet.media import VideoReader
+from vdet.media.reader import VideoReader
 from vdet.progress import Progress, no_progress
 from vdet.run.loop import Pipeline, build, named_errors, peek
 from vdet.run.result import FrameResult
@@ -181,8 +181,7 @@ def open_video(
                 yield OpenVideo(reader, pipeline, results)
     except StalledError as error:
         raise VideoError(
-            f"{job.source}: nothing could be read or written for {timeout:g} s; check the disk or "
-            "the network"
+            f"{job.source}: nothing was read or written for {timeout:g} s; check the disk"
         ) from error
 
 

@@ -10,9 +10,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from vdet.boxes import Float64Array
+from vdet.boxes import Float64Array, Image
 from vdet.draw.paint import Color
-from vdet.media.images import Image
 
 NEAR = 0.5
 """Metres; nothing nearer than this is drawn."""

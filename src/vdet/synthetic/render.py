@@ -12,12 +12,11 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from vdet.boxes import Float32Array
+from vdet.boxes import Float32Array, Image
 from vdet.config.schema import OutputSettings
 from vdet.files import staged
-from vdet.media import Frame, Picture, VideoInfo, VideoWriter
-from vdet.media.images import Image
-from vdet.media.writer import may_replace_video
+from vdet.media import Frame, Picture, VideoInfo
+from vdet.media.writer import VideoWriter, may_replace_video
 from vdet.synthetic.camera import NEAR, distances, mixed, shaded
 from vdet.synthetic.scene import LINE_WIDTH, PERIOD, Carriageway, LaneLine, Scene
 from vdet.synthetic.vehicle import draw_vehicle

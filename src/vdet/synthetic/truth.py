@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 
 from vdet.boxes import Box
-from vdet.files import staged
+from vdet.files import write_whole
 from vdet.synthetic.camera import fill_mask
 from vdet.synthetic.scene import Scene
 from vdet.synthetic.vehicle import outlines
@@ -78,5 +78,4 @@ def write_truth(path: Path, scene: Scene, *, overwrite: bool = False) -> None:
             flag = int(must_be_found(vehicle, scene.camera.height))
             last = f"{flag},{_CAR},{1 - vehicle.hidden:.3f}\n"
             lines.append(f"{index + 1},{vehicle.id},{place},{last}")
-    with staged(path, overwrite=overwrite) as temporary:
-        temporary.write_text("".join(lines), encoding="ascii", newline="\n")
+    write_whole(path, "".join(lines), overwrite=overwrite)

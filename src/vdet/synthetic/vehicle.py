@@ -11,9 +11,8 @@ from itertools import pairwise
 import cv2
 import numpy as np
 
-from vdet.boxes import Float64Array
+from vdet.boxes import Float64Array, Image
 from vdet.draw.paint import Color
-from vdet.media.images import Image
 from vdet.synthetic.camera import NEAR, PinholeCamera, beyond_near, fill, mixed, shaded
 from vdet.synthetic.scene import Body, Scene, SceneVehicle, Waypoint
 

@@ -186,8 +186,7 @@ class _Group:
         for frame in frames:
             if not latest <= frame.time < math.inf:
                 raise TruthError(
-                    f"frame {frame.index}: its time is {frame.time:g} s, after {latest:g} s; give "
-                    "times in seconds that never run backwards"
+                    f"frame {frame.index}: {frame.time:g} s is before {latest:g} s; times must rise"
                 )
             latest = frame.time
             self._counter.update(replace(frame, time=latest + shift) if shift else frame)

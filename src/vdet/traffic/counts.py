@@ -318,8 +318,7 @@ class _Axis:
         elif len(videos) > 1:
             if interval is not None:
                 raise ConfigError(
-                    "intervals over several videos need the time at which each begins; give "
-                    "--begin with the pattern of the times in their names, or no --interval"
+                    "intervals over several videos need the time at which each begins; give --begin"
                 )
             self._is_timed = False
             ends = accumulate(each.last - each.first for each in videos)

@@ -2,9 +2,8 @@
 
 from dataclasses import dataclass
 
-from vdet.boxes import Box
+from vdet.boxes import Box, Image
 from vdet.media import Picture
-from vdet.media.images import Image
 from vdet.track.track import FrameTracks, Track
 
 _PADDING = 0.1  # margin around a vehicle, as a share of the width and the height of its box

@@ -6,10 +6,10 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from vdet.boxes import Image
 from vdet.draw.boxes import BLACK, LINE, WHITE, draw_label, draw_line, draw_zone, line_width
 from vdet.draw.paint import Color, draw_arrow, draw_lines
 from vdet.lanes.ground import Ground
-from vdet.media.images import Image
 from vdet.polygons import Point
 from vdet.traffic.borders import PlacedLine, Zone
 from vdet.traffic.records import VehicleRecord

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from vdet.errors import OutputError
+from vdet.files import write_text
 
 SUFFIXES = (".csv", ".json")
 
@@ -52,7 +53,7 @@ def plain_moment(value: Any) -> Any:
 def write_json(path: Path, value: Any) -> None:
     """Write JSON, indented."""
     text = json.dumps(value, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
-    path.write_text(text, encoding="utf-8", errors="backslashreplace")
+    write_text(path, text)
 
 
 def join(

@@ -9,7 +9,7 @@ from benchmarks.patch_search import PatchSearch
 
 from drawn_patches import draw_patches
 from seed import SEED
-from vdet.boxes import Float32Array
+from vdet.boxes import Float32Array, Image
 from vdet.config.svm import FeatureSettings, WindowSettings
 from vdet.detect.svm.dense_search import DenseSearch
 from vdet.detect.svm.features import FeatureExtractor, to_patch
@@ -17,7 +17,6 @@ from vdet.detect.svm.model import BoxRegression, LinearModel
 from vdet.detect.svm.pyramid import FramePyramid
 from vdet.detect.svm.windows import WindowGrid, lay_grid
 from vdet.media import Picture, Planes
-from vdet.media.images import Image
 from vdet.synthetic.random_scenes import demo_scene
 from vdet.synthetic.render import render
 

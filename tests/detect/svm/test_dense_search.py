@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from benchmarks.patch_search import PatchSearch
 
+from vdet.boxes import Image
 from vdet.config.svm import FeatureSettings, HistogramSettings, HogSettings
 from vdet.detect.svm.dense_search import DenseSearch
 from vdet.detect.svm.features import FeatureExtractor
@@ -17,7 +18,6 @@ from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.pyramid import FramePyramid
 from vdet.detect.svm.windows import WindowGrid
 from vdet.media import Picture
-from vdet.media.images import Image
 
 FEATURES = FeatureSettings(
     patch=64, hog=HogSettings(cell=8), histogram=HistogramSettings(bins=None)

@@ -8,7 +8,7 @@ import pytest
 
 from boxing import moved_to, rounded
 from red_cars import CAR, HEIGHT, SETTINGS, THREE_SETS, WIDTH, by_perspective, red_finder, road
-from vdet.boxes import Box, Boxes
+from vdet.boxes import Box, Boxes, Image
 from vdet.config.schema import SvmSettings
 from vdet.config.svm import StillSettings
 from vdet.detect.svm.detector import SvmModel
@@ -17,7 +17,6 @@ from vdet.detect.svm.search import FrameSearch
 from vdet.detect.svm.stages import Trace
 from vdet.errors import FrameSizeError
 from vdet.media import Picture
-from vdet.media.images import Image
 
 MODEL = red_finder()
 ROWS = SETTINGS.svm

@@ -19,7 +19,7 @@ from detect.svm.engine_comparison import (
     with_boxes,
 )
 from seed import SEED
-from vdet.boxes import from_sizes, iou_matrix
+from vdet.boxes import Image, from_sizes, iou_matrix
 from vdet.config.schema import SvmSettings
 from vdet.config.svm import FeatureSettings, HistogramSettings, HogSettings, SearchSettings
 from vdet.detect.svm.dense_search import DenseSearch
@@ -30,7 +30,6 @@ from vdet.detect.svm.search import Engine, FrameSearch
 from vdet.detect.svm.windows import WindowGrid, Windows, lay_grids
 from vdet.media import Picture, Planes
 from vdet.media.coding import Coding
-from vdet.media.images import Image
 
 SHIPPED = {"seed": SEED.svm, "default": SvmSettings()}
 GRIDS = {

@@ -7,8 +7,8 @@ import cv2
 import numpy as np
 import pytest
 
+from vdet.boxes import Image
 from vdet.detect.svm.horizon import find_horizon
-from vdet.media.images import Image
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.random_scenes import demo_scene, empty_road
 from vdet.synthetic.render import Renderer, frames

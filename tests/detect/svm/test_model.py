@@ -225,7 +225,7 @@ def test_a_missing_model_is_named(path: Path) -> None:
 @pytest.mark.parametrize("data", [b"", b"not a zip file", b"PK\x05\x06" + bytes(18)])
 def test_a_file_that_is_not_a_zip_file_is_no_model(path: Path, data: bytes) -> None:
     path.write_bytes(data)
-    with pytest.raises(ModelError, match="is not a vdet model, or is damaged; make one with"):
+    with pytest.raises(ModelError, match="is not a vdet model, or is damaged; train one"):
         load_model(path)
 
 
@@ -248,7 +248,7 @@ def test_a_model_cut_off_anywhere_is_damaged(path: Path) -> None:
         (b"{not json", "is not a vdet model"),
         (b"\xff\xfe\xff", "is not a vdet model"),
         (b"[" * 100_000, "is not a vdet model"),
-        (header_of(version=1), r"of version 1, this program reads version 2; train it again"),
+        (header_of(version=1), r"of version 1, not 2; train it again"),
         (header_of(version=[1]), r"of version \[1\]"),
         (header_of(version="1"), "of version '1'"),
         (header_of(version=...), "is not a vdet model"),
@@ -280,13 +280,13 @@ def test_a_model_without_one_of_its_parts_is_damaged(path: Path, missing: str) -
 @pytest.mark.parametrize(
     ("name", "array", "message"),
     [
-        ("weights", np.zeros((2, 23), np.float32), r"shape \(2, 23\), its features need \(2, 24\)"),
-        ("weights", np.zeros((3, 24), np.float32), r"shape \(3, 24\), its features need \(2, 24\)"),
-        ("weights", np.zeros(24, np.float32), "its features need"),
-        ("weights", np.zeros((2, 24, 1), np.float32), "its features need"),
+        ("weights", np.zeros((2, 23), np.float32), r"shape \(2, 23\) instead of \(2, 24\)"),
+        ("weights", np.zeros((3, 24), np.float32), r"shape \(3, 24\) instead of \(2, 24\)"),
+        ("weights", np.zeros(24, np.float32), "instead of"),
+        ("weights", np.zeros((2, 24, 1), np.float32), "instead of"),
         ("weights", np.zeros((2, 24)), "weights are damaged"),
         ("weights", np.full((2, 24), np.nan, np.float32), "weights are damaged"),
-        ("biases", np.zeros((2, 1), np.float32), "its features need"),
+        ("biases", np.zeros((2, 1), np.float32), "instead of"),
         ("biases", np.array([0, np.inf], np.float32), "biases are damaged"),
         ("biases", np.zeros(2, "S4"), "biases are damaged"),
         ("biases", np.zeros(2, [("a", "f4")]), "biases are damaged"),

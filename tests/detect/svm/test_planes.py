@@ -9,7 +9,7 @@ from codings import in_any_coding
 from detect.svm.engine_comparison import fitted, log_odds, road
 from red_cars import CAR, HEIGHT, SETTINGS, THREE_SETS, WIDTH, red_finder
 from red_cars import road as plain_road
-from vdet.boxes import Float32Array, Float64Array, iou_matrix
+from vdet.boxes import Float32Array, Float64Array, Image, iou_matrix
 from vdet.config.schema import Settings, SvmSettings
 from vdet.config.svm import FeatureSettings
 from vdet.detect.factory import load_detector
@@ -17,7 +17,6 @@ from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.search import FrameSearch
 from vdet.media import Picture, Planes
 from vdet.media.coding import Coding
-from vdet.media.images import Image
 from vdet.synthetic.random_scenes import demo_scene
 from vdet.synthetic.truth import true_boxes
 

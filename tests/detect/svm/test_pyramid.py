@@ -8,12 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from codings import CODINGS, FULL, HD, LIMITED, in_any_coding, smooth_picture
+from vdet.boxes import Image
 from vdet.config.svm import ColorSpace, FeatureSettings
 from vdet.detect.svm.features import Channels, resize, split
 from vdet.detect.svm.pyramid import FramePyramid
 from vdet.media import Picture, Planes
 from vdet.media.coding import Coding
-from vdet.media.images import Image
 
 FEATURES = FeatureSettings(halved=())
 RGB = FeatureSettings(color_space="RGB", halved=())

@@ -7,14 +7,15 @@ import numpy as np
 import pytest
 
 from red_cars import NullDetector, red_finder
-from vdet.boxes import NO_BOXES, Boxes
+from vdet.boxes import NO_BOXES, Boxes, Image
 from vdet.config.schema import SvmSettings
 from vdet.detect.factory import load_detector, model_file
 from vdet.detect.protocol import DetectorModel
 from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.road_check import RoadCheck
-from vdet.media import Picture, VideoReader
-from vdet.media.images import Image, read_image
+from vdet.media import Picture
+from vdet.media.images import read_image
+from vdet.media.reader import VideoReader
 
 PICTURE = Picture(np.zeros((100, 200, 3), np.uint8))
 CARS = ((10, 10, 40, 30), (60, 10, 90, 30), (110, 10, 140, 30))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import seed
-from vdet.boxes import Int32Array
+from vdet.boxes import Image, Int32Array
 from vdet.config.schema import SvmSettings
 from vdet.config.section import scale_lengths
 from vdet.config.svm import (
@@ -22,7 +22,6 @@ from vdet.detect.svm.search import Engine, FrameSearch
 from vdet.detect.svm.windows import Windows, lay_grids
 from vdet.errors import FrameSizeError, ImageError
 from vdet.media import Picture
-from vdet.media.images import Image
 
 Sides = tuple[float, float, float, float]
 
@@ -209,17 +208,13 @@ class TestVehicles:
 
 @pytest.mark.parametrize(("width", "height"), [(63, 720), (1, 1), (2, 2), (40, 2000)])
 def test_a_frame_without_room_for_any_window_is_refused(width: int, height: int) -> None:
-    with pytest.raises(
-        FrameSizeError, match=rf"no search window fits .* {width}×{height} pixels; give"
-    ):
+    with pytest.raises(FrameSizeError, match=rf"no search window fits .* {width}×{height} pixels"):
         FrameSearch(model_of(COLOUR), SEED, width, height)
 
 
 def test_a_frame_with_too_many_windows_is_refused() -> None:
     settings = SvmSettings(search=fixed(WindowSettings(size=8, overlap=0.8, top=0, bottom=720)))
-    with pytest.raises(
-        ImageError, match=r"^907,649 search windows .* 1280×720 .* 100,000"
-    ) as error:
+    with pytest.raises(ImageError, match=r"^907,649 windows in 1280×720") as error:
         FrameSearch(model_of(COLOUR), settings, 1280, 720)
     assert not isinstance(error.value, FrameSizeError)
-    assert "give larger steps or fewer rows in detector.search.windows" in str(error.value)
+    assert "give larger steps" in str(error.value)

@@ -5,7 +5,7 @@ import pytest
 
 from boxing import moved_to
 from red_cars import CAR, HEIGHT, PERSPECTIVE, SCALE, SETTINGS, WIDTH, red_finder, road
-from vdet.boxes import Box
+from vdet.boxes import Box, Image
 from vdet.config.schema import SvmSettings
 from vdet.config.section import scale_lengths
 from vdet.config.svm import WindowSettings
@@ -15,7 +15,6 @@ from vdet.detect.svm.stages import Trace, blend_heat, stage_pictures
 from vdet.detect.svm.windows import Windows
 from vdet.draw.boxes import GREEN, color_of, draw_box, draw_label
 from vdet.media import Picture
-from vdet.media.images import Image
 
 NAMES = ["windows", "hits", "heat"]
 ROWS = SETTINGS.svm

@@ -84,10 +84,7 @@ def test_the_folded_model_gives_the_probabilities_of_scikit_learn(ensemble: bool
 def test_too_few_patches_of_a_class_for_the_folds_are_an_error(vehicles: int, others: int) -> None:
     vehicle = np.array([True] * vehicles + [False] * others, bool)
     vectors = np.ones((len(vehicle), 24), np.float32)
-    message = (
-        rf"a class has {min(vehicles, others)} training patches, calibration needs 3; "
-        "give more patches"
-    )
+    message = rf"a class has {min(vehicles, others)} training patches, and 3 are needed; give more"
     with pytest.raises(DataError, match=message):
         fit(vectors, vehicle)
 

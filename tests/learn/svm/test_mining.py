@@ -1,4 +1,4 @@
-"""Patches from labelled videos and pictures, without a model."""
+"""Patches from labelled videos and pictures, where every window is a hit."""
 
 import re
 import zipfile
@@ -9,19 +9,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vdet.boxes import Box
-from vdet.config.schema import OutputSettings, Settings
+from vdet.boxes import Box, Image
+from vdet.config.loading import load_settings
+from vdet.config.schema import OutputSettings, SvmSettings
+from vdet.detect.svm.kind import load_svm
 from vdet.errors import DataError, VideoError
 from vdet.learn.svm.choosing import MOST, Most
 from vdet.learn.svm.dataset import find_patches, read_patches
 from vdet.learn.svm.mining import PictureSource, VideoSource, mine
-from vdet.media import Frame, Picture, VideoInfo, VideoWriter
-from vdet.media.images import Image, write_image
+from vdet.media import Frame, Picture, VideoInfo
+from vdet.media.images import write_image
+from vdet.media.writer import VideoWriter
 
 WIDTH, HEIGHT, FRAMES = 640, 360, 5
 CAR = Box.sized(270, 190, 100, 70)
 TREE = Box.sized(60, 190, 96, 70)
 RED, GREEN = (0, 0, 255), (0, 160, 0)
+MODEL = load_svm(SvmSettings(), None)
+EVERY = load_settings(assignments=["train.mine.probability=0"])
 NAME = re.compile(r"(?:frame|picture)(\d{6})_x(-?\d+)_y(\d+)_s(\d{4})\.png")
 
 
@@ -68,7 +73,7 @@ def test_windows_on_the_truth_are_vehicles_and_others_false_alarms(
     video: VideoSource, tmp_path: Path
 ) -> None:
     archive = tmp_path / "mined.zip"
-    frames, counts = mine([video], archive, Settings())
+    frames, counts = mine([video], archive, EVERY, MODEL)
     assert frames == 3
     for box in boxes_of(archive, "vehicles/mined_road"):
         assert box.iou(CAR) > 0.35
@@ -84,7 +89,7 @@ def test_windows_on_the_truth_are_vehicles_and_others_false_alarms(
 
 def test_nothing_wanted_is_an_error(video: VideoSource, tmp_path: Path) -> None:
     with pytest.raises(DataError, match=r"road\.mp4: no window fits a vehicle or is a false alarm"):
-        mine([video], tmp_path / "mined.zip", Settings(), most=Most(0, 0, 0))
+        mine([video], tmp_path / "mined.zip", EVERY, MODEL, most=Most(0, 0, 0))
     assert not (tmp_path / "mined.zip").exists()
 
 
@@ -96,8 +101,8 @@ def test_frames_too_small_for_any_window_are_an_error_with_the_name_of_the_video
     with VideoWriter(source, info, OutputSettings()) as writer:
         writer.write(Frame(0, Fraction(0), Picture(np.zeros((8, 8, 3), np.uint8))))
     truth.write_text("1,1,1,1,4,4,1,3,1\n")
-    with pytest.raises(VideoError, match=r"tiny\.mp4: no search window fits into .* 8×8"):
-        mine([VideoSource(source, truth)], tmp_path / "mined.zip", Settings())
+    with pytest.raises(VideoError, match=r"tiny\.mp4: no search window fits into 8×8"):
+        mine([VideoSource(source, truth)], tmp_path / "mined.zip", EVERY, MODEL)
     assert not (tmp_path / "mined.zip").exists()
 
 
@@ -122,7 +127,7 @@ class TestPictures:
     ) -> None:
         sources = (PictureSource(folder), replace(video, last=1))
         output = tmp_path / "mined.zip"
-        assert mine(sources, output, Settings())[0] == 2
+        assert mine(sources, output, EVERY, MODEL)[0] == 2
         vehicles = boxes_of(output, "vehicles/mined_city")
         assert vehicles == boxes_of(output, "vehicles/mined_road") != []
         alarms = boxes_of(output, "non-vehicles/mined_city")
@@ -130,4 +135,4 @@ class TestPictures:
 
     def test_two_sources_of_one_name_are_refused(self, folder: Path, tmp_path: Path) -> None:
         with pytest.raises(DataError, match="2 sources are named city; rename them"):
-            mine([PictureSource(folder)] * 2, tmp_path / "mined.zip", Settings())
+            mine([PictureSource(folder)] * 2, tmp_path / "mined.zip", EVERY, MODEL)

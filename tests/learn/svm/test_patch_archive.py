@@ -4,8 +4,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vdet.boxes import Image
 from vdet.learn.svm.dataset import Sides, find_patches, patch_archive, read_patches
-from vdet.media.images import Image
 
 NAMES = ("vehicles/a/1.png", "boxes/a/2.png", "non-vehicles/a/3.png")
 BOXES: tuple[Sides | None, ...] = ((-0.5, -0.25, 0.5, 0.12344), (None, -0.25, 0.5, 0.0), None)

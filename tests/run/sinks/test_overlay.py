@@ -10,7 +10,7 @@ import pytest
 
 from red_cars import CAR, HEIGHT, WIDTH, road
 from run.red_runs import VIDEO, result_of
-from vdet.boxes import Box
+from vdet.boxes import Box, Image
 from vdet.config.schema import DrawSettings, LaneSettings, Settings
 from vdet.draw.boxes import BLACK, color_of, draw_box, draw_label
 from vdet.lanes.camera import CalibratedCamera
@@ -18,7 +18,6 @@ from vdet.lanes.road import Lane, LaneRequest, Road, RoadFinder
 from vdet.media import Picture, VideoInfo
 from vdet.media.coding import Coding
 from vdet.media.frame import Planes
-from vdet.media.images import Image
 from vdet.run.result import FrameResult
 from vdet.run.sinks.drawn import Overlay, time_text
 from vdet.track.track import Track

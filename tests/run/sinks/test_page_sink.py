@@ -11,8 +11,9 @@ from pages.html import Elements
 from red_cars import CAR, SETTINGS, road
 from run.red_runs import COUNT, outputs, result_of, run_red, video_info, write
 from running import names
+from vdet.boxes import Image
 from vdet.config.places import RegionsSettings
-from vdet.media.images import Image, decode_image, write_image
+from vdet.media.images import decode_image, write_image
 from vdet.pages.video import read_facts
 from vdet.run.sinks.protocol import Output
 from vdet.run.video import VideoJob

@@ -11,9 +11,9 @@ from boxing import rounded
 from red_cars import CAR, HEIGHT, SETTINGS, WIDTH, road
 from run.red_runs import model_for, result_of, write
 from run.sinks.test_overlay import LANE, LENS, road_seen
-from vdet.boxes import Box, Boxes
+from vdet.boxes import Box, Boxes, Image
 from vdet.lanes.road import Lane, Road
-from vdet.media.images import Image, read_image
+from vdet.media.images import read_image
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output
 

@@ -118,7 +118,7 @@ def test_json_lines_tell_the_lane_where_it_was_looked_for(tmp_path: Path) -> Non
 
 def test_formats_that_describe_the_video_are_not_for_pictures(tmp_path: Path) -> None:
     for ending in (".coco.json", ".xml", ".yolo.zip"):
-        with pytest.raises(OutputError, match=r"is for videos; give another format for pictures"):
+        with pytest.raises(OutputError, match=r"is for videos; give another format"):
             write(Output("tracks", tmp_path / f"a{ending}"), RESULTS, video=None)
     assert list(tmp_path.iterdir()) == []
 

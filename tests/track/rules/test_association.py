@@ -5,9 +5,8 @@ import pytest
 from boxing import moved_to
 from seed import SEED_TRACKER
 from textured_road import textured_road
-from vdet.boxes import Box
+from vdet.boxes import Box, Image
 from vdet.config.tracker import RulesTrackerSettings
-from vdet.media.images import Image
 from vdet.track.rules.association import (
     Association,
     combine,

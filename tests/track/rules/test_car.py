@@ -3,8 +3,7 @@ import pytest
 
 from boxing import moved_to
 from seed import SEED_TRACKER, tracker_but
-from vdet.boxes import Box
-from vdet.media.images import Image
+from vdet.boxes import Box, Image
 from vdet.track.rules.car import Car, Region, find_template
 
 BOX = Box.sized(100, 60, 80, 60)

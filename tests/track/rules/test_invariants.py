@@ -5,10 +5,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from seed import tracker_but
-from vdet.boxes import Box, Boxes
+from vdet.boxes import Box, Boxes, Image
 from vdet.config.tracker import RulesTrackerSettings
 from vdet.media import Picture
-from vdet.media.images import Image
 from vdet.track.rules.tracker import RulesTracker
 from vdet.track.track import Track
 

@@ -7,9 +7,8 @@ from boxing import moved_to
 from seed import SEED_TRACKER, tracker_but
 from textured_road import textured_road
 from track.rules.scenes import detections
-from vdet.boxes import NO_BOXES, Box, Boxes
+from vdet.boxes import NO_BOXES, Box, Boxes, Image
 from vdet.media import Picture
-from vdet.media.images import Image
 from vdet.track.rules.car import Region
 from vdet.track.rules.tracker import RulesTracker, large_enough
 from vdet.track.track import Track

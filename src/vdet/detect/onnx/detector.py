@@ -9,7 +9,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from vdet.boxes import Box, Boxes, Float32Array, Int32Array, Int64Array, visible
+from vdet.boxes import Box, Boxes, Float32Array, Image, Int32Array, Int64Array, visible
 from vdet.config.schema import NetworkSettings
 from vdet.detect.classes import our_name
 from vdet.detect.factory import DetectorKind
@@ -19,7 +19,6 @@ from vdet.detect.onnx.session import Session
 from vdet.draw.boxes import GREEN, draw_box
 from vdet.errors import ModelError
 from vdet.media import Picture
-from vdet.media.images import Image
 
 _MOST_BOXES = 10_000  # before suppression, those of the highest scores
 
@@ -41,10 +40,7 @@ class NetworkModel:
         names, wanted = self._recognized.names, settings.classes
         self._numbers = np.array([*our_classes(names, wanted), -1], np.int32)
         if (self._numbers < 0).all():
-            raise ModelError(
-                f"{path}: knows none of detector.classes ({', '.join(wanted)}); it knows "
-                f"{', '.join(names)}"
-            )
+            raise ModelError(f"{path}: knows none of detector.classes, only {', '.join(names)}")
 
     def for_video(self, width: int, height: int, images: Sequence[Image]) -> "NetworkDetector":  # noqa: ARG002
         """Return a detector for frames of one size."""

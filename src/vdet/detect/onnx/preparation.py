@@ -7,9 +7,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from vdet.boxes import Float32Array
+from vdet.boxes import Float32Array, Image
 from vdet.media import Picture
-from vdet.media.images import Image
 
 _MULTIPLE = 32  # of pixels: the stride of the coarsest cells
 GREY = 114

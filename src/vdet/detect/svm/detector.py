@@ -7,7 +7,7 @@ from dataclasses import astuple, dataclass, replace
 
 import numpy as np
 
-from vdet.boxes import Boxes, are_nested
+from vdet.boxes import Boxes, Image, are_nested
 from vdet.config.schema import SvmSettings
 from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
 from vdet.detect.svm.heat import Heat, HeatHistory, HotRegion, find_regions
@@ -19,7 +19,6 @@ from vdet.detect.svm.stages import Trace, stage_pictures
 from vdet.detect.svm.votes import Votes, split_regions
 from vdet.detect.svm.windows import Windows
 from vdet.media import Picture
-from vdet.media.images import Image
 
 log = logging.getLogger("vdet")
 

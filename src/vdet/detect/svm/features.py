@@ -10,9 +10,9 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from vdet.boxes import Float32Array
+from vdet.boxes import Float32Array, Image
 from vdet.config.svm import FeatureSettings
-from vdet.media.images import Image, split_channels
+from vdet.media.images import split_channels
 
 Channels = tuple[Image, Image, Image]
 """The channels of a colour space, uint8 `(H, W)` each; of those in `halved`, `(H / 2, W / 2)`."""

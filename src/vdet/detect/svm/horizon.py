@@ -9,8 +9,7 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-from vdet.boxes import Float64Array
-from vdet.media.images import Image
+from vdet.boxes import Float64Array, Image
 
 DEFAULT_HORIZON = 0.58
 """Where dashboard cameras usually have it, share of the height; used where none is found."""

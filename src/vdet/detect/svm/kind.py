@@ -1,17 +1,15 @@
 """The linear model as the kind of detector `svm`: its model files, and how it is loaded."""
 
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 from vdet.config.schema import NetworkSettings, SvmSettings
 from vdet.config.svm import FeatureSettings
-from vdet.detect.factory import DetectorKind
-from vdet.detect.protocol import DetectorModel
+from vdet.detect.factory import DetectorKind, load_detector
 from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.model import load_model
 from vdet.detect.svm.road_check import RoadCheck
 from vdet.errors import ModelError
-from vdet.plugins import DETECTORS, load_plugin
 
 _MODELS = Path(__file__).parents[2] / "models"
 
@@ -27,10 +25,7 @@ def shipped_model(settings: SvmSettings) -> Path:
     for path in sorted(_MODELS.glob("*.npz")):
         if load_model(path).features == settings.features:
             return path
-    raise ModelError(
-        "no shipped model was trained with the features in the settings; give --model, or train "
-        "one with these settings"
-    )
+    raise ModelError("no shipped model has these features; give --model, or train one")
 
 
 def load_svm(settings: SvmSettings, path: Path | None) -> SvmModel:
@@ -45,14 +40,8 @@ def load_svm(settings: SvmSettings, path: Path | None) -> SvmModel:
         The file cannot be used, or the model was trained with other features.
     """
     model = load_model(path or shipped_model(settings), requested_features(settings))
-    check = RoadCheck(cache(_load_network)) if path is None else None
-    return SvmModel(model, settings, check=check)
-
-
-def _load_network() -> DetectorModel:
-    """Load the shipped network."""
-    network: DetectorKind = load_plugin(DETECTORS, "net")
-    return network.load(NetworkSettings(), None)
+    network = cache(partial(load_detector, NetworkSettings()))
+    return SvmModel(model, settings, check=RoadCheck(network) if path is None else None)
 
 
 def requested_features(settings: SvmSettings) -> FeatureSettings | None:

@@ -125,13 +125,10 @@ def load_model(path: Path, features: FeatureSettings | None = None) -> LinearMod
     except ModelError as error:
         raise ModelError(f"{path}: {error}; train it again") from error
     except Exception as error:  # NumPy, json and pydantic raise a dozen kinds on damaged data
-        raise ModelError(
-            f"{path}: is not a vdet model, or is damaged; make one with vdet train"
-        ) from error
+        raise ModelError(f"{path}: is not a vdet model, or is damaged; train one") from error
     if features is not None and features != model.features:
         raise ModelError(
-            f"{path}: was trained with other features ({_difference(model.features, features)}); "
-            "remove these settings, or train a model with them"
+            f"{path}: was trained with other features: {_difference(model.features, features)}"
         )
     return model
 
@@ -141,10 +138,7 @@ def _read(archive: zipfile.ZipFile) -> LinearModel:
     if header["format"] != FORMAT or not isinstance(header["provenance"], dict):
         raise ValueError("not the header of a model")
     if header["version"] != FORMAT_VERSION:
-        raise ModelError(
-            f"is a model of version {header['version']!r:.20}, this program reads version "
-            f"{FORMAT_VERSION}"
-        )
+        raise ModelError(f"is of version {header['version']!r:.20}, not {FORMAT_VERSION}")
     # The shipped models name the size of small pictures, which are features no more. That of the
     # original does not say which channels are halved: none is.
     known = {"halved": ()} | header["features"]
@@ -175,9 +169,7 @@ def _check_arrays(model: LinearModel) -> None:
     layout = Layout.of(model.features)
     expected = (members, layout.length)
     if not 1 <= members <= MAX_MEMBERS or model.weights.shape != expected:
-        raise ModelError(
-            f"has weights of shape {model.weights.shape}, its features need {expected}"
-        )
+        raise ModelError(f"has weights of shape {model.weights.shape} instead of {expected}")
     for name in _ARRAYS:
         _check_array(getattr(model, name), expected if name == "weights" else (members,), name)
     if model.box_regression is not None:

@@ -3,10 +3,10 @@
 import cv2
 import numpy as np
 
+from vdet.boxes import Image
 from vdet.config.svm import FeatureSettings
 from vdet.detect.svm.features import Channels, halve, resize, split
 from vdet.media import Picture, Planes
-from vdet.media.images import Image
 
 _STREAM_SPACE = "YCrCb"  # the colour space whose channels planes have
 

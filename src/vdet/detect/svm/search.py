@@ -71,16 +71,10 @@ class FrameSearch:
     ) -> None:
         self.grids = tuple(lay_grids(settings, model.features, width, height, horizon=horizon))
         if not self.grids:
-            raise FrameSizeError(
-                f"no search window fits into a frame of {width}×{height} pixels; give a larger "
-                "frame, or smaller windows in detector.search.windows or "
-                "detector.search.perspective.sizes"
-            )
+            raise FrameSizeError(f"no search window fits into {width}×{height} pixels")
         if (count := sum(map(len, self.grids))) > MAX_WINDOWS:
             raise ImageError(
-                f"{count:,} search windows would be laid over a frame of {width}×{height} pixels, "
-                f"more than {MAX_WINDOWS:,}; give larger steps or fewer rows in "
-                "detector.search.windows and detector.search.perspective"
+                f"{count:,} windows in {width}×{height} pixels are too many; give larger steps"
             )
         self._searches = [engine(model, grid) for grid in self.grids]
         self._boxes = np.concatenate([grid.boxes for grid in self.grids])

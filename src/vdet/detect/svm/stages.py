@@ -6,11 +6,10 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from vdet.boxes import Box
+from vdet.boxes import Box, Image
 from vdet.detect.svm.heat import Heat
 from vdet.detect.svm.windows import WindowGrid, Windows
 from vdet.draw.boxes import GREEN, WHITE, color_of, draw_box, draw_label, label_tag
-from vdet.media.images import Image
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,12 +7,11 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from vdet.boxes import Float32Array
+from vdet.boxes import Float32Array, Image
 from vdet.config.train import NetworkTrainingSettings
 from vdet.detect.onnx.preparation import GREY
 from vdet.learn.net.sources import NetSample, NetSource, join
 from vdet.learn.net.weather import with_weather
-from vdet.media.images import Image
 
 LEAST_SIDE = 8.0
 """Least longer side of a vehicle, pixels; smaller vehicles are ignored."""

@@ -8,12 +8,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from vdet.boxes import BoolArray, Float32Array, Float64Array, Int64Array
+from vdet.boxes import BoolArray, Float32Array, Float64Array, Image, Int64Array
 from vdet.config.schema import Settings
 from vdet.labels.reading import read_labelled_pictures, read_truth
 from vdet.labels.roles import Roles
-from vdet.media import VideoReader
-from vdet.media.images import Image
+from vdet.media.reader import VideoReader
 
 CLASSES = ("car", "truck", "bus")
 """The classes that the network tells apart, in its order."""

@@ -3,8 +3,7 @@
 import cv2
 import numpy as np
 
-from vdet.boxes import Float32Array
-from vdet.media.images import Image
+from vdet.boxes import Float32Array, Image
 
 _NIGHT = 0.12  # share of pictures
 _FOG = 0.05

@@ -10,9 +10,8 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from vdet.boxes import Float32Array
+from vdet.boxes import Float32Array, Image
 from vdet.config.train import AugmentationSettings
-from vdet.media.images import Image
 
 UNKNOWN_SIDES: tuple[float, ...] = (np.nan,) * 4
 

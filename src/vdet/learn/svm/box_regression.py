@@ -74,11 +74,9 @@ def extract_box_patches(
         if file.vehicle and file.source not in with_boxes
     ]
     augmenter = partial(augment, settings=without_parts)
-    start = steps if boxed else no_steps
-    progress = start("describing patches with boxes", len(boxed))
+    progress = steps("describing patches with boxes", len(boxed))
     of_boxed = describe(boxed, augmenter=augmenter, progress=progress)
-    start = steps if assumed else no_steps
-    progress = start("describing vehicles again", len(assumed))
+    progress = steps("describing vehicles again", len(assumed))
     return BoxPatches(of_boxed, describe(assumed, augmenter=zoom_in, progress=progress))
 
 

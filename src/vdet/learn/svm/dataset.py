@@ -20,10 +20,11 @@ from pathlib import Path, PurePosixPath
 
 import cv2
 
-from vdet.archives import ArchiveError, list_members, open_archive, read_member
-from vdet.errors import DataError
-from vdet.files import escaped, printable, read_whole, staged
-from vdet.media.images import PICTURE_SUFFIXES, Image, decode_image
+from vdet.archives import ArchiveError, list_members, open_archive, read_member, store
+from vdet.boxes import Image
+from vdet.errors import DataError, escaped, printable
+from vdet.files import read_whole, staged
+from vdet.media.images import PICTURE_SUFFIXES, decode_image
 
 CLASSES = {"vehicles": True, "non-vehicles": False}
 BOXED = "boxes"
@@ -82,10 +83,7 @@ def find_patches(sources: Sequence[Path]) -> list[PatchFile]:
     files = [file for source in dict.fromkeys(sources) for file in _find_in(source)]
     for name, vehicle in CLASSES.items():
         if not any(file.vehicle is vehicle and not file.is_boxed for file in files):
-            raise DataError(
-                f"{', '.join(map(str, sources))}: no patches of the class {name}; expected "
-                f"pictures in {name}/<group>/ inside a folder or zip file"
-            )
+            raise DataError(f"{', '.join(map(str, sources))}: no pictures in {name}/<group>/")
     return sorted(files, key=lambda file: (file.group, _numeric(file.name), file.source))
 
 
@@ -103,8 +101,7 @@ def _find_in(source: Path) -> list[PatchFile]:
     files = [file for name in names if (file := _patch_file(source, name, boxes))]
     if not files:
         raise DataError(
-            f"{source}: no pictures in vehicles/<group>/ or non-vehicles/<group>/; "
-            "vdet mine cuts such patches out of labelled videos and pictures"
+            f"{source}: no pictures in vehicles/<group>/ or non-vehicles/<group>/; see vdet mine"
         )
     return files
 
@@ -191,16 +188,9 @@ def patch_archive(path: Path, *, overwrite: bool = False) -> Iterator[AddPatch]:
     with staged(path, overwrite=overwrite) as temporary, zipfile.ZipFile(temporary, "w") as file:
 
         def add(name: str, patch: Image, sides: Sides | None) -> None:
-            _store(file, name, cv2.imencode(".png", patch)[1].tobytes(), zipfile.ZIP_STORED)
+            store(file, name, cv2.imencode(".png", patch)[1].tobytes())
             if sides is not None:
                 rows.writerow([name, *("" if side is None else f"{side:.4f}" for side in sides)])
 
         yield add
-        _store(file, TABLE, table.getvalue().encode("utf-8"), zipfile.ZIP_DEFLATED)
-
-
-def _store(file: zipfile.ZipFile, name: str, data: bytes, method: int) -> None:
-    info = zipfile.ZipInfo(name)  # of the earliest time: makes files reproducible
-    info.create_system = 3  # Unix; the default depends on the system
-    info.external_attr = 0o644 << 16
-    file.writestr(info, data, method)
+        store(file, TABLE, table.getvalue())

@@ -124,10 +124,7 @@ def extract(
                 chunks[number] = chunk
                 progress(len(parts[number]))
     except WorkerKilledError as error:
-        raise DataError(
-            "a process that described patches was killed; there may be too little memory: try "
-            "fewer --jobs"
-        ) from error
+        raise DataError("a process was killed; with fewer --jobs it needs less memory") from error
     checksums = [each for number in range(len(parts)) for each in chunks[number][1]]
     data = _joined([chunks[number][0] for number in range(len(parts))])
     _check_broken(files, set(data.files), training.max_broken)
@@ -189,8 +186,7 @@ def _check_broken(files: Sequence[PatchFile], good: set[PatchFile], max_broken: 
         log.warning("… and %d more", len(broken) - MAX_NAMED)
     if len(broken) > max_broken * len(files):
         raise DataError(
-            f"{broken[0]}: {len(broken)} of {len(files)} patches are broken, more than the "
-            f"{max_broken:.1%} of train.svm.max_broken; get the data set again"
+            f"{broken[0]}: {len(broken)} of {len(files)} patches are broken (train.svm.max_broken)"
         )
 
 

@@ -53,9 +53,7 @@ def fit(rows: LabelledVectors, settings: Settings) -> LinearModel:
     training, labels = settings.train.svm, rows.labels
     fewest = min(np.count_nonzero(labels), np.count_nonzero(~labels))
     if fewest < FOLDS:
-        raise DataError(
-            f"a class has {fewest} training patches, calibration needs {FOLDS}; give more patches"
-        )
+        raise DataError(f"a class has {fewest} training patches, and {FOLDS} are needed; give more")
     scaler = StandardScaler(copy=False)
     for start in range(0, len(rows.vectors), _BLOCK):  # as a whole, it needs twice their memory
         scaler.partial_fit(rows.vectors[start : start + _BLOCK])

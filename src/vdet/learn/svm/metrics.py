@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
@@ -26,16 +27,16 @@ class Rate:
     low: float | None
     high: float | None
 
-    @staticmethod
-    def of(right: BoolArray) -> "Rate":
+    @classmethod
+    def of(cls, right: BoolArray) -> Self:
         """Return the share of the True ones, bool `(n,)`."""
         from scipy.stats import binomtest  # type: ignore[import-untyped]
 
         if not len(right):
-            return Rate(None, None, None)
+            return cls(None, None, None)
         count = int(np.count_nonzero(right))
         interval = binomtest(count, len(right)).proportion_ci(method="wilson")
-        return Rate(count / len(right), float(interval.low), float(interval.high))
+        return cls(count / len(right), float(interval.low), float(interval.high))
 
     def __str__(self) -> str:
         if self.value is None:
@@ -60,23 +61,17 @@ class Classification:
     confusion: tuple[tuple[int, int], tuple[int, int]]
     groups: dict[str, Rate]
 
-    @staticmethod
-    def of(
-        vehicle: BoolArray, predicted: BoolArray, groups: npt.NDArray[np.str_]
-    ) -> "Classification":
+    @classmethod
+    def of(cls, vehicle: BoolArray, predicted: BoolArray, groups: npt.NDArray[np.str_]) -> Self:
         """Compare the truth, bool `(n,)`, with the prediction, bool `(n,)`; groups are `(n,)`."""
+        from sklearn.metrics import confusion_matrix
+
         right = vehicle == predicted
-        found, missed, alarms, others = (
-            int(np.count_nonzero((vehicle == truth) & (predicted == answer)))
-            for truth in (True, False)
-            for answer in (True, False)
-        )
-        return Classification(
-            len(right),
-            Rate.of(right),
-            ((found, missed), (alarms, others)),
-            {name: Rate.of(right[groups == name]) for name in np.unique(groups).tolist()},
-        )
+        (found, missed), (alarms, others) = confusion_matrix(
+            vehicle, predicted, labels=[True, False]
+        ).tolist()
+        by_group = {name: Rate.of(right[groups == name]) for name in np.unique(groups).tolist()}
+        return cls(len(right), Rate.of(right), ((found, missed), (alarms, others)), by_group)
 
     def confusion_rows(self) -> list[list[str]]:
         """Return the rows of text under `CONFUSION_HEADINGS`."""

@@ -15,10 +15,10 @@ from pathlib import Path
 
 import numpy as np
 
-from vdet.config.schema import Settings, SvmSettings
+from vdet.boxes import Image
+from vdet.config.schema import Settings
 from vdet.detect.svm.detector import SvmModel
-from vdet.detect.svm.features import Layout, cut_window, to_patch
-from vdet.detect.svm.model import LinearModel
+from vdet.detect.svm.features import cut_window, to_patch
 from vdet.detect.svm.windows import Windows
 from vdet.errors import DataError, ImageError, TruthError, VideoError
 from vdet.labels.pictures import LabelledPicture
@@ -27,8 +27,8 @@ from vdet.labels.roles import Roles
 from vdet.labels.video import LabelledVideo
 from vdet.learn.svm.choosing import MOST, Most, PatchKind, choose_windows, cut_sides
 from vdet.learn.svm.dataset import patch_archive
-from vdet.media import Picture, VideoReader
-from vdet.media.images import Image
+from vdet.media import Picture
+from vdet.media.reader import VideoReader
 from vdet.progress import Progress, Steps, no_steps
 from vdet.run.loop import named_errors, peek
 
@@ -74,7 +74,7 @@ class VideoSource:
     last: int | None = None
 
     def frames(
-        self, model: SvmModel | None, settings: Settings, progress: Progress
+        self, model: SvmModel, settings: Settings, progress: Progress
     ) -> Iterator[LabelledFrame]:
         """Yield the frames to use; `progress` gets the number of frames that are read.
 
@@ -89,9 +89,7 @@ class VideoSource:
         truth = read_truth(self.truth, roles)
         last = min(self.last or truth.last_frame, truth.last_frame)
         if last < self.first:
-            raise TruthError(
-                f"{self.truth}: covers the frames up to {truth.last_frame}; mine some of these"
-            )
+            raise TruthError(f"{self.truth}: ends at frame {truth.last_frame}; begin earlier")
         number = 0
         with VideoReader(self.path, frames=last, settings=settings.input) as reader:
             info, advance = reader.info, progress(last)
@@ -122,7 +120,7 @@ class PictureSource:
     path: Path
 
     def frames(
-        self, model: SvmModel | None, settings: Settings, progress: Progress
+        self, model: SvmModel, settings: Settings, progress: Progress
     ) -> Iterator[LabelledFrame]:
         """Yield all pictures; `progress` gets their number.
 
@@ -148,7 +146,7 @@ def mine(
     sources: Sequence[VideoSource | PictureSource],
     output: Path,
     settings: Settings,
-    model: SvmModel | None = None,
+    model: SvmModel,
     *,
     most: Most = MOST,
     overwrite: bool = False,
@@ -221,24 +219,14 @@ def mine(
 
 
 def search_windows(
-    model: SvmModel | None, width: int, height: int, images: Sequence[Image]
+    model: SvmModel, width: int, height: int, images: Sequence[Image]
 ) -> Callable[[Image], Windows]:
     """Return a search of frames of this size, `images` are the first few, for their windows.
-
-    Without a model, the windows are those of the default settings, all with probability 1.
 
     Raises
     ------
     ImageError
         Such frames cannot be searched.
     """
-    detector = (model or _sure_model()).for_video(width, height, images)
+    detector = model.for_video(width, height, images)
     return lambda image: detector.search(Picture(image), None).windows
-
-
-def _sure_model() -> SvmModel:
-    """Return a model that takes every window for a vehicle."""
-    settings = SvmSettings()
-    weights = np.zeros((1, Layout.of(settings.features).length), np.float32)
-    zero, low = np.zeros(1, np.float32), np.full(1, -80, np.float32)
-    return SvmModel(LinearModel(settings.features, weights, zero, zero, low), settings)

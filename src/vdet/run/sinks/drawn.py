@@ -24,9 +24,9 @@ from vdet.draw.boxes import (
 )
 from vdet.draw.paint import Color, Surface, draw_lines
 from vdet.errors import OutputError
-from vdet.media import Frame, Picture, Planes, VideoInfo, VideoWriter
+from vdet.media import Frame, Picture, Planes, VideoInfo
 from vdet.media.images import PICTURE_SUFFIXES, encode_image
-from vdet.media.writer import VIDEO_SUFFIXES, may_replace_video
+from vdet.media.writer import VIDEO_SUFFIXES, VideoWriter, may_replace_video
 from vdet.polygons import Point
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import BaseSink, SinkContext, SinkKind
@@ -238,9 +238,7 @@ class PictureSink(BaseSink):
         Raises `OutputError` for a second picture.
         """
         if self._is_done:
-            raise OutputError(
-                f"{self.path}: takes one picture; for several give the name of a folder"
-            )
+            raise OutputError(f"{self.path}: takes one picture; for several give a folder")
         self._is_done = True
         data = encode_image(Picture(self._overlay.draw(result)).image, self.path)
         self.context.files.stage(self.path).write_bytes(data)

@@ -3,12 +3,14 @@
 import re
 from pathlib import Path
 
+from vdet.boxes import Image
 from vdet.config.rendering import render
 from vdet.draw.boxes import WHITE, color_of, draw_box, draw_label, draw_regions
+from vdet.files import write_text
 from vdet.lanes.drawing import stage_pictures
 from vdet.media import Picture
-from vdet.media.images import Image, encode_image, is_picture_name
-from vdet.pages.render import PAGE_NAME, jpeg_uri, link_to, write_page
+from vdet.media.images import encode_image, is_picture_name
+from vdet.pages.render import PAGE_NAME, jpeg_uri, link_to
 from vdet.pages.video import Player, VideoPage, write_index
 from vdet.regions import lay_regions
 from vdet.run.result import FrameResult
@@ -117,7 +119,7 @@ class PageSink(BaseSink):
     def finish(self) -> None:
         """Write the page."""
         self._keep(self._crops.end())
-        write_page(self._page().html(), self._file)
+        write_text(self._file, self._page().html())
 
     def write(self, result: FrameResult) -> None:
         """Add a frame."""

@@ -248,9 +248,7 @@ def open_sink(output: Output, context: SinkContext) -> Sink:
     kind = _kind_for(output)
     source = "pictures" if context.video is None else "videos"
     if kind.takes not in ("both", source):
-        raise OutputError(
-            f"{output.path}: the sink {output.sink} is for {kind.takes}; give another for {source}"
-        )
+        raise OutputError(f"{output.path}: the sink {output.sink} is for {kind.takes}")
     with output_errors(output.path):
         return _NamedSink(kind.open(output.path, context), output.path)
 

@@ -3,9 +3,8 @@
 import cv2
 import numpy as np
 
-from vdet.boxes import Float64Array
+from vdet.boxes import Float64Array, Image
 from vdet.media import Picture
-from vdet.media.images import Image
 
 _MARGIN = 0.15
 """Share of a box's width and height at each side that is left out: much of it is background."""

@@ -29,9 +29,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import combinations
 
-from vdet.boxes import Box
+from vdet.boxes import Box, Image
 from vdet.config.tracker import RulesTrackerSettings
-from vdet.media.images import Image
 from vdet.track.rules.car import Car, Region
 
 

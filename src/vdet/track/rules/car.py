@@ -7,9 +7,8 @@ from statistics import fmean, multimode
 import cv2
 import numpy as np
 
-from vdet.boxes import Box
+from vdet.boxes import Box, Image
 from vdet.config.tracker import RulesTrackerSettings
-from vdet.media.images import Image
 
 Point = tuple[float, float]
 

@@ -15,10 +15,9 @@ import math
 from collections.abc import Iterable
 from itertools import count
 
-from vdet.boxes import Boxes
+from vdet.boxes import Boxes, Image
 from vdet.config.tracker import RulesTrackerSettings
 from vdet.media import Picture
-from vdet.media.images import Image
 from vdet.track.rules.association import Association
 from vdet.track.rules.car import Car, Region
 from vdet.track.track import Track
