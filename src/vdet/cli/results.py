@@ -56,7 +56,7 @@ class Results:
 
 _json_option = option(
     "--json FILE",
-    "Write the results to FILE; with -, to standard output, and the text to standard error.",
+    "Write the results to FILE. With -, they go to standard output, the text to standard error.",
     str,
     name="json_target",
 )
