@@ -80,6 +80,8 @@ class MotionTracker:
         """Return the vehicles shown at a time; as `TimedTracker.at`."""
         known = [*self._gone, *(vehicle for vehicle in self._vehicles if vehicle.confirmed)]
         found = [(v, place) for v in known if (place := self._place(v, time)) is not None]
+        if not found:
+            return []
         boxes = visible(np.reshape([place.box for _, place in found], (-1, 4)), self._size)
         keep = [row for row, box in enumerate(boxes) if _least_side(box) >= 1]
         found, boxes = [found[row] for row in keep], boxes[keep]
@@ -141,7 +143,7 @@ class MotionTracker:
     def _boxes(self) -> Float64Array:
         """Return the visible parts of all vehicles, `(n, 4)`."""
         boxes = [vehicle.state.box for vehicle in self._vehicles]
-        return visible(np.reshape(boxes, (-1, 4)), self._size)
+        return visible(np.array(boxes).reshape(-1, 4), self._size)
 
     def _staying(self) -> list[Vehicle]:
         """Return the vehicles that are neither over nor out of the frame."""
@@ -150,6 +152,8 @@ class MotionTracker:
 
     def _pair(self, observations: Sequence[Observation]) -> dict[int, int]:
         """Pair rows of vehicles with numbers of observations; present vehicles choose first."""
+        if not (self._vehicles and observations):
+            return {}
         present: list[int] = []
         lost: list[int] = []
         new: list[int] = []
