@@ -44,7 +44,7 @@ from vdet.run.steps import Step, StepContext
 from vdet.run.video import RunTotals, VideoJob, check_job, open_video, run_video
 from vdet.track.factory import TrackerKind, make_tracker
 from vdet.track.track import FrameTracks, Track, VideoTracker
-from vdet.traffic.counting import count_file, count_frames
+from vdet.traffic.counting import count_files, count_frames
 from vdet.traffic.counts import Counts, Event
 
 __all__ = (
@@ -316,7 +316,8 @@ def count_tracks(
     if lines is not None:
         counts = load_layers(places={"counts": Path(lines)}).counts
     if isinstance(tracks, str | PathLike):
-        return count_file(Path(tracks), counts, size, rate, _ground(ground))
+        files = count_files([Path(tracks)], counts, size, rate, ground=_ground(ground))
+        return files[str(Path(tracks))]
     return count_frames(tracks, counts, size, _ground(ground))
 
 

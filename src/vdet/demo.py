@@ -27,7 +27,7 @@ from vdet.run.video import VideoJob, check_job, run_video
 from vdet.synthetic.random_scenes import busy_road, demo_scene
 from vdet.synthetic.render import write_clip
 from vdet.synthetic.truth import write_truth
-from vdet.traffic.counting import count_file
+from vdet.traffic.counting import count_files
 
 ROADS = 6
 """Drawn roads that the linear model learns from."""
@@ -109,7 +109,7 @@ def run_demo(
     truth, rate = read_truth(folder / TRUTH), float(scene.rate)
 
     def count(tracks: Path) -> int:
-        return len(count_file(tracks, settings.counts, size, rate).events)
+        return len(count_files([tracks], settings.counts, size, rate)[str(tracks)].events)
 
     crossings = count(folder / TRUTH)
 

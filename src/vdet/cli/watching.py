@@ -61,7 +61,7 @@ class Watched:
 
         records = VehicleRecords(width)
         if self.tracks is not None:
-            for frame in read_tracks(self.tracks, rate=1.0).frames:
+            for frame in read_tracks(self.tracks, rate=1.0):
                 records.add(frame)
             return records.end()
         job = VideoJob(clip, start=self.start, end=self.end)

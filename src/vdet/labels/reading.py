@@ -30,7 +30,8 @@ def read_tracks(path: Path, rate: float | None = None) -> SavedTracks:
     """
     data = read_bytes(path)
     saved = recognise(path, data).read(path, data)
-    vehicles = (each for each in saved.labels if not (each.ignored or is_region(each.name)))
+    regions = {name for name in {each.name for each in saved.labels} if is_region(name)}
+    vehicles = (each for each in saved.labels if not (each.ignored or each.name in regions))
     saved = replace(saved, labels=checked_labels(path, vehicles))
     return saved if rate is None else saved.at_rate(rate)
 

@@ -6,9 +6,10 @@ JSON lines have a record for each frame, even one without a box. CSV has a row f
 import csv
 import io
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import islice
 from pathlib import Path
-from typing import Annotated, Any, Required
+from typing import Annotated, Any, get_type_hints
 
 from pydantic import Field, TypeAdapter, ValidationError
 from typing_extensions import TypedDict
@@ -26,14 +27,9 @@ _OPTIONAL = ("score", "state", "class", "foot_x", "foot_y", "distance", "lane")
 
 
 # Dictionaries are read twice as fast as models, and an hour of video has a million boxes.
-_Track = TypedDict(
-    "_Track",
+_Known = TypedDict(
+    "_Known",
     {
-        "id": Required[Index],
-        "x": Required[Number],
-        "y": Required[Number],
-        "width": Required[Number],
-        "height": Required[Number],
         "score": Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)],
         "state": State,
         "class": str | None,
@@ -45,18 +41,29 @@ _Track = TypedDict(
 )
 
 
+class _Track(_Known):
+    id: Index
+    x: Number
+    y: Number
+    width: Number
+    height: Number
+
+
 class _Record(TypedDict):
     frame: Index
     time: float
     tracks: list[_Track]
 
 
-class _Row(_Track):
-    frame: Index
-    time: float
-
-
-_RECORD, _ROW = TypeAdapter(_Record), TypeAdapter(_Row)
+_RECORD = TypeAdapter(_Record)
+_KINDS = {"frame": Index, "time": float, "foot_x": Number, "foot_y": Number}
+_CELLS: dict[str, TypeAdapter[Any]] = {
+    name: TypeAdapter(list[kind | None])  # type: ignore[valid-type]
+    for name, kind in {**get_type_hints(_Track, include_extras=True), **_KINDS}.items()
+}
+"""The columns of a table; an empty cell is None."""
+_BLOCK = 300
+"""Rows of a table that are read at once, column by column; they fit into the cache."""
 
 
 def _label(line: int, frame: int, track: _Track) -> Label:
@@ -91,7 +98,7 @@ def track_record(track: Track) -> dict[str, Any]:
         "score": round(track.score, 4),
         "state": track.state,
         "class": track.class_name,
-        "foot": [round(value, 2) for value in track.foot],
+        "foot": list(track.written_foot),
         "distance": None if track.distance is None else round(track.distance, 2),
         "lane": track.lane,
     }
@@ -174,19 +181,49 @@ def _csv_labels(path: Path, text: str, times: _Times) -> Iterator[Label]:
         if any(names.count(name) != 1 for name in _NEEDED):
             needed = ", ".join(_NEEDED)
             raise ValueError(f"the header must name each of these columns once: {needed}")
-        for cells in filter(None, table):
-            if len(cells) != len(names):
-                raise ValueError(f"this line has not the {len(names)} columns of the header")
-            row: dict[str, Any] = {n: cell for n, cell in zip(names, cells, strict=True) if cell}
-            if "foot_x" in row and "foot_y" in row:
-                row["foot"] = row["foot_x"], row["foot_y"]
-            checked = _ROW.validate_python(row)
-            times[checked["frame"]] = table.line_num, checked["time"]
-            yield _label(table.line_num, checked["frame"], checked)
-    except ValueError as error:  # also a ValidationError
-        raise line_error(path, max(1, table.line_num), parsing.first_mistake(error)) from error
-    except csv.Error as error:
+        rows = ((table.line_num, cells) for cells in table if cells)
+        while block := list(islice(rows, _BLOCK)):
+            yield from _block_labels(path, names, block, times)
+    except (ValueError, csv.Error) as error:
         raise line_error(path, max(1, table.line_num), str(error)) from error
+
+
+def _block_labels(
+    path: Path, names: Sequence[str], block: Sequence[tuple[int, list[str]]], times: _Times
+) -> Iterator[Label]:
+    """Return the labels of rows, which come with their lines."""
+    for line, cells in block:
+        if len(cells) != len(names):
+            what = f"this line has not the {len(names)} columns of the header"
+            raise line_error(path, line, what)
+    lines, rows = zip(*block, strict=True)
+    known = dict.fromkeys(_CELLS, [None] * len(lines)) | {
+        name: _values(path, name, column, lines)
+        for name, column in zip(names, zip(*rows, strict=True), strict=True)
+        if name in _CELLS
+    }
+    frames, feet = known["frame"], zip(known["foot_x"], known["foot_y"], strict=True)
+    times.update(zip(frames, zip(lines, known["time"], strict=True), strict=True))
+    boxes = map(from_size, *(known[name] for name in ("x", "y", "width", "height")))
+    scores = [1.0 if score is None else score for score in known["score"]]
+    facts = scores, [False] * len(lines), [state or "seen" for state in known["state"]]
+    places = [None if None in foot else foot for foot in feet], known["distance"], known["lane"]
+    numbers = [frame + 1 for frame in frames], known["id"]
+    columns = lines, boxes, known["class"], *numbers, *facts, *places
+    return map(Label._make, zip(*columns, strict=True))
+
+
+def _values(path: Path, name: str, cells: Sequence[str], lines: Sequence[int]) -> list[Any]:
+    """Return the values of a column."""
+    given = [cell or None for cell in cells] if "" in cells else cells
+    if name in _NEEDED and None in given:
+        raise line_error(path, lines[given.index(None)], f"{name}: this cell is empty")
+    try:
+        values: list[Any] = _CELLS[name].validate_python(given)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_input=False)[0]
+        raise line_error(path, lines[int(first["loc"][0])], f"{name}: {first['msg']}") from error
+    return values
 
 
 JSON_LINES = Format("JSON lines", ".jsonl", read_json_lines, _json_lines)

@@ -2,9 +2,10 @@
 
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from datetime import datetime
+from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
@@ -67,7 +68,11 @@ class SavedTracks:
 
     @property
     def frames(self) -> tuple[FrameTracks, ...]:
-        """The frames with a box and the listed frames, in order; computed at each call.
+        """The frames that an iteration yields."""
+        return tuple(self)
+
+    def __iter__(self) -> Iterator[FrameTracks]:
+        """Yield the frames with a box and the listed frames, in order.
 
         Boxes are rounded to whole pixels, and scores lie between 0 and 1. A class is one of
         `OUR_NAMES` if the label means one, else the label. An unknown time is NaN: see `has_times`.
@@ -75,14 +80,10 @@ class SavedTracks:
         by_frame: dict[int, list[Label]] = defaultdict(list)
         for label in self.labels:
             by_frame[label.frame - 1].append(label)
-        return tuple(
-            FrameTracks(
-                index,
-                self.times.get(index, math.nan),
-                tuple(_track(label) for label in sorted(by_frame[index], key=lambda each: each.id)),
-            )
-            for index in self._indices()
-        )
+        for index in self._indices():
+            labels = sorted(by_frame[index], key=attrgetter("id"))
+            time = self.times.get(index, math.nan)
+            yield FrameTracks(index, time, tuple(map(_track, labels)))
 
     def _indices(self) -> list[int]:
         return sorted({label.frame - 1 for label in self.labels}.union(self.listed))
@@ -90,10 +91,13 @@ class SavedTracks:
 
 def _track(label: Label) -> Track:
     _, box, name, _, number, score, _, state, foot, distance, lane = label
-    x1, y1, x2, y2 = Box(*box).pixels
+    left, top, right, bottom = box
+    x1, y1 = math.floor(left + 0.5), math.floor(top + 0.5)
+    x2, y2 = math.floor(right + 0.5), math.floor(bottom + 0.5)
     whole = Box(x1, y1, max(x2, x1 + 1), max(y2, y1 + 1))
     named = None if name is None else our_name(name) or name
-    return Track(number, whole, min(1.0, max(0.0, score)), state, named, foot, distance, lane)
+    score = score if 0 <= score <= 1 else float(score > 1)
+    return Track(number, whole, score, state, named, foot, distance, lane)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -11,6 +11,7 @@ from vdet.track.track import FrameTracks, Track
 if TYPE_CHECKING:
     from vdet.lanes.road import Road
     from vdet.traffic.counter import VehicleCounter
+    from vdet.traffic.counts import Counts
     from vdet.traffic.speeds import SpeedMeter
 
 
@@ -46,6 +47,14 @@ class FrameResult:
     searched: bool = True
     counter: "VehicleCounter | None" = None
     speeds: "SpeedMeter | None" = None
+
+    def counts(self) -> "Counts | None":
+        """Return all counts, with the speeds that are known; the video has ended."""
+        if self.counter is None:
+            return None
+        from vdet.traffic.speeds import with_speeds
+
+        return with_speeds(self.counter.counts(), self.speeds)
 
     @property
     def frame_tracks(self) -> FrameTracks:

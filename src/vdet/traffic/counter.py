@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from vdet.boxes import Box
 from vdet.config.places import CountSettings
 from vdet.detect.classes import ClassScores
 from vdet.polygons import Point
@@ -42,8 +43,6 @@ _TURNED, _OPPOSITE = 0.15, 0.3
 _MOST_GROWTH = 2.0
 """Largest ratio of the heights of the last box of a track and the first one of the next."""
 
-_Pixels = tuple[int, int, int, int]
-
 
 @dataclass(slots=True)
 class _Vehicle:
@@ -61,7 +60,7 @@ class _Vehicle:
     states: list[BorderState]
     shown: float = 0.0  # when it was last shown, also by prediction
     velocity: complex = 0j  # x and y, pixels a second
-    box: _Pixels = (0, 0, 0, 0)
+    box: Box = field(init=False)
     clear: float = 0.0  # distance from `looked_at` within which nothing changes at any border
     looked_at: Point = (0.0, 0.0)
     classes: ClassScores = field(default_factory=ClassScores)
@@ -84,7 +83,7 @@ class _Vehicle:
 
     def is_leaving(self, width: int, height: int) -> bool:
         """Return whether it moves out at the edge of the frame, and so was not lost."""
-        x1, y1, x2, y2 = self.box
+        x1, y1, x2, y2 = self.box.pixels
         outward = complex((x2 >= width - 1) - (x1 <= 1), (y2 >= height - 1) - (y1 <= 1))
         return (self.velocity * outward.conjugate()).real > _LEAVES * self.last.height
 
@@ -194,8 +193,9 @@ class VehicleCounter:
             if self._now - vehicle.shown > REMEMBERED:
                 self._close(vehicle)
         ended = None
-        if any(track.id not in self._vehicles for track in frame.tracks):
-            ended = self._ended({track.id for track in frame.tracks})
+        shown = {track.id for track in frame.tracks}
+        if not shown <= self._vehicles.keys():
+            ended = self._ended(shown)
         for track in frame.tracks:
             self._see(track, frame.index, ended)
 
@@ -233,8 +233,8 @@ class VehicleCounter:
 
     def _see(self, track: Track, frame: int, ended: _Ended | None) -> None:
         # As exactly as files of tracks hold it, so that both count alike.
-        (x, y), box = track.foot, track.box.pixels
-        point, height = (round(x, 2), round(y, 2)), float(max(1, box[3] - box[1]))
+        point, box = track.written_foot, track.box
+        height = float(max(1, math.floor(box.y2 + 0.5) - math.floor(box.y1 + 0.5)))
         sighting = Sighting(self._now, frame, point, height, track.score)
         vehicle = self._vehicles.get(track.id) or self._begin(track.id, sighting, ended)
         if vehicle.is_another(sighting):
@@ -262,7 +262,7 @@ class VehicleCounter:
 
     def _look(self, vehicle: _Vehicle, sighting: Sighting, band: float) -> None:
         """Look what a vehicle does at the borders that it is near to."""
-        clear = math.inf
+        near = []
         for state in vehicle.states:
             left = state.clear - math.dist(sighting.point, state.seen_at)
             if left <= band:
@@ -274,8 +274,8 @@ class VehicleCounter:
                     state.entered = vehicle.first.time
                     vehicle.add(state.border.name, APPEAR, vehicle.first)
                 left = state.clear
-            clear = min(clear, left)
-        vehicle.clear, vehicle.looked_at = clear, sighting.point
+            near.append(left)
+        vehicle.clear, vehicle.looked_at = min(near, default=math.inf), sighting.point
 
     def _begin(self, number: int, sighting: Sighting, ended: _Ended | None) -> _Vehicle:
         """Remember a new vehicle, which may go on from another that has ended."""

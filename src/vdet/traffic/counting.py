@@ -24,17 +24,6 @@ _STEP = 0.04
 """Seconds that are taken for the time from the last frame before a seam to the first one after."""
 
 
-def count_file(
-    path: Path,
-    settings: CountSettings,
-    size: tuple[int, int] | None = None,
-    rate: float | None = None,
-    ground: GroundRequest | None = None,
-) -> Counts:
-    """Count the vehicles of a file of tracks; arguments and errors as of `count_files`."""
-    return count_files([path], settings, size, rate, ground=ground)[str(path)]
-
-
 def count_files(
     paths: Sequence[Path],
     settings: CountSettings,
@@ -76,7 +65,6 @@ def count_files(
         `begin` says.
     """
     counted: dict[str, Counts] = {}
-    meters: dict[str, SpeedMeter | None] = {}
     group: _Group | None = None
     for path in paths:
         saved = read_tracks(path, rate)
@@ -87,15 +75,13 @@ def count_files(
             created, start = saved.begin.isoformat(), 0.0
         clock = find_clock(path, begin, created, start)
         place = _size(settings, size or saved.size)
-        frames = saved.frames
-        if group is None or not group.goes_on(place, clock, frames):
+        first = min(saved.times.values(), default=None)
+        if group is None or not group.goes_on(place, clock, first):
             counted |= group.counts() if group else {}
-            group = _Group(settings, place, group.begun if group else 0)
-        group.add(str(path), clock, frames)
-        meters[str(path)] = _meter(frames, ground, place)
+            group = _Group(settings, place, ground, group.begun if group else 0)
+        group.add(str(path), clock, first or 0.0, saved)
         advance(1)
-    counted |= group.counts() if group else {}
-    return {name: with_speeds(counts, meters[name]) for name, counts in counted.items()}
+    return counted | (group.counts() if group else {})
 
 
 def count_frames(
@@ -105,21 +91,10 @@ def count_frames(
     ground: GroundRequest | None = None,
 ) -> Counts:
     """Count the vehicles in the tracks of each frame; arguments and errors as of `count_files`."""
-    place, every = _size(settings, size), tuple(frames)
-    group = _Group(settings, place)
-    group.add("", None, every)
-    return with_speeds(group.counts()[""], _meter(every, ground, place))
-
-
-def _meter(
-    frames: Iterable[FrameTracks], ground: GroundRequest | None, size: tuple[int, int]
-) -> SpeedMeter | None:
-    if ground is None:
-        return None
-    meter = SpeedMeter(ground.ground(*size), *size)
-    for frame in frames:
-        meter.add(frame)
-    return meter
+    group = _Group(settings, _size(settings, size), ground)
+    every = tuple(frames)
+    group.add("", None, every[0].time if every else 0.0, every)
+    return group.counts()[""]
 
 
 def _size(settings: CountSettings, size: tuple[int, int] | None) -> tuple[int, int]:
@@ -142,6 +117,7 @@ class _Video:
     first: float
     last: float
     shift: float
+    meter: SpeedMeter | None
 
     @property
     def end(self) -> float:
@@ -152,8 +128,15 @@ class _Video:
 class _Group:
     """Videos that follow one another, with one counter."""
 
-    def __init__(self, settings: CountSettings, size: tuple[int, int], begun: int = 0) -> None:
+    def __init__(
+        self,
+        settings: CountSettings,
+        size: tuple[int, int],
+        ground: GroundRequest | None,
+        begun: int = 0,
+    ) -> None:
         self._size = size
+        self._ground = ground.ground(*size) if ground else None
         self._counter = VehicleCounter(settings, *size, begun=begun)
         self._videos: list[_Video] = []
 
@@ -162,19 +145,20 @@ class _Group:
         """How many vehicles have begun in it and before it."""
         return self._counter.begun
 
-    def goes_on(
-        self, size: tuple[int, int], clock: Clock | None, frames: Sequence[FrameTracks]
-    ) -> bool:
-        """Return whether a video follows the last one."""
+    def goes_on(self, size: tuple[int, int], clock: Clock | None, first: float | None) -> bool:
+        """Return whether a video follows the last one; `first` is the time of its first frame."""
         before = self._videos[-1]
-        if not (clock and before.clock and frames and size == self._size):
+        if not (clock and before.clock and first is not None and size == self._size):
             return False
-        gap = clock.at(frames[0].time) - before.clock.at(before.last)
+        gap = clock.at(first) - before.clock.at(before.last)
         return gap.total_seconds() >= -_SEAM
 
-    def add(self, name: str, clock: Clock | None, frames: Sequence[FrameTracks]) -> None:
+    def add(
+        self, name: str, clock: Clock | None, first: float, frames: Iterable[FrameTracks]
+    ) -> None:
         """Count in the next video."""
-        first, shift = frames[0].time if frames else 0.0, 0.0
+        shift = 0.0
+        meter = SpeedMeter(self._ground, *self._size) if self._ground else None
         if self._videos:
             begin, before = self._videos[0], self._videos[-1]
             if clock and begin.clock:
@@ -190,7 +174,9 @@ class _Group:
                 )
             latest = frame.time
             self._counter.update(replace(frame, time=latest + shift) if shift else frame)
-        self._videos.append(_Video(name, clock, first, max(first, latest), shift))
+            if meter:
+                meter.add(frame)
+        self._videos.append(_Video(name, clock, first, max(first, latest), shift, meter))
 
     def counts(self) -> dict[str, Counts]:
         """Return the counts of each video, with its own times; the last one has ended."""
@@ -202,13 +188,16 @@ class _Group:
             time = round(event.time - self._videos[number].shift, 3)
             events[number].append(replace(event, time=time))
         return {
-            video.name: replace(
-                whole,
-                events=tuple(own),
-                first=video.first,
-                last=video.last,
-                clock=video.clock,
-                warnings=whole.warnings if video is self._videos[0] else (),
+            video.name: with_speeds(
+                replace(
+                    whole,
+                    events=tuple(own),
+                    first=video.first,
+                    last=video.last,
+                    clock=video.clock,
+                    warnings=whole.warnings if video is self._videos[0] else (),
+                ),
+                video.meter,
             )
             for video, own in zip(self._videos, events, strict=True)
         }

@@ -27,9 +27,7 @@ from vdet.traffic.count_files import (
     write_counts,
     write_flows,
 )
-from vdet.traffic.counter import VehicleCounter
 from vdet.traffic.records import VehicleRecords, join_records, write_records
-from vdet.traffic.speeds import SpeedMeter, with_speeds
 from vdet.traffic.tables import SUFFIXES
 
 WriteCounts = Callable[[Path, Videos, int | None], None]
@@ -126,16 +124,15 @@ class VehicleSink(BaseSink):
     def __init__(self, path: Path, context: SinkContext) -> None:
         super().__init__(path, context)
         self._records = VehicleRecords(self.video.width)
-        self._speeds: SpeedMeter | None = None
 
     def finish(self) -> None:
         """Write the records."""
-        records = self._records.end(self._speeds)
+        records = self._records.end(self.last.speeds if self.last else None)
         write_records(records, self.context.files.stage(self.path), self.context.clock)
 
     def write(self, result: FrameResult) -> None:
         """Add a frame."""
-        self._speeds = result.speeds
+        self.last = result
         self._records.add(result.frame_tracks)
 
 
@@ -157,22 +154,19 @@ class CountsSink(BaseSink):
     def __init__(self, write_table: WriteCounts, path: Path, context: SinkContext) -> None:
         super().__init__(path, context)
         self._write_table = write_table
-        self._counter: VehicleCounter | None = None
-        self._speeds: SpeedMeter | None = None
         if not context.settings.counts:
             raise OutputError(f"{path}: there is nothing to count at; give lines or zones")
 
     def finish(self) -> None:
         """Write the table."""
-        if self._counter:
-            counts = with_speeds(self._counter.counts(), self._speeds)
+        if self.last and (counts := self.last.counts()):
             counts = replace(counts, clock=self.context.clock)
             target = self.context.files.stage(self.path)
             self._write_table(target, {self.video.path.name: counts}, self.context.interval)
 
     def write(self, result: FrameResult) -> None:
-        """Keep the counter: at the end it has the counts of all frames."""
-        self._counter, self._speeds = result.counter, result.speeds
+        """Keep the result: at the end it has the counts of all frames."""
+        self.last = result
 
 
 COUNTS = SinkKind(

@@ -16,10 +16,8 @@ from vdet.regions import lay_regions
 from vdet.run.result import FrameResult
 from vdet.run.sinks.drawn import PICTURE_LABEL, label_text
 from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
-from vdet.traffic.counter import VehicleCounter
 from vdet.traffic.overview import BestCrops, Crop
 from vdet.traffic.records import VehicleRecords
-from vdet.traffic.speeds import SpeedMeter, with_speeds
 
 _BOXES = "boxes"
 _CROP_NAME = re.compile(r"vehicle-\d{4,}-at--?\d+\.\d{3}s\.(jpg|png)")
@@ -108,8 +106,6 @@ class PageSink(BaseSink):
         self._records = VehicleRecords(video.width)
         self._crops = BestCrops()
         self._thumbnails: dict[int, tuple[float, str]] = {}
-        self._counter: VehicleCounter | None = None
-        self._speeds: SpeedMeter | None = None
         self._gaps: list[tuple[float, float]] = []
         self._fullest: Picture | None = None
         self._most = 0
@@ -133,7 +129,7 @@ class PageSink(BaseSink):
         if self._fullest is None or len(frame.tracks) > self._most:
             self._fullest, self._most = picture, len(frame.tracks)
         self._records.add(frame)
-        self._counter, self._speeds = result.counter, result.speeds
+        self.last = result
         self._keep(self._crops.add(frame, picture))
 
     def _keep(self, crops: list[Crop]) -> None:
@@ -146,18 +142,17 @@ class PageSink(BaseSink):
             mask = {"mask": Path(settings.regions.mask).name}
             regions = settings.regions.model_copy(update=mask)
             settings = settings.model_copy(update={"regions": regions})
-        counts = with_speeds(self._counter.counts(), self._speeds) if self._counter else None
         return VideoPage(
             video=self.video,
             frames=self._frames,
             start=self._start,
             end=self._last + float(1 / self.video.rate),
-            records=self._records.end(self._speeds),
+            records=self._records.end(self.last.speeds if self.last else None),
             thumbnails=self._thumbnails,
             poster=self._fullest.image if self._fullest else None,
             player=self._player(),
             settings=render(settings),
-            counts=counts,
+            counts=self.last.counts() if self.last else None,
             interval=self.context.interval or 60,
             gaps=self._gaps,
             zero=clock.second_of_day if clock else None,

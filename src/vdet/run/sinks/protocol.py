@@ -83,7 +83,12 @@ class SinkContext:
 
 
 class BaseSink:
-    """What most sinks have in common: they finish where the run ends without an error."""
+    """What most sinks have in common: they finish where the run ends without an error.
+
+    `last` is the latest result, for sinks that set it.
+    """
+
+    last: FrameResult | None = None
 
     def __init__(self, path: Path, context: SinkContext) -> None:
         self.path = path
