@@ -108,7 +108,7 @@ def test_a_signal_after_the_work_does_not_change_the_exit_code() -> None:
     code = """if True:
         import os, signal, sys
         from vdet import process
-        process._exit_if_a_thread_hangs = lambda _: os.kill(os.getpid(), signal.SIGTERM)
+        process._exit = lambda _: os.kill(os.getpid(), signal.SIGTERM)
         sys.argv = ["vdet", "--version"]
         process.run()
     """

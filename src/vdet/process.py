@@ -1,7 +1,7 @@
 """The process of the program: its signals, its standard streams, the threads of its libraries."""
 
+import atexit
 import contextlib
-import gc
 import io
 import os
 import signal
@@ -41,9 +41,7 @@ def run() -> NoReturn:
         sys.exit(VdetError.exit_code)
     except SystemExit as end:
         _ignore_signals()  # the work is done: one that comes now must not change the exit code
-        _exit_if_a_thread_hangs(end.code)
-        gc.freeze()  # the memory goes back as a whole: to look for what is in circles takes time
-        raise
+        _exit(end.code)
 
 
 class LossyFile(io.FileIO):
@@ -115,9 +113,11 @@ def _watch_for_signals() -> None:
     threading.Thread(target=exit_late, daemon=True).start()
 
 
-def _exit_if_a_thread_hangs(code: object) -> None:
-    """Exit at once if a thread hangs in a read or write; unloading its libraries could crash it."""
-    if any(thread.daemon and thread.name.startswith("vdet-") for thread in threading.enumerate()):
-        sys.stdout.flush()
-        sys.stderr.flush()
-        os._exit(code if isinstance(code, int) else 1)
+def _exit(code: object) -> NoReturn:
+    """Exit without unloading the libraries: it takes time, and could crash a thread that hangs."""
+    names = [thread.name for thread in threading.enumerate() if thread.daemon]
+    if not any(name.startswith("vdet-") for name in names):  # else one hangs in a read or write
+        atexit._run_exitfuncs()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code if isinstance(code, int) else int(code is not None))
