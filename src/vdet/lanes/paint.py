@@ -67,9 +67,8 @@ def paint_mask(top: Image) -> Image:
     road = _larger_side(lightness, reach)
     rise = cv2.subtract(lightness, road)  # saturates at 0
     tint = cv2.subtract(yellow, _larger_side(yellow, reach))
-    paint = np.asarray(cv2.compare(rise, cv2.LUT(road, _LEAST_RISES), cv2.CMP_GT), np.uint8)
-    paint[tint > _YELLOW] = PAINT
-    return paint
+    paint = cv2.compare(rise, cv2.LUT(road, _LEAST_RISES), cv2.CMP_GT)
+    return np.asarray(cv2.bitwise_or(paint, cv2.compare(tint, _YELLOW, cv2.CMP_GT)), np.uint8)
 
 
 def _larger_side(channel: Image, reach: int) -> Image:
