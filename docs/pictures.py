@@ -18,7 +18,7 @@ from vdet.synthetic.render import write_clip
 from vdet.synthetic.scene import Body, Scene, SceneVehicle, Waypoint
 
 FOLDER = Path(__file__).parent
-COUNTED_FRAME = 172  # of the demo: a vehicle has overtaken on the right
+COUNTED_FRAME = 62  # of the demo's pole: half of the vehicles are counted
 STAGES = ("1-windows", "2-hits", "3-heat", "4-boxes")
 
 _SEED = 11
@@ -85,7 +85,7 @@ def main() -> None:
         )
         pictures = {
             "vdet": frame_with_vehicles(road, 21, *label),
-            "counts": frame_with_vehicles(demo / "road.mp4", COUNTED_FRAME, *counts),
+            "counts": frame_with_vehicles(demo / "pole.mp4", COUNTED_FRAME, *counts),
             "stages": stages(demo / "stages"),
         }
     for name, image in pictures.items():

@@ -1,4 +1,4 @@
-"""The demo: a drawn road, both detectors on it, and what they find against the truth."""
+"""The demo: drawn roads, both detectors on them, and what they find against the truth."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -24,10 +24,14 @@ from vdet.media.writer import may_replace_video
 from vdet.progress import Steps, no_steps
 from vdet.run.sinks.protocol import Output
 from vdet.run.video import VideoJob, check_job, run_video
-from vdet.synthetic.random_scenes import busy_road, demo_scene
+from vdet.synthetic.random_scenes import busy_road, demo_scene, pole_scene
 from vdet.synthetic.render import write_clip
+from vdet.synthetic.scene import Scene
 from vdet.synthetic.truth import write_truth
+from vdet.traffic.count_files import NOWHERE
 from vdet.traffic.counting import count_files
+
+Row = list[str]
 
 ROADS = 6
 """Drawn roads that the linear model learns from."""
@@ -35,19 +39,24 @@ ROADS = 6
 SEED = 5
 """Default seed of what is drawn."""
 
-ROAD, TRUTH, LINE = "road.mp4", "truth.txt", "lines.yaml"
-"""The drawn video, its true boxes, and the line at which vehicles are counted."""
+ROAD, TRUTH = "road.mp4", "truth.txt"
+"""The drawn video of a moving camera, and its true boxes."""
+
+POLE, POLE_TRUTH, LINES = "pole.mp4", "pole.txt", "lines.yaml"
+"""The same from a pole, and the lines at which vehicles are counted."""
 
 PATCHES, MODEL, METRICS = "patches.zip", "model.npz", "model.json"
 """The patches for the linear model, the model, and the metrics of its training."""
 
-_LINE = """\
-# The line of the demo: one vehicle overtakes the camera there, and one is overtaken.
+_LINES = """\
+# The lines of the demo, as shares of the frame.
 lines:
-  - {name: right lanes, start: [0.45, 0.72], end: [0.99, 0.72], left: ahead, right: back}
+  - {name: north, start: [0.2, 0.45], end: [0.9, 0.45], left: out, right: in}
+  - {name: south, start: [0.02, 0.8], end: [0.98, 0.8], left: in, right: out}
 drawn: true
 """
-_BY_NETWORK = {"video": "found.mp4", "tracks": "found.csv", "counts": "counts.csv", "page": "page"}
+_BY_NETWORK = {"video": "found.mp4", "tracks": "found.csv"}
+_ON_POLE = {"video": "counted.mp4", "tracks": "pole.csv", "flows": "flows.csv", "page": "page"}
 _MOST = Most(per_vehicle=2, false_alarms=6, parts=3)  # drawn vehicles are alike: few suffice
 _BY_MODEL = {"tracks": "model.csv", "stages": "stages"}
 
@@ -55,18 +64,18 @@ _BY_MODEL = {"tracks": "model.csv", "stages": "stages"}
 def check_demo(folder: Path, *, overwrite: bool) -> None:
     """Make the folder, and refuse to replace an earlier demo. Raises `OutputError`."""
     make_folder(folder)
-    names = (ROAD, TRUTH, LINE, PATCHES, MODEL, METRICS)
+    names = (ROAD, TRUTH, POLE, POLE_TRUTH, LINES, PATCHES, MODEL, METRICS)
     learnt = [path for each in _roads_to_learn(folder) for path in (each.path, each.truth)]
     for path in (*(folder / name for name in names), *learnt):
         may_replace = may_replace_video if path.suffix == ".mp4" else any_file
         check_output(path, overwrite=overwrite, makes_folder=True, may_replace=may_replace)
-    for outputs in (_BY_NETWORK, _BY_MODEL):
-        check_job(_job(folder, outputs, overwrite=overwrite))
+    for source, outputs in ((ROAD, _BY_NETWORK), (POLE, _ON_POLE), (ROAD, _BY_MODEL)):
+        check_job(_job(folder / source, outputs, overwrite=overwrite))
 
 
-def _job(folder: Path, outputs: dict[str, str], *, overwrite: bool) -> VideoJob:
-    paths = tuple(Output(sink, folder / name) for sink, name in outputs.items())
-    return VideoJob(folder / ROAD, paths, overwrite=overwrite)
+def _job(source: Path, outputs: dict[str, str], *, overwrite: bool) -> VideoJob:
+    paths = tuple(Output(sink, source.with_name(name)) for sink, name in outputs.items())
+    return VideoJob(source, paths, overwrite=overwrite)
 
 
 def run_demo(
@@ -77,7 +86,7 @@ def run_demo(
     announce: Callable[[str], object] = lambda _: None,
     steps: Steps = no_steps,
 ) -> list[str]:
-    """Draw a road, find its vehicles with both detectors, and compare them with the truth.
+    """Draw two roads, find and count their vehicles, and compare them with the truth.
 
     The linear model is first trained on patches that are mined from other drawn roads.
 
@@ -94,39 +103,34 @@ def run_demo(
 
     Returns
     -------
-    The comparison as lines of text: the scores of each detector, and how many vehicles it counted
-    at the line, of how many that crossed it.
+    The scores of each detector, and how many vehicles go from line to line: lines of text.
     """
     check_demo(folder, overwrite=overwrite)
-    scene = demo_scene(seed)
-    announce("1/4 drawing a road with vehicles …")
+    scene, pole = demo_scene(seed), pole_scene(seed)
+    announce("1/4 drawing two roads with vehicles …")
     steps("drawing", None)
-    write_clip(folder / ROAD, scene, overwrite=overwrite)
-    write_truth(folder / TRUTH, scene, overwrite=overwrite)
-    write_whole(folder / LINE, _LINE, overwrite=overwrite)
-    settings = load_settings(places={"counts": folder / LINE})
-    size = scene.camera.width, scene.camera.height
+    for drawn, clip, boxes in ((scene, ROAD, TRUTH), (pole, POLE, POLE_TRUTH)):
+        write_clip(folder / clip, drawn, overwrite=overwrite)
+        write_truth(folder / boxes, drawn, overwrite=overwrite)
+    write_whole(folder / LINES, _LINES, overwrite=overwrite)
     truth, rate = read_truth(folder / TRUTH), float(scene.rate)
 
-    def count(tracks: Path) -> int:
-        return len(count_files([tracks], settings.counts, size, rate)[str(tracks)].events)
-
-    crossings = count(folder / TRUTH)
-
-    def find(
-        name: str, outputs: dict[str, str], settings: Settings, model: Path | None
-    ) -> list[str]:
-        job = replace(_job(folder, outputs, overwrite=overwrite), at=scene.frames / scene.rate / 2)
+    def run(source: str, outputs: dict[str, str], settings: Settings, model: Path | None) -> Path:
+        job = _job(folder / source, outputs, overwrite=overwrite)
         detector = load_detector(settings.detector, model)
-        run_video(job, detector, settings, progress=partial(steps, "frames"))
-        tracks = folder / outputs["tracks"]
+        middle = scene.frames / scene.rate / 2
+        run_video(replace(job, at=middle), detector, settings, progress=partial(steps, "frames"))
+        return folder / outputs["tracks"]
+
+    def find(name: str, outputs: dict[str, str], settings: Settings, model: Path | None) -> Row:
+        tracks = run(ROAD, outputs, settings, model)
         found = score(read_predictions(tracks), truth, rate=rate)
         ratios = (found.precision, found.recall, found.f1, found.idf1)
-        counted = f"{count(tracks)} of {crossings}"
-        return [name, *(f"{ratio:.2f}" for ratio in ratios), str(found.id_switches), counted]
+        return [name, *(f"{ratio:.2f}" for ratio in ratios), str(found.id_switches)]
 
-    announce("2/4 finding the vehicles with the network …")
-    by_network = find("network", _BY_NETWORK, settings, None)
+    announce("2/4 finding and counting the vehicles with the network …")
+    by_network = find("network", _BY_NETWORK, load_settings(), None)
+    run(POLE, _ON_POLE, load_settings(places={"counts": folder / LINES}), None)
     announce(f"3/4 drawing {ROADS} more roads, and training a linear model on patches of them …")
     linear = load_settings(assignments=["train.mine.probability=0"], detector="svm")
     sources, rng = _roads_to_learn(folder), np.random.default_rng(seed)
@@ -142,10 +146,20 @@ def run_demo(
     metrics.write(folder / METRICS, overwrite=overwrite)
     announce("4/4 finding the vehicles with the linear model …")
     by_model = find(f"linear model {MODEL}", _BY_MODEL, linear, folder / MODEL)
-    return table(
-        ("", "precision", "recall", "F1", "IDF1", "id switches", "counted at the line"),
-        [by_network, by_model],
-    )
+    scores = table(("", "precision", "recall", "F1", "IDF1", "id switches"), [by_network, by_model])
+    return [*scores, "", *table(("from", "to", "vehicles", "in truth"), _flows(folder, pole))]
+
+
+def _flows(folder: Path, scene: Scene) -> list[Row]:
+    """Return the flows from the pole: how many vehicles were found, and how many are true."""
+    counts = load_settings(places={"counts": folder / LINES}).counts
+    size, rate = (scene.camera.width, scene.camera.height), float(scene.rate)
+    found: dict[tuple[str, str], list[int]] = {}
+    for number, name in enumerate((_ON_POLE["tracks"], POLE_TRUTH)):
+        (video,) = count_files([folder / name], counts, size, rate).values()
+        for row in video.flows():
+            found.setdefault((row.origin, row.destination or NOWHERE), [0, 0])[number] += row.count
+    return [[*way, *map(str, numbers)] for way, numbers in found.items()]
 
 
 def _roads_to_learn(folder: Path) -> tuple[VideoSource, ...]:

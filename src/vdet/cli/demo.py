@@ -1,4 +1,4 @@
-"""`vdet demo`: the whole program on a drawn road."""
+"""`vdet demo`: the whole program on drawn roads."""
 
 from pathlib import Path
 
@@ -14,11 +14,12 @@ from vdet.cli.options import PATH, option, overwrite_option
 @option("--seed N", "Seed of everything that is drawn.", click.IntRange(min=0), default=5)
 @overwrite_option
 def demo(folder: Path, seed: int, overwrite: bool) -> None:
-    """Try the whole program on a drawn road.
+    """Try the whole program on drawn roads.
 
-    A road with vehicles is drawn. The network finds and counts them. Then a linear model is trained
-    on patches of other drawn roads and finds them too. Both are compared with the truth. All files
-    are written into DIR, by default into demo.
+    Two roads with vehicles are drawn, from a moving camera and from a pole. The network finds them,
+    and counts those from the pole. Then a linear model is trained on patches of other drawn roads
+    and finds them too. All is compared with the truth. All files are written into DIR, by default
+    into demo.
     """
     from vdet.demo import METRICS, TRUTH, run_demo
 
@@ -35,7 +36,8 @@ def demo(folder: Path, seed: int, overwrite: bool) -> None:
         "",
         "Look at",
         f"  {folder / 'found.mp4'}  the road with the vehicles that the network found",
-        f"  {folder / 'page' / 'page.html'}  the page of this run",
+        f"  {folder / 'counted.mp4'}  the road from the pole, with lines and counts",
+        f"  {folder / 'page' / 'page.html'}  its page; {folder / 'flows.csv'} has the flows",
         f"  {folder / 'found.csv'}  the tracks; {folder / TRUTH} has the true ones",
         f"  {folder / 'stages'}/  every stage of the linear model in one frame",
         f"  {folder / METRICS}  the metrics of the training",

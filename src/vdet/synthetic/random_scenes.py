@@ -1,6 +1,7 @@
-"""Random scenes from a seed: empty roads, roads with traffic, and the road of the demo."""
+"""Random scenes from a seed: empty roads, roads with traffic, and those of the demo."""
 
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 
@@ -62,6 +63,25 @@ def demo_scene(seed: int, *, width: int = 960, height: int = 540) -> Scene:
         points = tuple(Waypoint(*point) for point in path)
         vehicles.append(SceneVehicle(number, points, _PAINTS[paints[number]], random_body(rng)))
     return replace(scene, vehicles=tuple(vehicles), frames=250)
+
+
+def pole_scene(seed: int) -> Scene:
+    """Return a road from a pole: 10 s, two lanes away from the camera and two to it, two cars each.
+
+    All cars come from outside the frame, and leave it or are far away in the end.
+    """
+    rng = np.random.default_rng(seed)
+    scene = empty_road(rng, PinholeCamera.pole(960, 540), lane=1, lanes=4, seed=seed)
+    vehicles = []
+    for number in range(8):
+        lateral, comes = (number % 4 - 1) * LANE_WIDTH, number % 4 < 2
+        start, speed = 2.4 * (number // 4) + rng.uniform(0, 0.5), rng.uniform(13, 16)
+        ahead, ends = ((90.0, -10.0), (-10.0, 90.0))[not comes], (start, start + 100 / speed)
+        points = zip(ends, ahead, strict=True)
+        path = tuple(Waypoint(*point, lateral, np.pi * comes) for point in points)
+        vehicles.append(SceneVehicle(number + 1, path, random_paint(rng), random_body(rng)))
+    still = replace(scene, roadside=(), speed=0.0, rate=Fraction(25, 2), frames=125)
+    return replace(still, vehicles=tuple(vehicles))
 
 
 def busy_road(rng: np.random.Generator) -> Scene:
