@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from vdet.boxes import Box
-from vdet.labels.formats import format_for
+from vdet.labels.formats import TrackWriter, format_for
 from vdet.track.track import FrameTracks, Track
 
 RATE, SECONDS, BOXES = 25, 3600, 1_200_000
@@ -65,7 +65,7 @@ def write_hour(path: Path, seed: int = 0) -> None:
     form = format_for(path)
     assert form is not None
     with path.open("wb") as file:
-        writer = form.write(file, None)
+        writer = TrackWriter(form, file)
         for index, shown in enumerate(tracks):
             writer.write(FrameTracks(index, index / RATE, tuple(shown)))
 

@@ -17,6 +17,7 @@ from vdet.errors import TruthError
 from vdet.evaluate.video import Variant, evaluate_clip, follow_together, open_clip
 from vdet.media import Frame, Picture, VideoInfo
 from vdet.media.reader import VideoReader
+from vdet.progress import no_progress
 from vdet.run.loop import build, peek
 from vdet.run.result import FrameResult
 from vdet.synthetic.scene import Scene
@@ -150,7 +151,7 @@ def test_vehicles_outside_the_regions_do_not_count(
     clip = open_clip(clip_path, truth_path)
     middle = 220  # of 320 pixels; two of the three vehicles are to the left of it
     left = "{name: left, points: [[0, 0], [0.6875, 0], [0.6875, 1], [0, 1]]}"
-    (result,) = evaluate_clip(clip, [variant(f"regions.polygons=[{left}]")])
+    (result,) = evaluate_clip(clip, [variant(f"regions.polygons=[{left}]")], no_progress)
     for frame in result.comparison.frames:
         for boxes in (frame.vehicle_boxes, frame.track_boxes):
             assert (boxes[:, [0, 2]].mean(axis=1) <= middle).all()
@@ -163,4 +164,4 @@ def test_truth_beyond_the_video_is_refused(
     truth = tmp_path / "gt.txt"
     truth.write_text("1,1,10,10,50,50,1,3,1\n31,1,10,10,50,50,1,3,1\n")
     with pytest.raises(TruthError, match=r"gt\.txt: has a box in frame 31 of a video of 30"):
-        evaluate_clip(open_clip(clip_path, truth), [variant()])
+        evaluate_clip(open_clip(clip_path, truth), [variant()], no_progress)

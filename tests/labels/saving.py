@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from vdet.boxes import Box
-from vdet.labels.formats import Format, SourceVideo
+from vdet.labels.formats import Format, SourceVideo, TrackWriter
 from vdet.labels.label import Label, checked_labels, from_size
 from vdet.labels.reading import read_tracks
 from vdet.labels.video import LabelledVideo, SavedTracks
@@ -58,7 +58,7 @@ def car(number: int = 1, box: Box = PLACE, **known: object) -> Track:
 def written(form: Format, frames: Iterable[FrameTracks], video: SourceVideo = VIDEO) -> bytes:
     """Return the content of a file with these frames."""
     file = io.BytesIO()
-    writer = form.write(file, video)
+    writer = TrackWriter(form, file, video)
     for each in frames:
         writer.write(each)
     writer.end()

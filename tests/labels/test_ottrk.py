@@ -12,6 +12,7 @@ import pytest
 from labels.saving import VIDEO, car, frame, read_back, written
 from vdet.boxes import Box
 from vdet.errors import TruthError
+from vdet.labels.formats import TrackWriter
 from vdet.labels.ottrk import OTTRK, read_ottrk
 from vdet.track.track import FrameTracks
 
@@ -51,7 +52,7 @@ def test_the_metadata_describe_the_video() -> None:
 def test_the_clock_is_kept(tmp_path: Path) -> None:
     path = tmp_path / "t.ottrk"
     with path.open("wb") as file:
-        writer = OTTRK.write(file, replace(VIDEO, begin=BEGIN))
+        writer = TrackWriter(OTTRK, file, replace(VIDEO, begin=BEGIN))
         for each in FRAMES:
             writer.write(each)
         writer.end()

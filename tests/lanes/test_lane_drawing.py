@@ -8,7 +8,7 @@ import pytest
 from vdet.boxes import Image
 from vdet.config.schema import LaneSettings
 from vdet.lanes.drawing import draw_lane, lane_text, stage_pictures
-from vdet.lanes.road import Lane, LaneRequest, RoadFinder, lane_record
+from vdet.lanes.road import Lane, LaneRequest, RoadFinder
 from vdet.media import Picture
 
 LANE = Lane(
@@ -35,9 +35,8 @@ def test_a_record_has_millimetres_and_tenths_of_pixels() -> None:
         "left": [[300.0, 650.1], [450.0, 550.0], [580.0, 460.0]],
         "right": [[1000.0, 650.0], [830.0, 550.0], [690.0, 460.0]],
     }
-    assert lane_record(LANE) == record
-    assert lane_record(STRAIGHT) == record | {"radius": None, "offset": 0.1}
-    assert lane_record(None) is None
+    assert LANE.record() == record
+    assert STRAIGHT.record() == record | {"radius": None, "offset": 0.1}
 
 
 def test_area_and_lines_are_drawn_and_nothing_beside_them(frame: Image) -> None:

@@ -92,8 +92,9 @@ def setting(event: threading.Event, items: Iterable[int]) -> Iterator[int]:
 
 class TestPrefetch:
     @pytest.mark.parametrize("depth", [1, 4, 100])
-    def test_gives_all_items_in_order(self, depth: int) -> None:
-        with prefetch(range(50), depth) as items:
+    def test_gives_all_items_in_order(self, depth: int, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr("vdet.run.threads.DEPTH", depth)
+        with prefetch(range(50)) as items:
             assert list(items) == list(range(50))
 
     @pytest.mark.parametrize("take", [1, 3])
@@ -142,9 +143,12 @@ class TestPrefetch:
 
 class TestWriteAsync:
     @pytest.mark.parametrize("depth", [1, 4, 100])
-    def test_passes_all_items_on_in_order(self, depth: int) -> None:
+    def test_passes_all_items_on_in_order(
+        self, depth: int, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr("vdet.run.threads.DEPTH", depth)
         taken: list[int] = []
-        with write_async(taken.append, depth, within=nullcontext()) as hand_over:
+        with write_async(taken.append, within=nullcontext()) as hand_over:
             hand_all(range(50), hand_over)
         assert taken == list(range(50))
 
@@ -196,14 +200,17 @@ class TestWriteAsync:
             give()
         assert threads_of_vdet() == ["vdet-write"]
 
-    def test_the_end_has_the_time_that_it_is_given_and_as_long_as_it_gets_on(self) -> None:
+    def test_the_end_has_the_time_that_it_is_given_and_as_long_as_it_gets_on(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr("vdet.run.threads.DEPTH", 9)
         passed: list[int] = []
 
         def take(item: int) -> None:
             time.sleep(0.2)
             passed.append(item)
 
-        with write_async(take, 9, within=nullcontext(), timeout=0.1, extra=lambda: SOON) as put:
+        with write_async(take, within=nullcontext(), timeout=0.1, extra=lambda: SOON) as put:
             for item in range(5):
                 put(item)
         assert passed == list(range(5))

@@ -8,6 +8,7 @@ import pytest
 
 from traffic.scenes import HEIGHT, WIDTH, Path, frames, through
 from vdet.config.places import CountSettings, LineSettings, ZoneSettings
+from vdet.labels.formats import TrackWriter
 from vdet.labels.records import JSON_LINES
 from vdet.traffic.counting import count_files
 from vdet.traffic.counts import Counts, flow_table, zone_table
@@ -32,7 +33,7 @@ def write_halves(folder: File, names: Sequence[str], *paths: Path) -> list[File]
     for name, (_, half) in zip(names, halves, strict=True):
         path = folder / name
         with path.open("wb") as file:
-            writer = JSON_LINES.write(file, None)
+            writer = TrackWriter(JSON_LINES, file)
             for index, frame in enumerate(half):
                 writer.write(type(frame)(index, index / 25, frame.tracks))
         files.append(path)

@@ -48,7 +48,6 @@ def calibrate(
         log.warning("%s: not used: %s", path, reason)
     save_camera(result.camera, output, overwrite=overwrite)
     camera = result.camera
-    print_lines(
-        f"{output}: {camera.width}×{camera.height}, focal length {camera.matrix[0][0]:.0f} px, "
-        f"RMS error {camera.rms:.2f} px, {len(result.photos)} of {len(found)} photographs used"
-    )
+    lens = f"focal length {camera.matrix[0][0]:.0f} px, RMS error {camera.rms:.2f} px"
+    used = f"{len(result.photos)} of {len(found)} photographs used"
+    print_lines(f"{output}: {camera.width}×{camera.height}, {lens}, {used}")

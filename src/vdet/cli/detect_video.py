@@ -84,8 +84,7 @@ _batch_options = options.bundle(
 )
 @options.output_option(
     "--vehicles FILE",
-    "Write a record of each vehicle: .csv or .json. With -d, give only the ending. A file over "
-    "all videos is then written too.",
+    "Write a record of each vehicle: .csv or .json. With -d, give only the ending.",
 )
 @options.output_option(
     "--crops DIR",
@@ -93,8 +92,7 @@ _batch_options = options.bundle(
 )
 @options.output_option(
     "--page DIR",
-    "Write page.html into DIR: a page on the vehicles of the video. With -d, give an ending "
-    "such as .page. A page that links all videos is then written too.",
+    "Write page.html, on the vehicles, into DIR. With -d, give an ending such as .page.",
 )
 @counting_options(" With -d, give only the ending, as in .counts.csv.")
 @options.sink_option
@@ -102,10 +100,7 @@ _batch_options = options.bundle(
 @options.end_option
 @options.option("--frames N", "Process at most N frames.", options.POSITIVE)
 @options.option(
-    "--stride N",
-    "Search every N-th frame. In the others, the tracker moves the vehicles on. The same as "
-    "--set detector.stride=N.",
-    click.IntRange(1, 100),
+    "--stride N", "Search every N-th frame, as --set detector.stride=N.", click.IntRange(1, 100)
 )
 @options.option(
     "--threads N",

@@ -10,15 +10,9 @@ from typing import Any, get_args
 from pydantic import ValidationError, create_model
 from pydantic_core import ErrorDetails
 
+from vdet.config import document
 from vdet.config.detector import NetworkSettings
-from vdet.config.document import (
-    Document,
-    Key,
-    config_error,
-    format_key,
-    parse_assignment,
-    read_document,
-)
+from vdet.config.document import Document, Key
 from vdet.config.schema import Section, Settings
 from vdet.config.svm import SvmSettings
 from vdet.config.tracker import MotionTrackerSettings, RulesTrackerSettings
@@ -126,11 +120,11 @@ def load_settings(
         One line for each mistake, with file, line, column, key and what was expected.
     """
     layers = [Document("defaults", {"detector": {"kind": detector}})] if detector else []
-    layers += [read_document(path)] if path else []
+    layers += [document.read_document(path)] if path else []
     layers += [_read_places(name, file) for name, file in (places or {}).items()]
     assigned = Document("--set", {})
     for text in assignments:
-        assigned = _over(assigned, parse_assignment(text))
+        assigned = _over(assigned, document.parse_assignment(text))
     layers.append(assigned)
     merged, chosen = _merge(layers)
     fields: Any = {name: (section, section()) for name, section in chosen.items()}
@@ -139,7 +133,7 @@ def load_settings(
         checked = model.model_validate(merged.values)
     except ValidationError as error:
         details = error.errors()
-        raise config_error(
+        raise document.config_error(
             (_describe(detail, merged, model) for detail in details), len(details)
         ) from error
     return Settings.model_construct(**dict(checked))
@@ -151,9 +145,9 @@ def _read_places(section: str, path: Path) -> Document:
     no_places = {name: value for name, value in defaults.items() if value in ([], None)}
     if "mask" in no_places and path.suffix.lower() not in _YAML_SUFFIXES:
         return Document(str(path), {section: no_places | {"mask": str(path)}})
-    document = read_document(path)
-    places = {(section, *key): place for key, place in document.places.items()}
-    return Document(document.name, {section: no_places | document.values}, places)
+    read = document.read_document(path)
+    places = {(section, *key): place for key, place in read.places.items()}
+    return Document(read.name, {section: no_places | read.values}, places)
 
 
 def _over(below: Document, above: Document) -> Document:
@@ -198,7 +192,7 @@ _EXPECTED = {"model_type": "should be a section, key: value", "tuple_type": "sho
 
 def _describe(detail: ErrorDetails, merged: Document, model: type[Settings]) -> str:
     key = tuple(detail["loc"])
-    named = f"{format_key(key)}: " if key else ""
+    named = f"{document.format_key(key)}: " if key else ""
     return f"{merged.place_of(key)}: {named}{_expected(detail, key, model)}"
 
 

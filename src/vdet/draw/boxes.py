@@ -8,16 +8,8 @@ from functools import cache
 import numpy as np
 
 from vdet.boxes import Box, Image
-from vdet.draw.paint import (
-    Color,
-    Surface,
-    draw_arrow,
-    draw_lines,
-    fill,
-    shade,
-    text_size,
-    write_text,
-)
+from vdet.draw import paint
+from vdet.draw.paint import Color, Surface
 from vdet.polygons import Point
 from vdet.regions import Regions
 
@@ -82,7 +74,7 @@ def draw_box(
     dash = _DASH * width if dashed else None
     for side in _sides(box.rounded, width):
         for part in _dashes(side, dash) if dash else [side]:
-            fill(surface, part, color)
+            paint.fill(surface, part, color)
     if label:
         draw_label(surface, label, (box.x1, box.y1), color)
 
@@ -94,8 +86,8 @@ def draw_label(surface: Surface, text: str, corner: tuple[float, float], color: 
     is wider than the surface becomes smaller; if it still does not fit, its end is cut off.
     """
     tag, origin, scale = _lay_out(surface, text, corner)
-    fill(surface, tag, color)
-    write_text(surface, text, origin, scale, text_color(color), within=tag)
+    paint.fill(surface, tag, color)
+    paint.write_text(surface, text, origin, scale, text_color(color), within=tag)
     return tag
 
 
@@ -109,9 +101,9 @@ def _lay_out(
 ) -> tuple[Box, tuple[float, float], float]:
     """Return the tag of a label, the lower left corner of its text, and the scale of its font."""
     rows, columns = surface.shape[:2]
-    scale = max(_SMALLEST_TEXT, min(rows / 1200, columns / (text_size(text, 1)[0] + 20)))
+    scale = max(_SMALLEST_TEXT, min(rows / 1200, columns / (paint.text_size(text, 1)[0] + 20)))
     margin = max(3, round(6 * scale))
-    width, height, baseline = text_size(text, scale)
+    width, height, baseline = paint.text_size(text, scale)
     tag_width, tag_height = width + 2 * margin, height + baseline + margin + (margin + 1) // 2
     left, bottom = (math.floor(value + 0.5) for value in corner)
     x = max(0, min(left, columns - tag_width))
@@ -151,7 +143,7 @@ def _dashes(side: Box, dash: int) -> Iterator[Box]:
 
 def draw_zone(surface: Surface, corners: Sequence[Point], label: str) -> None:
     """Draw a zone with a label at its highest corner; corners are in pixels."""
-    shade(surface, corners, ZONE, _SHADE)
+    paint.shade(surface, corners, ZONE, _SHADE)
     draw_outline(surface, corners, ZONE, label)
 
 
@@ -163,11 +155,11 @@ def draw_line(surface: Surface, start: Point, end: Point, labels: tuple[str, str
     """
     width, reach = line_width(surface), _ARROW * surface.shape[0]
     length = math.dist(start, end)
-    draw_arrow(surface, start, end, LINE, width, tip=min(1.0, reach / length))
+    paint.draw_arrow(surface, start, end, LINE, width, tip=min(1.0, reach / length))
     x, y = (end[1] - start[1]) / length, (start[0] - end[0]) / length  # to the left
     for label, way in zip(labels, ((x, y), (-x, -y)), strict=True):
         tip = start[0] + reach * way[0], start[1] + reach * way[1]
-        draw_arrow(surface, start, tip, LINE, width, tip=0.4)
+        paint.draw_arrow(surface, start, tip, LINE, width, tip=0.4)
         tag = label_tag(surface, label, (0, 0))  # its middle lies beyond the tip
         left = tip[0] + (way[0] - 1) * tag.width / 2
         draw_label(surface, label, (left, tip[1] + (way[1] + 1) * tag.height / 2), LINE)
@@ -185,7 +177,7 @@ def draw_regions(image: Image, regions: Regions) -> Image:
 
 def draw_outline(surface: Surface, corners: Sequence[Point], color: Color, label: str) -> None:
     """Draw the sides of a polygon, and write a label at its highest corner."""
-    draw_lines(surface, corners, color, line_width(surface), closed=True)
+    paint.draw_lines(surface, corners, color, line_width(surface), closed=True)
     left, top = min(corners, key=lambda corner: (corner[1], corner[0]))
     height = label_tag(surface, label, (0, 0)).height
     draw_label(surface, label, (round(left), round(top) + height), color)

@@ -6,14 +6,7 @@ from typing import Any
 
 from vdet.boxes import Box, Image
 from vdet.errors import counted, printable
-from vdet.evaluate.images import (
-    SIZE_NAMES,
-    ImageScores,
-    ImagesResult,
-    MeasuredImage,
-    MeasuredSet,
-    SizeScores,
-)
+from vdet.evaluate import images
 from vdet.evaluate.output import ABSENT, RunName, Table, score_table, share, table
 from vdet.evaluate.scores import score_detections
 from vdet.evaluate.tiles import FOUND, IGNORED, TRUE, Tile, draw_tile
@@ -33,7 +26,7 @@ _TILE_WIDTH = 480  # pixels
 _MOST_TILES = 9  # of each source
 
 
-def lines(result: ImagesResult, run: RunName) -> Iterator[str]:
+def lines(result: images.ImagesResult, run: RunName) -> Iterator[str]:
     """Yield the detector, what counted, and the scores of each source."""
     yield from run.lines()
     yield counting_line(result)
@@ -45,7 +38,7 @@ def lines(result: ImagesResult, run: RunName) -> Iterator[str]:
         yield from others
 
 
-def counting_line(result: ImagesResult) -> str:
+def counting_line(result: images.ImagesResult) -> str:
     """Return the rule for counting as text."""
     counting = result.counting
     text = f"boxes from score {counting.score:.2f}"
@@ -54,29 +47,29 @@ def counting_line(result: ImagesResult) -> str:
     return text
 
 
-def source_table(result: ImagesResult) -> Table:
+def source_table(result: images.ImagesResult) -> Table:
     """Return a row for each source, and one for the mean of several."""
     return score_table("source", COLUMNS, _named(result))
 
 
-def size_table(result: ImagesResult) -> Table:
+def size_table(result: images.ImagesResult) -> Table:
     """Return recall and F1 by the width of the vehicles, in the same rows."""
     rows = [[name, *map(_size_cell, scores.sizes)] for name, scores in _named(result)]
-    return ("recall / F1 by width", *SIZE_NAMES), rows
+    return ("recall / F1 by width", *images.SIZE_NAMES), rows
 
 
-def _named(result: ImagesResult) -> list[tuple[str, ImageScores]]:
+def _named(result: images.ImagesResult) -> list[tuple[str, images.ImageScores]]:
     """Return the name and the scores of each set, and of the mean of several."""
     named = [(source.labelled.name, source.scores) for source in result.sources]
     sets = sum(scores.vehicles > 0 for _, scores in named)
     return [*named, (f"mean of {sets}", result.mean)] if len(named) > 1 else named
 
 
-def _size_cell(size: SizeScores) -> str:
+def _size_cell(size: images.SizeScores) -> str:
     return f"{share(size.recall, 2)} / {share(size.f1, 2)}" if size.vehicles else ABSENT
 
 
-def others_lines(result: ImagesResult) -> list[str]:
+def others_lines(result: images.ImagesResult) -> list[str]:
     """Return a line for each set with labels that are not vehicles."""
     found = []
     for labelled in (source.labelled for source in result.sources):
@@ -88,7 +81,7 @@ def others_lines(result: ImagesResult) -> list[str]:
     return found
 
 
-def plain(result: ImagesResult, run: RunName) -> dict[str, Any]:
+def plain(result: images.ImagesResult, run: RunName) -> dict[str, Any]:
     """Return all numbers, and what was measured, as values for JSON."""
     return {
         **run.values(),
@@ -105,12 +98,12 @@ def plain(result: ImagesResult, run: RunName) -> dict[str, Any]:
     }
 
 
-def _plain_scores(scores: ImageScores) -> dict[str, Any]:
-    sizes = zip(SIZE_NAMES, map(asdict, scores.sizes), strict=True)
+def _plain_scores(scores: images.ImageScores) -> dict[str, Any]:
+    sizes = zip(images.SIZE_NAMES, map(asdict, scores.sizes), strict=True)
     return {**asdict(scores), "sizes": [{"width": name, **size} for name, size in sizes]}
 
 
-def images_page(result: ImagesResult, run: RunName) -> str:
+def images_page(result: images.ImagesResult, run: RunName) -> str:
     """Return the page as HTML. Raises `ImageError` if a picture can no longer be read."""
     headings, rows = source_table(result)
     sheets = [(each.labelled.name, worst_tiles(each)) for each in result.sources]
@@ -126,7 +119,7 @@ def images_page(result: ImagesResult, run: RunName) -> str:
     )
 
 
-def _f1_plot(result: ImagesResult) -> Plot:
+def _f1_plot(result: images.ImagesResult) -> Plot:
     score = result.counting.score
     colored = [(each, color(number)) for number, each in enumerate(result.sources)]
     lines = [curve(each.curve.scores, each.curve.f1, one) for each, one in colored]
@@ -136,7 +129,7 @@ def _f1_plot(result: ImagesResult) -> Plot:
     return Plot(title, number_axis(0, 1, "score"), number_axis(0, 1), (), lines, legend)
 
 
-def worst_tiles(source: MeasuredSet) -> list[Tile]:
+def worst_tiles(source: images.MeasuredSet) -> list[Tile]:
     """Return the pictures with the most mistakes among what counts, with all boxes.
 
     Raises `ImageError` if a picture can no longer be read.
@@ -154,7 +147,7 @@ def worst_tiles(source: MeasuredSet) -> list[Tile]:
     ]
 
 
-def _drawn(image: MeasuredImage) -> Image:
+def _drawn(image: images.MeasuredImage) -> Image:
     picture = image.picture.read()
     outlines = [(image.regions, IGNORED, 1)]
     for frame in image.shown.frames:

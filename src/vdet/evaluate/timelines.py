@@ -116,13 +116,11 @@ def _swapped(frame: ComparedFrame) -> ComparedFrame:
 
 
 def _stretches(
-    frames: Sequence[ComparedFrame], ids: Int64Array, partner_ids: Int64Array
+    frames: Sequence[ComparedFrame], ids: Int64Array, others: Int64Array
 ) -> list[Stretch]:
     seen: list[list[tuple[int, int | None, float]]] = [[] for _ in ids]
     for frame in frames:
-        partners = dict(
-            zip(frame.found.tolist(), partner_ids[frame.found_by].tolist(), strict=True)
-        )
+        partners = dict(zip(frame.found.tolist(), others[frame.found_by].tolist(), strict=True))
         overlaps = frame.iou.max(axis=1, initial=0).tolist()
         for vehicle, overlap in zip(frame.vehicles.tolist(), overlaps, strict=True):
             seen[vehicle].append((frame.number, partners.get(vehicle), overlap))

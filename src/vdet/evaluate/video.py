@@ -189,9 +189,7 @@ def best(runs: Sequence[RunResult]) -> RunResult:
     return max(runs, key=lambda run: run.total.f1)
 
 
-def evaluate_clip(
-    clip: Clip, variants: Sequence[Variant], progress: Progress = no_progress
-) -> list[ClipResult]:
+def evaluate_clip(clip: Clip, variants: Sequence[Variant], progress: Progress) -> list[ClipResult]:
     """Find the vehicles of a clip under each of the settings, in one pass, and score them.
 
     Vehicles of the truth that stand outside the regions are ignored.

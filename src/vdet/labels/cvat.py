@@ -18,7 +18,7 @@ from vdet.labels.label import Label, limited
 from vdet.labels.parsing import archive_texts, parse_number, parse_whole, text_of
 from vdet.labels.video import SavedTracks
 from vdet.labels.xml_reader import Element, read_xml
-from vdet.track.track import FrameTracks, Track
+from vdet.track.track import FrameTracks, State, Track
 
 _MEMBER = "annotations.xml"  # in the zip file that CVAT exports
 
@@ -116,13 +116,11 @@ def _labels(track: Element, box: Element) -> Iterator[Label]:
     left, top, right, bottom = (
         parse_number(box.attribute(side)) for side in ("xtl", "ytl", "xbr", "ybr")
     )
-    is_occluded = parse_whole(box.attributes.get("occluded", "0")) == 1
+    state: State = "lost" if parse_whole(box.attributes.get("occluded", "0")) == 1 else "seen"
     name = track.attribute("label")
     if not parse_whole(box.attribute("outside")):
         corners = left, top, right, bottom
-        yield Label(
-            box.line, corners, name, frame + 1, id_, state="lost" if is_occluded else "seen"
-        )
+        yield Label(box.line, corners, name, frame + 1, id_, state=state)
 
 
 CVAT = Format("CVAT for video 1.1", ".xml", read_cvat, whole=_write)

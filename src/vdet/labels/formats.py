@@ -82,20 +82,11 @@ class Format:
     heading: str = ""
     whole: WriteWhole | None = None
 
-    @property
-    def needs_video(self) -> bool:
-        """Whether it cannot be written without a video."""
-        return self.whole is not None
-
-    def write(self, file: BinaryIO, video: SourceVideo | None) -> "TrackWriter":
-        """Return a writer into a binary file, which another opens and closes."""
-        return TrackWriter(self, file, video)
-
 
 class TrackWriter:
     """Writes the tracks of a video into a binary file."""
 
-    def __init__(self, form: Format, file: BinaryIO, video: SourceVideo | None) -> None:
+    def __init__(self, form: Format, file: BinaryIO, video: SourceVideo | None = None) -> None:
         self._form, self._file, self._video = form, file, video
         self._kept: list[FrameTracks] = []
         self._file.write(form.heading.encode())

@@ -84,9 +84,7 @@ def read_yolo(path: Path, data: bytes) -> SavedTracks:
         `data.yaml` with names and the size of the frames, two files are of one frame, or a line is
         not of this form.
     """
-    texts = parsing.archive_texts(
-        path, data, lambda name: name.name == _DATA or _is_label_file(name)
-    )
+    texts = parsing.archive_texts(path, data, _is_wanted)
     described = [name for name in texts if PurePosixPath(name).name == _DATA]
     if not described:
         raise TruthError(f"{path}: needs {_DATA} with the names of the classes")
@@ -147,8 +145,9 @@ def _frames(path: Path, names: Sequence[str]) -> dict[int, str]:
     return files
 
 
-def _is_label_file(name: PurePosixPath) -> bool:
-    return name.suffix.lower() == ".txt" and "labels" in name.parts[:-1]
+def _is_wanted(name: PurePosixPath) -> bool:
+    is_label_file = name.suffix.lower() == ".txt" and "labels" in name.parts[:-1]
+    return is_label_file or name.name == _DATA
 
 
 def _label(place: int | str, columns: Sequence[str], names: Sequence[str], size: Size) -> Label:

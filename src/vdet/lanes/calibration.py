@@ -79,10 +79,7 @@ def calibrate(paths: Iterable[Path], pattern: Pattern) -> Calibration:
     if max(errors) > OUTLIER_RATIO * median:
         for photo, error in zip(photos, errors, strict=True):
             if error > OUTLIER_RATIO * median:
-                skipped[photo.path] = (
-                    f"is an outlier: error {error:.2f} px, more than {OUTLIER_RATIO:g} times the "
-                    f"median of {median:.2f} px"
-                )
+                skipped[photo.path] = f"is an outlier: error {error:.2f} px, median {median:.2f} px"
         photos = _without(skipped, photos, pattern)
         camera, _ = _fit(photos, pattern, size)
     if camera is None:

@@ -164,9 +164,7 @@ def fit_ground(pixels: Float64Array, metres: Float64Array, undistorter: Undistor
     error, pixel_error = (float(np.sqrt(np.mean(each**2))) for each in (off, pixel_off))
     if error > _MOST_ERROR * _length(area):
         worst = int(np.argmax(pixel_off))
-        raise ConfigError(
-            f"points[{worst}]: lies {off[worst]:.1f} m from where the others say; check its numbers"
-        )
+        raise ConfigError(f"points[{worst}]: lies {off[worst]:.1f} m from where the others say")
     rows = _mapped(to_metres, straight + np.array((0, 1))) - _mapped(to_metres, straight)
     row = float(np.median(np.hypot(*rows.T)))
     return Ground(to_metres, area, error, pixel_error, row, undistorter)

@@ -64,19 +64,16 @@ class Lane:
     left: Float64Array
     right: Float64Array
 
+    def record(self) -> dict[str, Any]:
+        """Return plain values for JSON, of the same meaning.
 
-def lane_record(lane: Lane | None) -> dict[str, Any] | None:
-    """Return a lane as plain values for JSON; None if there is none.
-
-    `radius` (None on a straight road), `offset` and `width` are metres, rounded to millimetres.
-    `left` and `right` are `[[x, y], …]`, pixels, rounded to tenths. All mean the same as in `Lane`.
-    """
-    if lane is None:
-        return None
-    record: dict[str, Any] = {"radius": lane.radius and round(lane.radius, 3)}
-    record |= {"offset": round(lane.offset, 3), "width": round(lane.width, 3)}
-    record |= {"left": np.round(lane.left, 1).tolist(), "right": np.round(lane.right, 1).tolist()}
-    return record
+        `radius` (None on a straight road), `offset` and `width` are metres, rounded to millimetres.
+        `left` and `right` are `[[x, y], …]`, pixels, rounded to tenths.
+        """
+        record: dict[str, Any] = {"radius": self.radius and round(self.radius, 3)}
+        record |= {"offset": round(self.offset, 3), "width": round(self.width, 3)}
+        lines = {"left": self.left, "right": self.right}
+        return record | {side: np.round(line, 1).tolist() for side, line in lines.items()}
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,8 +145,8 @@ class Road:
         return self.undistorter.copy(self.view.picture, used)
 
     def record(self) -> dict[str, Any] | None:
-        """Return the lane as plain values for JSON: see `lane_record`."""
-        return lane_record(self.lane)
+        """Return the lane as plain values for JSON."""
+        return self.lane.record() if self.lane else None
 
     def cuts(self, box: Box) -> bool:
         """Return whether the left, right or lower edge of the original frame cuts its box."""

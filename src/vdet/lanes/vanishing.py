@@ -112,14 +112,6 @@ class _Lines:
     ways: Float64Array
     lengths: Float64Array
 
-    @property
-    def homogeneous(self) -> Float64Array:
-        flat = np.cross(
-            np.column_stack([self.middles, np.ones(len(self.ways))]),
-            np.column_stack([self.ways, np.zeros(len(self.ways))]),
-        )
-        return np.asarray(flat, np.float64)
-
     def only(self, rows: BoolArray) -> "_Lines":
         return _Lines(self.middles[rows], self.ways[rows], self.lengths[rows])
 
@@ -147,7 +139,9 @@ def _straight(paths: Sequence[Float64Array], middle: Float64Array) -> _Lines:
 
 def _vanishing_point(lines: _Lines) -> tuple[Float64Array, BoolArray]:
     """Return the homogeneous point at which most lines meet, and which lines these are."""
-    flat, order = lines.homogeneous, np.argsort(-lines.lengths)
+    order = np.argsort(-lines.lengths)
+    ones = np.ones((len(order), 1))
+    flat = np.cross(np.hstack([lines.middles, ones]), np.hstack([lines.ways, 0 * ones]))
     best, most = np.zeros(len(order), np.bool_), 0.0
     for a, b in islice(combinations(order.tolist(), 2), _TRIED):
         point = np.cross(flat[a], flat[b])

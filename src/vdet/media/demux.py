@@ -241,7 +241,7 @@ def check_size(path: Path, width: int, height: int) -> None:
 def _orientation(path: Path, first: av.VideoFrame) -> Orientation:
     if sequence := find_sequence(path):
         with suppress(ImageError):  # of a format that only FFmpeg reads
-            return read_header(sequence.first_picture)[1]
+            return read_header(Path(sequence.pattern % sequence.first))[1]
     return Orientation.of_frame(first)
 
 

@@ -31,11 +31,6 @@ class PictureSequence:
     step: int = 1
 
     @property
-    def first_picture(self) -> Path:
-        """The file of the first picture."""
-        return Path(self.pattern % self.first)
-
-    @property
     def glob(self) -> str:
         """The pattern of `glob` that the pictures have, whose numbers all have as many digits."""
         match = _PATTERN.fullmatch(self.pattern)

@@ -227,10 +227,8 @@ class VideoReader:
         if declared:
             self._check_length(index + 1, declared, self.length)
         if self._end is not None and self.length + period < self._end:
-            self._faults.append(
-                f"ends at {float(self.length):.2f} s, before the end that was given "
-                f"({float(self._end):.2f} s)"
-            )
+            end = f"{float(self._end):.2f} s"
+            self._faults.append(f"ends at {float(self.length):.2f} s, before the end given, {end}")
 
     def _check_length(self, frames: int, declared: Fraction, found: Fraction) -> None:
         """Note a file that ends earlier than it declares; both lengths in seconds."""

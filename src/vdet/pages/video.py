@@ -186,9 +186,7 @@ class VideoPage:
         series = {"First seen": {"vehicles": came}, "At lines and zones": counted}
         ends = step * (self.start // step), step * math.ceil(self.end / step)
         x = charts.time_axis(*ends, self.zero)
-        return [
-            charts.interval_plot(some, x, step, title) for title, some in series.items() if some
-        ]
+        return [charts.interval_plot(some, x, step, name) for name, some in series.items() if some]
 
     @property
     def speed_plot(self) -> Plot | None:

@@ -5,22 +5,20 @@ group `vdet.steps`, is a function that takes a `StepContext` and returns the ste
 settings do not ask for it.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 from vdet.config.schema import Settings
 from vdet.media import Frame, VideoInfo
 from vdet.plugins import STEPS, load_plugin
 from vdet.run.result import FrameResult
-from vdet.track.track import Track
+from vdet.track.track import FrameTracks, Track
 
 if TYPE_CHECKING:
     from vdet.lanes.ground import GroundRequest
     from vdet.lanes.road import FrameView, LaneRequest, Road, RoadFinder
     from vdet.regions import Regions
-    from vdet.traffic.counter import VehicleCounter
-    from vdet.traffic.speeds import SpeedMeter
 
 
 class Step(Protocol):
@@ -133,28 +131,20 @@ class RegionStep:
         return replace(result, detections=detections, tracks=tracks)
 
 
-class SpeedStep:
-    """Measures the speeds of the vehicles that are shown."""
+@dataclass(frozen=True, slots=True)
+class TrafficStep:
+    """Gives the tracks of each frame to what counts vehicles or measures their speeds.
 
-    def __init__(self, speeds: "SpeedMeter") -> None:
-        self._speeds = speeds
+    `known` is what results get, by the name of their field.
+    """
 
-    def apply(self, result: FrameResult) -> FrameResult:
-        """Measure in the next frame, and add the meter."""
-        self._speeds.add(result.frame_tracks)
-        return replace(result, speeds=self._speeds)
-
-
-class CountStep:
-    """Counts the vehicles that are shown, at the lines and in the zones."""
-
-    def __init__(self, counter: "VehicleCounter") -> None:
-        self._counter = counter
+    add: Callable[[FrameTracks], object]
+    known: Mapping[str, Any]
 
     def apply(self, result: FrameResult) -> FrameResult:
-        """Count in the next frame, and add the counter."""
-        self._counter.update(result.frame_tracks)
-        return replace(result, counter=self._counter)
+        """Add the next frame."""
+        self.add(result.frame_tracks)
+        return replace(result, **self.known)
 
 
 def lane_step(context: StepContext) -> Step | None:
@@ -172,27 +162,28 @@ def region_step(context: StepContext) -> Step | None:
     """Make a `RegionStep` if there are regions."""
     if not context.settings.regions:
         return None
-    from vdet.regions import lay_regions
+    from vdet.regions import Regions
 
-    regions = lay_regions(context.settings.regions, context.width, context.height)
-    return RegionStep(regions) if regions else None
+    return RegionStep(Regions(context.settings.regions, context.width, context.height))
 
 
 def speed_step(context: StepContext) -> Step | None:
-    """Make a `SpeedStep` if the ground is known; a still picture has no speeds."""
+    """Make a step if the ground is known; a still picture has no speeds."""
     if context.ground is None or context.video is None:
         return None
     from vdet.traffic.speeds import SpeedMeter
 
     size = context.width, context.height
-    return SpeedStep(SpeedMeter(context.ground.ground(*size), *size))
+    meter = SpeedMeter(context.ground.ground(*size), *size)
+    return TrafficStep(meter.add, {"speeds": meter})
 
 
 def count_step(context: StepContext) -> Step | None:
-    """Make a `CountStep` if there are lines or zones; a still picture has no counts."""
+    """Make a step if there are lines or zones; a still picture has no counts."""
     counts = context.settings.counts
     if not counts or context.video is None:
         return None
     from vdet.traffic.counter import VehicleCounter
 
-    return CountStep(VehicleCounter(counts, context.width, context.height))
+    counter = VehicleCounter(counts, context.width, context.height)
+    return TrafficStep(counter.update, {"counter": counter})

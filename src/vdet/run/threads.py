@@ -19,7 +19,7 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 JOIN_TIMEOUT = 2.0  # seconds that a thread gets to end
-_DEPTH = 2  # items between two threads
+DEPTH = 2  # items between two threads
 _END = object()  # what follows the last item
 _AHEAD = 8
 """Largest number of items that `map_ordered` takes ahead for each thread."""
@@ -75,10 +75,8 @@ def _result(future: Future[R], timeout: float | None) -> R:
 
 
 @contextmanager
-def prefetch(
-    items: Iterable[T], depth: int = _DEPTH, *, timeout: float | None = None
-) -> Iterator[Iterator[T]]:
-    """Take `items` in a thread, at most `depth` ahead of the reader.
+def prefetch(items: Iterable[T], *, timeout: float | None = None) -> Iterator[Iterator[T]]:
+    """Take `items` in a thread, at most `DEPTH` ahead of the reader.
 
     A generator is closed in that thread too. If the next item does not come within `timeout`
     seconds, `StalledError` is raised.
@@ -88,7 +86,7 @@ def prefetch(
     take_one = partial(next, iterator, _END)
 
     with _Thread("vdet-prefetch") as thread:
-        ahead.extend(thread.submit(take_one) for _ in range(depth))
+        ahead.extend(thread.submit(take_one) for _ in range(DEPTH))
 
         def taken() -> Iterator[T]:
             while (item := _result(ahead.popleft(), timeout)) is not _END:
@@ -107,13 +105,12 @@ def prefetch(
 @contextmanager
 def write_async(
     take: Callable[[T], object],
-    depth: int = _DEPTH,
     *,
     within: AbstractContextManager[object],
     timeout: float | None = None,
     extra: Callable[[], float] = lambda: 0.0,
 ) -> Iterator[Callable[[T], None]]:
-    """Give a function that passes items to `take` in a thread; at most `depth` items wait.
+    """Give a function that passes items to `take` in a thread; at most `DEPTH` items wait.
 
     The thread enters and leaves the context manager `within`, with an error if the block ends with
     one. An error in the thread is raised by a later call, or when the block ends. A call raises
@@ -130,7 +127,7 @@ def write_async(
                 _result(waiting.popleft(), limit)
 
         def put(item: T) -> None:
-            wait(depth - 1, timeout)
+            wait(DEPTH - 1, timeout)
             waiting.append(thread.submit(take, item))
 
         waiting.append(thread.submit(within.__enter__))

@@ -134,4 +134,4 @@ def cars() -> Image:
 def grid_of(size: int, *, overlap: float | None = None, step: int | None = None) -> WindowGrid:
     """Lay windows of 48 to 128 pixels over `cars`; a patch has eight cells."""
     settings = WindowSettings(size=size, overlap=overlap, step=step, top=8, bottom=size + 52)
-    return lay_grid(settings, 440, 200)
+    return lay_grid(settings, 440, 200, 8)

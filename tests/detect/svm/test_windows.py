@@ -23,12 +23,12 @@ def stepped(size: int, step: int, top: int, bottom: int) -> WindowSettings:
 def boxes_of(
     settings: WindowSettings, width: int, height: int = ROWS, cells: int = 8
 ) -> Int32Array:
-    return lay_grid(settings, width, height, cells=cells).boxes
+    return lay_grid(settings, width, height, cells).boxes
 
 
 def test_the_seed_sets_have_423_and_408_windows_on_a_720p_frame() -> None:
-    assert len(lay_grid(LARGE, 1280, 720)) == len(boxes_of(LARGE, 1280, 720)) == 423
-    assert len(lay_grid(SMALL, 1280, 720)) == len(boxes_of(SMALL, 1280, 720)) == 408
+    assert len(lay_grid(LARGE, 1280, 720, 8)) == len(boxes_of(LARGE, 1280, 720)) == 423
+    assert len(lay_grid(SMALL, 1280, 720, 8)) == len(boxes_of(SMALL, 1280, 720)) == 408
 
 
 def test_windows_are_laid_row_by_row_from_the_top_left() -> None:
@@ -102,7 +102,7 @@ def test_windows_with_a_step_fill_the_band_as_far_as_they_fit(
 ) -> None:
     settings = stepped(size, step, top, top + size + spare)
     width = size + spare
-    grid = lay_grid(settings, width, ROWS, cells=cells)
+    grid = lay_grid(settings, width, ROWS, cells)
     x, y, w, h = grid.boxes.T
     assert (x[0], y[0]) == (0, top)
     assert (x + w).max() <= width
@@ -113,7 +113,7 @@ def test_windows_with_a_step_fill_the_band_as_far_as_they_fit(
 
 def test_the_share_is_one_over_the_number_of_windows_that_cover_a_pixel() -> None:
     for settings in (band(64, 0.75, 0, 320), stepped(64, 2, 0, 320)):
-        grid = lay_grid(settings, 320, 320)
+        grid = lay_grid(settings, 320, 320, 8)
         covered = np.zeros((320, 320))
         for x, y, w, h in grid.boxes.tolist():
             covered[y : y + h, x : x + w] += 1
@@ -123,7 +123,7 @@ def test_the_share_is_one_over_the_number_of_windows_that_cover_a_pixel() -> Non
 
 @pytest.mark.parametrize("n", [1, 2, 3, 50])
 def test_the_grids_of_every_nth_window_together_are_the_whole_grid(n: int) -> None:
-    grid = lay_grid(stepped(100, 1, 40, 300), 555, 720)  # of a fractional step
+    grid = lay_grid(stepped(100, 1, 40, 300), 555, 720, 8)  # of a fractional step
     parts = [grid.every_nth(n, column, row) for column in range(n) for row in range(n)]
     together = np.concatenate([part.boxes for part in parts])
     assert len(together) == sum(len(part) for part in parts) == len(grid)

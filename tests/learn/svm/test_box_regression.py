@@ -25,7 +25,9 @@ def fit(
     weights: Float32Array | None = None,
 ) -> BoxRegression:
     ones = np.ones(len(hogs), np.float32)
-    return fit_sides(hogs.copy(), sides, ones if weights is None else weights, penalty)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("vdet.learn.svm.box_regression.PENALTY", penalty)
+        return fit_sides(hogs.copy(), sides, ones if weights is None else weights)
 
 
 def test_a_linear_map_is_found() -> None:

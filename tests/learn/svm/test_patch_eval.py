@@ -93,7 +93,7 @@ def test_a_ready_model_is_tested_on_all_patches(bright_and_dark: Path) -> None:
 
 def test_the_metrics_are_those_of_the_definition() -> None:
     scores = scores_of([True, True, False, False], [0.9, 0.4, 0.6, 0.2])
-    assert scores.test.confusion == ((1, 1), (1, 1))
+    assert scores.test.confusion == [[1, 1], [1, 1]]
     assert (scores.precision.value, scores.recall.value, scores.roc_auc) == (0.5, 0.5, 0.75)
     assert scores.log_loss == pytest.approx(-np.log([0.9, 0.4, 0.4, 0.8]).mean())
 

@@ -163,8 +163,8 @@ def test_augmented_samples_follow_and_have_the_row_of_their_patch(
     mirror = partial(augment, settings=AugmentationSettings(mirror=True, cut=0, parts=0))
     rows = describe(files, augmenter=mirror)
     assert len(rows.files) == 57
-    assert rows.origins.tolist() == [*range(57), *range(57)]
-    assert rows.vehicle.tolist() == [file.vehicle for file in files] * 2
+    assert rows.origins.tolist() == [patch for patch in range(57) for _ in range(2)]
+    assert rows.vehicle.tolist() == [file.vehicle for file in files for _ in range(2)]
     last = read_image(files[-1].source / files[-1].name)
     expected = FeatureExtractor(SETTINGS.svm.features).describe(np.ascontiguousarray(last[:, ::-1]))
     np.testing.assert_array_equal(rows.vectors[-1], expected)

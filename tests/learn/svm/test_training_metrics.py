@@ -8,7 +8,7 @@ import pytest
 from vdet.learn.svm.metrics import Classification, Rate, TrainingMetrics
 
 TEST = Classification(
-    20, Rate(0.9, 0.7, 0.97), ((11, 2), (1, 6)), {"vehicles/far": Rate(0.84615, 0.5, 0.9)}
+    20, Rate(0.9, 0.7, 0.97), [[11, 2], [1, 6]], {"vehicles/far": Rate(0.84615, 0.5, 0.9)}
 )
 GROUPS = {"vehicles/far": 60, "boxes/mined": 7}
 METRICS = TrainingMetrics(
@@ -25,7 +25,7 @@ def test_patches_are_compared_by_class_and_by_group() -> None:
     predicted = np.array([True, True, False, True, False])
     found = Classification.of(vehicle, predicted, np.array(["a", "a", "b", "c", "c"]))
     assert (found.patches, found.accuracy.value) == (5, 0.6)
-    assert found.confusion == ((2, 1), (1, 1))
+    assert found.confusion == [[2, 1], [1, 1]]
     assert {name: rate.value for name, rate in found.groups.items()} == {"a": 1, "b": 0, "c": 0.5}
 
 

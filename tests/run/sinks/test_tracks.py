@@ -14,7 +14,7 @@ from run.red_runs import result_of, write
 from vdet.boxes import Box
 from vdet.config.schema import LaneSettings
 from vdet.errors import OutputError
-from vdet.lanes.road import Lane, LaneRequest, Road, RoadFinder, lane_record
+from vdet.lanes.road import Lane, LaneRequest, Road, RoadFinder
 from vdet.media import Picture
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output
@@ -113,7 +113,7 @@ def test_json_lines_tell_the_lane_where_it_was_looked_for(tmp_path: Path) -> Non
         record = json.loads(line)
         lanes.append(record.pop("lane"))
         assert record == json.loads(other)
-    assert lanes == [lane_record(LANE), None, None]
+    assert lanes == [LANE.record(), None, None]
 
 
 def test_formats_that_describe_the_video_are_not_for_pictures(tmp_path: Path) -> None:

@@ -80,9 +80,7 @@ def final_rows(outputs: Sequence[Array], least: float) -> RawBoxes:
     return _raw(table[:, :4], table[:, 4], table[:, 5])
 
 
-def named_columns(
-    outputs: Sequence[Array], least: float, *, order: tuple[int, int, int]
-) -> RawBoxes:
+def named_columns(outputs: Sequence[Array], least: float, order: tuple[int, int, int]) -> RawBoxes:
     """Read RT-DETR; `order` has the places of the outputs labels, boxes and scores."""
     labels, boxes, scores = (outputs[place][0] for place in order)
     rows = np.flatnonzero(scores >= least)

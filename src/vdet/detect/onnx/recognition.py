@@ -165,9 +165,8 @@ def _rt_detr(session: Session, names: Sequence[str]) -> Recognized:
     places = {name: place for place, name in enumerate(session.output_names)}
     if not {"labels", "boxes", "scores"} <= set(places):
         raise _unknown(session, f"it has an input {_SIZES}, but outputs {', '.join(places)}")
-    layout = partial(
-        layouts.named_columns, order=(places["labels"], places["boxes"], places["scores"])
-    )
+    order = places["labels"], places["boxes"], places["scores"]
+    layout = partial(layouts.named_columns, order=order)
     reasons = (f"it has an input {_SIZES}", "its outputs are labels, boxes and scores")
     form = replace(_form(session, None), fit="stretch")
     found = Recognized(session, "RT-DETR", reasons, tuple(names) or COCO, form, layout)
@@ -286,6 +285,4 @@ def _shapes(outputs: Sequence[Array]) -> str:
 
 
 def _unknown(session: Session, seen: str) -> ModelError:
-    return ModelError(
-        f"{session.path}: is of no form that vdet knows: {seen}; docs/networks.md lists the forms"
-    )
+    return ModelError(f"{session.path}: is of no known form: {seen}; see docs/networks.md")

@@ -11,18 +11,10 @@ from typing import Any
 import numpy as np
 
 from vdet.boxes import Float32Array
+from vdet.detect.svm import strips
 from vdet.detect.svm.features import Channels, Layout, patch_descriptors
 from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.pyramid import FramePyramid
-from vdet.detect.svm.strips import (
-    Strip,
-    block_sums,
-    block_weights,
-    describe_blocks,
-    histogram_tables,
-    table_sums,
-    window_blocks,
-)
 from vdet.detect.svm.windows import GridResult, IndexArray, WindowGrid
 
 MAX_PHASES = 2
@@ -78,8 +70,8 @@ class _AlignedPart:
 
     def __init__(self, model: LinearModel, grid: WindowGrid) -> None:
         self._model = model
-        self._weights, self._tables = block_weights(model), histogram_tables(model)
-        self._strip = Strip(grid, model.features)
+        self._weights, self._tables = strips.block_weights(model), strips.histogram_tables(model)
+        self._strip = strips.Strip(grid, model.features)
         self._columns = grid.columns
         cell = model.features.hog.cell
         self._cells = int(grid.step * model.features.patch / grid.size / cell)
@@ -90,9 +82,9 @@ class _AlignedPart:
         """Return the decision values, `(n, m)`, and the HOG blocks of the strip."""
         features = self._model.features
         strip = self._strip.cut(frame)
-        blocks = describe_blocks(strip, features)
-        values = block_sums(blocks, self._weights)[:, :: self._cells, :: self._cells]
-        values = values + table_sums(strip, self._tables, features, self._x, self._y)
+        blocks = strips.describe_blocks(strip, features)
+        values = strips.block_sums(blocks, self._weights)[:, :: self._cells, :: self._cells]
+        values = values + strips.table_sums(strip, self._tables, features, self._x, self._y)
         by_row = values.transpose(2, 1, 0).reshape(-1, len(values))
         return by_row + self._model.biases, blocks
 
@@ -100,7 +92,7 @@ class _AlignedPart:
         """Return the HOG features of some of the windows, by their indices."""
         rows, columns = np.divmod(places, self._columns)
         across, down = columns * self._cells, rows * self._cells
-        return window_blocks(described, across, down, self._model.features)
+        return strips.window_blocks(described, across, down, self._model.features)
 
 
 class _LocatedPart:
@@ -111,8 +103,8 @@ class _LocatedPart:
 
     def __init__(self, model: LinearModel, grid: WindowGrid) -> None:
         self._model = model
-        self._tables = histogram_tables(model)
-        self._strip = Strip(grid, model.features)
+        self._tables = strips.histogram_tables(model)
+        self._strip = strips.Strip(grid, model.features)
         row, column = np.divmod(np.arange(len(grid)), grid.columns)
         pixels = int(grid.step * Fraction(model.features.patch, grid.size))
         self._x, self._y = column * pixels, row * pixels
@@ -121,7 +113,7 @@ class _LocatedPart:
     def search(self, frame: FramePyramid) -> tuple[Float32Array, Channels]:
         """Return the decision values, `(n, m)`, and the strip."""
         strip = self._strip.cut(frame)
-        sums = table_sums(strip, self._tables, self._model.features, self._x, self._y)
+        sums = strips.table_sums(strip, self._tables, self._model.features, self._x, self._y)
         values = sums.T + self._model.biases
         for first in range(0, len(values), BATCH):
             hogs = self.hogs(strip, np.arange(first, min(first + BATCH, len(values))))

@@ -63,12 +63,9 @@ class SvmModel:
         horizon = perspective.horizon
         if horizon is None and (horizon := find_horizon(images)) is None:
             # A folder may hold many pictures without a horizon: only videos warn.
-            log.log(
-                logging.WARNING if len(images) > 1 else logging.INFO,
-                "no horizon is found in the first frames: %.2f of the height is assumed; set "
-                "detector.search.perspective.horizon, which may also be above the frame",
-                DEFAULT_HORIZON,
-            )
+            level = logging.WARNING if len(images) > 1 else logging.INFO
+            found = f"no horizon is found: {DEFAULT_HORIZON} of the height is assumed"
+            log.log(level, "%s; set detector.search.perspective.horizon", found)
             return DEFAULT_HORIZON
         log.info("the horizon lies at %.2f of the height", horizon)
         return horizon

@@ -60,7 +60,7 @@ class RoadCheck:
             self._has_warned = True
             log.warning(
                 "the linear model does not seem to know this road: it agrees with the network on "
-                "%d %% of the boxes; leave out -c svm, or train a model on pictures of this road",
+                "%d %% of the boxes; leave out -c svm",
                 round(100 * self._both / self._all),
             )
 

@@ -136,14 +136,12 @@ def lay_grids(
     """
     search = scale_lengths(settings.search, height / REFERENCE_HEIGHT)
     cells = features.patch // features.hog.cell
-    grids = [lay_grid(each, width, height, cells=cells) for each in search.windows]
+    grids = [lay_grid(each, width, height, cells) for each in search.windows]
     grids += lay_perspective(search.perspective, features, width, height, horizon=horizon)
     return [grid for grid in grids if len(grid)]
 
 
-def lay_grid(
-    settings: WindowSettings, frame_width: int, frame_height: int, *, cells: int = 8
-) -> WindowGrid:
+def lay_grid(settings: WindowSettings, width: int, height: int, cells: int) -> WindowGrid:
     """Lay the windows of a set over its band of rows and the width of the frame.
 
     With `overlap`, each product is truncated to a whole number: step = int(size·(1 - overlap)),
@@ -154,7 +152,7 @@ def lay_grid(
     ----------
     settings
         Lengths already scaled to the frame (`scale_lengths`).
-    frame_width, frame_height
+    width, height
         Pixels; the band ends where the frame does.
     cells
         Number of cells across a patch, in which `step` is counted.
@@ -165,7 +163,7 @@ def lay_grid(
     """
     size = settings.size
     bottom = max(settings.bottom, settings.top + size)  # scaling may have rounded a row away
-    spans = frame_width, min(bottom, frame_height) - settings.top
+    spans = width, min(bottom, height) - settings.top
     if size <= 0 or min(spans) < size:
         return WindowGrid(max(1, size), Fraction(1), Fraction(0), Fraction(settings.top), 0, 0)
     step, buffer = _step_and_buffer(settings, cells)

@@ -23,7 +23,7 @@ ASSUMED = 0.5
 """Weight of vehicle patches from sources without boxes, relative to patches with boxes."""
 
 PENALTY = 1.0
-"""Ridge penalty of the weights of scaled features, for each patch."""
+"""Ridge penalty of the weights of scaled features, for each row of weight 1."""
 
 _LEAST_SPREAD = 0.05
 """Added to each feature's spread, share of the mean spread: limits the weights of features that
@@ -102,13 +102,13 @@ def fit_split_boxes(
     rows = _training_rows(data, patches, hold_out, length)
     if rows is None:
         return None, None
-    regression = fit_sides(*rows, PENALTY)
+    regression = fit_sides(*rows)
     errors = []
     for each in (data, patches.boxed):
         tested = _with_sides(each, hold_out(each))
-        count = len(tested.files)
-        found = regression.sides(tested.vectors[:count, :length])
-        errors.append(abs(found - tested.sides[:count]))
+        patch_rows = tested.patches
+        found = regression.sides(tested.vectors[patch_rows, :length])
+        errors.append(abs(found - tested.sides[patch_rows]))
     together = np.concatenate(errors)
     return regression, round(float(np.nanmean(together)), 4) if len(together) else None
 
@@ -135,12 +135,10 @@ def _training_rows(
 
 def _with_sides(data: LabelledVectors, kept: BoolArray) -> LabelledVectors:
     """Return the kept patches of which at least one side is known."""
-    return data.of(kept & np.isfinite(data.sides[: len(kept)]).any(axis=1))
+    return data.of(kept & np.isfinite(data.sides[data.patches]).any(axis=1))
 
 
-def fit_sides(
-    hogs: Float32Array, sides: Float32Array, weights: Float32Array, penalty: float
-) -> BoxRegression:
+def fit_sides(hogs: Float32Array, sides: Float32Array, weights: Float32Array) -> BoxRegression:
     """Fit the sides of vehicles' boxes to HOG vectors; a side that is never known is always 0.
 
     Parameters
@@ -152,8 +150,6 @@ def fit_sides(
         of the window; NaN for unknown ones.
     weights
         How much each row counts, float32 `(n,)`.
-    penalty
-        Ridge penalty of the weights of scaled features, for each row of weight 1.
     """
     from sklearn.linear_model import Ridge
 
@@ -170,7 +166,7 @@ def fit_sides(
             root = np.sqrt(weight)
             rows -= mean
             rows *= root[:, np.newaxis]
-            ridge = Ridge(penalty * float(weight.sum()), fit_intercept=False, copy_X=False)
+            ridge = Ridge(PENALTY * float(weight.sum()), fit_intercept=False, copy_X=False)
             ridge.fit(rows, (targets - middle) * root)
             slopes[side] = ridge.coef_ / spread
             biases[side] = middle - ridge.coef_ @ mean

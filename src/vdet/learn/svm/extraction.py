@@ -2,11 +2,11 @@
 
 import hashlib
 import logging
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -36,7 +36,7 @@ SplitName = Literal["random", "tail"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LabelledVectors:
-    """Feature vectors of patches, followed by those of the samples made of these patches.
+    """Feature vectors of patches, each before those of the samples made of it.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class LabelledVectors:
     sides
         float32 `(n, 4)`: left, top, right, bottom of each vehicle, NaN for unknown sides.
     origins
-        intp `(n,)`: the row of the patch that a sample was made of; a patch has its own row.
+        intp `(n,)`: the number of the patch that a row shows or was made of.
     files
         The file of each patch.
     digest
@@ -67,9 +67,14 @@ class LabelledVectors:
         return np.array([file.group for file in self.files], str)
 
     @property
+    def patches(self) -> RowNumbers:
+        """The row of each patch itself, intp `(patches,)`."""
+        return np.unique(self.origins, return_index=True)[1]
+
+    @property
     def labels(self) -> BoolArray:
         """The labels of the patches, bool `(patches,)`."""
-        return self.vehicle[: len(self.files)]
+        return self.vehicle[self.patches]
 
     def of(self, kept: BoolArray) -> "LabelledVectors":
         """Return a copy of the kept patches, bool `(patches,)`, with the samples made of them."""
@@ -136,18 +141,17 @@ def _describe(
 ) -> tuple[LabelledVectors, list[int]]:
     """Return the vectors of the files that are not broken, and the checksums of all files."""
     patches = list(read_patches(files))
-    samples, good = [], []
+    samples: list[PatchSample] = []
+    origins: list[int] = []
+    good: list[PatchFile] = []
     for patch in patches:
         if patch.image is not None:
             sides = np.array(patch.file.sides or UNKNOWN_SIDES, np.float32)
-            samples.append(PatchSample(patch.image, patch.file.vehicle, sides))
-            good.append(patch)
-    origins = list(range(len(good)))
-    if augmenter is not None:
-        for row, patch in enumerate(good):
-            made = list(augmenter(samples[row], (seed, patch.checksum)))
-            samples += made
-            origins += [row] * len(made)
+            sample = PatchSample(patch.image, patch.file.vehicle, sides)
+            more = augmenter(sample, (seed, patch.checksum)) if augmenter else ()
+            samples += (sample, *more)
+            origins += [len(good)] * (len(samples) - len(origins))
+            good.append(patch.file)
     data = LabelledVectors(
         FeatureExtractor(features).describe_all(
             to_patch(sample.image, features.patch) for sample in samples
@@ -155,25 +159,18 @@ def _describe(
         np.array([sample.vehicle for sample in samples], bool),
         np.array([sample.sides for sample in samples], np.float32).reshape(-1, 4),
         np.array(origins, np.intp),
-        [patch.file for patch in good],
+        good,
     )
     return data, [patch.checksum for patch in patches]
 
 
 def _joined(chunks: Sequence[LabelledVectors]) -> LabelledVectors:
-    """Join all rows: those of all patches, followed by those of all samples."""
-    counts = [len(chunk.files) for chunk in chunks]
-    firsts = np.cumsum([0, *counts])
-
-    def joined(columns: Iterable[npt.NDArray[Any]]) -> npt.NDArray[Any]:
-        parts = [np.split(column, [count]) for column, count in zip(columns, counts, strict=True)]
-        return np.concatenate([patches for patches, _ in parts] + [samples for _, samples in parts])
-
+    firsts = np.cumsum([0, *(len(chunk.files) for chunk in chunks)])
     return LabelledVectors(
-        joined(chunk.vectors for chunk in chunks),
-        joined(chunk.vehicle for chunk in chunks),
-        joined(chunk.sides for chunk in chunks),
-        joined(chunk.origins + first for chunk, first in zip(chunks, firsts, strict=False)),
+        np.concatenate([chunk.vectors for chunk in chunks]),
+        np.concatenate([chunk.vehicle for chunk in chunks]),
+        np.concatenate([chunk.sides for chunk in chunks]),
+        np.concatenate([each.origins + first for each, first in zip(chunks, firsts, strict=False)]),
         [file for chunk in chunks for file in chunk.files],
     )
 

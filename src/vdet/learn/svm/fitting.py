@@ -57,12 +57,12 @@ def fit(rows: LabelledVectors, settings: Settings) -> LinearModel:
     scaler = StandardScaler(copy=False)
     for start in range(0, len(rows.vectors), _BLOCK):  # as a whole, it needs twice their memory
         scaler.partial_fit(rows.vectors[start : start + _BLOCK])
-    vectors = scaler.transform(rows.vectors)
+    vectors, patches = scaler.transform(rows.vectors), rows.patches
     svms, sigmoids, scores = [], [], np.zeros(len(labels))
     folds = StratifiedKFold(FOLDS, shuffle=True, random_state=training.seed)
     for _, tested in folds.split(labels, labels):
         svm = _fit_svm(vectors, rows.vehicle, ~np.isin(rows.origins, tested), training.C)
-        scores[tested] = vectors[tested] @ svm.x[:-1].astype(np.float32) + svm.x[-1]
+        scores[tested] = vectors[patches[tested]] @ svm.x[:-1].astype(np.float32) + svm.x[-1]
         svms.append(svm)
         sigmoids.append(_fit_sigmoid(scores[tested], labels[tested]))
     if not training.ensemble:

@@ -58,7 +58,7 @@ class Classification:
 
     patches: int
     accuracy: Rate
-    confusion: tuple[tuple[int, int], tuple[int, int]]
+    confusion: list[list[int]]
     groups: dict[str, Rate]
 
     @classmethod
@@ -67,11 +67,9 @@ class Classification:
         from sklearn.metrics import confusion_matrix
 
         right = vehicle == predicted
-        (found, missed), (alarms, others) = confusion_matrix(
-            vehicle, predicted, labels=[True, False]
-        ).tolist()
+        confusion = confusion_matrix(vehicle, predicted, labels=[True, False]).tolist()
         by_group = {name: Rate.of(right[groups == name]) for name in np.unique(groups).tolist()}
-        return cls(len(right), Rate.of(right), ((found, missed), (alarms, others)), by_group)
+        return cls(len(right), Rate.of(right), confusion, by_group)
 
     def confusion_rows(self) -> list[list[str]]:
         """Return the rows of text under `CONFUSION_HEADINGS`."""
@@ -147,10 +145,7 @@ class TrainingMetrics:
             yield f"sides of vehicles' boxes: mean error {self.box_error:.3f} of a patch's side"
         if not self.boxed:
             yield ""
-            yield (
-                "no patch came from vdet mine: in video, such a model finds far fewer vehicles; "
-                "docs/training.md says how to mine labelled video"
-            )
+            yield "no patch came from vdet mine: in video, such a model finds far fewer vehicles"
 
     def write(self, path: Path, *, overwrite: bool = False) -> None:
         """Write the metrics as JSON. Raises `OutputError`."""

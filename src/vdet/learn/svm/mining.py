@@ -189,6 +189,7 @@ def mine(
     for name, count in Counter(names).items():
         if count > 1:
             raise DataError(f"{count} sources are named {name}; rename them, or mine one at a time")
+    choose = partial(choose_windows, probability=settings.train.mine.probability, most=most)
     searched = 0
     counts: Counter[PatchKind] = Counter()
     with patch_archive(output, overwrite=overwrite) as add:
@@ -197,15 +198,8 @@ def mine(
             for frame in source.frames(model, settings, progress):
                 searched += 1
                 rng = np.random.default_rng((settings.train.svm.seed, frame.number))
-                for each in choose_windows(
-                    frame.windows,
-                    frame.labels.boxes,
-                    frame.labels.ignored,
-                    frame.image.shape[1],
-                    rng,
-                    probability=settings.train.mine.probability,
-                    most=most,
-                ):
+                labels, width = frame.labels, frame.image.shape[1]
+                for each in choose(frame.windows, labels.boxes, labels.ignored, width, rng):
                     x, y, side, _ = each.box.xywh
                     patch = to_patch(cut_window(frame.image, x, y, side, side), PATCH)
                     folder = _FOLDERS[each.kind].format(stem)

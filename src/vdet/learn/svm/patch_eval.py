@@ -113,7 +113,7 @@ def evaluate_patches(
         model, meaning = fit(data.of(~tested), settings), _SPLIT
     steps("computing scores", None)
     rows = np.flatnonzero(tested)
-    probabilities = model.probabilities(data.vectors[rows]).astype(np.float64)
+    probabilities = model.probabilities(data.vectors[data.patches[rows]]).astype(np.float64)
     return score_patches([data.files[row] for row in rows.tolist()], probabilities, meaning)
 
 

@@ -81,7 +81,7 @@ def train(
     if boxes is not None:
         steps("fitting the sides of boxes", None)
         regression, box_error = fit_split_boxes(data, boxes, held_of, settings)
-    predicted = model.probabilities(data.vectors[: len(held)]) >= 0.5
+    predicted = model.probabilities(data.vectors[data.patches]) >= 0.5
     metrics = TrainingMetrics(
         vehicles=int(np.count_nonzero(data.labels)),
         non_vehicles=int(np.count_nonzero(~data.labels)),
@@ -91,7 +91,7 @@ def train(
         features=data.vectors.shape[1],
         split=training.split,
         train_patches=int(np.count_nonzero(~held)),
-        train_augmented=int(np.count_nonzero(~held[data.origins[len(held) :]])),
+        train_augmented=int(np.count_nonzero(~held[data.origins]) - np.count_nonzero(~held)),
         train_accuracy=float((predicted == data.labels)[~held].mean()),
         test=Classification.of(data.labels[held], predicted[held], data.groups[held]),
         box_error=box_error,

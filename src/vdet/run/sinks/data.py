@@ -18,19 +18,11 @@ from vdet.labels.formats import SourceVideo, TrackWriter, format_for, track_suff
 from vdet.labels.records import JSON_LINES, track_record
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import STANDARD_OUTPUT, BaseSink, BatchTotal, SinkContext, SinkKind
-from vdet.traffic.count_files import (
-    COUNT_SUFFIXES,
-    FLOW_SUFFIXES,
-    Videos,
-    join_counts,
-    join_flows,
-    write_counts,
-    write_flows,
-)
+from vdet.traffic import count_files
 from vdet.traffic.records import VehicleRecords, join_records, write_records
 from vdet.traffic.tables import SUFFIXES
 
-WriteCounts = Callable[[Path, Videos, int | None], None]
+WriteCounts = Callable[[Path, count_files.Videos, int | None], None]
 
 
 class TrackSink(BaseSink):
@@ -48,12 +40,12 @@ class TrackSink(BaseSink):
 
     def __enter__(self) -> Self:
         if self.path == STANDARD_OUTPUT:
-            self._writer = JSON_LINES.write(sys.stdout.buffer, None)
+            self._writer = TrackWriter(JSON_LINES, sys.stdout.buffer)
             return self
         form = format_for(self.path)
         assert form is not None  # the suffixes of the kind say so
         video = self.context.video
-        if form.needs_video and video is None:
+        if form.whole and video is None:
             raise OutputError(f"{self.path}: {form.name} is for videos; give another format")
         source = None
         if video is not None:  # a whole video has the frames that are read
@@ -61,7 +53,7 @@ class TrackSink(BaseSink):
             begin = self.context.clock.zero if self.context.clock else None
             source = SourceVideo(video.path.name, video.width, video.height, frames, begin)
         self._file = self.context.files.stage(self.path).open("wb")
-        self._writer = form.write(self._file, source)
+        self._writer = TrackWriter(form, self._file, source)
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
@@ -170,16 +162,16 @@ class CountsSink(BaseSink):
 
 
 COUNTS = SinkKind(
-    partial(CountsSink, write_counts),
-    COUNT_SUFFIXES,
+    partial(CountsSink, count_files.write_counts),
+    count_files.COUNT_SUFFIXES,
     "counts",
     takes="videos",
-    total=BatchTotal("all", join_counts),
+    total=BatchTotal("all", count_files.join_counts),
 )
 FLOWS = SinkKind(
-    partial(CountsSink, write_flows),
-    FLOW_SUFFIXES,
+    partial(CountsSink, count_files.write_flows),
+    count_files.FLOW_SUFFIXES,
     "flows",
     takes="videos",
-    total=BatchTotal("all", join_flows),
+    total=BatchTotal("all", count_files.join_flows),
 )

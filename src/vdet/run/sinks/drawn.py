@@ -11,17 +11,7 @@ import numpy as np
 
 from vdet.config.schema import Settings
 from vdet.detect.classes import OUR_NAMES
-from vdet.draw.boxes import (
-    BLACK,
-    GREEN,
-    WHITE,
-    color_of,
-    draw_box,
-    draw_label,
-    draw_line,
-    draw_zone,
-    line_width,
-)
+from vdet.draw import boxes
 from vdet.draw.paint import Color, Surface, draw_lines
 from vdet.errors import OutputError
 from vdet.media import Frame, Picture, Planes, VideoInfo
@@ -79,7 +69,7 @@ class Overlay:
         self._draw_vehicles(surface, shown)
         if self._draw.time and self._start is not None:
             time = time_text(result.frame.time - self._start)
-            draw_label(surface, time, (0, surface.shape[0]), BLACK)
+            boxes.draw_label(surface, time, (0, surface.shape[0]), boxes.BLACK)
         return surface
 
     def _shown(self, result: FrameResult) -> list[Track]:
@@ -98,7 +88,7 @@ class Overlay:
             self._trails[number] = [point for point in points if now - point[0] <= longest]
             if not self._trails[number]:
                 del self._trails[number]
-        width = line_width(surface, self._draw.thickness)
+        width = boxes.line_width(surface, self._draw.thickness)
         for track in shown:
             path = [point for _, point in self._trails[track.id]]
             draw_lines(surface, path, self._color(track), width)
@@ -107,10 +97,10 @@ class Overlay:
         for track in shown if self._draw.boxes else ():
             dashed = self._draw.lost == "dashed" and track.state == "lost"
             color, thickness = self._color(track), self._draw.thickness
-            draw_box(surface, track.box, color, dashed=dashed, thickness=thickness)
+            boxes.draw_box(surface, track.box, color, dashed=dashed, thickness=thickness)
         for track in shown:
             if text := label_text(track, self._label):
-                draw_label(surface, text, (track.box.x1, track.box.y1), self._color(track))
+                boxes.draw_label(surface, text, (track.box.x1, track.box.y1), self._color(track))
 
     def _color(self, track: Track) -> Color:
         match self._draw.colors:
@@ -119,8 +109,8 @@ class Overlay:
             case "class":
                 number = _class_number(track.class_name)
             case "one":
-                return GREEN
-        return color_of(number) if number else WHITE
+                return boxes.GREEN
+        return boxes.color_of(number) if number else boxes.WHITE
 
 
 def label_text(track: Track, parts: Sequence[str]) -> str:
@@ -166,13 +156,13 @@ def draw_running_counts(surface: Surface, counter: "VehicleCounter", road: "Road
     """
     for zone in counter.zones:
         label = f"{zone.name}: {counter.present(zone)}"
-        draw_zone(surface, _on_road(zone.corners, road), label)
+        boxes.draw_zone(surface, _on_road(zone.corners, road), label)
     for line in counter.lines:
         left, right = (
             f"{line.name} {way}: {counter.count(line.name, way)}" for way in line.directions
         )
         start, end = _on_road((line.start, line.end), road)
-        draw_line(surface, start, end, (left, right))
+        boxes.draw_line(surface, start, end, (left, right))
 
 
 def _on_road(points: Sequence[Point], road: "Road | None") -> list[Point]:
