@@ -6,8 +6,6 @@ from pathlib import Path
 import pytest
 
 from conftest import Run
-from vdet.demo import check_demo
-from vdet.errors import OutputError
 from vdet.media.reader import VideoReader
 from vdet.synthetic.random_scenes import demo_scene
 from vdet.synthetic.scene import Scene
@@ -49,16 +47,8 @@ def test_draws_finds_counts_trains_and_compares(
 
     again = run("demo", folder)
     assert again.code == 1
-    assert "is there already; give --overwrite" in again.err
+    assert "is not empty; give another folder, or --overwrite" in again.err
     assert again.err.count("\n") == 1
-
-
-@pytest.mark.parametrize("name", ["road.mp4", "truth.txt", "found.csv", "model.npz"])
-def test_an_earlier_demo_is_not_written_over(tmp_path: Path, name: str) -> None:
-    (tmp_path / name).touch()
-    with pytest.raises(OutputError, match=f"{name}: is there already; give --overwrite"):
-        check_demo(tmp_path, overwrite=False)
-    check_demo(tmp_path, overwrite=True)
 
 
 def test_a_file_for_a_folder(run: Run, tmp_path: Path) -> None:

@@ -254,17 +254,14 @@ class Boxes:
         )
 
     @classmethod
-    def from_supervision(
-        cls, detections: "supervision.Detections", names: Sequence[str] = ()
-    ) -> "Boxes":
+    def from_supervision(cls, detections: "supervision.Detections") -> "Boxes":
         """Return boxes with copies of the columns of a `supervision.Detections`.
 
-        `names` are those of the classes that `class_id` counts. Without them the classes are those
-        of the column `class_name`. Without confidences, scores are 1. Errors as of `Boxes`.
+        The classes are those of the column `class_name`. Without confidences, scores are 1. Errors
+        as of `Boxes`.
         """
-        scores = detections.confidence
-        classes = detections.class_id if names else None
-        if not names and "class_name" in detections.data:
+        scores, names, classes = detections.confidence, [], None
+        if "class_name" in detections.data:
             known, classes = np.unique(detections.data["class_name"], return_inverse=True)
             names = known.tolist()
         return cls(

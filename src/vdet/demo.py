@@ -12,18 +12,18 @@ from vdet.config.schema import Settings
 from vdet.detect.factory import load_detector
 from vdet.detect.svm.kind import load_svm
 from vdet.detect.svm.model import save_model
+from vdet.errors import OutputError
 from vdet.evaluate.output import table
 from vdet.evaluate.scores import score
-from vdet.files import any_file, check_output, make_folder, write_whole
+from vdet.files import make_folder, write_whole
 from vdet.labels.reading import read_predictions, read_truth
 from vdet.learn.svm.choosing import Most
 from vdet.learn.svm.dataset import find_patches
 from vdet.learn.svm.mining import VideoSource, mine
 from vdet.learn.svm.training import train
-from vdet.media.writer import may_replace_video
 from vdet.progress import Steps, no_steps
 from vdet.run.sinks.protocol import Output
-from vdet.run.video import VideoJob, check_job, run_video
+from vdet.run.video import VideoJob, run_video
 from vdet.synthetic.random_scenes import busy_road, demo_scene, pole_scene
 from vdet.synthetic.render import write_clip
 from vdet.synthetic.scene import Scene
@@ -61,18 +61,6 @@ _MOST = Most(per_vehicle=2, false_alarms=6, parts=3)  # drawn vehicles are alike
 _BY_MODEL = {"tracks": "model.csv", "stages": "stages"}
 
 
-def check_demo(folder: Path, *, overwrite: bool) -> None:
-    """Make the folder, and refuse to replace an earlier demo. Raises `OutputError`."""
-    make_folder(folder)
-    names = (ROAD, TRUTH, POLE, POLE_TRUTH, LINES, PATCHES, MODEL, METRICS)
-    learnt = [path for each in _roads_to_learn(folder) for path in (each.path, each.truth)]
-    for path in (*(folder / name for name in names), *learnt):
-        may_replace = may_replace_video if path.suffix == ".mp4" else any_file
-        check_output(path, overwrite=overwrite, makes_folder=True, may_replace=may_replace)
-    for source, outputs in ((ROAD, _BY_NETWORK), (POLE, _ON_POLE), (ROAD, _BY_MODEL)):
-        check_job(_job(folder / source, outputs, overwrite=overwrite))
-
-
 def _job(source: Path, outputs: dict[str, str], *, overwrite: bool) -> VideoJob:
     paths = tuple(Output(sink, source.with_name(name)) for sink, name in outputs.items())
     return VideoJob(source, paths, overwrite=overwrite)
@@ -105,7 +93,9 @@ def run_demo(
     -------
     The scores of each detector, and how many vehicles go from line to line: lines of text.
     """
-    check_demo(folder, overwrite=overwrite)
+    make_folder(folder)
+    if not overwrite and any(folder.iterdir()):
+        raise OutputError(f"{folder}: is not empty; give another folder, or --overwrite")
     scene, pole = demo_scene(seed), pole_scene(seed)
     announce("1/4 drawing two roads with vehicles …")
     steps("drawing", None)

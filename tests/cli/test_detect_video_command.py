@@ -98,8 +98,8 @@ def test_a_picture_of_every_stage_of_one_moment(
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ((), "give OUT, or --no-video"),
-        (("out.mp4", "--no-video"), "give OUT, or --no-video"),
+        ((), "give one OUT, or --no-video"),
+        (("out.mp4", "--no-video"), "give one OUT, or --no-video"),
         (("--no-video",), "nothing would be written"),
         (("out.mp4", "--stages", "x"), "--stages and --at go together"),
         (("out.mp4", "--start", "5", "--end", "5"), "--end must be later"),

@@ -162,10 +162,7 @@ def _run(job: VideoJob, work: Work) -> dict[str, Any]:
     totals = run_video(job, model, work.settings)
     states = {str(each.path.absolute()): output_state(each) or (0, 0) for each in job.outputs}
     return {
-        "width": totals.width,
-        "height": totals.height,
-        "frames": totals.frames,
-        "tracks": totals.tracks,
+        **{name: getattr(totals, name) for name in ("width", "height", "frames", "tracks")},
         "begin": str(totals.clock) if totals.clock else None,
         "sizes": {path: size for path, (size, _) in states.items()},
         "times": {path: changed for path, (_, changed) in states.items()},

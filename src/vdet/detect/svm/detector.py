@@ -50,10 +50,18 @@ class SvmModel:
         """Return a detector for frames of one size; `images` show where the horizon is.
 
         Still pictures share the check; each video has its own.
+
+        Raises
+        ------
+        FrameSizeError
+            No search window fits into such a frame.
+        ImageError
+            Too many windows fit into such a frame.
         """
         horizon = self._horizon(images)
         check = self.check.restarted() if self.check and len(images) > 1 else self.check
-        return SvmDetector(self.model, self.settings, width, height, horizon=horizon, check=check)
+        search = FrameSearch(self.model, self.settings, width, height, horizon=horizon)
+        return SvmDetector(search, self.settings, (width, height), check)
 
     def _horizon(self, images: Sequence[Image]) -> float:
         """Return the row of the horizon, share of the height, and report it."""
@@ -76,37 +84,22 @@ class SvmDetector:
 
     Parameters
     ----------
-    width, height
-        Size of the frames, pixels.
-    horizon
-        Row of the horizon, share of the frames' height.
+    size
+        Width and height of the frames, pixels.
     check
         As of `SvmModel`.
-
-    Raises
-    ------
-    FrameSizeError
-        No search window fits into such a frame.
-    ImageError
-        Too many windows fit into such a frame.
     """
 
     def __init__(
         self,
-        model: LinearModel,
+        search: FrameSearch,
         settings: SvmSettings,
-        width: int,
-        height: int,
-        *,
-        horizon: float = DEFAULT_HORIZON,
+        size: tuple[int, int],
         check: RoadCheck | None = None,
     ) -> None:
-        self._check = check
-        self._search = FrameSearch(model, settings, width, height, horizon=horizon)
-        self._size = width, height
-        self._settings = settings
-        self._heat = scale_lengths(settings.heat, height / REFERENCE_HEIGHT)
-        self._history = HeatHistory(width, height, self._heat)
+        self._search, self._settings, self._size, self._check = search, settings, size, check
+        self._heat = scale_lengths(settings.heat, size[1] / REFERENCE_HEIGHT)
+        self._history = HeatHistory(*size, self._heat)
         self._recent: deque[Windows] = deque(maxlen=self._heat.frames)
 
     def search(self, picture: Picture, index: int | None) -> Candidates:
