@@ -264,13 +264,9 @@ class Boxes:
         if "class_name" in detections.data:
             known, classes = np.unique(detections.data["class_name"], return_inverse=True)
             names = known.tolist()
-        return cls(
-            detections.xyxy,
-            np.ones(len(detections.xyxy)) if scores is None else scores,
-            classes=classes,
-            names=names,
-            ids=detections.tracker_id,
-        )
+        scores = np.ones(len(detections.xyxy)) if scores is None else scores
+        ids = detections.tracker_id
+        return cls(detections.xyxy, scores, classes=classes, names=names, ids=ids)
 
 
 def _column(

@@ -21,7 +21,7 @@ from vdet.learn.svm.choosing import Most
 from vdet.learn.svm.dataset import find_patches
 from vdet.learn.svm.mining import VideoSource, mine
 from vdet.learn.svm.training import train
-from vdet.progress import Steps, no_steps
+from vdet.progress import Steps
 from vdet.run.sinks.protocol import Output
 from vdet.run.video import VideoJob, run_video
 from vdet.synthetic.random_scenes import busy_road, demo_scene, pole_scene
@@ -35,9 +35,6 @@ Row = list[str]
 
 ROADS = 6
 """Drawn roads that the linear model learns from."""
-
-SEED = 5
-"""Default seed of what is drawn."""
 
 ROAD, TRUTH = "road.mp4", "truth.txt"
 """The drawn video of a moving camera, and its true boxes."""
@@ -67,12 +64,7 @@ def _job(source: Path, outputs: dict[str, str], *, overwrite: bool) -> VideoJob:
 
 
 def run_demo(
-    folder: Path,
-    *,
-    seed: int = SEED,
-    overwrite: bool = False,
-    announce: Callable[[str], object] = lambda _: None,
-    steps: Steps = no_steps,
+    folder: Path, *, seed: int, overwrite: bool, announce: Callable[[str], object], steps: Steps
 ) -> list[str]:
     """Draw two roads, find and count their vehicles, and compare them with the truth.
 

@@ -145,11 +145,9 @@ class LocalProcesses:
         """Yield each item's number and result; see `Workers`."""
         from loky import ProcessPoolExecutor
 
+        count = max(1, min(self.count, len(items)))
         executor = ProcessPoolExecutor(
-            max(1, min(self.count, len(items))),
-            initializer=_initialize_worker,
-            initargs=(os.getpid(),),
-            env=ENVIRONMENT,
+            count, initializer=_initialize_worker, initargs=(os.getpid(),), env=ENVIRONMENT
         )
         waiting = iter(enumerate(items))
         in_work: dict[Future[R], int] = {}

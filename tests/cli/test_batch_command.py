@@ -137,7 +137,7 @@ def test_after_other_settings_or_another_model_videos_are_made_again(
         (("out.mp4", "--skip-existing"), "go with -d"),
         (("out.mp4", "--jobs", "2"), "go with -d"),
         (("out.mp4", "--scheduler", "tcp://x:1"), "go with -d"),
-        (("b.mp4", "c.mp4"), "or -d DIR for several videos"),
+        (("b.mp4", "c.mp4"), "for several videos name a folder: vdet detect-video "),
     ],
 )
 def test_wrong_usage(

@@ -119,18 +119,14 @@ def make_plan(
 def _totals(
     sources: Sequence[InputVideo], folder: Path, suffixes: Sequence[OutputSuffix]
 ) -> tuple[PlannedTotal, ...]:
-    return tuple(
-        PlannedTotal(
-            total,
-            folder / f"{total.name}{total.suffix or each.suffix or ''}",
-            {
-                source.place.with_suffix("").as_posix(): _path(folder / source.place, each)
-                for source in sources
-            },
-        )
-        for each in suffixes
-        if (total := sink_kind(each.sink).total)
-    )
+    places = {source.place.with_suffix("").as_posix(): folder / source.place for source in sources}
+    totals = []
+    for each in suffixes:
+        if total := sink_kind(each.sink).total:
+            path = folder / f"{total.name}{total.suffix or each.suffix or ''}"
+            outputs = {name: _path(place, each) for name, place in places.items()}
+            totals.append(PlannedTotal(total, path, outputs))
+    return tuple(totals)
 
 
 def _job(

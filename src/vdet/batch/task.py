@@ -180,14 +180,10 @@ def _record(job: VideoJob, work: Work) -> Record:
     paths: dict[str, tuple[str, ...]] = {}
     for output in job.outputs:
         paths[output.sink] = (*paths.get(output.sink, ()), str(output.path.absolute()))
-    return Record(
-        input=str(job.source.absolute()),
-        outputs={sink: each[0] if len(each) == 1 else each for sink, each in paths.items()},
-        started=datetime.now(UTC).isoformat(timespec="seconds"),
-        seconds=0.0,
-        model=work.model_name,
-        model_sha256=work.model_sha256,
-    )
+    outputs = {sink: each[0] if len(each) == 1 else each for sink, each in paths.items()}
+    source, now = str(job.source.absolute()), datetime.now(UTC).isoformat(timespec="seconds")
+    model = work.model_name
+    return Record(source, outputs, now, 0.0, model=model, model_sha256=work.model_sha256)
 
 
 @contextmanager

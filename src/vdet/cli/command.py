@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import click
@@ -96,17 +97,10 @@ class Program(click.Group):
 
 def verbosity_options() -> list[click.Parameter]:
     """Return `--quiet` and `--verbose`, which mean the same before and after the command."""
-    quiet = "Print no progress and no warnings, only errors."
-    verbose = "Print more about what is done."
+    make = partial(click.Option, is_flag=True, expose_value=False, callback=_apply_verbosity)
     return [
-        click.Option(
-            [f"-{name[0]}", f"--{name}"],
-            is_flag=True,
-            expose_value=False,
-            callback=_apply_verbosity,
-            help=text,
-        )
-        for name, text in (("quiet", quiet), ("verbose", verbose))
+        make(["-q", "--quiet"], help="Print no progress and no warnings, only errors."),
+        make(["-v", "--verbose"], help="Print more about what is done."),
     ]
 
 

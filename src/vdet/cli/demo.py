@@ -24,13 +24,8 @@ def demo(folder: Path, seed: int, overwrite: bool) -> None:
     from vdet.demo import METRICS, TRUTH, run_demo
 
     with progress_steps("") as steps:
-        result = run_demo(
-            folder,
-            seed=seed,
-            overwrite=overwrite,
-            announce=(lambda _: None) if is_quiet() else print_message,
-            steps=steps,
-        )
+        say = (lambda _: None) if is_quiet() else print_message
+        result = run_demo(folder, seed=seed, overwrite=overwrite, announce=say, steps=steps)
     print_lines(
         *result,
         "",

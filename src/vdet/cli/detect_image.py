@@ -81,9 +81,8 @@ def detect_image(
 
 
 def _print_vehicles(result: "FrameResult") -> None:
-    rows = [
-        f"  {track.class_name or 'vehicle':8} {track.score:.2f}  "
-        f"{', '.join(map(str, track.box.xywh))}"
-        for track in result.tracks
-    ]
+    rows = []
+    for track in result.tracks:
+        box = ", ".join(map(str, track.box.xywh))
+        rows.append(f"  {track.class_name or 'vehicle':8} {track.score:.2f}  {box}")
     print_message(f"{result.source}: {counted(len(rows), 'vehicle')}", *rows, err=False)

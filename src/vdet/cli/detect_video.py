@@ -2,6 +2,7 @@
 
 import logging
 import re
+import shlex
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
@@ -184,7 +185,18 @@ def detect_video(
 
 def _in_and_out(clips: tuple[Path, ...], *, no_video: bool) -> tuple[Path, list[options.Wanted]]:
     source, *outputs = clips
-    if len(outputs) > 1 or no_video == bool(outputs):
+    is_kept = False
+    if outputs and outputs[0].is_file():
+        from vdet.media.writer import may_replace_video
+
+        is_kept = not may_replace_video(outputs[0])
+    if len(outputs) > 1 or is_kept:
+        shown = shlex.join(map(str, clips[:2])) + (" …" if len(clips) > 2 else "")
+        raise click.UsageError(
+            f"{outputs[0]} would be replaced, and vdet did not write it; remove it, or for several "
+            f"videos name a folder: vdet detect-video {shown} -d found"
+        )
+    if no_video == bool(outputs):
         raise click.UsageError("give one OUT, or --no-video; or -d DIR for several videos")
     return source, [("video", path) for path in outputs]
 

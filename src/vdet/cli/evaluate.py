@@ -106,11 +106,8 @@ def patches(
         result = patch_eval.evaluate_patches(files, settings, model, jobs=jobs, steps=steps)
     sources = trained_on(model_path) if model_path else ()
     name = RunName("svm", model_path, choice.config_name, choice.assignments, sources)
-    results.print(
-        [*name.lines(), *patch_eval.lines(result)],
-        name.values() | patch_eval.values(result),
-        lambda: patch_eval.patch_page(result, name),
-    )
+    text, values = [*name.lines(), *patch_eval.lines(result)], patch_eval.values(result)
+    results.print(text, name.values() | values, lambda: patch_eval.patch_page(result, name))
 
 
 @command("vdet eval tracks out.txt gt.txt --page page")
@@ -147,11 +144,8 @@ def tracks(
     with progress_steps("") as steps:
         steps("comparing", None)
         run = score_files(prediction, truth, roles, until=until, rate=rate)
-    results.print(
-        result_lines([run]),
-        plain_clip(run.clips[0]),
-        lambda: video_page([run], f"compared with {truth} by vdet {__version__}"),
-    )
+    what = f"compared with {truth} by vdet {__version__}"
+    results.print(result_lines([run]), plain_clip(run.clips[0]), lambda: video_page([run], what))
 
 
 @command(
@@ -207,11 +201,8 @@ def video(
     with progress_steps(" frames") as steps:
         runs = evaluate_clips(clips, variants, partial(steps, ""))
     name = RunName.of(detectors[0], choice.model_path, choice.config_name, choice.assignments)
-    results.print(
-        [*name.lines(), *result_lines(runs)],
-        plain(runs, name),
-        lambda: video_page(runs, "; ".join(name.lines())),
-    )
+    text = [*name.lines(), *result_lines(runs)]
+    results.print(text, plain(runs, name), lambda: video_page(runs, "; ".join(name.lines())))
 
 
 def grid(sweeps: Sequence[str]) -> list[tuple[str, ...]]:
@@ -260,9 +251,5 @@ def _split(values: str) -> list[str]:
     return parts
 
 
-eval_group = click.Group(
-    "eval",
-    [images, patches, tracks, video],
-    help="Measure detection, tracking or the classifier.",
-    short_help="Measure detection, tracking or the classifier.",
-)
+_HELP = "Measure detection, tracking or the classifier."
+eval_group = click.Group("eval", [images, patches, tracks, video], help=_HELP, short_help=_HELP)

@@ -74,8 +74,6 @@ def mine(
         frames, counts = mining.mine(
             labelled, output, settings, model, overwrite=overwrite, steps=steps
         )
-    print_lines(
-        f"{output}: {counts['vehicle']} patches of vehicles, {counts['box']} more for their boxes, "
-        f"{counts['false alarm']} false alarms, {counts['part']} more on parts of vehicles; "
-        f"from {counted(frames, 'frame')}"
-    )
+    found = f"{counts['vehicle']} patches of vehicles, {counts['box']} more for their boxes"
+    alarms = f"{counts['false alarm']} false alarms, {counts['part']} more on parts of vehicles"
+    print_lines(f"{output}: {found}, {alarms}; from {counted(frames, 'frame')}")

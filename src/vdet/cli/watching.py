@@ -74,15 +74,10 @@ class Watched:
         return records.end()
 
 
+_tracks = options.option(
+    "--tracks-from FILE", "Take the vehicles from this file of tracks.", name="tracks"
+)
 watch_options = options.bundle(
-    "watched",
-    Watched,
-    options.option(
-        "--tracks-from FILE",
-        "Take the vehicles from this file of tracks instead of searching.",
-        name="tracks",
-    ),
-    options.start_option,
-    options.end_option,
+    "watched", Watched, _tracks, options.start_option, options.end_option
 )
 """`--tracks-from FILE`, `--start` and `--end`."""

@@ -171,12 +171,10 @@ def pool(comparisons: Sequence[Comparison]) -> Comparison:
         vehicles += len(one.vehicle_ids)
         tracks += len(one.track_ids)
     seconds = [one.seconds for one in comparisons if one.seconds is not None]
-    return Comparison(
-        tuple(frames),
-        joined(one.vehicle_ids for one in comparisons),
-        joined(one.track_ids for one in comparisons),
-        sum(seconds) if len(seconds) == len(comparisons) else None,
-    )
+    vehicle_ids = joined(one.vehicle_ids for one in comparisons)
+    track_ids = joined(one.track_ids for one in comparisons)
+    total = sum(seconds) if len(seconds) == len(comparisons) else None
+    return Comparison(tuple(frames), vehicle_ids, track_ids, total)
 
 
 def assign(weights: npt.NDArray[Any]) -> tuple[Int64Array, Int64Array]:

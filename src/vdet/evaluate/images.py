@@ -248,13 +248,10 @@ def mean_scores(sources: Sequence[MeasuredSet]) -> ImageScores:
     """Return the mean over sources."""
     scores = [source.scores for source in sources]
     best_f1, best_score = _best([each.curve for each in sources if each.scores.vehicles])
-    sizes = zip(*(each.sizes for each in scores), strict=True)
-    return ImageScores(
-        best_f1=best_f1,
-        best_score=best_score,
-        sizes=tuple(SizeScores(**_mean(column, SizeScores.__slots__)) for column in sizes),
-        **_mean(scores, (*_COUNTS, *_RATIOS)),
-    )
+    columns = zip(*(each.sizes for each in scores), strict=True)
+    sizes = tuple(SizeScores(**_mean(column, SizeScores.__slots__)) for column in columns)
+    means = _mean(scores, (*_COUNTS, *_RATIOS))
+    return ImageScores(best_f1=best_f1, best_score=best_score, sizes=sizes, **means)
 
 
 def _mean(scores: Sequence[Any], names: Iterable[str]) -> dict[str, Any]:
@@ -285,13 +282,9 @@ def _by_size(images: Sequence[MeasuredImage]) -> tuple[SizeScores, ...]:
             for kind, widths in enumerate((vehicles, vehicles[frame.rows], wrong)):
                 sizes = np.searchsorted(SIZES, widths, side="right")
                 counts[kind] += np.bincount(sizes, minlength=len(SIZE_NAMES))
-    return tuple(
-        SizeScores(
-            vehicles,
-            matches,
-            wrong,
-            ratio(matches, vehicles) if vehicles else None,
-            ratio(2 * matches, matches + wrong + vehicles) if vehicles else None,
-        )
-        for vehicles, matches, wrong in counts.T.tolist()
-    )
+    found = []
+    for count, matches, alarms in counts.T.tolist():
+        recall, f1 = ratio(matches, count), ratio(2 * matches, matches + alarms + count)
+        known = (recall, f1) if count else (None, None)
+        found.append(SizeScores(count, matches, alarms, *known))
+    return tuple(found)

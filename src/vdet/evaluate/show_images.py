@@ -83,19 +83,12 @@ def others_lines(result: images.ImagesResult) -> list[str]:
 
 def plain(result: images.ImagesResult, run: RunName) -> dict[str, Any]:
     """Return all numbers, and what was measured, as values for JSON."""
-    return {
-        **run.values(),
-        **asdict(result.counting),
-        "mean": _plain_scores(result.mean),
-        "sources": [
-            {
-                "source": each.labelled.name,
-                **_plain_scores(each.scores),
-                "not_vehicles": dict(each.labelled.others),
-            }
-            for each in result.sources
-        ],
-    }
+    sources = []
+    for each in result.sources:
+        others = {"not_vehicles": dict(each.labelled.others)}
+        sources.append({"source": each.labelled.name, **_plain_scores(each.scores), **others})
+    scores = {"mean": _plain_scores(result.mean), "sources": sources}
+    return {**run.values(), **asdict(result.counting), **scores}
 
 
 def _plain_scores(scores: images.ImageScores) -> dict[str, Any]:
@@ -136,15 +129,12 @@ def worst_tiles(source: images.MeasuredSet) -> list[Tile]:
     """
     scored = [(image, score_detections(image.shown)) for image in source.images]
     scored.sort(key=lambda each: -each[1].misses - each[1].false_positives)
-    return [
-        Tile(
-            _drawn(image),
-            image.picture.path.name,
-            f"{scores.misses} missed, {counted(scores.false_positives, 'false alarm')}",
-        )
-        for image, scores in scored[:_MOST_TILES]
-        if scores.misses or scores.false_positives
-    ]
+    tiles = []
+    for image, scores in scored[:_MOST_TILES]:
+        if scores.misses or scores.false_positives:
+            caption = f"{scores.misses} missed, {counted(scores.false_positives, 'false alarm')}"
+            tiles.append(Tile(_drawn(image), image.picture.path.name, caption))
+    return tiles
 
 
 def _drawn(image: images.MeasuredImage) -> Image:

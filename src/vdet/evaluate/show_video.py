@@ -122,14 +122,11 @@ def plain(runs: Sequence[RunResult], name: RunName) -> dict[str, Any]:
     Beside the detector, one run has `total` and `videos`; several have these each, with their
     `settings`, in `sweep`.
     """
-    results = [
-        {
-            "settings": dict(text.split("=", 1) for text in run.assignments),
-            "total": asdict(run.total),
-            "videos": [{"video": clip.name, **plain_clip(clip)} for clip in run.clips],
-        }
-        for run in runs
-    ]
+    results: list[dict[str, Any]] = []
+    for run in runs:
+        settings = dict(text.split("=", 1) for text in run.assignments)
+        videos = [{"video": clip.name, **plain_clip(clip)} for clip in run.clips]
+        results.append({"settings": settings, "total": asdict(run.total), "videos": videos})
     if len(results) > 1:
         return name.values() | {"sweep": results}
     del results[0]["settings"]
@@ -194,15 +191,12 @@ def mistake_tiles(clip: ClipResult) -> list[Tile]:
     if clip.video is None or not chosen:
         return []
     images = _frames(clip.video, {mistake.middle for mistake in chosen})
-    return [
-        Tile(
-            _cropped(images[mistake.middle], mistake, clip.comparison),
-            f"{_name(mistake)}, frame {mistake.middle}",
-            f"{_frame_span(mistake)}: best IoU {mistake.overlap:.2f}",
-        )
-        for mistake in chosen
-        if mistake.middle in images
-    ]
+    tiles = []
+    for mistake in (each for each in chosen if each.middle in images):
+        image = _cropped(images[mistake.middle], mistake, clip.comparison)
+        caption = f"{_frame_span(mistake)}: best IoU {mistake.overlap:.2f}"
+        tiles.append(Tile(image, f"{_name(mistake)}, frame {mistake.middle}", caption))
+    return tiles
 
 
 def _frames(video: Path, numbers: set[int]) -> dict[int, Image]:

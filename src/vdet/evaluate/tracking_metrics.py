@@ -63,12 +63,9 @@ def hota(comparison: Comparison) -> tuple[float, float, float]:
     lengths = comparison.vehicle_lengths()[:, np.newaxis] + comparison.track_lengths()
     boxes = int(comparison.vehicle_lengths().sum() + comparison.track_lengths().sum())
     vehicles, tracks, iou = _hota_pairs(comparison, lengths)
-    accuracies = np.array(
-        [
-            _hota_accuracies(lengths, boxes, vehicles[chosen], tracks[chosen])
-            for chosen in (at_least(iou, alpha) for alpha in ALPHAS)
-        ]
-    )
+    chosen = [at_least(iou, alpha) for alpha in ALPHAS]
+    pairs = [_hota_accuracies(lengths, boxes, vehicles[some], tracks[some]) for some in chosen]
+    accuracies = np.array(pairs)
     deta, assa = accuracies.mean(axis=0)
     return float(np.sqrt(accuracies.prod(axis=1)).mean()), float(deta), float(assa)
 

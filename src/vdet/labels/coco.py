@@ -25,7 +25,7 @@ from vdet.labels.label import Label, from_size, limited, line_error
 from vdet.labels.parsing import LIMIT, Index, Number, checked_times, first_mistake
 from vdet.labels.pictures import MAX_BOXES, MAX_PICTURES, LabelledPicture
 from vdet.labels.video import SavedTracks
-from vdet.track.track import FrameTracks
+from vdet.track.track import FrameTracks, State
 
 _VIDEO = 1
 """Id of the only video."""
@@ -206,27 +206,21 @@ def read_coco(path: Path, data: bytes) -> SavedTracks:
     frames = {each.frame_index: (f"images.{number}", each) for number, each in enumerate(images)}
     if len(frames) < len(images):
         raise TruthError(f"{path}: a frame_index of images appears twice")
-    labels = (
-        label._replace(
-            frame=image.frame_index + 1,
-            id=each.track_id,
-            score=each.score,
-            state="lost" if each.attributes.get("occluded") else "seen",
-        )
-        for image, annotations in document.labels()
-        for each, label in annotations
-    )
+
+    def labels() -> Iterator[Label]:
+        for image, annotations in document.labels():
+            for each, label in annotations:
+                frame, id_, score = image.frame_index + 1, each.track_id, each.score
+                state: State = "lost" if each.attributes.get("occluded") else "seen"
+                yield label._replace(frame=frame, id=id_, score=score, state=state)
+
     times = {
         index: (place, each.time)
         for index, (place, each) in frames.items()
         if each.time is not None
     }
-    return SavedTracks(
-        tuple(limited(path, labels)),
-        listed=tuple(sorted(frames)),
-        times=checked_times(path, times),
-        size=images[0].size if images else None,
-    )
+    listed, size = tuple(sorted(frames)), images[0].size if images else None
+    return SavedTracks(tuple(limited(path, labels())), listed, checked_times(path, times), size)
 
 
 COCO = Format("COCO", ".coco.json", read_coco, whole=_write)

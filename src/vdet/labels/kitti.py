@@ -50,13 +50,9 @@ def read_kitti(path: Path, data: bytes) -> SavedTracks:
 
 
 def _track_label(place: int | str, columns: Sequence[str]) -> Label:
-    return _object_label(
-        place,
-        columns[2:],
-        frame=parse_whole(columns[0]) + 1,
-        id_=parse_whole(columns[1]),
-        score=parse_number(columns[_TRACK_COLUMNS]) if len(columns) > _TRACK_COLUMNS else 1.0,
-    )
+    frame, id_ = (parse_whole(column) for column in columns[:2])
+    score = parse_number(columns[_TRACK_COLUMNS]) if len(columns) > _TRACK_COLUMNS else 1.0
+    return _object_label(place, columns[2:], frame + 1, id_, score)
 
 
 def _object_label(

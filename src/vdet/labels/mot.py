@@ -50,14 +50,9 @@ def _label(place: int | str, columns: Sequence[str]) -> Label:
     is_truth = len(columns) == _TRUTH_COLUMNS
     if is_truth and seventh not in {0, 1}:
         raise ValueError(f"the flag (column 7) is {seventh:g}; it must be 0 or 1")
-    return Label(
-        place,
-        from_size(left - 1, top - 1, width, height),
-        frame=parse_whole(columns[0]),
-        id=parse_whole(columns[1]),
-        score=1.0 if is_truth else seventh,
-        ignored=is_truth and seventh == 0,
-    )
+    frame, id_ = (parse_whole(column) for column in columns[:2])
+    box, score = from_size(left - 1, top - 1, width, height), 1.0 if is_truth else seventh
+    return Label(place, box, None, frame, id_, score, ignored=is_truth and seventh == 0)
 
 
 MOT = Format("MOTChallenge", ".txt", read_mot, _lines)

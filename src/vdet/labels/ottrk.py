@@ -125,32 +125,17 @@ def read_ottrk(path: Path, data: bytes) -> SavedTracks:
         what = error if isinstance(error, OSError) else first_mistake(error)
         raise TruthError(f"{path}: is not OTVision's tracks: {what}") from error
     share = 0.5 if document.version.startswith(_CENTRED) else 0.0
-    places = [f"data.detections.{number}" for number in range(len(document.boxes))]
-    labels = (
-        Label(
-            place,
-            from_size(box.x - share * box.w, box.y - share * box.h, box.w, box.h),
-            box.name,
-            box.frame,
-            box.id,
-            box.confidence,
-            state="between" if box.is_interpolated else "seen",
-        )
-        for place, box in zip(places, document.boxes, strict=True)
-    )
-    times = {
-        box.frame - 1: (place, box.occurrence - document.begin)
-        for place, box in zip(places, document.boxes, strict=True)
-    }
-    size = document.width, document.height
-    begin = datetime.fromtimestamp(document.begin, UTC)
-    return SavedTracks(
-        tuple(limited(path, labels)),
-        (),
-        checked_times(path, times),
-        size if all(size) else None,
-        begin,
-    )
+    labels: list[Label] = []
+    times: dict[int, tuple[int | str, float]] = {}
+    for number, box in enumerate(document.boxes):
+        place = f"data.detections.{number}"
+        corners = from_size(box.x - share * box.w, box.y - share * box.h, box.w, box.h)
+        known = box.name, box.frame, box.id, box.confidence, False
+        labels.append(Label(place, corners, *known, "between" if box.is_interpolated else "seen"))
+        times[box.frame - 1] = place, box.occurrence - document.begin
+    shape = document.width, document.height
+    size, begin = shape if all(shape) else None, datetime.fromtimestamp(document.begin, UTC)
+    return SavedTracks(tuple(limited(path, labels)), (), checked_times(path, times), size, begin)
 
 
 OTTRK = Format("OTVision tracks", ".ottrk", read_ottrk, whole=_write)

@@ -68,19 +68,10 @@ _BLOCK = 300
 
 def _label(line: int, frame: int, track: _Track) -> Label:
     """Return the label in a frame, counted from 0."""
-    return Label(
-        line,
-        from_size(track["x"], track["y"], track["width"], track["height"]),
-        track.get("class") or None,
-        frame + 1,
-        track["id"],
-        track.get("score", 1.0),
-        False,
-        track.get("state", "seen"),
-        track.get("foot"),
-        track.get("distance"),
-        track.get("lane"),
-    )
+    box = from_size(track["x"], track["y"], track["width"], track["height"])
+    score, state = track.get("score", 1.0), track.get("state", "seen")
+    known = track.get("class") or None, frame + 1, track["id"], score, False, state
+    return Label(line, box, *known, track.get("foot"), track.get("distance"), track.get("lane"))
 
 
 def _json_lines(frame: FrameTracks) -> Iterator[str]:

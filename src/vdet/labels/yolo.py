@@ -96,19 +96,14 @@ def read_yolo(path: Path, data: bytes) -> SavedTracks:
     if not all(isinstance(side, int) and 0 < side <= parsing.LIMIT for side in size):
         raise TruthError(f"{where}: needs the size of the frames, as width: 1280, height: 720")
     frames = _frames(path, [name for name in texts if name not in described])
-    labels = (
-        label
-        for index, name in sorted(frames.items())
-        for label in label_lines(
-            path,
-            texts[name],
-            partial(_track_label, names=names, size=size, frame=index + 1),
-            form="YOLO with tracks",
-            counts=(_COLUMNS + 1, _COLUMNS + 2),
-            member=printable(name),
-        )
-    )
-    return SavedTracks(tuple(limited(path, labels)), listed=tuple(sorted(frames)), size=size)
+    read = partial(label_lines, form="YOLO with tracks", counts=(_COLUMNS + 1, _COLUMNS + 2))
+
+    def labels() -> Iterator[Label]:
+        for index, name in sorted(frames.items()):
+            parse = partial(_track_label, names=names, size=size, frame=index + 1)
+            yield from read(path, texts[name], parse, member=printable(name))
+
+    return SavedTracks(tuple(limited(path, labels())), listed=tuple(sorted(frames)), size=size)
 
 
 def _values(text: str, where: str) -> Mapping[str, Any]:

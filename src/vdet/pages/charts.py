@@ -233,18 +233,12 @@ def interval_plot(series: Series, x: Axis, interval: int, title: str) -> Plot:
 def histogram(values: Sequence[float], step: float, title: str, unit: str) -> Plot:
     """Return how many values lie in each class of width `step`."""
     counts = Counter(int(value // step) for value in values)
-    low, high = step * min(counts), step * (max(counts) + 1)
-    bars = [
-        Bar(
-            step * n,
-            step * (n + 1),
-            0,
-            counts[n],
-            title=f"{step * n:g} to {step * (n + 1):g} {unit}",
-        )
-        for n in sorted(counts)
-    ]
-    return Plot(title, number_axis(low, high, unit), _counts(max(counts.values())), bars)
+    bars = []
+    for number, count in sorted(counts.items()):
+        low, high = step * number, step * (number + 1)
+        bars.append(Bar(low, high, 0, count, title=f"{low:g} to {high:g} {unit}"))
+    x = number_axis(bars[0].left, bars[-1].right, unit)
+    return Plot(title, x, _counts(max(counts.values())), bars)
 
 
 def _counts(most: float) -> Axis:

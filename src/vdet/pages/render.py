@@ -30,12 +30,8 @@ def render(template: str, **values: Any) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {
-        "clock": clock,
-        "counted": counted,
-        "jpeg": jpeg_uri,
-        "line": lambda text: escaped(str(text)),
-    }
+    environment.filters |= {"clock": clock, "counted": counted, "jpeg": jpeg_uri}
+    environment.filters["line"] = lambda text: escaped(str(text))
     return environment.get_template(template).render(values, version=__version__)
 
 

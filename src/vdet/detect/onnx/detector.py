@@ -75,13 +75,8 @@ class NetworkDetector:
         raw, least = candidates
         rows = suppress(raw.boxes, raw.scores, self.settings.overlap)
         rows = rows[raw.scores[rows] >= least]
-        return Boxes(
-            raw.boxes[rows],
-            raw.scores[rows],
-            classes=raw.classes[rows],
-            names=self.settings.classes,
-            trace=raw,
-        )
+        classes, names = raw.classes[rows], self.settings.classes
+        return Boxes(raw.boxes[rows], raw.scores[rows], classes=classes, names=names, trace=raw)
 
     def stage_pictures(self, image: Image, detections: Boxes) -> dict[str, Image]:
         """Return the network's input as a picture, and the boxes before suppression."""

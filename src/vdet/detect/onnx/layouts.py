@@ -110,8 +110,6 @@ def _of_best_classes(middle: Array, size: Array, scores: Array, least: float) ->
 def _raw(boxes: Array, scores: Array, classes: Array) -> RawBoxes:
     """Return the boxes. Raises `ValueError` where the shapes do not fit each other."""
     count = len(scores)
-    return RawBoxes(
-        boxes.astype(np.float32).reshape(count, 4),
-        np.clip(scores.astype(np.float32).reshape(count), 0, 1),
-        classes.astype(np.int32).reshape(count),
-    )
+    clipped = np.clip(scores.astype(np.float32).reshape(count), 0, 1)
+    numbers = classes.astype(np.int32).reshape(count)
+    return RawBoxes(boxes.astype(np.float32).reshape(count, 4), clipped, numbers)

@@ -37,14 +37,11 @@ class DenseSearch:
             part = _LocatedPart
             n = (pixels / max(map(features.shrink, range(3)))).denominator
         self._numbers = np.arange(len(grid)).reshape(grid.rows, grid.columns)
-        self._parts: list[tuple[IndexArray, _Part]] = [
-            (
-                self._numbers[row::n, column::n].ravel(),
-                part(model, grid.every_nth(n, column, row)),
-            )
-            for row in range(min(n, grid.rows))
-            for column in range(min(n, grid.columns))
-        ]
+        self._parts: list[tuple[IndexArray, _Part]] = []
+        for row in range(min(n, grid.rows)):
+            for column in range(min(n, grid.columns)):
+                numbers = self._numbers[row::n, column::n].ravel()
+                self._parts.append((numbers, part(model, grid.every_nth(n, column, row))))
 
     def search(self, frame: FramePyramid) -> GridResult:
         """Return the probability of each window."""

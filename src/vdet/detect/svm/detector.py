@@ -138,14 +138,11 @@ class SvmDetector:
 
     def _detections(self, regions: Sequence[HotRegion], trace: Trace) -> Boxes:
         strengths = np.array([region.strength for region in regions], np.float64)
+        centroids = np.reshape([region.centroid for region in regions], (-1, 2))
+        sides = np.reshape([astuple(region.box) for region in regions], (-1, 4))
+        scores = [self._settings.score.of(strength) for strength in strengths.tolist()]
         return Boxes(
-            np.reshape([astuple(region.box) for region in regions], (-1, 4)),
-            [self._settings.score.of(strength) for strength in strengths.tolist()],
-            data={
-                "centroid": np.reshape([region.centroid for region in regions], (-1, 2)),
-                "strength": strengths,
-            },
-            trace=trace,
+            sides, scores, data={"centroid": centroids, "strength": strengths}, trace=trace
         )
 
     def _shown_in_still(self, found: Boxes) -> Boxes:

@@ -144,12 +144,10 @@ def _read(archive: zipfile.ZipFile) -> LinearModel:
     known = {"halved": ()} | header["features"]
     known.pop("spatial", None)
     boxes = [name for name in _BOX_ARRAYS if f"{name}.npy" in archive.namelist()]
-    model = LinearModel(
-        FeatureSettings.model_validate(known),
-        **{name: _read_array(archive, name) for name in _ARRAYS},
-        provenance=header["provenance"],
-        box_regression=BoxRegression(*(_read_array(archive, n) for n in boxes)) if boxes else None,
-    )
+    features, provenance = FeatureSettings.model_validate(known), header["provenance"]
+    arrays = {name: _read_array(archive, name) for name in _ARRAYS}
+    regression = BoxRegression(*(_read_array(archive, name) for name in boxes)) if boxes else None
+    model = LinearModel(features, **arrays, provenance=provenance, box_regression=regression)
     _check_arrays(model)
     return model
 

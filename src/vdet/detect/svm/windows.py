@@ -111,14 +111,9 @@ class WindowGrid:
 
     def every_nth(self, n: int, column: int, row: int) -> "WindowGrid":
         """Return the grid of every n-th window, from this column and row on."""
-        return WindowGrid(
-            self.size,
-            self.step * n,
-            self.left + column * self.step,
-            self.top + row * self.step,
-            len(range(column, self.columns, n)),
-            len(range(row, self.rows, n)),
-        )
+        left, top = self.left + column * self.step, self.top + row * self.step
+        columns, rows = len(range(column, self.columns, n)), len(range(row, self.rows, n))
+        return WindowGrid(self.size, self.step * n, left, top, columns, rows)
 
 
 def lay_grids(

@@ -80,13 +80,9 @@ class LabelledVectors:
         """Return a copy of the kept patches, bool `(patches,)`, with the samples made of them."""
         used = np.flatnonzero(kept[self.origins])
         new_rows = np.cumsum(kept) - 1
-        return LabelledVectors(
-            self.vectors[used],
-            self.vehicle[used],
-            self.sides[used],
-            new_rows[self.origins[used]],
-            [self.files[row] for row in np.flatnonzero(kept).tolist()],
-        )
+        vectors, vehicle, sides = self.vectors[used], self.vehicle[used], self.sides[used]
+        files = [self.files[row] for row in np.flatnonzero(kept).tolist()]
+        return LabelledVectors(vectors, vehicle, sides, new_rows[self.origins[used]], files)
 
 
 def extract(
@@ -152,15 +148,11 @@ def _describe(
             samples += (sample, *more)
             origins += [len(good)] * (len(samples) - len(origins))
             good.append(patch.file)
-    data = LabelledVectors(
-        FeatureExtractor(features).describe_all(
-            to_patch(sample.image, features.patch) for sample in samples
-        ),
-        np.array([sample.vehicle for sample in samples], bool),
-        np.array([sample.sides for sample in samples], np.float32).reshape(-1, 4),
-        np.array(origins, np.intp),
-        good,
-    )
+    images = (to_patch(sample.image, features.patch) for sample in samples)
+    vectors = FeatureExtractor(features).describe_all(images)
+    vehicle = np.array([sample.vehicle for sample in samples], bool)
+    of_boxes = np.array([sample.sides for sample in samples], np.float32).reshape(-1, 4)
+    data = LabelledVectors(vectors, vehicle, of_boxes, np.array(origins, np.intp), good)
     return data, [patch.checksum for patch in patches]
 
 

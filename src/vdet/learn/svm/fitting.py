@@ -75,13 +75,8 @@ def fit(rows: LabelledVectors, settings: Settings) -> LinearModel:
     weights = np.array([svm.x[:-1] for svm in svms]) / scaler.scale_
     biases = np.array([svm.x[-1] for svm in svms]) - weights @ scaler.mean_
     slopes, offsets = np.array(sigmoids, np.float32).T
-    return LinearModel(
-        settings.svm.features,
-        weights.astype(np.float32),
-        biases.astype(np.float32),
-        slopes,
-        offsets,
-    )
+    planes = weights.astype(np.float32), biases.astype(np.float32)
+    return LinearModel(settings.svm.features, *planes, slopes, offsets)
 
 
 def _fit_svm(vectors: Float32Array, vehicle: BoolArray, used: BoolArray, penalty: float) -> Any:
@@ -112,9 +107,7 @@ def _fit_sigmoid(scores: Float64Array, vehicle: BoolArray) -> tuple[float, float
     """
     positives, negatives = np.count_nonzero(vehicle), np.count_nonzero(~vehicle)
     targets = np.where(vehicle, (positives + 1) / (positives + 2), 1 / (negatives + 2))
-    found = LogisticRegression(C=np.inf, tol=1e-8).fit(
-        np.tile(scores, 2)[:, np.newaxis],
-        np.repeat([True, False], len(scores)),
-        np.concatenate([targets, 1 - targets]),
-    )
+    values, signs = np.tile(scores, 2)[:, np.newaxis], np.repeat([True, False], len(scores))
+    weights = np.concatenate([targets, 1 - targets])
+    found = LogisticRegression(C=np.inf, tol=1e-8).fit(values, signs, weights)
     return -found.coef_[0, 0], -found.intercept_[0]

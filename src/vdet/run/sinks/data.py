@@ -128,13 +128,8 @@ class VehicleSink(BaseSink):
         self._records.add(result.frame_tracks)
 
 
-VEHICLES = SinkKind(
-    VehicleSink,
-    SUFFIXES,
-    "records of vehicles",
-    takes="videos",
-    total=BatchTotal("all", join_records),
-)
+_RECORDS = BatchTotal("all", join_records)
+VEHICLES = SinkKind(VehicleSink, SUFFIXES, "records of vehicles", takes="videos", total=_RECORDS)
 
 
 class CountsSink(BaseSink):

@@ -168,10 +168,5 @@ class PageSink(BaseSink):
         return Player(path.name, link_to(path, self.path), bool(drawn), start)
 
 
-PAGE = SinkKind(
-    PageSink,
-    what="pages",
-    marker=PAGE_NAME,
-    takes="videos",
-    total=BatchTotal("index", write_index, suffix=".html"),
-)
+_INDEX = BatchTotal("index", write_index, suffix=".html")
+PAGE = SinkKind(PageSink, what="pages", marker=PAGE_NAME, takes="videos", total=_INDEX)
