@@ -68,7 +68,8 @@ def paint_mask(top: Image) -> Image:
     rise = cv2.subtract(lightness, road)  # saturates at 0
     tint = cv2.subtract(yellow, _larger_side(yellow, reach))
     paint = cv2.compare(rise, cv2.LUT(road, _LEAST_RISES), cv2.CMP_GT)
-    return np.asarray(cv2.bitwise_or(paint, cv2.compare(tint, _YELLOW, cv2.CMP_GT)), np.uint8)
+    _, yellow_paint = cv2.threshold(tint, _YELLOW, PAINT, cv2.THRESH_BINARY)
+    return np.asarray(cv2.bitwise_or(paint, yellow_paint), np.uint8)
 
 
 def _larger_side(channel: Image, reach: int) -> Image:
