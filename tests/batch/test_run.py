@@ -51,20 +51,20 @@ def same(item: int) -> int:
 @pytest.mark.parametrize("count", [1, 2, 4])
 def test_only_items_that_kill_their_process_have_no_result(count: int) -> None:
     items = list(range(10))
-    results = dict(each_once(same, items, FakeWorkers(count, deadly=[3, 7])))
+    results = dict(each_once(same, items, FakeWorkers(count, deadly=[3, 7]), same))
     assert results == {item: None if item in (3, 7) else item for item in items}
 
 
 def test_items_that_were_in_work_when_a_process_was_killed_are_repeated_one_by_one() -> None:
     workers = FakeWorkers(2, deadly=[3], kills_left=1)
-    results = dict(each_once(same, range(6), workers))
+    results = dict(each_once(same, range(6), workers, same))
     assert results == {item: item for item in range(6)}
     assert workers.calls == [[0, 1, 2, 3], [4, 5], [2], [3]]
 
 
 def test_what_is_repeated_may_differ_and_counts_for_its_item() -> None:
     workers = FakeWorkers(2, deadly=[3], kills_left=1)
-    results = dict(each_once(same, range(4), workers, again=lambda item: item + 10))
+    results = dict(each_once(same, range(4), workers, lambda item: item + 10))
     assert results == {0: 0, 1: 1, 2: 12, 3: 13}
 
 

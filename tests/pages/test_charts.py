@@ -38,11 +38,11 @@ def test_axes_have_round_numbers() -> None:
 
 
 def test_a_level_has_a_bar_for_each_step_in_which_something_is_shown() -> None:
-    plot = level_plot([(40, 160), (80, 160), (90, 99)], time_axis(0, 160), "levels")
+    plot = level_plot([(40, 160), (80, 160), (90, 99)], time_axis(0, 160), "levels", [])
     heights = {round(bar.left): bar.high for bar in plot.bars}
     assert [heights.get(second, 0) for second in (39, 40, 80, 90, 99)] == [0, 1, 2, 3, 2]
     assert plot.y.high == 3
-    assert level_plot([], time_axis(0, 0), "nothing").bars == []
+    assert level_plot([], time_axis(0, 0), "nothing", []).bars == []
 
 
 def test_the_series_of_an_interval_are_stacked_and_named_with_their_sums() -> None:

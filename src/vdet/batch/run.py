@@ -36,7 +36,7 @@ def run_batch(plan: Plan, work: Work, *, workers: Workers) -> Generator[tuple[Vi
     try:
         with (
             open_manifest(plan.manifest) as add,
-            closing(each_once(function, plan.jobs, workers, again=_replacing)) as results,
+            closing(each_once(function, plan.jobs, workers, _replacing)) as results,
         ):
             for job, result in results:
                 record = result or record_of_killed(job, work)
@@ -67,11 +67,7 @@ def _replacing(job: VideoJob) -> VideoJob:
 
 
 def each_once(
-    function: Callable[[T], R],
-    items: Sequence[T],
-    workers: Workers,
-    *,
-    again: Callable[[T], T] = lambda item: item,
+    function: Callable[[T], R], items: Sequence[T], workers: Workers, again: Callable[[T], T]
 ) -> Generator[tuple[T, R | None]]:
     """Yield every item with its result, in the order in which they end.
 

@@ -182,10 +182,7 @@ def curve(xs: Float64Array, ys: Float64Array, color: str) -> Line:
 
 
 def level_plot(
-    spans: Sequence[tuple[float, float]],
-    x: Axis,
-    title: str,
-    gaps: Sequence[tuple[float, float]] = (),
+    spans: Sequence[tuple[float, float]], x: Axis, title: str, gaps: Sequence[tuple[float, float]]
 ) -> Plot:
     """Return how many of the spans, each from its first to its last time, there are at once.
 

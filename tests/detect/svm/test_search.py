@@ -17,6 +17,7 @@ from vdet.config.svm import (
 )
 from vdet.detect.svm.dense_search import DenseSearch
 from vdet.detect.svm.features import Layout
+from vdet.detect.svm.horizon import DEFAULT_HORIZON
 from vdet.detect.svm.model import BoxRegression, LinearModel
 from vdet.detect.svm.search import Engine, FrameSearch
 from vdet.detect.svm.windows import Windows, lay_grids
@@ -95,7 +96,7 @@ class TestLayingGrids:
 
     def test_all_default_sets_fit_into_a_720p_frame(self) -> None:
         settings = SvmSettings()
-        grids = lay_grids(settings, settings.features, 1280, 720)
+        grids = lay_grids(settings, settings.features, 1280, 720, horizon=DEFAULT_HORIZON)
         shares = settings.search.perspective.sizes
         assert [grid.size for grid in grids] == [round(1280 * share) for share in shares]
 
@@ -108,7 +109,7 @@ class TestLayingGrids:
         ("width", "height"), [(640, 360), (1920, 1080), (1279, 721), (853, 480)]
     )
     def test_the_sets_scale_with_the_rows_of_the_frame(self, width: int, height: int) -> None:
-        large, small = lay_grids(SEED, SEED.features, width, height)
+        large, small = lay_grids(SEED, SEED.features, width, height, horizon=DEFAULT_HORIZON)
         factor = height / 720
         assert large.boxes[0].tolist() == [0, *[int(n * factor + 0.5) for n in (380, 128, 128)]]
         assert small.boxes[0].tolist() == [0, *[int(n * factor + 0.5) for n in (400, 64, 64)]]
@@ -129,10 +130,12 @@ class TestLayingGrids:
 
     def test_a_set_that_does_not_fit_leaves_the_others(self) -> None:
         # the large windows are wider than the frame, the small ones are not
-        assert [grid.size for grid in lay_grids(SEED, COLOUR, 100, 720)] == [64]
+        assert [
+            grid.size for grid in lay_grids(SEED, COLOUR, 100, 720, horizon=DEFAULT_HORIZON)
+        ] == [64]
 
     def test_no_window_is_ever_smaller_than_a_pixel(self) -> None:
-        assert lay_grids(SEED, COLOUR, 400, 2) == []
+        assert lay_grids(SEED, COLOUR, 400, 2, horizon=DEFAULT_HORIZON) == []
 
 
 class TestSearching:

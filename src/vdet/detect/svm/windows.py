@@ -19,7 +19,6 @@ from vdet.boxes import Float32Array, Int32Array
 from vdet.config.schema import SvmSettings
 from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
 from vdet.config.svm import FeatureSettings, PerspectiveSettings, WindowSettings
-from vdet.detect.svm.horizon import DEFAULT_HORIZON
 
 IndexArray = npt.NDArray[np.intp]
 
@@ -117,12 +116,7 @@ class WindowGrid:
 
 
 def lay_grids(
-    settings: SvmSettings,
-    features: FeatureSettings,
-    width: int,
-    height: int,
-    *,
-    horizon: float = DEFAULT_HORIZON,
+    settings: SvmSettings, features: FeatureSettings, width: int, height: int, *, horizon: float
 ) -> list[WindowGrid]:
     """Lay the window sets over a frame of `width` × `height` pixels.
 
@@ -178,12 +172,7 @@ def _step_and_buffer(settings: WindowSettings, cells: int) -> tuple[Fraction, Fr
 
 
 def lay_perspective(
-    settings: PerspectiveSettings,
-    features: FeatureSettings,
-    width: int,
-    height: int,
-    *,
-    horizon: float,
+    sets: PerspectiveSettings, features: FeatureSettings, width: int, height: int, *, horizon: float
 ) -> list[WindowGrid]:
     """Lay the sets over a frame of `width` × `height` pixels.
 
@@ -203,17 +192,17 @@ def lay_perspective(
     """
     cells = features.patch // features.hog.cell
     grids: list[WindowGrid] = []
-    for share in settings.sizes:
-        side = share * settings.zoom * min(width, _MAX_ASPECT * height)
+    for share in sets.sizes:
+        side = share * sets.zoom * min(width, _MAX_ASPECT * height)
         halvings = max(0, math.floor(math.log2(max(side, 1) / features.patch)))
         unit = cells << halvings
         size = unit * max(1, round(side / unit))
-        first = horizon * height + (settings.highest - 1) * size
+        first = horizon * height + (sets.highest - 1) * size
         top = max(0, round(first / (1 << halvings)) << halvings)
-        step = Fraction(settings.step * size, cells)
-        beyond = int(Fraction(settings.beyond) * size / step)
+        step = Fraction(sets.step * size, cells)
+        beyond = int(Fraction(sets.beyond) * size / step)
         columns = (width + 2 * beyond * step - size) // step + 1
-        wanted = round((settings.lowest - settings.highest) * size / step) + 1
+        wanted = round((sets.lowest - sets.highest) * size / step) + 1
         rows = min(wanted, (height - top - size) // step + 1)
         if size <= width and min(columns, rows) >= 1 and size not in {grid.size for grid in grids}:
             left = -beyond * step
