@@ -1,6 +1,8 @@
 """The page of a video, and the page over many."""
 
 import re
+import shutil
+import subprocess
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -230,3 +232,18 @@ class TestIndex:
 
     def test_of_no_video_it_says_so(self, tmp_path: Path) -> None:
         assert "No video could be searched." in self.index(tmp_path).text
+
+
+@pytest.mark.skipif(not shutil.which("chromium"), reason="needs Chromium")
+def test_a_narrow_browser_needs_no_sideways_scrolling(tmp_path: Path) -> None:
+    measures = "<script>document.title = document.documentElement.scrollWidth</script></body>"
+    path = tmp_path / "page.html"
+    path.write_text(page().html().replace("</body>", measures), "utf-8")
+    frame = f'<iframe src="{path.name}" style="width: 390px; height: 9000px"></iframe>'
+    reads = "<script>onload = () => document.title = frames[0].document.title</script>"
+    path.with_name("narrow.html").write_text(frame + reads, "utf-8")
+    options = ("--headless", "--no-sandbox", "--disable-gpu", "--allow-file-access-from-files")
+    address = path.with_name("narrow.html").as_uri()
+    command = ["chromium", *options, f"--user-data-dir={tmp_path}", "--dump-dom", address]
+    html = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert "<title>390</title>" in html
