@@ -129,6 +129,10 @@ def _run_rows(times: Times, played: float) -> list[Measurement]:
             "detect-video with regions, counts, records and trails / without",
             "detect with answers", "detect", "≤ 1.03",
         ),
+        row(
+            "detect-video --flows --begin --ground / without",
+            "detect with flows", "detect", "≤ 1.03",
+        ),
         row("length / detect-video --no-video", "played", "detect only", "≥ 10", "14"),
         row("length / detect-video --no-video -c svm", "played", "detect only with svm", "–"),
     ]  # fmt: skip

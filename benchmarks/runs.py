@@ -4,6 +4,7 @@ import subprocess
 import sys
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from benchmarks.plain import transcode
 from benchmarks.rounds import Task, measure_both
@@ -19,6 +20,7 @@ from vdet.config.section import Section
 from vdet.detect.factory import load_detector
 from vdet.detect.protocol import DetectorModel
 from vdet.lanes.camera import CalibratedCamera
+from vdet.lanes.ground import GroundPoint, GroundPoints, GroundRequest
 from vdet.lanes.road import LaneRequest
 from vdet.media.images import write_image
 from vdet.media.reader import VideoReader
@@ -51,18 +53,36 @@ ANSWERS: dict[str, Section] = {
 """A region that leaves nothing out, three lines and two zones, and trails."""
 
 
+GROUND = GroundRequest(
+    "ground.yaml",
+    GroundPoints(
+        points=tuple(
+            GroundPoint(pixel=pixel, metres=metres)
+            for pixel, metres in (
+                ((0.15, 0.95), (0, 0)), ((0.85, 0.95), (7.4, 0)),
+                ((0.58, 0.62), (7.4, 30)), ((0.44, 0.62), (0, 30)),
+            )
+        )
+    ),
+)  # fmt: skip
+"""Points on the road; the numbers do not change the time of speeds."""
+
+
 def run_times(path: Path, folder: Path, rounds: int) -> dict[str, tuple[float, float]]:
     """Return the seconds of wall time and of processor time of the first `FRAMES` frames.
 
     Keys: `transcode` (decoded, and encoded with the same settings), `detect` (vehicles detected,
     drawn and written), `detect with lanes`, `detect with svm`, `detect with answers` (`ANSWERS`,
-    counts and records of vehicles too), `detect only` and `detect only with svm` (nothing written).
+    counts and records of vehicles too), `detect with flows` (flows by the clock, and speeds, at the
+    lines of `ANSWERS`), `detect only` and `detect only with svm` (nothing written).
     """
     out = folder / "out.mp4"
     video = (Output("video", out),)
     files = Output("counts", folder / "counts.csv"), Output("vehicles", folder / "cars.csv")
     default, svm = Settings(), Settings(detector=SvmSettings())
     answering = default.model_copy(update=ANSWERS)
+    counting = default.model_copy(update={"counts": ANSWERS["counts"]})
+    traffic = Output("flows", folder / "flows.csv"), Output("counts", folder / "counts.csv")
     model, linear = load_detector(default.detector), load_detector(svm.detector)
 
     def detect(
@@ -70,8 +90,9 @@ def run_times(path: Path, folder: Path, rounds: int) -> dict[str, tuple[float, f
         outputs: tuple[Output, ...] = video,
         settings: Settings = default,
         lanes: LaneRequest | None = None,
+        **more: Any,
     ) -> None:
-        job = VideoJob(path, outputs, frames=FRAMES, lanes=lanes, overwrite=True)
+        job = VideoJob(path, outputs, frames=FRAMES, lanes=lanes, overwrite=True, **more)
         run_video(job, detector, settings)
 
     tasks: dict[str, Task] = {
@@ -80,6 +101,9 @@ def run_times(path: Path, folder: Path, rounds: int) -> dict[str, tuple[float, f
         "detect with lanes": partial(detect, model, lanes=LaneRequest(CAMERA)),
         "detect with svm": partial(detect, linear, settings=svm),
         "detect with answers": partial(detect, model, (*video, *files), answering),
+        "detect with flows": partial(
+            detect, model, (*video, *traffic), counting, ground=GROUND, begin="2026-05-01 07:00"
+        ),
         "detect only": partial(detect, model, ()),
         "detect only with svm": partial(detect, linear, (), svm),
     }

@@ -164,7 +164,7 @@ def test_shares_need_the_size_of_the_frames(run: Run, tmp_path: Path) -> None:
             1,
             "short.yaml:1:1: counts: gate: is shorter than 1 %",
         ),
-        (["t.csv", "--lines", "l.yaml", "--interval", "5min"], 2, "goes with --counts or --flows"),
+        (["t.csv", "--lines", "l.yaml", "--interval", "5min"], 2, "goes with --counts, --flows"),
         (["t.csv", "--lines", "l.yaml", "--interval", "7min"], 2, "'7min' is no part of a day"),
         (["t.csv", "--lines", "l.yaml", "--begin", "now"], 2, "'now' is not a time"),
         (["t.csv", "--lines", "l.yaml", "--begin", "%Y%m%d"], 1, "t.csv: its name has no time"),

@@ -23,7 +23,7 @@ log = logging.getLogger("vdet")
 @command(
     "vdet count tracks.jsonl --lines lines.yaml",
     "vdet count tracks.jsonl --lines lines.yaml --flows flows.csv --interval 15min",
-    "vdet count found/*.csv --lines lines.yaml --counts counts.json",
+    "vdet count found/*.tracks.csv --lines lines.yaml --counts counts.json",
 )
 @click.argument("tracks", nargs=-1, required=True, type=options.PATH, metavar="TRACKS...")
 @counting_options()

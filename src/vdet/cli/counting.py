@@ -35,11 +35,12 @@ class Counting:
 
     def check(self, settings: "Settings", *, several: bool) -> None:
         """Raise `click.UsageError` where the options do not fit the outputs or the videos."""
-        tables = {sink for sink, _ in options.wanted_outputs()} & {"counts", "flows"}
+        wanted = {sink for sink, _ in options.wanted_outputs()}
+        tables = wanted & {"counts", "flows"}
         if tables and not settings.counts:
             raise click.UsageError(f"--{min(tables)} needs lines or zones; give --lines FILE")
-        if self.interval and not tables:
-            raise click.UsageError("--interval goes with --counts or --flows")
+        if self.interval and not (tables or "page" in wanted):
+            raise click.UsageError("--interval goes with --counts, --flows or --page")
         if self.begin and several and "%" not in self.begin:
             raise click.UsageError(
                 "--begin: for several videos give a pattern of their names, as in %Y%m%d_%H%M%S"
@@ -83,7 +84,7 @@ def counting_options(more: str = "") -> Callable[[F], F]:
     )
     interval = option(
         "--interval TIME",
-        "Interval of the tables of counts and flows, as in 5min, 15min or 1h.",
+        "Interval of tables, and of the bars of a page, as in 5min, 15min or 1h.",
         _interval,
         show_default="the whole video",
     )
