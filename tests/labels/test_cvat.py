@@ -97,7 +97,7 @@ class TestWriting:
 
     def test_names_that_xml_cannot_hold_are_escaped(self, tmp_path: Path) -> None:
         text = written(CVAT, [frame(0, car(class_name='<"\x1b">'))])
-        (only,) = read_back(CVAT, tmp_path, text).frames
+        (only,) = read_back(CVAT, tmp_path, text)
         assert only.tracks[0].class_name == '<"\\x1b">'
 
 

@@ -87,29 +87,28 @@ def checked_labels(path: Path, labels: Iterable[Label]) -> tuple[Label, ...]:
     checked: list[Label] = []
     places: dict[tuple[int, int], int | str] = {}
     for label in labels:
-        place, _, _, frame, number, *_ = label
-        mistake, key = mistake_in_box(label), (frame, number)
-        if frame < 1:
+        mistake = mistake_in_box(label)
+        key = label.frame, label.id
+        if label.frame < 1:
             mistake = "the frame comes before the video's first"
-        elif number < 0 and number < (NO_ID if label.ignored else 0):
-            mistake = f"id {number} is negative; number the vehicles from 0 or 1"
-        elif key in places and number != NO_ID:
-            other = places[key]
-            named = f"line {other}" if isinstance(other, int) else other
-            mistake = f"id {number} is in the same frame already ({named})"
+        elif label.id < (NO_ID if label.ignored else 0):
+            mistake = f"id {label.id} is negative; number the vehicles from 0 or 1"
+        elif key in places and label.id != NO_ID:
+            place = places[key]
+            named = f"line {place}" if isinstance(place, int) else place
+            mistake = f"id {label.id} is in the same frame already ({named})"
         if mistake is not None:
-            raise line_error(path, place, mistake)
-        places[key] = place
+            raise line_error(path, label.place, mistake)
+        places[key] = label.place
         checked.append(label)
     return tuple(checked)
 
 
 def mistake_in_box(label: Label) -> str | None:
     """Return what is wrong with the box or the name of a label; None if nothing is."""
-    x1, y1, x2, y2 = label.box
-    width, height = x2 - x1, y2 - y1
+    width, height = label.box[2] - label.box[0], label.box[3] - label.box[1]
     if width <= 0 or height <= 0 or width * height <= 0:
         return f"the box has no area: {width:g} wide, {height:g} high"
-    if label.name and len(label.name) > _MAX_NAME:
+    if len(label.name or "") > _MAX_NAME:
         return f"the label has more than {_MAX_NAME} characters; give a shorter one"
     return None

@@ -66,11 +66,6 @@ class SavedTracks:
         times = {index: index / rate for index in self._indices()}
         return replace(self, times=times | dict(self.times))
 
-    @property
-    def frames(self) -> tuple[FrameTracks, ...]:
-        """The frames that an iteration yields."""
-        return tuple(self)
-
     def __iter__(self) -> Iterator[FrameTracks]:
         """Yield the frames with a box and the listed frames, in order.
 
