@@ -1,5 +1,6 @@
 """Whole runs of detect-video: wall time with and without outputs and lanes, and peak memory."""
 
+import os
 import subprocess
 import sys
 from functools import partial
@@ -134,9 +135,11 @@ def start_times(path: Path, folder: Path, rounds: int) -> dict[str, tuple[float,
         "second": ["-m", "vdet", "--quiet", *video],
         "plain second": ["-c", plain],
     }
+    environment = {**os.environ, "PYTHONPYCACHEPREFIX": str(folder / "bytecode")}
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)  # programs that are installed have bytecode
+    run = partial(subprocess.run, check=True, capture_output=True, env=environment)
     tasks: dict[str, Task] = {
-        name: partial(subprocess.run, [sys.executable, *each], check=True, capture_output=True)
-        for name, each in commands.items()
+        name: partial(run, [sys.executable, *each]) for name, each in commands.items()
     }
     return measure_both(tasks, rounds)
 
