@@ -189,9 +189,9 @@ class VehicleCounter:
         """Add the tracks of the next frame."""
         self._now = round(frame.time, 6)  # as files hold it
         self._first = min(self._first, self._now)
-        for vehicle in list(self._vehicles.values()):
-            if self._now - vehicle.shown > REMEMBERED:
-                self._close(vehicle)
+        oldest = self._now - REMEMBERED
+        for vehicle in [each for each in self._vehicles.values() if each.shown < oldest]:
+            self._close(vehicle)
         ended = None
         shown = {track.id for track in frame.tracks}
         if not shown <= self._vehicles.keys():
