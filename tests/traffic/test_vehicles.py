@@ -92,7 +92,7 @@ class TestNewIds:
         there = [(number, 30.0 + 40 * number) for number in range(30)]
         video = [
             FrameTracks(n, n / 25, tuple(track((x, y), first + number) for number, x in there))
-            for n, (y, first) in enumerate([(395.0, 0)] * 5 + [(440.0, 100)] * 5)
+            for n, (y, first) in enumerate([(395.0, 0)] * 5 + [(425.0, 100)] * 5)
         ]
         line = LineSettings(name="line", start=(0, 418), end=(1280, 418))
         assert [event.id for event in events(video, line)] == [100 + n for n, _ in there]

@@ -40,6 +40,8 @@ _JUDGED = 1.0
 """Seconds after which that is clear."""
 _TURNED, _OPPOSITE = 0.15, 0.3
 """Way back after which it is another one: in heights of its box, and as a share of all its way."""
+_REACH = 0.5
+"""Farthest that the next track begins from where the last one ended or would be, in heights."""
 _MOST_GROWTH = 2.0
 """Largest ratio of the heights of the last box of a track and the first one of the next."""
 
@@ -135,14 +137,14 @@ class _Ended:
 
     def take(self, sighting: Sighting) -> _Vehicle | None:
         """Return the nearest vehicle that goes on at a place, each only once; None if none does."""
-        reach = 1 + _MOST_GROWTH * sighting.height
+        reach = 1 + _REACH * _MOST_GROWTH * sighting.height
         first, last = np.searchsorted(
             self._places[:, 0], sighting.point[0] + np.array([-reach, reach])
         )
         heights = self._heights[first:last]
         larger, smaller = np.maximum(heights, sighting.height), np.minimum(heights, sighting.height)
         distances = np.hypot(*(self._places[first:last] - sighting.point).T)
-        fits = np.flatnonzero((larger <= _MOST_GROWTH * smaller) & (distances <= larger))
+        fits = np.flatnonzero((larger <= _MOST_GROWTH * smaller) & (distances <= _REACH * larger))
         near: list[tuple[float, int, int]] = [
             (distances[row], number, first + row)
             for row in fits.tolist()

@@ -25,7 +25,7 @@ def buffers(x: float, y: float) -> Float64Array:
 
 def test_boxes_that_do_not_touch_fit_where_the_motion_is_unknown() -> None:
     assert buffered_iou(EXPECTED, buffers(0.05, 0.05), BESIDE)[0, 0] == 0
-    assert buffered_iou(EXPECTED, buffers(0.5, 0.1), BESIDE)[0, 0] == pytest.approx(90 / 310)
+    assert buffered_iou(EXPECTED, buffers(0.5, 0.1), BESIDE)[0, 0] == pytest.approx(40 / 260)
 
 
 # Pairs
@@ -64,7 +64,7 @@ def moved(dx: float, dy: float = 0) -> Float64Array:
 
 
 def test_a_newly_confirmed_vehicle_near_a_lost_one_takes_its_id() -> None:
-    lost, new = vehicle(number=7, unseen=1.2), vehicle(moved(110))
+    lost, new = vehicle(number=7, unseen=1.2), vehicle(moved(70))
     assert take_over_ids([lost, new]) == [new]
     assert new.id == 7
 
@@ -103,8 +103,8 @@ def test_others_do_not(new: Vehicle) -> None:
 
 
 def test_of_two_lost_vehicles_the_nearest_is_taken_and_only_by_one() -> None:
-    lost = [vehicle(moved(-60), number=7, unseen=0.4), vehicle(moved(20), number=8, unseen=0.4)]
-    new = [vehicle(), vehicle(moved(0, 60))]
+    lost = [vehicle(moved(-30), number=7, unseen=0.4), vehicle(moved(20), number=8, unseen=0.4)]
+    new = [vehicle(), vehicle(moved(0, 40))]
     assert take_over_ids([*lost, *new]) == new
     assert [each.id for each in new] == [8, 7]
 

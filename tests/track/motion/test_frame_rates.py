@@ -46,7 +46,7 @@ def test_a_lost_vehicle_is_shown_for_the_same_time(rate: int) -> None:
 
 @every_rate
 def test_a_lost_vehicle_keeps_its_id_for_the_same_time(rate: int) -> None:
-    for missed, id_ in ((0.8, 1), (1.3, 2)):
+    for missed, id_ in ((0.6, 1), (1.3, 2)):
         gap: list[list[Box]] = [[]] * round(missed * rate)
         shown = follow([*[[CAR]] * rate, *gap, *[[CAR]] * rate], rate)
         assert ids(shown[-1:]) == {id_}

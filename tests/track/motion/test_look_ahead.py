@@ -59,8 +59,8 @@ def test_between_two_searches_a_vehicle_is_on_its_way_from_one_to_the_other() ->
         assert track.box.iou(place) > 0.92
 
 
-@pytest.mark.parametrize(("missed", "state"), [(AHEAD - 2, "between"), (AHEAD + 3, "")])
-def test_a_gap_is_bridged_if_it_is_not_longer_than_the_look_ahead(missed: int, state: str) -> None:
+@pytest.mark.parametrize(("missed", "state"), [(AHEAD - 4, "between"), (AHEAD + 3, "")])
+def test_a_gap_is_bridged_if_the_look_ahead_shows_that_it_ends(missed: int, state: str) -> None:
     places = moving(CAR, dx=4, frames=80)
     clip = [[] if 30 <= n < 30 + missed else [place] for n, place in enumerate(places)]
     shown = shown_later(clip)

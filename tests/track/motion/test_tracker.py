@@ -87,15 +87,15 @@ def test_through_missed_frames_a_vehicle_is_shown_where_its_motion_leads() -> No
 
 def test_after_that_it_is_not_shown_but_keeps_its_id() -> None:
     gone = CARRIED + 5
-    shown = follow([*[[CAR]] * 20, *[[]] * gone, *[[CAR]] * 5])
+    shown = follow([*[[CAR]] * 20, *[[]] * gone, *[[CAR]] * 8])
     assert [len(tracks) for tracks in shown[20 : 20 + gone]] == [1] * CARRIED + [0] * 5
-    assert [id_at(tracks, CAR) for tracks in shown[-5:]] == [1] * 5
+    assert [id_at(tracks, CAR) for tracks in shown[-5:]] == [1] * 5  # once it is sure again
 
 
 def test_weak_detections_do_not_re_identify_a_lost_vehicle() -> None:
-    faint = [(place, FAINT) for place in moving(CAR, dx=6, frames=15)]
+    faint = [(place, FAINT) for place in moving(CAR, dx=6, frames=10)]
     missed: list[list[Box]] = [[]] * (CARRIED + 1)
-    shown = follow([*[[CAR]] * 20, *missed, *[[place] for place in faint], *[[CAR]] * 5])
+    shown = follow([*[[CAR]] * 20, *missed, *[[place] for place in faint], *[[CAR]] * 8])
     assert [id_at(tracks, CAR) for tracks in shown[-5:]] == [1] * 5
 
 
@@ -123,7 +123,7 @@ def test_a_vehicle_hidden_by_a_nearer_one_is_not_shown_and_keeps_its_id() -> Non
     car, van_id = id_at(shown[20], CAR), id_at(shown[20], vans[20])
     for n, tracks in enumerate(shown[20:], start=20):
         assert id_at(tracks, vans[n]) == van_id
-        assert hidden[n] or id_at(tracks, CAR) == car
+        assert any(hidden[n - 3 : n + 1]) or id_at(tracks, CAR) == car  # it must be sure again
         assert not hidden[n] or [track.id for track in tracks] == [van_id]
 
 

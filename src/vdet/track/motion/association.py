@@ -15,23 +15,29 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vdet.boxes import BoolArray, Float64Array, area, coverage, iou, visible
+from vdet.boxes import BoolArray, Float64Array, coverage, iou, visible
 from vdet.track.motion.appearance import differences
 from vdet.track.motion.assignment import assign
 from vdet.track.motion.vehicle import Vehicle
 
 Pairs = dict[int, int]
 
-WIDEST_BUFFER = 0.5
+WIDEST_BUFFER = 0.25
 """Most that a box is widened by on each side, shares of its size."""
 
-_REACH = 1.5
-"""How far from its expected place a lost vehicle may turn up, in sizes of the vehicle."""
+_REACH = 0.75
+_REACH_GROWTH = 0.35
+"""How far from its expected place a lost vehicle may turn up, in sizes of the vehicle, and how much
+farther for each second that it was hidden.
+"""
 
-_OPPOSED = 0.1
+_NEAR = 1.5
+"""How far from a hidden vehicle another one may be that comes out, in sizes of the vehicle."""
+
+_OPPOSED = 0.25
 """Product of two opposed velocities, in sizes a second, from which on they are of two vehicles."""
 
-MOST_UNLIKE = 1.2
+_MOST_UNLIKE = 1.2
 """Largest difference of the appearances of a lost vehicle and of one that may be it."""
 
 _BESIDE = 0.4
@@ -40,10 +46,8 @@ _BESIDE = 0.4
 A vehicle may drive away from its track while detections of its parts still hold it.
 """
 
-_BESIDE_REACH = 1.0
 _BESIDE_UNLIKE = 0.6
-"""As `_REACH` and `MOST_UNLIKE`, for two tracks that were there at the same time."""
-
+"""As `_MOST_UNLIKE`, for two tracks that were there at the same time."""
 
 _GROWTH = 3.0
 """How much larger or smaller its box may be then, as an area."""
@@ -164,10 +168,14 @@ def pair(values: Float64Array, rounds: Sequence[Sequence[int]]) -> Pairs:
 
 
 def take_over_ids(vehicles: Sequence[Vehicle]) -> list[Vehicle]:
-    """Give the ids of lost vehicles to those newly confirmed near by; return the others.
+    """Give the ids of lost vehicles to those newly confirmed where they should be by then.
 
-    Behind another vehicle a prediction goes astray, and the vehicle that appears beside it is
-    followed as a new one at first.
+    A single detection says too little of what it shows: a vehicle that is found again is followed
+    as a new one at first.
+
+    Returns
+    -------
+    The vehicles without the lost ones that were found.
     """
     left = list(vehicles)
     for new in vehicles:
@@ -175,7 +183,7 @@ def take_over_ids(vehicles: Sequence[Vehicle]) -> list[Vehicle]:
             continue
         lost = [v for v in left if v.confirmed and v.unseen and _may_be(v, new)]
         if lost:
-            nearest = min(lost, key=lambda vehicle: _distance(vehicle, new))
+            nearest = min(lost, key=lambda vehicle: _astray(vehicle, new))
             new.take_over(nearest)
             left.remove(nearest)
     return left
@@ -185,7 +193,8 @@ def without_duplicates(vehicles: Sequence[Vehicle], size: tuple[int, int]) -> li
     """Leave one track for each vehicle: the one with the highest score, or else the oldest one.
 
     It keeps the id that was not lost for longer. A track that is not confirmed replaces no other
-    one; it stays beside it while its score is higher.
+    one; it stays beside it while its score is higher. Of two tracks that were apart before, one
+    follows the vehicle that hides its own: it is lost.
     """
     boxes = visible(np.reshape([vehicle.state.box for vehicle in vehicles], (-1, 4)), size)
     inside = coverage(boxes, boxes)
@@ -203,7 +212,10 @@ def without_duplicates(vehicles: Sequence[Vehicle], size: tuple[int, int]) -> li
             same = vehicles[other]
             is_shown = overlaps[row, other] and same.confirmed and not same.unseen
             if is_shown and _are_same(vehicle, same, boxes[row], boxes[other], hidden):
-                if vehicle.confirmed:
+                if vehicle.confirmed and min(vehicle.age, same.age) > _APART:
+                    max(vehicle, same, key=lambda each: each.since).lose()
+                    kept.append(row)
+                elif vehicle.confirmed:
                     same.merge(vehicle)
                 break
         else:
@@ -234,29 +246,41 @@ def _are_same(
 def _comes_out(vehicle: Vehicle, nearer: Vehicle, hidden: Sequence[Vehicle]) -> bool:
     """Return whether a `hidden` vehicle was near, and this one is as clear as the nearer."""
     is_clear = vehicle.detection_scores.value > CLEAR * nearer.detection_scores.value
-    return is_clear and any(_distance(each, vehicle) < _REACH for each in hidden)
+    here = vehicle.state.mean[:, 0]
+    return is_clear and any(_distance(each.state.mean[:, 0], here) < _NEAR for each in hidden)
 
 
 def _may_be(lost: Vehicle, new: Vehicle) -> bool:
     """Return whether a vehicle that is seen again may be the lost one.
 
-    It is near, looks like it, does not drive the other way, and was not there before.
+    It is where that one should be by then, looks like it, does not drive the other way, and was not
+    there before.
     """
     turned = float(lost.history.last_velocity @ new.history.last_velocity) < -_OPPOSED
     beside = lost.history.last_seen - new.begin
-    reach, unlike = (_REACH, MOST_UNLIKE) if beside < 0 else (_BESIDE_REACH, _BESIDE_UNLIKE)
+    unlike = _MOST_UNLIKE if beside < 0 else _BESIDE_UNLIKE
     return (
         beside < _BESIDE
         and not turned
         and bool(differences(lost.appearance, new.appearance) < unlike)
-        and _distance(lost, new) < reach
+        and _astray(lost, new) < _REACH + _REACH_GROWTH * lost.hidden
     )
 
 
-def _distance(one: Vehicle, other: Vehicle) -> float:
-    """Return the distance of the centres in mean sizes; infinite where the sizes do not agree."""
-    a, b = one.state.box, other.state.box
-    if abs(math.log(area(a) / area(b))) > math.log(_GROWTH):
+def _astray(lost: Vehicle, new: Vehicle) -> float:
+    """Return how far from its expected place a lost vehicle is if it is the new one, in sizes."""
+    return _distance(lost.history.expected(new.history.begin), new.history.first)
+
+
+def _distance(one: Float64Array, other: Float64Array) -> float:
+    """Return the distance of two places in mean sizes; infinite where the sizes do not agree.
+
+    Parameters
+    ----------
+    one, other
+        Centre x and y and log width and height, `(4,)`.
+    """
+    if abs(float(np.sum(one[2:] - other[2:]))) > math.log(_GROWTH):
         return math.inf
-    sizes = a[2:] - a[:2] + b[2:] - b[:2]
-    return math.hypot(*((a[:2] + a[2:] - b[:2] - b[2:]) / sizes))
+    sizes = (np.exp(one[2:]) + np.exp(other[2:])) / 2
+    return math.hypot(*((one[:2] - other[:2]) / sizes))

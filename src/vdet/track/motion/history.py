@@ -80,6 +80,16 @@ class History:
         self._smoothed: list[Float64Array] | None = None
 
     @property
+    def begin(self) -> float:
+        """Time of the earliest moment that is remembered."""
+        return self._moments[0].time
+
+    @property
+    def first(self) -> Float64Array:
+        """Where the vehicle was then: smoothed centre x and y and log width and height, `(4,)`."""
+        return self._means()[0][:, 0]
+
+    @property
     def last_seen(self) -> float:
         """Time of the latest detection."""
         return self._last_detected.time
@@ -89,6 +99,13 @@ class History:
         """Velocity at the latest detection, x and y in sizes of the vehicle a second."""
         mean = self._last_detected.state.mean
         return np.asarray(mean[:2, 1] / np.exp(mean[2:, 0]))
+
+    def expected(self, time: float) -> Float64Array:
+        """Return where the vehicle should be at a time after its latest detection; as `first`."""
+        last = self._last_detected
+        place = last.state.mean[:, 0].copy()
+        place[:2] += last.state.mean[:2, 1] * max(time - last.time, 0.0)
+        return place
 
     @property
     def _last_detected(self) -> Moment:

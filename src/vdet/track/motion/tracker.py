@@ -10,7 +10,6 @@ from vdet.config.schema import MotionTrackerSettings
 from vdet.media import Picture
 from vdet.track.motion.appearance import appearances, differences
 from vdet.track.motion.association import (
-    MOST_UNLIKE,
     are_hidden,
     are_parts,
     buffered_iou,
@@ -24,6 +23,9 @@ from vdet.track.track import Track
 
 FIRST_STEP = 0.04
 """Seconds that the first frame counts for."""
+
+_STAYS = 0.75
+"""Share of the least score from which on a vehicle that was shown before is shown again."""
 
 _OVERLAP = 0.3
 """Least intersection over union of a detection with the expected box of its vehicle."""
@@ -91,7 +93,7 @@ class MotionTracker:
         shown = [
             row
             for row, (_, place) in enumerate(found)
-            if self._is_clear(boxes[row], scores[row][0])
+            if self._is_clear(found[row][0], boxes[row], scores[row][0])
             and not (hidden[row] and (place.bridges or place.state == "lost"))
         ]
         nested = are_nested(boxes[shown], [scores[row][1] for row in shown])
@@ -151,28 +153,23 @@ class MotionTracker:
         return [vehicle for vehicle, box in each if _least_side(box) >= 1 and not vehicle.is_over]
 
     def _pair(self, observations: Sequence[Observation]) -> dict[int, int]:
-        """Pair rows of vehicles with numbers of observations; present vehicles choose first."""
+        """Pair rows of vehicles with numbers of observations; present vehicles choose first.
+
+        Lost vehicles are found again by `take_over_ids`.
+        """
         if not (self._vehicles and observations):
             return {}
-        present: list[int] = []
-        lost: list[int] = []
-        new: list[int] = []
-        for row, vehicle in enumerate(self._vehicles):
-            group = present if vehicle.is_present else lost if vehicle.confirmed else new
-            group.append(row)
+        present = [row for row, each in enumerate(self._vehicles) if each.is_present]
+        new = [row for row, each in enumerate(self._vehicles) if not each.confirmed]
         expected = self._boxes()
         boxes = np.reshape([observation.box for observation in observations], (-1, 4))
         buffers = np.reshape([v.state.deviation for v in self._vehicles], (-1, 2))
         values = buffered_iou(expected, buffers, boxes)
         values[values < _OVERLAP] = 0
-        unlike = self._differences(observations)
-        values *= np.exp(-(unlike**2))
-        values[lost] *= unlike[lost] < MOST_UNLIKE
-        weak = [number for number, o in enumerate(observations) if not self._adds_evidence(o)]
-        values[np.ix_(lost, weak)] = 0  # weak detections must not re-identify lost tracks
+        values *= np.exp(-(self._differences(observations) ** 2))
         parts = are_parts(boxes, np.array([observation.score for observation in observations]))
         values[np.ix_(self._hidden(expected), parts)] = 0  # parts of the vehicle that hides it
-        return pair(values, [present, lost, new])
+        return pair(values, [present, new])
 
     def _differences(self, observations: Sequence[Observation]) -> Float64Array:
         """Return how much the appearances of vehicles and observations differ, `(n, m)`."""
@@ -186,10 +183,14 @@ class MotionTracker:
     def _hidden(self, boxes: Float64Array) -> BoolArray:
         return are_hidden(boxes, np.array([each.is_present for each in self._vehicles], bool))
 
-    def _is_clear(self, box: Float64Array, score: float) -> bool:
-        """Return whether a vehicle is wide enough and likely enough to be shown."""
+    def _is_clear(self, vehicle: Vehicle, box: Float64Array, score: float) -> bool:
+        """Return whether a vehicle is wide enough and likely enough to be shown.
+
+        One that was shown before may be a little less likely.
+        """
         is_wide = bool(box[2] - box[0] >= self._settings.smallest * self._size[0])
-        return is_wide and score >= self._settings.least_score
+        least = self._settings.least_score * (1.0 if vehicle.id is None else _STAYS)
+        return is_wide and score >= least
 
     def _track(self, vehicle: Vehicle, place: Place, box: Float64Array, score: float) -> Track:
         vehicle.id = next(self._ids) if vehicle.id is None else vehicle.id

@@ -194,6 +194,11 @@ class Vehicle:
         self.history.add(Moment(look.time, self.state, None, self.state.mean, self._gain))
         self._weigh(0.0, seconds)
 
+    def lose(self) -> None:
+        """Take it for lost: the latest detection shows another vehicle."""
+        self.evidence = 0.0
+        self.unseen = max(self.unseen, self._settings.carried)
+
     def take_over(self, other: "Vehicle") -> None:
         """Go on with the id and the history of another track of the same vehicle."""
         self.id = self.id if other.id is None else other.id
