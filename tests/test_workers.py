@@ -98,15 +98,17 @@ def test_one_local_process_is_another_one_and_does_one_item_at_a_time() -> None:
 def test_what_ended_processes_left_is_removed_without_a_word(tmp_path: Path) -> None:
     (tmp_path / "left").touch()
     code = f"""if True:
-        import contextlib, sys
+        import sys
+        import vdet.cli
         from loky.backend import resource_tracker
         from vdet.process import run
         from vdet.workers import LocalProcesses
-        sys.argv = ["vdet", "config", "--quiet"]
-        with contextlib.suppress(SystemExit):
-            run()
-        assert len(list(LocalProcesses(2).map(abs, [1, 2]))) == 2
-        resource_tracker.register({str(tmp_path / "left")!r}, "file")
+        def work_in_processes():
+            assert len(list(LocalProcesses(2).map(abs, [1, 2]))) == 2
+            resource_tracker.register({str(tmp_path / "left")!r}, "file")
+            sys.exit()
+        vdet.cli.main = work_in_processes
+        run()
     """
     result = subprocess.run(
         [sys.executable, "-c", code], check=True, capture_output=True, text=True
