@@ -142,7 +142,7 @@ class TestWhichForm:
         assert len(read_labelled_pictures(path).pictures) == 2
 
     def test_nothing_known_says_what_was_looked_for(self, tmp_path: Path) -> None:
-        with pytest.raises(TruthError, match=r"pictures: one \.json file \(COCO\), image_2 and"):
+        with pytest.raises(TruthError, match=r"with one \.json file \(COCO\), image_2 and"):
             read_labelled_pictures(tmp_path)
 
     @pytest.mark.parametrize("name", ["none", "labels.txt"])
@@ -167,16 +167,16 @@ class TestCoco:
         return path
 
     @pytest.mark.parametrize("place", ["labels.json", "annotations/labels.json"])
+    @pytest.mark.parametrize("folder", ["val", "images/default"])  # the second is CVAT's
     def test_the_file_may_lie_above_or_beside_the_pictures(
-        self, tmp_path: Path, place: str
+        self, tmp_path: Path, place: str, folder: str
     ) -> None:
-        written = write_coco(tmp_path / "set" / "val", SCENE)
+        written = write_coco(tmp_path / "set" / folder, SCENE)
         path = tmp_path / "set" / place
         path.parent.mkdir(exist_ok=True)
         written.rename(path)
-        assert [each.path.parent.name for each in read_labelled_pictures(path).pictures] == [
-            "val"
-        ] * 2
+        found = {each.path.parent for each in read_labelled_pictures(path).pictures}
+        assert found == {tmp_path / "set" / folder}
         assert len(read_labelled_pictures(tmp_path / "set").pictures) == 2
 
     def test_a_file_may_be_larger_than_what_is_held_of_it(

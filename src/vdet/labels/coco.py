@@ -229,8 +229,8 @@ COCO = Format("COCO", ".coco.json", read_coco, whole=_write)
 def read_coco_pictures(path: Path) -> Iterator[LabelledPicture]:
     """Yield every picture of a COCO file; `iscrowd: 1` marks an ignore region.
 
-    Pictures lie beside the file or in a folder beside it; if the file is in `annotations`, also
-    beside that folder. Only boxes and categories are used.
+    Pictures lie beside the file or at most two folders below, as in `images/default` of CVAT; if
+    the file is in `annotations`, beside or below that folder. Only boxes and categories are used.
 
     Raises
     ------
@@ -255,9 +255,10 @@ def _picture_folder(path: Path, names: Sequence[str]) -> Path:
     near = path.parent
     if not names or (near / names[0]).is_file():
         return near
-    above = [near, near.parent] if near.name == _ANNOTATIONS else [near]
-    below = (each for folder in above for each in sorted(folder.iterdir()) if each.is_dir())
-    found = [folder for folder in (*above, *below) if (folder / names[0]).is_file()]
+    above = near.parent if near.name == _ANNOTATIONS else near
+    levels = (above,), sorted(above.glob("*/")), sorted(above.glob("*/*/"))
+    holding = ([each for each in level if (each / names[0]).is_file()] for level in levels)
+    found = next(filter(None, holding), [])
     if len(found) != 1:
         which = " and ".join(str(folder) for folder in found[:2])
         what = f"lies in {which}" if found else "is missing: it should lie beside it or below"

@@ -130,4 +130,5 @@ def _pictures(path: Path) -> Iterable[LabelledPicture]:
         names = ", ".join(str(file.relative_to(path)) for file in files[:5])
         raise TruthError(f"{path}: holds several .json files ({names}); give the one with labels")
     wanted = ", ".join(f"{' and '.join(form.folders)} ({form.name})" for form in forms)
-    raise TruthError(f"{path}: is no set of labelled pictures: one .json file (COCO), {wanted}")
+    what = "is no set of labelled pictures: a folder with one .json file (COCO)"
+    raise TruthError(f"{path}: {what}, {wanted}")
