@@ -52,7 +52,12 @@ def read_predictions(path: Path) -> LabelledVideo:
 
 
 def read_truth(path: Path, roles: Roles = DEFAULT_ROLES) -> LabelledVideo:
-    """Read the truth of a video from any format of tracks.
+    """Read the truth of a video from any format of tracks, as `read_true_labels` does."""
+    return LabelledVideo.of(read_true_labels(path, roles))
+
+
+def read_true_labels(path: Path, roles: Roles) -> tuple[Label, ...]:
+    """Read the vehicles and ignore regions of a video from any format of tracks.
 
     Boxes without a label are vehicles. In MOTChallenge flag 0 marks an ignore region, also in the
     older form with ten columns.
@@ -75,7 +80,7 @@ def read_truth(path: Path, roles: Roles = DEFAULT_ROLES) -> LabelledVideo:
     labels: Iterable[Label] = form.read(path, data).labels
     if form is MOT:  # in the older form, the column of the score is the flag
         labels = (each._replace(ignored=each.score == 0 or each.ignored) for each in labels)
-    return LabelledVideo.of(checked_labels(path, _with_roles(path, labels, roles)))
+    return checked_labels(path, _with_roles(path, labels, roles))
 
 
 def _with_roles(path: Path, labels: Iterable[Label], roles: Roles) -> Iterator[Label]:

@@ -1,6 +1,7 @@
 """Labelled pictures and videos in memory, from which the training draws."""
 
 import hashlib
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,9 +9,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from vdet.boxes import BoolArray, Float32Array, Float64Array, Image, Int64Array
+from vdet.boxes import BoolArray, Float32Array, Image, Int64Array
 from vdet.config.schema import Settings
-from vdet.labels.reading import read_labelled_pictures, read_truth
+from vdet.detect.classes import our_name
+from vdet.labels.label import Label
+from vdet.labels.pictures import LabelledPicture
+from vdet.labels.reading import read_labelled_pictures, read_true_labels
 from vdet.labels.roles import Roles
 from vdet.media.reader import VideoReader
 
@@ -98,14 +102,12 @@ def image_source(path: Path, settings: Settings) -> NetSource:
         A picture cannot be read.
     """
     labelled = read_labelled_pictures(path, Roles.from_settings(settings))
-    samples = [
-        _sample(each.read(), each.boxes, each.classes, each.ignored) for each in labelled.pictures
-    ]
+    samples = [_sample(each.read(), each) for each in labelled.pictures]
     return NetSource(Path(labelled.name).resolve().name, samples)
 
 
 def clip_source(video: Path, truth_file: Path, settings: Settings) -> NetSource:
-    """Read every `EVERY`-th frame of a labelled video into memory; all its vehicles are cars.
+    """Read every `EVERY`-th frame of a labelled video into memory; vehicles without label are cars.
 
     `settings` has the roles of labels, and how much damage is tolerated.
 
@@ -116,22 +118,24 @@ def clip_source(video: Path, truth_file: Path, settings: Settings) -> NetSource:
     VideoError
         The video cannot be read, or is too damaged.
     """
-    truth = read_truth(truth_file, Roles.from_settings(settings))
+    frames: dict[int, list[Label]] = defaultdict(list)
+    for label in read_true_labels(truth_file, Roles.from_settings(settings)):
+        name = our_name(label.name or "car") or "vehicle"
+        frames[label.frame].append(label._replace(name=name))
     samples = []
-    with VideoReader(video, frames=truth.last_frame, settings=settings.input) as reader:
+    with VideoReader(video, frames=max(frames, default=0), settings=settings.input) as reader:
         for number, frame in enumerate(reader, start=1):
             if number % EVERY == 0:
-                rows = truth.frame(number)
-                samples.append(_sample(frame.image, rows.boxes, ["car"] * len(rows), rows.ignored))
+                labelled = LabelledPicture(video, truth_file, tuple(frames[number]))
+                samples.append(_sample(frame.image, labelled))
     return NetSource(video.name, samples)
 
 
-def _sample(
-    image: Image, boxes: Float64Array, names: Sequence[str], ignored: BoolArray
-) -> NetSample:
+def _sample(image: Image, labelled: LabelledPicture) -> NetSample:
+    names, boxes = labelled.classes, labelled.boxes.astype(np.float32)
     classes = [CLASSES.index(name) if name in CLASSES else UNKNOWN for name in names]
-    ignored = ignored | np.array([name not in (*CLASSES, "vehicle") for name in names], np.bool_)
-    return NetSample(image, boxes.astype(np.float32), np.array(classes, np.int64), ignored).shrunk()
+    ignored = labelled.ignored | np.array([n not in (*CLASSES, "vehicle") for n in names], np.bool_)
+    return NetSample(image, boxes, np.array(classes, np.int64), ignored).shrunk()
 
 
 def join(samples: Sequence[NetSample], image: Image) -> NetSample:
