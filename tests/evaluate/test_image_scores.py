@@ -10,8 +10,10 @@ from hypothesis import strategies as st
 
 from vdet.boxes import Boxes
 from vdet.evaluate.images import (
+    ClassScores,
     Counting,
     ImageScores,
+    ImagesResult,
     MeasuredImage,
     MeasuredSet,
     mean_scores,
@@ -106,6 +108,20 @@ class TestSizes:
         assert [size.false_positives for size in sizes] == [0, 0, 1, 0]
         assert [size.recall for size in sizes] == [0, 1, 0, 1]
         assert [size.f1 for size in sizes] == [0, 1, 0, 1]
+
+
+def test_vehicles_are_counted_by_their_class_and_the_class_of_their_detection() -> None:
+    places, true = [at(x) for x in range(0, 800, 200)], ["car", "truck", "truck", "vehicle"]
+    labels = [Label(0, box, name) for box, name in zip(places, true, strict=True)]
+    picture = LabelledPicture(Path("a.png"), Path("a.txt"), tuple(labels))
+    boxes = np.array([*places[:2], places[3], at(900)])
+    found = Boxes(boxes, [0.9] * 4, classes=[0, 0, 1, 1], names=["car", "truck"])
+    measured = score_source(
+        LabelledPictures("set", (picture,)), [MeasuredImage.of(picture, WIDTH, found, PLAIN)]
+    )
+    car, truck = ImagesResult(PLAIN, (measured,), measured.scores).classes()
+    assert car == ClassScores("car", 1, 0.5, 1, 2 / 3, {"car": 1, "truck": 0})
+    assert truck == ClassScores("truck", 2, 0, 0, 0, {"car": 1, "truck": 0})
 
 
 class TestBestF1:

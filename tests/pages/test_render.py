@@ -28,7 +28,7 @@ def html() -> str:
         sources=([NASTY], [[NASTY]]),
         others=[NASTY],
         plot=Plot(NASTY, axis, axis, bars, lines, [(NASTY, "#fff")]),
-        sizes=([NASTY], [[NASTY]]),
+        tables=[([NASTY], [[NASTY]])],
         sheets=[(NASTY, [tile])],
     )
 

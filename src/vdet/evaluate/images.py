@@ -1,6 +1,7 @@
 """Scores of a detector in labelled pictures: at one score, at every score, and by size."""
 
-from collections.abc import Iterable, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Self
 
@@ -8,6 +9,7 @@ import numpy as np
 
 from vdet.boxes import BoolArray, Boxes, Float64Array
 from vdet.config.schema import Settings
+from vdet.detect.classes import OUR_NAMES
 from vdet.detect.protocol import DetectorModel
 from vdet.evaluate.average_precision import RankedPredictions, rank_predictions
 from vdet.evaluate.comparison import Comparison, compare, pool
@@ -53,6 +55,8 @@ class MeasuredImage:
         float64 `(n, 4)`: x1, y1, x2, y2 of the ignore regions.
     every, shown
         The vehicles beside the detections of every score, and beside those that count.
+    named
+        The class of each detection by its id in `shown`; None if it is not known.
     """
 
     picture: LabelledPicture
@@ -60,6 +64,7 @@ class MeasuredImage:
     regions: Float64Array
     every: Comparison
     shown: Comparison
+    named: Sequence[str | None]
 
     @classmethod
     def of(cls, picture: LabelledPicture, width: int, found: Boxes, counting: Counting) -> Self:
@@ -67,12 +72,21 @@ class MeasuredImage:
         least = counting.least_width * width
         regions = picture.ignored | (_widths(picture.boxes) < least)
         truth = _one_frame(picture.boxes, np.ones(len(regions)), regions)
-        best = np.argsort(-found.scores, kind="stable")[:MAX_IN_FRAME]
-        boxes, scores = found.sides[best], found.scores[best]
+        found = found[np.argsort(-found.scores, kind="stable")[:MAX_IN_FRAME]]
+        boxes, scores = found.sides, found.scores
         detected = _one_frame(boxes, scores, _widths(boxes) < least)
         shown = detected.where(scores >= counting.score)
         comparisons = compare(detected, truth), compare(shown, truth)
-        return cls(picture, width, picture.boxes[regions], *comparisons)
+        return cls(picture, width, picture.boxes[regions], *comparisons, found.class_names)
+
+    def class_pairs(self) -> Iterator[tuple[str | None, str | None]]:
+        """Yield the class of each vehicle and of the detection that finds it; None for neither."""
+        for frame in self.shown.frames:
+            true = np.array(self.picture.classes, object)[self.shown.vehicle_ids[frame.vehicles]]
+            named = np.array(self.named, object)[self.shown.track_ids[frame.tracks]]
+            yield from zip(true[frame.rows], named[frame.columns], strict=True)
+            yield from ((name, None) for name in np.delete(true, frame.rows))
+            yield from ((None, name) for name in np.delete(named, frame.columns))
 
 
 def _one_frame(boxes: Float64Array, scores: Float64Array, ignored: BoolArray) -> LabelledVideo:
@@ -134,6 +148,26 @@ class ImageScores:
     sizes: tuple[SizeScores, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class ClassScores:
+    """How well the vehicles of one class are found and named, in the pictures of all sets.
+
+    Attributes
+    ----------
+    precision, recall, f1
+        Of detections that name the class; those that find a vehicle of unknown kind are left out.
+    named
+        The number of vehicles that are found, by the class of their detections.
+    """
+
+    name: str
+    vehicles: int
+    precision: float
+    recall: float
+    f1: float
+    named: dict[str, int]
+
+
 _COUNTS = ("images", "vehicles", "matches", "false_positives")
 _RATIOS = ("precision", "recall", "f1", "mean_iou", "ap50", "ap50_95")
 
@@ -180,6 +214,23 @@ class ImagesResult:
     counting: Counting
     sources: tuple[MeasuredSet, ...]
     mean: ImageScores
+
+    def classes(self) -> Iterator[ClassScores]:
+        """Yield the scores of each class that has vehicles; none if detections have no class."""
+        images = (image for source in self.sources for image in source.images)
+        pairs = Counter(pair for image in images for pair in image.class_pairs())
+        names = [name for name in OUR_NAMES if any(named == name for _, named in pairs)]
+        for name in OUR_NAMES[:-1]:
+            counts = {each: pairs[name, each] for each in names}
+            right, missed = pairs[name, name], pairs[name, None]
+            shown = sum(pairs[true, name] for true in (*OUR_NAMES[:-1], None))
+            if names and (vehicles := missed + sum(counts.values())):
+                ratios = (
+                    ratio(right, shown),
+                    ratio(right, vehicles),
+                    ratio(2 * right, shown + vehicles),
+                )
+                yield ClassScores(name, vehicles, *ratios, counts)
 
 
 def evaluate_images(

@@ -1,13 +1,13 @@
 """The results of an evaluation in pictures: lines of text, values for JSON, and a page."""
 
 from collections.abc import Iterator
-from dataclasses import asdict
+from dataclasses import asdict, astuple
 from typing import Any
 
 from vdet.boxes import Box, Image
 from vdet.errors import counted, printable
 from vdet.evaluate import images
-from vdet.evaluate.output import ABSENT, RunName, Table, score_table, share, table
+from vdet.evaluate.output import ABSENT, RunName, Table, figure, score_table, share, table
 from vdet.evaluate.scores import score_detections
 from vdet.evaluate.tiles import FOUND, IGNORED, TRUE, Tile, draw_tile
 from vdet.pages.charts import SOFT, Line, Plot, color, curve, number_axis
@@ -30,9 +30,10 @@ def lines(result: images.ImagesResult, run: RunName) -> Iterator[str]:
     """Yield the detector, what counted, and the scores of each source."""
     yield from run.lines()
     yield counting_line(result)
-    for headings, rows in (source_table(result), size_table(result)):
-        yield ""
-        yield from table(headings, rows)
+    for headings, rows in (source_table(result), size_table(result), class_table(result)):
+        if rows:
+            yield ""
+            yield from table(headings, rows)
     if others := others_lines(result):
         yield ""
         yield from others
@@ -56,6 +57,15 @@ def size_table(result: images.ImagesResult) -> Table:
     """Return recall and F1 by the width of the vehicles, in the same rows."""
     rows = [[name, *map(_size_cell, scores.sizes)] for name, scores in _named(result)]
     return ("recall / F1 by width", *images.SIZE_NAMES), rows
+
+
+def class_table(result: images.ImagesResult) -> Table:
+    """Return a row for each class: its scores, and the number found by the class given."""
+    headings, rows = ["class", "vehicles", "precision", "recall", "F1"], []
+    for name, *scores, named in map(astuple, result.classes()):
+        headings[5:] = [f"as {each}" for each in named]
+        rows.append([name, *map(figure, (*scores, *named.values()))])
+    return headings, rows
 
 
 def _named(result: images.ImagesResult) -> list[tuple[str, images.ImageScores]]:
@@ -88,7 +98,8 @@ def plain(result: images.ImagesResult, run: RunName) -> dict[str, Any]:
         others = {"not_vehicles": dict(each.labelled.others)}
         sources.append({"source": each.labelled.name, **_plain_scores(each.scores), **others})
     scores = {"mean": _plain_scores(result.mean), "sources": sources}
-    return {**run.values(), **asdict(result.counting), **scores}
+    classes = list(map(asdict, result.classes()))
+    return {**run.values(), **asdict(result.counting), **scores, "classes": classes}
 
 
 def _plain_scores(scores: images.ImageScores) -> dict[str, Any]:
@@ -107,7 +118,7 @@ def images_page(result: images.ImagesResult, run: RunName) -> str:
         sources=(headings, rows),
         others=others_lines(result),
         plot=_f1_plot(result),
-        sizes=size_table(result),
+        tables=[size_table(result), class_table(result)],
         sheets=[(name, tiles) for name, tiles in sheets if tiles],
     )
 
