@@ -2,9 +2,9 @@
 
 Each group of sets is left out of a training in turn, and searched by the network that was trained
 without it. `traffic_cams` is split into fifths of its cameras, `overpass` into its cameras. The
-scores of all groups together give the calibration of the shipped network's scores. The last network
-is trained without the video, and then follows the vehicles in it. Results are kept in the folder
-`--work`; a run that was stopped goes on from there.
+scores of all groups together give the calibration of the shipped network's scores. Networks given
+by `--model` search the same pictures. The last network is trained without the video, and then
+follows the vehicles in it. Results are kept in the folder `--work`; a stopped run goes on there.
 """
 
 import argparse
@@ -12,7 +12,7 @@ import json
 import re
 import zlib
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -22,31 +22,45 @@ from sklearn.linear_model import LogisticRegression
 from vdet.boxes import BoolArray, Float64Array
 from vdet.config.loading import load_settings
 from vdet.config.schema import NetworkSettings, Settings
-from vdet.detect.factory import load_detector
+from vdet.detect.factory import load_detector, trained_on
 from vdet.evaluate.average_precision import rank_predictions
 from vdet.evaluate.comparison import pool
 from vdet.evaluate.images import Counting, ImagesResult, MeasuredSet, evaluate_images
+from vdet.evaluate.output import figure, share, table
 from vdet.evaluate.show_video import result_lines
 from vdet.evaluate.video import Variant, evaluate_clips, open_clip
 from vdet.labels.reading import read_labelled_pictures
 from vdet.learn.net.run import NetworkJob, train_to_file
 from vdet.workers import core_count
 
-GROUPS = (
-    ("idd",),
-    ("cityscapes", "cityscapes_more", "cityscapes_negatives"),
-    ("indonesia_web",),
-    ("uk_residential",),
-    ("us_dashcams", "us_dusk"),
-    ("boston_roof",),
-    *((f"traffic_cams.{fifth}",) for fifth in range(5)),
-    ("overpass.kabul",),
-    ("overpass.y",),
-    ("overpass.night",),
-    ("overpass.dense", "overpass.parking"),
-)
-LEAST_WIDTH = 0.03
-"""Narrower vehicles are ignore regions, share of the picture's width."""
+Group = tuple[str, ...]
+
+KINDS: dict[str, tuple[Group, ...]] = {
+    "windscreens and streets": (
+        ("idd",),
+        ("cityscapes", "cityscapes_more", "cityscapes_negatives"),
+        ("indonesia_web",),
+        ("uk_residential",),
+        ("us_dashcams", "us_dusk"),
+        ("boston_roof",),
+    ),
+    "traffic_cams by fifths": tuple((f"traffic_cams.{fifth}",) for fifth in range(5)),
+    "overpass by camera": (
+        ("overpass.kabul",),
+        ("overpass.y",),
+        ("overpass.night",),
+        ("overpass.dense", "overpass.parking"),
+    ),
+}
+"""The groups of sets that are left out together, by their kind."""
+
+ByKind = Mapping[str, list[ImagesResult]]
+"""The results of all groups, by their kind."""
+
+_NEAR, _FAR = 0.03, 0.02
+"""Narrower vehicles are ignore regions, share of the picture's width: of the first kind, and of
+cameras on poles and bridges.
+"""
 
 _SAME_CAMERA = {
     **dict.fromkeys(("c048", "c064"), "c001"),
@@ -57,6 +71,8 @@ _SAME_CAMERA = {
 
 _LEAST_SCORE = 0.02
 _UNCALIBRATED = ("train.net.score.slope=1", "train.net.score.offset=0")
+_OURS = "trained without them"
+_FROM_RANDOM = "train.net.rate=0.002"  # the default rate is for a training from a base
 
 
 def _fifth(picture: str) -> str:
@@ -112,9 +128,10 @@ def train(job: NetworkJob, settings: Settings) -> Path:
 
 
 def measure(sets: Sequence[Path], network: Path) -> ImagesResult:
-    """Search sets of pictures."""
+    """Search the sets of a group."""
     detector = NetworkSettings(least=_LEAST_SCORE).showing_all()
-    counting = Counting(detector.shown_score, LEAST_WIDTH)
+    is_far = sets[0].name.partition(".")[0] in SPLITS
+    counting = Counting(detector.shown_score, _FAR if is_far else _NEAR)
     labelled = [read_labelled_pictures(path) for path in sets]
     model = load_detector(detector, network)
     return evaluate_images(labelled, model, counting, threads=core_count())
@@ -144,33 +161,46 @@ def main() -> None:
     parser.add_argument("video", type=Path, help="labelled video, in every training")
     parser.add_argument("truth", type=Path, help="its true boxes")
     parser.add_argument("--steps", type=int, default=4000, help="steps of each training")
-    parser.add_argument("--work", type=Path, default=Path("build/leave_one_out"))
+    work = "networks and results; those of other steps and settings need another folder"
+    parser.add_argument("--work", type=Path, default=Path("build/leave_one_out"), help=work)
     parser.add_argument("--base", type=Path, help="network that has seen no group: the start")
+    parser.add_argument("--model", type=Path, action="append", default=[], help="measured too")
+    parser.add_argument(
+        "--set", action="append", default=[], help="setting, as train.net.width=320"
+    )
     arguments = parser.parse_args()
     arguments.work.mkdir(parents=True, exist_ok=True)
-    settings = load_settings(None, [f"train.net.steps={arguments.steps}", *_UNCALIBRATED])
+    rate = [] if arguments.base else [_FROM_RANDOM]
+    changes = [f"train.net.steps={arguments.steps}", *rate, *arguments.set]
+    settings = load_settings(None, [*changes, *_UNCALIBRATED])
     clip = (arguments.video, arguments.truth)
     sets = split_sets(arguments.roads, arguments.work / "sets")
-    results = []
-    for group in GROUPS:
+    results: dict[str, ByKind] = defaultdict(lambda: defaultdict(list))
+    for kind, group in ((kind, group) for kind, groups in KINDS.items() for group in groups):
         left_out = [path for path in sets if path.name in group]
         learnt = tuple(path for path in sets if path.name not in group)
         output = arguments.work / f"without_{group[0]}.onnx"
         job = NetworkJob(learnt, (clip,), output, arguments.base)
-        results.append(measure(left_out, train(job, settings)))
-        print(f"without {', '.join(group)}: {results[-1].mean.best_f1:.3f}", flush=True)
-    summary = summarize(results)
-    print("\n".join(summary.lines()))
+        networks = {_OURS: train(job, settings), **{str(each): each for each in arguments.model}}
+        for name, network in networks.items():
+            result = measure(left_out, network)
+            results[name][kind].append(result)
+            print(f"{', '.join(group)}: best F1 {result.mean.best_f1:.3f} ({name})", flush=True)
+    summaries = {name: summarize(each) for name, each in results.items()}
+    print("\n".join(summary_lines(summaries)))
+    for model in arguments.model:
+        print(f"{model} has seen: {', '.join(trained_on(settings.detector, model)) or 'not known'}")
     path = arguments.work / "results.json"
-    path.write_text(json.dumps(asdict(summary), indent=2) + "\n", encoding="utf-8")
+    values = {name: asdict(summary) for name, summary in summaries.items()}
+    path.write_text(json.dumps(values, indent=2) + "\n", encoding="utf-8")
     job = NetworkJob(tuple(sets), (), arguments.work / "without_the_video.onnx", arguments.base)
-    network = train(job, load_settings(None, [f"train.net.steps={arguments.steps}"]))
+    network = train(job, load_settings(None, changes))
     print("\n".join(video_lines(clip, network, settings)))
 
 
 @dataclass(frozen=True, slots=True)
 class SetScores:
-    """Of a set that the network has not seen: F1 at the common score, and at its own best one."""
+    """Of a set: F1 at the common score, and at its own best one."""
 
     name: str
     vehicles: int
@@ -182,40 +212,47 @@ class SetScores:
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """The scores of all sets with vehicles, their means, and the calibration of the scores.
+    """The scores of a network in all sets with vehicles, the means of the kinds, a calibration.
 
     `score` is the score, as the networks give it, at which the mean F1 of the groups is highest.
+    `means` has the mean F1 of the groups of each kind at that score, and at the best of each group.
     """
 
     sets: tuple[SetScores, ...]
     score: float
-    mean_f1: float
-    mean_best_f1: float
+    means: dict[str, tuple[float, float]]
     slope: float
     offset: float
 
-    def lines(self) -> Iterator[str]:
-        """Yield the summary as lines of text."""
-        for each in self.sets:
-            yield (
-                f"{each.name:<20} {each.vehicles:5d} vehicles  F1 {each.f1:.3f}  "
-                f"best {each.best_f1:.3f} at {each.best_score:.2f}  AP50 {each.ap50:.3f}"
-            )
-        yield (
-            f"mean F1 of the groups {self.mean_f1:.3f} at score {self.score:.2f}; "
-            f"each at its best score {self.mean_best_f1:.3f}"
-        )
-        yield f"train.net.score.slope={self.slope:.3f} train.net.score.offset={self.offset:.3f}"
+
+def summary_lines(summaries: Mapping[str, Summary]) -> Iterator[str]:
+    """Yield a table of the sets that were left out, and the calibration, as lines of text."""
+    ours, *others = summaries.values()
+    names = [Path(name).name for name in summaries][1:]
+    headings = ("left out", "vehicles", "F1", "best F1", "at score", "AP50", *names)
+    rows = []
+    for each, *more in zip(ours.sets, *(other.sets for other in others), strict=True):
+        ratios = each.f1, each.best_f1, each.best_score, each.ap50, *(one.best_f1 for one in more)
+        rows.append([each.name, str(each.vehicles), *map(figure, ratios)])
+    for kind, (f1, best) in ours.means.items():
+        theirs = (share(other.means[kind][1]) for other in others)
+        rows.append([f"mean, {kind}", "", share(f1), share(best), "", "", *theirs])
+    yield from table(headings, rows)
+    yield f"F1 is at score {ours.score:.2f} in all sets; of other networks: the best of each set"
+    yield f"train.net.score.slope={ours.slope:.3f} train.net.score.offset={ours.offset:.3f}"
 
 
-def summarize(results: Sequence[ImagesResult]) -> Summary:
+def summarize(by_kind: ByKind) -> Summary:
     """Return the scores at one score for all groups, and fit the calibration to all detections."""
+    results = [result for each in by_kind.values() for result in each]
     sources = [source for result in results for source in result.sources]
     scores = np.unique(np.concatenate([source.curve.scores for source in sources]))
-    means = np.mean([_group_f1(result, scores) for result in results], axis=0)
-    common = scores[np.argmax(means)]
+    common = scores[np.argmax(_mean_f1(results, scores))]
     slope, offset = fit_calibration(*ranked_logits(sources))
-    bests = [result.mean.best_f1 for result in results if result.mean.best_f1 is not None]
+    means = {}
+    for kind, each in by_kind.items():
+        bests = [result.mean.best_f1 for result in each if result.mean.best_f1 is not None]
+        means[kind] = float(_mean_f1(each, common)), float(np.mean(bests))
     return Summary(
         sets=tuple(
             SetScores(
@@ -231,8 +268,7 @@ def summarize(results: Sequence[ImagesResult]) -> Summary:
             if source.scores.vehicles
         ),
         score=float(common),
-        mean_f1=float(means.max()),
-        mean_best_f1=float(np.mean(bests)),
+        means=means,
         slope=slope,
         offset=offset,
     )
@@ -244,10 +280,13 @@ def video_lines(clip: tuple[Path, Path], network: Path, settings: Settings) -> l
     return list(result_lines(evaluate_clips([open_clip(*clip)], [variant])))
 
 
-def _group_f1(result: ImagesResult, scores: Float64Array) -> Float64Array:
-    """Return the mean F1 of the sets with vehicles at each of `scores`."""
-    curves = [source.curve for source in result.sources if source.scores.vehicles]
-    return np.asarray(np.mean([curve.at(scores) for curve in curves], axis=0))
+def _mean_f1(results: Sequence[ImagesResult], scores: Float64Array) -> Float64Array:
+    """Return the mean F1 of groups at each of `scores`; of a group, that of its sets."""
+    groups = []
+    for result in results:
+        curves = [source.curve for source in result.sources if source.scores.vehicles]
+        groups.append(np.mean([curve.at(scores) for curve in curves], axis=0))
+    return np.asarray(np.mean(groups, axis=0))
 
 
 if __name__ == "__main__":
