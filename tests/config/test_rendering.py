@@ -135,8 +135,9 @@ def test_a_config_of_the_linear_model_is_a_part_of_its_settings_printed(name: st
     assert all(line in printed for line in "\n".join(blocks).splitlines())
 
 
-def test_the_config_svm_is_the_linear_model_with_its_defaults() -> None:
-    assert load_settings(CONFIGS / "svm.yaml") == SVM
+def test_the_config_svm_is_the_linear_model_with_a_longer_look_ahead() -> None:
+    tracker = SVM.tracker.model_copy(update={"look_ahead": 0.8})
+    assert load_settings(CONFIGS / "svm.yaml") == SVM.model_copy(update={"tracker": tracker})
 
 
 def test_no_other_config_ships() -> None:

@@ -69,6 +69,16 @@ def test_a_newly_confirmed_vehicle_near_a_lost_one_takes_its_id() -> None:
     assert new.id == 7
 
 
+def test_one_of_which_only_a_part_was_seen_first_is_found_where_it_is_now() -> None:
+    lost, new = vehicle(number=7, unseen=0.4), vehicle(np.array([470.0, 230.0, 500.0, 260.0]))
+    take_over_ids([lost, new])
+    assert new.id is None
+    new.predict(0.04)
+    new.see(Observation(BOX, 1.0), Look(0.04, 0.04, SIZE))
+    take_over_ids([lost, new])
+    assert new.id == 7
+
+
 def driving(made: Vehicle, down: float) -> Vehicle:
     """Let a vehicle be seen once more, so far lower."""
     made.predict(0.04)

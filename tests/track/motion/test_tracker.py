@@ -225,6 +225,15 @@ def test_a_small_vehicle_before_a_large_one_is_not_a_part_of_it() -> None:
 # Ids
 
 
+def test_a_shadow_that_is_taken_for_a_vehicle_keeps_none_that_brakes_over_it() -> None:
+    shadow = (CAR, WEAK)
+    speeds = [8.0] * 32 + [max(8 - 0.8 * n, 1.0) for n in range(58)]
+    lefts = [round(100 + sum(speeds[:n])) for n in range(90)]
+    cars = [moved_to(CAR, left, 400) for left in lefts]
+    shown = follow([car] if abs(car.x1 - CAR.x1) < 60 else [car, shadow] for car in cars)
+    assert id_at(shown[20], cars[20]) == id_at(shown[-1], cars[-1])
+
+
 def test_the_size_of_the_frame_does_not_matter() -> None:
     def doubled(box: Box) -> Box:
         return Box.sized(2 * box.x1, 2 * box.y1, 2 * box.width, 2 * box.height)

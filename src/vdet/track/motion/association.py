@@ -270,11 +270,12 @@ def _may_be(lost: Vehicle, new: Vehicle) -> bool:
 def _astray(lost: Vehicle, new: Vehicle) -> float:
     """Return how far from its expected place a lost vehicle is if it is the new one, in sizes.
 
-    Of one that was hidden, only a part was seen first and last: where it is now counts too.
+    Where it is now counts too if only a part was seen first: of one that was hidden, or where the
+    first box has another size.
     """
     then = _distance(lost.history.expected(new.history.begin), new.history.first)
     now = _distance(lost.state.mean[:, 0], new.state.mean[:, 0])
-    return min(then, now) if lost.hidden else then
+    return min(then, now) if lost.hidden or math.isinf(then) else then
 
 
 def _distance(one: Float64Array, other: Float64Array) -> float:

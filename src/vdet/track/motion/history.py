@@ -18,10 +18,10 @@ from vdet.track.track import State
 SCORE_TIME = 0.5
 """Seconds over which the scores of detections are averaged."""
 
-_ENTRY = 0.25
+_ENTRY = 0.4
 """Seconds before the first detection in which a vehicle is shown that comes into the frame."""
 
-_ENTERING = 0.2
+_ENTERING = 0.1
 """Least speed of a vehicle that comes into the frame, in its sizes a second."""
 
 

@@ -30,6 +30,12 @@ _STAYS = 0.75
 _OVERLAP = 0.3
 """Least intersection over union of a detection with the expected box of its vehicle."""
 
+_UNSURE = 0.2
+"""Share by which a vehicle that scores 0 has less claim to a detection than one that scores 1.
+
+A shadow that is taken for a vehicle does not keep the detections of those that drive over it.
+"""
+
 
 class MotionTracker:
     """The vehicles of one video; make a new one for every video, ids start at 1 in each.
@@ -167,6 +173,8 @@ class MotionTracker:
         values = buffered_iou(expected, buffers, boxes)
         values[values < _OVERLAP] = 0
         values *= np.exp(-(self._differences(observations) ** 2))
+        scores = np.array([[vehicle.detection_scores.value] for vehicle in self._vehicles])
+        values *= 1 - _UNSURE * (1 - scores)
         parts = are_parts(boxes, np.array([observation.score for observation in observations]))
         values[np.ix_(self._hidden(expected), parts)] = 0  # parts of the vehicle that hides it
         return pair(values, [present, new])
