@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from vdet.boxes import Boxes
 from vdet.evaluate.images import (
-    ClassScores,
+    ClassResult,
     Counting,
     ImageScores,
     ImagesResult,
@@ -120,8 +120,8 @@ def test_vehicles_are_counted_by_their_class_and_the_class_of_their_detection() 
         LabelledPictures("set", (picture,)), [MeasuredImage.of(picture, WIDTH, found, PLAIN)]
     )
     car, truck = ImagesResult(PLAIN, (measured,), measured.scores).classes()
-    assert car == ClassScores("car", 1, 0.5, 1, 2 / 3, {"car": 1, "truck": 0})
-    assert truck == ClassScores("truck", 2, 0, 0, 0, {"car": 1, "truck": 0})
+    assert car == ClassResult("car", 1, 0.5, 1, 2 / 3, {"car": 1, "truck": 0})
+    assert truck == ClassResult("truck", 2, 0, 0, 0, {"car": 1, "truck": 0})
 
 
 class TestBestF1:

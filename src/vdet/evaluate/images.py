@@ -149,7 +149,7 @@ class ImageScores:
 
 
 @dataclass(frozen=True, slots=True)
-class ClassScores:
+class ClassResult:
     """How well the vehicles of one class are found and named, in the pictures of all sets.
 
     Attributes
@@ -215,22 +215,23 @@ class ImagesResult:
     sources: tuple[MeasuredSet, ...]
     mean: ImageScores
 
-    def classes(self) -> Iterator[ClassScores]:
+    def classes(self) -> Iterator[ClassResult]:
         """Yield the scores of each class that has vehicles; none if detections have no class."""
         images = (image for source in self.sources for image in source.images)
         pairs = Counter(pair for image in images for pair in image.class_pairs())
         names = [name for name in OUR_NAMES if any(named == name for _, named in pairs)]
-        for name in OUR_NAMES[:-1]:
+        known = OUR_NAMES[:-1]
+        for name in known if names else ():
             counts = {each: pairs[name, each] for each in names}
             right, missed = pairs[name, name], pairs[name, None]
-            shown = sum(pairs[true, name] for true in (*OUR_NAMES[:-1], None))
-            if names and (vehicles := missed + sum(counts.values())):
+            shown = sum(pairs[true, name] for true in (*known, None))
+            if vehicles := missed + sum(counts.values()):
                 ratios = (
                     ratio(right, shown),
                     ratio(right, vehicles),
                     ratio(2 * right, shown + vehicles),
                 )
-                yield ClassScores(name, vehicles, *ratios, counts)
+                yield ClassResult(name, vehicles, *ratios, counts)
 
 
 def evaluate_images(
