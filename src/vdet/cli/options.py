@@ -334,12 +334,14 @@ def as_outputs(wanted: Iterable[Wanted]) -> tuple["Output", ...]:
     return tuple(Output(sink, path) for sink, path in wanted)
 
 
-camera_option = option("--camera FILE", "Undistort with this file, which vdet calibrate wrote.")
+camera_option = option(
+    "--camera FILE", "Correct the lens distortion by this file of vdet calibrate."
+)
 
 
 def lane_options(command: F) -> F:
     """Add `--lanes` and `--camera FILE`, for `read_lanes`."""
-    add_lanes = option("--lanes", "Find the lane too, and draw it into undistorted frames.")
+    add_lanes = option("--lanes", "Find the lane too, and draw it.")
     return add_lanes(camera_option(command))
 
 
@@ -353,6 +355,6 @@ def read_lanes(lanes: bool, camera: Path | None) -> "LaneRequest | None":
     from vdet.lanes.road import LaneRequest
 
     if camera is None:
-        log.warning("--lanes without --camera: pictures are taken as undistorted")
+        log.warning("--lanes without --camera: lens distortion is not corrected")
         return LaneRequest()
     return LaneRequest(load_camera(camera))

@@ -1,4 +1,4 @@
-"""A calibrated camera and its file, and frames and boxes without its lens distortion."""
+"""A calibrated camera and its file; pictures, points and boxes without its lens distortion."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -15,7 +15,6 @@ from vdet.boxes import Box, Float64Array, Image
 from vdet.config.document import read_values
 from vdet.errors import ConfigError
 from vdet.files import write_whole
-from vdet.media import Picture, Planes
 
 _ASPECT_TOLERANCE = 0.005  # accepts 854×480 for 1280×720
 _SIDE_POINTS = np.linspace(0, 1, 16)
@@ -90,17 +89,14 @@ Maps = tuple[cv2.typing.MatLike, cv2.typing.MatLike]
 """Where each pixel comes from, as OpenCV takes it."""
 
 
-def warped(layer: Image, maps: Maps, outside: int = 0, target: Image | None = None) -> Image:
-    """Return a layer of a picture with its pixels moved; it is `outside` beyond its sides.
-
-    The memory of `target` is used where it is given.
-    """
+def warped(layer: Image, maps: Maps, outside: int = 0) -> Image:
+    """Return a layer of a picture with its pixels moved; it is `outside` beyond its sides."""
     border = cv2.BORDER_CONSTANT, (outside,)
-    return np.asarray(cv2.remap(layer, *maps, cv2.INTER_LINEAR, target, *border), np.uint8)
+    return np.asarray(cv2.remap(layer, *maps, cv2.INTER_LINEAR, None, *border), np.uint8)
 
 
 class Undistorter:
-    """Removes the lens distortion of one camera from frames of one size.
+    """Removes the lens distortion of one camera from frames of one size, and adds it.
 
     Focal lengths, principal point and frame size stay the same. Without a camera, nothing changes.
 
@@ -112,40 +108,22 @@ class Undistorter:
 
     def __init__(self, camera: CalibratedCamera | None, width: int, height: int) -> None:
         self._camera = camera
-        self._maps: dict[tuple[int, ...], Maps] = {}
         if camera:
             self._size = width, height
             self._matrix = camera.matrix_for(width, height)
             self._distortion = np.array(camera.distortion)
 
-    def copy(self, picture: Picture, used: Planes | None = None) -> Image | Planes:
-        """Return an undistorted copy of a frame, BGR or planes as it is: see `Planes.copy`.
-
-        It is black outside the camera's view.
-        """
+    def image(self, image: Image) -> Image:
+        """Return an undistorted image; it is black outside the camera's view."""
         if not self._camera:
-            return picture.copy(used)
-        planes = picture.planes
-        if planes is None:
-            return self._undistorted(picture.image, 0)
-        black = 0 if planes.coding.full_range else 16
-        straight = used or Planes.blank(*self._size, planes.coding)
-        for source, target, outside in zip(
-            planes.layers, straight.layers, (black, 128, 128), strict=True
-        ):
-            self._undistorted(source, outside, target)
-        return straight
-
-    def _undistorted(self, image: Image, outside: int, target: Image | None = None) -> Image:
-        """Return an undistorted layer of a frame, which may have another size; or fill `target`."""
-        height, width = size = image.shape[:2]
-        if size not in self._maps:
-            assert self._camera
-            matrix = self._camera.matrix_for(width, height)
-            self._maps[size] = cv2.initUndistortRectifyMap(
-                matrix, self._distortion, np.eye(3), matrix, (width, height), cv2.CV_16SC2
-            )
-        return warped(image, self._maps[size], outside, target)
+            return image.copy()
+        matrix, distortion = self._matrix, self._distortion
+        return warped(
+            image,
+            cv2.initUndistortRectifyMap(
+                matrix, distortion, np.eye(3), matrix, self._size, cv2.CV_16SC2
+            ),
+        )
 
     def points(self, points: Float64Array) -> Float64Array:
         """Return where pixels `(n, 2)` of the frame lie in the undistorted frame, `(n, 2)`."""

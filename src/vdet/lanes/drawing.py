@@ -1,4 +1,4 @@
-"""The lane drawn into undistorted frames, and a picture of every stage of finding it."""
+"""The lane drawn into frames, and a picture of every stage of finding it."""
 
 import cv2
 import numpy as np
@@ -7,7 +7,6 @@ from vdet.boxes import Float64Array, Image
 from vdet.draw.boxes import draw_label, line_width
 from vdet.draw.paint import Color, Surface, draw_lines, shade
 from vdet.lanes.road import Lane, Road
-from vdet.media import Picture
 
 AREA: Color = (80, 200, 60)
 LINE: Color = (40, 60, 255)
@@ -16,7 +15,7 @@ _SCALE = 2  # top views are small, so their pictures are enlarged
 
 
 def draw_lane(surface: Surface, lane: Lane) -> None:
-    """Draw the lane's area and lines into an undistorted frame, and write its numbers."""
+    """Draw the lane's area and lines into a frame, and write its numbers."""
     _draw_area(surface, lane.left, lane.right)
     first, second = lane_text(lane)
     tag = draw_label(surface, first, (0, 0), AREA)
@@ -40,12 +39,12 @@ def stage_pictures(road: Road) -> dict[str, Image]:
     `road` is the undistorted frame with the outline of the top view, `above` the top view, `mask`
     its paint (what vehicles hide is grey), and `fit` the top view with the lane.
     """
-    frame = Picture(road.undistorted()).image
+    frame = road.undistorter.image(road.view.picture.image)
     draw_lines(frame, road.top_view.outline, LINE, line_width(frame), closed=True)
     above, fit = _enlarge(road.view.top), _enlarge(road.view.top)
     if lane := road.lane:
-        lines = (road.top_view.frame_to_top(line) * _SCALE for line in (lane.left, lane.right))
-        _draw_area(fit, *lines)
+        straight = (road.undistorter.points(line) for line in (lane.left, lane.right))
+        _draw_area(fit, *(road.top_view.frame_to_top(line) * _SCALE for line in straight))
     mask = np.asarray(cv2.cvtColor(road.view.mask, cv2.COLOR_GRAY2BGR), np.uint8)
     return {"road": frame, "above": above, "mask": _enlarge(mask), "fit": fit}
 

@@ -1,4 +1,4 @@
-"""The road in the frames of a video: each frame undistorted, its lane, and places on the road.
+"""The road in the frames of a video: its lane, and places on it.
 
 `RoadFinder.observe` does what needs one frame alone. `RoadFinder.update` takes the frames in their
 order: it fits the lane near the last one, or finds a new one, and smooths it over time.
@@ -18,7 +18,7 @@ from vdet.lanes.camera import CalibratedCamera, Maps, Undistorter, warped
 from vdet.lanes.curves import Equations, FrameFit, LaneCurves, add_earlier, fit_near, fit_new, solve
 from vdet.lanes.paint import hide, paint_mask
 from vdet.lanes.top_view import TopView
-from vdet.media import Picture, Planes
+from vdet.media import Picture
 
 CARRY = 12
 """Number of frames for which an unseen line is kept."""
@@ -41,7 +41,7 @@ _LANES = 3
 
 @dataclass(frozen=True, slots=True)
 class LaneRequest:
-    """Ask for lanes; `camera` took the frames, None if they are undistorted already."""
+    """Ask for lanes; `camera` took the frames, None if they have no distortion."""
 
     camera: CalibratedCamera | None = None
 
@@ -50,7 +50,7 @@ class LaneRequest:
 class Lane:
     """The lane that the camera is in: its shape in metres, its two lines in pixels.
 
-    The lines are in the undistorted frame, `(n, 2)` as `x, y`, and begin at the nearest point.
+    The lines are in the frame, `(n, 2)` as `x, y`, and begin at the nearest point.
     """
 
     curvature: float
@@ -138,24 +138,20 @@ class Road:
     """The lines of `lane` on the ground; None if there is no lane."""
     top_view: TopView
     undistorter: Undistorter
-    """Moves boxes and points of the original frame to the undistorted one."""
-
-    def undistorted(self, used: Planes | None = None) -> Image | Planes:
-        """Return an undistorted copy of the frame: BGR or planes, as the frame is."""
-        return self.undistorter.copy(self.view.picture, used)
+    """Moves boxes and points of the frame to the undistorted one."""
 
     def record(self) -> dict[str, Any] | None:
         """Return the lane as plain values for JSON."""
         return self.lane.record() if self.lane else None
 
     def cuts(self, box: Box) -> bool:
-        """Return whether the left, right or lower edge of the original frame cuts its box."""
+        """Return whether the left, right or lower edge of the frame cuts its box."""
         height, width = self.view.picture.height, self.view.picture.width
         beside = box.x1 <= _EDGE * width or box.x2 >= (1 - _EDGE) * width
         return bool(beside or box.y2 >= (1 - _EDGE) * height)
 
     def position(self, foot: tuple[float, float]) -> RoadPosition | None:
-        """Return where on the road a vehicle is that stands at `foot` in the original frame.
+        """Return where on the road a vehicle is that stands at `foot` in the frame.
 
         `foot` is `(x, y)` in pixels; whole numbers are the edges of pixels, as in boxes. None
         without a lane, and where the lane does not reach: see `position_on_road`.
@@ -218,7 +214,7 @@ class RoadFinder:
     def update(self, view: FrameView, vehicles: Iterable[Box] = ()) -> Road:
         """Return the road in the next frame.
 
-        `vehicles` are the boxes of those in it, in the original frame. They hide paint.
+        `vehicles` are the boxes of those in it. They hide paint.
         """
         placed = [self._undistorter.box(box) for box in vehicles]
         view = replace(view, mask=hide(view.mask, self._top_view, placed))
@@ -240,7 +236,8 @@ class RoadFinder:
         curves, curvature = state.curves, state.curvature
         far, near = self._top_view.distances[[0, -1]]
         z = np.geomspace(near, far, _LINE_POINTS)
-        left, right = (self._top_view.ground_to_frame(x, z) for x in curves.at(z))
+        lines = (self._top_view.ground_to_frame(x, z) for x in curves.at(z))
+        left, right = (self._undistorter.distorted(line) for line in lines)
         radius = None if abs(curvature) * _STRAIGHT < 1 else 1 / abs(curvature)
         offset = -(curves.left + curves.right) / 2
         return Lane(curvature, radius, offset, curves.width, left, right)

@@ -28,7 +28,7 @@ class FrameResult:
     detections, tracks
         In pixels of that frame.
     road
-        The lane, and the undistorted frame; None if lanes are not looked for.
+        The lane; None if lanes are not looked for.
     searched
         Whether the detector searched the frame: see `detector.stride`. Where it did not, there are
         no detections.

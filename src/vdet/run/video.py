@@ -54,7 +54,7 @@ class VideoJob:
         Time of the stage pictures, seconds from the first frame. If no output needs more, only the
         frames from 2 s before it are processed.
     lanes
-        If given, the lane is found too, and everything is drawn on undistorted frames.
+        If given, the lane is found too.
     ground
         If given, the speeds of the vehicles are measured.
     inputs

@@ -1,7 +1,6 @@
 """The sinks that write data: `tracks`, `json`, `vehicles`, `counts` and `flows`.
 
-Times are in seconds and those of the input. Pixels are those of the input frame, counted from 0,
-even where the frame is drawn undistorted, so boxes can be compared with labels of the input.
+Times are in seconds and those of the input. Pixels are those of the input frame, counted from 0.
 """
 
 import json
@@ -32,7 +31,7 @@ class TrackSink(BaseSink):
     `.jsonl`, frame by frame. In `.jsonl` a frame has `lane` if the lane is looked for: null if none
     is shown, else an object with `radius` (metres, null on a straight road), `offset` (of the
     camera from the middle of the lane, metres, positive to the right), `width` (metres), `left` and
-    `right`: each line as `[[x, y], …]`, pixels of the undistorted frame, the nearest point first.
+    `right`: each line as `[[x, y], …]`, pixels of the frame, the nearest point first.
     """
 
     _file: BinaryIO | None = None

@@ -2,12 +2,9 @@
 
 import zlib
 from collections.abc import Sequence
-from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
-
-import numpy as np
 
 from vdet.config.schema import Settings
 from vdet.detect.classes import OUR_NAMES
@@ -24,7 +21,6 @@ from vdet.run.threads import write_async
 from vdet.track.track import Track
 
 if TYPE_CHECKING:
-    from vdet.lanes.road import Road
     from vdet.traffic.counter import VehicleCounter
 
 PICTURE_LABEL = ("score",)
@@ -52,19 +48,15 @@ class Overlay:
         """Return a copy of the frame with its vehicles: BGR or planes, as the frame came.
 
         The memory of `used` is taken.
-
-        If lanes are searched for, it is a copy of the undistorted frame with the lane, and vehicles
-        are drawn where they lie in it.
         """
-        road = result.road
-        surface = road.undistorted(used) if road else result.frame.picture.copy(used)
-        if road and road.lane:
+        surface = result.frame.picture.copy(used)
+        if result.road and result.road.lane:
             from vdet.lanes.drawing import draw_lane
 
-            draw_lane(surface, road.lane)
-        shown = _placed(self._shown(result), road, surface)
+            draw_lane(surface, result.road.lane)
+        shown = self._shown(result)
         if result.counter and self._settings.counts.drawn:
-            draw_running_counts(surface, result.counter, road)
+            draw_running_counts(surface, result.counter)
         self._draw_trails(surface, shown, float(result.frame.time))
         self._draw_vehicles(surface, shown)
         if self._draw.time and self._start is not None:
@@ -135,41 +127,15 @@ def _class_number(name: str | None) -> int:
     return zlib.crc32(name.encode()) if name else 0
 
 
-def _placed(tracks: Sequence[Track], road: "Road | None", surface: Surface) -> list[Track]:
-    """Return where the vehicles lie in the picture; those outside it are left out."""
-    height, width = surface.shape[:2]
-    placed = []
-    for track in tracks:
-        box = track.box.clipped(width, height)
-        (foot,) = _on_road([track.foot], road)
-        if road:
-            box = road.undistorter.box(box)
-        if box.area:
-            placed.append(replace(track, box=box, whole_foot=foot))
-    return placed
-
-
-def draw_running_counts(surface: Surface, counter: "VehicleCounter", road: "Road | None") -> None:
-    """Draw the lines and zones, and what is counted so far; vehicles are drawn over them.
-
-    In an undistorted picture they lie on the same places of the road.
-    """
+def draw_running_counts(surface: Surface, counter: "VehicleCounter") -> None:
+    """Draw the lines and zones, and what is counted so far; vehicles are drawn over them."""
     for zone in counter.zones:
-        label = f"{zone.name}: {counter.present(zone)}"
-        boxes.draw_zone(surface, _on_road(zone.corners, road), label)
+        boxes.draw_zone(surface, zone.corners, f"{zone.name}: {counter.present(zone)}")
     for line in counter.lines:
         left, right = (
             f"{line.name} {way}: {counter.count(line.name, way)}" for way in line.directions
         )
-        start, end = _on_road((line.start, line.end), road)
-        boxes.draw_line(surface, start, end, (left, right))
-
-
-def _on_road(points: Sequence[Point], road: "Road | None") -> list[Point]:
-    """Return where points of the frame lie in the picture that is drawn into."""
-    if road is None:
-        return list(points)
-    return [(x, y) for x, y in road.undistorter.points(np.array(points, np.float64)).tolist()]
+        boxes.draw_line(surface, line.start, line.end, (left, right))
 
 
 class VideoSink(BaseSink):
