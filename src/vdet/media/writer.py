@@ -152,6 +152,8 @@ def _can_hold(kind: str, path: Path, index: int) -> bool:
 VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv")
 
 _CODEC: Final = "libx264"
+_LARGEST_AT_ONCE = 1920 * 1088
+"""Pixels of the largest frames of which several are encoded at once; that takes more memory."""
 _MARK = "made by vdet"
 _FINEST = 10_000_000  # ticks a second; more is not safe in mp4 players
 _COARSEST = 20_000  # ticks a second; FFmpeg writes no coarser ones into mp4
@@ -318,11 +320,14 @@ class VideoWriter:
         self, info: VideoInfo, settings: OutputSettings, threads: int | None
     ) -> av.VideoStream:
         options = {"preset": settings.preset, "crf": str(settings.crf)}
+        options["x264-params"] = "sync-lookahead=1"  # fewer frames in memory
         stream = self._container.add_stream(_CODEC, rate=info.rate, options=options)
         context = stream.codec_context
         context.width = info.width + info.width % 2
         context.height = info.height + info.height % 2
         context.thread_count = threads or 0
+        is_small = context.width * context.height <= _LARGEST_AT_ONCE
+        context.thread_type = "FRAME" if is_small else "SLICE"
         context.pix_fmt = "yuv420p"
         context.time_base = self._time_base
         context.sample_aspect_ratio = info.pixel_aspect

@@ -104,6 +104,7 @@ def _limited_options() -> Any:
 
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
+    options.enable_mem_pattern = False  # it reserves more than is used
     options.log_severity_level = _SILENT
     options.add_session_config_entry("session.use_env_allocators", "1")
     cpu = onnxruntime.OrtMemoryInfo(
