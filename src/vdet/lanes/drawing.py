@@ -40,11 +40,12 @@ def stage_pictures(road: Road) -> dict[str, Image]:
     its paint (what vehicles hide is grey), and `fit` the top view with the lane.
     """
     frame = road.undistorter.image(road.view.picture.image)
-    draw_lines(frame, road.top_view.outline, LINE, line_width(frame), closed=True)
-    above, fit = _enlarge(road.view.top), _enlarge(road.view.top)
+    above = _enlarge(road.top_view.picture(frame))
+    fit = above.copy()
     if lane := road.lane:
         straight = (road.undistorter.points(line) for line in (lane.left, lane.right))
         _draw_area(fit, *(road.top_view.frame_to_top(line) * _SCALE for line in straight))
+    draw_lines(frame, road.top_view.outline, LINE, line_width(frame), closed=True)
     mask = np.asarray(cv2.cvtColor(road.view.mask, cv2.COLOR_GRAY2BGR), np.uint8)
     return {"road": frame, "above": above, "mask": _enlarge(mask), "fit": fit}
 

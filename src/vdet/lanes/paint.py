@@ -48,22 +48,24 @@ _RISE, _LEAST_RISE = 0.10, 10.0
 _LEAST_RISES = np.maximum(np.arange(256) * np.float32(_RISE), _LEAST_RISE).astype(np.uint8)
 """The least rise in whole values, by the lightness of the road."""
 _YELLOW = 9.0
-"""Least rise in b of CIELAB from the road to yellow paint, of 0 to 255."""
+"""Least fall in blue chroma from the road to yellow paint, of 0 to 255."""
 _BASE = 15.0
 """Length of the nearest part of the road, which the histogram covers, metres."""
 _WINDOW = 3.0
 """Length of a sliding window, metres."""
 
 
-def paint_mask(top: Image) -> Image:
+def paint_mask(luma: Image, blue: Image) -> Image:
     """Return 255 for paint and 0 for the rest, uint8 `(rows, columns)`.
 
-    `top` is the road from above, BGR uint8 `(rows, columns, 3)`.
+    `luma` and `blue` chroma are those of the road from above, uint8 `(rows, columns)`, in the
+    common coding.
     """
     width = round(_LINE_WIDTH * ACROSS) | 1  # odd, so that the blur does not shift lines
     reach = round(_REACH * ACROSS)
-    smooth = cv2.blur(cv2.cvtColor(top, cv2.COLOR_BGR2Lab), (width, 3))
-    lightness, yellow = (np.asarray(cv2.extractChannel(smooth, i), np.uint8) for i in (0, 2))
+    lightness, yellow = (
+        np.asarray(cv2.blur(each, (width, 3)), np.uint8) for each in (luma, cv2.bitwise_not(blue))
+    )
     road = _larger_side(lightness, reach)
     rise = cv2.subtract(lightness, road)  # saturates at 0
     tint = cv2.subtract(yellow, _larger_side(yellow, reach))

@@ -19,6 +19,7 @@ from vdet.lanes.curves import Equations, FrameFit, LaneCurves, add_earlier, fit_
 from vdet.lanes.paint import hide, paint_mask
 from vdet.lanes.top_view import TopView
 from vdet.media import Picture
+from vdet.media.images import split_channels
 
 CARRY = 12
 """Number of frames for which an unseen line is kept."""
@@ -120,10 +121,8 @@ class FrameView:
 
     picture: Picture
     """The frame itself."""
-    top: Image
-    """The road from above, BGR uint8 `(rows, columns, 3)`."""
     mask: Image
-    """The paint on it, uint8 `(rows, columns)`: 255 for paint, else 0."""
+    """The paint in the top view, uint8 `(rows, columns)`: 255 for paint, else 0."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,10 +205,11 @@ class RoadFinder:
         if planes := picture.planes:
             luma = warped(planes.luma, of_frame)
             blue, red = (warped(each, of_chroma, outside=128) for each in planes.layers[1:])
-            top = planes.coding.to_bgr((luma, blue, red))
+            luma, blue, _ = planes.coding.to_common((luma, blue, red))
         else:
             top = warped(picture.image, of_frame)
-        return FrameView(picture, top, paint_mask(top))
+            luma, _, blue = split_channels(np.asarray(cv2.cvtColor(top, cv2.COLOR_BGR2YCrCb)))
+        return FrameView(picture, paint_mask(luma, blue))
 
     def update(self, view: FrameView, vehicles: Iterable[Box] = ()) -> Road:
         """Return the road in the next frame.

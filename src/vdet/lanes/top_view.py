@@ -8,7 +8,7 @@ the camera looks along the road and does not roll.
 import cv2
 import numpy as np
 
-from vdet.boxes import Float64Array
+from vdet.boxes import Float64Array, Image
 from vdet.config.schema import LaneSettings
 
 ACROSS = 30.0
@@ -58,6 +58,12 @@ class TopView:
         rows, columns = np.mgrid[: len(self.distances), : len(self.laterals)]
         shown = _transform(self._warp, np.column_stack([columns.ravel(), rows.ravel()]))
         return shown.reshape(*rows.shape, 2)
+
+    def picture(self, frame: Image) -> Image:
+        """Return what it shows of an undistorted frame."""
+        size = len(self.laterals), len(self.distances)
+        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        return np.asarray(cv2.warpPerspective(frame, self._warp, size, flags=flags), np.uint8)
 
     def ground_to_frame(self, x: Float64Array, z: Float64Array) -> Float64Array:
         """Return the pixels `(n, 2)` in the undistorted frame of ground points, metres `(n,)`."""
