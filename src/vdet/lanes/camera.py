@@ -117,13 +117,8 @@ class Undistorter:
         """Return an undistorted image; it is black outside the camera's view."""
         if not self._camera:
             return image.copy()
-        matrix, distortion = self._matrix, self._distortion
-        return warped(
-            image,
-            cv2.initUndistortRectifyMap(
-                matrix, distortion, np.eye(3), matrix, self._size, cv2.CV_16SC2
-            ),
-        )
+        model = self._matrix, self._distortion, np.eye(3), self._matrix
+        return warped(image, cv2.initUndistortRectifyMap(*model, self._size, cv2.CV_16SC2))
 
     def points(self, points: Float64Array) -> Float64Array:
         """Return where pixels `(n, 2)` of the frame lie in the undistorted frame, `(n, 2)`."""
