@@ -107,3 +107,10 @@ def test_a_vehicle_that_drives_evenly_along_the_road_is_predicted_without_lag(sp
 
     state = after([seen(number) for number in range(38)])
     assert state.box == pytest.approx(seen(38), abs=0.05 * (state.box[2] - state.box[0]))
+
+
+def test_what_comes_out_from_behind_another_vehicle_does_not_run_ahead_of_its_box() -> None:
+    """Its box grows faster than it comes nearer, and moves evenly."""
+    seen = [sized(400 - 5 * n, 300 - 0.6 * n, 30 * 1.08**n, 22 * 1.06**n) for n in range(16)]
+    state = after(seen[:-1])
+    assert state.box == pytest.approx(seen[-1], abs=0.12 * (state.box[2] - state.box[0]))

@@ -19,6 +19,9 @@ from vdet.boxes import Float64Array
 _MOST_NEARER = 0.3
 """Largest change of the distance in a step that is believed, as a share of it."""
 
+_MOST_NEARER_RATE = 0.75
+"""The same of a second: what comes out from behind another vehicle seems to come nearer faster."""
+
 BORDER = 0.005
 """A box that ends this near to the frame's side, as a share of the frame, touches it."""
 
@@ -64,7 +67,8 @@ class MotionState:
         with a distance of Z, size and place change by 1 / Z and velocity by 1 / Z².
         """
         step = np.array([[1.0, seconds], [0.0, 1.0]])
-        nearer = float(np.clip(np.mean(self.mean[2:, 1]) * seconds, -_MOST_NEARER, _MOST_NEARER))
+        most = min(_MOST_NEARER, _MOST_NEARER_RATE * seconds)
+        nearer = float(np.clip(np.mean(self.mean[2:, 1]) * seconds, -most, most))
         growth = 1 / (1 - nearer)
         mean = self.mean @ step.T
         mean[:2, 0] += self.mean[:2, 1] * seconds * (growth - 1)
