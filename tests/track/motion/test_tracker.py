@@ -196,6 +196,15 @@ def test_a_vehicle_that_comes_in_at_the_side_is_shown_as_far_as_it_is_seen() -> 
 # One vehicle, one track
 
 
+def test_a_hidden_vehicle_does_not_take_the_detection_of_the_nearer_one() -> None:
+    """Not even where the nearer one could have that of its part instead."""
+    near, part = Box.sized(400, 300, 100, 70), Box.sized(400, 300, 63, 70)
+    far = moved_to(near, 425, 285)
+    shown = follow([[near, far]] * 30 + [[near, part]] * 2)
+    assert shown[-1][0].id == id_at(shown[28][:1], near)
+    assert shown[-1][0].box.iou(near) > 0.95
+
+
 def test_two_boxes_that_overlap_and_stand_level_are_one_vehicle() -> None:
     rear, side = Box.sized(400, 400, 120, 80), Box.sized(470, 398, 130, 84)
     assert ids(follow([[rear, side]] * 30)) == {1}

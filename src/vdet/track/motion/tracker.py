@@ -161,7 +161,8 @@ class MotionTracker:
     def _pair(self, observations: Sequence[Observation]) -> dict[int, int]:
         """Pair rows of vehicles with numbers of observations; present vehicles choose first.
 
-        Lost vehicles are found again by `take_over_ids`.
+        The values are squared: one good pair is worth more than two poor ones. Lost vehicles are
+        found again by `take_over_ids`.
         """
         if not (self._vehicles and observations):
             return {}
@@ -177,7 +178,7 @@ class MotionTracker:
         values *= 1 - _UNSURE * (1 - scores)
         parts = are_parts(boxes, np.array([observation.score for observation in observations]))
         values[np.ix_(self._hidden(expected), parts)] = 0  # parts of the vehicle that hides it
-        return pair(values, [present, new])
+        return pair(values**2, [present, new])
 
     def _differences(self, observations: Sequence[Observation]) -> Float64Array:
         """Return how much the appearances of vehicles and observations differ, `(n, m)`."""
