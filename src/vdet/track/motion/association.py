@@ -93,13 +93,16 @@ def are_hidden(boxes: Float64Array, present: BoolArray) -> BoolArray:
     return np.asarray(hiding.any(axis=1))
 
 
-def is_same(box: Float64Array, other: Float64Array) -> bool:
-    """Return whether two boxes, `(4,)`, show the same vehicle."""
+def is_same(box: Float64Array, other: Float64Array, least: float = _LEVEL_OVERLAP) -> bool:
+    """Return whether two boxes, `(4,)`, show the same vehicle.
+
+    `least` is the share of one that lies in the other, if they are level.
+    """
     one, two = box[np.newaxis], other[np.newaxis]
     height = min(box[3] - box[1], other[3] - other[1])
     is_level = abs(other[3] - box[3]) < _LEVEL * height
     overlap = max(coverage(one, two), coverage(two, one))
-    return bool(iou(box, other) > _ALIKE or (is_level and overlap > _LEVEL_OVERLAP))
+    return bool(iou(box, other) > _ALIKE or (is_level and overlap > least))
 
 
 def are_parts(boxes: Float64Array, scores: Float64Array) -> BoolArray:
@@ -193,8 +196,8 @@ def without_duplicates(vehicles: Sequence[Vehicle], size: tuple[int, int]) -> li
     """Leave one track for each vehicle: the one with the highest score, or else the oldest one.
 
     It keeps the id that was not lost for longer. A track that is not confirmed replaces no other
-    one; it stays beside it while its score is higher. Of two tracks that were apart before, one
-    follows the vehicle that hides its own: it is lost.
+    one; it stays beside it while its score is higher. Of two tracks that were apart before, the
+    weaker one follows the vehicle that hides its own: it is lost.
     """
     boxes = visible(np.reshape([vehicle.state.box for vehicle in vehicles], (-1, 4)), size)
     inside = coverage(boxes, boxes)
@@ -213,7 +216,7 @@ def without_duplicates(vehicles: Sequence[Vehicle], size: tuple[int, int]) -> li
             is_shown = overlaps[row, other] and same.confirmed and not same.unseen
             if is_shown and _are_same(vehicle, same, boxes[row], boxes[other], hidden):
                 if vehicle.confirmed and min(vehicle.age, same.age) > _APART:
-                    max(vehicle, same, key=lambda each: each.since).lose()
+                    vehicle.lose()
                     kept.append(row)
                 elif vehicle.confirmed:
                     same.merge(vehicle)
@@ -232,12 +235,14 @@ def _are_same(
 ) -> bool:
     """Return whether a track shows the same vehicle as another one, higher in rank.
 
-    One that may be a `hidden` vehicle that comes out is no part of the vehicle before it.
+    One that may be a `hidden` vehicle that comes out is no part of the vehicle before it. One
+    that has been followed for a while is the same only if most of one lies in the other.
     """
     is_weaker = vehicle.confirmed or vehicle.scores.value <= other.scores.value
     if min(vehicle.age, other.age) > _APART:
         return bool(iou(box, other_box) > _ALIKE)
-    if is_weaker and is_same(box, other_box):
+    is_known = vehicle.confirmed and max(vehicle.age, other.age) > _APART
+    if is_weaker and is_same(box, other_box, PART if is_known else _LEVEL_OVERLAP):
         return True
     may_be_part = not vehicle.confirmed and is_part(box, other_box)
     return may_be_part and not _comes_out(vehicle, other, hidden)
