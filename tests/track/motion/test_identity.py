@@ -51,6 +51,11 @@ def moving(x: float, y: float, width: float, dx: float, dy: float = 0) -> Callab
     return lambda time: Box.sized(x + dx * time - width / 2, y + dy * time, width, 0.7 * width)
 
 
+def turning_off(time: float) -> Box:
+    """Return the box of a vehicle that drives to the right, and then slowly to the left."""
+    return moving(min(500 + 120 * time, 720 - 50 * time), 400, 100, 0)(time)
+
+
 def picture(vehicles: Sequence[Painted], time: float) -> Picture:
     image = np.full((HEIGHT, WIDTH, 3), (88, 104, 92), np.uint8)
     for vehicle in vehicles:  # the nearest last
@@ -88,6 +93,11 @@ SCENES = {
         Painted(WHITE, moving(640, 300, 100, -60, 60), end=1.0),
         Painted(GREY, moving(760, 420, 110, -40, -60), begin=1.2),
     ),
+    "a car drives away slowly and is lost, and one of its colour comes near there": (
+        Painted(SILVER, moving(640, 400, 100, 0, -40), end=1.0),
+        Painted(SILVER, moving(640, 312, 100, 0, 35), begin=1.4),
+    ),
+    "a car is lost while it turns off": (Painted(SILVER, turning_off, hidden=(1.0, 1.6)),),
     "a red car is lost beside a white one that was not seen before": (
         Painted(RED, moving(500, 400, 90, 40), end=1.4),
         Painted(WHITE, moving(610, 405, 90, 40), begin=1.4),

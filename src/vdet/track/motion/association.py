@@ -34,8 +34,10 @@ farther for each second that it was hidden.
 _NEAR = 1.5
 """How far from a hidden vehicle another one may be that comes out, in sizes of the vehicle."""
 
-_OPPOSED = 0.25
-"""Product of two opposed velocities, in sizes a second, from which on they are of two vehicles."""
+_OPPOSED, _UP_AND_DOWN = 0.5, 0.1
+"""Product of two opposed velocities, in sizes a second, from which on they are of two vehicles, and
+the same of their vertical parts: who turns off changes the way across first, but not up and down.
+"""
 
 _MOST_UNLIKE = 1.2
 """Largest difference of the appearances of a lost vehicle and of one that may be it."""
@@ -261,7 +263,8 @@ def _may_be(lost: Vehicle, new: Vehicle) -> bool:
     It is where that one should be by then, looks like it, does not drive the other way, and was not
     there before.
     """
-    turned = float(lost.history.last_velocity @ new.history.last_velocity) < -_OPPOSED
+    across, down = lost.history.last_velocity * new.history.last_velocity
+    turned = across + down < -_OPPOSED or down < -_UP_AND_DOWN
     beside = lost.history.last_seen - new.begin
     unlike = _MOST_UNLIKE if beside < 0 else _BESIDE_UNLIKE
     return (
