@@ -28,6 +28,12 @@ def test_once_it_is_confirmed_what_it_did_before_counts() -> None:
     assert event.frame == 2
 
 
+def test_what_stays_in_its_place_crosses_no_line() -> None:
+    jitters = [(600.0, 385.0)] * 10 + [(600.0, 415.0)] * 30
+    assert events(feet(*jitters)) == ()
+    assert ways(events(feet(*jitters, *[(600.0, 445.0)] * 10))) == ["here"]
+
+
 class TestNewIds:
     def test_a_new_id_on_the_line_goes_on_with_the_old_one(self) -> None:
         old = frames(through((0, 600, 300), (1.9, 600, 395)), seconds=2)
@@ -92,7 +98,7 @@ class TestNewIds:
         there = [(number, 30.0 + 40 * number) for number in range(30)]
         video = [
             FrameTracks(n, n / 25, tuple(track((x, y), first + number) for number, x in there))
-            for n, (y, first) in enumerate([(395.0, 0)] * 5 + [(425.0, 100)] * 5)
+            for n, (y, first) in enumerate([(395, 0)] * 5 + [(425, 100)] * 5 + [(455, 100)] * 5)
         ]
         line = LineSettings(name="line", start=(0, 418), end=(1280, 418))
         assert [event.id for event in events(video, line)] == [100 + n for n, _ in there]

@@ -44,6 +44,11 @@ _REACH = 0.5
 """Farthest that the next track begins from where the last one ended or would be, in heights."""
 _MOST_GROWTH = 2.0
 """Largest ratio of the heights of the last box of a track and the first one of the next."""
+_MOVED = 0.75
+"""Way from where it was first seen after which a vehicle may cross lines, in heights of its box.
+
+What stays in its place, such as a shadow that is taken for a vehicle, may still jitter over one.
+"""
 
 
 @dataclass(slots=True)
@@ -67,6 +72,7 @@ class _Vehicle:
     looked_at: Point = (0.0, 0.0)
     classes: ClassScores = field(default_factory=ClassScores)
     events: list[Event] = field(default_factory=list)
+    has_moved: bool = False
     back: Sighting | None = None  # the first one after it was out of sight, until it is judged
     before: complex = 0j  # its velocity before that
     again: float = 0.0  # when it came back, once that is judged
@@ -243,6 +249,7 @@ class VehicleCounter:
             vehicle = self._split(vehicle, sighting)
         vehicle.classes.add(track.class_name, track.score)
         vehicle.box, vehicle.shown = box, self._now
+        vehicle.has_moved |= math.dist(point, vehicle.first.point) > _MOVED * height
         band = max(BAND * height, LEAST_BAND * self._size[1])
         if math.dist(point, vehicle.looked_at) + band >= vehicle.clear:
             self._look(vehicle, sighting, band)
@@ -310,10 +317,11 @@ class VehicleCounter:
     def _confirm(self, vehicle: _Vehicle) -> None:
         """Count the vehicle's new events, if it is confirmed."""
         if self._is_confirmed(vehicle):
-            for event in vehicle.events:
+            lines = () if vehicle.has_moved else {line.name for line in self.lines}
+            for event in [each for each in vehicle.events if each.name not in lines]:
                 self._tally[event.name, event.direction] += 1
                 self._counted.append((event, vehicle.classes))
-            vehicle.events.clear()
+                vehicle.events.remove(event)
 
     def _close(self, vehicle: _Vehicle) -> None:
         """End a vehicle that is not shown any more."""
