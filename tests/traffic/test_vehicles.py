@@ -73,7 +73,9 @@ class TestNewIds:
             ("here", 1),
             ("away", 2),
         ]
-        assert [(e.direction, e.vehicle) for e in events(frames(same))] == [("here", 1)]
+        bends = through((0, 400, 380), (2, 600, 380), (3, 620, 390), (4, 590, 430), gone=lost)
+        for path in (same, bends):
+            assert [(e.direction, e.vehicle) for e in events(frames(path))] == [("here", 1)]
 
     def test_stop_and_go_with_a_new_id_every_second(self) -> None:
         """A queue that rocks on the line while the tracker gives it new ids, and then moves on."""

@@ -38,7 +38,7 @@ _OUT_OF_SIGHT = 0.5
 """Seconds that a vehicle is not shown before it is looked at whether it is the same one."""
 _JUDGED = 1.0
 """Seconds after which that is clear."""
-_TURNED, _OPPOSITE = 0.15, 0.3
+_TURNED, _OPPOSITE = 0.15, 0.6
 """Way back after which it is another one: in heights of its box, and as a share of all its way."""
 _REACH = 0.5
 """Farthest that the next track begins from where the last one ended or would be, in heights."""
