@@ -34,6 +34,12 @@ def test_what_stays_in_its_place_crosses_no_line() -> None:
     assert ways(events(feet(*jitters, *[(600.0, 445.0)] * 10))) == ["here"]
 
 
+def test_one_that_is_lost_just_before_a_line_crosses_it_if_it_drives_on() -> None:
+    assert ways(events(frames(through((0, 600, 300), (2, 600, 395))))) == ["here"]
+    assert events(frames(through((0, 600, 300), (1, 600, 390), (2, 600, 395)))) == ()
+    assert events(frames(through((0, 600, 300), (2, 600, 395)), seconds=2)) == ()  # it may go on
+
+
 class TestNewIds:
     def test_a_new_id_on_the_line_goes_on_with_the_old_one(self) -> None:
         old = frames(through((0, 600, 300), (1.9, 600, 395)), seconds=2)
@@ -43,7 +49,7 @@ class TestNewIds:
         assert 1.9 < event.time < 2.1
 
     def test_a_new_id_elsewhere_or_later_is_another_vehicle(self) -> None:
-        old = frames(through((0, 600, 300), (1.9, 600, 395)), seconds=2)
+        old = frames(through((0, 600, 310), (1.9, 600, 385)), seconds=2)
         for new in (
             through((2.1, 800, 405), (4, 800, 500)),
             through((3.5, 600, 405), (6, 600, 500)),

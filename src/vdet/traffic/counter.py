@@ -44,6 +44,8 @@ _REACH = 0.5
 """Farthest that the next track begins from where the last one ended or would be, in heights."""
 _MOST_GROWTH = 2.0
 """Largest ratio of the heights of the last box of a track and the first one of the next."""
+_ONWARD = 0.2, 0.3
+"""Seconds after which a lost vehicle is taken to have driven on; two places settle a crossing."""
 _MOVED = 0.75
 """Way from where it was first seen after which a vehicle may cross lines, in heights of its box.
 
@@ -324,7 +326,11 @@ class VehicleCounter:
                 vehicle.events.remove(event)
 
     def _close(self, vehicle: _Vehicle) -> None:
-        """End a vehicle that is not shown any more."""
+        """End a vehicle that is not shown any more; if it was lost, it drives on for a moment."""
+        last, was_lost = vehicle.last, self._now - vehicle.shown > _GAP
+        for time in (last.time + seconds for seconds in _ONWARD if was_lost):
+            onward = last._replace(time=time, point=vehicle.expected(time))
+            self._look(vehicle, onward, BAND * last.height)
         for state in vehicle.states:
             if (change := state.end(vehicle.last)) is not None:
                 self._note(vehicle, state, change)
