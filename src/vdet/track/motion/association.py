@@ -34,7 +34,7 @@ farther for each second that it was hidden.
 _NEAR = 1.5
 """How far from a hidden vehicle another one may be that comes out, in sizes of the vehicle."""
 
-_OPPOSED, _UP_AND_DOWN = 0.5, 0.1
+_OPPOSED, _UP_AND_DOWN = 0.55, 0.1
 """Product of two opposed velocities, in sizes a second, from which on they are of two vehicles, and
 the same of their vertical parts: who turns off changes the way across first, but not up and down.
 """
