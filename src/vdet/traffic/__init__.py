@@ -14,14 +14,13 @@ The counts of a video follow from its tracks alone (`FrameTracks`), live or from
 5. A way back counts only one height of the box away from the line, or where it meets the line one
    height or more from where the vehicle crossed before.
 6. Vehicles that are seen for less than `counts.confirmed` do not count. Once a vehicle is
-   confirmed, its earlier events count too. Until it has moved by three quarters of the height of
-   its box, it crosses no line.
+   confirmed, its earlier events count too.
 7. The class of a vehicle is that with the highest sum of scores over all its frames.
 8. A vehicle that is first seen within a second after another was last seen, and near the place
    where that one was or would be, is taken for the same vehicle: its tracks have one number. A
    vehicle that moves out at the edge of the frame has no such successor. A track that was not
-   shown for half a second and then drives the other way goes on as another vehicle. One that is
-   lost and has no successor drives on for 0.3 seconds.
+   shown for half a second and then drives the other way goes on as another vehicle. One that
+   has moved, is lost and has no successor drives on for 0.3 seconds.
 9. Only events are stored. All totals, flows and stays follow from them.
 
 `borders` places lines and zones in a frame and holds what a vehicle does at one of them, `counter`

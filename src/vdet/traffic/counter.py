@@ -46,11 +46,6 @@ _MOST_GROWTH = 2.0
 """Largest ratio of the heights of the last box of a track and the first one of the next."""
 _ONWARD = 0.2, 0.3
 """Seconds after which a lost vehicle is taken to have driven on; two places settle a crossing."""
-_MOVED = 0.75
-"""Way from where it was first seen after which a vehicle may cross lines, in heights of its box.
-
-What stays in its place, such as a shadow that is taken for a vehicle, may still jitter over one.
-"""
 
 
 @dataclass(slots=True)
@@ -74,7 +69,6 @@ class _Vehicle:
     looked_at: Point = (0.0, 0.0)
     classes: ClassScores = field(default_factory=ClassScores)
     events: list[Event] = field(default_factory=list)
-    has_moved: bool = False
     back: Sighting | None = None  # the first one after it was out of sight, until it is judged
     before: complex = 0j  # its velocity before that
     again: float = 0.0  # when it came back, once that is judged
@@ -251,7 +245,6 @@ class VehicleCounter:
             vehicle = self._split(vehicle, sighting)
         vehicle.classes.add(track.class_name, track.score)
         vehicle.box, vehicle.shown = box, self._now
-        vehicle.has_moved |= math.dist(point, vehicle.first.point) > _MOVED * height
         band = max(BAND * height, LEAST_BAND * self._size[1])
         if math.dist(point, vehicle.looked_at) + band >= vehicle.clear:
             self._look(vehicle, sighting, band)
@@ -319,16 +312,16 @@ class VehicleCounter:
     def _confirm(self, vehicle: _Vehicle) -> None:
         """Count the vehicle's new events, if it is confirmed."""
         if self._is_confirmed(vehicle):
-            lines = () if vehicle.has_moved else {line.name for line in self.lines}
-            for event in [each for each in vehicle.events if each.name not in lines]:
+            for event in vehicle.events:
                 self._tally[event.name, event.direction] += 1
                 self._counted.append((event, vehicle.classes))
-                vehicle.events.remove(event)
+            vehicle.events.clear()
 
     def _close(self, vehicle: _Vehicle) -> None:
         """End a vehicle that is not shown any more; if it was lost, it drives on for a moment."""
         last, was_lost = vehicle.last, self._now - vehicle.shown > _GAP
-        for time in (last.time + seconds for seconds in _ONWARD if was_lost):
+        has_moved = math.dist(last.point, vehicle.first.point) > last.height
+        for time in (last.time + seconds for seconds in _ONWARD if was_lost and has_moved):
             onward = last._replace(time=time, point=vehicle.expected(time))
             self._look(vehicle, onward, BAND * last.height)
         for state in vehicle.states:
