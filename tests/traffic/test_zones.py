@@ -32,6 +32,11 @@ def test_one_that_is_first_seen_inside_appears() -> None:
     assert found[1].seconds == pytest.approx(2)
 
 
+def test_one_that_is_lost_just_before_it_enters_and_vanishes() -> None:
+    found = events(frames(through((0, 600, 200), (2, 600, 295))), ZONE)
+    assert [(event.direction, event.seconds) for event in found] == [("enter", None), ("vanish", 0)]
+
+
 def test_a_new_id_inside_goes_on_with_the_stay() -> None:
     old = frames(through((0, 200, 400), (3.9, 590, 400)), seconds=4)
     new = numbered(frames(through((4.1, 610, 400), (8, 1000, 400))), 2)

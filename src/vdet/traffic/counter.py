@@ -320,16 +320,17 @@ class VehicleCounter:
     def _close(self, vehicle: _Vehicle) -> None:
         """End a vehicle that is not shown any more; if it was lost, it drives on for a moment."""
         last, was_lost = vehicle.last, self._now - vehicle.shown > _GAP
-        has_moved = math.dist(last.point, vehicle.first.point) > last.height
-        for time in (last.time + seconds for seconds in _ONWARD if was_lost and has_moved):
-            onward = last._replace(time=time, point=vehicle.expected(time))
-            self._look(vehicle, onward, BAND * last.height)
+        if was_lost and math.dist(last.point, vehicle.first.point) > last.height:
+            for time in (last.time + seconds for seconds in _ONWARD):
+                onward = last._replace(time=time, point=vehicle.expected(time))
+                self._look(vehicle, onward, BAND * last.height)
         for state in vehicle.states:
-            if (change := state.end(vehicle.last)) is not None:
+            if (change := state.end(last)) is not None:
                 self._note(vehicle, state, change)
             if state.entered is not None:
-                stay = vehicle.last.time - state.entered
-                vehicle.add(state.border.name, VANISH, vehicle.last, stay)
+                end = max(last.time, state.entered)  # it may have entered while it drove on
+                stay = end - state.entered
+                vehicle.add(state.border.name, VANISH, last._replace(time=end), stay)
         self._confirm(vehicle)
         self._look_for_misses(vehicle)
         del self._vehicles[vehicle.key]
