@@ -95,7 +95,7 @@ def are_hidden(boxes: Float64Array, present: BoolArray) -> BoolArray:
     return np.asarray(hiding.any(axis=1))
 
 
-def is_same(box: Float64Array, other: Float64Array, least: float = _LEVEL_OVERLAP) -> bool:
+def is_same(box: Float64Array, other: Float64Array, least: float) -> bool:
     """Return whether two boxes, `(4,)`, show the same vehicle.
 
     `least` is the share of one that lies in the other, if they are level.
