@@ -117,10 +117,11 @@ def test_sliding_windows_follow_a_bend_by_both_lines_or_one(rows: slice) -> None
 
 def test_paint_along_a_line_is_the_middle_of_each_painted_row() -> None:
     line = np.linspace(1.0, 2.0, len(VIEW.distances))
-    paint = paint_along(drawn(line, rows=slice(10, 90)), VIEW, line + 0.1, margin=0.3)
+    [paint] = paint_along(drawn(line, rows=slice(10, 90)), VIEW, [line + 0.1], margin=0.3)
     assert (paint.z == VIEW.distances[10:90]).all()
     assert np.abs(paint.x - line[10:90]).max() < 0.02
-    assert len(paint_along(drawn(line), VIEW, line + 0.5, margin=0.3).z) == 0
+    [none] = paint_along(drawn(line), VIEW, [line + 0.5], margin=0.3)
+    assert len(none.z) == 0
 
 
 def box_from(left: float, right: float, distance: float) -> Box:
@@ -143,7 +144,7 @@ def test_rows_that_are_hidden_in_part_are_left_out() -> None:
     mask = drawn(*constant(-1.85, 1.85))
     # from 20 m on, the box hides the inner half of the right line's paint
     half = hide(mask, VIEW, [box_from(-0.5, 1.85, 20)])
-    hidden, free = (paint_along(half, VIEW, x, 0.2) for x in constant(1.85, -1.85))
+    hidden, free = paint_along(half, VIEW, constant(1.85, -1.85), 0.2)
     assert hidden.z.max() < 20.5
     assert hidden.x == pytest.approx(1.85, abs=0.02)
     assert hidden.visible == pytest.approx(len(hidden.z) / len(mask))

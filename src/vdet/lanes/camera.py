@@ -111,6 +111,7 @@ class Undistorter:
         if camera:
             self._size = width, height
             self._matrix = camera.matrix_for(width, height)
+            self._to_rays = np.linalg.inv(self._matrix)
             self._distortion = np.array(camera.distortion)
 
     def image(self, image: Image) -> Image:
@@ -132,7 +133,7 @@ class Undistorter:
         """Return where pixels `(n, 2)` of the undistorted frame lie in the frame, `(n, 2)`."""
         if not self._camera:
             return points
-        rays = np.column_stack([points, np.ones(len(points))]) @ np.linalg.inv(self._matrix).T
+        rays = np.column_stack([points, np.ones(len(points))]) @ self._to_rays.T
         zero = np.zeros(3)
         moved, _ = cv2.projectPoints(rays, zero, zero, self._matrix, self._distortion)
         return np.asarray(moved, np.float64).reshape(-1, 2)

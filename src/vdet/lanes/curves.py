@@ -41,6 +41,9 @@ _BEND_WEIGHT = (0.1 / 0.001) ** 2
 _PITCH_WEIGHT = (0.1 / 0.003) ** 2
 _WIDTH_WEIGHT = (0.1 / 0.2) ** 2
 _MIN_WEIGHT = 1e-3  # keeps the equations solvable
+_APART = np.array([0, 0, -1, 1, 0])  # the width, from the five parameters
+_PRIOR = np.diag([_BEND_WEIGHT, _MIN_WEIGHT, _MIN_WEIGHT, _MIN_WEIGHT, _PITCH_WEIGHT])
+_PRIOR += _WIDTH_WEIGHT * np.outer(_APART, _APART)
 
 _LEAST_VISIBLE = 0.25
 """Less of a line asks for no less paint: a little paint can be anything."""
@@ -123,11 +126,8 @@ def solve(equations: Equations, width: float) -> LaneCurves:
 
     With little paint, they are straight and level, and the lane is `width` metres wide.
     """
-    apart = np.array([0, 0, -1, 1, 0])
-    prior = np.diag([_BEND_WEIGHT, _MIN_WEIGHT, _MIN_WEIGHT, _MIN_WEIGHT, _PITCH_WEIGHT])
-    prior += _WIDTH_WEIGHT * np.outer(apart, apart)
-    vector = equations[:, -1] + _WIDTH_WEIGHT * width * apart
-    return LaneCurves(*np.linalg.solve(equations[:, :-1] + prior, vector).tolist())
+    vector = equations[:, -1] + _WIDTH_WEIGHT * width * _APART
+    return LaneCurves(*np.linalg.solve(equations[:, :-1] + _PRIOR, vector).tolist())
 
 
 def _rows(
@@ -178,7 +178,7 @@ def _fit(mask: Image, top_view: TopView, positions: LinePositions, guess: LaneCu
     """Fit curves to the paint near `positions`, then twice to the paint close to the last fit."""
     width = guess.width
     for margin in (MARGIN, FINE_MARGIN, FINE_MARGIN):
-        left, right = (paint_along(mask, top_view, x, margin) for x in positions)
+        left, right = paint_along(mask, top_view, positions, margin)
         equations = normal_equations(left, right, guess)
         guess = solve(equations, width)
         positions = guess.at(top_view.distances)

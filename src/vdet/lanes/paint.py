@@ -6,7 +6,7 @@ of a shadow, a kerb or pale concrete only one side is darker. Lightness is compa
 road's own, so a line in a shadow is found too. Yellow paint differs from pale concrete by colour.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -98,25 +98,29 @@ def hide(mask: Image, top_view: TopView, boxes: Iterable[Box]) -> Image:
     return hidden
 
 
-def paint_along(mask: Image, top_view: TopView, x: Float64Array, margin: float) -> LinePaint:
-    """Return the middle of the paint in each row, within `margin` metres of `x` `(rows,)`.
+def paint_along(
+    mask: Image, top_view: TopView, lines: Sequence[Float64Array], margin: float
+) -> list[LinePaint]:
+    """Return the middle of the paint in each row, within `margin` metres of each line.
 
-    A row is left out if a part of it is hidden there: the middle of the rest would be wrong.
+    A line has x of each row, metres `(rows,)`. A row is left out if a part of it is hidden there:
+    the middle of the rest would be wrong.
     """
     half = max(1, round(margin * ACROSS))
     around = np.arange(-half, half + 1)
-    middles = np.clip(np.rint(top_view.columns(x)), -half - 1, mask.shape[1] + half).astype(np.intp)
+    columns = np.rint(top_view.columns(np.stack(lines)))
+    middles = np.clip(columns, -half - 1, mask.shape[1] + half).astype(np.intp)
     padded = cv2.copyMakeBorder(mask, 0, 0, 2 * half + 1, 2 * half + 1, cv2.BORDER_CONSTANT)
-    columns = (middles + 2 * half + 1)[:, None] + around
-    columns += np.arange(len(mask))[:, None] * padded.shape[1]
-    near = np.asarray(padded, np.uint8).ravel()[columns]
-    visible = (near != HIDDEN).all(axis=1)
-    band = near == PAINT
-    counts = np.count_nonzero(band, axis=1) * visible
-    rows = np.flatnonzero(counts)
-    middle = middles[rows] + (band[rows] @ around) / counts[rows]
-    x = top_view.laterals[0] + middle / ACROSS
-    return LinePaint(top_view.distances[rows], x, float(visible.mean()))
+    first = np.arange(len(mask)) * padded.shape[1] + 2 * half + 1
+    near = np.asarray(padded, np.uint8).ravel()[(middles + first)[..., None] + around]
+    visible = (near != HIDDEN).all(axis=2)
+    summed = np.stack([np.ones_like(around), around], axis=1, dtype=np.float32)
+    counts, moments = np.moveaxis((near == PAINT).astype(np.float32) @ summed, 2, 0)
+    x = top_view.laterals[0] + (middles + moments / np.maximum(counts, 1)) / ACROSS
+    return [
+        LinePaint(top_view.distances[rows], of_line[rows], float(seen.mean()))
+        for of_line, rows, seen in zip(x, (counts > 0) & visible, visible, strict=True)
+    ]
 
 
 def find_base(mask: Image, top_view: TopView) -> tuple[float, float] | None:

@@ -191,6 +191,9 @@ class RoadFinder:
         self._undistorter = Undistorter(request.camera, width, height)
         self._top_view = TopView(settings, width, height)
         self._state: _LaneState | None = None
+        far, near = self._top_view.distances[[0, -1]]
+        self._shown = np.geomspace(near, far, _LINE_POINTS)
+        """Distances of the points of a `Lane`, metres."""
         shown = self._top_view.pixels()
         seen = self._undistorter.distorted(shown.reshape(-1, 2)).reshape(shown.shape)
         self._maps: list[Maps] = [
@@ -203,9 +206,9 @@ class RoadFinder:
         """Mark the paint in the top view of a frame, which is made without undistorting it all."""
         of_frame, of_chroma = self._maps
         if planes := picture.planes:
-            luma = warped(planes.luma, of_frame)
-            blue, red = (warped(each, of_chroma, outside=128) for each in planes.layers[1:])
-            luma, blue, _ = planes.coding.to_common((luma, blue, red))
+            luma, blue = warped(planes.luma, of_frame), warped(planes.blue, of_chroma, outside=128)
+            no_red = np.full_like(blue, 128)  # roads and paint have little of it
+            luma, blue, _ = planes.coding.to_common((luma, blue, no_red))
         else:
             top = warped(picture.image, of_frame)
             luma, _, blue = split_channels(np.asarray(cv2.cvtColor(top, cv2.COLOR_BGR2YCrCb)))
@@ -234,10 +237,9 @@ class RoadFinder:
 
     def _lane(self, state: _LaneState) -> Lane:
         curves, curvature = state.curves, state.curvature
-        far, near = self._top_view.distances[[0, -1]]
-        z = np.geomspace(near, far, _LINE_POINTS)
-        lines = (self._top_view.ground_to_frame(x, z) for x in curves.at(z))
-        left, right = (self._undistorter.distorted(line) for line in lines)
+        z = self._shown
+        lines = self._top_view.ground_to_frame(np.concatenate(curves.at(z)), np.tile(z, 2))
+        left, right = np.split(self._undistorter.distorted(lines), 2)
         radius = None if abs(curvature) * _STRAIGHT < 1 else 1 / abs(curvature)
         offset = -(curves.left + curves.right) / 2
         return Lane(curvature, radius, offset, curves.width, left, right)

@@ -52,6 +52,7 @@ class TopView:
         x, z = self.laterals[0], self.distances[0]
         self._warp = self._to_frame @ [[1 / ACROSS, 0, x], [0, -1 / ALONG, z], [0, 0, 1]]
         """From `(column, row, 1)` of the top view to pixels of the undistorted frame."""
+        self._to_top = np.asarray(np.linalg.inv(self._warp), np.float64)
 
     def pixels(self) -> Float64Array:
         """Return the pixels of the undistorted frame, `(rows, columns, 2)`, that it shows."""
@@ -80,7 +81,7 @@ class TopView:
 
     def frame_to_top(self, pixels: Float64Array) -> Float64Array:
         """Return where pixels `(n, 2)` of the undistorted frame lie in the top view, `(n, 2)`."""
-        return _transform(np.asarray(np.linalg.inv(self._warp), np.float64), pixels)
+        return _transform(self._to_top, pixels)
 
     def columns(self, x: Float64Array) -> Float64Array:
         """Return the columns of the top view at lateral positions x, metres."""
