@@ -6,7 +6,7 @@ import os
 import re
 import stat
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Set
 from pathlib import Path
 from typing import Any, Self
 
@@ -16,6 +16,9 @@ from vdet.temporary import create_folder, remove_stale, sync, try_to_remove
 _CHUNK = 1_000_000  # bytes
 _ASIDE = ".older"  # folder in a temporary one, for files that are replaced
 
+
+FileId = tuple[int, int]
+"""Device and inode of a file, whatever its names are."""
 
 MayReplace = Callable[[Path], bool]
 """Returns whether an existing file may be replaced, if the user asks for it."""
@@ -51,8 +54,7 @@ def check_output(
         `path` is an input, is a folder, is there already (without `overwrite`) or may not be
         replaced, or its folder cannot be written to.
     """
-    if any(_is_same(path, source) for source in inputs):
-        raise OutputError(f"{path}: is the input itself; give another output")
+    refuse_input(path, file_ids(inputs))
     if path.is_dir():
         raise OutputError(f"{path}: is a folder; give the name of a file")
     if os.path.lexists(path):
@@ -69,12 +71,20 @@ def check_output(
         raise OutputError(f"{path}: the folder {folder} cannot be written to")
 
 
-def _is_same(path: Path, other: Path) -> bool:
-    """Return whether two names lead to one file: the same device and inode."""
-    try:
-        return path.samefile(other)
-    except OSError:  # one of them is not there
-        return False
+def refuse_input(path: Path, inputs: Set[FileId]) -> None:
+    """Raise `OutputError` if an output is one of the inputs."""
+    if file_ids([path]) & inputs:
+        raise OutputError(f"{path}: is the input itself; give another output")
+
+
+def file_ids(paths: Iterable[Path]) -> set[FileId]:
+    """Return the identities of those files that are there."""
+    ids = set()
+    for path in paths:
+        with contextlib.suppress(OSError):
+            status = path.stat()
+            ids.add((status.st_dev, status.st_ino))
+    return ids
 
 
 def _check_replaceable(path: Path, may_replace: MayReplace) -> None:

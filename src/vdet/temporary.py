@@ -48,10 +48,11 @@ def try_to_remove(path: Path) -> None:
 def remove_stale(folder: Path) -> None:
     """Remove the temporary folders in `folder` whose writers have ended."""
     with contextlib.suppress(OSError):
-        for path in folder.iterdir():
-            if _NAME.fullmatch(path.name):
-                with contextlib.suppress(OSError):
-                    _remove_if_stale(path)
+        with os.scandir(folder) as entries:  # there may be thousands: no paths are made of them
+            names = [entry.name for entry in entries if _NAME.fullmatch(entry.name)]
+        for name in names:
+            with contextlib.suppress(OSError):
+                _remove_if_stale(folder / name)
 
 
 def _remove_if_stale(folder: Path) -> None:

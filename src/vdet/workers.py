@@ -105,12 +105,26 @@ def return_freed_memory() -> None:
     It would raise its own limit to 32 MB, and keep frames in the gaps between others. With another
     C library nothing is done.
     """
+    _set_limits_of_malloc(mmap=1_000_000, trim=16_000_000)
+
+
+def keep_freed_memory() -> None:
+    """Let glibc keep blocks that are freed, such as pictures, for the next ones.
+
+    New memory would take longer than what is decoded into it. Blocks of more than 32 MB are
+    returned to the system. With another C library nothing is done.
+    """
+    _set_limits_of_malloc(mmap=2**25, trim=2**26)
+
+
+def _set_limits_of_malloc(*, mmap: int, trim: int) -> None:
+    """Set the bytes of a block with pages of its own, and of a free end of the heap."""
     import ctypes
 
     with contextlib.suppress(AttributeError, OSError, TypeError):
         set_limit = ctypes.CDLL(None).mallopt
-        set_limit(_M_MMAP_THRESHOLD, 1_000_000)  # bytes of a block with pages of its own
-        set_limit(_M_TRIM_THRESHOLD, 16_000_000)  # free bytes at the end of the heap
+        set_limit(_M_MMAP_THRESHOLD, mmap)
+        set_limit(_M_TRIM_THRESHOLD, trim)
 
 
 def make_workers(jobs: int | None = None, scheduler: str | None = None) -> Workers:

@@ -3,7 +3,6 @@
 import errno
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,7 +10,7 @@ from vdet.batch.inputs import InputVideo, find_sources, matches_in
 from vdet.batch.manifest import Written, check_manifest, read_written
 from vdet.batch.task import result_digest
 from vdet.errors import BatchError, OutputError
-from vdet.files import check_output
+from vdet.files import check_output, file_ids
 from vdet.run.sinks.protocol import BatchTotal, Output, check_sinks, output_state, sink_kind
 from vdet.run.video import VideoJob
 
@@ -181,22 +180,14 @@ def _refuse_nested(clips: Iterable[Path], sources: Iterable[InputVideo], folder:
             raise BatchError(f"{source.path}: lies in the output folder {folder}; give another")
 
 
-def _identity(path: Path) -> tuple[int, int] | None:
-    """Return the device and the inode of a file; None if it is not there."""
-    with suppress(OSError):
-        state = path.stat()
-        return state.st_dev, state.st_ino
-    return None
-
-
 def _refuse_shared(jobs: Iterable[VideoJob], totals: Iterable[PlannedTotal], folder: Path) -> None:
     """Refuse an output with the name of another output, of a total, the manifest or an input."""
-    inputs = {_identity(path) for job in jobs for path in (job.source, *job.inputs)} - {None}
+    inputs = file_ids(path for job in jobs for path in (job.source, *job.inputs))
     owners = {folder / MANIFEST: "the manifest"}
     makers = [(total.path, "the outputs of all videos") for total in totals]
     makers += [(output.path, str(job.source)) for job in jobs for output in job.outputs]
     for path, maker in makers:
-        if _identity(path) in inputs:
+        if file_ids([path]) & inputs:
             raise OutputError(f"{path}: is an input itself; give another folder")
         if path in owners:
             raise BatchError(f"{owners[path]} and {maker}: both would become {path}; rename one")

@@ -53,7 +53,9 @@ def images(
     from vdet.evaluate.show_images import images_page, lines, plain
     from vdet.labels.reading import read_labelled_pictures
     from vdet.labels.roles import Roles
-    from vdet.workers import core_count
+    from vdet.workers import core_count, keep_freed_memory
+
+    keep_freed_memory()
 
     model = choice.load_detector(detector.showing_all())
     results.check([*data, *choice.inputs(settings, detector)])

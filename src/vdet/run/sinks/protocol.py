@@ -11,7 +11,15 @@ from typing import Any, Literal, Protocol, Self
 from vdet.config.schema import Settings
 from vdet.detect.protocol import StagePictures
 from vdet.errors import OutputError
-from vdet.files import MayReplace, OutputFiles, any_file, check_output, output_errors
+from vdet.files import (
+    MayReplace,
+    OutputFiles,
+    any_file,
+    check_output,
+    file_ids,
+    output_errors,
+    refuse_input,
+)
 from vdet.media import VideoInfo
 from vdet.plugins import SINKS, load_plugin
 from vdet.run.result import FrameResult
@@ -208,6 +216,7 @@ def check_sinks(
         There is no sink with such a name.
     """
     seen: set[Path] = set()
+    ids = file_ids(inputs)
     for output in outputs:
         kind, path = _kind_for(output), output.path
         if path.resolve() in seen:
@@ -217,10 +226,10 @@ def check_sinks(
             continue
         if kind.marker:
             path = min(path.glob(kind.marker), default=path / kind.marker)
+        refuse_input(path, ids)
         check_output(
             path,
             overwrite=overwrite,
-            inputs=inputs,
             makes_folder=makes_folder or bool(kind.marker),
             may_replace=kind.may_replace,
         )
