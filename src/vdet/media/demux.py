@@ -51,13 +51,17 @@ _FIRST_BOXES = {
 _OWN_FIELDS = 0xF00  # flags of a track run: each sample has fields of its own in the file
 
 
-def open_input(path: Path, frame_rate: float | None = None) -> InputContainer:
+def open_input(
+    path: Path, frame_rate: float | None = None, *, for_tags: bool = False
+) -> InputContainer:
     """Open a video file, or numbered pictures (`img_%04d.png`, or a folder), for reading.
 
     Parameters
     ----------
     frame_rate
         Of numbered pictures, per second; None: `ASSUMED_RATE`.
+    for_tags
+        Only the tags of the file are wanted: no frame is decoded to learn more of its streams.
 
     Raises
     ------
@@ -87,6 +91,8 @@ def open_input(path: Path, frame_rate: float | None = None) -> InputContainer:
             kind = "mjpeg"  # FFmpeg may take it for a pipe of pictures, which is not read
     try:
         options["max_pixels"] = str(MAX_PIXELS)  # the file is probed with decoders
+        if for_tags:
+            options["codec_whitelist"] = "none"
         return av.open(name, "r", kind, options, metadata_errors="replace")  # tags: any encoding
     except (av.PermissionError, av.error.MemoryError) as error:
         raise VideoError(f"{path}: cannot be opened: {error.strerror}") from error

@@ -153,8 +153,8 @@ VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv")
 
 _CODEC: Final = "libx264"
 _X264 = "b-adapt=0:scenecut=0:sync-lookahead=1"
-"""Parameters of x264. It does not search the next frames for cuts and for the best kind of each: that
-takes a tenth of a run, and makes files 1 % smaller. It keeps few frames in memory.
+"""Parameters of x264. The next frames are not searched for cuts and for the best kind of each: that
+takes a tenth of a run, and saves 1 % of the file. It keeps few frames in memory.
 """
 _LARGEST_AT_ONCE = 1920 * 1088
 """Pixels of the largest frames of which several are encoded at once; that takes more memory."""
@@ -174,7 +174,7 @@ def may_replace_video(path: Path) -> bool:
     if not path.is_file():
         return path.is_symlink()  # it leads nowhere
     try:
-        with open_input(path) as container:
+        with open_input(path, for_tags=True) as container:
             tags = {key.lower(): value for key, value in container.metadata.items()}
     except VideoError:
         return not begins_like_mp4(path)
