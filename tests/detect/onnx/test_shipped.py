@@ -8,6 +8,8 @@ from vdet.detect.factory import load_detector
 from vdet.detect.onnx.detector import SHIPPED
 from vdet.detect.onnx.recognition import recognize
 from vdet.detect.onnx.session import Session
+from vdet.detect.protocol import stage_pictures_of
+from vdet.media import Picture
 from vdet.testing import check_detector
 
 MOST_BYTES = 1_500_000
@@ -28,3 +30,13 @@ def test_it_passes_the_checks_of_detectors_in_frames_of_any_shape(width: int, he
     rng = np.random.default_rng(0)
     images = [rng.integers(0, 256, (height, width, 3), np.uint8) for _ in range(2)]
     check_detector(load_detector(NetworkSettings()), images)
+
+
+def test_a_still_picture_has_a_larger_input_than_a_frame() -> None:
+    detector = load_detector(NetworkSettings()).for_video(1280, 720, [])
+    image = np.zeros((720, 1280, 3), np.uint8)
+    inputs = []
+    for index in (0, None):
+        detections = detector.detect(detector.search(Picture(image), index))
+        inputs.append(stage_pictures_of(detector)(image, detections)["input"].shape)
+    assert inputs == [(352, 640, 3), (448, 832, 3)]

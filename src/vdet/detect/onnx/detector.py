@@ -14,6 +14,7 @@ from vdet.config.schema import NetworkSettings
 from vdet.detect.classes import our_name
 from vdet.detect.factory import DetectorKind
 from vdet.detect.onnx.layouts import RawBoxes
+from vdet.detect.onnx.preparation import InputForm
 from vdet.detect.onnx.recognition import Recognized, read_header, recognize
 from vdet.detect.onnx.session import Session
 from vdet.draw.boxes import GREEN, draw_box
@@ -21,6 +22,9 @@ from vdet.errors import ModelError
 from vdet.media import Picture
 
 _MOST_BOXES = 10_000  # before suppression, those of the highest scores
+
+Candidates = tuple[RawBoxes, InputForm, float]
+"""The boxes before suppression, the input that they were found in, and the least score."""
 
 SHIPPED = Path(__file__).parents[2] / "models" / "net.onnx"
 
@@ -45,46 +49,52 @@ class NetworkModel:
     def for_video(self, width: int, height: int, images: Sequence[Image]) -> "NetworkDetector":  # noqa: ARG002
         """Return a detector for frames of one size."""
         network = self._recognized.for_frames(width, height)
-        return NetworkDetector(network, self._numbers, self._settings)
+        for_stills = self._recognized.for_frames(width, height, are_stills=True)
+        return NetworkDetector(network, for_stills, self._numbers, self._settings)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NetworkDetector:
     """Finds vehicles in frames of one size: a `VideoDetector` without state.
 
-    `numbers` has the index of each class of the network in `detector.classes`, -1 for those that
-    are not wanted; its last entry, -1, stands for unknown classes.
+    `for_stills` is the network for still pictures. `numbers` has the index of each class of the
+    network in `detector.classes`, -1 for those that are not wanted; its last entry, -1, stands for
+    unknown classes.
     """
 
     network: Recognized
+    for_stills: Recognized
     numbers: Int32Array
     settings: NetworkSettings
 
-    def search(self, picture: Picture, index: int | None) -> tuple[RawBoxes, float]:
+    def search(self, picture: Picture, index: int | None) -> Candidates:
         """Return the vehicles in pixels of the frame before suppression, and the least score."""
-        raw = self.network.find(picture, self.settings.least)
+        network = self.for_stills if index is None else self.network
+        raw = network.find(picture, self.settings.least)
         boxes = visible(raw.boxes.astype(np.float64), (picture.width, picture.height))
         is_known = (raw.classes >= 0) & (raw.classes < len(self.numbers))
         numbers = self.numbers[np.where(is_known, raw.classes, -1)]
         keep = (numbers >= 0) & (boxes[:, 2:] - boxes[:, :2] >= 1).all(axis=1)  # not with a NaN
         found = RawBoxes(boxes[keep].astype(np.float32), raw.scores[keep], numbers[keep])
-        return found, self.settings.still_score if index is None else 0.0
+        return found, network.form, self.settings.still_score if index is None else 0.0
 
-    def detect(self, candidates: tuple[RawBoxes, float]) -> Boxes:
+    def detect(self, candidates: Candidates) -> Boxes:
         """Return one box for each vehicle."""
-        raw, least = candidates
+        raw, form, least = candidates
         rows = suppress(raw.boxes, raw.scores, self.settings.overlap)
         rows = rows[raw.scores[rows] >= least]
         classes, names = raw.classes[rows], self.settings.classes
-        return Boxes(raw.boxes[rows], raw.scores[rows], classes=classes, names=names, trace=raw)
+        return Boxes(
+            raw.boxes[rows], raw.scores[rows], classes=classes, names=names, trace=(raw, form)
+        )
 
     def stage_pictures(self, image: Image, detections: Boxes) -> dict[str, Image]:
         """Return the network's input as a picture, and the boxes before suppression."""
         boxes = image.copy()
-        raw: RawBoxes = detections.trace
+        raw, form = detections.trace
         for box, score in zip(raw.boxes.round().astype(int).tolist(), raw.scores, strict=True):
             draw_box(boxes, Box(*box), GREEN, f"{score:.2f}")
-        return {"input": self.network.form.scaled(Picture(image))[0], "candidates": boxes}
+        return {"input": form.scaled(Picture(image))[0], "candidates": boxes}
 
 
 def our_classes(names: Sequence[str], wanted: Sequence[str]) -> list[int]:

@@ -114,7 +114,7 @@ def _scaled_picture(picture: Picture, width: int, height: int) -> Image:
     return planes.coding.to_bgr((first, second, third))
 
 
-def size_of_area(width: int, height: int, pixels: int) -> tuple[int, int]:
+def size_of_area(width: int, height: int, pixels: float) -> tuple[int, int]:
     """Return width and height of about `pixels` in the shape of a frame, for our own networks."""
     factor = (pixels / (width * height)) ** 0.5 / _MULTIPLE
     return max(1, round(width * factor)) * _MULTIPLE, max(1, round(height * factor)) * _MULTIPLE

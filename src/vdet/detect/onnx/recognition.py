@@ -25,6 +25,8 @@ _MAX_PIXELS = 16_000_000
 _MOST_FINAL_ROWS = 1000
 _DEFAULT_SIDE = 640  # of the usual exports with an input of any size
 _SIZES = "orig_target_sizes"
+_STILL_PIXELS = 1.69
+"""Pixels of the input for a still picture, as a multiple of those for a frame of a video."""
 
 COCO = tuple(Path(__file__).with_name("coco.txt").read_text("utf-8").splitlines())
 """The 80 classes of the COCO data set in the order that detectors number them."""
@@ -75,9 +77,15 @@ class Recognized:
     layout: OutputLayout
     header: Header | None = None
 
-    def for_frames(self, width: int, height: int) -> "Recognized":
-        """Return the network for frames of one size; the input of our networks depends on it."""
-        return _ours(self.session, self.header, width, height) if self.header else self
+    def for_frames(self, width: int, height: int, *, are_stills: bool = False) -> "Recognized":
+        """Return the network for frames of one size, which the input of our networks depends on.
+
+        Still pictures have a larger input: there is time to find smaller vehicles.
+        """
+        if self.header is None:
+            return self
+        pixels = self.header.pixels * (_STILL_PIXELS if are_stills else 1)
+        return _ours(self.session, self.header, size_of_area(width, height, pixels))
 
     def find(self, picture: Picture, least: float) -> RawBoxes:
         """Return the boxes in pixels of the picture, with scores of at least `least`.
@@ -135,7 +143,7 @@ def recognize(session: Session, names: Sequence[str] = ()) -> Recognized:
         shapes = session.output_shapes
         if [shape[2:] for shape in shapes] != [[5 + len(header.classes)]]:
             raise _unknown(session, f"it has a header of vdet, but gives {shapes}")
-        return _ours(session, header, 1, 1)
+        return _ours(session, header, size_of_area(1, 1, header.pixels))
     has_sizes = any(slot.name == _SIZES for slot in session.inputs)
     if len(session.inputs) != 1 + has_sizes:
         raise _unknown(session, f"it has {len(session.inputs)} inputs")
@@ -152,9 +160,8 @@ def read_header(session: Session) -> Header | None:
         raise ModelError(f"{session.path}: its header is damaged or from a newer vdet") from error
 
 
-def _ours(session: Session, header: Header, width: int, height: int) -> Recognized:
-    """Return a network of ours for frames of one size."""
-    size = size_of_area(width, height, header.pixels)
+def _ours(session: Session, header: Header, size: tuple[int, int]) -> Recognized:
+    """Return a network of ours with an input of one size, width and height in pixels."""
     form = InputForm(*size, rows_first=True, dtype=np.uint8)
     layout = partial(layouts.our_cells, cells=cell_centers(*size), score=header.calibration)
     reasons = ("it has a header of vdet",)
