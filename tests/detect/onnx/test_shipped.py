@@ -39,4 +39,4 @@ def test_a_still_picture_has_a_larger_input_than_a_frame() -> None:
     for index in (0, None):
         detections = detector.detect(detector.search(Picture(image), index))
         inputs.append(stage_pictures_of(detector)(image, detections)["input"].shape)
-    assert inputs == [(352, 640, 3), (448, 832, 3)]
+    assert inputs == [(352, 640, 3), (416, 768, 3)]

@@ -25,7 +25,7 @@ _MAX_PIXELS = 16_000_000
 _MOST_FINAL_ROWS = 1000
 _DEFAULT_SIDE = 640  # of the usual exports with an input of any size
 _SIZES = "orig_target_sizes"
-_STILL_PIXELS = 1.69
+_STILL_PIXELS = 1.44
 """Pixels of the input for a still picture, as a multiple of those for a frame of a video."""
 
 COCO = tuple(Path(__file__).with_name("coco.txt").read_text("utf-8").splitlines())
