@@ -67,7 +67,7 @@ class NetworkSettings(DetectorSettings):
     """Ignore boxes with a lower score."""
     overlap: Share = 0.55
     """Remove a box if its intersection over union with a better one is higher."""
-    still_score: Share = 0.4
+    still_score: Share = 0.45
     """Least score of a vehicle in a still picture. In video, the tracker decides."""
     classes: tuple[str, ...] = Field(
         ("car", "truck", "bus", "vehicle"), min_length=1, max_length=100
