@@ -72,10 +72,10 @@ GROUND = GroundRequest(
 def run_times(path: Path, folder: Path, rounds: int) -> dict[str, tuple[float, float]]:
     """Return the seconds of wall time and of processor time of the first `FRAMES` frames.
 
-    Keys: `transcode` (decoded, and encoded with the same settings), `detect` (vehicles detected,
-    drawn and written), `detect with lanes`, `detect with svm`, `detect with answers` (`ANSWERS`,
-    counts and records of vehicles too), `detect with flows` (flows by the clock, and speeds, at the
-    lines of `ANSWERS`), `detect only` and `detect only with svm` (nothing written).
+    Keys: `transcode` (decoded, and encoded with the same preset and quality), `detect` (vehicles
+    detected, drawn and written), `detect with lanes`, `detect with svm`, `detect with answers`
+    (`ANSWERS`, counts and records of vehicles too), `detect with flows` (flows by the clock, and
+    speeds, at the lines of `ANSWERS`), `detect only` and `detect only with svm` (nothing written).
     """
     out = folder / "out.mp4"
     video = (Output("video", out),)

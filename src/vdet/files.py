@@ -18,7 +18,7 @@ _ASIDE = ".older"  # folder in a temporary one, for files that are replaced
 
 
 FileId = tuple[int, int]
-"""Device and inode of a file, whatever its names are."""
+"""Device and inode of a file: the same for all its names."""
 
 MayReplace = Callable[[Path], bool]
 """Returns whether an existing file may be replaced, if the user asks for it."""
@@ -73,12 +73,12 @@ def check_output(
 
 def refuse_input(path: Path, inputs: Set[FileId]) -> None:
     """Raise `OutputError` if an output is one of the inputs."""
-    if file_ids([path]) & inputs:
+    if inputs and file_ids([path]) & inputs:
         raise OutputError(f"{path}: is the input itself; give another output")
 
 
 def file_ids(paths: Iterable[Path]) -> set[FileId]:
-    """Return the identities of those files that are there."""
+    """Return the identities of the files that exist; links are followed."""
     ids = set()
     for path in paths:
         with contextlib.suppress(OSError):

@@ -48,7 +48,7 @@ def try_to_remove(path: Path) -> None:
 def remove_stale(folder: Path) -> None:
     """Remove the temporary folders in `folder` whose writers have ended."""
     with contextlib.suppress(OSError):
-        with os.scandir(folder) as entries:  # there may be thousands: no paths are made of them
+        with os.scandir(folder) as entries:  # names, not paths: there may be thousands
             names = [entry.name for entry in entries if _NAME.fullmatch(entry.name)]
         for name in names:
             with contextlib.suppress(OSError):

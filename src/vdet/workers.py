@@ -109,16 +109,16 @@ def return_freed_memory() -> None:
 
 
 def keep_freed_memory() -> None:
-    """Let glibc keep blocks that are freed, such as pictures, for the next ones.
+    """Let glibc keep freed blocks, such as pictures, and use them again.
 
-    New memory would take longer than what is decoded into it. Blocks of more than 32 MB are
-    returned to the system. With another C library nothing is done.
+    To get new pages from the system takes longer than to decode a picture into them. Blocks of
+    more than 32 MB are returned to the system. With another C library nothing is done.
     """
-    _set_limits_of_malloc(mmap=2**25, trim=2**26)
+    _set_limits_of_malloc(mmap=32_000_000, trim=64_000_000)
 
 
 def _set_limits_of_malloc(*, mmap: int, trim: int) -> None:
-    """Set the bytes of a block with pages of its own, and of a free end of the heap."""
+    """Set the least bytes of a block with pages of its own, and of a free end that is returned."""
     import ctypes
 
     with contextlib.suppress(AttributeError, OSError, TypeError):

@@ -56,7 +56,6 @@ def images(
     from vdet.workers import core_count, keep_freed_memory
 
     keep_freed_memory()
-
     model = choice.load_detector(detector.showing_all())
     results.check([*data, *choice.inputs(settings, detector)])
     roles = Roles.from_settings(settings)

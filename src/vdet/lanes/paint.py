@@ -101,10 +101,10 @@ def hide(mask: Image, top_view: TopView, boxes: Iterable[Box]) -> Image:
 def paint_along(
     mask: Image, top_view: TopView, lines: Sequence[Float64Array], margin: float
 ) -> list[LinePaint]:
-    """Return the middle of the paint in each row, within `margin` metres of each line.
+    """Return, for each line, the middle of its paint in each row, within `margin` metres of it.
 
-    A line has x of each row, metres `(rows,)`. A row is left out if a part of it is hidden there:
-    the middle of the rest would be wrong.
+    Each of `lines` is the x of one line in each row, metres `(rows,)`. A row is left out if a part
+    of it is hidden near the line: the middle of the rest would be wrong.
     """
     half = max(1, round(margin * ACROSS))
     around = np.arange(-half, half + 1)
@@ -114,8 +114,9 @@ def paint_along(
     first = np.arange(len(mask)) * padded.shape[1] + 2 * half + 1
     near = np.asarray(padded, np.uint8).ravel()[(middles + first)[..., None] + around]
     visible = (near != HIDDEN).all(axis=2)
-    summed = np.stack([np.ones_like(around), around], axis=1, dtype=np.float32)
-    counts, moments = np.moveaxis((near == PAINT).astype(np.float32) @ summed, 2, 0)
+    # one product counts the painted columns and adds up their offsets
+    weights = np.stack([np.ones_like(around), around], axis=1, dtype=np.float32)
+    counts, moments = np.moveaxis((near == PAINT).astype(np.float32) @ weights, 2, 0)
     x = top_view.laterals[0] + (middles + moments / np.maximum(counts, 1)) / ACROSS
     return [
         LinePaint(top_view.distances[rows], of_line[rows], float(seen.mean()))

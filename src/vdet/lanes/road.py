@@ -192,7 +192,7 @@ class RoadFinder:
         self._top_view = TopView(settings, width, height)
         self._state: _LaneState | None = None
         far, near = self._top_view.distances[[0, -1]]
-        self._shown = np.geomspace(near, far, _LINE_POINTS)
+        self._lane_z = np.geomspace(near, far, _LINE_POINTS)
         """Distances of the points of a `Lane`, metres."""
         shown = self._top_view.pixels()
         seen = self._undistorter.distorted(shown.reshape(-1, 2)).reshape(shown.shape)
@@ -207,7 +207,7 @@ class RoadFinder:
         of_frame, of_chroma = self._maps
         if planes := picture.planes:
             luma, blue = warped(planes.luma, of_frame), warped(planes.blue, of_chroma, outside=128)
-            no_red = np.full_like(blue, 128)  # roads and paint have little of it
+            no_red = np.full_like(blue, 128)  # saves time; roads and paint have little red
             luma, blue, _ = planes.coding.to_common((luma, blue, no_red))
         else:
             top = warped(picture.image, of_frame)
@@ -237,7 +237,7 @@ class RoadFinder:
 
     def _lane(self, state: _LaneState) -> Lane:
         curves, curvature = state.curves, state.curvature
-        z = self._shown
+        z = self._lane_z
         lines = self._top_view.ground_to_frame(np.concatenate(curves.at(z)), np.tile(z, 2))
         left, right = np.split(self._undistorter.distorted(lines), 2)
         radius = None if abs(curvature) * _STRAIGHT < 1 else 1 / abs(curvature)

@@ -153,8 +153,8 @@ VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv")
 
 _CODEC: Final = "libx264"
 _X264 = "b-adapt=0:scenecut=0:sync-lookahead=1"
-"""Parameters of x264. The next frames are not searched for cuts and for the best kind of each: that
-takes a tenth of a run, and saves 1 % of the file. It keeps few frames in memory.
+"""Parameters of x264. It does not search the next frames for cuts, nor for the best kind of each:
+that takes a tenth of a run, and saves 1 % of the file. It keeps few frames in memory.
 """
 _LARGEST_AT_ONCE = 1920 * 1088
 """Pixels of the largest frames of which several are encoded at once; that takes more memory."""
@@ -323,8 +323,7 @@ class VideoWriter:
     def _add_picture(
         self, info: VideoInfo, settings: OutputSettings, threads: int | None
     ) -> av.VideoStream:
-        options = {"preset": settings.preset, "crf": str(settings.crf)}
-        options["x264-params"] = _X264
+        options = {"preset": settings.preset, "crf": str(settings.crf), "x264-params": _X264}
         stream = self._container.add_stream(_CODEC, rate=info.rate, options=options)
         context = stream.codec_context
         context.width = info.width + info.width % 2

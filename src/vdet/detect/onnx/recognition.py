@@ -41,7 +41,7 @@ class Header(Section):
     format: Literal[1] = 1
     classes: tuple[str, ...] = Field(min_length=1, max_length=1000)
     pixels: int = Field(147_456, ge=1024, le=_MAX_PIXELS)
-    """Size of the scaled frame."""
+    """Of the scaled frame of a video; a still picture has `_STILL_PIXELS` times as many."""
     calibration: NetworkScoreSettings = NetworkScoreSettings()
     provenance: dict[str, Any] = Field({})
     """What it was trained on and how, and its metrics."""
@@ -78,13 +78,14 @@ class Recognized:
     header: Header | None = None
 
     def for_frames(self, width: int, height: int, *, are_stills: bool = False) -> "Recognized":
-        """Return the network for frames of one size, which the input of our networks depends on.
+        """Return the network with an input for frames of one size, width and height in pixels.
 
-        Still pictures have a larger input: there is time to find smaller vehicles.
+        Only the input of our networks depends on it. It is larger for still pictures, to find
+        smaller vehicles: they need not keep up with a video.
         """
         if self.header is None:
             return self
-        pixels = self.header.pixels * (_STILL_PIXELS if are_stills else 1)
+        pixels = min(_MAX_PIXELS, self.header.pixels * (_STILL_PIXELS if are_stills else 1))
         return _ours(self.session, self.header, size_of_area(width, height, pixels))
 
     def find(self, picture: Picture, least: float) -> RawBoxes:

@@ -51,7 +51,7 @@ class RoadCheck:
         if self._has_warned or number & (number - 1):
             return
         other = self._load_other().for_video(picture.width, picture.height, [picture.image])
-        seen = other.detect(other.search(picture, None))
+        seen = other.detect(other.search(picture, number))
         ours, theirs = (_compared(each, picture.width) for each in (found, seen))
         overlaps = iou_matrix(ours, theirs) >= _LEAST_IOU
         self._both += int(overlaps.any(axis=1).sum() + overlaps.any(axis=0).sum())
