@@ -99,32 +99,19 @@ def limit_library_threads() -> None:
     threadpool_limits(1)
 
 
-def return_freed_memory() -> None:
-    """Let glibc return large blocks that are freed, such as frames, to the system.
+def return_freed_memory(least: int = 1_000_000, at_end: int = 16_000_000) -> None:
+    """Let glibc return freed memory to the system, with limits in bytes.
 
-    It would raise its own limit to 32 MB, and keep frames in the gaps between others. With another
-    C library nothing is done.
+    Blocks from `least` on, such as frames, are returned, and the end of the heap once `at_end` of
+    it are free. glibc would raise its own limit to 32 MB, and keep frames in the gaps between
+    others. With another C library nothing is done.
     """
-    _set_limits_of_malloc(mmap=1_000_000, trim=16_000_000)
-
-
-def keep_freed_memory() -> None:
-    """Let glibc keep freed blocks, such as pictures, and use them again.
-
-    To get new pages from the system takes longer than to decode a picture into them. Blocks of
-    more than 32 MB are returned to the system. With another C library nothing is done.
-    """
-    _set_limits_of_malloc(mmap=32_000_000, trim=64_000_000)
-
-
-def _set_limits_of_malloc(*, mmap: int, trim: int) -> None:
-    """Set the least bytes of a block with pages of its own, and of a free end that is returned."""
     import ctypes
 
     with contextlib.suppress(AttributeError, OSError, TypeError):
         set_limit = ctypes.CDLL(None).mallopt
-        set_limit(_M_MMAP_THRESHOLD, mmap)
-        set_limit(_M_TRIM_THRESHOLD, trim)
+        set_limit(_M_MMAP_THRESHOLD, least)
+        set_limit(_M_TRIM_THRESHOLD, at_end)
 
 
 def make_workers(jobs: int | None = None, scheduler: str | None = None) -> Workers:

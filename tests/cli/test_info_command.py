@@ -19,10 +19,7 @@ MODELS = Path(__file__).parents[2] / "src" / "vdet" / "models"
     ("name", "lines"),
     [
         ("svm.npz", ("kind: linear model of vdet", "learnt boxes: True")),
-        (
-            "net.onnx",
-            ("input for 1280x720: 640x352", "picture: 768x416", "vehicles: car; truck; bus"),
-        ),
+        ("net.onnx", ("form: vdet", "input for 1280x720: 640x352", "vehicles: car; truck; bus")),
     ],
 )
 def test_a_shipped_model_says_what_it_was_trained_on(

@@ -65,15 +65,12 @@ def _network(path: Path) -> Facts:
     from vdet.detect.onnx.recognition import recognize
     from vdet.detect.onnx.session import Session
 
-    found, for_stills = (
-        recognize(Session(path)).for_frames(1280, 720, are_stills=each) for each in (False, True)
-    )
+    found = recognize(Session(path)).for_frames(1280, 720)
     return {
         "kind": "network",
         "form": found.name,
         "reasons": list(found.reasons),
         "input_for_1280x720": f"{found.form.width}x{found.form.height}",
-        "input_for_a_still_picture": f"{for_stills.form.width}x{for_stills.form.height}",
         "vehicles": [name for name in found.names if our_name(name)],
         "other_classes": [name for name in found.names if not our_name(name)],
         "trained_on": list(trained_on(path)),
