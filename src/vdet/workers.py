@@ -99,6 +99,13 @@ def limit_library_threads() -> None:
     threadpool_limits(1)
 
 
+PICTURES = 32_000_000, 64_000_000
+"""Limits for `return_freed_memory` with which each picture takes the memory of an earlier one.
+
+New memory takes longer than to decode a picture into it.
+"""
+
+
 def return_freed_memory(least: int = 1_000_000, at_end: int = 16_000_000) -> None:
     """Let glibc return freed memory to the system, with limits in bytes.
 

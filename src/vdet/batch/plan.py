@@ -9,8 +9,8 @@ from pathlib import Path
 from vdet.batch.inputs import InputVideo, find_sources, matches_in
 from vdet.batch.manifest import Written, check_manifest, read_written
 from vdet.batch.task import result_digest
-from vdet.errors import BatchError
-from vdet.files import check_output, file_ids, refuse_input
+from vdet.errors import BatchError, OutputError
+from vdet.files import check_output, file_ids
 from vdet.run.sinks.protocol import BatchTotal, Output, check_sinks, output_state, sink_kind
 from vdet.run.video import VideoJob
 
@@ -187,7 +187,8 @@ def _refuse_shared(jobs: Iterable[VideoJob], totals: Iterable[PlannedTotal], fol
     makers = [(total.path, "the outputs of all videos") for total in totals]
     makers += [(output.path, str(job.source)) for job in jobs for output in job.outputs]
     for path, maker in makers:
-        refuse_input(path, inputs)
+        if file_ids([path]) & inputs:
+            raise OutputError(f"{path}: is an input itself; give another folder")
         if path in owners:
             raise BatchError(f"{owners[path]} and {maker}: both would become {path}; rename one")
         owners[path] = maker

@@ -55,9 +55,9 @@ def detect_image(
     from vdet.regions import check_mask
     from vdet.run.pictures import PictureSearch, find_images, plan_pictures, run_pictures
     from vdet.run.sinks.protocol import check_sinks
-    from vdet.workers import core_count, return_freed_memory
+    from vdet.workers import PICTURES, core_count, return_freed_memory
 
-    return_freed_memory(32_000_000, 64_000_000)  # new memory takes longer than to decode into it
+    return_freed_memory(*PICTURES)
     check_mask(settings.regions)
     model = choice.load_detector(settings.detector)
     sources = find_images(images)

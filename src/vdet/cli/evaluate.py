@@ -53,9 +53,9 @@ def images(
     from vdet.evaluate.show_images import images_page, lines, plain
     from vdet.labels.reading import read_labelled_pictures
     from vdet.labels.roles import Roles
-    from vdet.workers import core_count, return_freed_memory
+    from vdet.workers import PICTURES, core_count, return_freed_memory
 
-    return_freed_memory(32_000_000, 64_000_000)  # new memory takes longer than to decode into it
+    return_freed_memory(*PICTURES)
     model = choice.load_detector(detector.showing_all())
     results.check([*data, *choice.inputs(settings, detector)])
     roles = Roles.from_settings(settings)

@@ -68,7 +68,7 @@ class NetworkDetector:
     settings: NetworkSettings
 
     def search(self, picture: Picture, index: int | None) -> Candidates:
-        """Return the vehicles in pixels of the frame before suppression, and the least score."""
+        """Return the vehicles, in pixels of the frame."""
         network = self.for_stills if index is None else self.network
         raw = network.find(picture, self.settings.least)
         boxes = visible(raw.boxes.astype(np.float64), (picture.width, picture.height))
@@ -83,10 +83,8 @@ class NetworkDetector:
         raw, form, least = candidates
         rows = suppress(raw.boxes, raw.scores, self.settings.overlap)
         rows = rows[raw.scores[rows] >= least]
-        classes, names = raw.classes[rows], self.settings.classes
-        return Boxes(
-            raw.boxes[rows], raw.scores[rows], classes=classes, names=names, trace=(raw, form)
-        )
+        classes, names, trace = raw.classes[rows], self.settings.classes, (raw, form)
+        return Boxes(raw.boxes[rows], raw.scores[rows], classes=classes, names=names, trace=trace)
 
     def stage_pictures(self, image: Image, detections: Boxes) -> dict[str, Image]:
         """Return the network's input as a picture, and the boxes before suppression."""
