@@ -1,10 +1,10 @@
 """How well the network finds vehicles of cameras that it has not seen: `make unseen`.
 
-Each group of sets is left out of a training in turn, and searched by the network that was trained
-without it. `traffic_cams` is split into fifths of its cameras, `overpass` into its cameras. The
-scores of all groups together give the calibration of the shipped network's scores. Networks given
-by `--model` search the same pictures. The last network is trained without the video, and then
-follows the vehicles in it. Results are kept in the folder `--work`; a stopped run goes on there.
+Each training leaves out one group of sets of each kind, and its network searches them.
+`traffic_cams` is split into fifths of its cameras, `overpass` into its cameras. The scores of all
+groups together give the calibration of the shipped network's scores. Networks given by `--model`
+search the same pictures. The last training leaves out the video too, and its network follows the
+vehicles in it. Results are kept in the folder `--work`; a stopped run goes on there.
 """
 
 import argparse
@@ -14,6 +14,7 @@ import zlib
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from itertools import zip_longest
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,7 @@ from sklearn.linear_model import LogisticRegression
 from vdet.boxes import BoolArray, Float64Array
 from vdet.config.loading import load_settings
 from vdet.config.schema import NetworkSettings, Settings
+from vdet.config.train import NetworkScoreSettings
 from vdet.detect.factory import load_detector, trained_on
 from vdet.evaluate.average_precision import rank_predictions
 from vdet.evaluate.comparison import pool
@@ -52,7 +54,7 @@ KINDS: dict[str, tuple[Group, ...]] = {
         ("overpass.dense", "overpass.parking"),
     ),
 }
-"""The groups of sets that are left out together, by their kind."""
+"""The groups of sets by their kind; the n-th training leaves out the n-th group of each kind."""
 
 ByKind = Mapping[str, list[ImagesResult]]
 """The results of all groups, by their kind."""
@@ -69,8 +71,7 @@ _SAME_CAMERA = {
 }
 """Clips of `traffic_cams` from one camera."""
 
-_LEAST_SCORE = 0.02
-_UNCALIBRATED = ("train.net.score.slope=1", "train.net.score.offset=0")
+_LEAST_SCORE = 5e-5
 _OURS = "trained without them"
 _FROM_RANDOM = "train.net.rate=0.002"  # the default rate is for a training from a base
 
@@ -138,14 +139,14 @@ def measure(sets: Sequence[Path], network: Path) -> ImagesResult:
 
 
 def ranked_logits(sources: Sequence[MeasuredSet]) -> tuple[Float64Array, BoolArray]:
-    """Return the output of the network for each detection, and whether it finds a vehicle."""
+    """Return the logit of each detection's score, and whether the detection finds a vehicle."""
     ranked = [rank_predictions(pool([i.every for i in each.images])) for each in sources]
     scores = np.clip(np.concatenate([each.scores for each in ranked]), 1e-6, 1 - 1e-6)
     return np.log(scores / (1 - scores)), np.concatenate([each.right[0] for each in ranked])
 
 
 def fit_calibration(logits: Float64Array, right: BoolArray) -> tuple[float, float]:
-    """Return slope and offset of the sigmoid that fits best (Platt, 1999)."""
+    """Return slope and offset of the sigmoid that fits the logits best (Platt, 1999)."""
     model = LogisticRegression(C=1e6).fit(logits[:, np.newaxis], right)
     return float(model.coef_[0, 0]), float(model.intercept_[0])
 
@@ -171,31 +172,33 @@ def main() -> None:
     arguments = parser.parse_args()
     arguments.work.mkdir(parents=True, exist_ok=True)
     rate = [] if arguments.base else [_FROM_RANDOM]
-    changes = [f"train.net.steps={arguments.steps}", *rate, *arguments.set]
-    settings = load_settings(None, [*changes, *_UNCALIBRATED])
+    settings = load_settings(None, [f"train.net.steps={arguments.steps}", *rate, *arguments.set])
     clip = (arguments.video, arguments.truth)
     sets = split_sets(arguments.roads, arguments.work / "sets")
     results: dict[str, ByKind] = defaultdict(lambda: defaultdict(list))
-    for kind, group in ((kind, group) for kind, groups in KINDS.items() for group in groups):
-        left_out = [path for path in sets if path.name in group]
-        learnt = tuple(path for path in sets if path.name not in group)
-        output = arguments.work / f"without_{group[0]}.onnx"
-        job = NetworkJob(learnt, (clip,), output, arguments.base)
-        networks = {_OURS: train(job, settings), **{str(each): each for each in arguments.model}}
-        for name, network in networks.items():
-            result = measure(left_out, network)
-            results[name][kind].append(result)
-            print(f"{', '.join(group)}: best F1 {result.mean.best_f1:.3f} ({name})", flush=True)
+    trainings = list(zip_longest(*KINDS.values(), fillvalue=()))
+    for groups in trainings:
+        names = [name for group in groups for name in group]
+        learnt = tuple(path for path in sets if path.name not in names)
+        clips = () if groups is trainings[-1] else (clip,)
+        output = arguments.work / f"without_{names[0]}.onnx"
+        ours = train(NetworkJob(learnt, clips, output, arguments.base), settings)
+        networks = {_OURS: ours, **{str(each): each for each in arguments.model}}
+        for kind, group in zip(KINDS, groups, strict=True):
+            left_out = [path for path in sets if path.name in group]
+            for name, network in networks.items() if group else ():
+                result = measure(left_out, network)
+                results[name][kind].append(result)
+                best = figure(result.mean.best_f1)
+                print(f"{', '.join(group)}: best F1 {best} ({name})", flush=True)
     summaries = {name: summarize(each) for name, each in results.items()}
-    print("\n".join(summary_lines(summaries)))
+    print("\n".join(summary_lines(summaries, settings.train.net.score)))
     for model in arguments.model:
         print(f"{model} has seen: {', '.join(trained_on(settings.detector, model)) or 'not known'}")
     path = arguments.work / "results.json"
     values = {name: asdict(summary) for name, summary in summaries.items()}
     path.write_text(json.dumps(values, indent=2) + "\n", encoding="utf-8")
-    job = NetworkJob(tuple(sets), (), arguments.work / "without_the_video.onnx", arguments.base)
-    network = train(job, load_settings(None, changes))
-    print("\n".join(video_lines(clip, network, settings)))
+    print("\n".join(video_lines(clip, ours, settings)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,8 +217,9 @@ class SetScores:
 class Summary:
     """The scores of a network in all sets with vehicles, the means of the kinds, a calibration.
 
-    `score` is the score, as the networks give it, at which the mean F1 of the groups is highest.
+    `score` is the score at which the mean F1 of the groups is highest.
     `means` has the mean F1 of the groups of each kind at that score, and at the best of each group.
+    `slope` and `offset` calibrate the scores that the network gives; 1 and 0 leave them unchanged.
     """
 
     sets: tuple[SetScores, ...]
@@ -225,8 +229,11 @@ class Summary:
     offset: float
 
 
-def summary_lines(summaries: Mapping[str, Summary]) -> Iterator[str]:
-    """Yield a table of the sets that were left out, and the calibration, as lines of text."""
+def summary_lines(summaries: Mapping[str, Summary], given: NetworkScoreSettings) -> Iterator[str]:
+    """Yield a table of the sets that were left out, and the calibration, as lines of text.
+
+    `given` is the calibration that our networks have been given.
+    """
     ours, *others = summaries.values()
     names = [Path(name).name for name in summaries][1:]
     headings = ("left out", "vehicles", "F1", "best F1", "at score", "AP50", *names)
@@ -239,7 +246,8 @@ def summary_lines(summaries: Mapping[str, Summary]) -> Iterator[str]:
         rows.append([f"mean, {kind}", "", share(f1), share(best), "", "", *theirs])
     yield from table(headings, rows)
     yield f"F1 is at score {ours.score:.2f} in all sets; of other networks: the best of each set"
-    yield f"train.net.score.slope={ours.slope:.3f} train.net.score.offset={ours.offset:.3f}"
+    slope, offset = ours.slope * given.slope, ours.slope * given.offset + ours.offset
+    yield f"train.net.score.slope={slope:.3f} train.net.score.offset={offset:.3f}"
 
 
 def summarize(by_kind: ByKind) -> Summary:
