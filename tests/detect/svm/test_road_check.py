@@ -92,7 +92,7 @@ def test_pictures_and_video_are_compared(caplog: pytest.LogCaptureFixture, is_st
     model = SvmModel(red, SvmSettings(features=red.features), check=check)
     image = np.full((360, 640, 3), 90, np.uint8)
     detector = model.for_video(640, 360, [image])
-    for index in range(10):
+    for index in range(20):
         if is_still:
             detector = model.for_video(640, 360, [image])
         detector.detect(detector.search(Picture(image), None if is_still else index))

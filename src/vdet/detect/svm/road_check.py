@@ -14,7 +14,7 @@ LEAST_WIDTH = 0.06
 """Share of the frame's width. Narrower vehicles are not compared: the linear model does not search
 for them."""
 
-LEAST_BOXES = 5
+LEAST_BOXES = 6
 """Least number of boxes, of both detectors together, by which the model is judged."""
 
 LEAST_AGREEMENT = 0.5
