@@ -86,7 +86,7 @@ def counting_options(more: str = "") -> Callable[[F], F]:
         "--interval TIME",
         "Interval of tables, and of the bars of a page, as in 5min, 15min or 1h.",
         _interval,
-        show_default="the whole video",
+        show_default="the whole video; 1min on a page",
     )
     begin = option(
         "--begin TIME",

@@ -92,9 +92,9 @@ _batch_options = options.bundle(
 )
 @options.output_option(
     "--page DIR",
-    "Write page.html, on the vehicles, into DIR. With -d, give an ending such as .page.",
+    "Write page.html, a page about the vehicles, into DIR. With -d, give an ending such as .page.",
 )
-@counting_options(" With -d, give only the ending, as in .counts.csv.")
+@counting_options(" With -d, give only the ending of the name.")
 @options.sink_option
 @options.start_option
 @options.end_option

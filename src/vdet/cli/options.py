@@ -103,7 +103,7 @@ def option(
     more
         Further arguments of `click.option`.
     """
-    words = shown.replace(",", "").split()
+    words = [word.rstrip(",") for word in shown.split()]
     flags = [word for word in words if word.startswith("-")]
     metavar = " ".join(words[len(flags) :])
     if not metavar:
@@ -119,7 +119,7 @@ def option(
 overwrite_option = option("--overwrite", "Replace outputs that are there already.")
 scheduler_option = option(
     "--scheduler ADDRESS",
-    "Work on this Dask cluster, as tcp://host:8786. Its workers must find files by their names.",
+    "Work on this Dask cluster, as tcp://host:8786. Its workers must see the files by their names.",
 )
 until_option = option(
     "--until FRAME",
@@ -145,11 +145,11 @@ model_option = option(
 )
 regions_option = option(
     "--regions FILE",
-    "Search only these regions: polygons (.yaml), or a mask, a picture with them in white.",
+    "Show only vehicles in these regions: polygons (.yaml), or a mask, white in them.",
 )
 ground_option = option(
     "--ground FILE",
-    "Measure metres and speeds by this file (.yaml): points of the road in pixels and in metres.",
+    "Measure distances and speeds with this file (.yaml): points of the road in pixels and metres.",
     name="ground_file",
 )
 lines_option = option("--lines FILE", "Count at the lines and zones of this file (.yaml).")

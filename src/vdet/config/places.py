@@ -32,7 +32,7 @@ class PlacedSection(Section):
 
     size: tuple[Side, Side] | None = None
     """Width and height in pixels of the frames that the points are for. Frames of another size are
-    fine if they have the same shape. null: points are shares of the frame, 0 to 1.
+    fine if they have the same aspect ratio. null: points are shares of the frame, 0 to 1.
     """
 
     def scales(self, width: int, height: int) -> tuple[float, float]:
@@ -107,8 +107,8 @@ class RegionsSettings(PlacedSection):
     polygons: tuple[RegionSettings, ...] = Field((), max_length=MOST_SHAPES)
     """Polygons."""
     mask: str | None = Field(None, min_length=1, max_length=4096)
-    """Picture of the frame's shape: vehicles are shown where it is white, and not where it is
-    black.
+    """Picture with the aspect ratio of the frame. Vehicles are shown where it is white, and not
+    where it is black.
     """
 
     def __bool__(self) -> bool:
