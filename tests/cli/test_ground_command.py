@@ -156,6 +156,9 @@ def test_the_camera_of_a_lens_is_named_in_the_file(run: Run) -> None:
     corners = np.array([(0.2086, 0.93), (0.7898, 0.93)]) * (WIDTH, HEIGHT)
     places = request.ground(WIDTH, HEIGHT).place(lens.distorted(corners) + 0.5)
     assert float(np.hypot(*(places[1] - places[0]))) == pytest.approx(3.7, rel=0.01)
+    arguments = ("ground", "frame.png", "--lane", "--camera", "my: camera.yaml", "--overwrite")
+    refused = run(*arguments, "-o", "my: camera.yaml")
+    assert (refused.code, "is the input itself" in refused.err) == (1, True)
 
 
 def test_the_grid_in_metres_is_drawn(run: Run) -> None:
