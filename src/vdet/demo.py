@@ -1,7 +1,6 @@
 """The demo: drawn roads, both detectors on them, and what they find against the truth."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -58,11 +57,6 @@ _MOST = Most(per_vehicle=2, false_alarms=6, parts=3)  # drawn vehicles are alike
 _BY_MODEL = {"tracks": "model.csv", "stages": "stages"}
 
 
-def _job(source: Path, outputs: dict[str, str], *, overwrite: bool) -> VideoJob:
-    paths = tuple(Output(sink, source.with_name(name)) for sink, name in outputs.items())
-    return VideoJob(source, paths, overwrite=overwrite)
-
-
 def run_demo(
     folder: Path, *, seed: int, overwrite: bool, announce: Callable[[str], object], steps: Steps
 ) -> list[str]:
@@ -96,12 +90,13 @@ def run_demo(
         write_truth(folder / boxes, drawn, overwrite=overwrite)
     write_whole(folder / LINES, _LINES, overwrite=overwrite)
     truth, rate = read_truth(folder / TRUTH), float(scene.rate)
+    middle = scene.frames / scene.rate / 2
 
     def run(source: str, outputs: dict[str, str], settings: Settings, model: Path | None) -> Path:
-        job = _job(folder / source, outputs, overwrite=overwrite)
+        paths = tuple(Output(sink, folder / name) for sink, name in outputs.items())
+        job = VideoJob(folder / source, paths, at=middle, overwrite=overwrite)
         detector = load_detector(settings.detector, model)
-        middle = scene.frames / scene.rate / 2
-        run_video(replace(job, at=middle), detector, settings, progress=partial(steps, "frames"))
+        run_video(job, detector, settings, progress=partial(steps, "frames"))
         return folder / outputs["tracks"]
 
     def find(name: str, outputs: dict[str, str], settings: Settings, model: Path | None) -> Row:
@@ -115,8 +110,10 @@ def run_demo(
     run(POLE, _ON_POLE, load_settings(places={"counts": folder / LINES}), None)
     announce(f"3/4 drawing {ROADS} more roads, and training a linear model on patches of them …")
     linear = load_settings(assignments=["train.mine.probability=0"], detector="svm")
-    sources, rng = _roads_to_learn(folder), np.random.default_rng(seed)
-    make_folder(folder / "training")
+    training, rng = folder / "training", np.random.default_rng(seed)
+    make_folder(training)
+    roads = [training / f"road{number}.mp4" for number in range(1, ROADS + 1)]
+    sources = [VideoSource(road, road.with_suffix(".txt"), every=2) for road in roads]
     for source in sources:
         busy = busy_road(rng)
         write_clip(source.path, busy, overwrite=overwrite)
@@ -142,11 +139,3 @@ def _flows(folder: Path, scene: Scene) -> list[Row]:
         for row in video.flows():
             found.setdefault((row.origin, row.destination or NOWHERE), [0, 0])[number] += row.count
     return [[*way, *map(str, numbers)] for way, numbers in found.items()]
-
-
-def _roads_to_learn(folder: Path) -> tuple[VideoSource, ...]:
-    training = folder / "training"
-    return tuple(
-        VideoSource(training / f"road{number}.mp4", training / f"road{number}.txt", every=2)
-        for number in range(1, ROADS + 1)
-    )

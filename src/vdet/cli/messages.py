@@ -92,16 +92,9 @@ def progress_steps(unit: str) -> Iterator[Steps]:
         def start(what: str, total: int | None) -> Advance:
             stack.close()
             timed = total is None and bool(what)
-            bar = stack.enter_context(
-                live_bar(
-                    total=total,
-                    desc=what or None,
-                    unit=unit,
-                    leave=not timed,
-                    bar_format="{desc} [{elapsed}]" if timed else None,
-                )
-            )
-            return bar.update
+            form = "{desc} [{elapsed}]" if timed else None
+            bar = live_bar(total=total, desc=what, unit=unit, leave=not timed, bar_format=form)
+            return stack.enter_context(bar).update
 
         yield start
 

@@ -96,9 +96,7 @@ def label_tag(surface: Surface, text: str, corner: tuple[float, float]) -> Box:
     return _lay_out(surface, text, corner)[0]
 
 
-def _lay_out(
-    surface: Surface, text: str, corner: tuple[float, float]
-) -> tuple[Box, tuple[float, float], float]:
+def _lay_out(surface: Surface, text: str, corner: Point) -> tuple[Box, Point, float]:
     """Return the tag of a label, the lower left corner of its text, and the scale of its font."""
     rows, columns = surface.shape[:2]
     scale = max(_SMALLEST_TEXT, min(rows / 1200, columns / (paint.text_size(text, 1)[0] + 20)))

@@ -63,13 +63,7 @@ def draw_arrow(
 
 
 def write_text(
-    surface: Surface,
-    text: str,
-    origin: tuple[float, float],
-    scale: float,
-    color: Color,
-    *,
-    within: Box,
+    surface: Surface, text: str, origin: Point, scale: float, color: Color, *, within: Box
 ) -> None:
     """Write a line of text with its lower left corner at `origin`, and only inside `within`.
 

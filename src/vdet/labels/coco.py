@@ -214,11 +214,7 @@ def read_coco(path: Path, data: bytes) -> SavedTracks:
                 state: State = "lost" if each.attributes.get("occluded") else "seen"
                 yield label._replace(frame=frame, id=id_, score=score, state=state)
 
-    times = {
-        index: (place, each.time)
-        for index, (place, each) in frames.items()
-        if each.time is not None
-    }
+    times = {n: (place, each.time) for n, (place, each) in frames.items() if each.time is not None}
     listed, size = tuple(sorted(frames)), images[0].size if images else None
     return SavedTracks(tuple(limited(path, labels())), listed, checked_times(path, times), size)
 

@@ -137,8 +137,6 @@ _BT2020_TO_BT709 = np.array(
     [[1.6605, -0.5876, -0.0728], [-0.1246, 1.1329, -0.0083], [-0.0182, -0.1006, 1.1187]]
 )
 
-_Table = npt.NDArray[np.float32]
-
 
 class StandardRange:
     """Converts frames of HDR video to standard range; `transfer` is a key of `HDR_TRANSFERS`."""

@@ -162,20 +162,13 @@ def open_video(
             if reader.length is not None and latest >= reader.length:
                 raise _no_frame(job, f"{float(latest):.2f} s is beyond its end", reader.length)
             images, frames = peek(read)
-            make = partial(
-                build,
-                settings=settings,
-                video=reader.info,
-                images=images,
-                lanes=job.lanes,
-                ground=job.ground,
-            )
+            make = partial(build, lanes=job.lanes, ground=job.ground)
             try:
-                pipeline = make(model, tracker=tracker, steps=steps)
+                pipeline = make(model, settings, reader.info, images, tracker=tracker, steps=steps)
             except FrameSizeError as error:
                 log.warning("%s: gets no boxes: %s", job.source, error)
-                pipeline = make(as_model(lambda _: NO_BOXES))
-            del make, images  # otherwise they stay in memory for the whole run
+                pipeline = make(as_model(lambda _: NO_BOXES), settings, reader.info, images)
+            del images  # otherwise they stay in memory for the whole run
             threads = job.threads or core_count()
             with closing(pipeline.follow(frames, job.source, threads=threads)) as results:
                 yield OpenVideo(reader, pipeline, results)

@@ -55,7 +55,7 @@ def write_counts(path: Path, videos: Videos, interval: int | None = None) -> Non
             "totals": _items(_TOTALS, count_table(every, interval)),
             "zones": _items(_ZONES, zone_table(every, interval)),
         }
-        _write_json(path, videos, interval, tables, with_events=True)
+        _write_json(path, videos, interval, tables, events=True)
     elif _is_table(path, ".totals"):
         write_table(path, _TOTALS, map(_cells, count_table(every, interval)))
     elif _is_table(path, ".zones"):
@@ -75,7 +75,7 @@ def write_flows(path: Path, videos: Videos, interval: int | None = None) -> None
     rows = flow_table(every, interval)
     if is_json(path):
         tables = {"flows": _items(_FLOWS, rows), "matrix": flow_matrix(every, rows)}
-        _write_json(path, videos, interval, tables)
+        _write_json(path, videos, interval, tables, events=False)
     elif _is_table(path, ".matrix"):
         matrix = flow_matrix(every, rows)
         write_table(
@@ -123,18 +123,13 @@ def _joined(table: str, keys: Sequence[str], videos: Mapping[str, Any]) -> dict[
 
 
 def _write_json(
-    path: Path,
-    videos: Videos,
-    interval: int | None,
-    tables: Mapping[str, Any],
-    *,
-    with_events: bool = False,
+    path: Path, videos: Videos, interval: int | None, tables: Mapping[str, Any], *, events: bool
 ) -> None:
     facts: dict[str, Any] = {}
     for name, each in videos.items():
         begin = plain_moment(each.clock and each.clock.at(each.first))
         facts[name] = {"begin": begin, "warnings": list(each.warnings)}
-        if with_events:
+        if events:
             facts[name]["events"] = [
                 dict(zip(_EVENTS, _event(each, event), strict=True)) for event in each.events
             ]

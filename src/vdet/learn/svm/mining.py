@@ -163,8 +163,7 @@ def mine(
     output
         The zip file to write; `overwrite` replaces one that is there.
     model
-        The model whose false alarms are searched for. None: any window without a vehicle counts as
-        one.
+        The model whose false alarms are searched for.
     most
         Most patches of each kind in a frame.
     steps

@@ -37,7 +37,7 @@ def train(
     files
         If some have known sides, the model learns to find the sides of vehicles.
     jobs
-        Processes, as joblib counts them: -1 for one per core.
+        Number of processes; None: one for each core.
     scheduler
         Address of a Dask scheduler whose workers describe the patches instead.
     steps

@@ -76,7 +76,7 @@ class JsonSink(BaseSink):
     """Collects an item per picture, and writes the list at the end, if there is an item.
 
     Each item has `image`, `width`, `height` and `boxes`: the tracks of the picture as in `.jsonl`,
-    without `id` and `predicted`. If lanes are searched for, it also has `lane`, as in `.jsonl`.
+    without `id` and `state`. If lanes are searched for, it also has `lane`, as in `.jsonl`.
     """
 
     def __init__(self, path: Path, context: SinkContext) -> None:
@@ -155,17 +155,10 @@ class CountsSink(BaseSink):
         self.last = result
 
 
-COUNTS = SinkKind(
-    partial(CountsSink, count_files.write_counts),
-    count_files.COUNT_SUFFIXES,
-    "counts",
-    takes="videos",
-    total=BatchTotal("all", count_files.join_counts),
-)
-FLOWS = SinkKind(
-    partial(CountsSink, count_files.write_flows),
-    count_files.FLOW_SUFFIXES,
-    "flows",
-    takes="videos",
-    total=BatchTotal("all", count_files.join_flows),
+COUNTS, FLOWS = (
+    SinkKind(partial(CountsSink, write), ends, what, takes="videos", total=BatchTotal("all", join))
+    for what, write, ends, join in (
+        ("counts", count_files.write_counts, count_files.COUNT_SUFFIXES, count_files.join_counts),
+        ("flows", count_files.write_flows, count_files.FLOW_SUFFIXES, count_files.join_flows),
+    )
 )
