@@ -60,7 +60,7 @@ _batch_options = options.bundle(
     options.option(
         "-d, --directory DIR", "Process every CLIP, and write the outputs into DIR.", name="folder"
     ),
-    options.jobs_option("With -d: process N videos at once, each in its own process."),
+    options.jobs_option("With -d: process N videos at once, each in a process."),
     options.option("--skip-existing", "With -d: skip videos whose outputs are all up to date."),
     options.option("--dry-run", "With -d: list what would be written, and stop."),
     options.scheduler_option,

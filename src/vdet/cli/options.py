@@ -149,10 +149,10 @@ regions_option = option(
 )
 ground_option = option(
     "--ground FILE",
-    "Measure distances and speeds with this file (.yaml): points of the road in pixels and metres.",
+    "Points of the road in pixels and metres (.yaml), for distances and speeds.",
     name="ground_file",
 )
-lines_option = option("--lines FILE", "Count at the lines and zones of this file (.yaml).")
+lines_option = option("--lines FILE", "Lines and zones at which vehicles are counted (.yaml).")
 
 
 def jobs_option(text: str = "Work in N processes.") -> Callable[[F], F]:
