@@ -67,7 +67,7 @@ net: $(TOOLS)  ## train the shipped network on (hours): sets of pictures in ROAD
 		--set 'train.net.weights={"traffic_cams":3,"overpass":2.2}'
 	cp build/net/net.onnx src/vdet/models/
 
-unseen: $(TOOLS)  ## measure on cameras left out of trainings, also the networks in MODELS (many hours)
+unseen: $(TOOLS)  ## measure on cameras left out of trainings, also the networks in MODELS (six hours)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check torch --constraint constraints.txt
 	$(BIN)/python -m benchmarks.leave_one_out $(ROADS) $(DATA)/project_video.mp4 $(TRUTH) \
 		$(addprefix --model ,$(MODELS))
