@@ -60,7 +60,7 @@ _batch_options = options.bundle(
     options.option(
         "-d, --directory DIR", "Process every CLIP, and write the outputs into DIR.", name="folder"
     ),
-    options.jobs_option("With -d: process N videos at once, each in a process."),
+    options.jobs_option("With -d: process N videos at once."),
     options.option("--skip-existing", "With -d: skip videos whose outputs are all up to date."),
     options.option("--dry-run", "With -d: list what would be written, and stop."),
     options.scheduler_option,
@@ -94,7 +94,7 @@ _batch_options = options.bundle(
     "--page DIR",
     "Write page.html, a page about the vehicles, into DIR. With -d, give an ending such as .page.",
 )
-@counting_options(" With -d, give only the ending of the name.")
+@counting_options(" With -d, give only the ending.")
 @options.sink_option
 @options.start_option
 @options.end_option
@@ -167,7 +167,7 @@ def detect_video(
     from vdet.run.video import VideoJob
 
     check_mask(settings.regions)
-    inputs = (*choice.inputs(settings, settings.detector), *([camera] if camera else []))
+    inputs = tuple(choice.inputs(settings, settings.detector, camera))
     part = start, end, frames, at or Fraction(0)
     job = VideoJob(source, (), *part, request, inputs, overwrite, ground=choice.ground())
     job = replace(job, begin=counting.begin, interval=counting.interval)

@@ -77,7 +77,7 @@ def ground(
         raise click.UsageError("for a clip give -o ground.yaml, and either --length or --lane")
     options.check_suffix(output, *_YAML, what="files of the ground")
     settings = choice.read()
-    inputs = [source, *choice.inputs(settings), *([camera] if camera else [])]
+    inputs = [source, *choice.inputs(settings, camera=camera)]
     check_output(output, overwrite=overwrite, inputs=inputs)
     pixels, metres, size, how = _fit(source, length, watched, camera, choice)
     pairs = zip(pixels.round(2).tolist(), metres.round(3).tolist(), strict=True)

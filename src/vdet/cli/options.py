@@ -223,9 +223,12 @@ class SettingsChoice:
         return load_detector(settings, self.model_path)
 
     def inputs(
-        self, settings: "Settings", detector: "DetectorSettings | None" = None
+        self,
+        settings: "Settings",
+        detector: "DetectorSettings | None" = None,
+        camera: Path | None = None,
     ) -> list[Path]:
-        """Return the files of these settings, and the model file of a detector."""
+        """Return the files of these settings, the model file of a detector, and a camera file."""
         from vdet.detect.factory import model_file
 
         config: Path | None = None
@@ -234,8 +237,8 @@ class SettingsChoice:
 
             config = find_config(self.config_name)
         model = detector and model_file(detector, self.model_path)
-        named = (config, self.regions, self.lines, self.ground_file, settings.regions.mask, model)
-        return [Path(each) for each in named if each]
+        places = self.regions, self.lines, self.ground_file, settings.regions.mask
+        return [Path(each) for each in (config, *places, model, camera) if each]
 
     def read_for_whole_frames(self, *more: str, detector: str | None = None) -> "Settings":
         """Read them for a command that looks at whole frames; refuse regions as a `ConfigError`."""

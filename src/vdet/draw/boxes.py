@@ -79,7 +79,7 @@ def draw_box(
         draw_label(surface, label, (box.x1, box.y1), color)
 
 
-def draw_label(surface: Surface, text: str, corner: tuple[float, float], color: Color) -> Box:
+def draw_label(surface: Surface, text: str, corner: Point, color: Color) -> Box:
     """Write text on a filled tag whose lower left corner is `corner`, and return the tag.
 
     The corner is `(x, y)` in pixels. The tag is moved so that it lies in the surface. A text that
@@ -91,7 +91,7 @@ def draw_label(surface: Surface, text: str, corner: tuple[float, float], color: 
     return tag
 
 
-def label_tag(surface: Surface, text: str, corner: tuple[float, float]) -> Box:
+def label_tag(surface: Surface, text: str, corner: Point) -> Box:
     """Return the tag that `draw_label` would draw."""
     return _lay_out(surface, text, corner)[0]
 
