@@ -7,6 +7,9 @@ TOOLS := $(VENV)/.tools
 DATA ?= $(or $(VDET_DATA),data)
 ROADS ?= $(DATA)/roads
 TRUTH ?= $(DATA)/project_video_0001-0880.txt
+WEIGHTS := {"traffic_cams":3, "overpass":2.2, "bdd100k_dashcam":2.5, "vietnam_street":1.5, \
+	"bangladesh_roads":1.5, "manaus_misc":1.5, "dawn_fog":1.3, "topview_roads":1.2, \
+	"toll_km39":1.2, "lake_county_cctv":1.2}
 PATCHES = $(DATA)/vehicles.zip $(DATA)/non-vehicles.zip
 
 .DEFAULT_GOAL := help
@@ -64,7 +67,7 @@ net: $(TOOLS)  ## train the shipped network on (hours): sets of pictures in ROAD
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check torch --constraint constraints.txt
 	$(BIN)/vdet train-net $(sort $(wildcard $(ROADS)/*/)) -o build/net/net.onnx --overwrite \
 		--video $(DATA)/project_video.mp4 $(TRUTH) --base src/vdet/models/net.onnx \
-		--set 'train.net.weights={"traffic_cams":3,"overpass":2.2}'
+		--set train.net.steps=14000 --set 'train.net.weights=$(WEIGHTS)'
 	cp build/net/net.onnx src/vdet/models/
 
 unseen: $(TOOLS)  ## measure on cameras left out of trainings, also the networks in MODELS (six hours)

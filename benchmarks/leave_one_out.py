@@ -32,7 +32,7 @@ from vdet.evaluate.output import figure, share, table
 from vdet.evaluate.show_video import result_lines
 from vdet.evaluate.video import Variant, evaluate_clips, open_clip
 from vdet.labels.reading import read_labelled_pictures
-from vdet.learn.net.run import NetworkJob, train_to_file
+from vdet.learn.net.run import NetworkJob, read_sources, train_to_file
 from vdet.workers import core_count
 
 Group = tuple[str, ...]
@@ -124,7 +124,8 @@ def _split(path: Path, part_of: Callable[[str], str], folder: Path) -> list[Path
 def train(job: NetworkJob, settings: Settings) -> Path:
     """Train a network, if there is none yet, and return its file."""
     if not job.output.exists():
-        train_to_file(job, settings, progress=lambda step, _: _print_step(job, step))
+        sources = read_sources(job, settings)
+        train_to_file(job, sources, settings, progress=lambda step, _: _print_step(job, step))
     return job.output
 
 

@@ -19,7 +19,7 @@ MODELS = Path(__file__).parents[2] / "src" / "vdet" / "models"
     ("name", "lines"),
     [
         ("svm.npz", ("kind: linear model of vdet", "learnt boxes: True")),
-        ("net.onnx", ("form: vdet", "input for 1280x720: 640x352", "vehicles: car; truck; bus")),
+        ("net.onnx", ("form: vdet", "input for 1280x720: 640x352", "classes: car; truck; bus")),
     ],
 )
 def test_a_shipped_model_says_what_it_was_trained_on(
@@ -41,8 +41,8 @@ def test_another_network_says_why_it_was_taken_for_what(run: Run, tmp_path: Path
     assert result.code == 0
     assert "form: Ultralytics v8 or later" in result.out
     assert "its output is (1, 84, 168): columns of box and class scores" in result.out
-    assert "vehicles: car; motorcycle; bus; truck" in result.out
-    assert "other classes: person; bicycle; " in result.out
+    assert "classes: person; bicycle; car; motorcycle; bus; truck\n" in result.out
+    assert "other classes: airplane; train; boat; " in result.out
 
 
 def test_a_video_is_described(run: Run, tmp_path: Path) -> None:

@@ -36,7 +36,7 @@ def test_read_as_tracks_regions_are_left_out_and_types_are_classes(tmp_path: Pat
     lines = [kitti_line(0, -1 if name == "DontCare" else k, name) for k, name in enumerate(names)]
     path.write_text("\n".join(lines))
     (only,) = read_tracks(path)
-    assert [track.class_name for track in only.tracks] == ["car", "truck", "Pedestrian"]
+    assert [track.class_name for track in only.tracks] == ["car", "truck", "person"]
 
 
 @pytest.mark.parametrize(

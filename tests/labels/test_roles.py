@@ -10,9 +10,9 @@ from vdet.labels.roles import DEFAULT_ROLES, Roles
 @pytest.mark.parametrize(
     ("labels", "role"),
     [
-        (("Car", "van", "TRUCK", "lorry", "bus", "vehicle", "Pick-up"), "vehicle"),
+        (("Car", "van", "TRUCK", "lorry", "bus", "vehicle", "Pick-up", "tuk-tuk"), "vehicle"),
         (("DontCare", "dont_care", "Ignore region", "Misc", "trailer", "Motorbike"), "ignored"),
-        (("Pedestrian", "Person_sitting", "Cyclist"), "other"),
+        (("Pedestrian", "Person_sitting", "Cyclist", "rider"), "ignored"),
         (("cow", "traffic sign", ""), None),
     ],
 )
@@ -33,8 +33,7 @@ def test_settings_give_words_another_role_and_add_new_ones() -> None:
 @pytest.mark.parametrize(
     ("classes", "vehicles"),
     [
-        (("car", "truck", "bus", "vehicle", "motorcycle"), OUR_NAMES),
-        (("vehicle",), ("car", "truck", "bus", "vehicle")),
+        (OUR_NAMES, OUR_NAMES),
         (("car",), ("car",)),
         (("truck", "tractor"), ("truck",)),
     ],
@@ -47,3 +46,26 @@ def test_classes_that_the_detector_does_not_look_for_are_ignored(
         name: "vehicle" if name in vehicles else "ignored" for name in OUR_NAMES
     }
     assert all(roles.role_of(name) == "vehicle" for name in classes)
+
+
+def test_a_detector_of_vehicles_looks_for_cars_trucks_and_buses() -> None:
+    settings = load_settings(None, ['detector.classes=["vehicle"]'])
+    roles = Roles.from_settings(settings)
+    wanted = [name for name in OUR_NAMES if roles.role_of(name) == "vehicle"]
+    assert wanted == ["car", "truck", "bus", "vehicle"]
+
+
+@pytest.mark.parametrize(
+    ("classes", "learnt"),
+    [
+        (["car", "tractor"], {"Car": "car", "tractor": "tractor", "rickshaw": "vehicle"}),
+        (["person"], {"pedestrian": "person"}),
+    ],
+)
+def test_a_network_learns_its_classes_and_vehicles_of_unknown_kind(
+    classes: list[str], learnt: dict[str, str]
+) -> None:
+    roles = Roles.for_training(load_settings(None, [f"train.net.classes={classes}"]))
+    words = ("Car", "bus", "tractor", "rickshaw", "pedestrian", "rider", "cow")
+    found = {word: roles.class_of(word) for word in words if roles.role_of(word) == "vehicle"}
+    assert found == learnt

@@ -10,7 +10,7 @@ import numpy as np
 from vdet.boxes import Image
 from vdet.media.images import encode_image
 
-NAMES = ("car", "truck", "bus", "ignore", "person")
+NAMES = ("car", "truck", "bus", "ignore", "cow")
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ def write_coco(folder: Path, pictures: Pictures) -> Path:
 def write_kitti(folder: Path, pictures: Pictures) -> Path:
     write_pictures(folder / "image_2", pictures)
     (folder / "label_2").mkdir(exist_ok=True)
-    types = dict(zip(NAMES, ("Car", "Truck", "Bus", "DontCare", "Pedestrian"), strict=True))
+    types = dict(zip(NAMES, ("Car", "Truck", "Bus", "DontCare", "Cow"), strict=True))
     for name, each in pictures.items():
         lines = [
             f"{types[boxed.name]} 0.00 0 -1.57 {x} {y} {x + w} {y + h} 1 1 4 2 1 20 -1.6\n"

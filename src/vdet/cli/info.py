@@ -71,7 +71,7 @@ def _network(path: Path) -> Facts:
         "form": found.name,
         "reasons": list(found.reasons),
         "input_for_1280x720": f"{found.form.width}x{found.form.height}",
-        "vehicles": [name for name in found.names if our_name(name)],
+        "classes": [name for name in found.names if our_name(name)],
         "other_classes": [name for name in found.names if not our_name(name)],
         "trained_on": list(trained_on(path)),
         "provenance": found.header.provenance if found.header else {},

@@ -48,7 +48,7 @@ def train_net(
     options.check_suffix(output, ".onnx", what="networks")
     settings = choice.read()
     try:
-        from vdet.learn.net.run import NetworkJob, train_to_file
+        from vdet.learn.net.run import NetworkJob, read_sources, source_lines, train_to_file
     except ImportError as error:
         raise DataError(f"{error.name} is not installed; pip install torch onnx") from error
     from vdet.workers import limit_library_threads
@@ -59,11 +59,13 @@ def train_net(
     inputs += choice.inputs(settings)
     for path in (job.output, job.metrics):
         check_output(path, overwrite=overwrite, inputs=inputs)
+    sources = read_sources(job, settings)
+    print_lines(*source_lines([report for _, report in sources]), "")
     with live_bar(total=settings.train.net.steps, unit=" steps") as bar:
 
         def advance(step: int, loss: float) -> None:
             bar.set_postfix_str(f"loss {loss:.3f}", refresh=False)
             bar.update(step - bar.n)
 
-        metrics = train_to_file(job, settings, progress=advance)
-    print_lines(*metrics.lines(), "", f"{output}: the network; {job.metrics}: the metrics")
+        metrics = train_to_file(job, sources, settings, progress=advance)
+    print_lines(*metrics.lines(), f"{output}: the network; {job.metrics}: the metrics")

@@ -5,7 +5,7 @@ The defaults are those of `configs/default.yaml`, which is their printed form.
 
 from typing import Annotated, Literal
 
-from pydantic import Field, SerializeAsAny, field_validator, model_validator
+from pydantic import Field, SerializeAsAny, model_validator
 
 from vdet.config.detector import DetectorSettings, NetworkSettings
 from vdet.config.places import CountSettings, RegionsSettings
@@ -64,26 +64,15 @@ class LaneSettings(Section):
 Role = Literal["vehicle", "ignored", "other"]
 """What a labelled box is in evaluation and training."""
 
-_WORDS: dict[Role, tuple[str, ...]] = {
-    "ignored": ("tram", "train", "misc", "trailer", "caravan", "auto-rickshaw"),
-    "other": ("pedestrian", "person", "person sitting", "cyclist", "bicycle", "rider"),
-}
-_ROLES = {word: role for role, words in _WORDS.items() for word in words}
-
 
 class LabelSettings(Section):
     """What the labels of videos and pictures mean."""
 
-    roles: dict[str, Role] = Field(_ROLES, max_length=1000)
+    roles: dict[str, Role] = Field({}, max_length=1000)
     """vehicle: must be found. ignored: detections there are not judged. other: left out. Without a
-    role, car, truck, bus, motorcycle and vehicle are vehicles if the detector looks for them, and
-    ignored if not.
+    role, car, truck, bus, motorcycle, bicycle, person and vehicle must be found if the detector
+    looks for them, and are ignored if not.
     """
-
-    @field_validator("roles")
-    @classmethod
-    def _add_defaults(cls, roles: dict[str, Role]) -> dict[str, Role]:
-        return _ROLES | roles
 
 
 LabelPart = Literal["id", "class", "score", "distance"]

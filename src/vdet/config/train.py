@@ -75,6 +75,13 @@ class NetworkTrainingSettings(Section):
     """Height of the pictures."""
     rate: float = Field(1e-3, gt=0, le=1)
     """Highest learning rate of AdamW."""
+    classes: tuple[str, ...] = Field(
+        ("car", "truck", "bus", "motorcycle", "bicycle", "person"), min_length=1, max_length=100
+    )
+    """Classes to learn, in the order of the network's outputs."""
+    repeat: Share = 0.4
+    """Draw pictures with a class that is in a smaller share of the pictures more often. 0: do not.
+    """
     weights: dict[str, Annotated[float, Field(gt=0, le=1000)]] = Field({})
     """How often to draw pictures of a set, by its name, relative to others."""
     score: NetworkScoreSettings = NetworkScoreSettings()

@@ -2,15 +2,17 @@
 
 from functools import lru_cache
 
-OUR_NAMES = ("car", "truck", "bus", "motorcycle", "vehicle")
+OUR_NAMES = ("car", "truck", "bus", "motorcycle", "bicycle", "person", "vehicle")
 """The classes in all outputs; `vehicle` is a vehicle of unknown class."""
 
 WORDS = {
-    "car": ("car", "van", "suv", "taxi"),
-    "truck": ("truck", "lorry", "pickup", "pickup truck"),
+    "car": ("car", "van", "suv", "taxi", "pickup", "pickup truck"),
+    "truck": ("truck", "lorry"),
     "bus": ("bus", "coach"),
-    "motorcycle": ("motorcycle", "motorbike", "motor"),
-    "vehicle": ("vehicle",),
+    "motorcycle": ("motorcycle", "motorbike", "motor", "motorcyclist", "scooter"),
+    "bicycle": ("bicycle", "bike", "cyclist"),
+    "person": ("person", "pedestrian", "person sitting"),
+    "vehicle": ("vehicle", "other vehicle", "rickshaw", "auto-rickshaw", "tuk-tuk", "tempo"),
 }
 """For each of `OUR_NAMES` the words that label files and networks use."""
 

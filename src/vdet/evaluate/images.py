@@ -72,6 +72,8 @@ class MeasuredImage:
         least = counting.least_width * width
         regions = picture.ignored | (_widths(picture.boxes) < least)
         truth = _one_frame(picture.boxes, np.ones(len(regions)), regions)
+        labelled = [name not in picture.unlabelled for name in found.class_names]
+        found = found[np.flatnonzero(labelled)]
         found = found[np.argsort(-found.scores, kind="stable")[:MAX_IN_FRAME]]
         boxes, scores = found.sides, found.scores
         detected = _one_frame(boxes, scores, _widths(boxes) < least)

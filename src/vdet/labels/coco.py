@@ -133,11 +133,17 @@ class _Frame(_Image):
     time: float | None = None
 
 
+@_entry
+class _Info:
+    unlabelled_classes: tuple[str, ...] = ()
+
+
 class _Document:
     """The needed content of a COCO file.
 
     `images` and `categories` are by id; `annotations` are by the id of their image, each with its
-    number in the file. Raises `TruthError`.
+    number in the file. `unlabelled` are the classes that the file does not label although they may
+    be there: `unlabelled_classes` of its `info`, a key of our own. Raises `TruthError`.
     """
 
     def __init__(
@@ -147,11 +153,13 @@ class _Document:
         self.images: dict[int, Any] = {}
         self.categories: dict[int, Any] = {}
         self.annotations: dict[int, list[tuple[int, Any]]] = defaultdict(list)
+        self.unlabelled: tuple[str, ...] = ()
         kinds = {"images": image, "annotations": annotation, "categories": _Category}
         adapters = {name: TypeAdapter[Any](kind) for name, kind in kinds.items()}
+        adapters["info"] = TypeAdapter(_Info)
         lists = JsonLists(file)
         try:
-            for name, number, text in lists.entries(kinds):
+            for name, number, text in lists.entries(adapters):
                 self._add(name, number, adapters[name].validate_json(text, strict=True))
             if missing := kinds.keys() - lists.found:
                 raise ValueError(f"the list {min(missing)} is missing")
@@ -160,6 +168,9 @@ class _Document:
             raise TruthError(f"{path}: is not {form}{place}: {first_mistake(error)}") from error
 
     def _add(self, name: str, number: int, entry: Any) -> None:
+        if name == "info":
+            self.unlabelled = entry.unlabelled_classes
+            return
         if number == (MAX_PICTURES if name == "images" else MAX_BOXES):
             raise ValueError(f"there are more than {number:,} {name}; cut the file into parts")
         if name == "annotations":
@@ -242,8 +253,8 @@ def read_coco_pictures(path: Path) -> Iterator[LabelledPicture]:
         raise TruthError(f"{path}: cannot be read: {error.strerror}") from error
     folder = _picture_folder(path, [image.file_name for image in document.images.values()])
     for image, annotations in document.labels():
-        labels = tuple(label for _, label in annotations)
-        yield LabelledPicture(folder / image.file_name, path, labels, image.size)
+        labels, picture = tuple(label for _, label in annotations), folder / image.file_name
+        yield LabelledPicture(picture, path, labels, image.size, document.unlabelled)
 
 
 def _picture_folder(path: Path, names: Sequence[str]) -> Path:

@@ -35,6 +35,8 @@ class JsonLists:
     def entries(self, names: Container[str]) -> Iterator[tuple[str, int, str]]:
         """Yield the name of the list, the number and the text of each entry of the lists `names`.
 
+        An object of such a name is one entry.
+
         Raises
         ------
         ValueError
@@ -47,8 +49,8 @@ class JsonLists:
             if name in names and self._next() == "[":
                 self.found.add(name)
                 yield from self._list(name)
-            else:
-                self._value()
+            elif (text := self._value()).startswith("{") and name in names:
+                yield name, 0, text
             if self._take(",}") == "}":
                 break
         if self._next():

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from vdet.boxes import BoolArray, Float64Array, Image
-from vdet.detect.classes import our_name
 from vdet.errors import ImageError, TruthError, printable
 from vdet.labels.label import MAX_IN_FRAME, Label, line_error, mistake_in_box
+from vdet.labels.riders import merge_riders
 from vdet.labels.roles import DEFAULT_ROLES, Roles
 from vdet.media.images import is_picture_name, read_image
 
@@ -31,15 +31,18 @@ class LabelledPicture:
         The file of the picture, and the file of its labels.
     labels
         From a reader: all labels of the file. In `LabelledPictures`: only vehicles and ignore
-        regions, each with an area; `name` is one of `OUR_NAMES`.
+        regions, each with an area; `name` is a class of `Roles`.
     size
         Width and height of the picture in pixels; None if the labels do not contain them.
+    unlabelled
+        Classes that have no label although they may be in the picture.
     """
 
     path: Path
     file: Path
     labels: tuple[Label, ...] = ()
     size: tuple[int, int] | None = None
+    unlabelled: tuple[str, ...] = ()
 
     @property
     def boxes(self) -> Float64Array:
@@ -78,12 +81,14 @@ class LabelledPictures:
     """Labelled pictures of one source.
 
     `name` is shown in tables. `others` are the labels that are neither vehicles nor ignore regions,
-    each with the number of its boxes, the most frequent first. These boxes are left out.
+    whose boxes are left out, and `ignored` those that make a box an ignore region; each with the
+    number of its boxes, the most frequent first.
     """
 
     name: str
     pictures: tuple[LabelledPicture, ...]
     others: tuple[tuple[str, int], ...] = ()
+    ignored: tuple[tuple[str, int], ...] = ()
 
 
 def checked_pictures(
@@ -98,7 +103,7 @@ def checked_pictures(
         more than `MAX_PICTURES`, `MAX_BOXES` in all or `MAX_IN_FRAME` in one picture.
     """
     checked: dict[Path, LabelledPicture] = {}
-    others: Counter[str] = Counter()
+    counts = Counter[str](), Counter[str]()
     boxes = 0
     for picture in pictures:
         boxes += len(picture.labels)
@@ -108,18 +113,25 @@ def checked_pictures(
             )
         if picture.path in checked:
             raise TruthError(f"{name}: has the picture {printable(picture.path.name)} twice")
-        checked[picture.path] = replace(picture, labels=tuple(_with_roles(picture, roles, others)))
+        checked[picture.path] = replace(
+            picture,
+            labels=tuple(_with_roles(picture, roles, *counts)),
+            unlabelled=tuple(filter(None, map(roles.class_of, picture.unlabelled))),
+        )
     if not checked:
         raise TruthError(f"{name}: has no labelled picture")
-    return LabelledPictures(name, tuple(checked.values()), tuple(others.most_common()))
+    others, ignored = (tuple(each.most_common()) for each in counts)
+    return LabelledPictures(name, tuple(checked.values()), others, ignored)
 
 
-def _with_roles(picture: LabelledPicture, roles: Roles, others: Counter[str]) -> Iterator[Label]:
-    """Yield the vehicles and ignore regions of a picture, and count the other labels."""
+def _with_roles(
+    picture: LabelledPicture, roles: Roles, others: Counter[str], ignored: Counter[str]
+) -> Iterator[Label]:
+    """Yield the vehicles and ignore regions of a picture, and count the labels of the others."""
     if not picture.path.is_file():
         raise TruthError(f"{picture.path}: is missing; its labels are there")
     count = 0
-    for label in picture.labels:
+    for label in merge_riders(picture.labels):
         name = label.name or ""
         role = roles.role_of(name)
         if role not in ("vehicle", "ignored"):
@@ -131,8 +143,9 @@ def _with_roles(picture: LabelledPicture, roles: Roles, others: Counter[str]) ->
         if mistake:
             raise line_error(picture.file, label.place, mistake)
         count += 1
-        ignored = label.ignored or role == "ignored"
-        yield label._replace(name=our_name(name) or "vehicle", ignored=ignored)
+        ignored.update([name] if role == "ignored" and not label.ignored else [])
+        is_ignored = label.ignored or role == "ignored"
+        yield label._replace(name=roles.class_of(name) or "vehicle", ignored=is_ignored)
 
 
 def pictures_below(folder: Path) -> list[Path]:

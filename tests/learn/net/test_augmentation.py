@@ -1,11 +1,14 @@
 """Training pictures: their boxes lie where the vehicles are, whatever was changed."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from learn.net.blocks import block_picture, block_source
 from vdet.config.train import NetworkTrainingSettings
-from vdet.learn.net.augmentation import Drawing, SampleDrawer
+from vdet.learn.net.augmentation import Drawing, SampleDrawer, repeat_factors
+from vdet.learn.net.pasting import Paster
 from vdet.learn.net.sources import MAX_PIXELS, NetSample, NetSource
 from vdet.learn.net.weather import with_weather
 
@@ -94,9 +97,40 @@ def test_a_weight_makes_a_source_come_more_often() -> None:
         NetSource("other", [black_on_white().samples[0]]),
     )
     settings = NetworkTrainingSettings(weights={"other": 3})
-    drawer = SampleDrawer([one, other], settings)
+    drawer = SampleDrawer([one, other], settings.model_copy(update={"repeat": 0}))
     picks = [drawer._pick(np.random.default_rng(seed)) for seed in range(200)]
     assert 130 <= sum(pick is other.samples[0] for pick in picks) <= 170  # three in four
+
+
+def test_pictures_with_rare_classes_come_more_often() -> None:
+    cars, (bus,) = block_source(9).samples, black_on_white().samples
+    cars = [replace(each, classes=np.zeros_like(each.classes)) for each in cars]
+    bus = replace(bus, classes=np.array([1]))
+    # The bus is in a tenth of the pictures: √(0.4 / 0.1) = 2 times.
+    factors = repeat_factors([*cars, bus], np.full(10, 0.1), 0.4)
+    assert factors.tolist() == pytest.approx([1.0] * 9 + [2.0])
+
+
+def test_objects_of_rare_classes_are_pasted_with_their_boxes() -> None:
+    blocks = [replace(e, classes=np.zeros_like(e.classes)) for e in block_source(20).samples]
+    [white] = black_on_white().samples
+    rare = replace(white, classes=np.array([1]))
+    paster = Paster([*blocks, rare])
+    plain = NetSample(
+        np.full((352, 640, 3), 255, np.uint8),
+        np.zeros((0, 4), np.float32), np.zeros(0, np.int64), np.zeros(0, np.bool_),
+    )  # fmt: skip
+    drawn = [paster.paste(np.random.default_rng(seed), plain) for seed in range(40)]
+    pasted = [each for each in drawn if len(each.boxes)]
+    assert 4 <= len(pasted) <= 24
+    assert plain.image.min() == 255, "the picture itself is not changed"
+    for sample in pasted:
+        assert set(sample.classes.tolist()) == {1}
+        dark = sample.image.mean(axis=2) < 128
+        inside = np.zeros_like(dark)
+        for left, top, right, bottom in sample.boxes.round().astype(int):
+            inside[top:bottom, left:right] = True
+        assert np.mean(dark == inside) > 0.99
 
 
 def test_weather_comes_in_some_pictures_and_night_is_dark() -> None:
@@ -106,6 +140,6 @@ def test_weather_comes_in_some_pictures_and_night_is_dark() -> None:
     changed = [image for image in drawn if not np.array_equal(image, day)]
     dark = [image for image in changed if np.median(image) < 120]
     assert {image.shape for image in drawn} == {day.shape}
-    assert 50 <= len(changed) <= 140
+    assert 60 <= len(changed) <= 180
     assert 20 <= len(dark) <= 90
     assert any(image.max() > 220 for image in dark)  # lamps

@@ -27,12 +27,15 @@ from vdet.learn.net.architecture import (  # noqa: E402
 from vdet.learn.net.assignment import Vehicles, assign  # noqa: E402
 from vdet.learn.net.export import export_network, start_from  # noqa: E402
 from vdet.learn.net.losses import giou, paired_iou  # noqa: E402
-from vdet.learn.net.sources import CLASSES, NetSource  # noqa: E402
-from vdet.learn.net.training import train_network  # noqa: E402
+from vdet.learn.net.sources import UNKNOWN, NetSample, NetSource  # noqa: E402
+from vdet.learn.net.training import _uncounted, class_weights, train_network  # noqa: E402
 from vdet.media import Picture  # noqa: E402
 from vdet.testing import check_detector  # noqa: E402
 
-QUICK = NetworkTrainingSettings(steps=120, batch=4, width=256, height=128, rate=3e-3)
+CLASSES = ("car", "truck", "bus")
+QUICK = NetworkTrainingSettings(
+    steps=120, batch=4, width=256, height=128, rate=3e-3, classes=CLASSES
+)
 
 
 def box(*sides: float) -> Tensor:
@@ -138,9 +141,43 @@ def test_a_wider_network_gives_at_first_what_its_narrower_base_gives(
     export_network(base, Header(classes=CLASSES), path)
     monkeypatch.setattr(architecture, "TRUNK", ((32, 0), (64, 2), (96, 1), (128, 1)))
     wider = Network(len(CLASSES)).train()
-    start_from(wider, path, pictures)
+    start_from(wider, path, pictures, CLASSES)
     expected, found = flatten(base(pictures)), flatten(wider(pictures))
     assert torch.allclose(found, expected, atol=1e-3)
+
+
+def test_the_classes_of_a_base_are_found_by_their_names(tmp_path: Path) -> None:
+    path, pictures = tmp_path / "base.onnx", torch.rand(4, 3, 64, 96) * 255
+    base = Network(3).eval()
+    export_network(base, Header(classes=CLASSES), path)
+    other = Network(4).train()
+    start_from(other, path, pictures, ("person", "bus", "car", "bicycle"))
+    expected, found = flatten(base(pictures)), flatten(other(pictures))
+    for mine, theirs in enumerate([0, 1, 2, 3, 4, None, 7, 5, None]):
+        if theirs is not None:
+            assert torch.allclose(found[..., mine], expected[..., theirs], atol=1e-3)
+
+
+def test_what_looks_like_a_class_without_labels_is_no_background() -> None:
+    centers, _ = cell_centers(32, 64)
+    everywhere, left = [0.0, 0, 64, 32], [0.0, 0, 32, 32]
+    regions = Vehicles(
+        torch.tensor([0, 1]), torch.tensor([everywhere, left]), torch.tensor([2, UNKNOWN])
+    )
+    seen = torch.zeros(2, len(centers), dtype=torch.long)
+    seen[0, 3] = 2
+    picture, cell = _uncounted(regions, centers, seen)
+    assert cell[picture == 0].tolist() == [3]
+    assert (centers[cell[picture == 1]][:, 0] < 32).all()
+    assert (picture == 1).sum() == (centers[:, 0] < 32).sum()
+
+
+def test_rare_classes_weigh_more_and_unknown_kinds_as_much_as_the_most_frequent() -> None:
+    classes = np.array([0] * 16 + [1] * 4 + [UNKNOWN] * 2)
+    boxes = np.array([[0, 0, 9, 9]] * len(classes), np.float32)
+    sample = NetSample(np.zeros((9, 9, 3), np.uint8), boxes, classes, np.zeros(22, np.bool_))
+    weights = class_weights([NetSource("all", [sample])], 3)
+    assert weights.tolist() == [1, 2, 4, 1]
 
 
 def test_a_base_of_another_form_is_refused(tmp_path: Path) -> None:

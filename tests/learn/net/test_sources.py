@@ -1,13 +1,15 @@
 """What a training reads into memory: frames of labelled video."""
 
+import json
 from pathlib import Path
 
 import pytest
 
+from labels.writers import Boxed, Labelled, write_coco
 from strange.test_numbered_pictures import write_pictures
 from vdet.config.schema import InputSettings, Settings
 from vdet.errors import VideoError
-from vdet.learn.net.sources import CLASSES, UNKNOWN, clip_source
+from vdet.learn.net.sources import UNKNOWN, clip_source, image_source
 
 
 def test_a_damaged_video_is_learnt_from_as_far_as_the_settings_tolerate(tmp_path: Path) -> None:
@@ -16,7 +18,7 @@ def test_a_damaged_video_is_learnt_from_as_far_as_the_settings_tolerate(tmp_path
     for number in (5, 6):
         (tmp_path / f"{number}.png").write_text("no picture")
     tolerant = Settings(input=InputSettings(max_damaged=0.2))
-    assert clip_source(clip, truth, tolerant).report().vehicles == 2
+    assert clip_source(clip, truth, tolerant)[1].vehicles == {"car": 2}
     with pytest.raises(VideoError, match=r"2 of 12 frames .* more than input\.max_damaged"):
         clip_source(clip, truth, Settings())
 
@@ -26,5 +28,23 @@ def test_vehicles_of_a_labelled_video_keep_their_classes(tmp_path: Path) -> None
     rows = ["1,5,5,20,20,1,seen,lorry", "2,30,5,20,20,1,seen,vehicle", "3,5,30,20,20,1,seen,"]
     header = "frame,time,id,x,y,width,height,score,state,class"
     truth.write_text("\n".join([header, *(f"3,0.1,{row}" for row in rows)]))
-    (sample,) = clip_source(clip, truth, Settings()).samples
-    assert sample.classes.tolist() == [CLASSES.index("truck"), UNKNOWN, CLASSES.index("car")]
+    settings = Settings()
+    (sample,) = clip_source(clip, truth, settings)[0].samples
+    classes = settings.train.net.classes
+    assert sample.classes.tolist() == [classes.index("truck"), UNKNOWN, classes.index("car")]
+
+
+def test_a_class_without_labels_makes_the_picture_an_ignore_region_for_it(tmp_path: Path) -> None:
+    scene = {
+        "a": Labelled(160, 96, (Boxed("car", (20, 30, 60, 40)), Boxed("ignore", (0, 0, 9, 9))))
+    }
+    labels = write_coco(tmp_path, scene)
+    document = json.loads(labels.read_text(encoding="utf-8"))
+    document["info"]["unlabelled_classes"] = ["pedestrian"]
+    labels.write_text(json.dumps(document), encoding="utf-8")
+    settings = Settings()
+    (sample,) = image_source(tmp_path, settings)[0].samples
+    person = settings.train.net.classes.index("person")
+    assert sample.boxes.tolist() == [[20, 30, 80, 70], [0, 0, 9, 9], [0, 0, 160, 96]]
+    assert sample.classes.tolist() == [0, UNKNOWN, person]
+    assert sample.ignored.tolist() == [False, True, True]

@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 
 from conftest import Run
-from labels.writers import WRITERS, Boxed, Labelled
+from labels.writers import WRITERS, Boxed, Labelled, write_coco
 from vdet.config.schema import NetworkSettings
 from vdet.detect.factory import trained_on
-from vdet.detect.onnx.recognition import recognize
+from vdet.detect.onnx.recognition import read_header, recognize
 from vdet.detect.onnx.session import Session
 
 torch = pytest.importorskip(
@@ -35,10 +35,10 @@ def test_it_learns_from_pictures_labelled_in_each_form(run: Run, tmp_path: Path,
     folder, output = write_set(tmp_path / "my_set", form), tmp_path / "net.onnx"
     result = run("train-net", folder, "-o", output, *QUICK)
     assert result.code == 0, result.err
-    assert result.out.splitlines()[0].split() == ["my_set", "2", "pictures", "2", "vehicles"]
+    assert result.out.splitlines()[0] == "my_set: 2 pictures; 2 car"
     assert trained_on(NetworkSettings(), output) == ("my_set",)
     report = json.loads((tmp_path / "net.json").read_text(encoding="utf-8"))
-    assert (report["steps"], report["sources"][0]["vehicles"]) == (2, 2)
+    assert (report["steps"], report["sources"][0]["vehicles"]) == (2, {"car": 2})
     assert sorted(path.name for path in tmp_path.iterdir()) == ["my_set", "net.json", "net.onnx"]
     picture = next(folder.rglob("a.png"))
     found = run("detect-image", picture, "-c", "net", "--model", output, "--json", "-")
@@ -92,3 +92,29 @@ def test_a_base_that_is_not_there_is_said_before_the_training(run: Run, tmp_path
     assert result.code == 1
     assert "base.onnx: cannot be read: No such file" in result.err
     assert [path.name for path in tmp_path.iterdir()] == ["set"]
+
+
+def test_it_says_what_becomes_of_each_label(run: Run, tmp_path: Path) -> None:
+    pictures = tmp_path / "set"
+    boxes = [Boxed(name, (20, 30, 60, 40)) for name in ("car", "bus", "ignore")]
+    labels = write_coco(pictures, {"a": Labelled(160, 96, (*boxes, CAR))})
+    document = json.loads(labels.read_text(encoding="utf-8"))
+    document["info"]["unlabelled_classes"] = ["cyclist", "dog"]
+    document["categories"] += [{"id": 6, "name": "rickshaw"}, {"id": 7, "name": "person"}]
+    document["annotations"] += [
+        {"id": number, "image_id": 0, "category_id": number, "bbox": [90, 30, 30, 20]}
+        for number in (5, 6, 7)
+    ]
+    labels.write_text(json.dumps(document), encoding="utf-8")
+    classes = ("--set", 'train.net.classes=["car","bicycle","bus"]')
+    result = run("train-net", pictures, "-o", tmp_path / "net.onnx", *QUICK, *classes)
+    assert result.code == 0, result.err
+    assert result.out.splitlines()[:4] == [
+        "set: 1 picture; 2 car, 1 bus, 1 vehicle",
+        "  not labelled, so not background: bicycle",
+        "  ignored: 1 person",
+        "  background, as their label is unknown: 1 cow",
+    ]
+    header = read_header(Session(tmp_path / "net.onnx"))
+    assert header is not None
+    assert header.classes == ("car", "bicycle", "bus")

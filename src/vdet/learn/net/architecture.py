@@ -15,10 +15,10 @@ from vdet.detect.onnx import layouts
 from vdet.detect.onnx.layouts import STRIDES
 
 STEM = 16
-TRUNK = ((32, 0), (64, 2), (128, 3), (192, 2))
+TRUNK = ((32, 0), (64, 2), (160, 3), (256, 2))
 """Width of each stage, and the number of blocks behind its first one, which halves the size."""
 
-NECK = 64
+NECK = 80
 """Width of the joined levels and of the heads."""
 
 _FIRST_SCORE = 0.01

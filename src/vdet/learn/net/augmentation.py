@@ -7,9 +7,10 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from vdet.boxes import Float32Array, Image
+from vdet.boxes import BoolArray, Float32Array, Float64Array, Image
 from vdet.config.train import NetworkTrainingSettings
 from vdet.detect.onnx.preparation import GREY
+from vdet.learn.net.pasting import Paster
 from vdet.learn.net.sources import NetSample, NetSource, join
 from vdet.learn.net.weather import with_weather
 
@@ -41,7 +42,8 @@ class Drawing:
 class SampleDrawer:
     """Draws training pictures from sources.
 
-    The probability of a source is proportional to its weight and to the square root of its size.
+    The probability of a source is proportional to its weight and to the square root of its size,
+    that of a picture in it to `repeat_factors`.
 
     Parameters
     ----------
@@ -50,10 +52,19 @@ class SampleDrawer:
     """
 
     def __init__(self, sources: Sequence[NetSource], settings: NetworkTrainingSettings) -> None:
-        self._sources = sources
-        counts = [len(source.samples) for source in sources]
-        weights = np.sqrt(counts) * [settings.weights.get(source.name, 1.0) for source in sources]
-        self._shares = weights / weights.sum()
+        self._samples = [sample for source in sources for sample in source.samples]
+        shares = np.concatenate(
+            [
+                np.full(
+                    len(each.samples),
+                    settings.weights.get(each.name, 1.0) / len(each.samples) ** 0.5,
+                )
+                for each in sources
+            ]
+        )
+        factors = repeat_factors(self._samples, shares / shares.sum(), settings.repeat)
+        self._shares = shares * factors / (shares * factors).sum()
+        self._paster = Paster(self._samples)
 
     def draw(self, rng: np.random.Generator, drawing: Drawing) -> NetSample:
         """Return one training picture with the vehicles in it."""
@@ -64,13 +75,13 @@ class SampleDrawer:
             sample = _place(rng, self._pick(rng), (drawing.width, drawing.height), scale)
         if rng.random() < 0.5:
             sample = _mirrored(sample)
-        visible = sample.boxes[~sample.ignored]
+        sample = self._paster.paste(rng, sample)
+        visible = sample.boxes[~sample.ignored & _may_have_lamps(sample.boxes)]
         image = with_weather(rng, _recolored(rng, sample.image), visible)
         return _without_small(replace(sample, image=_with_noise(rng, image)))
 
     def _pick(self, rng: np.random.Generator) -> NetSample:
-        source = self._sources[int(rng.choice(len(self._sources), p=self._shares))]
-        return source.samples[int(rng.integers(len(source.samples)))]
+        return self._samples[int(rng.choice(len(self._samples), p=self._shares))]
 
     def _mosaic(self, rng: np.random.Generator, drawing: Drawing) -> NetSample:
         """Return four pictures that meet in a random point."""
@@ -88,6 +99,35 @@ class SampleDrawer:
             moved = part.boxes + np.array([left, top, left, top], np.float32)
             parts.append(replace(part, boxes=moved))
         return join(parts, image)
+
+
+def _may_have_lamps(boxes: Float32Array) -> BoolArray:
+    """Return which boxes are no narrower than vehicles; people are."""
+    sides = boxes[:, 2:] - boxes[:, :2]
+    return np.asarray(sides[:, 0] > 0.45 * sides[:, 1], np.bool_)
+
+
+def repeat_factors(
+    samples: Sequence[NetSample], shares: Float64Array, threshold: float
+) -> Float64Array:
+    """Return how many times more often each picture is drawn for the rarest class in it.
+
+    A class in a fraction f of the pictures, fewer than `threshold`, gives √(threshold / f).
+    Source: Gupta et al., "LVIS", 2019 (repeat factor sampling).
+
+    Parameters
+    ----------
+    shares
+        Float64 `(n,)`: the probability of each picture before; the sum is 1.
+    """
+    present = [np.unique(each.classes[~each.ignored]) for each in samples]
+    count = 1 + max((int(each.max()) for each in present if len(each)), default=0)
+    has = np.zeros((len(samples), count + 1), np.bool_)  # the last column: unknown kinds
+    for row, each in zip(has, present, strict=True):
+        row[each] = True
+    fractions = np.maximum(shares @ has[:, :count], 1e-9)
+    factors = np.maximum(1.0, np.sqrt(threshold / fractions))
+    return np.asarray(np.where(has[:, :count], factors, 1.0).max(axis=1), np.float64)
 
 
 def _scale(rng: np.random.Generator, limits: tuple[float, float]) -> float:
@@ -137,16 +177,18 @@ def _cropped(sample: NetSample) -> NetSample:
     limits = np.array([width, height, width, height], np.float32)
     cut = np.clip(sample.boxes, 0, limits)
     left = _areas(cut) / np.maximum(_areas(sample.boxes), 1e-6)
-    ignored = sample.ignored | (left < _LEAST_VISIBLE)
     keep = _areas(cut) > 0
-    return NetSample(sample.image, cut[keep], sample.classes[keep], ignored[keep])
+    cropped = replace(sample, boxes=cut).ignoring(left < _LEAST_VISIBLE)
+    return NetSample(
+        sample.image, cropped.boxes[keep], cropped.classes[keep], cropped.ignored[keep]
+    )
 
 
 def _without_small(sample: NetSample) -> NetSample:
     """Ignore vehicles that are too small to be found."""
     sides = sample.boxes[:, 2:] - sample.boxes[:, :2]
     small = (sides.max(1, initial=0) < LEAST_SIDE) | (sides.min(1, initial=1e9) < LEAST_SIDE / 2)
-    return replace(sample, ignored=sample.ignored | small)
+    return sample.ignoring(small)
 
 
 def _mirrored(sample: NetSample) -> NetSample:

@@ -8,6 +8,7 @@ import copy
 import io
 import json
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,8 @@ import torch
 from onnx import numpy_helper
 from torch import Tensor, nn
 
-from vdet.detect.onnx.recognition import HEADER_KEY, Header
+from vdet.detect.onnx.recognition import HEADER_KEY, Header, read_header
+from vdet.detect.onnx.session import Session
 from vdet.errors import DataError
 from vdet.files import staged
 from vdet.learn.net.architecture import Network
@@ -71,15 +73,18 @@ def export_network(
 
 
 @torch.no_grad()
-def start_from(network: Network, path: Path, pictures: Tensor) -> None:
+def start_from(network: Network, path: Path, pictures: Tensor, classes: Sequence[str]) -> None:
     """Give a network the weights of a file that `export_network` has written.
 
     Normalisation is part of the convolutions there. Each normalisation of the network gets the
     mean and deviation of what it sees in some pictures, and undoes itself at first. Layers may be
     wider than those of the file: further channels have random weights and change no output yet.
+    So have classes that the file does not know.
 
     Parameters
     ----------
+    classes
+        Those of the network, in its order.
     pictures
         BGR, 0 to 255, float32 `(B, 3, H, W)`: at least a batch as the training shows them.
 
@@ -95,16 +100,23 @@ def start_from(network: Network, path: Path, pictures: Tensor) -> None:
         if isinstance(layer, nn.Conv2d):
             weight, bias = next(folded)
             factor = 1 / 255 if layer is network.stem else 1.0
-            _fill(layer.weight, weight / factor)
+            if layer.bias is None:
+                rows = list(range(len(weight)))
+            else:  # a head: its classes may be others, or in another order
+                rows, weight, bias = list(places), weight[list(columns)], bias[list(columns)]
+                layer.bias[rows] = bias
+            _fill(layer.weight, rows, weight / factor)
             biases.append(bias)
-            if layer.bias is not None:
-                layer.bias.copy_(bias)
         elif isinstance(layer, nn.BatchNorm2d):
             _undo(layer, inputs[0], biases[-1])
 
     layers = [each for each in network.modules() if isinstance(each, nn.Conv2d | nn.BatchNorm2d)]
     hooks = [layer.register_forward_pre_hook(load) for layer in layers]
     try:
+        header = read_header(Session(path))
+        theirs = header.classes if header else ()
+        pairs = [(5 + n, 5 + classes.index(c)) for n, c in enumerate(theirs) if c in classes]
+        columns, places = zip(*((n, n) for n in range(5)), *pairs, strict=True)
         folded = iter(_convolutions(path))
         network(pictures)
         if next(folded, None) is not None:
@@ -130,11 +142,10 @@ def _convolutions(path: Path) -> list[tuple[Tensor, Tensor]]:
     ]
 
 
-def _fill(weight: Tensor, known: Tensor) -> None:
-    """Set the weights of the first channels; these do not depend on the other channels."""
-    outputs, inputs = known.shape[:2]
-    weight[:outputs] = 0
-    weight[:outputs, :inputs] = known
+def _fill(weight: Tensor, rows: Sequence[int], known: Tensor) -> None:
+    """Set the weights of the channels `rows`; these do not depend on further inputs."""
+    weight[rows] = 0
+    weight[rows, : known.shape[1]] = known
 
 
 def _undo(norm: nn.BatchNorm2d, inputs: Tensor, bias: Tensor) -> None:

@@ -5,7 +5,7 @@ from torch import Tensor
 from torch.nn import functional
 
 BOX_WEIGHT = 2.0
-CLASS_WEIGHT = 0.3
+CLASS_WEIGHT = 0.4
 
 
 def paired_iou(a: Tensor, b: Tensor) -> Tensor:

@@ -2,16 +2,17 @@
 
 import time
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from vdet.config.schema import Settings
 from vdet.detect.onnx.recognition import Header, read_header
 from vdet.detect.onnx.session import Session
+from vdet.errors import printable
 from vdet.files import write_json
 from vdet.learn.net.export import export_network
-from vdet.learn.net.sources import CLASSES, SourceReport, clip_source, image_source
+from vdet.learn.net.sources import Counts, Source, SourceReport, clip_source, image_source
 from vdet.learn.net.training import StepProgress, train_network
 from vdet.version import __version__
 
@@ -63,20 +64,53 @@ class NetworkMetrics:
 
     def lines(self) -> Iterator[str]:
         """Yield the metrics as lines of text."""
-        for source in self.sources:
-            yield f"{source.name:<28}{source.pictures:6d} pictures {source.vehicles:8d} vehicles"
         loss = "" if self.loss is None else f"; loss at the end {self.loss:.3f}"
         duration = f"{self.steps:,} steps, {self.seconds / 60:.1f} minutes"
         yield f"{self.parameters:,} parameters after {duration}{loss}"
 
 
-def train_to_file(job: NetworkJob, settings: Settings, *, progress: StepProgress) -> NetworkMetrics:
-    """Train a network, write it with its metrics, and remove the checkpoint.
+def read_sources(job: NetworkJob, settings: Settings) -> list[Source]:
+    """Read all pictures of a training into memory.
 
     Raises
     ------
     TruthError, ImageError, VideoError
         Pictures, videos or their labels cannot be read.
+    """
+    sources = [image_source(path, settings) for path in job.pictures]
+    return sources + [clip_source(video, truth, settings) for video, truth in job.clips]
+
+
+def source_lines(reports: Sequence[SourceReport]) -> Iterator[str]:
+    """Yield as lines of text what a training learns of its sources, and what not."""
+    for each in reports:
+        learnt = _counted(each.vehicles) or "nothing to learn"
+        plural = "" if each.pictures == 1 else "s"
+        yield f"{each.name}: {each.pictures:,} picture{plural}; {learnt}"
+        if each.unlabelled:
+            yield f"  not labelled, so not background: {', '.join(each.unlabelled)}"
+        if each.ignored:
+            yield f"  ignored: {_counted(each.ignored)}"
+        if each.background:
+            yield f"  background, as their label is unknown: {_counted(each.background)}"
+
+
+def _counted(counts: Counts) -> str:
+    return ", ".join(f"{count:,} {printable(name)}" for name, count in counts.items())
+
+
+def train_to_file(
+    job: NetworkJob, sources: Sequence[Source], settings: Settings, *, progress: StepProgress
+) -> NetworkMetrics:
+    """Train a network, write it with its metrics, and remove the checkpoint.
+
+    Parameters
+    ----------
+    sources
+        Those of `read_sources`.
+
+    Raises
+    ------
     ModelError
         The base cannot be read.
     DataError
@@ -88,8 +122,6 @@ def train_to_file(job: NetworkJob, settings: Settings, *, progress: StepProgress
     began = time.monotonic()
     checkpoint = job.output.with_suffix(".ckpt")
     base = read_header(Session(job.base)) if job.base else None
-    sources = [image_source(path, settings) for path in job.pictures]
-    sources += [clip_source(video, truth, settings) for video, truth in job.clips]
     learning = settings.train.net
     losses: deque[float] = deque(maxlen=_AVERAGED)
 
@@ -97,16 +129,18 @@ def train_to_file(job: NetworkJob, settings: Settings, *, progress: StepProgress
         losses.append(loss)
         progress(step, loss)
 
-    network = train_network(sources, learning, checkpoint, base=job.base, progress=advance)
+    network = train_network(
+        [each for each, _ in sources], learning, checkpoint, base=job.base, progress=advance
+    )
     report = NetworkMetrics(
-        sources=tuple(source.report() for source in sources),
+        sources=tuple(report for _, report in sources),
         steps=learning.steps,
         parameters=sum(each.numel() for each in network.parameters()),
         seconds=round(time.monotonic() - began, 1),
         loss=round(sum(losses) / len(losses), 4) if losses else None,
     )
     header = Header(
-        classes=CLASSES,
+        classes=learning.classes,
         pixels=learning.width * learning.height,
         calibration=learning.score,
         provenance={

@@ -1,9 +1,9 @@
 """Labelled pictures and videos in memory, from which the training draws."""
 
 import hashlib
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
@@ -11,21 +11,17 @@ import numpy as np
 
 from vdet.boxes import BoolArray, Float32Array, Image, Int64Array
 from vdet.config.schema import Settings
-from vdet.detect.classes import our_name
 from vdet.labels.label import Label
-from vdet.labels.pictures import LabelledPicture
+from vdet.labels.pictures import LabelledPicture, LabelledPictures
 from vdet.labels.reading import read_labelled_pictures, read_true_labels
 from vdet.labels.roles import Roles
 from vdet.media.reader import VideoReader
-
-CLASSES = ("car", "truck", "bus")
-"""The classes that the network tells apart, in its order."""
 
 MAX_PIXELS = 640_000
 """Pictures are held with at most this many pixels; larger ones are scaled down."""
 
 UNKNOWN = -1
-"""The class of a vehicle whose kind is not known."""
+"""The class of a vehicle whose kind is not known, and of an ignore region for all classes."""
 
 EVERY = 4
 """Every N-th frame of a labelled video is used: neighbours are nearly equal."""
@@ -42,9 +38,11 @@ class NetSample:
     boxes
         float32 `(n, 4)`: x1, y1, x2, y2, pixels of `image`.
     classes
-        int64 `(n,)`, `UNKNOWN` for a vehicle whose kind is not known.
+        int64 `(n,)`: indices in `train.net.classes`; `UNKNOWN` for a vehicle whose kind is not
+        known.
     ignored
-        bool `(n,)`: the box is an ignore region, neither vehicle nor background.
+        bool `(n,)`: the box is an ignore region, neither vehicle nor background. With a class, it
+        is one only where the network sees that class.
     """
 
     image: Image
@@ -63,14 +61,38 @@ class NetSample:
         scale = np.array([size[0] / width, size[1] / height] * 2, np.float32)
         return NetSample(image, self.boxes * scale, self.classes, self.ignored)
 
+    def ignoring(self, rows: BoolArray) -> "NetSample":
+        """Return the sample with further boxes as ignore regions for all classes."""
+        classes = np.where(rows & ~self.ignored, UNKNOWN, self.classes)
+        return replace(self, classes=classes, ignored=self.ignored | rows)
+
+
+Counts = dict[str, int]
+"""The number of boxes by label or class."""
+
 
 @dataclass(frozen=True, slots=True)
 class SourceReport:
-    """The name of a source, its pictures and vehicles, and a SHA-256 of pictures and labels."""
+    """What a training makes of a source.
+
+    Attributes
+    ----------
+    vehicles
+        The objects to learn by class; "vehicle" are those of unknown kind.
+    ignored, background
+        The labels that are not learnt: neither object nor background, or background.
+    unlabelled
+        The classes that the source does not label; what looks like them is not background.
+    sha256
+        Of pictures and labels.
+    """
 
     name: str
     pictures: int
-    vehicles: int
+    vehicles: Counts
+    ignored: Counts
+    background: Counts
+    unlabelled: tuple[str, ...]
     sha256: str
 
 
@@ -81,18 +103,15 @@ class NetSource:
     name: str
     samples: Sequence[NetSample]
 
-    def report(self) -> SourceReport:
-        """Count pictures and vehicles, and compute the SHA-256."""
-        digest = hashlib.sha256()
-        for sample in self.samples:
-            for part in (sample.image, sample.boxes, sample.classes, sample.ignored):
-                digest.update(part.tobytes())
-        vehicles = sum(int(np.count_nonzero(~sample.ignored)) for sample in self.samples)
-        return SourceReport(self.name, len(self.samples), vehicles, digest.hexdigest())
+
+Source = tuple[NetSource, SourceReport]
+"""A source, and what a training makes of it."""
 
 
-def image_source(path: Path, settings: Settings) -> NetSource:
-    """Read a set of labelled pictures into memory; `settings` has the roles of labels.
+def image_source(path: Path, settings: Settings) -> Source:
+    """Read a set of labelled pictures into memory.
+
+    `settings` has the classes to learn and the roles of labels.
 
     Raises
     ------
@@ -101,15 +120,17 @@ def image_source(path: Path, settings: Settings) -> NetSource:
     ImageError
         A picture cannot be read.
     """
-    labelled = read_labelled_pictures(path, Roles.from_settings(settings))
-    samples = [_sample(each.read(), each) for each in labelled.pictures]
-    return NetSource(Path(labelled.name).resolve().name, samples)
+    labelled = read_labelled_pictures(path, Roles.for_training(settings))
+    classes = settings.train.net.classes
+    samples = [_sample(each.read(), each, classes) for each in labelled.pictures]
+    source = NetSource(Path(labelled.name).resolve().name, samples)
+    return source, _report(source, classes, labelled)
 
 
-def clip_source(video: Path, truth_file: Path, settings: Settings) -> NetSource:
+def clip_source(video: Path, truth_file: Path, settings: Settings) -> Source:
     """Read every `EVERY`-th frame of a labelled video into memory; vehicles without label are cars.
 
-    `settings` has the roles of labels, and how much damage is tolerated.
+    `settings` has the classes to learn, the roles of labels, and how much damage is tolerated.
 
     Raises
     ------
@@ -119,23 +140,58 @@ def clip_source(video: Path, truth_file: Path, settings: Settings) -> NetSource:
         The video cannot be read, or is too damaged.
     """
     frames: dict[int, list[Label]] = defaultdict(list)
-    for label in read_true_labels(truth_file, Roles.from_settings(settings)):
-        name = our_name(label.name or "car") or "vehicle"
+    roles = Roles.for_training(settings)
+    for label in read_true_labels(truth_file, roles):
+        name = roles.class_of(label.name or "car") or "vehicle"
         frames[label.frame].append(label._replace(name=name))
     samples = []
     with VideoReader(video, frames=max(frames, default=0), settings=settings.input) as reader:
         for number, frame in enumerate(reader, start=1):
             if number % EVERY == 0:
                 labelled = LabelledPicture(video, truth_file, tuple(frames[number]))
-                samples.append(_sample(frame.image, labelled))
-    return NetSource(video.name, samples)
+                samples.append(_sample(frame.image, labelled, settings.train.net.classes))
+    source, classes = NetSource(video.name, samples), settings.train.net.classes
+    return source, _report(source, classes, LabelledPictures(video.name, ()))
 
 
-def _sample(image: Image, labelled: LabelledPicture) -> NetSample:
-    names, boxes = labelled.classes, labelled.boxes.astype(np.float32)
-    classes = [CLASSES.index(name) if name in CLASSES else UNKNOWN for name in names]
-    ignored = labelled.ignored | np.array([n not in (*CLASSES, "vehicle") for n in names], np.bool_)
-    return NetSample(image, boxes, np.array(classes, np.int64), ignored).shrunk()
+def _report(source: NetSource, classes: Sequence[str], labelled: LabelledPictures) -> SourceReport:
+    """Count what is learnt and what is not, and compute the SHA-256."""
+    digest = hashlib.sha256()
+    names, vehicles = (*classes, "vehicle"), Counter[str]()
+    for sample in source.samples:
+        for part in (sample.image, sample.boxes, sample.classes, sample.ignored):
+            digest.update(part.tobytes())
+        vehicles.update(names[each] for each in sample.classes[~sample.ignored].tolist())
+    unlabelled = {name for each in labelled.pictures for name in each.unlabelled}
+    return SourceReport(
+        source.name,
+        len(source.samples),
+        {name: vehicles[name] for name in names if vehicles[name]},
+        dict(labelled.ignored),
+        dict(labelled.others),
+        tuple(name for name in classes if name in unlabelled),
+        digest.hexdigest(),
+    )
+
+
+def _sample(image: Image, labelled: LabelledPicture, classes: Sequence[str]) -> NetSample:
+    """Return a sample; the whole picture is an ignore region for each class without labels."""
+    whole = np.array([[0, 0, image.shape[1], image.shape[0]]] * len(classes), np.float32)
+    unlabelled = [classes.index(name) for name in labelled.unlabelled if name in classes]
+    named = [classes.index(name) if name in classes else UNKNOWN for name in labelled.classes]
+    objects = NetSample(
+        image,
+        labelled.boxes.astype(np.float32),
+        np.array(named, np.int64),
+        np.zeros(len(named), np.bool_),
+    ).ignoring(labelled.ignored)
+    regions = NetSample(
+        image,
+        whole[: len(unlabelled)],
+        np.array(unlabelled, np.int64),
+        np.ones(len(unlabelled), np.bool_),
+    )
+    return join([objects, regions], image).shrunk()
 
 
 def join(samples: Sequence[NetSample], image: Image) -> NetSample:

@@ -21,7 +21,7 @@ from vdet.learn.net.assignment import Vehicles, assign
 from vdet.learn.net.augmentation import Drawing, SampleDrawer
 from vdet.learn.net.export import start_from
 from vdet.learn.net.losses import BOX_WEIGHT, CLASS_WEIGHT, giou, quality_focal_loss
-from vdet.learn.net.sources import CLASSES, UNKNOWN, NetSample, NetSource, join
+from vdet.learn.net.sources import UNKNOWN, NetSample, NetSource, join
 from vdet.run.threads import prefetch
 
 CHECKPOINT = 500
@@ -40,6 +40,10 @@ _LAST_RATE = 0.02
 """Last learning rate, as a share of the highest."""
 _WEIGHT_DECAY = 0.02
 _LONGEST_GRADIENT = 10.0
+_BALANCE = 0.5
+"""Exponent of the frequency of a class, relative to the most frequent one, in its weight."""
+_MOST_WEIGHT = 6.0
+"""Largest weight of a class."""
 _AVERAGE = 0.998
 """Share that the moving average of the weights keeps at each step."""
 _MAGNIFIED = 1.4  # scale of the small pictures, whose vehicles would be too small
@@ -116,7 +120,7 @@ def train_network(
         **settings.model_dump(exclude={"score"}),  # it changes no weight
     }
     with _fast_torch():
-        run = _Run(settings, learnt_with)
+        run = _Run(settings, learnt_with, class_weights(sources, len(settings.classes)))
         if checkpoint.exists():
             run.restore(checkpoint)
         elif base is not None:
@@ -157,11 +161,17 @@ def _fast_torch() -> Iterator[None]:
 class _Run:
     """The state of a training between two steps."""
 
-    def __init__(self, settings: NetworkTrainingSettings, learnt_with: dict[str, Any]) -> None:
+    def __init__(
+        self,
+        settings: NetworkTrainingSettings,
+        learnt_with: dict[str, Any],
+        class_weights: Tensor,
+    ) -> None:
         torch.manual_seed(_SEED)
         self._settings = settings
         self._learnt_with = learnt_with
-        self._network = Network(len(CLASSES)).to(memory_format=torch.channels_last).train()
+        self._class_weights = class_weights
+        self._network = Network(len(settings.classes)).to(memory_format=torch.channels_last).train()
         self.averaged = copy.deepcopy(self._network)
         weights = [each for each in self._network.parameters() if each.ndim > 1]
         others = [each for each in self._network.parameters() if each.ndim <= 1]
@@ -176,7 +186,7 @@ class _Run:
 
     def start_from(self, path: Path, batch: Batch) -> None:
         """Take the first weights from an exported network. Raises `DataError`."""
-        start_from(self._network, path, batch.pictures)
+        start_from(self._network, path, batch.pictures, self._settings.classes)
         self.averaged.load_state_dict(self._network.state_dict())
 
     @property
@@ -194,7 +204,7 @@ class _Run:
         """Do one step and return its loss."""
         for group in self._optimizer.param_groups:
             group["lr"] = self.rate
-        loss = _loss(self._network, batch)
+        loss = _loss(self._network, batch, self._class_weights)
         self._optimizer.zero_grad()
         loss.backward()  # type: ignore[no-untyped-call]
         torch.nn.utils.clip_grad_norm_(self._network.parameters(), _LONGEST_GRADIENT)
@@ -232,7 +242,19 @@ class _Run:
             raise DataError(f"{path}: belongs to a training {others}; remove it")
 
 
-def _loss(network: Network, batch: Batch) -> Tensor:
+def class_weights(sources: Sequence[NetSource], count: int) -> Tensor:
+    """Return the weight of each class in the loss, float32 `(count + 1,)`; rare ones have more.
+
+    The last one is that of vehicles of unknown kind, 1. The most frequent class has 1 too.
+    """
+    found = np.zeros(count + 1)
+    for sample in (sample for source in sources for sample in source.samples):
+        found += np.bincount(sample.classes[~sample.ignored] % (count + 1), minlength=count + 1)
+    weights = (found[:count].max() / np.maximum(found, 1)) ** _BALANCE
+    return torch.tensor([*np.minimum(weights[:count], _MOST_WEIGHT), 1.0], dtype=torch.float32)
+
+
+def _loss(network: Network, batch: Batch, weights: Tensor) -> Tensor:
     height, width = batch.pictures.shape[2:]
     centers, strides = cell_centers(height, width)
     raw = flatten(network(batch.pictures))
@@ -241,21 +263,28 @@ def _loss(network: Network, batch: Batch) -> Tensor:
     cells = batch.vehicles.picture[row], cell
     targets = torch.zeros_like(scores)
     targets[cells] = iou
+    classes = batch.vehicles.classes[row]
     counted = torch.ones_like(scores)
-    counted[_inside(batch.ignored, centers)] = 0
-    counted[cells] = 1
+    counted[_uncounted(batch.ignored, centers, raw[..., 5:].detach().argmax(-1))] = 0
+    counted[cells] = weights[classes].sqrt()
     whole = iou.sum().clamp(min=1)
     score_loss = (quality_focal_loss(scores, targets) * counted).sum() / whole
     box_loss = ((1 - giou(boxes[cells], batch.vehicles.boxes[row])) * iou).sum() / whole
-    classes, outputs = batch.vehicles.classes[row], raw[..., 5:][cells]
-    class_loss = functional.cross_entropy(outputs, classes, ignore_index=UNKNOWN, reduction="sum")
+    class_loss = functional.cross_entropy(
+        raw[..., 5:][cells], classes, weights[:-1], ignore_index=UNKNOWN, reduction="sum"
+    )
     return score_loss + BOX_WEIGHT * box_loss + CLASS_WEIGHT * class_loss / max(len(iou), 1)
 
 
-def _inside(ignored: Vehicles, centers: Tensor) -> tuple[Tensor, Tensor]:
-    """Return the picture and the cell of all cells whose middle lies in an ignore region."""
+def _uncounted(ignored: Vehicles, centers: Tensor, seen: Tensor) -> tuple[Tensor, Tensor]:
+    """Return the picture and the cell of all cells whose middle lies in an ignore region.
+
+    Of a region with a class, only the cells that see it: `seen` is the best class `(B, cells)`.
+    """
     boxes = ignored.boxes[:, None]
     inside = ((centers > boxes[..., :2]) & (centers < boxes[..., 2:])).all(-1)
+    classes = ignored.classes[:, None]
+    inside &= (classes == UNKNOWN) | (classes == seen[ignored.picture])
     row, cell = torch.nonzero(inside, as_tuple=True)
     return ignored.picture[row], cell
 

@@ -1,14 +1,18 @@
-"""Night, fog and rain, drawn into pictures of clear days."""
+"""Night, fog, rain and drops on the glass, drawn into pictures of clear days."""
 
 import cv2
 import numpy as np
 
 from vdet.boxes import Float32Array, Image
 
-_NIGHT = 0.12  # share of pictures
-_FOG = 0.05
-_RAIN = 0.06
-_LAMP = (0.03, 0.09)  # radius of a lamp's glare, share of the vehicle's width; least and most
+_NIGHT = 0.14  # fraction of pictures
+_DARK = 70.0  # mean of a picture that is not darkened further
+_FOG = 0.06
+_RAIN = 0.1
+_LAMP = (0.03, 0.09)  # radius of a lamp, fraction of the vehicle's width; least and most
+_TWO_LAMPS = 0.75  # least width of a vehicle with two lamps, fraction of its height
+_WIPED = 0.15  # fraction of pictures in rain with a wiper
+_DROPS = 40  # most drops on the glass
 
 
 def with_weather(rng: np.random.Generator, image: Image, boxes: Float32Array) -> Image:
@@ -21,7 +25,9 @@ def with_weather(rng: np.random.Generator, image: Image, boxes: Float32Array) ->
     """
     chance = rng.random()
     if chance < _NIGHT:
-        return _at_night(rng, image, boxes)
+        if image.mean() > _DARK:
+            image = _at_night(rng, image, boxes)
+        return _with_drops(rng, image) if rng.random() < 0.2 else image
     if chance < _NIGHT + _FOG:
         return _in_fog(rng, image)
     if chance < _NIGHT + _FOG + _RAIN:
@@ -30,8 +36,11 @@ def with_weather(rng: np.random.Generator, image: Image, boxes: Float32Array) ->
 
 
 def _at_night(rng: np.random.Generator, image: Image, boxes: Float32Array) -> Image:
-    """Darken the picture, tint it, and light the lamps of vehicles and some others."""
-    dark = (image / 255.0) ** rng.uniform(1.1, 2.0) * rng.uniform(0.3, 0.8)
+    """Darken the picture, tint it, and light the lamps of vehicles and some others.
+
+    The lamps of some pictures glare, and a wet road reflects them.
+    """
+    dark = (image / 255.0) ** rng.uniform(1.1, 2.0) * rng.uniform(0.2, 0.8)
     dark *= rng.uniform(0.75, 1.15, 3)
     light = np.zeros(image.shape, np.float32)
     for x1, y1, x2, y2 in boxes[rng.random(len(boxes)) < 0.8]:
@@ -39,7 +48,8 @@ def _at_night(rng: np.random.Generator, image: Image, boxes: Float32Array) -> Im
         radius = max(1.0, (x2 - x1) * rng.uniform(*_LAMP))
         y = y1 + (y2 - y1) * rng.uniform(0.5, 0.75)
         inset = (x2 - x1) * rng.uniform(0.08, 0.25)
-        for x in (x1 + inset, x2 - inset):
+        is_wide = x2 - x1 > _TWO_LAMPS * (y2 - y1)
+        for x in (x1 + inset, x2 - inset) if is_wide else ((x1 + x2) / 2,):
             cv2.circle(light, (round(float(x)), round(float(y))), round(float(radius)), color, -1)
     height, width = image.shape[:2]
     for _ in range(int(rng.integers(0, 5))):  # lamps of the street
@@ -47,6 +57,10 @@ def _at_night(rng: np.random.Generator, image: Image, boxes: Float32Array) -> Im
         cv2.circle(light, place, int(rng.integers(1, 4)), (0.6, 0.85, 1.0), -1)
     bloom = cv2.GaussianBlur(light, (0, 0), width * rng.uniform(0.004, 0.02))
     lit = dark + light + bloom * rng.uniform(0.5, 2.5)
+    if rng.random() < 0.3:  # a wet road
+        length = int(height * rng.uniform(0.1, 0.25))
+        mirrored = cv2.blur(light, (3, 2 * length + 1), anchor=(1, 2 * length))
+        lit += mirrored * rng.uniform(1, 4)
     return np.asarray(np.clip(lit * 255, 0, 255), np.uint8)
 
 
@@ -59,28 +73,62 @@ def _lamp_color(rng: np.random.Generator) -> tuple[float, float, float]:
 
 def _in_fog(rng: np.random.Generator, image: Image) -> Image:
     """Blend the picture with grey, more so at the top."""
-    top = rng.uniform(0.3, 0.8)
+    top = rng.uniform(0.3, 0.85)
     share = np.linspace(top, top * rng.uniform(0.2, 0.8), len(image))[:, np.newaxis, np.newaxis]
     fogged = image * (1 - share) + rng.uniform(120, 220) * share
     return np.asarray(fogged, np.uint8)
 
 
 def _in_rain(rng: np.random.Generator, image: Image) -> Image:
-    """Dull the picture and draw streaks, and sometimes drops on the glass."""
+    """Dull the picture and draw streaks; often with drops on the glass, sometimes with a wiper."""
     height, width = image.shape[:2]
     rain = np.zeros((height, width), np.uint8)
     slant = rng.uniform(-0.3, 0.3)
-    for _ in range(int(width * height * rng.uniform(0.0005, 0.003))):
+    for _ in range(int(width * height * rng.uniform(0, 0.003))):
         x, y = int(rng.integers(width)), int(rng.integers(height))
         length = rng.uniform(0.01, 0.05) * height
         end = round(x + slant * length), round(y + length)
         cv2.line(rain, (x, y), end, int(rng.integers(60, 200)), 1)
     streaks = cv2.GaussianBlur(rain, (0, 0), 0.7)[..., np.newaxis] / 255.0
-    wet = image * rng.uniform(0.5, 0.9) * (1 - streaks) + 200 * streaks
+    grey, veil = rng.uniform(90, 190), rng.uniform(0, 0.6)  # low contrast, as behind spray
+    wet = (image * (1 - veil) + grey * veil) * rng.uniform(0.6, 1.0) * (1 - streaks) + 200 * streaks
     result = np.asarray(np.clip(wet, 0, 255), np.uint8)
-    for _ in range(int(rng.integers(0, 6))):
-        x, y = int(rng.integers(width)), int(rng.integers(height))
-        size = max(3, int(rng.uniform(0.01, 0.04) * width))
-        part = result[y : y + size, x : x + size]
-        part[:] = cv2.blur(part, (size | 1, size | 1))
+    if rng.random() < 0.7:
+        result = _with_drops(rng, result)
+    if rng.random() < _WIPED:
+        result = _with_wiper(rng, result)
     return result
+
+
+def _with_drops(rng: np.random.Generator, image: Image) -> Image:
+    """Draw drops on the glass: each shows a blurred, upside-down picture of what is around it."""
+    height, width = image.shape[:2]
+    blurred = cv2.GaussianBlur(image, (0, 0), 0.004 * width * rng.uniform(0.5, 2))
+    shown, mask = blurred.copy(), np.zeros((height, width), np.uint8)
+    for _ in range(int(rng.integers(3, _DROPS))):
+        radius = max(2, int(width * 0.025 * rng.random() ** 2))
+        x, y = int(rng.integers(width)), int(rng.integers(height))
+        left, top = max(0, x - 2 * radius), max(0, y - 2 * radius)
+        around = blurred[top : y + 2 * radius, left : x + 2 * radius][::-1, ::-1]
+        part = shown[top : y + radius, left : x + radius]
+        if min(part.shape[:2]) < 2:
+            continue
+        size = part.shape[1], part.shape[0]
+        bright = cv2.resize(around, size, interpolation=cv2.INTER_AREA) * rng.uniform(0.7, 1.3)
+        part[:] = np.clip(bright, 0, 255)
+        axes = radius, max(2, int(radius * rng.uniform(0.8, 1.6)))
+        cv2.ellipse(mask, (x, y), axes, 0, 0, 360, 255, -1)
+    alpha = cv2.GaussianBlur(mask, (0, 0), 1.5)[..., np.newaxis] / 255.0
+    return np.asarray(image * (1 - alpha) + shown * alpha, np.uint8)
+
+
+def _with_wiper(rng: np.random.Generator, image: Image) -> Image:
+    """Draw a dark, blurred wiper and what it smears."""
+    height, width = image.shape[:2]
+    mask = np.zeros((height, width), np.uint8)
+    foot = int(rng.integers(width)), height
+    tip = int(foot[0] + rng.uniform(-0.6, 0.6) * width), int(height * rng.uniform(0, 0.5))
+    cv2.line(mask, foot, tip, 255, max(2, int(width * rng.uniform(0.005, 0.025))))
+    alpha = cv2.GaussianBlur(mask, (0, 0), 0.006 * width)[..., np.newaxis] / 255.0
+    smeared = cv2.blur(image, (1 + 2 * int(0.01 * width), 1))
+    return np.asarray(smeared * (1 - alpha) + 25 * alpha, np.uint8)
