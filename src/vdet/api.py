@@ -4,7 +4,7 @@ Images are BGR uint8 arrays `(H, W, 3)`, as OpenCV reads them.
 
 The detector is the network where none is chosen. A model file decides which detector runs: the
 linear model with .npz, a network with .onnx. Settings choose a detector too, for example
-`load_settings("svm")`; without `model`, the shipped file that fits them is used.
+`load_settings("svm")`.
 
 A detector or a tracker of your own is an object, which is used as it is:
 
@@ -12,7 +12,7 @@ A detector or a tracker of your own is an object, which is used as it is:
   `DetectorModel`, which makes a detector for each video;
 * a tracker is a `VideoTracker`, for one video.
 
-A name is that of a kind of detector or tracker, also of another package.
+A name is that of a kind of detector or tracker, also of another package, or that of a model file.
 """
 
 import math
@@ -22,6 +22,7 @@ from dataclasses import replace
 from fractions import Fraction
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 from vdet.boxes import Box, Boxes, Image
 from vdet.config.loading import find_config, kind_of_model
@@ -32,16 +33,13 @@ from vdet.detect.protocol import DetectorModel, VideoDetector
 from vdet.errors import VdetError, check_positive
 from vdet.evaluate.scores import Scores
 from vdet.evaluate.video import score_files
-from vdet.lanes.camera import load_camera
-from vdet.lanes.ground import GroundRequest, load_ground
-from vdet.lanes.road import LaneRequest
 from vdet.media import Frame, Picture
 from vdet.progress import no_progress, reporting
 from vdet.run.pictures import PictureJob, PictureSearch, run_picture
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output, SinkContext, SinkKind, check_sinks
 from vdet.run.steps import Step, StepContext
-from vdet.run.video import RunTotals, VideoJob, check_job, open_video, run_video
+from vdet.run.video import Run, RunTotals, check_run, open_video, run_video
 from vdet.track.factory import TrackerKind, make_tracker
 from vdet.track.track import FrameTracks, Track, VideoTracker
 from vdet.traffic.counting import count_files, count_frames
@@ -49,36 +47,35 @@ from vdet.traffic.counts import Counts, Event
 
 __all__ = (
     "Box", "Boxes", "Counts", "Detector", "DetectorKind", "DetectorModel", "DetectorSettings",
-    "Event", "Frame", "FrameResult", "FrameTracks", "Picture", "RunTotals", "Scores", "Settings",
-    "SinkContext", "SinkKind", "Step", "StepContext", "Track", "Tracker", "TrackerKind",
-    "TrackerSettings", "VdetError", "VideoDetector", "VideoTracker", "count_tracks", "detect_image",
-    "detect_video", "evaluate_tracks", "follow", "load_settings",
+    "Event", "Frame", "FrameResult", "FrameTracks", "Output", "Picture", "Run", "RunTotals",
+    "Scores", "Settings", "SinkContext", "SinkKind", "Step", "StepContext", "Track", "Tracker",
+    "TrackerKind", "TrackerSettings", "VdetError", "VideoDetector", "VideoTracker", "count_tracks",
+    "detect_image", "detect_video", "evaluate_tracks", "follow", "load_settings",
 )  # fmt: skip
 
 PathName = str | PathLike[str]
 Paths = PathName | Sequence[PathName]
-AnyDetector = str | DetectorObject
+AnyDetector = PathName | DetectorObject
 AnyTracker = str | VideoTracker
 Seconds = float | Fraction
 
 
-def load_settings(config: PathName | None = None, assignments: Sequence[str] = ()) -> Settings:
+def load_settings(config: Paths = (), assignments: Sequence[str] = ()) -> Settings:
     """Read settings.
 
     Parameters
     ----------
     config
-        A YAML file, or the name of a shipped config such as "seed"; None for the default settings.
+        A YAML file, or the name of a shipped config such as "seed", or several; later ones win.
     assignments
         Single values on top, as the command line takes them: `["tracker.kind=rules"]`.
 
     Raises
     ------
     ConfigError
-        The file or a value is wrong; the message has one line for each mistake.
+        A file or a value is wrong; the message has one line for each mistake.
     """
-    path = None if config is None else find_config(os.fspath(config))
-    return load_layers(path, assignments)
+    return load_layers([find_config(os.fspath(each)) for each in _listed(config)], assignments)
 
 
 class Detector:
@@ -93,11 +90,10 @@ class Detector:
     def __init__(
         self,
         settings: Settings | None = None,
-        model: PathName | None = None,
         *,
         detector: AnyDetector | None = None,
     ) -> None:
-        self._settings, self._model, _ = _resolved(settings, model, detector, None)
+        self._settings, self._model, _ = _resolved(settings, detector, None)
         self.for_video = self._model.for_video
 
     def detect(self, image: Image) -> Boxes:
@@ -161,24 +157,22 @@ class Tracker:
 
 
 def follow(
-    source: PathName,
+    source: PathName | Run,
     *,
+    settings: Settings | None = None,
     detector: AnyDetector | None = None,
     tracker: AnyTracker | None = None,
     steps: Sequence[Step] = (),
-    settings: Settings | None = None,
-    model: PathName | None = None,
     start: Seconds | None = None,
     end: Seconds | None = None,
     frames: int | None = None,
-    lanes: bool = False,
-    camera: PathName | None = None,
-    threads: int = 1,
 ) -> Generator[FrameResult]:
     """Yield a result for each frame of a video: the frame, its detections and its tracks.
 
     Parameters
     ----------
+    source
+        The video, or a `Run`, which has its own settings and part.
     detector, tracker
         Objects or names, as the module describes them; None for those of the settings. With an
         object, and without settings, every frame is searched.
@@ -187,43 +181,27 @@ def follow(
     start, end
         Seconds from the first frame; frames with start ≤ time < end are taken.
     frames
-        Largest number of frames to take.
-    lanes, camera
-        Whether the lane is found too, and the file of the camera that `vdet calibrate` wrote.
-    threads
-        Threads of the search; the results do not depend on it.
+        Maximum number of frames to take.
 
     Raises `VideoError` if the video cannot be read or searched.
     """
-    check_positive(frames=frames, threads=threads)
-    settings, loaded, tracker = _resolved(settings, model, detector, tracker)
-    part = _exact(start), _exact(end), frames
-    job = VideoJob(Path(source), (), *part, lanes=_lanes(lanes, camera), threads=threads)
-    with open_video(job, loaded, settings, tracker=tracker, steps=steps) as video:
+    check_positive(frames=frames)
+    run = _run(source, start=_exact(start), end=_exact(end), frames=frames, threads=1)
+    chosen, loaded, tracker = _resolved(_settings(source, settings), detector, tracker)
+    with open_video(replace(run, settings=chosen), loaded, tracker=tracker, steps=steps) as video:
         yield from video.results
 
 
 def detect_video(
-    source: PathName,
+    source: PathName | Run,
     video: PathName | None = None,
     *,
-    tracks: Paths | None = None,
+    tracks: Paths = (),
     outputs: Mapping[str, Paths] | None = None,
+    settings: Settings | None = None,
     detector: AnyDetector | None = None,
     tracker: AnyTracker | None = None,
     steps: Sequence[Step] = (),
-    settings: Settings | None = None,
-    model: PathName | None = None,
-    start: Seconds | None = None,
-    end: Seconds | None = None,
-    frames: int | None = None,
-    at: Seconds = 0,
-    lanes: bool = False,
-    camera: PathName | None = None,
-    ground: PathName | None = None,
-    begin: str | None = None,
-    interval: int | None = None,
-    threads: int | None = None,
     overwrite: bool = False,
     progress: Callable[[int, int | None], object] | None = None,
 ) -> RunTotals:
@@ -233,6 +211,8 @@ def detect_video(
 
     Parameters
     ----------
+    source
+        The video; or a `Run`, for a part of it or a number of threads.
     video
         The video with the vehicles drawn in: .mp4, .mov or .mkv.
     tracks
@@ -240,29 +220,27 @@ def detect_video(
         (CVAT), .kitti.txt, .yolo.zip or .ottrk.
     outputs
         Other outputs, one path or several, by the name of their sink.
-    at
-        The moment of the output "stages", seconds from the first frame.
-    ground
-        The file of the ground, for the speeds of vehicles.
-    begin, interval
-        When the video begins (as `--begin`), and the seconds of intervals of counts and flows.
     overwrite
-        Replace outputs that are there already.
+        Replace outputs that exist already.
     progress
         Called after each frame with the number of frames done, and that of all if it is known.
 
     The others are those of `follow`, and the errors those of the command `vdet detect-video`.
     """
-    check_positive(frames=frames, threads=threads)
-    settings, loaded, tracker = _resolved(settings, model, detector, tracker)
-    wanted = _outputs({"video": video, "tracks": tracks, **(outputs or {})})
-    part = _exact(start), _exact(end), frames, Fraction(str(at))
-    request, inputs = _lanes(lanes, camera), _inputs(model, camera, ground, settings.regions.mask)
-    job = VideoJob(Path(source), wanted, *part, request, inputs, overwrite, threads)
-    job = replace(job, begin=begin, interval=interval, ground=_ground(ground))
-    check_job(job)
+    chosen, loaded, tracker = _resolved(_settings(source, settings), detector, tracker)
+    run = _run(source)
+    wanted = _outputs({"video": video or (), "tracks": tracks, **(outputs or {})})
+    files = [*_files(chosen), *run.inputs]
+    run = replace(
+        run,
+        settings=chosen,
+        outputs=run.outputs + wanted,
+        inputs=tuple(files),
+        overwrite=overwrite or run.overwrite,
+    )
+    check_run(run)
     reported = reporting(progress) if progress else no_progress
-    return run_video(job, loaded, settings, tracker=tracker, steps=steps, progress=reported)
+    return run_video(run, loaded, tracker=tracker, steps=steps, progress=reported)
 
 
 def detect_image(
@@ -270,55 +248,42 @@ def detect_image(
     picture: PathName | None = None,
     *,
     outputs: Mapping[str, Paths] | None = None,
-    detector: AnyDetector | None = None,
     settings: Settings | None = None,
-    model: PathName | None = None,
+    detector: AnyDetector | None = None,
     overwrite: bool = False,
 ) -> Boxes:
     """Find the vehicles in a picture file, and write the outputs that are asked for.
 
     `picture` is the file with the vehicles drawn in; the others are those of `detect_video`.
     """
-    settings, loaded, _ = _resolved(settings, model, detector, None)
-    job = PictureJob(Path(source), _outputs({"picture": picture, **(outputs or {})}))
-    inputs = [job.source, *_inputs(model, settings.regions.mask)]
+    settings, loaded, _ = _resolved(settings, detector, None)
+    job = PictureJob(Path(source), _outputs({"picture": picture or (), **(outputs or {})}))
+    inputs = [job.source, *_files(settings)]
     check_sinks(job.outputs, overwrite=overwrite, inputs=inputs)
     return run_picture(job, PictureSearch(loaded, settings), overwrite=overwrite).detections
 
 
 def count_tracks(
     tracks: PathName | Iterable[FrameTracks],
-    lines: PathName | None = None,
+    settings: Settings,
     *,
     size: tuple[int, int] | None = None,
     rate: float | None = None,
-    settings: Settings | None = None,
-    ground: PathName | None = None,
 ) -> Counts:
-    """Count the vehicles of a video at lines and in zones, from its tracks.
-
-    `follow` counts too, where its settings have lines or zones: `FrameResult.counter`.
+    """Count the vehicles of a video at the lines and in the zones of the settings.
 
     Parameters
     ----------
     tracks
         A file that `detect_video` wrote, or the tracks of each frame: `FrameResult.frame_tracks`.
-    lines
-        The file of lines and zones; None for those of the settings.
     size
-        Width and height of the frames, pixels; None: as the tracks or the lines say.
+        Width and height of the frames, pixels; None: as the tracks or `camera.size` say.
     rate
         Frames per second, for a file of tracks without times.
-    ground
-        The file of the ground, for the speeds at events.
     """
-    counts = (settings or Settings()).counts
-    if lines is not None:
-        counts = load_layers(places={"counts": Path(lines)}).counts
     if isinstance(tracks, str | PathLike):
-        files = count_files([Path(tracks)], counts, size, rate, ground=_ground(ground))
-        return files[str(Path(tracks))]
-    return count_frames(tracks, counts, size, _ground(ground))
+        return count_files([Path(tracks)], settings, size, rate)[str(Path(tracks))]
+    return count_frames(tracks, settings, size)
 
 
 def evaluate_tracks(
@@ -338,52 +303,62 @@ def evaluate_tracks(
     return score_files(Path(tracks), Path(truth), until=until, rate=rate).total
 
 
+def _run(source: PathName | Run, **part: Any) -> Run:
+    """Return a run; `part` is that of a video, not of a `Run`."""
+    if not isinstance(source, Run):
+        return Run(Path(source), **part)
+    if any(value is not None for name, value in part.items() if name != "threads"):
+        raise ValueError("start, end, frames: a Run has its own; leave them out")
+    return source
+
+
+def _settings(source: PathName | Run, settings: Settings | None) -> Settings | None:
+    if not isinstance(source, Run):
+        return settings
+    if settings is not None:
+        raise ValueError("settings: a Run has its own; leave them out")
+    return source.settings
+
+
 def _resolved(
-    settings: Settings | None,
-    model: PathName | None,
-    detector: AnyDetector | None,
-    tracker: AnyTracker | None,
+    settings: Settings | None, detector: AnyDetector | None, tracker: AnyTracker | None
 ) -> tuple[Settings, DetectorModel, VideoTracker | None]:
     """Return the settings, the detector, and the tracker; None for that of the settings."""
-    path = None if model is None else Path(model)
     changes: dict[str, object] = {}
     if isinstance(tracker, str):
         changes["tracker"] = load_layers(assignments=[f"tracker.kind={tracker}"]).tracker
         tracker = None
-    if detector is None or isinstance(detector, str):
-        if detector or settings is None:
-            kind = detector or (kind_of_model(path) if path else None)
-            changes["detector"] = load_layers(detector=kind).detector
-        chosen = (settings or Settings()).model_copy(update=changes)
-        return chosen, load_detector(chosen.detector, path), tracker
-    if path is not None:
-        raise ValueError("model: the detector is an object, which has its own; leave model out")
-    if settings is None:
+    if isinstance(detector, str | PathLike):
+        name = os.fspath(detector)
+        if kind := kind_of_model(Path(name)):
+            own = settings.detector if settings else None
+            if own is None or own.kind != kind:
+                own = load_layers(detector=kind).detector
+            changes["detector"] = own.model_copy(update={"model": name})
+        else:
+            changes["detector"] = load_layers(detector=name).detector
+        detector = None
+    elif detector is not None and settings is None:
         changes["detector"] = DetectorSettings(kind="object")  # every frame is searched
-    return (settings or Settings()).model_copy(update=changes), as_model(detector), tracker
+    chosen = (settings or Settings()).model_copy(update=changes)
+    model = load_detector(chosen.detector) if detector is None else as_model(detector)
+    return chosen, model, tracker
 
 
-def _outputs(named: Mapping[str, Paths | None]) -> tuple[Output, ...]:
+def _files(settings: Settings) -> list[Path]:
+    """Return the files that settings name."""
+    files = [settings.detector.model, *(each.mask for each in settings.regions)]
+    return [Path(each) for each in files if each]
+
+
+def _outputs(named: Mapping[str, Paths]) -> tuple[Output, ...]:
     return tuple(
-        Output(sink, Path(path))
-        for sink, paths in named.items()
-        if paths is not None
-        for path in ([paths] if isinstance(paths, str | PathLike) else paths)
+        Output(sink, Path(path)) for sink, paths in named.items() for path in _listed(paths)
     )
 
 
-def _inputs(*files: PathName | None) -> tuple[Path, ...]:
-    return tuple(Path(file) for file in files if file is not None)
-
-
-def _lanes(lanes: bool, camera: PathName | None) -> LaneRequest | None:
-    if camera is not None:
-        return LaneRequest(load_camera(Path(camera)))
-    return LaneRequest() if lanes else None
-
-
-def _ground(file: PathName | None) -> GroundRequest | None:
-    return None if file is None else load_ground(Path(file))
+def _listed(paths: Paths) -> Sequence[PathName]:
+    return [paths] if isinstance(paths, str | PathLike) else paths
 
 
 def _exact(seconds: Seconds | None) -> Fraction | None:

@@ -1,5 +1,6 @@
 """The demo: drawn roads, both detectors on them, and what they find against the truth."""
 
+import json
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -22,7 +23,7 @@ from vdet.learn.svm.mining import VideoSource, mine
 from vdet.learn.svm.training import train
 from vdet.progress import Steps
 from vdet.run.sinks.protocol import Output
-from vdet.run.video import VideoJob, run_video
+from vdet.run.video import Run, run_video
 from vdet.synthetic.random_scenes import busy_road, demo_scene, pole_scene
 from vdet.synthetic.render import write_clip
 from vdet.synthetic.scene import Scene
@@ -38,18 +39,19 @@ ROADS = 6
 ROAD, TRUTH = "road.mp4", "truth.txt"
 """The drawn video of a moving camera, and its true boxes."""
 
-POLE, POLE_TRUTH, LINES = "pole.mp4", "pole.txt", "lines.yaml"
+POLE, POLE_TRUTH, GATE = "pole.mp4", "pole.txt", "gate.yaml"
 """The same from a pole, and the lines at which vehicles are counted."""
 
 PATCHES, MODEL, METRICS = "patches.zip", "model.npz", "model.json"
 """The patches for the linear model, the model, and the metrics of its training."""
 
-_LINES = """\
-# The lines of the demo, as shares of the frame.
-lines:
-  - {name: north, start: [0.2, 0.45], end: [0.9, 0.45], left: out, right: in}
-  - {name: south, start: [0.02, 0.8], end: [0.98, 0.8], left: in, right: out}
-drawn: true
+_GATE = """\
+# The lines of the demo, as fractions of the frame.
+traffic:
+  lines:
+    - {name: north, start: [0.2, 0.45], end: [0.9, 0.45], left: out, right: in}
+    - {name: south, start: [0.02, 0.8], end: [0.98, 0.8], left: in, right: out}
+  drawn: true
 """
 _BY_NETWORK = {"video": "found.mp4", "tracks": "found.csv"}
 _ON_POLE = {"video": "counted.mp4", "tracks": "pole.csv", "flows": "flows.csv", "page": "page"}
@@ -88,26 +90,25 @@ def run_demo(
     for drawn, clip, boxes in ((scene, ROAD, TRUTH), (pole, POLE, POLE_TRUTH)):
         write_clip(folder / clip, drawn, overwrite=overwrite)
         write_truth(folder / boxes, drawn, overwrite=overwrite)
-    write_whole(folder / LINES, _LINES, overwrite=overwrite)
+    write_whole(folder / GATE, _GATE, overwrite=overwrite)
     truth, rate = read_truth(folder / TRUTH), float(scene.rate)
     middle = scene.frames / scene.rate / 2
 
-    def run(source: str, outputs: dict[str, str], settings: Settings, model: Path | None) -> Path:
+    def process(source: str, outputs: dict[str, str], settings: Settings) -> Path:
         paths = tuple(Output(sink, folder / name) for sink, name in outputs.items())
-        job = VideoJob(folder / source, paths, at=middle, overwrite=overwrite)
-        detector = load_detector(settings.detector, model)
-        run_video(job, detector, settings, progress=partial(steps, "frames"))
+        run = Run(folder / source, settings, paths, at=middle, overwrite=overwrite)
+        run_video(run, load_detector(settings.detector), progress=partial(steps, "frames"))
         return folder / outputs["tracks"]
 
-    def find(name: str, outputs: dict[str, str], settings: Settings, model: Path | None) -> Row:
-        tracks = run(ROAD, outputs, settings, model)
+    def find(name: str, outputs: dict[str, str], settings: Settings) -> Row:
+        tracks = process(ROAD, outputs, settings)
         found = score(read_predictions(tracks), truth, rate=rate)
         ratios = (found.precision, found.recall, found.f1, found.idf1)
         return [name, *(f"{ratio:.2f}" for ratio in ratios), str(found.id_switches)]
 
     announce("2/4 finding and counting the vehicles with the network …")
-    by_network = find("network", _BY_NETWORK, load_settings(), None)
-    run(POLE, _ON_POLE, load_settings(places={"counts": folder / LINES}), None)
+    by_network = find("network", _BY_NETWORK, load_settings())
+    process(POLE, _ON_POLE, load_settings([folder / GATE]))
     announce(f"3/4 drawing {ROADS} more roads, and training a linear model on patches of them …")
     linear = load_settings(assignments=["train.mine.probability=0"], detector="svm")
     training, rng = folder / "training", np.random.default_rng(seed)
@@ -124,18 +125,19 @@ def run_demo(
     save_model(learnt, folder / MODEL, overwrite=overwrite)
     metrics.write(folder / METRICS, overwrite=overwrite)
     announce("4/4 finding the vehicles with the linear model …")
-    by_model = find(f"linear model {MODEL}", _BY_MODEL, linear, folder / MODEL)
+    own = load_settings(assignments=[f"detector.model={json.dumps(str(folder / MODEL))}"])
+    by_model = find(f"linear model {MODEL}", _BY_MODEL, own)
     scores = table(("", "precision", "recall", "F1", "IDF1", "id switches"), [by_network, by_model])
     return [*scores, "", *table(("from", "to", "vehicles", "in truth"), _flows(folder, pole))]
 
 
 def _flows(folder: Path, scene: Scene) -> list[Row]:
     """Return the flows from the pole: how many vehicles were found, and how many are true."""
-    counts = load_settings(places={"counts": folder / LINES}).counts
+    settings = load_settings([folder / GATE])
     size, rate = (scene.camera.width, scene.camera.height), float(scene.rate)
     found: dict[tuple[str, str], list[int]] = {}
     for number, name in enumerate((_ON_POLE["tracks"], POLE_TRUTH)):
-        (video,) = count_files([folder / name], counts, size, rate).values()
+        (video,) = count_files([folder / name], settings, size, rate).values()
         for row in video.flows():
             found.setdefault((row.origin, row.destination or NOWHERE), [0, 0])[number] += row.count
     return [[*way, *map(str, numbers)] for way, numbers in found.items()]

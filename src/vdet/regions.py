@@ -1,18 +1,20 @@
 """Regions: the parts of the frames of one video in which vehicles are shown."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
 import numpy as np
 
 from vdet.boxes import BoolArray
-from vdet.config.places import RegionsSettings
+from vdet.config.camera import CameraSettings
+from vdet.config.places import RegionSettings
 from vdet.errors import ConfigError
 from vdet.media.images import read_header, read_image
 from vdet.polygons import Point
 
 _WHITE = 128
-"""Least value of a pixel of a mask that is included."""
+"""Minimum value of a pixel of a mask that is included."""
 
 
 class Regions:
@@ -29,25 +31,28 @@ class Regions:
     Raises
     ------
     ConfigError
-        They are given for frames of another aspect ratio.
+        A mask has another aspect ratio.
     ImageError
-        The mask cannot be read.
+        A mask cannot be read.
     """
 
-    def __init__(self, settings: RegionsSettings, width: int, height: int) -> None:
-        across, down = settings.scales(width, height)
+    def __init__(self, settings: Sequence[RegionSettings], width: int, height: int) -> None:
         self.included: dict[str, list[Point]] = {}
         self.excluded: dict[str, list[Point]] = {}
-        for each in settings.polygons:
-            named = self.included if each.kind == "include" else self.excluded
-            named[each.name] = [(x * across, y * down) for x, y in each.points]
-        shown = np.full((height, width), not self.included, np.uint8)
-        for polygons, value in ((self.included, 1), (self.excluded, 0)):
-            for corners in polygons.values():  # with the pixels of their sides
-                cv2.fillPoly(shown, [np.floor(corners).astype(np.int32)], value)
-        self.pixels: BoolArray = shown > 0
-        if settings.mask:
-            self.pixels &= _read_mask(settings.mask, width, height)
+        shape = height, width
+        inside, outside = np.zeros(shape, np.uint8), np.zeros(shape, np.uint8)
+        for each in settings:
+            is_included = each.kind == "include"
+            layer = inside if is_included else outside
+            if each.mask:
+                layer |= _read_mask(each.mask, width, height)
+            else:
+                corners = [(x * width, y * height) for x, y in each.points or ()]
+                (self.included if is_included else self.excluded)[each.name] = corners
+                # With the pixels of its sides.
+                cv2.fillPoly(layer, [np.floor(corners).astype(np.int32)], 1)
+        shows_all = not any(each.kind == "include" for each in settings)
+        self.pixels: BoolArray = (shows_all | (inside > 0)) & (outside == 0)
 
     def contains(self, point: Point) -> bool:
         """Return whether a vehicle whose foot is at a point, x and y in pixels, is shown.
@@ -59,7 +64,7 @@ class Regions:
         return bool(self.pixels[y, x])
 
 
-def lay_regions(settings: RegionsSettings, width: int, height: int) -> Regions | None:
+def lay_regions(settings: Sequence[RegionSettings], width: int, height: int) -> Regions | None:
     """Lay the regions of the settings over frames; None for the whole frame.
 
     Errors as of `Regions`.
@@ -67,17 +72,18 @@ def lay_regions(settings: RegionsSettings, width: int, height: int) -> Regions |
     return Regions(settings, width, height) if settings else None
 
 
-def check_mask(settings: RegionsSettings) -> None:
-    """Refuse a mask that cannot be read, before any work. Raises `ImageError`."""
-    if settings.mask:
-        read_header(Path(settings.mask))
+def check_masks(settings: Sequence[RegionSettings]) -> None:
+    """Refuse masks that cannot be read, before any work. Raises `ImageError`."""
+    for each in settings:
+        if each.mask:
+            read_header(Path(each.mask))
 
 
 def _read_mask(path: str, width: int, height: int) -> BoolArray:
     image = read_image(Path(path))
     rows, columns = image.shape[:2]
     try:
-        RegionsSettings(size=(columns, rows)).scales(width, height)
+        CameraSettings(size=(columns, rows)).check_frames(width, height)
     except ConfigError as error:
         raise ConfigError(
             f"{path}: has another shape than the frames of {width}×{height}; draw it over one"

@@ -1,4 +1,4 @@
-"""The plan of a batch: a job for each video. A wrong plan is refused before any work."""
+"""The plan of a batch: a run for each video. A wrong plan is refused before any work."""
 
 import errno
 import os
@@ -8,11 +8,11 @@ from pathlib import Path
 
 from vdet.batch.inputs import InputVideo, find_sources, matches_in
 from vdet.batch.manifest import Written, check_manifest, read_written
-from vdet.batch.task import result_digest
+from vdet.batch.task import Identity, result_digest
 from vdet.errors import BatchError, OutputError
 from vdet.files import check_output, file_ids
 from vdet.run.sinks.protocol import BatchTotal, Output, check_sinks, output_state, sink_kind
-from vdet.run.video import VideoJob
+from vdet.run.video import Run
 
 MANIFEST = "manifest.jsonl"
 
@@ -48,71 +48,79 @@ class PlannedTotal:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """The jobs to do and those that are left out; all their outputs lie in `folder`."""
+    """The runs to do and those that are left out; all their outputs lie in `folder`."""
 
     folder: Path
-    jobs: tuple[VideoJob, ...]
-    skipped: tuple[VideoJob, ...]
+    identity: Identity
+    runs: tuple[Run, ...]
+    skipped: tuple[Run, ...]
     totals: tuple[PlannedTotal, ...] = ()
 
     @property
     def manifest(self) -> Path:
-        """The file for the records of the jobs."""
+        """The file for the records of the runs."""
         return self.folder / MANIFEST
 
 
 def make_plan(
     clips: Sequence[Path],
     folder: Path,
-    common: VideoJob,
+    common: Run,
     suffixes: Sequence[OutputSuffix],
     *,
-    digest: str | None = None,
+    skip_existing: bool = False,
 ) -> Plan:
-    """Plan a job for every video of `clips`; outputs lie in `folder` by the places of the videos.
+    """Plan a run for every video of `clips`; outputs lie in `folder` by the places of the videos.
+
+    The paths in the settings become absolute: processes on other machines work in other folders.
 
     Parameters
     ----------
     common
-        A job with what all jobs have in common.
+        A run with what all runs have in common.
     suffixes
         The outputs of each video; a sink may come several times.
-    digest
-        That of the `Work`, to skip jobs whose outputs are all there, and up to date as the manifest
-        says. Else all outputs of a job are made again, but only those that vdet wrote are replaced.
+    skip_existing
+        Skip runs whose outputs are all there, and up to date as the manifest says. All outputs of
+        the other runs are made again, but only those that vdet wrote are replaced.
 
     Raises
     ------
     BatchError
         There is no video; an input lies in `folder`, or `folder` in an input; two outputs have one
-        name; with `digest`, an output is there that vdet did not write.
+        name; with `skip_existing`, an output is there that vdet did not write.
     OutputError
         An output cannot be written, or is there already; the manifest cannot be used.
-    ConfigError
-        There is no sink of a name.
+    ConfigError, ModelError
+        There is no sink of a name, or the detector cannot be loaded.
     """
+    settings = common.settings.with_paths(lambda path: str(Path(path).absolute()))
+    common = replace(common, settings=settings)
+    identity = Identity.of(common, {each.sink for each in suffixes})
     sources = find_sources(clips)
     _refuse_nested(clips, sources, folder)
-    jobs = [_job(source, folder, common, suffixes) for source in sources]
+    runs = [_planned(source, folder, common, suffixes) for source in sources]
     totals = _totals(sources, folder, suffixes)
-    _refuse_shared(jobs, totals, folder)
+    _refuse_shared(runs, totals, folder)
     manifest = folder / MANIFEST
     check_manifest(manifest)
     check_output(manifest, overwrite=True, makes_folder=True)
     replaces, skipped = common.overwrite, []
-    if digest is not None:
+    if skip_existing:
         written, replaces = read_written(manifest), manifest.exists()
-        skipped = [job for job in jobs if _is_done(job, digest, written)]
-        jobs = [_replacing_ours(job, written) for job in jobs if job not in skipped]
-    for job in jobs:
+        done = [_is_done(run, identity, written) for run in runs]
+        skipped = [run for run, is_done in zip(runs, done, strict=True) if is_done]
+        left = [run for run, is_done in zip(runs, done, strict=True) if not is_done]
+        runs = [_replacing_ours(run, written) for run in left]
+    for run in runs:
         try:
-            check_sinks(job.outputs, overwrite=job.overwrite, makes_folder=True)
+            check_sinks(run.outputs, overwrite=run.overwrite, makes_folder=True)
         except OSError as error:
             if error.errno != errno.ENAMETOOLONG:  # such a file fails alone
                 raise
     for total in totals:
         check_output(total.path, overwrite=replaces, makes_folder=True)
-    return Plan(folder, tuple(jobs), tuple(skipped), totals)
+    return Plan(folder, identity, tuple(runs), tuple(skipped), totals)
 
 
 def _totals(
@@ -128,9 +136,9 @@ def _totals(
     return tuple(totals)
 
 
-def _job(
-    source: InputVideo, folder: Path, common: VideoJob, suffixes: Sequence[OutputSuffix]
-) -> VideoJob:
+def _planned(
+    source: InputVideo, folder: Path, common: Run, suffixes: Sequence[OutputSuffix]
+) -> Run:
     place = folder / source.place
     outputs = tuple(Output(each.sink, _path(place, each)) for each in suffixes)
     return replace(common, source=source.path, outputs=outputs)
@@ -145,29 +153,29 @@ def _path(place: Path, output: OutputSuffix) -> Path:
     return place.with_suffix(writable[0])
 
 
-def _is_done(job: VideoJob, digest: str, written: Mapping[str, Written]) -> bool:
-    """Return whether all outputs of a job are as they were written, for this work and input."""
-    digest = result_digest(digest, job.source)
-    for output in job.outputs:
+def _is_done(run: Run, identity: Identity, written: Mapping[str, Written]) -> bool:
+    """Return whether all outputs of a run are as they were written, for this batch and input."""
+    digest = result_digest(identity, run.source)
+    for output in run.outputs:
         state, known = output_state(output), written.get(os.path.realpath(output.path))
         if state is None or known is None or known[:2] != (digest, state[0]):
             return False
     return True
 
 
-def _replacing_ours(job: VideoJob, written: Mapping[str, Written]) -> VideoJob:
-    """Return a job that replaces its outputs, where vdet wrote all of them that are there.
+def _replacing_ours(run: Run, written: Mapping[str, Written]) -> Run:
+    """Return a run that replaces its outputs, where vdet wrote all of them that are there.
 
     Raises
     ------
     BatchError
         One is there that has another size or time than the manifest says, and is not empty.
     """
-    for output in job.outputs:
+    for output in run.outputs:
         state = output_state(output)
         if state and state[0] and written.get(os.path.realpath(output.path), ())[1:] != state:
             raise BatchError(f"{output.path}: is not as vdet wrote it; remove it, or --overwrite")
-    return replace(job, overwrite=any(os.path.lexists(output.path) for output in job.outputs))
+    return replace(run, overwrite=any(os.path.lexists(output.path) for output in run.outputs))
 
 
 def _refuse_nested(clips: Iterable[Path], sources: Iterable[InputVideo], folder: Path) -> None:
@@ -180,12 +188,12 @@ def _refuse_nested(clips: Iterable[Path], sources: Iterable[InputVideo], folder:
             raise BatchError(f"{source.path}: lies in the output folder {folder}; give another")
 
 
-def _refuse_shared(jobs: Iterable[VideoJob], totals: Iterable[PlannedTotal], folder: Path) -> None:
+def _refuse_shared(runs: Iterable[Run], totals: Iterable[PlannedTotal], folder: Path) -> None:
     """Refuse an output with the name of another output, of a total, the manifest or an input."""
-    inputs = file_ids(path for job in jobs for path in (job.source, *job.inputs))
+    inputs = file_ids(path for run in runs for path in (run.source, *run.inputs))
     owners = {folder / MANIFEST: "the manifest"}
     makers = [(total.path, "the outputs of all videos") for total in totals]
-    makers += [(output.path, str(job.source)) for job in jobs for output in job.outputs]
+    makers += [(output.path, str(run.source)) for run in runs for output in run.outputs]
     for path, maker in makers:
         if file_ids([path]) & inputs:
             raise OutputError(f"{path}: is an input itself; give another folder")

@@ -9,9 +9,9 @@ from typing import TypeVar
 
 from vdet.batch.manifest import Record, open_manifest
 from vdet.batch.plan import Plan
-from vdet.batch.task import Work, process_file, record_of_killed
+from vdet.batch.task import Identity, process_file, record_of_killed
 from vdet.files import OutputFiles, make_folder, output_errors
-from vdet.run.video import VideoJob
+from vdet.run.video import Run
 from vdet.temporary import remove_stale
 from vdet.workers import WorkerKilledError, Workers, is_repeated
 
@@ -19,8 +19,12 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 
-def run_batch(plan: Plan, work: Work, *, workers: Workers) -> Generator[tuple[VideoJob, Record]]:
+def run_batch(
+    plan: Plan, *, workers: Workers, threads: int | None = None
+) -> Generator[tuple[Run, Record]]:
     """Process the files of a plan; yield each when it has ended, with its record in the manifest.
+
+    `threads` is the number of threads of each run that has none.
 
     At the end, temporary files of killed worker processes are removed.
 
@@ -32,19 +36,20 @@ def run_batch(plan: Plan, work: Work, *, workers: Workers) -> Generator[tuple[Vi
         The cluster of `workers` cannot be used, or its scheduler has ended.
     """
     make_folder(plan.folder)
-    function = partial(_process, work=work)
+    runs = [replace(run, threads=run.threads or threads) for run in plan.runs]
+    function = partial(_process, identity=plan.identity)
     try:
         with (
             open_manifest(plan.manifest) as add,
-            closing(each_once(function, plan.jobs, workers, _replacing)) as results,
+            closing(each_once(function, runs, workers, _replacing)) as results,
         ):
-            for job, result in results:
-                record = result or record_of_killed(job, work)
+            for run, result in results:
+                record = result or record_of_killed(run, plan.identity)
                 add(record)
-                yield job, record
+                yield run, record
         write_totals(plan)
     finally:
-        paths = [output.path for job in plan.jobs for output in job.outputs]
+        paths = [output.path for run in runs for output in run.outputs]
         for folder in {path.parent for path in paths} | set(filter(os.path.isdir, paths)):
             remove_stale(folder)
 
@@ -57,13 +62,13 @@ def write_totals(plan: Plan) -> None:
             total.made_by.write(there, files.stage(total.path))
 
 
-def _process(job: VideoJob, *, work: Work) -> Record:
-    return process_file(_replacing(job) if is_repeated() else job, work=work)
+def _process(run: Run, *, identity: Identity) -> Record:
+    return process_file(_replacing(run) if is_repeated() else run, identity=identity)
 
 
-def _replacing(job: VideoJob) -> VideoJob:
-    """Return a job that replaces its outputs: when its process was killed, it may have ended."""
-    return replace(job, overwrite=True)
+def _replacing(run: Run) -> Run:
+    """Return a run that replaces its outputs: when its process was killed, it may have ended."""
+    return replace(run, overwrite=True)
 
 
 def each_once(

@@ -20,89 +20,69 @@ from vdet.detect.factory import load_detector, model_file
 from vdet.detect.protocol import DetectorModel
 from vdet.errors import in_one_line
 from vdet.run.sinks.protocol import output_state
-from vdet.run.video import VideoJob, run_video
+from vdet.run.video import Run, run_video
 from vdet.version import __version__
 
-_SEARCH = {"input", "detector", "tracker", "regions", "steps"}
+_SEARCH = {"input", "camera", "detector", "tracker", "regions", "steps", "lanes"}
 """The sections of the settings that tracks depend on."""
 
-_READ_BY = {"tracks": set[str](), "counts": {"counts"}, "flows": {"counts"}, "crops": set[str]()}
+_READ_BY = {"tracks": set[str](), "counts": {"traffic"}, "flows": {"traffic"}, "crops": set[str]()}
 """The sections that a sink reads too. Another sink may read all but `train` and `labels`."""
 
 
 @dataclass(frozen=True, slots=True)
-class Work:
-    """What every video of a batch is processed with; workers load the model themselves.
+class Identity:
+    """What the outputs of a batch depend on, beside each video.
 
     Attributes
     ----------
-    model
-        A model file; None for the shipped one, or for a detector without one.
-    threads
-        Number of threads of search, decoder and encoder of each video; None for one per core.
     digest
-        SHA-256 of program, model and settings, and of the part and lanes that are wanted.
-    model_name, model_sha256
+        SHA-256 of program, model and settings, and of the part that is wanted.
+    model, model_sha256
         Name and SHA-256 of the model file; None for a detector without one.
     """
 
-    settings: Settings
-    model: Path | None = None
-    threads: int | None = None
-    digest: str = ""
-    model_name: str | None = None
+    digest: str
+    model: str | None = None
     model_sha256: str | None = None
 
     @classmethod
-    def of(
-        cls,
-        job: VideoJob,
-        sinks: Iterable[str],
-        settings: Settings,
-        model: Path | None,
-        threads: int | None,
-    ) -> Self:
-        """Return the work of jobs that differ from `job` in their input and outputs only.
-
-        Its paths are absolute: processes on other machines work in other folders.
+    def of(cls, run: Run, sinks: Iterable[str]) -> Self:
+        """Return the identity of runs that differ from `run` in their video and outputs only.
 
         Raises
         ------
         ConfigError, ModelError
             The detector cannot be loaded.
         """
-        load_detector(settings.detector, model)
-        file, mask = model_file(settings.detector, model), settings.regions.mask
+        settings = run.settings
+        load_detector(settings.detector)
+        file = model_file(settings.detector)
         sha256 = _digest_of(file) or None
-        # What decides in still pictures only does not count.
-        shown = settings.model_copy(update={"detector": settings.detector.showing_all()})
+        # What decides in still pictures only does not count, nor where the model file lies.
+        detector = settings.detector.showing_all().model_copy(update={"model": None})
+        shown = settings.model_copy(update={"detector": detector})
         wanted = (
-            *(f"vdet {__version__}", sha256, job.start, job.end, job.frames, job.lanes),
-            *(job.begin, job.interval, job.ground),
-            _digest_of(mask),
-            shown.model_dump_json(include=_sections(sinks, with_lanes=job.lanes is not None)),
+            *(f"vdet {__version__}", sha256, run.start, run.end, run.frames),
+            *(_digest_of(each.mask) for each in settings.regions),
+            shown.model_dump_json(include=_sections(sinks)),
         )
-        if mask:
-            regions = settings.regions.model_copy(update={"mask": str(Path(mask).absolute())})
-            settings = settings.model_copy(update={"regions": regions})
-        digest, name = _digest(*map(repr, wanted)), file.name if file else None
-        return cls(settings, model and model.absolute(), threads, digest, name, sha256)
+        return cls(_digest(*map(repr, wanted)), file.name if file else None, sha256)
 
 
-def _sections(sinks: Iterable[str], *, with_lanes: bool) -> set[str]:
+def _sections(sinks: Iterable[str]) -> set[str]:
     """Return the sections of the settings that outputs depend on."""
     all_of_them = set(Settings.model_fields) - {"train", "labels"}
-    found = _SEARCH.union(*(_READ_BY.get(sink, all_of_them) for sink in sinks))
-    return found | {"lanes"} if with_lanes else found - {"lanes"}
+    return _SEARCH.union(*(_READ_BY.get(sink, all_of_them) for sink in sinks))
 
 
-def result_digest(work: str, source: Path) -> str:
+def result_digest(identity: Identity, source: Path) -> str:
     """Return a digest of all that the result for an input depends on.
 
     Parameters
     ----------
-    work
-        The digest of the `Work`.
+    identity
+        That of the batch.
     source
         The input. It counts by its size and the time of its last change; numbered pictures count by
         those of all files in their folder.
@@ -110,7 +90,7 @@ def result_digest(work: str, source: Path) -> str:
     states = []
     with suppress(OSError):  # there is no such input; reading it is an error soon
         states = [(file.name, file.stat()) for file in _files(source)]
-    return _digest(work, *(repr((name, s.st_size, s.st_mtime_ns)) for name, s in states))
+    return _digest(identity.digest, *(repr((name, s.st_size, s.st_mtime_ns)) for name, s in states))
 
 
 def _files(source: Path) -> list[Path]:
@@ -130,16 +110,16 @@ def _digest_of(path: Path | str | None) -> str:
     return ""
 
 
-def process_file(job: VideoJob, *, work: Work) -> Record:
-    """Run a job, and return its record.
+def process_file(run: Run, *, identity: Identity) -> Record:
+    """Process a video, and return its record.
 
     Errors are recorded, and not raised.
     """
-    began, record = time.perf_counter(), _record(job, work)
-    digest = result_digest(work.digest, job.source)
-    with _collected_warnings(job) as warnings:
+    began, record = time.perf_counter(), _record(run, identity)
+    digest = result_digest(identity, run.source)
+    with _collected_warnings(run) as warnings:
         try:
-            record = replace(record, digest=digest, **_run(job, work))
+            record = replace(record, digest=digest, **_process(run, identity))
         except Exception as failure:
             record = replace(record, error=in_one_line(failure))
             if os.environ.get("VDET_DEBUG") == "1":
@@ -148,19 +128,17 @@ def process_file(job: VideoJob, *, work: Work) -> Record:
     return replace(record, seconds=seconds, warnings=tuple(warnings))
 
 
-def record_of_killed(job: VideoJob, work: Work) -> Record:
-    """Return the record of a job whose process was killed each time."""
-    error = f"{job.source}: its process was killed, or crashed; there may be too little memory"
-    return replace(_record(job, work), error=error)
+def record_of_killed(run: Run, identity: Identity) -> Record:
+    """Return the record of a run whose process was killed each time."""
+    error = f"{run.source}: its process was killed, or crashed; there may be too little memory"
+    return replace(_record(run, identity), error=error)
 
 
-def _run(job: VideoJob, work: Work) -> dict[str, Any]:
-    """Run a job, and return what its record says about the result."""
-    job = replace(job, threads=work.threads, codec_threads=work.threads)
-    chosen = pickle.dumps((work.settings.detector, work.model))  # settings may be unhashable
-    model = _kept_detector(chosen, work.model_sha256)
-    totals = run_video(job, model, work.settings)
-    states = {str(each.path.absolute()): output_state(each) or (0, 0) for each in job.outputs}
+def _process(run: Run, identity: Identity) -> dict[str, Any]:
+    """Process a video, and return what its record says about the result."""
+    chosen = pickle.dumps(run.settings.detector)  # settings of other packages may be unhashable
+    totals = run_video(run, _kept_detector(chosen, identity.model_sha256))
+    states = {str(each.path.absolute()): output_state(each) or (0, 0) for each in run.outputs}
     return {
         **{name: getattr(totals, name) for name in ("width", "height", "frames", "tracks")},
         "begin": str(totals.clock) if totals.clock else None,
@@ -172,24 +150,24 @@ def _run(job: VideoJob, work: Work) -> dict[str, Any]:
 @lru_cache(maxsize=1)
 def _kept_detector(chosen: bytes, _sha256: str | None) -> DetectorModel:
     """Load a detector, which this process keeps for the next videos; the file may not change."""
-    return load_detector(*pickle.loads(chosen))
+    return load_detector(pickle.loads(chosen))
 
 
-def _record(job: VideoJob, work: Work) -> Record:
-    """Return the record of a job that begins now."""
+def _record(run: Run, identity: Identity) -> Record:
+    """Return the record of a run that begins now."""
     paths: dict[str, tuple[str, ...]] = {}
-    for output in job.outputs:
+    for output in run.outputs:
         paths[output.sink] = (*paths.get(output.sink, ()), str(output.path.absolute()))
     outputs = {sink: each[0] if len(each) == 1 else each for sink, each in paths.items()}
-    source, now = str(job.source.absolute()), datetime.now(UTC).isoformat(timespec="seconds")
-    model = work.model_name
-    return Record(source, outputs, now, 0.0, model=model, model_sha256=work.model_sha256)
+    source, now = str(run.source.absolute()), datetime.now(UTC).isoformat(timespec="seconds")
+    model, sha256 = identity.model, identity.model_sha256
+    return Record(source, outputs, now, 0.0, model=model, model_sha256=sha256)
 
 
 @contextmanager
-def _collected_warnings(job: VideoJob) -> Iterator[list[str]]:
-    """Give a list of the warnings about a job; other threads may log about other files."""
-    prefixes = tuple(f"{path}: " for path in (job.source, *(each.path for each in job.outputs)))
+def _collected_warnings(run: Run) -> Iterator[list[str]]:
+    """Give a list of the warnings about a run; other threads may log about other files."""
+    prefixes = tuple(f"{path}: " for path in (run.source, *(each.path for each in run.outputs)))
     messages: list[str] = []
 
     def collect(record: logging.LogRecord) -> bool:

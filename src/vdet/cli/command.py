@@ -20,7 +20,7 @@ HEADINGS: Mapping[str, Sequence[str]] = {
     ),
     _OTHERS: (),
     "Several videos": ("--directory", "--skip-existing", "--dry-run"),
-    "Lanes": ("--lanes", "--camera"),
+    "Lanes": ("--lanes",),
     "Model and settings": ("--model", "--base", "--config", "--set"),
     "Parallel work": ("--jobs", "--threads", "--scheduler"),
     "General": ("--quiet", "--verbose", "--version", "--help"),

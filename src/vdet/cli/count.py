@@ -10,7 +10,7 @@ import click
 
 from vdet.cli import options
 from vdet.cli.command import command
-from vdet.cli.counting import Counting, counting_options
+from vdet.cli.counting import check_counting, counting_options
 from vdet.cli.messages import is_quiet, print_lines, print_message, progress_steps
 from vdet.files import OutputFiles, output_errors
 
@@ -21,9 +21,9 @@ log = logging.getLogger("vdet")
 
 
 @command(
-    "vdet count tracks.jsonl --lines lines.yaml",
-    "vdet count tracks.jsonl --lines lines.yaml --flows flows.csv --interval 15min",
-    "vdet count found/*.tracks.csv --lines lines.yaml --counts counts.json",
+    "vdet count tracks.jsonl -c gate.yaml",
+    "vdet count tracks.jsonl -c gate.yaml --flows flows.csv --interval 15min",
+    "vdet count found/*.tracks.csv -c gate.yaml --counts counts.json",
 )
 @click.argument("tracks", nargs=-1, required=True, type=options.PATH, metavar="TRACKS...")
 @counting_options()
@@ -39,11 +39,10 @@ log = logging.getLogger("vdet")
     options.RATE,
     show_default="from the times in TRACKS",
 )
-@options.settings_options("counts.confirmed=0.5", options.lines_option, options.ground_option)
+@options.settings_options("traffic.confirmed=0.5")
 @options.overwrite_option
 def count(
     tracks: tuple[Path, ...],
-    counting: Counting,
     size: tuple[int, int] | None,
     rate: float | None,
     choice: options.SettingsChoice,
@@ -56,28 +55,22 @@ def count(
     another, a vehicle that both of them show counts once.
     """
     settings = choice.read()
-    if not settings.counts:
-        raise click.UsageError("there is nothing to count at; give --lines FILE")
-    counting.check(settings, several=len(tracks) > 1)
+    if not settings.traffic:
+        raise click.UsageError("there is nothing to count at; give lines or zones with -c FILE")
+    check_counting(settings, several=len(tracks) > 1)
     from vdet.run.sinks.protocol import check_sinks
     from vdet.traffic.count_files import write_counts, write_flows
     from vdet.traffic.counting import count_files
 
     outputs = options.as_outputs(options.wanted_outputs())
-    check_sinks(outputs, overwrite=overwrite, inputs=[*tracks, *choice.inputs(settings)])
+    check_sinks(
+        outputs, overwrite=overwrite, inputs=[*tracks, *choice.inputs(settings, with_model=False)]
+    )
     gc.disable()  # it takes a third of the time, and finds nothing: boxes are in no circles
     try:
         with progress_steps(" files") as steps:
             advance = steps("", len(tracks) if len(tracks) > 1 else None)
-            videos = count_files(
-                tracks,
-                settings.counts,
-                size,
-                rate,
-                begin=counting.begin,
-                ground=choice.ground(),
-                advance=advance,
-            )
+            videos = count_files(tracks, settings, size, rate, advance=advance)
     finally:
         gc.enable()
     for name, counts in videos.items():
@@ -89,7 +82,7 @@ def count(
         for output in outputs:
             write = {"counts": write_counts, "flows": write_flows}[output.sink]
             with output_errors(output.path):
-                write(files.stage(output.path), videos, counting.interval)
+                write(files.stage(output.path), videos, settings.traffic.seconds)
     print_lines(*_totals(videos), *_matrix(list(videos.values())))
 
 

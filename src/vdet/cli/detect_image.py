@@ -33,15 +33,13 @@ log = logging.getLogger("vdet")
 @options.option("--stages DIR", "Write a picture of every stage into DIR.")
 @options.output_option("--json FILE", "Write the boxes to FILE, or with - to standard output.")
 @options.sink_option
-@options.lane_options
-@options.settings_options("detector.still_score=0.5", options.regions_option, options.model_option)
+@options.lanes_option
+@options.settings_options("detector.still_score=0.5", options.model_option)
 @options.overwrite_option
 def detect_image(
     images: tuple[Path, ...],
     output: Path | None,
     stages: Path | None,
-    lanes: bool,
-    camera: Path | None,
     choice: options.SettingsChoice,
     overwrite: bool,
 ) -> int:
@@ -50,19 +48,19 @@ def detect_image(
     Each IMAGE is a file, or a folder of files. Without an output, the vehicles are printed: class,
     score, and box in pixels, as x, y, width and height.
     """
-    request = options.read_lanes(lanes, camera)
     settings = choice.read()
-    from vdet.regions import check_mask
+    from vdet.detect.factory import load_detector
+    from vdet.regions import check_masks
     from vdet.run.pictures import PictureSearch, find_images, plan_pictures, run_pictures
     from vdet.run.sinks.protocol import check_sinks
     from vdet.workers import PICTURES, core_count, return_freed_memory
 
     return_freed_memory(*PICTURES)
-    check_mask(settings.regions)
-    model = choice.load_detector(settings.detector)
+    check_masks(settings.regions)
+    model = load_detector(settings.detector)
     sources = find_images(images)
     shared = options.as_outputs(options.wanted_outputs())
-    inputs = [*sources, *choice.inputs(settings, settings.detector, camera)]
+    inputs = [*sources, *choice.inputs(settings)]
     check_sinks(shared, overwrite=overwrite, inputs=inputs)
     jobs = plan_pictures(sources, output, stages, overwrite=overwrite, inputs=inputs)
     is_printed = not (output or stages or shared)
@@ -70,7 +68,7 @@ def detect_image(
         failures = run_pictures(
             jobs,
             shared,
-            PictureSearch(model, settings, request),
+            PictureSearch(model, settings),
             overwrite=overwrite,
             threads=core_count(),
             progress=partial(steps, ""),

@@ -15,16 +15,14 @@ import click
 
 from vdet.cli import options
 from vdet.cli.command import command
-from vdet.cli.counting import Counting, counting_options
+from vdet.cli.counting import check_counting, counting_options
 from vdet.cli.messages import is_quiet, print_lines, print_message, progress_steps
 from vdet.errors import counted, failure_code
 
 if TYPE_CHECKING:
     from vdet.batch.manifest import Record
     from vdet.batch.plan import OutputSuffix, Plan
-    from vdet.batch.task import Work
-    from vdet.config.schema import Settings
-    from vdet.run.video import VideoJob
+    from vdet.run.video import Run
     from vdet.workers import Workers
 
 log = logging.getLogger("vdet")
@@ -71,7 +69,7 @@ _batch_options = options.bundle(
     "vdet detect-video in.mp4 out.mp4 --tracks out.csv",
     "vdet detect-video in.mp4 --no-video --tracks - --start 1:30 --end 2:00",
     "vdet detect-video in.mp4 --no-video --stages stages --at 12.5",
-    "vdet detect-video in.mp4 --no-video --lines lines.yaml --flows flows.csv --interval 15min",
+    "vdet detect-video in.mp4 --no-video -c gate.yaml --flows flows.csv --interval 15min",
     "vdet detect-video clips/ -d found --tracks .jsonl --skip-existing",
 )
 @click.argument("clips", nargs=-1, required=True, type=options.PATH, metavar="IN [OUT] | CLIP...")
@@ -99,8 +97,8 @@ _batch_options = options.bundle(
 @options.start_option
 @options.end_option
 @options.option("--frames N", "Process at most N frames.", options.POSITIVE)
-@options.option(
-    "--stride N", "Search every N-th frame, as --set detector.stride=N.", click.IntRange(1, 100)
+@options.short_form(
+    "--stride N", "detector.stride", "Search every N-th frame.", click.IntRange(1, 100)
 )
 @options.option(
     "--threads N",
@@ -115,14 +113,8 @@ _batch_options = options.bundle(
     f"--at {options.TIME_FORM}", "Show the frame at this time with --stages.", options.parse_time
 )
 @_batch_options
-@options.lane_options
-@options.settings_options(
-    "output.crf=18",
-    options.regions_option,
-    options.lines_option,
-    options.ground_option,
-    options.model_option,
-)
+@options.lanes_option
+@options.settings_options("output.crf=18", options.model_option)
 @options.overwrite_option
 def detect_video(
     clips: tuple[Path, ...],
@@ -130,12 +122,8 @@ def detect_video(
     start: Fraction | None,
     end: Fraction | None,
     frames: int | None,
-    stride: int | None,
     threads: int | None,
     at: Fraction | None,
-    counting: Counting,
-    lanes: bool,
-    camera: Path | None,
     choice: options.SettingsChoice,
     overwrite: bool,
     batch: BatchOptions,
@@ -160,27 +148,18 @@ def detect_video(
         wanted = [*video, *wanted]
     if no_video and not wanted:
         raise click.UsageError("nothing would be written; give an output, such as --tracks")
-    request = options.read_lanes(lanes, camera)
-    settings = choice.read(*([f"detector.stride={stride}"] if stride else []))
-    counting.check(settings, several=batch.folder is not None)
-    from vdet.regions import check_mask
-    from vdet.run.video import VideoJob
+    settings = choice.read()
+    check_counting(settings, several=batch.folder is not None)
+    from vdet.regions import check_masks
+    from vdet.run.video import Run
 
-    check_mask(settings.regions)
-    inputs = tuple(choice.inputs(settings, settings.detector, camera))
-    part = start, end, frames, at or Fraction(0)
-    job = VideoJob(source, (), *part, request, inputs, overwrite, ground=choice.ground())
-    job = replace(job, begin=counting.begin, interval=counting.interval)
+    check_masks(settings.regions)
+    inputs, part = tuple(choice.inputs(settings)), (start, end, frames, at or Fraction(0))
+    run = Run(source, settings, (), *part, inputs, overwrite, threads)
     if batch.folder is None:
-        job = replace(job, outputs=options.as_outputs(wanted), threads=threads)
-        _process_one(job, settings, choice)
+        _process_one(replace(run, outputs=options.as_outputs(wanted)))
         return 0
-    from vdet.batch.task import Work
-
-    suffixes = _read_suffixes(wanted, no_video=no_video)
-    sinks = {each.sink for each in suffixes}
-    work = Work.of(job, sinks, settings, choice.model_path, threads)
-    return _process_batch(clips, job, suffixes, work, batch)
+    return _process_batch(clips, run, _read_suffixes(wanted, no_video=no_video), batch)
 
 
 def _in_and_out(clips: tuple[Path, ...], *, no_video: bool) -> tuple[Path, list[options.Wanted]]:
@@ -201,20 +180,21 @@ def _in_and_out(clips: tuple[Path, ...], *, no_video: bool) -> tuple[Path, list[
     return source, [("video", path) for path in outputs]
 
 
-def _process_one(job: "VideoJob", settings: "Settings", choice: options.SettingsChoice) -> None:
-    from vdet.run.video import check_job, run_video
+def _process_one(run: "Run") -> None:
+    from vdet.detect.factory import load_detector
+    from vdet.run.video import check_run, run_video
 
-    model = choice.load_detector(settings.detector)
-    check_job(job)
+    model = load_detector(run.settings.detector)
+    check_run(run)
     with progress_steps(" frames") as steps:
         steps("opening", None)
-        totals = run_video(job, model, settings, progress=partial(steps, ""))
+        totals = run_video(run, model, progress=partial(steps, ""))
     if not is_quiet():
         rate = totals.frames / totals.seconds
         found = f"{counted(totals.frames, 'frame')}, {counted(totals.tracks, 'track')}"
-        print_message(f"{job.source}: {found}, {totals.seconds:.1f} s, {rate:.1f} frames/s")
-        if totals.clock and settings.counts:
-            print_message(f"{job.source}: begins {totals.clock}")
+        print_message(f"{run.source}: {found}, {totals.seconds:.1f} s, {rate:.1f} frames/s")
+        if totals.clock and run.settings.traffic:
+            print_message(f"{run.source}: begins {totals.clock}")
 
 
 def _read_suffixes(wanted: Sequence[options.Wanted], *, no_video: bool) -> "list[OutputSuffix]":
@@ -241,11 +221,7 @@ def _suffix(sink: str, path: Path) -> str:
 
 
 def _process_batch(
-    clips: Sequence[Path],
-    common: "VideoJob",
-    suffixes: "Sequence[OutputSuffix]",
-    work: "Work",
-    batch: BatchOptions,
+    clips: Sequence[Path], common: "Run", suffixes: "Sequence[OutputSuffix]", batch: BatchOptions
 ) -> int:
     """Process a batch, or list what would be written, and return the exit code."""
     from vdet.batch.plan import make_plan
@@ -254,25 +230,24 @@ def _process_batch(
     folder = batch.folder or Path()
     if batch.scheduler:  # the workers were started in other folders
         clips, folder = [clip.absolute() for clip in clips], folder.absolute()
-    digest = work.digest if batch.skip_existing else None
-    plan = make_plan(clips, folder, common, suffixes, digest=digest)
+    plan = make_plan(clips, folder, common, suffixes, skip_existing=batch.skip_existing)
     if batch.dry_run:
         print_lines(
-            *(f"{job.source}: {_output_names(job)} there already" for job in plan.skipped),
-            *(f"{job.source} → {_output_names(job)}" for job in plan.jobs),
+            *(f"{run.source}: {_output_names(run)} there already" for run in plan.skipped),
+            *(f"{run.source} → {_output_names(run)}" for run in plan.runs),
         )
         return 0
-    if not plan.jobs:
+    if not plan.runs:
         write_totals(plan)  # a run that was interrupted may have left them out
         print_message(f"{plan.folder}: {counted(len(plan.skipped), 'file')} there already")
         return 0
-    workers, threads = _workers(batch, len(plan.jobs))
-    failed = _run(plan, replace(work, threads=work.threads or threads), workers)
-    return failure_code(failed, len(plan.jobs) + len(plan.skipped))
+    workers, threads = _workers(batch, len(plan.runs))
+    failed = _run(plan, workers, threads)
+    return failure_code(failed, len(plan.runs) + len(plan.skipped))
 
 
-def _output_names(job: "VideoJob") -> str:
-    return ", ".join(str(output.path) for output in job.outputs)
+def _output_names(run: "Run") -> str:
+    return ", ".join(str(output.path) for output in run.outputs)
 
 
 def _workers(batch: BatchOptions, files: int) -> "tuple[Workers, int]":
@@ -286,33 +261,33 @@ def _workers(batch: BatchOptions, files: int) -> "tuple[Workers, int]":
     return LocalProcesses(jobs), max(1, cores // jobs)
 
 
-def _run(plan: "Plan", work: "Work", workers: "Workers") -> int:
+def _run(plan: "Plan", workers: "Workers", threads: int) -> int:
     """Run the batch, print the result of each file, and return how many failed."""
     from vdet.batch.run import run_batch
 
     failed = 0
     with (
         progress_steps(" files") as steps,
-        closing(run_batch(plan, work, workers=workers)) as results,
+        closing(run_batch(plan, workers=workers, threads=threads)) as results,
     ):
-        advance = steps("", len(plan.jobs))
-        for job, record in results:
-            _print_result(job, record, counts=bool(work.settings.counts))
+        advance = steps("", len(plan.runs))
+        for run, record in results:
+            _print_result(run, record)
             failed += record.error is not None
             advance(1)
     if not is_quiet():
         skipped = f"{len(plan.skipped)} there already, " if plan.skipped else ""
-        done = counted(len(plan.jobs) - failed, "file")
+        done = counted(len(plan.runs) - failed, "file")
         print_message(f"{plan.manifest}: {done} done, {skipped}{failed} failed")
     return failed
 
 
-def _print_result(job: "VideoJob", record: "Record", *, counts: bool) -> None:
+def _print_result(run: "Run", record: "Record") -> None:
     for warning in record.warnings:
         log.warning("%s", warning)
     if record.error:
         log.error("%s", record.error)
     elif not is_quiet():
         found = f"{counted(record.frames or 0, 'frame')}, {counted(record.tracks or 0, 'track')}"
-        begin = f", begins {record.begin}" if record.begin and counts else ""
-        print_message(f"{job.source}: {found}, {record.seconds:.1f} s{begin}")
+        begin = f", begins {record.begin}" if record.begin and run.settings.traffic else ""
+        print_message(f"{run.source}: {found}, {record.seconds:.1f} s{begin}")

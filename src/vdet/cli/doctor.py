@@ -72,5 +72,5 @@ def _check_config(name: str) -> str:
     from vdet.detect.factory import load_detector
 
     path = find_config(name)
-    load_detector(load_settings(path).detector)
+    load_detector(load_settings([path]).detector)
     return f"{path}, its model loads"

@@ -48,6 +48,7 @@ def images(
     """
     settings = choice.read_for_whole_frames()
     detector = settings.detector
+    from vdet.detect.factory import load_detector
     from vdet.evaluate.images import Counting, evaluate_images
     from vdet.evaluate.output import RunName
     from vdet.evaluate.show_images import images_page, lines, plain
@@ -56,15 +57,15 @@ def images(
     from vdet.workers import PICTURES, core_count, return_freed_memory
 
     return_freed_memory(*PICTURES)
-    model = choice.load_detector(detector.showing_all())
-    results.check([*data, *choice.inputs(settings, detector)])
+    model = load_detector(detector.showing_all())
+    results.check([*data, *choice.inputs(settings)])
     roles = Roles.from_settings(settings)
     sets = [read_labelled_pictures(path, roles) for path in data]
     counting = Counting(detector.shown_score if score is None else score, least_width)
     with progress_steps(" pictures") as steps:
         progress = partial(steps, "")
         result = evaluate_images(sets, model, counting, threads=core_count(), progress=progress)
-    run = RunName.of(detector, choice.model_path, choice.config_name, choice.assignments)
+    run = RunName.of(detector, choice.name, choice.assignments)
     results.print(lines(result, run), plain(result, run), lambda: images_page(result, run))
 
 
@@ -73,11 +74,11 @@ def images(
     "vdet eval patches patches/ --model model.npz",
 )
 @click.argument("data", nargs=-1, required=True, type=options.PATH, metavar="DATA...")
-@options.option(
+@options.short_form(
     "--model FILE",
-    "Test this model on all of DATA.",
-    name="model_path",
-    show_default="a new model, tested on the last patches of each folder",
+    "detector.model",
+    "Test this model on all of DATA; without one, a new model is tested on the last patches of "
+    "each folder.",
 )
 @options.settings_options("train.svm.C=1e-4")
 @options.jobs_option()
@@ -99,14 +100,14 @@ def patches(
     from vdet.learn.svm import patch_eval
     from vdet.learn.svm.dataset import find_patches
 
-    model_path = choice.model_path
+    model_path = Path(settings.svm.model) if settings.svm.model else None
     model = load_model(model_path, requested_features(settings.svm)) if model_path else None
     results.check([*data, *([model_path] if model_path else [])])
     files = find_patches(data)
     with progress_steps("") as steps:
         result = patch_eval.evaluate_patches(files, settings, model, jobs=jobs, steps=steps)
     sources = trained_on(model_path) if model_path else ()
-    name = RunName("svm", model_path, choice.config_name, choice.assignments, sources)
+    name = RunName("svm", model_path, choice.name, choice.assignments, sources)
     text, values = [*name.lines(), *patch_eval.lines(result)], patch_eval.values(result)
     results.print(text, name.values() | values, lambda: patch_eval.patch_page(result, name))
 
@@ -163,7 +164,7 @@ def tracks(
     name="sweeps",
     multiple=True,
 )
-@options.settings_options("tracker.needed=0.3", options.regions_option, options.model_option)
+@options.settings_options("tracker.needed=0.3", options.model_option)
 @results_options
 def video(
     videos: tuple[Path, ...],
@@ -175,33 +176,34 @@ def video(
 ) -> None:
     """Measure detection and tracking in labelled video.
 
-    Vehicles are found and followed in each video IN, and compared with its truth. With --regions,
-    vehicles outside the regions do not count.
+    Vehicles are found and followed in each video IN, and compared with its truth. Vehicles
+    outside the regions of the settings do not count.
     """
     if len(videos) != len(truths):
         given = f"videos: {len(videos)}, truths: {len(truths)}"
         raise click.UsageError(f"give one --truth for each video ({given})")
     base = choice.read()
+    from vdet.detect.factory import load_detector
     from vdet.evaluate.output import RunName
     from vdet.evaluate.show_video import plain, result_lines, video_page
     from vdet.evaluate.video import Variant, evaluate_clips, open_clip
     from vdet.labels.roles import Roles
-    from vdet.regions import check_mask
+    from vdet.regions import check_masks
 
-    check_mask(base.regions)
+    check_masks(base.regions)
     variants = []
     for extra in grid(sweeps):
         settings = choice.read(*extra)
-        model = choice.load_detector(settings.detector)
+        model = load_detector(settings.detector)
         variants.append(Variant(settings, model, extra))
     detectors = [variant.settings.detector for variant in variants]
-    files = [path for each in detectors for path in choice.inputs(base, each)]
+    files = [path for each in variants for path in choice.inputs(each.settings)]
     results.check([*videos, *truths, *files])
     roles = Roles.from_settings(base)
     clips = [open_clip(*pair, until, roles) for pair in zip(videos, truths, strict=True)]
     with progress_steps(" frames") as steps:
         runs = evaluate_clips(clips, variants, partial(steps, ""))
-    name = RunName.of(detectors[0], choice.model_path, choice.config_name, choice.assignments)
+    name = RunName.of(detectors[0], choice.name, choice.assignments)
     text = [*name.lines(), *result_lines(runs)]
     results.print(text, plain(runs, name), lambda: video_page(runs, "; ".join(name.lines())))
 

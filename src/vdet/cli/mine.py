@@ -56,7 +56,7 @@ def mine(
     from vdet.labels.reading import holds_labelled_pictures
     from vdet.learn.svm import mining
 
-    inputs = [*sources, *truths, *choice.inputs(settings, settings.svm)]
+    inputs = [*sources, *truths, *choice.inputs(settings)]
     check_output(output, overwrite=overwrite, inputs=inputs)
     videos = [path for path in sources if not holds_labelled_pictures(path)]
     if len(videos) != len(truths):
@@ -69,7 +69,7 @@ def mine(
         else mining.PictureSource(path)
         for path in sources
     ]
-    model = load_svm(settings.svm, choice.model_path)
+    model = load_svm(settings.svm, Path(settings.svm.model) if settings.svm.model else None)
     with progress_steps(" frames") as steps:
         frames, counts = mining.mine(
             labelled, output, settings, model, overwrite=overwrite, steps=steps

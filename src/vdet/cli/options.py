@@ -3,7 +3,7 @@
 A *bundle* adds several options to a command, which gets their values as one argument.
 """
 
-import logging
+import json
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields
@@ -18,10 +18,7 @@ from click.shell_completion import CompletionItem
 from vdet.errors import ConfigError, OutputError
 
 if TYPE_CHECKING:
-    from vdet.config.schema import DetectorSettings, Settings
-    from vdet.detect.protocol import DetectorModel
-    from vdet.lanes.ground import GroundRequest
-    from vdet.lanes.road import LaneRequest
+    from vdet.config.schema import Settings
     from vdet.run.sinks.protocol import Output
 
 PATH = click.Path(path_type=Path)
@@ -34,8 +31,6 @@ SHARE = click.FloatRange(0, 1)
 TIME_FORM = "[[HH:]MM:]SS"
 
 F = TypeVar("F", bound=Callable[..., Any])
-
-log = logging.getLogger("vdet")
 
 _LONGEST = 10_000 * 3600  # seconds
 _TIME = re.compile(r"([0-9]{1,9}:){0,2}[0-9]{1,9}(\.[0-9]{1,9})?", re.ASCII)
@@ -137,22 +132,6 @@ start_option = option(
     f"--start {TIME_FORM}", "Begin at this time, as in 90, 1:30 or 0:01:30.5.", parse_time
 )
 end_option = option(f"--end {TIME_FORM}", "Stop before this time.", parse_time)
-model_option = option(
-    "--model FILE",
-    "Model of the detector: .npz from vdet train, or .onnx. It decides which detector runs.",
-    name="model_path",
-    show_default="the shipped one that fits the settings",
-)
-regions_option = option(
-    "--regions FILE",
-    "Show only vehicles in these regions: polygons (.yaml), or a mask, white in them.",
-)
-ground_option = option(
-    "--ground FILE",
-    "Points of the road in pixels and metres (.yaml), for distances and speeds.",
-    name="ground_file",
-)
-lines_option = option("--lines FILE", "Lines and zones at which vehicles are counted (.yaml).")
 
 
 def jobs_option(text: str = "Work in N processes.") -> Callable[[F], F]:
@@ -171,78 +150,78 @@ def check_suffix(output: Path, *suffixes: str, what: str) -> None:
         raise OutputError(f"{output}: {what} are written as {suffixes[0]}; name it so")
 
 
+Short = tuple[str, Any]
+"""A short form of a setting that was given: the key, and its value."""
+
+_SHORT = f"{__name__}.short"
+
+
+def short_form(shown: str, key: str, text: str, kind: Any = None) -> Callable[[F], F]:
+    """Add an option that is a short form of a setting: see `SettingsChoice`."""
+
+    def keep(context: click.Context, _: click.Parameter, given: Any) -> None:
+        if given not in (None, False):
+            context.meta.setdefault(_SHORT, []).append((key, given))
+
+    words = f"{text.removesuffix('.')} (`{key}`)."
+    return option(shown, words, kind, expose_value=False, callback=keep)
+
+
+model_option = short_form(
+    "--model FILE",
+    "detector.model",
+    "Model of the detector: .npz from vdet train, or .onnx. It decides which detector runs.",
+    str,
+)
+lanes_option = short_form("--lanes", "lanes.enabled", "Find the lane too, and draw it.")
+
+
 @dataclass(frozen=True, slots=True)
 class SettingsChoice:
-    """The settings that `settings_options` choose, with the model file and the places."""
+    """The settings that `settings_options` choose: files, assignments and their short forms."""
 
-    config_name: str | None
+    configs: tuple[str, ...]
     assignments: tuple[str, ...]
-    model_path: Path | None = None
-    regions: Path | None = None
-    lines: Path | None = None
-    ground_file: Path | None = None
 
     def read(self, *more: str, detector: str | None = None) -> "Settings":
-        """Read them; `more` are further assignments.
+        """Read them, and `more` assignments; `detector` is its kind where nothing chooses one.
 
-        The model file decides which detector runs; without one it is `detector`, or the default
-        where that is None. Raises `ConfigError`.
+        Raises `ConfigError`.
         """
-        named = {"regions": self.regions, "counts": self.lines}
-        places = {name: file for name, file in named.items() if file}
-        given = self.config_name, self.assignments, more, places, self.model_path, detector
-        if not any(given):
+        short = click.get_current_context().meta.get(_SHORT, [])
+        given = (f"{key}={json.dumps(value)}" for key, value in short)
+        assignments = (*self.assignments, *given, *more)
+        if not (self.configs or assignments or detector):
             from vdet.config.schema import Settings
 
             return Settings()
-        from vdet.config.loading import find_config, kind_of_model, load_settings
+        from vdet.config.loading import load_settings
 
-        if self.model_path is not None:
-            detector = kind_of_model(self.model_path) or detector
-        path = find_config(self.config_name) if self.config_name else None
-        return load_settings(path, (*self.assignments, *more), places, detector=detector)
+        return load_settings(self._files(), assignments, detector=detector)
 
-    def ground(self) -> "GroundRequest | None":
-        """Read the file of the ground; None without one. Raises `ConfigError`."""
-        if self.ground_file is None:
-            return None
-        from vdet.lanes.ground import load_ground
+    def _files(self) -> list[Path]:
+        if not self.configs:
+            return []
+        from vdet.config.loading import find_config
 
-        return load_ground(self.ground_file)
+        return [find_config(name) for name in self.configs]
 
-    def load_detector(self, settings: "DetectorSettings") -> "DetectorModel":
-        """Load the detector.
+    @property
+    def name(self) -> str | None:
+        """The names of the files as the user gave them; None for the defaults."""
+        return " ".join(self.configs) or None
 
-        Raises
-        ------
-        ConfigError, ModelError
-            It cannot be loaded.
-        """
-        from vdet.detect.factory import load_detector
-
-        return load_detector(settings, self.model_path)
-
-    def inputs(
-        self,
-        settings: "Settings",
-        detector: "DetectorSettings | None" = None,
-        camera: Path | None = None,
-    ) -> list[Path]:
-        """Return the files of these settings, the model file of a detector, and a camera file."""
+    def inputs(self, settings: "Settings", *, with_model: bool = True) -> list[Path]:
+        """Return the files that the settings are read from and those that they name."""
         from vdet.detect.factory import model_file
 
-        config: Path | None = None
-        if self.config_name:
-            from vdet.config.loading import find_config
+        model = model_file(settings.detector) if with_model else None
+        masks = [Path(each.mask) for each in settings.regions if each.mask]
+        return [*self._files(), *masks, *([model] if model else [])]
 
-            config = find_config(self.config_name)
-        model = detector and model_file(detector, self.model_path)
-        places = self.regions, self.lines, self.ground_file, settings.regions.mask
-        return [Path(each) for each in (config, *places, model, camera) if each]
-
-    def read_for_whole_frames(self, *more: str, detector: str | None = None) -> "Settings":
+    def read_for_whole_frames(self, *, detector: str | None = None) -> "Settings":
         """Read them for a command that looks at whole frames; refuse regions as a `ConfigError`."""
-        settings = self.read(*more, detector=detector)
+        settings = self.read(detector=detector)
         if settings.regions:
             raise ConfigError("regions: this command looks at whole frames; leave the regions out")
         return settings
@@ -255,9 +234,11 @@ def settings_options(example: str, *more: Callable[..., Any]) -> Callable[[F], F
     """
     config = option(
         "-c, --config FILE",
-        "Read settings from a YAML file, or from a shipped one: default, svm or seed.",
+        "Read settings from a YAML file, or from a shipped one: default, svm or seed. Can be "
+        "repeated; later files win.",
         str,
-        name="config_name",
+        name="configs",
+        multiple=True,
         shell_complete=_complete_configs,
     )
     assign = option(
@@ -335,29 +316,3 @@ def as_outputs(wanted: Iterable[Wanted]) -> tuple["Output", ...]:
     from vdet.run.sinks.protocol import Output
 
     return tuple(Output(sink, path) for sink, path in wanted)
-
-
-camera_option = option(
-    "--camera FILE", "Correct the lens distortion by this file of vdet calibrate."
-)
-
-
-def lane_options(command: F) -> F:
-    """Add `--lanes` and `--camera FILE`, for `read_lanes`."""
-    add_lanes = option("--lanes", "Find the lane too, and draw it.")
-    return add_lanes(camera_option(command))
-
-
-def read_lanes(lanes: bool, camera: Path | None) -> "LaneRequest | None":
-    """Return what `lane_options` ask for, None for no lanes; read the camera file."""
-    if camera is not None and not lanes:
-        raise click.UsageError("--camera goes with --lanes")
-    if not lanes:
-        return None
-    from vdet.lanes.camera import load_camera
-    from vdet.lanes.road import LaneRequest
-
-    if camera is None:
-        log.warning("--lanes without --camera: lens distortion is not corrected")
-        return LaneRequest()
-    return LaneRequest(load_camera(camera))

@@ -41,7 +41,9 @@ def train(
     options.check_suffix(output, ".npz", what="models")
     metrics_path = output.with_suffix(".json")
     for path in (output, metrics_path):
-        check_output(path, overwrite=overwrite, inputs=[*data, *choice.inputs(settings)])
+        check_output(
+            path, overwrite=overwrite, inputs=[*data, *choice.inputs(settings, with_model=False)]
+        )
     from vdet.detect.svm.model import save_model
     from vdet.learn.svm.dataset import find_patches
     from vdet.learn.svm.training import train as fit_model

@@ -56,7 +56,7 @@ def train_net(
     limit_library_threads()
     job = NetworkJob(data, clips, output, base, overwrite)
     inputs = [*data, *([base] if base else []), *(path for clip in clips for path in clip)]
-    inputs += choice.inputs(settings)
+    inputs += choice.inputs(settings, with_model=False)
     for path in (job.output, job.metrics):
         check_output(path, overwrite=overwrite, inputs=inputs)
     sources = read_sources(job, settings)

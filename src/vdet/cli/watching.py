@@ -43,9 +43,7 @@ class Watched:
                 return frame.image
         raise VideoError(f"{clip}: has no frame at {float(self.start or 0):.2f} s; check --start")
 
-    def records(
-        self, clip: Path, width: int, settings: "Settings", choice: options.SettingsChoice
-    ) -> "tuple[VehicleRecord, ...]":
+    def records(self, clip: Path, width: int, settings: "Settings") -> "tuple[VehicleRecord, ...]":
         """Return the records of the vehicles: from the file of tracks, else the clip is searched.
 
         `width` is that of the frames, pixels.
@@ -55,8 +53,9 @@ class Watched:
         VdetError
             The tracks or the clip cannot be used.
         """
+        from vdet.detect.factory import load_detector
         from vdet.labels.reading import read_tracks
-        from vdet.run.video import VideoJob, open_video
+        from vdet.run.video import Run, open_video
         from vdet.traffic.records import VehicleRecords
 
         records = VehicleRecords(width)
@@ -64,9 +63,9 @@ class Watched:
             for frame in read_tracks(self.tracks, rate=1.0):
                 records.add(frame)
             return records.end()
-        job = VideoJob(clip, start=self.start, end=self.end)
-        model = choice.load_detector(settings.detector)
-        with progress_steps(" frames") as steps, open_video(job, model, settings) as video:
+        run = Run(clip, settings, start=self.start, end=self.end)
+        model = load_detector(settings.detector)
+        with progress_steps(" frames") as steps, open_video(run, model) as video:
             advance = partial(steps, "")(video.reader.expected)
             for result in video.results:
                 records.add(result.frame_tracks)

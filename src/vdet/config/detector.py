@@ -20,6 +20,8 @@ class DetectorSettings(Section):
     model_suffix: ClassVar[str | None] = None
 
     kind: str
+    model: str | None = Field(None, min_length=1, max_length=4096)
+    """Model file: .npz from `vdet train`, or .onnx. null: the shipped one that fits."""
     searches: Searches = None
     """Search at least this many frames in a second of video. The tracker predicts where the
     vehicles are in the others. null: search all frames.
@@ -81,7 +83,7 @@ class NetworkSettings(DetectorSettings):
     @property
     def search_key(self) -> object:
         """What the search of a frame depends on."""
-        return self.kind, self.least, self.classes, self.names
+        return self.kind, self.model, self.least, self.classes, self.names
 
     @property
     def vehicle_classes(self) -> tuple[str, ...]:

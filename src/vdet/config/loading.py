@@ -1,9 +1,9 @@
-"""Layers of settings → one `Settings`: the defaults, then a YAML file, then assignments."""
+"""Layers of settings → one `Settings`: the defaults, then YAML files, then assignments."""
 
 import contextlib
 import difflib
 import reprlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, get_args
 
@@ -13,6 +13,7 @@ from pydantic_core import ErrorDetails
 from vdet.config import document
 from vdet.config.detector import NetworkSettings
 from vdet.config.document import Document, Key
+from vdet.config.points import inside, items, to_fractions
 from vdet.config.schema import Section, Settings
 from vdet.config.svm import SvmSettings
 from vdet.config.tracker import MotionTrackerSettings, RulesTrackerSettings
@@ -25,8 +26,6 @@ _CONFIGS = (_PACKAGE / "configs", _PACKAGE.parents[1] / "configs")
 
 _ALIASES = {"net": "default"}
 """Other names of shipped configs."""
-
-_YAML_SUFFIXES = (".yaml", ".yml")
 
 
 GROUPS = {"detector": DETECTORS, "tracker": TRACKERS}
@@ -96,36 +95,33 @@ def shipped_configs() -> dict[str, Path]:
 
 
 def load_settings(
-    path: Path | None = None,
-    assignments: Sequence[str] = (),
-    places: Mapping[str, Path] | None = None,
-    *,
-    detector: str | None = None,
+    paths: Sequence[Path] = (), assignments: Sequence[str] = (), *, detector: str | None = None
 ) -> Settings:
-    """Read settings: defaults, then the file at `path`, then assignments such as `output.crf=18`.
+    """Read settings: defaults, then the files at `paths`, then assignments such as `output.crf=18`.
 
-    `detector` is the kind of detector where no layer chooses one; None for the default.
-
-    `places` are files by the name of a section with places in the frame (`PlacedSection`). Such a
-    file holds the keys of this section; for `regions` one that is not named `.yaml` or `.yml` is a
-    mask. It lies above `path`, and replaces all places of the section.
+    `detector` is the kind of detector where no layer chooses one, or a model file that is for one;
+    None for the default.
 
     A list in a later layer replaces the whole list of an earlier one. Where a layer chooses another
     kind of detector or tracker than the layers below, that section starts from the defaults of this
-    kind. All assignments are one layer.
+    kind. All assignments are one layer. A relative path in a file is relative to that file, and the
+    points in a file with `camera.size` are pixels of such frames.
 
     Raises
     ------
     ConfigError
         One line for each mistake, with file, line, column, key and what was expected.
     """
-    layers = [Document("defaults", {"detector": {"kind": detector}})] if detector else []
-    layers += [document.read_document(path)] if path else []
-    layers += [_read_places(name, file) for name, file in (places or {}).items()]
     assigned = Document("--set", {})
     for text in assignments:
         assigned = _over(assigned, document.parse_assignment(text))
-    layers.append(assigned)
+    layers = [*map(_read_file, paths), assigned]
+    for layer in layers:
+        to_fractions(layer.values)
+    models = [inside(layer.values, "detector", "model") for layer in layers]
+    named = [model for model in models if isinstance(model, str)]
+    kind = (kind_of_model(Path(named[-1])) if named else None) or detector
+    layers = [Document("defaults", {"detector": {"kind": kind}})] * bool(kind) + layers
     merged, chosen = _merge(layers)
     fields: Any = {name: (section, section()) for name, section in chosen.items()}
     model = create_model("Settings", __base__=Settings, **fields)
@@ -139,15 +135,16 @@ def load_settings(
     return Settings.model_construct(**dict(checked))
 
 
-def _read_places(section: str, path: Path) -> Document:
-    """Read a file of a section with places in the frame as a layer of settings."""
-    defaults: Mapping[str, Any] = getattr(Settings(), section).model_dump(mode="json")
-    no_places = {name: value for name, value in defaults.items() if value in ([], None)}
-    if "mask" in no_places and path.suffix.lower() not in _YAML_SUFFIXES:
-        return Document(str(path), {section: no_places | {"mask": str(path)}})
-    read = document.read_document(path)
-    places = {(section, *key): place for key, place in read.places.items()}
-    return Document(read.name, {section: no_places | read.values}, places)
+def _read_file(path: Path) -> Document:
+    """Read a file as a layer, with paths as seen from the working folder."""
+    layer = document.read_document(path)
+    for holder, key in (
+        *((region, "mask") for region in items(layer.values, "regions")),
+        (inside(layer.values, "detector"), "model"),
+    ):
+        if isinstance(holder, dict) and isinstance(holder.get(key), str):
+            holder[key] = str(path.parent / holder[key])
+    return layer
 
 
 def _over(below: Document, above: Document) -> Document:

@@ -5,13 +5,15 @@ import contextlib
 import inspect
 import textwrap
 from collections.abc import Iterator, Mapping
+from inspect import isclass
 from itertools import pairwise
-from typing import get_args
+from typing import Any, get_args, get_origin
 
 import yaml
 from pydantic.fields import FieldInfo
 from pydantic_core import to_jsonable_python
 
+from vdet.config.points import to_pixels
 from vdet.config.schema import Section, Settings
 
 HEADING = "# vdet settings. `vdet config` prints the effective ones."
@@ -23,7 +25,9 @@ def render(settings: Settings) -> str:
 
     Each key is preceded by what it means; the keys of list items stand before the list.
     """
-    return "\n".join([HEADING, *_section(settings, "")]) + "\n"
+    values = to_jsonable_python(settings, exclude_none=True)  # an item says only what it has
+    to_pixels(values)
+    return "\n".join([HEADING, *_section(settings, values, "")]) + "\n"
 
 
 def explanations(section: type[Section]) -> Mapping[str, str]:
@@ -46,22 +50,22 @@ def explanations(section: type[Section]) -> Mapping[str, str]:
     return found | {name: text for name, text in described.items() if text}
 
 
-def _section(section: Section, indent: str) -> Iterator[str]:
+def _section(section: Section, values: Mapping[str, Any], indent: str) -> Iterator[str]:
     texts = explanations(type(section))
     for name, field in type(section).model_fields.items():
         value = getattr(section, name)
+        if not indent:
+            yield ""
         if isinstance(value, Section):
-            if not indent:
-                yield ""
             yield from _comment(_first_line(type(value)), indent)
             yield f"{indent}{name}:"
-            yield from _section(value, indent + "  ")
+            yield from _section(value, values[name], indent + "  ")
             continue
-        yield from _comment(texts.get(name, ""), indent)
+        for paragraph in texts.get(name, "").split("\n\n"):
+            yield from _comment(paragraph, indent)
         if item := _item_section(field):
             yield from _item_keys(item, indent)
-        # An item of a list says only what it has.
-        plain = value if value is None else to_jsonable_python(value, exclude_none=True)
+        plain = values.get(name)
         style, width = None if isinstance(plain, list) else False, WIDTH - len(indent)
         text = yaml.safe_dump({name: plain}, default_flow_style=style, sort_keys=False, width=width)
         yield from textwrap.indent(text, indent).splitlines()
@@ -81,9 +85,8 @@ def _item_keys(item: type[Section], indent: str) -> Iterator[str]:
 def _item_section(field: FieldInfo) -> type[Section] | None:
     """Return the section that the items of a list are; None for any other field."""
     items = get_args(field.annotation)
-    if items and isinstance(items[0], type) and issubclass(items[0], Section):
-        return items[0]
-    return None
+    is_list = get_origin(field.annotation) is tuple
+    return items[0] if is_list and isclass(items[0]) and issubclass(items[0], Section) else None
 
 
 def _first_line(section: type[Section]) -> str:

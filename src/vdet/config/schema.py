@@ -3,12 +3,14 @@
 The defaults are those of `configs/default.yaml`, which is their printed form.
 """
 
+from collections.abc import Callable
 from typing import Annotated, Literal
 
-from pydantic import Field, SerializeAsAny, model_validator
+from pydantic import Field, SerializeAsAny, field_validator, model_validator
 
+from vdet.config.camera import CameraSettings, moment
 from vdet.config.detector import DetectorSettings, NetworkSettings
-from vdet.config.places import CountSettings, RegionsSettings
+from vdet.config.places import RegionList, TrafficSettings
 from vdet.config.section import Section, Share
 from vdet.config.svm import SvmSettings
 from vdet.config.tracker import MotionTrackerSettings, TrackerSettings
@@ -24,13 +26,15 @@ class StepSettings(Section):
 
 
 class LaneSettings(Section):
-    """The road in front of the camera: a trapezoid whose sides are the lines of a straight lane.
+    """The lane: whether it is looked for, and a trapezoid whose sides are its lines on a straight.
 
     For another camera, take an undistorted frame of a straight and level road. Choose two rows:
     the nearer one above the bonnet, the farther one a little below the horizon. Note the columns
     at which the lines of the vehicle's lane cross them.
     """
 
+    enabled: bool = False
+    """Find the lane, and draw it."""
     top: Share = 0.63
     """Farther row, as a share of the frame's height."""
     bottom: Share = 0.93
@@ -84,8 +88,17 @@ class InputSettings(Section):
 
     max_damaged: Share = 0.05
     """Largest accepted share of damaged or lost frames."""
+    begin: str | None = Field(None, max_length=100)
+    """When the video begins, as in '2026-05-01 07:00+02:00'. null: as camera.clock says."""
     frame_rate: float | None = Field(None, ge=0.01, le=1000)
     """Frames per second of numbered pictures (img_%04d.png). null: 25, with a warning."""
+
+    @field_validator("begin")
+    @classmethod
+    def _is_a_moment(cls, begin: str | None) -> str | None:
+        if begin is not None:
+            moment(begin)
+        return begin
 
 
 class OutputSettings(Section):
@@ -125,15 +138,34 @@ class Settings(Section):
 
     detector: SerializeAsAny[DetectorSettings] = NetworkSettings()
     tracker: SerializeAsAny[TrackerSettings] = MotionTrackerSettings()
-    regions: RegionsSettings = RegionsSettings()
+    camera: CameraSettings = CameraSettings()
+    regions: RegionList = ()
+    """Regions of the frame in which vehicles are shown.
+
+    A vehicle is where the middle of its lower edge is. Without an included region the whole frame
+    counts, except for excluded ones.
+    """
     steps: StepSettings = StepSettings()
-    counts: CountSettings = CountSettings()
+    traffic: TrafficSettings = TrafficSettings()
     lanes: LaneSettings = LaneSettings()
     train: TrainSettings = TrainSettings()
     labels: LabelSettings = LabelSettings()
     input: InputSettings = InputSettings()
     output: OutputSettings = OutputSettings()
     draw: DrawSettings = DrawSettings()
+
+    def with_paths(self, change: Callable[[str], str]) -> "Settings":
+        """Return the settings with the paths of the model file and of masks changed."""
+        regions = tuple(
+            each.model_copy(update={"mask": change(each.mask)}) if each.mask else each
+            for each in self.regions
+        )
+        model = self.detector.model
+        detector = self.detector.model_copy(update={"model": change(model) if model else None})
+        return self.model_copy(update={"regions": regions, "detector": detector})
+
+    def __hash__(self) -> int:  # some fields are dictionaries
+        return hash(self.model_dump_json())
 
     @property
     def svm(self) -> SvmSettings:

@@ -35,8 +35,8 @@ class DetectorKind:
     trained_on: Callable[[Path], tuple[str, ...]] = lambda _: ()
 
 
-def load_detector(settings: DetectorSettings, model: Path | None = None) -> DetectorModel:
-    """Load the detector that the settings name; `model` is a file, None for the shipped one.
+def load_detector(settings: DetectorSettings) -> DetectorModel:
+    """Load the detector that the settings name.
 
     Raises
     ------
@@ -45,7 +45,7 @@ def load_detector(settings: DetectorSettings, model: Path | None = None) -> Dete
     ModelError
         The model file cannot be used.
     """
-    kind = None
+    kind, model = None, Path(settings.model) if settings.model else None
     if model:
         from vdet.config.loading import kind_of_model  # it imports YAML
 
@@ -57,13 +57,14 @@ def load_detector(settings: DetectorSettings, model: Path | None = None) -> Dete
     return _kind(settings).load(settings, model)
 
 
-def model_file(settings: DetectorSettings, model: Path | None = None) -> Path | None:
+def model_file(settings: DetectorSettings) -> Path | None:
     """Return the model file that `load_detector` would read; None for a detector without one."""
-    return model or _kind(settings).shipped(settings)
+    return Path(settings.model) if settings.model else _kind(settings).shipped(settings)
 
 
-def trained_on(settings: DetectorSettings, path: Path | None) -> tuple[str, ...]:
-    """Return the names of the data that a model file was trained on, if the file names them."""
+def trained_on(settings: DetectorSettings) -> tuple[str, ...]:
+    """Return the names of the data that a detector was trained on, if its model file names them."""
+    path = model_file(settings)
     return _kind(settings).trained_on(path) if path else ()
 
 

@@ -28,14 +28,11 @@ class RunName:
 
     @staticmethod
     def of(
-        detector: DetectorSettings,
-        model: Path | None,
-        config: str | None,
-        assignments: tuple[str, ...],
+        detector: DetectorSettings, config: str | None, assignments: tuple[str, ...]
     ) -> "RunName":
-        """Return the name of a run; `model` is the model file, None for the shipped one."""
-        file = model_file(detector, model)
-        return RunName(detector.kind, file, config, assignments, trained_on(detector, file))
+        """Return the name of a run."""
+        file = model_file(detector)
+        return RunName(detector.kind, file, config, assignments, trained_on(detector))
 
     def lines(self) -> list[str]:
         """Return the detector, and the data that its model was trained on, as lines of text."""

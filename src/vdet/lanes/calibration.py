@@ -12,8 +12,8 @@ import numpy as np
 from pydantic import ValidationError
 
 from vdet.boxes import Float32Array, Image
+from vdet.config.camera import LensSettings
 from vdet.errors import ImageError
-from vdet.lanes.camera import CalibratedCamera
 from vdet.media.images import read_image
 
 MIN_PHOTOS = 5
@@ -46,7 +46,7 @@ class BoardPhoto:
 class Calibration:
     """A camera, and the photographs that it was fitted to."""
 
-    camera: CalibratedCamera
+    camera: LensSettings
     photos: list[BoardPhoto]
     skipped: dict[Path, str]
     """The photographs that were not used, each with the reason."""
@@ -137,7 +137,7 @@ def _without(
 
 def _fit(
     photos: Sequence[BoardPhoto], pattern: Pattern, size: tuple[int, int]
-) -> tuple[CalibratedCamera | None, list[float]]:
+) -> tuple[LensSettings | None, list[float]]:
     """Fit a camera to the corners of all photographs; return it and each photograph's error.
 
     There is no camera if all boards are seen from one side: these fit any focal length. An error
@@ -154,7 +154,13 @@ def _fit(
     if np.clip(normals @ normals.T, -1, 1).min() <= math.cos(math.radians(MIN_ANGLE)):
         k1, k2, p1, p2, k3 = np.ravel(distortion).tolist()
         with suppress(ValidationError):  # no real camera has such values
-            camera = CalibratedCamera(*size, matrix.tolist(), (k1, k2, p1, p2, k3), rms)
+            camera = LensSettings(
+                width=size[0],
+                height=size[1],
+                matrix=matrix.tolist(),
+                distortion=(k1, k2, p1, p2, k3),
+                rms=rms,
+            )
     return camera, np.ravel(errors).tolist()
 
 

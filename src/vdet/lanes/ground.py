@@ -5,82 +5,19 @@ squared distances in pixels are smallest, because pixels are what is read off a 
 """
 
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Annotated
 
 import cv2
 import numpy as np
-from pydantic import Field
 
 from vdet.boxes import Float64Array
-from vdet.config.document import read_values
-from vdet.config.places import Coordinate, Place, PlacedSection
-from vdet.config.section import Section
+from vdet.config.camera import CameraSettings
 from vdet.errors import ConfigError
-from vdet.lanes.camera import CalibratedCamera, Undistorter, load_camera
+from vdet.lanes.camera import Undistorter
 
 _THIN = 0.01
 """Width of points that count as one line, as a share of their length."""
 _MOST_ERROR = 0.03
 """Largest error of the fit, as a share of the length of the area."""
-_MISTAKES = {"missing": "is missing", "extra_forbidden": "is not a key of files of the ground"}
-
-
-class GroundPoint(Section):
-    """A point of the road."""
-
-    pixel: Place
-    """Where it is in the frame, x and y; whole numbers are the middles of pixels."""
-    metres: tuple[Coordinate, Coordinate]
-    """Where it is on the road, x and y in metres from any point, at right angles."""
-
-
-class GroundPoints(PlacedSection):
-    """A file of the ground: points of the road in pixels and in metres."""
-
-    points: Annotated[tuple[GroundPoint, ...], Field(max_length=100)]
-    """Four points or more, around the part of the road in which speeds are measured."""
-    camera: str | None = None
-    """The camera file of `vdet calibrate`, for a lens that distorts; null for one that does not."""
-
-
-def load_ground(path: Path) -> "GroundRequest":
-    """Read a file of the ground, and the camera that it names, beside it.
-
-    Raises
-    ------
-    ConfigError
-        A file cannot be read, or has a mistake; one line for each.
-    """
-    points = read_values(path, GroundPoints, _MISTAKES)
-    camera = load_camera(path.parent / points.camera) if points.camera else None
-    return GroundRequest(str(path), points, camera)
-
-
-@dataclass(frozen=True, slots=True)
-class GroundRequest:
-    """Ask for metres: the points of a file, and the camera that it names."""
-
-    name: str
-    points: GroundPoints
-    camera: CalibratedCamera | None = None
-
-    def ground(self, width: int, height: int) -> "Ground":
-        """Fit the road plane for frames of `width` × `height` pixels.
-
-        Raises
-        ------
-        ConfigError
-            The points do not fix a plane, do not fit together, or are for frames of another shape.
-        """
-        try:
-            scales = self.points.scales(width, height)
-            pixels = np.array([each.pixel for each in self.points.points], np.float64)
-            metres = np.array([each.metres for each in self.points.points], np.float64)
-            undistorter = Undistorter(self.camera, width, height)
-            return fit_ground(pixels.reshape(-1, 2) * scales, metres.reshape(-1, 2), undistorter)
-        except ConfigError as error:
-            raise ConfigError(f"{self.name}: {error}") from error
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -135,6 +72,21 @@ class Ground:
         return self.undistorter.distorted(_mapped(back, metres)) + 0.5
 
 
+def ground_of(camera: CameraSettings, width: int, height: int) -> "Ground | None":
+    """Fit the road plane of a camera for frames of `width` × `height` pixels; None without points.
+
+    Raises
+    ------
+    ConfigError
+        The points do not fix a plane or do not fit together, or the lens is for other frames.
+    """
+    if not camera.ground:
+        return None
+    pixels = np.array([each.pixel for each in camera.ground], np.float64) * (width, height)
+    metres = np.array([each.metres for each in camera.ground], np.float64)
+    return fit_ground(pixels, metres, Undistorter(camera.lens, width, height))
+
+
 def fit_ground(pixels: Float64Array, metres: Float64Array, undistorter: Undistorter) -> Ground:
     """Fit the plane to points in pixels of the frame and in metres, `(n, 2)` each.
 
@@ -145,16 +97,18 @@ def fit_ground(pixels: Float64Array, metres: Float64Array, undistorter: Undistor
         them, or they do not fit together.
     """
     if len(pixels) < 4:
-        raise ConfigError(f"points: {len(pixels)} are given; give four or more")
+        raise ConfigError(f"camera.ground: {len(pixels)} are given; give four or more")
     straight = undistorter.points(pixels)
     for points, unit in ((straight, "pixel"), (metres, "metres")):
         if any(_is_thin(np.delete(points, row, axis=0)) for row in range(len(points))):
-            raise ConfigError(f"points: all, or all but one, lie on a line ({unit}); give corners")
+            raise ConfigError(
+                f"camera.ground: all, or all but one, lie on a line ({unit}); give corners"
+            )
     to_pixels, _ = cv2.findHomography(metres, straight)
     inverse = np.linalg.inv(to_pixels) if to_pixels is not None else np.zeros((3, 3))
     depths = straight @ inverse[2, :2] + inverse[2, 2]
     if not (np.all(depths > 0) or np.all(depths < 0)):
-        raise ConfigError("points: the horizon would run between them; two may be exchanged")
+        raise ConfigError("camera.ground: the horizon would run between them; two may be exchanged")
     to_metres = np.asarray(inverse * np.sign(depths[0]), np.float64)
     off = np.hypot(*(_mapped(to_metres, straight) - metres).T)
     back = np.asarray(np.linalg.inv(to_metres), np.float64)
@@ -164,7 +118,9 @@ def fit_ground(pixels: Float64Array, metres: Float64Array, undistorter: Undistor
     error, pixel_error = (float(np.sqrt(np.mean(each**2))) for each in (off, pixel_off))
     if error > _MOST_ERROR * _length(area):
         worst = int(np.argmax(pixel_off))
-        raise ConfigError(f"points[{worst}]: lies {off[worst]:.1f} m from where the others say")
+        raise ConfigError(
+            f"camera.ground[{worst}]: lies {off[worst]:.1f} m from where the others say"
+        )
     rows = _mapped(to_metres, straight + np.array((0, 1))) - _mapped(to_metres, straight)
     row = float(np.median(np.hypot(*rows.T)))
     return Ground(to_metres, area, error, pixel_error, row, undistorter)

@@ -13,8 +13,9 @@ import cv2
 import numpy as np
 
 from vdet.boxes import Box, Float64Array, Image
+from vdet.config.camera import LensSettings
 from vdet.config.schema import LaneSettings
-from vdet.lanes.camera import CalibratedCamera, Maps, Undistorter, warped
+from vdet.lanes.camera import Maps, Undistorter, warped
 from vdet.lanes.curves import Equations, FrameFit, LaneCurves, add_earlier, fit_near, fit_new, solve
 from vdet.lanes.paint import hide, paint_mask
 from vdet.lanes.top_view import TopView
@@ -38,13 +39,6 @@ _ROW = 0.1
 """Largest relative error of a distance for an error of one row: more is near the horizon."""
 _LANES = 3
 """Number of lanes to each side of the own one that are reported."""
-
-
-@dataclass(frozen=True, slots=True)
-class LaneRequest:
-    """Ask for lanes; `camera` took the frames, None if they have no distortion."""
-
-    camera: CalibratedCamera | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,9 +180,9 @@ class RoadFinder:
     """
 
     def __init__(
-        self, request: LaneRequest, settings: LaneSettings, width: int, height: int
+        self, lens: LensSettings | None, settings: LaneSettings, width: int, height: int
     ) -> None:
-        self._undistorter = Undistorter(request.camera, width, height)
+        self._undistorter = Undistorter(lens, width, height)
         self._top_view = TopView(settings, width, height)
         self._state: _LaneState | None = None
         far, near = self._top_view.distances[[0, -1]]

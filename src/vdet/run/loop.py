@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 from statistics import fmean
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from vdet.boxes import NO_BOXES, Boxes, Image
 from vdet.config.schema import Settings
@@ -21,10 +21,6 @@ from vdet.run.steps import ParallelStep, Step, StepContext, make_steps
 from vdet.run.threads import map_ordered
 from vdet.track.factory import make_tracker, timed
 from vdet.track.track import TimedTracker, Track, VideoTracker
-
-if TYPE_CHECKING:
-    from vdet.lanes.ground import GroundRequest
-    from vdet.lanes.road import LaneRequest
 
 FIRST_FRAMES = 2
 """Number of frames that `DetectorModel.for_video` gets."""
@@ -203,8 +199,6 @@ def build(
     *,
     tracker: VideoTracker | None = None,
     steps: Sequence[Step] = (),
-    lanes: "LaneRequest | None" = None,
-    ground: "GroundRequest | None" = None,
 ) -> Pipeline:
     """Make the pipeline of a video, or of one still picture.
 
@@ -219,21 +213,18 @@ def build(
         becomes a track, with ids from 1.
     steps
         Steps in addition to those of the settings.
-    lanes
-        If given, the lane is found too, and the distance and the lane of each vehicle.
-    ground
-        If given, the speeds of the vehicles are measured.
 
     Raises
     ------
     FrameSizeError
         Frames of this size are too small to be searched.
     ConfigError, ImageError
-        The regions, the lines, the ground or the camera do not fit the frames.
+        The places in the settings or the lens do not fit the frames.
     """
     height, width = (video.height, video.width) if video else images[0].shape[:2]
+    settings.camera.check_frames(width, height)
     detector = model.for_video(width, height, images)
-    made = make_steps(StepContext(settings, width, height, video, lanes, ground), steps)
+    made = make_steps(StepContext(settings, width, height, video), steps)
     if video is None:
         return Pipeline(detector, timed(StillTracker()), made, is_still=True)
     followed_by = timed(tracker) if tracker else make_tracker(settings, width, height)

@@ -5,7 +5,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from vdet.boxes import Boxes, Image
 from vdet.config.schema import Settings
@@ -19,9 +18,6 @@ from vdet.run.loop import build, named_errors
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output, Sink, SinkContext, check_sinks, open_sinks
 from vdet.run.threads import map_ordered
-
-if TYPE_CHECKING:
-    from vdet.lanes.road import LaneRequest
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,11 +96,10 @@ def plan_pictures(
 
 @dataclass(frozen=True, slots=True)
 class PictureSearch:
-    """How pictures are searched; `lanes` is None where lanes are not looked for."""
+    """How pictures are searched."""
 
     model: DetectorModel
     settings: Settings
-    lanes: "LaneRequest | None" = None
 
     def detect(self, source: Path, image: Image) -> FrameResult:
         """Search a picture, BGR uint8 `(H, W, 3)`; threads may call this at once.
@@ -122,7 +117,7 @@ class PictureSearch:
         """
         frame = Frame(0, Fraction(0), Picture(image))
         with named_errors(source, ImageError):
-            pipeline = build(self.model, self.settings, None, [image], lanes=self.lanes)
+            pipeline = build(self.model, self.settings, None, [image])
             candidates = pipeline.search((frame, True))
 
         def finish() -> FrameResult:

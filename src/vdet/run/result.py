@@ -10,9 +10,6 @@ from vdet.track.track import FrameTracks, Track
 
 if TYPE_CHECKING:
     from vdet.lanes.road import Road
-    from vdet.traffic.counter import VehicleCounter
-    from vdet.traffic.counts import Counts
-    from vdet.traffic.speeds import SpeedMeter
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,11 +29,6 @@ class FrameResult:
     searched
         Whether the detector searched the frame: see `detector.stride`. Where it did not, there are
         no detections.
-    counter
-        It has counted up to this frame; None if there are no lines and zones. All results of a
-        video share it.
-    speeds
-        It has measured up to this frame; None without a ground. All results of a video share it.
     """
 
     source: Path
@@ -45,16 +37,6 @@ class FrameResult:
     tracks: tuple[Track, ...]
     road: "Road | None" = None
     searched: bool = True
-    counter: "VehicleCounter | None" = None
-    speeds: "SpeedMeter | None" = None
-
-    def counts(self) -> "Counts | None":
-        """Return all counts, with the speeds that are known; the video has ended."""
-        if self.counter is None:
-            return None
-        from vdet.traffic.speeds import with_speeds
-
-        return with_speeds(self.counter.counts(), self.speeds)
 
     @property
     def frame_tracks(self) -> FrameTracks:

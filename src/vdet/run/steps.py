@@ -5,19 +5,18 @@ group `vdet.steps`, is a function that takes a `StepContext` and returns the ste
 settings do not ask for it.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from vdet.config.schema import Settings
 from vdet.media import Frame, VideoInfo
 from vdet.plugins import STEPS, load_plugin
 from vdet.run.result import FrameResult
-from vdet.track.track import FrameTracks, Track
+from vdet.track.track import Track
 
 if TYPE_CHECKING:
-    from vdet.lanes.ground import GroundRequest
-    from vdet.lanes.road import FrameView, LaneRequest, Road, RoadFinder
+    from vdet.lanes.road import FrameView, Road, RoadFinder
     from vdet.regions import Regions
 
 
@@ -49,33 +48,27 @@ class StepContext:
         Size of the frames, pixels.
     video
         None for a still picture.
-    lanes
-        None if lanes are not looked for.
-    ground
-        None if no speeds are measured.
     """
 
     settings: Settings
     width: int
     height: int
     video: VideoInfo | None = None
-    lanes: "LaneRequest | None" = None
-    ground: "GroundRequest | None" = None
 
 
 def make_steps(context: StepContext, others: Sequence[Step] = ()) -> list[Step]:
-    """Make the steps that the settings ask for; `others` come before the counting, at the end.
+    """Make the steps that the settings ask for, and then `others`.
 
     Raises
     ------
     ConfigError, ImageError
-        The regions, the lines or the camera do not fit the frames.
+        The regions or the lens do not fit the frames.
     ConfigError
         There is no step with a name in `settings.steps.names`.
     """
     chosen = [load_plugin(STEPS, name) for name in context.settings.steps.names]
-    steps = [make(context) for make in (lane_step, region_step, speed_step, *chosen)]
-    return [step for step in (*steps, *others, count_step(context)) if step is not None]
+    steps = [make(context) for make in (lane_step, region_step, *chosen)]
+    return [step for step in (*steps, *others) if step is not None]
 
 
 class LaneStep:
@@ -131,30 +124,14 @@ class RegionStep:
         return replace(result, detections=detections, tracks=tracks)
 
 
-@dataclass(frozen=True, slots=True)
-class TrafficStep:
-    """Gives the tracks of each frame to what counts vehicles or measures their speeds.
-
-    `known` is what results get, by the name of their field.
-    """
-
-    add: Callable[[FrameTracks], object]
-    known: Mapping[str, Any]
-
-    def apply(self, result: FrameResult) -> FrameResult:
-        """Add the next frame."""
-        self.add(result.frame_tracks)
-        return replace(result, **self.known)
-
-
 def lane_step(context: StepContext) -> Step | None:
     """Make a `LaneStep` if lanes are looked for."""
-    if context.lanes is None:
+    settings = context.settings
+    if not settings.lanes.enabled:
         return None
     from vdet.lanes.road import RoadFinder
 
-    settings = context.settings
-    roads = RoadFinder(context.lanes, settings.lanes, context.width, context.height)
+    roads = RoadFinder(settings.camera.lens, settings.lanes, context.width, context.height)
     return LaneStep(roads, settings.detector.foot)
 
 
@@ -165,25 +142,3 @@ def region_step(context: StepContext) -> Step | None:
     from vdet.regions import Regions
 
     return RegionStep(Regions(context.settings.regions, context.width, context.height))
-
-
-def speed_step(context: StepContext) -> Step | None:
-    """Make a step if the ground is known; a still picture has no speeds."""
-    if context.ground is None or context.video is None:
-        return None
-    from vdet.traffic.speeds import SpeedMeter
-
-    size = context.width, context.height
-    meter = SpeedMeter(context.ground.ground(*size), *size)
-    return TrafficStep(meter.add, {"speeds": meter})
-
-
-def count_step(context: StepContext) -> Step | None:
-    """Make a step if there are lines or zones; a still picture has no counts."""
-    counts = context.settings.counts
-    if not counts or context.video is None:
-        return None
-    from vdet.traffic.counter import VehicleCounter
-
-    counter = VehicleCounter(counts, context.width, context.height)
-    return TrafficStep(counter.update, {"counter": counter})

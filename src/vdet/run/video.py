@@ -4,11 +4,10 @@ import logging
 import time
 from collections.abc import Generator, Iterator, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from vdet.boxes import NO_BOXES
 from vdet.config.schema import Settings
@@ -25,27 +24,25 @@ from vdet.run.steps import Step
 from vdet.run.threads import StalledError, prefetch
 from vdet.track.track import VideoTracker
 from vdet.traffic.clock import Clock, find_clock
+from vdet.traffic.live import LiveTraffic
 from vdet.workers import core_count, return_freed_memory
-
-if TYPE_CHECKING:
-    from vdet.lanes.ground import GroundRequest
-    from vdet.lanes.road import LaneRequest
-    from vdet.traffic.counter import VehicleCounter
 
 log = logging.getLogger("vdet")
 
 LEAD = Fraction(2)
-"""Seconds before the frame at `VideoJob.at` that are processed too, for detector and tracker."""
+"""Seconds before the frame at `Run.at` that are processed too, for detector and tracker."""
 
 IO_TIMEOUT = 120.0  # seconds
 
 
 @dataclass(frozen=True, slots=True)
-class VideoJob:
-    """A video, the part of it that is processed, and the outputs.
+class Run:
+    """A run: a video, the part of it that is processed, the settings and the outputs.
 
     Attributes
     ----------
+    settings
+        All that the results depend on, beside the video and the part.
     start, end
         Seconds from the first frame; frames with start ≤ time < end are processed.
     frames
@@ -53,43 +50,29 @@ class VideoJob:
     at
         Time of the stage pictures, seconds from the first frame. If no output needs more, only the
         frames from 2 s before it are processed.
-    lanes
-        If given, the lane is found too.
-    ground
-        If given, the speeds of the vehicles are measured.
     inputs
         Other files that are read, such as settings; outputs never replace them.
     overwrite
         Replace outputs that are there already.
     threads
-        Number of threads that search; None for one per core.
-    codec_threads
-        Number of threads of the encoder; None for one per core.
+        Number of threads that search, and of the encoder; None for one per core.
     timeout
-        Seconds in which the next frame must be read or written. After that the job fails, so that
+        Seconds in which the next frame must be read or written. After that the run fails, so that
         a disk or a network that hangs does not stop a batch. Reading gets the duration of the part
         before `start` in addition.
-    begin
-        When the video begins: see `find_clock`.
-    interval
-        That of tables of counts, seconds; None for the whole.
     """
 
     source: Path
+    settings: Settings = field(default_factory=Settings)
     outputs: tuple[Output, ...] = ()
     start: Fraction | None = None
     end: Fraction | None = None
     frames: int | None = None
     at: Fraction = Fraction(0)
-    lanes: "LaneRequest | None" = None
     inputs: tuple[Path, ...] = ()
     overwrite: bool = False
     threads: int | None = None
-    codec_threads: int | None = None
     timeout: float = IO_TIMEOUT
-    begin: str | None = None
-    interval: int | None = None
-    ground: "GroundRequest | None" = None
 
     @property
     def is_part(self) -> bool:
@@ -128,23 +111,23 @@ class RunTotals:
 
 @dataclass(frozen=True, slots=True)
 class OpenVideo:
-    """A video that is being read, and the results of its frames."""
+    """A video that is being read, the results of its frames, and what reads all its tracks."""
 
     reader: VideoReader
     pipeline: Pipeline
     results: Generator[FrameResult]
+    traffic: LiveTraffic
 
 
-def check_job(job: VideoJob) -> None:
-    """Refuse a job whose outputs cannot be written, before any work. Raises `OutputError`."""
-    check_sinks(job.outputs, overwrite=job.overwrite, inputs=[job.source, *job.inputs])
+def check_run(run: Run) -> None:
+    """Refuse a run whose outputs cannot be written, before any work. Raises `OutputError`."""
+    check_sinks(run.outputs, overwrite=run.overwrite, inputs=[run.source, *run.inputs])
 
 
 @contextmanager
 def open_video(
-    job: VideoJob,
+    run: Run,
     model: DetectorModel,
-    settings: Settings,
     *,
     tracker: VideoTracker | None = None,
     steps: Sequence[Step] = (),
@@ -153,50 +136,50 @@ def open_video(
 
     Reading and searching run in threads.
     """
-    timeout = job.timeout + float(job.start or 0)
-    reading = _reader_and_frames(job, settings)
+    timeout = run.timeout + float(run.start or 0)
+    reading = _reader_and_frames(run)
     try:
-        with named_errors(job.source, VideoError), prefetch(reading, timeout=timeout) as read:
+        with named_errors(run.source, VideoError), prefetch(reading, timeout=timeout) as read:
             reader: VideoReader = next(read)
-            latest = max(job.start or Fraction(0), job.at if job.shows_at else Fraction(0))
+            latest = max(run.start or Fraction(0), run.at if run.shows_at else Fraction(0))
             if reader.length is not None and latest >= reader.length:
-                raise _no_frame(job, f"{float(latest):.2f} s is beyond its end", reader.length)
+                raise _no_frame(run, f"{float(latest):.2f} s is beyond its end", reader.length)
             images, frames = peek(read)
-            make = partial(build, lanes=job.lanes, ground=job.ground)
+            settings, info = run.settings, reader.info
             try:
-                pipeline = make(model, settings, reader.info, images, tracker=tracker, steps=steps)
+                pipeline = build(model, settings, info, images, tracker=tracker, steps=steps)
             except FrameSizeError as error:
-                log.warning("%s: gets no boxes: %s", job.source, error)
-                pipeline = make(as_model(lambda _: NO_BOXES), settings, reader.info, images)
+                log.warning("%s: gets no boxes: %s", run.source, error)
+                pipeline = build(as_model(lambda _: NO_BOXES), settings, info, images)
+            traffic = LiveTraffic(settings, info.width, info.height)
             del images  # otherwise they stay in memory for the whole run
-            threads = job.threads or core_count()
-            with closing(pipeline.follow(frames, job.source, threads=threads)) as results:
-                yield OpenVideo(reader, pipeline, results)
+            threads = run.threads or core_count()
+            with closing(pipeline.follow(frames, run.source, threads=threads)) as results:
+                yield OpenVideo(reader, pipeline, results, traffic)
     except StalledError as error:
         raise VideoError(
-            f"{job.source}: nothing was read or written for {timeout:g} s; check the disk"
+            f"{run.source}: nothing was read or written for {timeout:g} s; check the disk"
         ) from error
 
 
-def _reader_and_frames(job: VideoJob, settings: Settings) -> Generator[Any]:
+def _reader_and_frames(run: Run) -> Generator[Any]:
     """Yield the reader, and then its frames; the thread that reads them opens and closes it."""
     with VideoReader(
-        job.source, start=job.start, end=job.end, frames=job.frames, settings=settings.input
+        run.source, start=run.start, end=run.end, frames=run.frames, settings=run.settings.input
     ) as reader:
         yield reader
         yield from reader
 
 
 def run_video(
-    job: VideoJob,
+    run: Run,
     model: DetectorModel,
-    settings: Settings,
     *,
     tracker: VideoTracker | None = None,
     steps: Sequence[Step] = (),
     progress: Progress = no_progress,
 ) -> RunTotals:
-    """Run a job. Its outputs appear under their names together, at the end of the run.
+    """Run a run. Its outputs appear under their names together, at the end of the run.
 
     Reading, searching and encoding run in threads, tracking and drawing in the calling one.
 
@@ -220,64 +203,62 @@ def run_video(
     """
     began = time.perf_counter()
     return_freed_memory()
-    only_at = job.shows_at and all(sink_kind(each.sink).one_frame for each in job.outputs)
-    if only_at and job.frames is None:
-        job = replace(job, start=max(job.at - LEAD, job.start or Fraction(0)))
+    only_at = run.shows_at and all(sink_kind(each.sink).one_frame for each in run.outputs)
+    if only_at and run.frames is None:
+        run = replace(run, start=max(run.at - LEAD, run.start or Fraction(0)))
     with (
-        OutputFiles(overwrite=job.overwrite) as files,
-        open_video(job, model, settings, tracker=tracker, steps=steps) as video,
-        open_sinks(job.outputs, context := _context(job, settings, files, video)) as sinks,
+        OutputFiles(overwrite=run.overwrite) as files,
+        open_video(run, model, tracker=tracker, steps=steps) as video,
+        open_sinks(run.outputs, context := _context(run, files, video)) as sinks,
     ):
         info = video.reader.info
         advance = progress(None if only_at else video.reader.expected)
         frames, writing, last, ids = 0, 0.0, None, set[int]()
-        counter: VehicleCounter | None = None
         for result in video.results:
+            video.traffic.add(result.frame_tracks)
             written = time.perf_counter()
             for sink in sinks:
                 sink.write(result)
             writing += time.perf_counter() - written
             ids.update(track.id for track in result.tracks)
             frames += 1
-            counter = result.counter
             advance(1)
             if result.searched:
                 last = result.frame.time - info.start
-                if only_at and last >= job.at:
+                if only_at and last >= run.at:
                     break
-        if last is None or (job.shows_at and last < job.at):
-            when = "in the times given" if last is None else f"at {float(job.at):.2f} s or later"
-            raise _no_frame(job, f"no frame is read {when}", video.reader.length)
-        for warning in counter.counts().warnings if counter else ():
-            log.warning("%s: %s", job.source, warning)
+        if last is None or (run.shows_at and last < run.at):
+            when = "in the times given" if last is None else f"at {float(run.at):.2f} s or later"
+            raise _no_frame(run, f"no frame is read {when}", video.reader.length)
+        counts = video.traffic.counts()
+        for warning in counts.warnings if counts else ():
+            log.warning("%s: %s", run.source, warning)
     seconds = time.perf_counter() - began
     log.info(
         "%s: finding the vehicles took %.1f s, drawing and writing them %.1f s",
-        *(job.source, seconds - writing, writing),
+        *(run.source, seconds - writing, writing),
     )
     return RunTotals(info.width, info.height, frames, len(ids), seconds, context.clock)
 
 
-def _context(
-    job: VideoJob, settings: Settings, files: OutputFiles, video: OpenVideo
-) -> SinkContext:
+def _context(run: Run, files: OutputFiles, video: OpenVideo) -> SinkContext:
     info = video.reader.info
     return SinkContext(
         files,
-        settings,
+        run.settings,
         info,
-        is_part=job.is_part,
-        at=job.at,
-        codec_threads=job.codec_threads or core_count(),
-        interval=job.interval,
-        clock=find_clock(job.source, job.begin, info.tags.creation_time, float(info.start)),
-        timeout=job.timeout,
-        outputs=job.outputs,
+        is_part=run.is_part,
+        at=run.at,
+        threads=run.threads or core_count(),
+        clock=find_clock(run.source, run.settings, info.tags.creation_time, float(info.start)),
+        timeout=run.timeout,
+        outputs=run.outputs,
+        traffic=video.traffic,
         stage_pictures=stage_pictures_of(video.pipeline.detector),
     )
 
 
-def _no_frame(job: VideoJob, words: str, length: Fraction | None) -> VideoError:
+def _no_frame(run: Run, words: str, length: Fraction | None) -> VideoError:
     """Return the error of a time at which there is no frame."""
     end = "check them" if length is None else f"it ends at {float(length):.2f} s"
-    return VideoError(f"{job.source}: {words}; {end}")
+    return VideoError(f"{run.source}: {words}; {end}")

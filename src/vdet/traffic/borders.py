@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from vdet.config.places import CountSettings
+from vdet.config.places import TrafficSettings
 from vdet.polygons import Point, Segment, contains, distance_to, meeting, side_of, sides
 
 ENTER, EXIT, APPEAR, VANISH = "enter", "exit", "appear", "vanish"
@@ -98,20 +98,13 @@ Border = PlacedLine | Zone
 
 
 def place(
-    settings: CountSettings, width: int, height: int
+    settings: TrafficSettings, width: int, height: int
 ) -> tuple[tuple[PlacedLine, ...], tuple[Zone, ...]]:
-    """Place lines and zones in frames of `width` × `height` pixels.
-
-    Raises
-    ------
-    ConfigError
-        They are given for frames of another aspect ratio.
-    """
+    """Place lines and zones in frames of `width` × `height` pixels."""
     size = width, height
-    across, down = settings.scales(width, height)
 
     def placed(point: Point) -> Point:
-        return _snapped(point[0] * across, width), _snapped(point[1] * down, height)
+        return _snapped(point[0] * width, width), _snapped(point[1] * height, height)
 
     lines = tuple(
         PlacedLine(each.name, (each.left, each.right), start, end, _reach(start, end, size))

@@ -8,17 +8,14 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
+from vdet.config.camera import CODES, moment
+from vdet.config.schema import Settings
 from vdet.errors import ConfigError
 
 _IN_NAMES = re.compile(
     r"(?<!\d)(\d{4})[-_.]?(\d\d)[-_.]?(\d\d)[-_T ](\d\d)[-_.:]?(\d\d)[-_.:]?(\d\d)(?!\d)", re.ASCII
 )
 """A time in the name of a file, such as 2026-05-01_07-00-00 or 20260501_070000."""
-
-_DIGITS = {"%Y": r"\d{4}", **dict.fromkeys(("%m", "%d", "%H", "%M", "%S", "%y"), r"\d\d")}
-"""The codes of a pattern, and what stands for each in a name."""
-
-_EARLIEST, _LATEST = 1990, 9000  # years
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,35 +47,18 @@ class Clock:
         return self.zero + timedelta(seconds=seconds)
 
 
-def check_begin(begin: str) -> None:
-    """Refuse a text that `find_clock` could not use as `begin`. Raises `ConfigError`."""
-    if is_pattern(begin):
-        rest = re.sub("|".join(_DIGITS), "", begin)
-        if "%" in rest or begin == rest:
-            raise ConfigError(f"{begin!r}: a pattern has only {', '.join(_DIGITS)} and other text")
-    else:
-        _parsed(begin)
-
-
-def is_pattern(begin: str) -> bool:
-    """Return whether a text is the pattern of times in names, and not a time."""
-    return "%" in begin
-
-
 def find_clock(
-    path: Path, begin: str | None = None, created: str | None = None, start: float = 0.0
+    path: Path, settings: Settings, created: str | None = None, start: float = 0.0
 ) -> Clock | None:
     """Return the clock of a video; None if nothing says when it begins.
 
-    A time without a zone is in the time zone of this computer.
+    `input.begin` decides, then the pattern of `camera.clock`, then the creation time of the video,
+    then a time in its name. A time without a zone is in the time zone of this computer.
 
     Parameters
     ----------
     path
         The video, or a file that is named after it.
-    begin
-        When it begins, as in ISO 8601, or the pattern of the time in its name, such as
-        "%Y%m%d_%H%M%S". None: its creation time, else the time in its name.
     created
         The creation time in the metadata of the file.
     start
@@ -87,46 +67,38 @@ def find_clock(
     Raises
     ------
     ConfigError
-        `begin` is neither, or the name has no such time.
+        The name has no time as the pattern says.
     """
-    found = _begin(path, begin, created)
+    found = _begin(path, settings, created)
     if found is None:
         return None
-    moment, source = found
-    return Clock(moment.astimezone(moment.tzinfo) - timedelta(seconds=start), source)
+    begin, source = found
+    return Clock(begin.astimezone(begin.tzinfo) - timedelta(seconds=start), source)
 
 
-def _begin(path: Path, begin: str | None, created: str | None) -> tuple[datetime, str] | None:
-    if begin and not is_pattern(begin):
-        return _parsed(begin), "as given"
-    if begin:
-        codes = re.sub(r"%[a-zA-Z]|[^%]", lambda part: _code(part[0]), begin, flags=re.DOTALL)
+def _begin(path: Path, settings: Settings, created: str | None) -> tuple[datetime, str] | None:
+    if begin := settings.input.begin:
+        return moment(begin), "as given"
+    if pattern := settings.camera.clock.pattern:
+        codes = re.sub(r"%[a-zA-Z]|[^%]", lambda part: _code(part[0]), pattern, flags=re.DOTALL)
         texts = re.findall(f"(?=({codes}))", path.name, re.ASCII)
-        found = next(_moments(lambda text: datetime.strptime(text, begin), texts), None)
+        found = next(_moments(lambda text: datetime.strptime(text, pattern), texts), None)
         if found is None:
-            raise ConfigError(f"{path}: its name has no time like {begin}; give another --begin")
+            raise ConfigError(f"{path}: its name has no time like {pattern}: camera.clock.pattern")
         return found, "from its name"
-    if created and (moment := next(_moments(datetime.fromisoformat, [created]), None)):
-        return moment.astimezone(), "its creation time"
+    if created and (known := next(_moments(datetime.fromisoformat, [created]), None)):
+        return known.astimezone(), "its creation time"
     named = map("".join, _IN_NAMES.findall(path.name))
     in_name = next(_moments(lambda digits: datetime.strptime(digits, "%Y%m%d%H%M%S"), named), None)
     return (in_name, "from its name") if in_name else None
 
 
 def _code(part: str) -> str:
-    return _DIGITS.get(part) or re.escape(part)
+    return CODES.get(part) or re.escape(part)
 
 
 def _moments(parse: Callable[[Any], datetime], values: Iterable[Any]) -> Iterator[datetime]:
-    """Yield those values that are moments; cameras without a clock begin in 1904, 1970 or 1980."""
+    """Yield those values that are moments."""
     for value in values:
         with suppress(ValueError):
-            moment = parse(value)
-            if _EARLIEST <= moment.year <= _LATEST:
-                yield moment
-
-
-def _parsed(text: str) -> datetime:
-    if moment := next(_moments(datetime.fromisoformat, [text]), None):
-        return moment
-    raise ConfigError(f"{text!r} is not a time; give one as in '2026-05-01 07:00+02:00'")
+            yield moment(parse(value).isoformat())

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from vdet.boxes import Box
-from vdet.config.places import CountSettings
+from vdet.config.places import TrafficSettings
 from vdet.detect.classes import ClassScores
 from vdet.polygons import Point
 from vdet.track.track import FrameTracks, Track
@@ -175,7 +175,7 @@ class VehicleCounter:
         They are given for frames of another aspect ratio than `width` × `height` pixels.
     """
 
-    def __init__(self, settings: CountSettings, width: int, height: int, begun: int = 0) -> None:
+    def __init__(self, settings: TrafficSettings, width: int, height: int, begun: int = 0) -> None:
         self.lines, self.zones = place(settings, width, height)
         self._confirmed = settings.confirmed
         self._borders: tuple[Border, ...] = (*self.lines, *self.zones)

@@ -6,10 +6,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from vdet.config.places import CountSettings
+from vdet.config.schema import Settings
 from vdet.errors import ConfigError, TruthError
 from vdet.labels.reading import read_tracks
-from vdet.lanes.ground import GroundRequest
+from vdet.lanes.ground import ground_of
 from vdet.progress import Advance
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Clock, find_clock
@@ -26,12 +26,10 @@ _STEP = 0.04
 
 def count_files(
     paths: Sequence[Path],
-    settings: CountSettings,
+    settings: Settings,
     size: tuple[int, int] | None = None,
     rate: float | None = None,
     *,
-    begin: str | None = None,
-    ground: GroundRequest | None = None,
     advance: Advance = lambda _: None,
 ) -> dict[str, Counts]:
     """Count the vehicles of files of tracks at the lines and in the zones of the settings.
@@ -45,10 +43,6 @@ def count_files(
         Width and height of the frames, pixels; None: as the file says, else as the lines say.
     rate
         Frames per second, for a file without times.
-    begin
-        As of `find_clock`.
-    ground
-        If given, the speeds of the vehicles are measured.
     advance
         Called after each file with 1.
 
@@ -61,8 +55,8 @@ def count_files(
     TruthError
         A file cannot be used, or its times are missing or wrong.
     ConfigError
-        The lines do not fit the frames, the size of the frames is not known, or there is no time as
-        `begin` says.
+        The lines do not fit the frames, the size of the frames is not known, or a name has no time
+        as the pattern of the clock says.
     """
     counted: dict[str, Counts] = {}
     group: _Group | None = None
@@ -73,12 +67,12 @@ def count_files(
         created, start = None, saved.times.get(0, 0.0)
         if saved.begin:
             created, start = saved.begin.isoformat(), 0.0
-        clock = find_clock(path, begin, created, start)
+        clock = find_clock(path, settings, created, start)
         place = _size(settings, size or saved.size)
         first = min(saved.times.values(), default=None)
         if group is None or not group.goes_on(place, clock, first):
             counted |= group.counts() if group else {}
-            group = _Group(settings, place, ground, group.begun if group else 0)
+            group = _Group(settings, place, group.begun if group else 0)
         group.add(str(path), clock, first or 0.0, saved)
         advance(1)
     return counted | (group.counts() if group else {})
@@ -86,23 +80,22 @@ def count_files(
 
 def count_frames(
     frames: Iterable[FrameTracks],
-    settings: CountSettings,
+    settings: Settings,
     size: tuple[int, int] | None = None,
-    ground: GroundRequest | None = None,
 ) -> Counts:
     """Count the vehicles in the tracks of each frame; arguments and errors as of `count_files`."""
-    group = _Group(settings, _size(settings, size), ground)
+    group = _Group(settings, _size(settings, size))
     every = tuple(frames)
     group.add("", None, every[0].time if every else 0.0, every)
     return group.counts()[""]
 
 
-def _size(settings: CountSettings, size: tuple[int, int] | None) -> tuple[int, int]:
-    if not settings:
+def _size(settings: Settings, size: tuple[int, int] | None) -> tuple[int, int]:
+    if not settings.traffic:
         raise ConfigError("there is nothing to count at; give lines or zones")
-    if size := size or settings.size:
+    if size := size or settings.camera.size:
         return size
-    raise ConfigError("the lines are shares of the frame; give --size, as in 1280x720")
+    raise ConfigError("the lines are fractions of the frame; give --size, as in 1280x720")
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,14 +123,14 @@ class _Group:
 
     def __init__(
         self,
-        settings: CountSettings,
+        settings: Settings,
         size: tuple[int, int],
-        ground: GroundRequest | None,
         begun: int = 0,
     ) -> None:
+        settings.camera.check_frames(*size)
         self._size = size
-        self._ground = ground.ground(*size) if ground else None
-        self._counter = VehicleCounter(settings, *size, begun=begun)
+        self._ground = ground_of(settings.camera, *size)
+        self._counter = VehicleCounter(settings.traffic, *size, begun=begun)
         self._videos: list[_Video] = []
 
     @property

@@ -118,12 +118,12 @@ class VehicleSink(BaseSink):
 
     def finish(self) -> None:
         """Write the records."""
-        records = self._records.end(self.last.speeds if self.last else None)
+        traffic = self.context.traffic
+        records = self._records.end(traffic.speeds if traffic else None)
         write_records(records, self.context.files.stage(self.path), self.context.clock)
 
     def write(self, result: FrameResult) -> None:
         """Add a frame."""
-        self.last = result
         self._records.add(result.frame_tracks)
 
 
@@ -140,19 +140,20 @@ class CountsSink(BaseSink):
     def __init__(self, write_table: WriteCounts, path: Path, context: SinkContext) -> None:
         super().__init__(path, context)
         self._write_table = write_table
-        if not context.settings.counts:
+        if not context.settings.traffic:
             raise OutputError(f"{path}: there is nothing to count at; give lines or zones")
 
     def finish(self) -> None:
         """Write the table."""
-        if self.last and (counts := self.last.counts()):
+        counts = self.context.traffic.counts() if self.context.traffic else None
+        if counts:
             counts = replace(counts, clock=self.context.clock)
             target = self.context.files.stage(self.path)
-            self._write_table(target, {self.video.path.name: counts}, self.context.interval)
+            interval = self.context.settings.traffic.seconds
+            self._write_table(target, {self.video.path.name: counts}, interval)
 
     def write(self, result: FrameResult) -> None:
-        """Keep the result: at the end it has the counts of all frames."""
-        self.last = result
+        """Do nothing: the run counts the vehicles."""
 
 
 COUNTS, FLOWS = (

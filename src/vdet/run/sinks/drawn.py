@@ -35,11 +35,19 @@ class Overlay:
     ----------
     video
         None for a still picture, which has no trails and no time.
+    counter
+        Its counts so far are drawn, if the settings say so.
     """
 
-    def __init__(self, settings: Settings, video: VideoInfo | None) -> None:
+    def __init__(
+        self,
+        settings: Settings,
+        video: VideoInfo | None,
+        counter: "VehicleCounter | None" = None,
+    ) -> None:
         self._settings, self._draw = settings, settings.draw
         self._start = video.start if video else None
+        self._counter = counter if settings.traffic.drawn else None
         automatic = ("id",) if video else PICTURE_LABEL
         self._label = automatic if self._draw.label is None else self._draw.label
         self._trails: dict[int, list[tuple[float, Point]]] = {}  # with the time in seconds
@@ -55,8 +63,8 @@ class Overlay:
 
             draw_lane(surface, result.road.lane)
         shown = self._shown(result)
-        if result.counter and self._settings.counts.drawn:
-            draw_running_counts(surface, result.counter)
+        if self._counter:
+            draw_running_counts(surface, self._counter)
         self._draw_trails(surface, shown, float(result.frame.time))
         self._draw_vehicles(surface, shown)
         if self._draw.time and self._start is not None:
@@ -143,14 +151,15 @@ class VideoSink(BaseSink):
 
     def __enter__(self) -> Self:
         context = self.context
-        self._overlay = Overlay(context.settings, self.video)
+        counter = context.traffic.counter if context.traffic else None
+        self._overlay = Overlay(context.settings, self.video, counter)
         writer = VideoWriter(
             context.files.stage(self.path, may_replace_video),
             self.video,
             context.settings.output,
             name=self.path,
             whole_sound=not context.is_part,
-            threads=context.codec_threads,
+            threads=context.threads,
         )
         self._used: list[Planes] = []  # new memory would take longer than what is copied into it
 

@@ -129,7 +129,6 @@ class PageSink(BaseSink):
         if self._fullest is None or len(frame.tracks) > self._most:
             self._fullest, self._most = picture, len(frame.tracks)
         self._records.add(frame)
-        self.last = result
         self._keep(self._crops.add(frame, picture))
 
     def _keep(self, crops: list[Crop]) -> None:
@@ -137,23 +136,19 @@ class PageSink(BaseSink):
             self._thumbnails[crop.id] = crop.time, jpeg_uri(crop.image, _THUMBNAIL)
 
     def _page(self) -> VideoPage:
-        settings, clock = self.context.settings, self.context.clock
-        if settings.regions.mask:  # its folders are nobody's business
-            mask = {"mask": Path(settings.regions.mask).name}
-            regions = settings.regions.model_copy(update=mask)
-            settings = settings.model_copy(update={"regions": regions})
+        settings, clock, traffic = self.context.settings, self.context.clock, self.context.traffic
         return VideoPage(
             video=self.video,
             frames=self._frames,
             start=self._start,
             end=self._last + float(1 / self.video.rate),
-            records=self._records.end(self.last.speeds if self.last else None),
+            records=self._records.end(traffic.speeds if traffic else None),
             thumbnails=self._thumbnails,
             poster=self._fullest.image if self._fullest else None,
             player=self._player(),
-            settings=render(settings),
-            counts=self.last.counts() if self.last else None,
-            interval=self.context.interval or 60,
+            settings=render(settings.with_paths(lambda path: Path(path).name)),
+            counts=traffic.counts() if traffic else None,
+            interval=settings.traffic.seconds or 60,
             gaps=self._gaps,
             zero=clock.second_of_day if clock else None,
         )

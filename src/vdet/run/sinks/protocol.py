@@ -24,6 +24,7 @@ from vdet.media import VideoInfo
 from vdet.plugins import SINKS, load_plugin
 from vdet.run.result import FrameResult
 from vdet.traffic.clock import Clock
+from vdet.traffic.live import LiveTraffic
 
 STANDARD_OUTPUT = Path("-")
 
@@ -62,16 +63,16 @@ class SinkContext:
         Whether only a part of the video is read.
     at
         The option `--at`: seconds from the first frame.
-    codec_threads
+    threads
         Number of threads of an encoder; None lets it choose.
-    interval
-        That of tables of counts, seconds; None for the whole.
     clock
         When the video begins; None where it is not known.
     timeout
         Seconds after which a write that does not end is an error.
     outputs
         All outputs of the run, for a sink that refers to another.
+    traffic
+        The counts and the speeds of a video, up to the latest result; None for still pictures.
     stage_pictures
         Returns a picture of each stage of the detection by its name, in order. It takes the image
         of a frame and its detections.
@@ -82,21 +83,16 @@ class SinkContext:
     video: VideoInfo | None = None
     is_part: bool = False
     at: Fraction = Fraction(0)
-    codec_threads: int | None = None
-    interval: int | None = None
+    threads: int | None = None
     clock: Clock | None = None
     timeout: float | None = None
     outputs: tuple[Output, ...] = ()
+    traffic: LiveTraffic | None = None
     stage_pictures: StagePictures = lambda *_: {}
 
 
 class BaseSink:
-    """What most sinks have in common: they finish where the run ends without an error.
-
-    `last` is the latest result, for sinks that set it.
-    """
-
-    last: FrameResult | None = None
+    """What most sinks have in common: they finish where the run ends without an error."""
 
     def __init__(self, path: Path, context: SinkContext) -> None:
         self.path = path

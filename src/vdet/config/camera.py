@@ -1,0 +1,152 @@
+"""The section `camera`: the frames that places are given for, the lens, the road and the clock."""
+
+import re
+from datetime import datetime
+from typing import Annotated
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import Field, field_validator
+from pydantic_core.core_schema import ValidationInfo
+
+from vdet.config.places import Coordinate, Place
+from vdet.config.section import Section
+from vdet.errors import ConfigError
+
+_ASPECT_TOLERANCE = 0.01
+"""Largest relative difference of the aspect ratios of a frame and of the reference size."""
+_EARLIEST, _LATEST = 1990, 9000
+"""Years of moments; cameras without a clock begin in 1904, 1970 or 1980."""
+_LENS_TOLERANCE = 0.005  # accepts 854×480 for 1280×720
+
+Side = Annotated[int, Field(ge=16, le=100_000)]
+Size = tuple[Side, Side]
+_Coefficient = Annotated[float, Field(ge=-1000, le=1000)]
+_Row = tuple[float, float, float]
+
+
+class LensSettings(Section):
+    """A pinhole camera with lens distortion, written by `vdet calibrate`.
+
+    The distortion is Brown's model, as OpenCV implements it. All lengths are in pixels; x points
+    right, y points down, and whole numbers are pixel centres.
+    """
+
+    width: Side
+    """Width of the calibration photographs."""
+    height: Side
+    """Height of the calibration photographs."""
+    matrix: tuple[_Row, _Row, _Row]
+    """Focal lengths and principal point: `((fx, 0, cx), (0, fy, cy), (0, 0, 1))`."""
+    distortion: tuple[_Coefficient, _Coefficient, _Coefficient, _Coefficient, _Coefficient]
+    """k1, k2, p1, p2, k3."""
+    rms: float = Field(ge=0)
+    """Root mean square distance between the corners in the photographs and those that the camera
+    model predicts.
+    """
+
+    @field_validator("matrix")
+    @classmethod
+    def _check_matrix(
+        cls, matrix: tuple[_Row, _Row, _Row], info: ValidationInfo
+    ) -> tuple[_Row, _Row, _Row]:
+        (fx, skew, x), (zero, fy, y), last = matrix
+        width, height = (info.data.get(side) for side in ("width", "height"))
+        if width and height:  # else they are wrong themselves
+            is_real = 0.1 * width <= min(fx, fy) and max(fx, fy) <= 100 * width
+            in_frame = 0 <= x < width and 0 <= y < height
+            if not (is_real and in_frame and (skew, zero, last) == (0, 0, (0, 0, 1))):
+                raise ValueError(
+                    "should be [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], with focal lengths of 0.1 to "
+                    "100 times the width, and the principal point in the frame"
+                )
+        return matrix
+
+    def matrix_for(self, width: int, height: int) -> npt.NDArray[np.float64]:
+        """Return the camera matrix `(3, 3)` for frames of another size, but the same aspect ratio.
+
+        Raises
+        ------
+        ConfigError
+            The aspect ratio differs, so the frame is not a resized one.
+        """
+        across, down = width / self.width, height / self.height
+        if abs(across / down - 1) > _LENS_TOLERANCE:
+            raise ConfigError(
+                f"camera.lens: is for {self.width}×{self.height}, not {width}×{height}; "
+                "calibrate again"
+            )
+        (fx, _, cx), (_, fy, cy), last = self.matrix
+        x, y = (cx + 0.5) * across - 0.5, (cy + 0.5) * down - 0.5
+        return np.array([(fx * across, 0, x), (0, fy * down, y), last])
+
+
+class GroundPoint(Section):
+    """A point of the road."""
+
+    pixel: Place
+    """Where it is in the frame, x and y; whole numbers are the middles of pixels."""
+    metres: tuple[Coordinate, Coordinate]
+    """Where it is on the road, x and y in metres from any point, at right angles."""
+
+
+CODES = {"%Y": r"\d{4}", **dict.fromkeys(("%m", "%d", "%H", "%M", "%S", "%y"), r"\d\d")}
+"""The codes of a pattern of times, and the digits that each stands for."""
+
+
+def moment(text: str) -> datetime:
+    """Return a moment as ISO 8601 writes it. Raises `ValueError`."""
+    try:
+        found = datetime.fromisoformat(text)
+    except ValueError:
+        found = datetime.min
+    if not _EARLIEST <= found.year <= _LATEST:
+        raise ValueError(f"{text!r} is not a time; give one as in '2026-05-01 07:00+02:00'")
+    return found
+
+
+class ClockSettings(Section):
+    """When the videos of the camera begin."""
+
+    pattern: str | None = Field(None, max_length=200)
+    """Pattern of the time in the names of videos, as in %Y%m%d_%H%M%S. null: the creation time in
+    the video, else a time in its name.
+    """
+
+    @field_validator("pattern")
+    @classmethod
+    def _has_known_codes(cls, pattern: str | None) -> str | None:
+        if pattern is not None:
+            rest = re.sub("|".join(CODES), "", pattern)
+            if "%" in rest or pattern == rest:
+                raise ValueError(f"a pattern has only {', '.join(CODES)} and other text")
+        return pattern
+
+
+class CameraSettings(Section):
+    """The camera: its frames, lens, road and clock. Lines and zones refer to its frames."""
+
+    size: Size | None = None
+    """Width and height in pixels of the frames that the points in this file are given for. Frames
+    of another size are fine if they have the same aspect ratio. null: points are fractions of the
+    frame, 0 to 1.
+    """
+    lens: LensSettings | None = None
+    """The lens, from `vdet calibrate`. null: it does not distort."""
+    ground: tuple[GroundPoint, ...] = Field((), max_length=100)
+    """Points of the road in pixels and metres, four or more, around the part of the road in which
+    speeds and distances are measured.
+    """
+    clock: ClockSettings = ClockSettings()
+
+    def check_frames(self, width: int, height: int) -> None:
+        """Raise a `ConfigError` if frames have another aspect ratio than `size`."""
+        if self.size is None:
+            return
+        given_width, given_height = self.size
+        aspect = (width / height) / (given_width / given_height)
+        if abs(aspect - 1) > _ASPECT_TOLERANCE:
+            raise ConfigError(
+                f"camera.size: places are given for frames of {given_width}×{given_height}, "
+                f"which have another shape than {width}×{height}; give places for such frames"
+            )
