@@ -107,7 +107,7 @@ def main() -> None:
         "-c", "--config", default="default", help="settings of the detector: default, svm, seed"
     )
     options = parser.parse_args()
-    settings = load_settings(find_config(options.config))
+    settings = load_settings([find_config(options.config)])
     steps: dict[str, Step] = {"truth": true_lines, "lane": found_lines, "tracks": Shown(settings)}
     for name in options.steps or steps:
         every = 3 if name == "tracks" else 1

@@ -118,7 +118,7 @@ def main() -> None:
     parser.add_argument("patches", type=Path, nargs="+", help="the sets, the mined one among them")
     options = parser.parse_args()
     truth = read_truth(options.truth)
-    settings = load_settings(None, SETTINGS, detector="svm")
+    settings = load_settings((), SETTINGS, detector="svm")
     models = _models(options.patches, truth.last_frame, settings)
     limit_library_threads()
     searched = _search(options.video, truth.last_frame, models, settings)
@@ -189,7 +189,7 @@ def _sweep(
     truth: LabelledVideo,
 ) -> Iterator[str]:
     """Yield the lines of a table: the F1 of each value, over all blocks and by block."""
-    variants = [load_settings(None, [f"{key}={value}"], detector="svm") for value in values]
+    variants = [load_settings((), [f"{key}={value}"], detector="svm") for value in values]
     found = [_tracks(searched, model, settings) for settings in variants]
     by_block = np.array([_f1_by_block(each, truth) for each in found])
     yield f"\n{key}: F1, id switches, false tracks, frames until shown; F1 of the blocks"

@@ -173,7 +173,7 @@ def main() -> None:
     arguments = parser.parse_args()
     arguments.work.mkdir(parents=True, exist_ok=True)
     rate = [] if arguments.base else [_FROM_RANDOM]
-    settings = load_settings(None, [f"train.net.steps={arguments.steps}", *rate, *arguments.set])
+    settings = load_settings((), [f"train.net.steps={arguments.steps}", *rate, *arguments.set])
     clip = (arguments.video, arguments.truth)
     sets = split_sets(arguments.roads, arguments.work / "sets")
     results: dict[str, ByKind] = defaultdict(lambda: defaultdict(list))

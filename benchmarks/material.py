@@ -30,7 +30,7 @@ class ShippedConfig:
 
 
 def shipped_config(name: str) -> ShippedConfig:
-    settings = load_settings(find_config(name))
+    settings = load_settings([find_config(name)])
     return ShippedConfig(settings, load_model(shipped_model(settings.svm)))
 
 

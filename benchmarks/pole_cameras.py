@@ -19,7 +19,7 @@ import numpy as np
 
 from benchmarks.drawn_traffic import follow
 from vdet.boxes import Float64Array
-from vdet.config.places import CountSettings, LineSettings
+from vdet.config.places import LineSettings, TrafficSettings
 from vdet.config.schema import Settings
 from vdet.detect.factory import load_detector
 from vdet.detect.protocol import DetectorModel
@@ -91,7 +91,7 @@ class PoleScene:
     name: str
     scene: Scene
     trips: dict[int, Trip]
-    lines: CountSettings
+    lines: TrafficSettings
     ground: Ground
 
     def true_tracks(self, every: int = 1) -> Iterator[FrameTracks]:
@@ -215,7 +215,7 @@ def _pixels(camera: PinholeCamera, *points: tuple[float, float]) -> Float64Array
     return camera.project(np.array([(x, 0.0, z) for x, z in points], np.float64))
 
 
-def _lines(camera: PinholeCamera) -> CountSettings:
+def _lines(camera: PinholeCamera) -> TrafficSettings:
     above = camera.above_ground
     near, far, level = 2.2 * above, 4.0 * above, 3.0 * above
     middle, right = _lane(1) + LANE_WIDTH / 2, _lane(3) + LANE_WIDTH / 2
@@ -230,7 +230,7 @@ def _lines(camera: PinholeCamera) -> CountSettings:
     for name, points in ends.items():
         (ax, ay), (bx, by) = np.clip(_pixels(camera, *points), 0, (WIDTH, HEIGHT)).tolist()
         lines.append(LineSettings(name=name, start=(ax, ay), end=(bx, by)))
-    return CountSettings(size=(WIDTH, HEIGHT), lines=tuple(lines))
+    return TrafficSettings(size=(WIDTH, HEIGHT), lines=tuple(lines))
 
 
 def _ground(camera: PinholeCamera) -> Ground:

@@ -9,27 +9,27 @@ from typing import Any
 
 from benchmarks.plain import transcode
 from benchmarks.rounds import Task, measure_both
+from vdet.config.camera import LensSettings
 from vdet.config.places import (
-    CountSettings,
     LineSettings,
     RegionSettings,
     RegionsSettings,
+    TrafficSettings,
     ZoneSettings,
 )
 from vdet.config.schema import DrawSettings, Settings, SvmSettings
 from vdet.config.section import Section
 from vdet.detect.factory import load_detector
 from vdet.detect.protocol import DetectorModel
-from vdet.lanes.camera import CalibratedCamera
 from vdet.lanes.ground import GroundPoint, GroundPoints, GroundRequest
 from vdet.lanes.road import LaneRequest
 from vdet.media.images import write_image
 from vdet.media.reader import VideoReader
 from vdet.run.sinks.protocol import Output
-from vdet.run.video import VideoJob, run_video
+from vdet.run.video import Run, run_video
 
 FRAMES = 250
-CAMERA = CalibratedCamera(
+CAMERA = LensSettings(
     1280, 720, ((1157, 0, 668), (0, 1153, 388), (0, 0, 1)), (-0.25, 0.0, 0.0, 0.0, 0.0), 0.0
 )
 """Similar to the project video's camera; the numbers do not change the time of undistortion."""
@@ -39,7 +39,7 @@ ANSWERS: dict[str, Section] = {
     "regions": RegionsSettings(
         polygons=(RegionSettings(name="all", points=((0, 0), (1, 0), (1, 1), (0, 1))),)
     ),
-    "counts": CountSettings(
+    "counts": TrafficSettings(
         lines=tuple(
             LineSettings(name=f"row {row}", start=(0, row), end=(1, row), left="up", right="down")
             for row in (0.65, 0.7, 0.75)
@@ -93,7 +93,7 @@ def run_times(path: Path, folder: Path, rounds: int) -> dict[str, tuple[float, f
         lanes: LaneRequest | None = None,
         **more: Any,
     ) -> None:
-        job = VideoJob(path, outputs, frames=FRAMES, lanes=lanes, overwrite=True, **more)
+        job = Run(path, outputs, frames=FRAMES, lanes=lanes, overwrite=True, **more)
         run_video(job, detector, settings)
 
     tasks: dict[str, Task] = {

@@ -16,7 +16,7 @@ from benchmarks.material import find_video
 from vdet.config.schema import Settings
 from vdet.detect.factory import load_detector
 from vdet.run.sinks.protocol import Output
-from vdet.run.video import VideoJob, run_video
+from vdet.run.video import Run, run_video
 
 FRAMES = 20_000
 MIN_FRAMES = 1000
@@ -168,7 +168,7 @@ def main() -> None:
             Output("video", folder / "out.mp4"),
             Output("tracks", folder / "out.jsonl"),
         )
-        job = VideoJob(folder / "long.mp4", outputs, frames=frames)
+        job = Run(folder / "long.mp4", outputs, frames=frames)
         settings = Settings()
         detector = load_detector(settings.detector)
         totals = run_video(job, detector, settings, progress=monitor)

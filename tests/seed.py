@@ -3,7 +3,7 @@
 from vdet.config.loading import find_config, load_settings
 from vdet.config.tracker import RulesTrackerSettings
 
-SEED = load_settings(find_config("seed"))
+SEED = load_settings([find_config("seed")])
 
 
 def tracker_but(**changes: object) -> RulesTrackerSettings:

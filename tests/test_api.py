@@ -145,7 +145,7 @@ def test_follow_can_be_left_early(clip_path: Path) -> None:
 
 
 def test_the_tracker_that_looks_at_pixels_asks_for_them() -> None:
-    settings = vdet.load_settings(None, ["tracker.kind=rules"])
+    settings = vdet.load_settings((), ["tracker.kind=rules"])
     tracker = vdet.Tracker(320, 240, settings)
     found = vdet.Boxes([[96, 120, 160, 168]], [0.9])
     with pytest.raises(ValueError, match="image"):
@@ -256,7 +256,7 @@ def test_live_counts_are_those_of_the_file_and_of_the_frames(
         "- {name: gate, start: [100, 0], end: [100, 240]}\n"
     )
     settings = vdet.load_settings(assignments=[])
-    counts = load_settings(None, (), {"counts": lines}).counts
+    counts = load_settings((), (), {"counts": lines}).counts
     settings = settings.model_copy(update={"counts": counts})
     results = list(vdet.follow(red_clip, detector=red_boxes, tracker=Latest(), settings=settings))
     counter = results[-1].counter

@@ -14,9 +14,9 @@ from vdet.batch.task import result_digest
 from vdet.errors import BatchError, OutputError
 from vdet.run.sinks import data
 from vdet.run.sinks.protocol import BatchTotal, Output, output_state
-from vdet.run.video import VideoJob
+from vdet.run.video import Run
 
-COMMON = VideoJob(Path(), frames=7)
+COMMON = Run(Path(), frames=7)
 DIGEST = "settings"
 VIDEO: dict[str, str | None] = {"video": None}
 
@@ -53,7 +53,7 @@ def plan_outputs(
     )
 
 
-def outputs(jobs: tuple[VideoJob, ...]) -> list[list[str]]:
+def outputs(jobs: tuple[Run, ...]) -> list[list[str]]:
     return [[str(output.path) for output in job.outputs] for job in jobs]
 
 

@@ -14,7 +14,7 @@ from vdet.batch.task import Work
 from vdet.config.schema import Settings
 from vdet.errors import OutputError
 from vdet.run.sinks.protocol import BatchTotal
-from vdet.run.video import VideoJob
+from vdet.run.video import Run
 from vdet.workers import WorkerKilledError
 
 T = TypeVar("T")
@@ -71,7 +71,7 @@ def test_what_is_repeated_may_differ_and_counts_for_its_item() -> None:
 def test_a_file_that_ended_when_its_process_was_killed_is_made_again(tmp_path: Path) -> None:
     clip = write_drive(tmp_path / "clip.mp4", 3)
     outputs = [OutputSuffix("tracks", ".csv")]
-    plan = make_plan([clip], tmp_path / "out", VideoJob(Path()), outputs)
+    plan = make_plan([clip], tmp_path / "out", Run(Path()), outputs)
     workers = FakeWorkers(1, deadly=plan.jobs, kills_left=1)
     work = Work(Settings(), None, threads=1)
     ((job, record),) = run_batch(plan, work, workers=workers)

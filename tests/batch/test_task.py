@@ -15,14 +15,14 @@ from vdet.detect.factory import load_detector
 from vdet.detect.protocol import DetectorModel
 from vdet.detect.svm.model import save_model
 from vdet.run.sinks.protocol import Output
-from vdet.run.video import VideoJob, run_video
+from vdet.run.video import Run, run_video
 
 
 @pytest.fixture
-def job(tmp_path: Path) -> VideoJob:
+def job(tmp_path: Path) -> Run:
     source = write_drive(tmp_path / "a.mp4", 15)
     day = tmp_path / "out" / "day"
-    return VideoJob(source, (Output("video", day / "a.mp4"), Output("tracks", day / "a.csv")))
+    return Run(source, (Output("video", day / "a.mp4"), Output("tracks", day / "a.csv")))
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +34,7 @@ def work(tmp_path_factory: pytest.TempPathFactory) -> Work:
 
 
 def test_the_record_says_what_was_done_and_folders_are_made(
-    job: VideoJob, work: Work, tmp_path: Path
+    job: Run, work: Work, tmp_path: Path
 ) -> None:
     before = datetime.now(UTC).replace(microsecond=0)
     record = process_file(job, work=work)
@@ -56,7 +56,7 @@ def test_the_record_says_what_was_done_and_folders_are_made(
 
 
 def test_the_detector_is_loaded_once_for_all_files(
-    job: VideoJob, work: Work, monkeypatch: pytest.MonkeyPatch
+    job: Run, work: Work, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     loaded: list[object] = []
 
@@ -72,7 +72,7 @@ def test_the_detector_is_loaded_once_for_all_files(
 
 
 def test_only_warnings_about_this_file_are_recorded(
-    job: VideoJob, work: Work, monkeypatch: pytest.MonkeyPatch
+    job: Run, work: Work, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def warn_and_process(*arguments: object, **options: object) -> object:
         log = logging.getLogger("vdet")
@@ -87,7 +87,7 @@ def test_only_warnings_about_this_file_are_recorded(
     assert logging.getLogger("vdet").handlers == before
 
 
-def test_an_error_is_recorded_without_numbers(job: VideoJob, work: Work) -> None:
+def test_an_error_is_recorded_without_numbers(job: Run, work: Work) -> None:
     job.source.write_bytes(b"no video")
     record = process_file(job, work=work)
     assert record.error is not None
@@ -96,7 +96,7 @@ def test_an_error_is_recorded_without_numbers(job: VideoJob, work: Work) -> None
     assert (record.digest, record.sizes) == (None, {})
 
 
-def test_a_file_whose_process_was_killed_has_a_record(job: VideoJob, work: Work) -> None:
+def test_a_file_whose_process_was_killed_has_a_record(job: Run, work: Work) -> None:
     record = record_of_killed(job, work)
     assert record.error is not None
     assert record.error.startswith(f"{job.source}: its process was killed")

@@ -7,7 +7,8 @@ import pytest
 
 from conftest import Run
 from lanes.chessboards import photographs
-from vdet.lanes.camera import CalibratedCamera, load_camera
+from vdet.config.camera import LensSettings
+from vdet.lanes.camera import load_camera
 from vdet.media.images import write_image
 
 
@@ -15,7 +16,7 @@ from vdet.media.images import write_image
 def boards(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder of six photographs of a board and one of a wall."""
     folder = tmp_path_factory.mktemp("boards")
-    camera = CalibratedCamera(
+    camera = LensSettings(
         640, 480, ((560, 0, 322), (0, 558, 236), (0, 0, 1)), (-0.25, 0.06, 0, 0, 0), 0
     )
     for number, image in enumerate(photographs(camera, 6)):

@@ -11,7 +11,8 @@ from conftest import Run
 from lanes.poles import CORNERS, HEIGHT, WIDTH, seen
 from running import write_drive
 from vdet.boxes import Float64Array
-from vdet.lanes.camera import CalibratedCamera, Undistorter, save_camera
+from vdet.config.camera import LensSettings
+from vdet.lanes.camera import Undistorter, save_camera
 from vdet.lanes.ground import load_ground
 from vdet.media.images import write_image
 
@@ -146,7 +147,7 @@ def test_the_plane_follows_from_the_lane_of_the_settings(run: Run) -> None:
 
 def test_the_camera_of_a_lens_is_named_in_the_file(run: Run) -> None:
     matrix = ((1000.0, 0.0, 640.0), (0.0, 1000.0, 360.0), (0.0, 0.0, 1.0))
-    camera = CalibratedCamera(WIDTH, HEIGHT, matrix, (-0.2, 0.0, 0.0, 0.0, 0.0), 0.2)
+    camera = LensSettings(WIDTH, HEIGHT, matrix, (-0.2, 0.0, 0.0, 0.0, 0.0), 0.2)
     save_camera(camera, Path("my: camera.yaml"))
     result = run("ground", "frame.png", "--lane", "--camera", "my: camera.yaml", "-o", "new.yaml")
     assert result.code == 0, result.err

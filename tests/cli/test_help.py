@@ -113,11 +113,11 @@ def test_examples_of_settings_have_an_effect(names: tuple[str, ...], text: str) 
         assert "://" in text
         return
     if names == ("eval", "video") and "," in example[1]:
-        values = [load_settings(None, assignments) for assignments in grid([example[1]])]
+        values = [load_settings((), assignments) for assignments in grid([example[1]])]
         assert len(values) > 1
         assert values[0] != values[1]
     else:
-        assert load_settings(None, [example[1]]) != Settings()
+        assert load_settings((), [example[1]]) != Settings()
 
 
 def test_one_option_means_the_same_in_every_command() -> None:

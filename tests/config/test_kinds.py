@@ -22,7 +22,7 @@ def path(tmp_path: Path) -> Path:
 
 def load(path: Path, text: str, *assignments: str) -> Settings:
     path.write_text(text, encoding="utf-8")
-    return load_settings(path, assignments)
+    return load_settings([path], assignments)
 
 
 def refusal(path: Path, text: str, *assignments: str) -> list[str]:
@@ -52,7 +52,7 @@ class TestLayers:
     def test_a_kind_may_be_chosen_over_printed_settings(
         self, path: Path, printed: str, chosen: str
     ) -> None:
-        text = render(load_settings(None, [f"tracker.kind={printed}"]))
+        text = render(load_settings((), [f"tracker.kind={printed}"]))
         assert load(path, text, f"tracker.kind={chosen}") == load_settings(
             None, [f"tracker.kind={chosen}"]
         )
@@ -67,10 +67,10 @@ class TestLayers:
         ],
     )
     def test_assignments_are_one_layer_in_any_order(self, assignments: tuple[str, ...]) -> None:
-        assert load_settings(None, assignments).tracker == RulesTrackerSettings(history=5)
+        assert load_settings((), assignments).tracker == RulesTrackerSettings(history=5)
 
     def test_settings_can_be_sent_to_another_process(self) -> None:
-        settings = load_settings(None, ["tracker.kind=rules", "tracker.history=5"])
+        settings = load_settings((), ["tracker.kind=rules", "tracker.history=5"])
         assert pickle.loads(pickle.dumps(settings)) == settings
         assert hash(settings.tracker) == hash(RulesTrackerSettings(history=5))
 
@@ -191,11 +191,11 @@ class TestOtherPackages:
         with pytest.raises(
             ConfigError, match=r"detector\.level: belongs to detector\.kind: fake, .* with net$"
         ):
-            load_settings(None, ["detector.level=9"])
+            load_settings((), ["detector.level=9"])
 
     def test_its_settings_are_printed_with_their_comments_and_read_back(self, path: Path) -> None:
         parts = ["detector.parts=[{size: 4}]", "detector.by_name={a: {size: 5}}"]
-        settings = load_settings(None, ["detector.kind=fake", *parts])
+        settings = load_settings((), ["detector.kind=fake", *parts])
         text = render(settings)
         assert "  # its parts\n  # Each item is a part of it.\n  #   size: how large" in text
         assert "# A detector of another package.\ndetector:\n  # fake: finds nothing\n" in text
@@ -206,7 +206,7 @@ class TestOtherPackages:
         with pytest.raises(
             ConfigError, match=r"known are svm, net, broken, fake, missing, nameless, odd$"
         ):
-            load_settings(None, ["detector.kind=best"])
+            load_settings((), ["detector.kind=best"])
 
     @pytest.mark.parametrize(
         ("kind", "words"),
@@ -219,4 +219,4 @@ class TestOtherPackages:
     )
     def test_a_package_that_is_broken_is_named(self, kind: str, words: str) -> None:
         with pytest.raises(ConfigError, match=rf"^--set: detector\.kind: {words}"):
-            load_settings(None, [f"detector.kind={kind}"])
+            load_settings((), [f"detector.kind={kind}"])

@@ -29,7 +29,7 @@ def path(tmp_path: Path) -> Path:
 
 def load(path: Path, text: str, *assignments: str) -> Settings:
     path.write_text(text, encoding="utf-8")
-    return load_settings(path, assignments, detector="svm")
+    return load_settings([path], assignments, detector="svm")
 
 
 def refusal(path: Path, text: str, *assignments: str) -> list[str]:
@@ -156,7 +156,7 @@ def test_a_mistake_in_an_assignment_to_the_detector_is_explained_in_one_line(
     assignment: str, message: str
 ) -> None:
     with pytest.raises(ConfigError) as error:
-        load_settings(None, [f"detector.{assignment}"], detector="svm")
+        load_settings((), [f"detector.{assignment}"], detector="svm")
     (line,) = str(error.value).split("\n")
     assert line.startswith(f"--set: detector.{message}")
 
@@ -171,7 +171,7 @@ def test_a_mistake_in_an_assignment_to_the_detector_is_explained_in_one_line(
 )
 def test_a_mistake_in_an_assignment_is_explained_in_one_line(assignment: str, message: str) -> None:
     with pytest.raises(ConfigError) as error:
-        load_settings(None, [assignment], detector="svm")
+        load_settings((), [assignment], detector="svm")
     (line,) = str(error.value).split("\n")
     assert line.startswith(f"--set: {message}")
 
@@ -210,7 +210,7 @@ _YAML = st.recursive(
 def test_any_text_gives_settings_or_a_config_error(path: Path, text: str) -> None:
     path.write_text(text, encoding="utf-8", errors="surrogatepass")
     try:
-        loaded = load_settings(path)
+        loaded = load_settings([path])
     except ConfigError as error:
         assert str(error).startswith(str(path))  # noqa: PT017
     else:
@@ -221,7 +221,7 @@ def test_any_text_gives_settings_or_a_config_error(path: Path, text: str) -> Non
 @settings(max_examples=200)
 def test_any_assignment_gives_settings_or_a_config_error(text: str) -> None:
     try:
-        loaded = load_settings(None, [text])
+        loaded = load_settings((), [text])
     except ConfigError as error:
         assert str(error).startswith("--set")  # noqa: PT017
     else:
@@ -231,7 +231,7 @@ def test_any_assignment_gives_settings_or_a_config_error(text: str) -> None:
 def test_a_section_of_which_nothing_is_given_stays_as_it_was(tmp_path: Path) -> None:
     file = tmp_path / "my.yaml"
     file.write_text("detector:\n  # kind: svm\n  heat:\n    # threshold: 2\ntracker:\n")
-    assert load_settings(file, detector="svm") == SVM
+    assert load_settings([file], detector="svm") == SVM
 
 
 @pytest.fixture
@@ -242,8 +242,8 @@ def _in_an_empty_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None
 @pytest.mark.usefixtures("_in_an_empty_folder")
 class TestFindConfig:
     def test_shipped_configs_are_found_by_their_names(self) -> None:
-        assert load_settings(find_config("default")) == Settings()
-        assert load_settings(find_config("seed")).svm.features.patch == 64
+        assert load_settings([find_config("default")]) == Settings()
+        assert load_settings([find_config("seed")]).svm.features.patch == 64
 
     def test_a_path_is_taken_as_it_is(self, tmp_path: Path) -> None:
         (tmp_path / "my.yaml").touch()

@@ -31,7 +31,7 @@ CONFIGS = Path(__file__).parents[2] / "configs"
 def read_back(text: str, folder: Path) -> Settings:
     path = folder / "printed.yaml"
     path.write_text(text, encoding="utf-8")
-    return load_settings(path)
+    return load_settings([path])
 
 
 def fields_of(section: Section, prefix: str = "") -> Iterator[tuple[str, FieldInfo]]:
@@ -123,7 +123,7 @@ def test_printed_settings_are_read_back_the_same(folder: Path, settings: Setting
 def test_the_default_config_is_the_defaults_printed() -> None:
     path = CONFIGS / "default.yaml"
     text = path.read_text(encoding="utf-8")
-    assert load_settings(path) == Settings()
+    assert load_settings([path]) == Settings()
     assert text == render(Settings())
 
 
@@ -131,13 +131,13 @@ def test_the_default_config_is_the_defaults_printed() -> None:
 def test_a_config_of_the_linear_model_is_a_part_of_its_settings_printed(name: str) -> None:
     path = CONFIGS / f"{name}.yaml"
     _, *blocks = path.read_text(encoding="utf-8").rstrip().split("\n\n")
-    printed = iter(render(load_settings(path)).splitlines())
+    printed = iter(render(load_settings([path])).splitlines())
     assert all(line in printed for line in "\n".join(blocks).splitlines())
 
 
 def test_the_config_svm_is_the_linear_model_with_a_longer_look_ahead() -> None:
     tracker = SVM.tracker.model_copy(update={"look_ahead": 0.8})
-    assert load_settings(CONFIGS / "svm.yaml") == SVM.model_copy(update={"tracker": tracker})
+    assert load_settings([CONFIGS / "svm.yaml"]) == SVM.model_copy(update={"tracker": tracker})
 
 
 def test_no_other_config_ships() -> None:

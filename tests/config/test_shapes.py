@@ -7,7 +7,7 @@ import pytest
 from pydantic import ValidationError
 
 from vdet.config.loading import load_settings
-from vdet.config.places import CountSettings, RegionsSettings
+from vdet.config.places import RegionsSettings, TrafficSettings
 from vdet.errors import ConfigError
 
 SQUARE = [[100, 100], [300, 100], [300, 300], [100, 300]]
@@ -20,9 +20,9 @@ def regions(points: Any, **others: Any) -> RegionsSettings:
     )
 
 
-def line(**others: Any) -> CountSettings:
+def line(**others: Any) -> TrafficSettings:
     values = {"name": "line", "start": [0, 400], "end": [1280, 400]} | others
-    return CountSettings.model_validate({"size": HD, "lines": [values]})
+    return TrafficSettings.model_validate({"size": HD, "lines": [values]})
 
 
 @pytest.mark.parametrize(
@@ -41,7 +41,7 @@ def test_polygons_that_make_no_sense_are_refused(points: Any, message: str) -> N
     with pytest.raises(ValidationError, match=message):
         regions(points)
     with pytest.raises(ValidationError, match=message):
-        CountSettings.model_validate({"size": HD, "zones": [{"name": "z", "points": points}]})
+        TrafficSettings.model_validate({"size": HD, "zones": [{"name": "z", "points": points}]})
 
 
 def test_shares_beyond_1_are_asked_for_a_size() -> None:
@@ -96,20 +96,25 @@ class TestFilesOfASection:
             "counts: {size: [9, 9], confirmed: 0.3, lines: [{name: a, start: [0, 0], end: [9, 9]}]}"
         )
         lines.write_text("zones: [{name: z, points: [[0, 0], [1, 0], [1, 1]]}]")
-        counts = load_settings(config, ["counts.drawn=true"], {"counts": lines}).counts
-        assert (counts.size, counts.lines, counts.confirmed, counts.drawn) == (None, (), 0.3, True)
+        counts = load_settings([config], ["traffic.drawn=true"], {"counts": lines}).counts
+        assert (counts.size, counts.lines, traffic.confirmed, traffic.drawn) == (
+            None,
+            (),
+            0.3,
+            True,
+        )
         assert [zone.name for zone in counts.zones] == ["z"]
 
     def test_a_mistake_has_its_place_in_the_file(self, tmp_path: Path) -> None:
         lines = tmp_path / "lines.yaml"
         lines.write_text("lines:\n  - {name: a, start: [0, 0], end: [1, 1], lefft: up}\n")
         with pytest.raises(ConfigError) as caught:
-            load_settings(None, (), {"counts": lines})
+            load_settings((), (), {"counts": lines})
         assert str(caught.value) == (
             f"{lines}:2:43: counts.lines[0].lefft: is no setting; did you mean left?"
         )
 
     def test_a_picture_is_a_mask(self, tmp_path: Path) -> None:
         mask = tmp_path / "mask.PNG"
-        assert load_settings(None, (), {"regions": mask}).regions.mask == str(mask)
-        assert load_settings(None, (), {"regions": mask}).regions.polygons == ()
+        assert load_settings((), (), {"regions": mask}).regions.mask == str(mask)
+        assert load_settings((), (), {"regions": mask}).regions.polygons == ()

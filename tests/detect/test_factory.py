@@ -151,7 +151,7 @@ class TestAnotherPackage:
         sys.modules.pop("corner_detector", None)
 
     def test_another_detector_is_found_by_the_name_of_its_kind(self) -> None:
-        settings = load_settings(None, ["detector={kind: corner, side: 20}"])
+        settings = load_settings((), ["detector={kind: corner, side: 20}"])
         detector = load_detector(settings.detector).for_video(100, 80, [])
         assert detector.detect(None).sides.tolist() == [[0, 0, 20, 20]]
         assert model_file(settings.detector) is None

@@ -27,7 +27,7 @@ FRAMES = 10
 
 
 def settings(*assignments: str) -> Settings:
-    return load_settings(None, (*QUICK, *assignments))
+    return load_settings((), (*QUICK, *assignments))
 
 
 class OfModel(Protocol):

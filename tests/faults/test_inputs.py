@@ -16,7 +16,7 @@ from running import frames_of, names, until, write_drive
 from vdet.batch.task import process_file
 from vdet.errors import VideoError
 from vdet.run.sinks.protocol import Output
-from vdet.run.video import VideoJob, run_video
+from vdet.run.video import Run, run_video
 
 COUNT = 60
 
@@ -29,12 +29,10 @@ def clip(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def job(clip: Path, tmp_path: Path) -> VideoJob:
+def job(clip: Path, tmp_path: Path) -> Run:
     (tmp_path / "out").mkdir()
     outputs = {"video": "clip.mp4", "tracks": "clip.csv"}
-    return VideoJob(
-        clip, tuple(Output(sink, tmp_path / "out" / name) for sink, name in outputs.items())
-    )
+    return Run(clip, tuple(Output(sink, tmp_path / "out" / name) for sink, name in outputs.items()))
 
 
 def after(frames: int, happens: Callable[[], object]) -> Callable[[object], Callable[[int], None]]:
@@ -48,12 +46,12 @@ def after(frames: int, happens: Callable[[], object]) -> Callable[[object], Call
     return lambda _: advance
 
 
-def test_a_file_that_is_removed_while_it_is_read_is_read_to_its_end(job: VideoJob) -> None:
+def test_a_file_that_is_removed_while_it_is_read_is_read_to_its_end(job: Run) -> None:
     run_video(job, red_model(), SETTINGS, progress=after(5, job.source.unlink))
     assert frames_of(job.outputs[0].path) == COUNT
 
 
-def test_a_file_that_is_removed_before_its_turn_is_recorded(job: VideoJob, tmp_path: Path) -> None:
+def test_a_file_that_is_removed_before_its_turn_is_recorded(job: Run, tmp_path: Path) -> None:
     job.source.unlink()
     record = process_file(job, work=red_work(tmp_path))
     assert record.error == f"{job.source}: there is no such file; check the name"
@@ -61,7 +59,7 @@ def test_a_file_that_is_removed_before_its_turn_is_recorded(job: VideoJob, tmp_p
 
 
 def test_a_file_that_shrinks_is_read_as_far_as_it_goes_with_a_warning(
-    job: VideoJob, caplog: pytest.LogCaptureFixture
+    job: Run, caplog: pytest.LogCaptureFixture
 ) -> None:
     half = job.source.stat().st_size // 2
     shrink = after(5, lambda: os.truncate(job.source, half))
@@ -109,7 +107,7 @@ def pipe(clip: Path, tmp_path: Path) -> Iterator[Pipe]:
     pipe.close()
 
 
-def test_an_input_that_stalls_is_given_up(pipe: Pipe, job: VideoJob, tmp_path: Path) -> None:
+def test_an_input_that_stalls_is_given_up(pipe: Pipe, job: Run, tmp_path: Path) -> None:
     stalling = replace(job, source=pipe.path, timeout=1)
     with pytest.raises(VideoError, match=r"pipe\.ts: nothing was read or written for 1 s"):
         run_video(stalling, red_model(), SETTINGS)

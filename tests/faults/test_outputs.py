@@ -19,7 +19,7 @@ from vdet.errors import VideoError
 from vdet.media import Frame
 from vdet.media.writer import VideoWriter
 from vdet.run.sinks.protocol import Output
-from vdet.run.video import VideoJob, run_video
+from vdet.run.video import Run, run_video
 from vdet.track.motion.tracker import MotionTracker
 from vdet.track.rules.tracker import RulesTracker
 
@@ -60,16 +60,16 @@ def test_a_folder_that_cannot_be_written_is_refused_before_any_work(
 
 
 @pytest.fixture
-def job(tmp_path: Path) -> VideoJob:
+def job(tmp_path: Path) -> Run:
     source = write_drive(tmp_path / "clip.mp4", 150)
     outputs = {"video": "clip.mp4", "tracks": "clip.csv"}
-    return VideoJob(
+    return Run(
         source, tuple(Output(sink, tmp_path / "out" / name) for sink, name in outputs.items())
     )
 
 
 def test_a_writer_that_fails_at_the_100th_frame(
-    job: VideoJob, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    job: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     write = VideoWriter.write
     written: list[int] = []
@@ -88,7 +88,7 @@ def test_a_writer_that_fails_at_the_100th_frame(
 
 
 def test_a_writer_that_hangs_at_its_end_is_given_up(
-    job: VideoJob, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    job: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     released = threading.Event()
     leave = VideoWriter.__exit__
@@ -108,7 +108,7 @@ def test_a_writer_that_hangs_at_its_end_is_given_up(
 
 
 def test_a_tracker_that_raises(
-    run: Run, job: VideoJob, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    run: Run, job: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def update(*_: object) -> None:
         raise ZeroDivisionError("no\nscale")

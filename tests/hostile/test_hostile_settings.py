@@ -157,7 +157,7 @@ def test_hostile_yaml_is_refused_with_a_reason(tmp_path: Path, name: str) -> Non
     path = tmp_path / "my.yaml"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(ConfigError, match=words) as error:
-        load_settings(path, detector="svm")
+        load_settings([path], detector="svm")
     lines = str(error.value).splitlines()
     assert 1 <= len(lines) <= MAX_MISTAKES + 1
     assert all(line.isprintable() and len(line) < 1000 for line in lines)
@@ -189,4 +189,4 @@ def test_other_encodings_than_utf_8_are_refused(tmp_path: Path, data: bytes) -> 
     path = tmp_path / "my.yaml"
     path.write_bytes(data)
     with pytest.raises(ConfigError, match=r"my\.yaml: is not UTF-8 text"):
-        load_settings(path)
+        load_settings([path])

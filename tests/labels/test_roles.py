@@ -22,7 +22,7 @@ def test_labels_mean_the_same_in_any_spelling(labels: tuple[str, ...], role: str
 
 def test_settings_give_words_another_role_and_add_new_ones() -> None:
     changes = ("motorbike=vehicle", "tram=other", "cow=ignored")
-    roles = Roles.from_settings(load_settings(None, [f"labels.roles.{each}" for each in changes]))
+    roles = Roles.from_settings(load_settings((), [f"labels.roles.{each}" for each in changes]))
     names = ("motorcycle", "Tram", "cow", "misc", "car", "dont care")
     assert list(map(roles.role_of, names)) == [
         *("vehicle", "other", "ignored"),
@@ -49,7 +49,7 @@ def test_classes_that_the_detector_does_not_look_for_are_ignored(
 
 
 def test_a_detector_of_vehicles_looks_for_cars_trucks_and_buses() -> None:
-    settings = load_settings(None, ['detector.classes=["vehicle"]'])
+    settings = load_settings((), ['detector.classes=["vehicle"]'])
     roles = Roles.from_settings(settings)
     wanted = [name for name in OUR_NAMES if roles.role_of(name) == "vehicle"]
     assert wanted == ["car", "truck", "bus", "vehicle"]
@@ -65,7 +65,7 @@ def test_a_detector_of_vehicles_looks_for_cars_trucks_and_buses() -> None:
 def test_a_network_learns_its_classes_and_vehicles_of_unknown_kind(
     classes: list[str], learnt: dict[str, str]
 ) -> None:
-    roles = Roles.for_training(load_settings(None, [f"train.net.classes={classes}"]))
+    roles = Roles.for_training(load_settings((), [f"train.net.classes={classes}"]))
     words = ("Car", "bus", "tractor", "rickshaw", "pedestrian", "rider", "cow")
     found = {word: roles.class_of(word) for word in words if roles.role_of(word) == "vehicle"}
     assert found == learnt

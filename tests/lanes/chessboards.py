@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 
 from vdet.boxes import Image
-from vdet.lanes.camera import CalibratedCamera
+from vdet.config.camera import LensSettings
 
 PATTERN = (9, 6)
 _TEXELS = 40  # side of a square of the board, texels
@@ -16,14 +16,12 @@ _POSES = (
 )  # fmt: skip
 
 
-def photographs(camera: CalibratedCamera, number: int = len(_POSES)) -> list[Image]:
+def photographs(camera: LensSettings, number: int = len(_POSES)) -> list[Image]:
     """Draw the board, 9 × 6 inner corners, in different poses."""
     return [_photograph(camera, np.array(pose)) for pose in _POSES[:number]]
 
 
-def _photograph(
-    camera: CalibratedCamera, pose: np.ndarray[tuple[int], np.dtype[np.float64]]
-) -> Image:
+def _photograph(camera: LensSettings, pose: np.ndarray[tuple[int], np.dtype[np.float64]]) -> Image:
     """Look up where the ray of each pixel meets the board; the unit of length is a square."""
     rotation, _ = cv2.Rodrigues(pose[:3])
     middle = np.array([(PATTERN[0] - 1) / 2, (PATTERN[1] - 1) / 2, 0])

@@ -5,8 +5,8 @@ from collections.abc import Callable
 import pytest
 from benchmarks.drawn_traffic import lane_view
 
+from vdet.config.camera import LensSettings
 from vdet.config.schema import LaneSettings
-from vdet.lanes.camera import CalibratedCamera
 from vdet.lanes.road import Lane, LaneRequest, RoadFinder
 from vdet.media import Picture
 from vdet.synthetic.camera import PinholeCamera
@@ -71,9 +71,9 @@ def drive(
 
 
 @pytest.fixture(scope="session")
-def wide_camera() -> CalibratedCamera:
+def wide_camera() -> LensSettings:
     """A camera with visible lens distortion."""
-    return CalibratedCamera(
+    return LensSettings(
         640,
         480,
         ((560.0, 0, 322.0), (0, 558.0, 236.0), (0, 0, 1)),

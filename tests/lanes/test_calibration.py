@@ -9,18 +9,19 @@ import numpy.typing as npt
 import pytest
 
 from lanes.chessboards import PATTERN, photographs
+from vdet.config.camera import LensSettings
 from vdet.errors import ImageError
 from vdet.lanes.calibration import Calibration, calibrate, find_corners
-from vdet.lanes.camera import CalibratedCamera, Undistorter
+from vdet.lanes.camera import Undistorter
 from vdet.media.images import read_image, write_image
 
-LARGE = CalibratedCamera(
+LARGE = LensSettings(
     2560, 1920, ((2240, 0, 1289.5), (0, 2232, 945.5), (0, 0, 1)), (0, 0, 0, 0, 0), 0
 )
 
 
 @pytest.fixture(scope="module")
-def photos(wide_camera: CalibratedCamera, tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+def photos(wide_camera: LensSettings, tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     folder = tmp_path_factory.mktemp("boards")
     return [
         written(image, folder / f"board{number}.png")
@@ -39,7 +40,7 @@ def calibration(photos: list[Path]) -> Calibration:
 
 
 def test_the_camera_is_recovered(
-    calibration: Calibration, wide_camera: CalibratedCamera, photos: list[Path]
+    calibration: Calibration, wide_camera: LensSettings, photos: list[Path]
 ) -> None:
     camera = calibration.camera
     assert (camera.width, camera.height) == (640, 480)
@@ -55,7 +56,7 @@ def test_the_camera_is_recovered(
 
 @pytest.mark.parametrize("large", [False, True])
 def test_corners_are_found_to_a_fraction_of_a_pixel(
-    wide_camera: CalibratedCamera, *, large: bool
+    wide_camera: LensSettings, *, large: bool
 ) -> None:
     camera = LARGE if large else wide_camera
     corners = find_corners(photographs(camera, 1)[0], PATTERN)
@@ -102,7 +103,7 @@ def test_too_few_photographs_with_a_board_are_refused(photos: list[Path]) -> Non
 
 
 def test_boards_that_are_all_seen_from_the_front_are_refused(
-    wide_camera: CalibratedCamera, tmp_path: Path
+    wide_camera: LensSettings, tmp_path: Path
 ) -> None:
     front = photographs(wide_camera, 1)[0]
     same = []

@@ -10,11 +10,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from vdet.boxes import Box
+from vdet.config.camera import LensSettings
 from vdet.errors import ConfigError
-from vdet.lanes.camera import CalibratedCamera, Undistorter, load_camera, save_camera
+from vdet.lanes.camera import Undistorter, load_camera, save_camera
 
 MATRIX = ((560.0, 0.0, 322.0), (0.0, 558.0, 236.0), (0.0, 0.0, 1.0))
-CAMERA = CalibratedCamera(640, 480, MATRIX, (-0.25, 0.06, 0.0005, -0.0004, 0.0), 0.5)
+CAMERA = LensSettings(640, 480, MATRIX, (-0.25, 0.06, 0.0005, -0.0004, 0.0), 0.5)
 GOOD = {
     "width": 640,
     "height": 480,
@@ -40,7 +41,7 @@ def test_a_frame_of_twice_the_size_is_undistorted_in_the_same_way(undistorter: U
 
 def test_an_aspect_ratio_may_differ_by_rounding_only() -> None:
     matrix = ((1150, 0, 640), (0, 1150, 360), (0, 0, 1))
-    camera = CalibratedCamera(1280, 720, matrix, (0, 0, 0, 0, 0), 1)
+    camera = LensSettings(1280, 720, matrix, (0, 0, 0, 0, 0), 1)
     assert camera.matrix_for(854, 480)[0, 0] == pytest.approx(767, abs=1)
     for size in ((640, 480), (720, 1280), (1320, 720)):
         with pytest.raises(ConfigError, match=r"is for 1280×720, not"):
@@ -88,8 +89,8 @@ def test_a_box_is_clipped_to_the_frame(undistorter: Undistorter) -> None:
     assert undistorter.box(Box.sized(0, 0, 12, 12)).area == 0
 
 
-@pytest.mark.parametrize("camera", [None, CalibratedCamera(640, 480, MATRIX, (0, 0, 0, 0, 0), 0)])
-def test_without_distortion_nothing_changes(camera: CalibratedCamera | None) -> None:
+@pytest.mark.parametrize("camera", [None, LensSettings(640, 480, MATRIX, (0, 0, 0, 0, 0), 0)])
+def test_without_distortion_nothing_changes(camera: LensSettings | None) -> None:
     undistorter = Undistorter(camera, 640, 480)
     image = np.random.default_rng(0).integers(0, 256, (480, 640, 3), dtype=np.uint8)
     assert (undistorter.image(image) == image).all()
@@ -127,7 +128,7 @@ def test_every_camera_is_read_with_all_its_digits(
     rms: float,
 ) -> None:
     matrix = ((focal[0], 0.0, center[0]), (0.0, focal[1], center[1]), (0.0, 0.0, 1.0))
-    camera = CalibratedCamera(640, 480, matrix, distortion, rms)
+    camera = LensSettings(640, 480, matrix, distortion, rms)
     save_camera(camera, path, overwrite=True)
     assert load_camera(path) == camera
 

@@ -7,14 +7,15 @@ import pytest
 
 from lanes.poles import CORNERS, HEIGHT, WIDTH, seen
 from vdet.boxes import Float64Array
+from vdet.config.camera import LensSettings
 from vdet.errors import ConfigError
-from vdet.lanes.camera import CalibratedCamera, Undistorter, save_camera
+from vdet.lanes.camera import Undistorter, save_camera
 from vdet.lanes.ground import Ground, fit_ground, load_ground
 
 PLAIN = Undistorter(None, WIDTH, HEIGHT)
 EDGE = 0.5
 """Whole numbers are middles of pixels in a file, and edges of pixels in boxes."""
-CAMERA = CalibratedCamera(
+CAMERA = LensSettings(
     WIDTH, HEIGHT, ((1000, 0, 640), (0, 1000, 360), (0, 0, 1)), (-0.25, 0.05, 0, 0, 0), 0.2
 )
 

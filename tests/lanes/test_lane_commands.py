@@ -15,12 +15,13 @@ import yaml
 from conftest import Outcome, Run
 from red_cars import SETTINGS, red_finder
 from vdet.boxes import Box, Image
+from vdet.config.camera import LensSettings
 from vdet.config.schema import LaneSettings, OutputSettings, Settings
 from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
 from vdet.config.svm import WindowSettings
 from vdet.detect.svm.model import save_model
 from vdet.draw.boxes import color_of
-from vdet.lanes.camera import CalibratedCamera, Undistorter, save_camera
+from vdet.lanes.camera import Undistorter, save_camera
 from vdet.media import Frame, Picture, VideoInfo
 from vdet.media.images import read_image, write_image
 from vdet.media.reader import VideoReader
@@ -30,7 +31,7 @@ from vdet.synthetic.render import Renderer
 from vdet.synthetic.scene import Scene
 
 WIDTH, HEIGHT, COUNT = 640, 480, 10
-LENS = CalibratedCamera(
+LENS = LensSettings(
     WIDTH, HEIGHT, ((480, 0, 320), (0, 480, 240), (0, 0, 1)), (-0.35, 0.1, 0.0, 0.0, 0.0), 0.4
 )
 CAR = Box.sized(500, 300, 64, 56)  # in the distorted frame, near its edge
@@ -260,7 +261,7 @@ def test_a_picture_of_another_aspect_ratio_does_not_stop_the_others(
 def test_a_video_of_another_aspect_ratio_is_refused(run: Run, files: Files, tmp_path: Path) -> None:
     wide = tmp_path / "wide.yaml"
     matrix = ((960, 0, 640), (0, 960, 360), (0, 0, 1))
-    save_camera(CalibratedCamera(1280, 720, matrix, (0, 0, 0, 0, 0), 0), wide)
+    save_camera(LensSettings(1280, 720, matrix, (0, 0, 0, 0, 0), 0), wide)
     outputs = (tmp_path / "out.mp4", "--tracks", tmp_path / "t.csv")
     result = run("detect-video", files.clip, *outputs, *files.red, "--lanes", "--camera", wide)
     assert result.code == 1

@@ -10,8 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vdet.boxes import Box
+from vdet.config.camera import LensSettings
 from vdet.config.schema import LaneSettings
-from vdet.lanes.camera import CalibratedCamera, Undistorter
+from vdet.lanes.camera import Undistorter
 from vdet.lanes.curves import LaneCurves
 from vdet.lanes.road import LaneRequest, Road, RoadFinder, RoadPosition, position_on_road
 from vdet.lanes.top_view import TopView
@@ -112,7 +113,7 @@ def test_a_foot_is_at_the_edge_of_a_pixel_as_boxes_are(road: Road) -> None:
     assert position.lane == 0
 
 
-def test_feet_are_undistorted(road: Road, wide_camera: CalibratedCamera) -> None:
+def test_feet_are_undistorted(road: Road, wide_camera: LensSettings) -> None:
     lens = Undistorter(wide_camera, 640, 480)
     [[x, y]] = lens.points(np.array([[560.0, 400.0]])).tolist()
     assert abs(y - 400) > 5

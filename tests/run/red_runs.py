@@ -17,7 +17,7 @@ from vdet.media.reader import VideoReader
 from vdet.run.loop import build, peek
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output, SinkContext, open_sink
-from vdet.run.video import RunTotals, VideoJob, run_video
+from vdet.run.video import Run, RunTotals, run_video
 from vdet.track.track import Track
 
 COUNT = 60
@@ -50,7 +50,7 @@ def outputs(**paths: Path) -> tuple[Output, ...]:
     return tuple(Output(sink, path) for sink, path in paths.items())
 
 
-def run_red(job: VideoJob, settings: Settings = SETTINGS, **options: Any) -> RunTotals:
+def run_red(job: Run, settings: Settings = SETTINGS, **options: Any) -> RunTotals:
     """Run a job that finds red cars."""
     return run_video(job, model_for(settings), settings, **options)
 

@@ -22,7 +22,7 @@ from vdet.media.frame import UNSPECIFIED, Planes
 from vdet.media.images import Orientation
 from vdet.media.reader import VideoReader
 from vdet.media.writer import VideoWriter
-from vdet.run.video import VideoJob
+from vdet.run.video import Run
 
 TONE_RATE = 48_000
 
@@ -149,7 +149,7 @@ class TestPixels:
         """Far from boxes and labels, and inside boxes: luma and chroma are equal, bit for bit."""
         wanted = outputs(video=tmp_path / "out.mp4", tracks=tmp_path / "out.jsonl")
         settings = written_with(OutputSettings(preset="ultrafast", crf=0))
-        run_red(VideoJob(filmed, wanted), settings)
+        run_red(Run(filmed, wanted), settings)
         masks = untouched(tmp_path / "out.jsonl")
         drawn = 0
         pairs = zip(planes_of(filmed), planes_of(tmp_path / "out.mp4"), strict=True)
@@ -167,7 +167,7 @@ class TestPixels:
 class TestFidelity:
     def test_sound_is_kept_to_the_bit_and_in_step(self, red_clip: Path, tmp_path: Path) -> None:
         source = _remuxed(red_clip, tmp_path / "in.mp4", tone=True)
-        run_red(VideoJob(source, outputs(video=tmp_path / "out.mp4")))
+        run_red(Run(source, outputs(video=tmp_path / "out.mp4")))
         before, after = _sound(source), _sound(tmp_path / "out.mp4")
         assert len(before) > 100
         assert [data for _, data in after] == [data for _, data in before]
@@ -176,7 +176,7 @@ class TestFidelity:
     def test_a_part_has_the_sound_of_that_part(self, red_clip: Path, tmp_path: Path) -> None:
         source = _remuxed(red_clip, tmp_path / "in.mp4", tone=True)
         begin, end = Fraction(10, 25), Fraction(35, 25)
-        run_red(VideoJob(source, outputs(video=tmp_path / "out.mp4"), start=begin, end=end))
+        run_red(Run(source, outputs(video=tmp_path / "out.mp4"), start=begin, end=end))
         after = _sound(tmp_path / "out.mp4")
         assert len(after) == pytest.approx(float(end - begin) * TONE_RATE / 1024, abs=2)
         times = {data: time - float(begin) for time, data in _sound(source)}
@@ -190,7 +190,7 @@ class TestFidelity:
 
         source = _remuxed(red_clip, tmp_path / "in.mp4", stretch=slower_and_slower)
         wanted = outputs(video=tmp_path / "out.mp4", tracks=tmp_path / "out.jsonl")
-        run_red(VideoJob(source, wanted))
+        run_red(Run(source, wanted))
         times = [frame.time for frame in read(source)]
         steps = {later - earlier for earlier, later in pairwise(times)}
         assert len(steps) > 20, "the clip's rate does not vary"
@@ -205,7 +205,7 @@ class TestFidelity:
         self, red_clip: Path, tmp_path: Path, rotation: int
     ) -> None:
         source = _remuxed(red_clip, tmp_path / "in.mp4", rotation=rotation)
-        job = VideoJob(source, outputs(video=tmp_path / "out.mp4"), frames=5)
+        job = Run(source, outputs(video=tmp_path / "out.mp4"), frames=5)
         totals = run_red(job, with_search(SETTINGS, probability=1.0))
         assert totals.frames == 5
         with VideoReader(tmp_path / "out.mp4") as reader:

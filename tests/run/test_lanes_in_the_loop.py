@@ -4,10 +4,11 @@ import pytest
 
 from red_cars import HEIGHT, WIDTH, drive
 from run.red_runs import follow
-from vdet.lanes.camera import CalibratedCamera, Undistorter
+from vdet.config.camera import LensSettings
+from vdet.lanes.camera import Undistorter
 from vdet.lanes.road import LaneRequest
 
-LENS = CalibratedCamera(
+LENS = LensSettings(
     WIDTH, HEIGHT, ((240, 0, 160), (0, 240, 120), (0, 0, 1)), (-0.35, 0.1, 0.0, 0.0, 0.0), 0.4
 )
 COUNT = 10

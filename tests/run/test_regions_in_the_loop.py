@@ -17,7 +17,7 @@ from vdet.errors import ImageError, VideoError
 from vdet.media.images import read_image, write_image
 from vdet.run.pictures import PictureJob, PictureSearch, run_picture
 from vdet.run.sinks.protocol import Output
-from vdet.run.video import VideoJob
+from vdet.run.video import Run
 
 RIGHT = [[100, 0], [320, 0], [320, 240], [100, 240]]
 
@@ -59,7 +59,7 @@ def test_a_picture_shows_only_what_stands_in_the_region(settings: Settings) -> N
 def test_regions_for_another_shape_name_the_file(red_clip: Path, tmp_path: Path) -> None:
     settings = within([[0, 0], [9, 0], [9, 9]], size=(100, 100))
     with pytest.raises(VideoError, match=r"red\.mp4: regions\.size: places are given for frames"):
-        run_red(VideoJob(red_clip, outputs(tracks=tmp_path / "t.csv")), settings)
+        run_red(Run(red_clip, outputs(tracks=tmp_path / "t.csv")), settings)
     with pytest.raises(ImageError, match=r"a\.png: regions\.size"):
         PictureSearch(model_for(settings), settings).detect(Path("a.png"), road(CAR))
     assert list(tmp_path.iterdir()) == []
@@ -84,7 +84,7 @@ def test_a_mask_that_is_drawn_anew_makes_results_out_of_date(tmp_path: Path) -> 
     chosen = Settings(regions=within([], mask=str(mask)).regions)
 
     def digest() -> str:
-        return Work.of(VideoJob(Path("a.mp4")), ["tracks"], chosen, None, None).digest
+        return Work.of(Run(Path("a.mp4")), ["tracks"], chosen, None, None).digest
 
     write_image(mask, np.zeros((24, 32, 3), np.uint8))
     before = digest()

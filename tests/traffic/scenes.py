@@ -6,7 +6,7 @@ from itertools import groupby, pairwise
 from typing import Any
 
 from vdet.boxes import Box
-from vdet.config.places import CountSettings, LineSettings, ZoneSettings
+from vdet.config.places import LineSettings, TrafficSettings, ZoneSettings
 from vdet.polygons import Point
 from vdet.track.track import FrameTracks, State, Track
 from vdet.traffic.counting import count_frames
@@ -98,7 +98,7 @@ def counts(
     **rule: Any,
 ) -> Counts:
     """Count at lines and zones, given in pixels of 1280×720, in frames of this size."""
-    settings = CountSettings(
+    settings = TrafficSettings(
         size=(WIDTH, HEIGHT),
         lines=tuple(each for each in shapes if isinstance(each, LineSettings)),
         zones=tuple(each for each in shapes if isinstance(each, ZoneSettings)),

@@ -7,13 +7,13 @@ from pathlib import Path as File
 import pytest
 
 from traffic.scenes import HEIGHT, WIDTH, Path, frames, through
-from vdet.config.places import CountSettings, LineSettings, ZoneSettings
+from vdet.config.places import LineSettings, TrafficSettings, ZoneSettings
 from vdet.labels.formats import TrackWriter
 from vdet.labels.records import JSON_LINES
 from vdet.traffic.counting import count_files
 from vdet.traffic.counts import Counts, flow_table, zone_table
 
-SETTINGS = CountSettings(
+SETTINGS = TrafficSettings(
     size=(WIDTH, HEIGHT),
     lines=(
         LineSettings(name="west", start=(200, 200), end=(200, 600), left="out", right="in"),

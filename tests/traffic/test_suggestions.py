@@ -3,7 +3,7 @@
 import pytest
 
 from traffic.scenes import HEIGHT, WIDTH, Path, frames, through
-from vdet.config.places import CountSettings, LineSettings
+from vdet.config.places import LineSettings, TrafficSettings
 from vdet.polygons import side_of
 from vdet.track.track import FrameTracks
 from vdet.traffic.counting import count_frames
@@ -31,7 +31,7 @@ def test_a_stream_gets_a_line_in_and_a_line_out_that_all_its_vehicles_cross() ->
     lines = tuple(
         LineSettings(name=each.name, start=each.start, end=each.end) for each in (first, last)
     )
-    counts = count_frames(video, CountSettings(size=(WIDTH, HEIGHT), lines=lines))
+    counts = count_frames(video, TrafficSettings(size=(WIDTH, HEIGHT), lines=lines))
     assert [(total.name, total.direction, total.count) for total in counts.totals] == [
         ("in 1", "left", 4), ("in 1", "right", 0), ("out 1", "left", 4), ("out 1", "right", 0),
     ]  # fmt: skip

@@ -23,7 +23,7 @@ def _somewhere_else(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("name", "length"), [("svm", 4800), ("seed", 4800)])
 def test_every_shipped_config_has_a_shipped_model(name: str, length: int) -> None:
-    settings = load_settings(find_config(name)).svm
+    settings = load_settings([find_config(name)]).svm
     path = shipped_model(settings)
     assert path.stem == name
     assert model_file(settings) == path
@@ -41,10 +41,10 @@ def test_features_are_asked_for_where_they_are_given() -> None:
     same = FeatureSettings()
     assert requested_features(SvmSettings(features=HSV)) == HSV
     assert requested_features(SvmSettings(features=same)) == same
-    given = load_settings(None, ["detector.features.patch=32"], detector="svm").svm
+    given = load_settings((), ["detector.features.patch=32"], detector="svm").svm
     assert requested_features(given) == same
     assert requested_features(SvmSettings()) is None
-    assert requested_features(load_settings(None, ["detector.kind=svm"]).svm) is None
+    assert requested_features(load_settings((), ["detector.kind=svm"]).svm) is None
 
 
 def test_a_model_file_brings_its_own_features_but_not_others_than_are_asked_for() -> None:

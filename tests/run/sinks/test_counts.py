@@ -10,18 +10,18 @@ import pytest
 from red_cars import SETTINGS
 from run.red_runs import outputs, read, result_of, run_red, write
 from vdet.boxes import Box
-from vdet.config.places import CountSettings, LineSettings, ZoneSettings
+from vdet.config.places import LineSettings, TrafficSettings, ZoneSettings
 from vdet.config.schema import Settings
 from vdet.errors import OutputError, VideoError
 from vdet.pages.render import PAGE_NAME
 from vdet.pages.video import read_facts
 from vdet.run.sinks.data import COUNTS
 from vdet.run.sinks.protocol import Output
-from vdet.run.video import VideoJob
+from vdet.run.video import Run
 from vdet.testing import check_sink
 from vdet.traffic.count_files import join_counts
 
-COUNTS_AT = CountSettings(
+COUNTS_AT = TrafficSettings(
     size=(320, 240),
     lines=(LineSettings(name="gate", start=(100, 0), end=(100, 240), left="out", right="in"),),
     zones=(ZoneSettings(name="yard", points=((110, 0), (320, 0), (320, 240), (110, 240))),),
@@ -29,14 +29,14 @@ COUNTS_AT = CountSettings(
 """The middle of the red car goes from 72 to 131 in 60 frames."""
 
 
-def with_counts(counts: CountSettings = COUNTS_AT) -> Settings:
+def with_counts(counts: TrafficSettings = COUNTS_AT) -> Settings:
     return SETTINGS.model_copy(update={"counts": counts})
 
 
 @pytest.mark.parametrize("name", ["counts.csv", "counts.json"])
 def test_it_passes_the_checks_of_every_sink(name: str, tmp_path: Path) -> None:
     settings = with_counts(
-        CountSettings(lines=(LineSettings(name="a", start=(0, 0.5), end=(1, 1)),))
+        TrafficSettings(lines=(LineSettings(name="a", start=(0, 0.5), end=(1, 1)),))
     )
     check_sink(COUNTS, tmp_path / name, settings)
 
@@ -47,7 +47,7 @@ def test_a_run_counts_the_red_car(red_clip: Path, tmp_path: Path) -> None:
         Output("counts", tmp_path / "c.json"),
         *outputs(tracks=tmp_path / "t.jsonl"),
     )
-    run_red(VideoJob(red_clip, wanted), with_counts())
+    run_red(Run(red_clip, wanted), with_counts())
     with (tmp_path / "c.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert [(row["name"], row["direction"]) for row in rows] == [
@@ -76,7 +76,7 @@ def test_a_run_counts_the_red_car(red_clip: Path, tmp_path: Path) -> None:
 def test_running_counts_are_drawn_if_asked_for(red_clip: Path, tmp_path: Path) -> None:
     drawn = COUNTS_AT.model_copy(update={"drawn": True})
     for name, counts in (("plain.mp4", COUNTS_AT), ("drawn.mp4", drawn)):
-        run_red(VideoJob(red_clip, outputs(video=tmp_path / name)), with_counts(counts))
+        run_red(Run(red_clip, outputs(video=tmp_path / name)), with_counts(counts))
     plain, shown = read(tmp_path / "plain.mp4"), read(tmp_path / "drawn.mp4")
     changes = [
         np.abs(a.image.astype(int) - b.image).max(axis=2) > 60
@@ -96,7 +96,7 @@ def test_lines_for_another_shape_are_refused(red_clip: Path, tmp_path: Path) -> 
     path = tmp_path / "c.csv"
     settings = with_counts(COUNTS_AT.model_copy(update={"size": (320, 180)}))
     with pytest.raises(VideoError, match=r"red\.mp4: counts\.size: places are given for .*320×180"):
-        run_red(VideoJob(red_clip, outputs(counts=path)), settings)
+        run_red(Run(red_clip, outputs(counts=path)), settings)
     assert not path.exists()
 
 
@@ -104,7 +104,7 @@ def test_lines_for_another_shape_are_refused(red_clip: Path, tmp_path: Path) -> 
 def test_a_batch_has_a_file_over_all_videos(suffix: str, red_clip: Path, tmp_path: Path) -> None:
     paths = {name: tmp_path / f"{name}{suffix}" for name in ("a", "b")}
     for path in paths.values():
-        run_red(VideoJob(red_clip, outputs(counts=path)), with_counts())
+        run_red(Run(red_clip, outputs(counts=path)), with_counts())
     join_counts(paths, tmp_path / f"all{suffix}")
     text = (tmp_path / f"all{suffix}").read_text()
     if suffix == ".csv":
@@ -120,7 +120,7 @@ def test_a_batch_has_a_file_over_all_videos(suffix: str, red_clip: Path, tmp_pat
 
 
 def test_a_page_shows_the_counts(red_clip: Path, tmp_path: Path) -> None:
-    run_red(VideoJob(red_clip, outputs(page=tmp_path / "page")), with_counts())
+    run_red(Run(red_clip, outputs(page=tmp_path / "page")), with_counts())
     facts = read_facts(tmp_path / "page" / PAGE_NAME)
     assert facts.counts == {"gate: out": 1, "yard: enter": 1, "yard: vanish": 1}
     assert "gate: out" in (tmp_path / "page" / PAGE_NAME).read_text()

@@ -11,9 +11,9 @@ import pytest
 from red_cars import CAR, HEIGHT, WIDTH, road
 from run.red_runs import VIDEO, result_of
 from vdet.boxes import Box, Image
+from vdet.config.camera import LensSettings
 from vdet.config.schema import DrawSettings, LaneSettings, Settings
 from vdet.draw.boxes import BLACK, color_of, draw_box, draw_label
-from vdet.lanes.camera import CalibratedCamera
 from vdet.lanes.road import Lane, LaneRequest, Road, RoadFinder
 from vdet.media import Picture, VideoInfo
 from vdet.media.coding import Coding
@@ -22,7 +22,7 @@ from vdet.run.result import FrameResult
 from vdet.run.sinks.drawn import Overlay, time_text
 from vdet.track.track import Track
 
-LENS = CalibratedCamera(
+LENS = LensSettings(
     WIDTH, HEIGHT, ((240, 0, 160), (0, 240, 120), (0, 0, 1)), (-0.35, 0.1, 0.0, 0.0, 0.0), 0.4
 )
 LANE = Lane(
@@ -51,7 +51,7 @@ def shown(overlay: Overlay, result: FrameResult) -> Image:
     return surface
 
 
-def road_seen(camera: CalibratedCamera | None) -> Road:
+def road_seen(camera: LensSettings | None) -> Road:
     finder = RoadFinder(LaneRequest(camera), LaneSettings(), WIDTH, HEIGHT)
     return finder.update(finder.observe(Picture(road(CAR))))
 

@@ -16,7 +16,7 @@ from vdet.config.places import RegionsSettings
 from vdet.media.images import decode_image, write_image
 from vdet.pages.video import read_facts
 from vdet.run.sinks.protocol import Output
-from vdet.run.video import VideoJob
+from vdet.run.video import Run
 
 
 def page_of(folder: Path) -> Elements:
@@ -36,7 +36,7 @@ def test_a_run_writes_a_page_that_shows_the_video_of_the_run(
     red_clip: Path, tmp_path: Path
 ) -> None:
     wanted = outputs(video=tmp_path / "out.mp4", page=tmp_path / "page")
-    run_red(VideoJob(red_clip, wanted))
+    run_red(Run(red_clip, wanted))
     made = page_of(tmp_path / "page")
     (video,) = made.all("video")
     assert video["src"] == "../out.mp4"
@@ -49,7 +49,7 @@ def test_a_run_writes_a_page_that_shows_the_video_of_the_run(
 
 
 def test_without_a_video_of_the_run_it_shows_the_source(red_clip: Path, tmp_path: Path) -> None:
-    run_red(VideoJob(red_clip, outputs(page=tmp_path / "page"), start=Fraction(1)))
+    run_red(Run(red_clip, outputs(page=tmp_path / "page"), start=Fraction(1)))
     made = page_of(tmp_path / "page")
     (video,) = made.all("video")
     target = (tmp_path / "page" / (video["src"] or "")).resolve()
@@ -77,7 +77,7 @@ def test_the_still_is_the_first_frame_that_shows_the_most_vehicles(tmp_path: Pat
 
 
 def test_a_page_is_replaced_only_where_that_is_asked_for(red_clip: Path, tmp_path: Path) -> None:
-    job = VideoJob(red_clip, outputs(page=tmp_path), frames=3)
+    job = Run(red_clip, outputs(page=tmp_path), frames=3)
     (tmp_path / "notes.txt").write_text("mine")
     run_red(job)
     before = (tmp_path / "page.html").read_text()
@@ -92,7 +92,7 @@ def test_the_folders_of_a_mask_are_nobodys_business(red_clip: Path, tmp_path: Pa
     write_image(mask, np.full_like(road(), 255))
     regions = RegionsSettings(mask=str(mask))
     settings = SETTINGS.model_copy(update={"regions": regions})
-    run_red(VideoJob(red_clip, outputs(page=tmp_path / "page")), settings)
+    run_red(Run(red_clip, outputs(page=tmp_path / "page")), settings)
     text = page_of(tmp_path / "page").text
     assert "mask: mask.png" in text
     assert "secret" not in text

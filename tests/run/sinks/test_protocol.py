@@ -27,7 +27,7 @@ from vdet.run.sinks.protocol import (
     check_sinks,
     open_sink,
 )
-from vdet.run.video import VideoJob, check_job
+from vdet.run.video import Run, check_job
 
 MOMENTS = ("open", "enter", "first", "middle", "end")
 
@@ -74,7 +74,7 @@ def test_every_sink_gets_each_result_once_and_in_order(
         *outputs(video=tmp_path / "a.mp4", tracks=tmp_path / "a.csv"),
         Output("last", tmp_path / "last"),
     )
-    run_red(VideoJob(red_clip, wanted, threads=3))
+    run_red(Run(red_clip, wanted, threads=3))
     for sink in (first, last):
         assert [result.frame.index for result in sink.results] == list(range(COUNT))
         assert (sink.entered, sink.left) == (1, [None])
@@ -121,15 +121,13 @@ class TestFailure:
     """One sink of several fails: no output of the run appears, and nothing else is left."""
 
     @pytest.fixture(params=["before the others", "after the others"])
-    def job(
-        self, request: pytest.FixtureRequest, red_clip: Path, tmp_path: Path
-    ) -> Iterator[VideoJob]:
+    def job(self, request: pytest.FixtureRequest, red_clip: Path, tmp_path: Path) -> Iterator[Run]:
         threads = threading.active_count()
         folders = {name: tmp_path / name for name in ("stages", "page", "crops")}
         wanted = outputs(video=tmp_path / "out.mp4", tracks=tmp_path / "out.csv", **folders)
         fragile = Output("fragile", tmp_path / "fragile.txt")
         in_order = (fragile, *wanted) if "before" in request.param else (*wanted, fragile)
-        yield VideoJob(red_clip, in_order, frames=20)
+        yield Run(red_clip, in_order, frames=20)
         assert threading.active_count() == threads
 
     def set_failure(self, register: Register, moment: str, error: Exception) -> None:
@@ -142,7 +140,7 @@ class TestFailure:
 
     @pytest.mark.parametrize("moment", MOMENTS)
     def test_no_output_appears_and_the_same_job_runs_again(
-        self, job: VideoJob, register: Register, tmp_path: Path, moment: str
+        self, job: Run, register: Register, tmp_path: Path, moment: str
     ) -> None:
         self.set_failure(register, moment, RuntimeError("broken"))
         with pytest.raises(RuntimeError, match="broken"):
@@ -159,7 +157,7 @@ class TestFailure:
 
     @pytest.mark.parametrize("moment", ["middle", "end"])
     def test_an_error_of_the_disk_names_the_output_that_it_hit(
-        self, job: VideoJob, register: Register, tmp_path: Path, moment: str
+        self, job: Run, register: Register, tmp_path: Path, moment: str
     ) -> None:
         self.set_failure(register, moment, OSError(28, "No space left on device"))
         path = tmp_path / "fragile.txt"
@@ -184,7 +182,7 @@ def test_frames_too_small_to_be_searched_get_no_boxes_but_every_output(
         stages=tmp_path / "stages",
         collects=tmp_path,
     )
-    totals = run_red(VideoJob(source, wanted))
+    totals = run_red(Run(source, wanted))
     assert (totals.frames, totals.tracks) == (5, 0)
     assert f"{source}: gets no boxes: no search window fits into" in caplog.text
     assert [len(result.detections) for result in sink.results] == [0] * 5

@@ -13,14 +13,14 @@ from vdet.boxes import Box
 from vdet.files import OutputFiles
 from vdet.media.images import read_image
 from vdet.run.sinks.protocol import Output, SinkContext, open_sink
-from vdet.run.video import VideoJob
+from vdet.run.video import Run
 
 
 def test_a_run_writes_the_record_and_the_picture_of_its_car(red_clip: Path, tmp_path: Path) -> None:
     wanted = outputs(
         vehicles=tmp_path / "a.csv", crops=tmp_path / "crops", tracks=tmp_path / "tracks.csv"
     )
-    run_red(VideoJob(red_clip, wanted))
+    run_red(Run(red_clip, wanted))
     with (tmp_path / "tracks.csv").open() as file:
         tracks = list(csv.DictReader(file))
     with (tmp_path / "a.csv").open() as file:
