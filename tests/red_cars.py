@@ -8,7 +8,6 @@ from typing import Self
 import numpy as np
 
 from boxing import moved_to
-from vdet.batch.task import Work
 from vdet.boxes import NO_BOXES, Box, Boxes, Image
 from vdet.config.schema import Settings, SvmSettings
 from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
@@ -99,10 +98,11 @@ def red_model() -> SvmModel:
     return SvmModel(red_finder(), SETTINGS.svm)
 
 
-def red_work(folder: Path) -> Work:
-    """Give the same for a worker, which reads the model from a file in `folder`."""
+def red_settings(folder: Path) -> Settings:
+    """Give the same as settings, which name the file of the model in `folder`."""
     save_model(red_finder(), folder / "red.npz")
-    return Work(SETTINGS, folder / "red.npz", threads=1)
+    detector = SETTINGS.svm.model_copy(update={"model": str(folder / "red.npz")})
+    return SETTINGS.model_copy(update={"detector": detector})
 
 
 def road(*boxes: Box) -> Image:

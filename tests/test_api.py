@@ -1,11 +1,14 @@
 """The public API: docs/api.md runs as it stands, and `import vdet` does nothing else."""
 
 import json
+import pickle
+import shutil
 import subprocess
 import sys
 import threading
 from collections.abc import Iterator
 from dataclasses import replace
+from fractions import Fraction
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -19,7 +22,7 @@ from doc_pages import blocks
 from red_cars import HEIGHT, WIDTH, car_at, drive
 from running import frames_of, write_drive
 from vdet.boxes import Image
-from vdet.config.loading import load_settings
+from vdet.detect.onnx.detector import SHIPPED
 from vdet.media.images import write_image
 from vdet.media.reader import VideoReader
 from vdet.synthetic.render import render
@@ -99,7 +102,10 @@ def test_a_picture_too_small_is_an_image_error() -> None:
 
 def test_follow_gives_the_same_for_any_number_of_threads(clip_path: Path) -> None:
     one, three = (
-        [(r.frame.index, r.tracks) for r in vdet.follow(clip_path, frames=9, threads=threads)]
+        [
+            (result.frame.index, result.tracks)
+            for result in vdet.follow(vdet.Run(clip_path, frames=9, threads=threads))
+        ]
         for threads in (1, 3)
     )
     assert one == three
@@ -110,15 +116,28 @@ def test_follow_gives_the_same_for_any_number_of_threads(clip_path: Path) -> Non
 def test_numbers_below_one_are_refused_by_name(clip_path: Path, number: dict[str, Any]) -> None:
     (name,) = number
     with pytest.raises(vdet.VdetError, match=f"^{name}: is -?[01]; give 1 or more"):
-        next(vdet.follow(clip_path, **number))
-    with pytest.raises(vdet.VdetError, match=f"^{name}: is -?[01]; give 1 or more"):
-        vdet.detect_video(clip_path, **number)
+        vdet.Run(clip_path, **number)
+
+
+def test_a_run_has_its_own_part_and_settings(clip_path: Path) -> None:
+    run = vdet.Run(clip_path, frames=3)
+    assert len(list(vdet.follow(run))) == 3
+    with pytest.raises(ValueError, match="start, end, frames: a Run has its own"):
+        next(vdet.follow(run, frames=2))
+    with pytest.raises(ValueError, match="settings: a Run has its own"):
+        vdet.detect_video(run, settings=vdet.load_settings())
+
+
+def test_a_run_is_a_value() -> None:
+    one, other = (vdet.Run(Path("a.mp4"), vdet.load_settings()) for _ in range(2))
+    assert one == other
+    assert len({one, other, pickle.loads(pickle.dumps(one))}) == 1
 
 
 def test_no_file_that_is_read_is_overwritten(clip_path: Path, tmp_path: Path) -> None:
     mask = tmp_path / "mask.csv"
     mask.touch()
-    settings = vdet.load_settings(assignments=[f"regions.mask={mask}"])
+    settings = vdet.load_settings(assignments=[f"regions=[{{name: a, mask: {mask}}}]"])
     with pytest.raises(vdet.VdetError, match=r"mask\.csv: is the input itself"):
         vdet.detect_video(clip_path, tracks=mask, settings=settings, overwrite=True)
 
@@ -214,19 +233,22 @@ def test_follow_takes_objects_and_names(red_clip: Path, detector: Any, tracker: 
 
 def test_detect_video_takes_what_the_command_takes(red_clip: Path, tmp_path: Path) -> None:
     seen: list[tuple[int, int | None]] = []
-    totals = vdet.detect_video(
+    changes = ["lanes.enabled=true", "input.begin='2026-05-01 07:00+02:00'"]
+    run = vdet.Run(
         red_clip,
+        vdet.load_settings(assignments=changes),
+        start=Fraction("0.08"),
+        end=Fraction("0.4"),
+        frames=6,
+        at=Fraction("0.2"),
+    )
+    totals = vdet.detect_video(
+        run,
         tracks=[tmp_path / "a.csv", tmp_path / "a.jsonl"],
         outputs={"stages": tmp_path / "stages"},
         detector=red_boxes,
         tracker=Latest(),
         steps=[Even()],
-        start=0.08,
-        end=0.4,
-        frames=6,
-        at=0.2,
-        lanes=True,
-        begin="2026-05-01 07:00+02:00",
         progress=lambda done, total: seen.append((done, total)),
     )
     assert (totals.frames, totals.tracks) == (6, 1)
@@ -243,8 +265,17 @@ def test_detect_image_takes_an_object(tmp_path: Path) -> None:
     (frame,) = drive(1)
     write_image(tmp_path / "red.png", frame.image)
     assert len(vdet.detect_image(tmp_path / "red.png", detector=red_boxes)) == 1
-    with pytest.raises(ValueError, match="leave model out"):
-        vdet.detect_image(tmp_path / "red.png", detector=red_boxes, model="my.npz")
+
+
+def test_a_model_file_decides_the_kind_of_its_detector(tmp_path: Path) -> None:
+    for name in ("svm.npz", "net.onnx"):
+        shutil.copy(SHIPPED.with_name(name), tmp_path / name)
+        assert (
+            len(vdet.Detector(detector=tmp_path / name).detect(np.zeros((96, 160, 3), np.uint8)))
+            == 0
+        )
+    with pytest.raises(vdet.VdetError, match=r"none\.npz: cannot be read"):
+        vdet.Detector(detector="none.npz")
 
 
 def test_live_counts_are_those_of_the_file_and_of_the_frames(
@@ -252,23 +283,27 @@ def test_live_counts_are_those_of_the_file_and_of_the_frames(
 ) -> None:
     lines = tmp_path / "lines.yaml"
     lines.write_text(
-        f"size: [{WIDTH}, {HEIGHT}]\nconfirmed: 0\nlines:\n"
-        "- {name: gate, start: [100, 0], end: [100, 240]}\n"
+        f"camera: {{size: [{WIDTH}, {HEIGHT}]}}\ntraffic:\n  confirmed: 0\n  lines:\n"
+        "  - {name: gate, start: [100, 0], end: [100, 240]}\n"
     )
-    settings = vdet.load_settings(assignments=[])
-    counts = load_settings((), (), {"counts": lines}).counts
-    settings = settings.model_copy(update={"counts": counts})
+    settings = vdet.load_settings([lines], ["detector.stride=1"])
     results = list(vdet.follow(red_clip, detector=red_boxes, tracker=Latest(), settings=settings))
-    counter = results[-1].counter
-    assert counter is not None
     tracks = tmp_path / "t.jsonl"
     vdet.detect_video(
-        red_clip, tracks=tracks, detector=red_boxes, tracker=Latest(), settings=settings
+        red_clip,
+        tracks=tracks,
+        outputs={"counts": tmp_path / "c.json"},
+        detector=red_boxes,
+        tracker=Latest(),
+        settings=settings,
     )
-    from_file = vdet.count_tracks(tracks, lines)
+    from_file = vdet.count_tracks(tracks, settings)
     assert sum(total.count for total in from_file.totals) == 1
-    assert from_file == counter.counts()
-    assert from_file == vdet.count_tracks([result.frame_tracks for result in results], lines)
+    live = json.loads((tmp_path / "c.json").read_text())
+    assert [each["count"] for each in live["totals"]] == [each.count for each in from_file.totals]
+    frames = [result.frame_tracks for result in results]
+    size = WIDTH, HEIGHT
+    assert from_file == vdet.count_tracks(frames, settings, size=size)
 
 
 def test_tracks_are_compared_with_the_truth(red_clip: Path, tmp_path: Path) -> None:

@@ -6,19 +6,24 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vdet.config.places import RegionsSettings
+from vdet.config.places import RegionSettings
+from vdet.config.schema import Settings
 from vdet.errors import ConfigError, ImageError
 from vdet.media.images import write_image
-from vdet.regions import Regions, check_mask, lay_regions
+from vdet.regions import Regions, check_masks, lay_regions
 
 ROAD = {"name": "road", "points": [[0.5, 0.5], [1, 0.5], [1, 1], [0.25, 1]]}
 BUSH = {"name": "bush", "points": [[0.8, 0.6], [0.9, 0.6], [0.9, 0.8], [0.8, 0.8]]}
 
 
-def laid(
-    *polygons: dict[str, Any], mask: str | None = None, size: tuple[int, int] = (320, 180)
-) -> Regions:
-    return Regions(RegionsSettings.model_validate({"polygons": polygons, "mask": mask}), *size)
+def laid(*regions: dict[str, Any], size: tuple[int, int] = (320, 180)) -> Regions:
+    found = lay_regions(Settings.model_validate({"regions": regions}).regions, *size)
+    assert found is not None
+    return found
+
+
+def test_without_regions_the_whole_frame_counts() -> None:
+    assert lay_regions((), 320, 180) is None
 
 
 def test_a_point_counts_where_it_is_included_and_not_excluded() -> None:
@@ -30,37 +35,31 @@ def test_a_point_counts_where_it_is_included_and_not_excluded() -> None:
 
 class TestMasks:
     @pytest.fixture
-    def mask(self, tmp_path: Path) -> str:
+    def mask(self, tmp_path: Path) -> dict[str, Any]:
         """A mask of twice the size: white at the right."""
         image = np.zeros((360, 640, 3), np.uint8)
         image[:, 400:] = 255
         write_image(tmp_path / "mask.png", image)
-        return str(tmp_path / "mask.png")
+        return {"name": "mask", "mask": str(tmp_path / "mask.png")}
 
-    def test_white_is_included(self, mask: str) -> None:
-        regions = laid(mask=mask)
-        assert [regions.contains((x, 90)) for x in (199, 200, 400)] == [False, True, True]
+    def test_white_is_included_or_excluded(self, mask: dict[str, Any]) -> None:
+        included, excluded = laid(mask), laid(mask | {"kind": "exclude"})
+        assert [included.contains((x, 90)) for x in (199, 200, 400)] == [False, True, True]
+        assert [excluded.contains((x, 90)) for x in (199, 200, 400)] == [True, False, False]
 
-    def test_polygons_and_a_mask_both_decide(self, mask: str) -> None:
-        regions = laid(ROAD, mask=mask)
-        assert [regions.contains(p) for p in ((210, 80), (190, 120), (210, 120))] == [
-            False, False, True,
+    def test_a_vehicle_is_in_any_of_the_included_regions(self, mask: dict[str, Any]) -> None:
+        regions = laid(ROAD, mask)
+        assert [regions.contains(p) for p in ((210, 80), (190, 120), (60, 80))] == [
+            True, True, False,
         ]  # fmt: skip
 
-    def test_one_of_another_shape_is_refused(self, mask: str) -> None:
+    def test_one_of_another_shape_is_refused(self, mask: dict[str, Any]) -> None:
         with pytest.raises(ConfigError, match="has another shape than the frames"):
-            laid(mask=mask, size=(320, 240))
+            laid(mask, size=(320, 240))
 
     def test_one_that_is_no_picture_is_refused_before_any_work(self, tmp_path: Path) -> None:
         (tmp_path / "mask.png").write_text("white")
         for name in ("mask.png", "none.png"):
+            region = RegionSettings(name="a", mask=str(tmp_path / name))
             with pytest.raises(ImageError, match=name):
-                check_mask(RegionsSettings(mask=str(tmp_path / name)))
-
-
-def test_pixels_for_another_shape_are_refused() -> None:
-    settings = RegionsSettings.model_validate(
-        {"size": [100, 100], "polygons": [{"name": "a", "points": [[0, 0], [9, 0], [9, 9]]}]}
-    )
-    with pytest.raises(ConfigError, match=r"^regions\.size: places are given for frames of 1"):
-        lay_regions(settings, 320, 180)
+                check_masks([region])

@@ -30,7 +30,7 @@ from vdet.config.loading import load_settings as load_layers
 from vdet.config.schema import DetectorSettings, Settings, TrackerSettings
 from vdet.detect.factory import DetectorKind, DetectorObject, as_model, load_detector
 from vdet.detect.protocol import DetectorModel, VideoDetector
-from vdet.errors import VdetError, check_positive
+from vdet.errors import VdetError
 from vdet.evaluate.scores import Scores
 from vdet.evaluate.video import score_files
 from vdet.media import Frame, Picture
@@ -185,7 +185,6 @@ def follow(
 
     Raises `VideoError` if the video cannot be read or searched.
     """
-    check_positive(frames=frames)
     run = _run(source, start=_exact(start), end=_exact(end), frames=frames, threads=1)
     chosen, loaded, tracker = _resolved(_settings(source, settings), detector, tracker)
     with open_video(replace(run, settings=chosen), loaded, tracker=tracker, steps=steps) as video:

@@ -10,15 +10,20 @@ import pytest
 
 from vdet.batch.manifest import Record, open_manifest
 from vdet.batch.plan import OutputSuffix, Plan, make_plan
-from vdet.batch.task import result_digest
+from vdet.batch.task import Identity, result_digest
 from vdet.errors import BatchError, OutputError
 from vdet.run.sinks import data
 from vdet.run.sinks.protocol import BatchTotal, Output, output_state
 from vdet.run.video import Run
 
 COMMON = Run(Path(), frames=7)
-DIGEST = "settings"
+IDENTITY = Identity("settings")
 VIDEO: dict[str, str | None] = {"video": None}
+
+
+@pytest.fixture(autouse=True)
+def same_identity(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Identity, "of", lambda *_: IDENTITY)
 
 
 @pytest.fixture
@@ -49,15 +54,15 @@ def plan_outputs(
         Path(folder),
         replace(COMMON, overwrite=overwrite),
         [OutputSuffix(*each) for each in suffixes.items()],
-        digest=DIGEST if skip_existing else None,
+        skip_existing=skip_existing,
     )
 
 
-def outputs(jobs: tuple[Run, ...]) -> list[list[str]]:
-    return [[str(output.path) for output in job.outputs] for job in jobs]
+def outputs(runs: tuple[Run, ...]) -> list[list[str]]:
+    return [[str(output.path) for output in job.outputs] for job in runs]
 
 
-def record(source: str, *paths: str, work: str = DIGEST) -> None:
+def record(source: str, *paths: str, work: Identity = IDENTITY) -> None:
     """Write outputs, and what the manifest says about them."""
     Path("out").mkdir(exist_ok=True)
     for path in paths:
@@ -65,7 +70,7 @@ def record(source: str, *paths: str, work: str = DIGEST) -> None:
     note(source, *(Output("video", Path(path)) for path in paths), work=work)
 
 
-def note(source: str, *outputs: Output, work: str = DIGEST) -> None:
+def note(source: str, *outputs: Output, work: Identity = IDENTITY) -> None:
     """Add a record of outputs to the manifest."""
     states = {str(each.path.absolute()): output_state(each) or (0, 0) for each in outputs}
     made = Record(
@@ -82,10 +87,10 @@ def note(source: str, *outputs: Output, work: str = DIGEST) -> None:
 class TestJobs:
     def test_outputs_mirror_inputs_in_a_container_that_can_be_written(self) -> None:
         made = plan("clips")
-        assert [str(job.source) for job in made.jobs] == [
+        assert [str(job.source) for job in made.runs] == [
             *("clips/a.mp4", "clips/b.MKV", "clips/c.avi", "clips/day/a.mp4"),
         ]
-        assert outputs(made.jobs) == [
+        assert outputs(made.runs) == [
             ["out/a.mp4"],
             ["out/b.MKV"],
             ["out/c.mp4"],
@@ -97,14 +102,14 @@ class TestJobs:
     def test_a_sink_may_write_several_outputs_of_each_video(self) -> None:
         suffixes = [OutputSuffix("tracks", end) for end in (".txt", ".kitti.txt", ".coco.json")]
         plan = make_plan([Path("clips/a.mp4")], Path("out"), COMMON, suffixes)
-        assert outputs(plan.jobs) == [["out/a.txt", "out/a.kitti.txt", "out/a.coco.json"]]
+        assert outputs(plan.runs) == [["out/a.txt", "out/a.kitti.txt", "out/a.coco.json"]]
 
     def test_jobs_whose_outputs_are_all_there_and_up_to_date_are_skipped(self) -> None:
         record("clips/a.mp4", "out/a.mp4", "out/a.csv")
         record("clips/b.MKV", "out/b.MKV")
         made = plan("clips", tracks=".csv", skip_existing=True)
         assert [job.source.name for job in made.skipped] == ["a.mp4"]
-        assert [(str(job.source), job.overwrite) for job in made.jobs] == [
+        assert [(str(job.source), job.overwrite) for job in made.runs] == [
             ("clips/b.MKV", True),
             ("clips/c.avi", False),
             ("clips/day/a.mp4", False),
@@ -122,14 +127,16 @@ class TestJobs:
             lambda: Path("out/a.csv").unlink(),
             lambda: Path("clips/a.mp4").write_bytes(b"longer clip"),
             lambda: os.utime("clips/a.mp4", (0, 0)),
-            lambda: note("clips/a.mp4", Output("tracks", Path("out/a.csv")), work="other settings"),
+            lambda: note(
+                "clips/a.mp4", Output("tracks", Path("out/a.csv")), work=Identity("other")
+            ),
         ],
     )
     def test_what_is_empty_or_out_of_date_is_done_again(self, change: Callable[[], object]) -> None:
         record("clips/a.mp4", "out/a.csv")
         assert self.tracks_alone().skipped
         change()
-        (job,) = self.tracks_alone().jobs
+        (job,) = self.tracks_alone().runs
         assert job.overwrite == Path("out/a.csv").exists()
 
     @pytest.mark.parametrize(
@@ -176,7 +183,7 @@ class TestRefused:
 
     def test_tracks_that_would_be_the_manifest(self) -> None:
         Path("clips/a.mp4").rename("clips/manifest.mp4")
-        assert len(plan("clips").jobs) == 4
+        assert len(plan("clips").runs) == 4
         with pytest.raises(BatchError, match=r"^the manifest and clips/manifest\.mp4: both would"):
             plan("clips", tracks=".jsonl")
 
@@ -189,8 +196,8 @@ class TestRefused:
     def test_an_output_folder_that_a_pattern_will_match(self, clip: str) -> None:
         with pytest.raises(BatchError, match=r"^clips/found: lies in the input "):
             plan(clip, folder="clips/found")
-        assert plan("clips/*.mp4", folder="clips/found").jobs
-        assert plan("clips/day*/*.mp4", folder="clips/found").jobs
+        assert plan("clips/*.mp4", folder="clips/found").runs
+        assert plan("clips/day*/*.mp4", folder="clips/found").runs
 
     def test_an_output_that_is_an_input(self) -> None:
         Path("out").mkdir()
@@ -255,11 +262,11 @@ class TestFolders:
 
     def test_one_that_is_there_is_refused_or_replaced_unless_it_is_empty(self) -> None:
         Path("out/a.stages").mkdir(parents=True)
-        assert self.plan().jobs
+        assert self.plan().runs
         self.record()
         with pytest.raises(OutputError, match=r"out/a\.stages/1-boxes\.png: is there already"):
             self.plan()
-        assert self.plan(overwrite=True).jobs
+        assert self.plan(overwrite=True).runs
 
     def test_one_that_is_up_to_date_is_skipped(self) -> None:
         self.record()
@@ -273,4 +280,4 @@ class TestFolders:
         with pytest.raises(BatchError, match=r"out/a\.stages: is not as vdet wrote it"):
             self.plan(skip_existing=True)
         Path("out/a.stages").rename("elsewhere")
-        assert not self.plan(skip_existing=True).jobs[0].overwrite
+        assert not self.plan(skip_existing=True).runs[0].overwrite

@@ -10,8 +10,7 @@ import pytest
 from running import write_drive
 from vdet.batch.plan import OutputSuffix, Plan, PlannedTotal, make_plan
 from vdet.batch.run import each_once, run_batch, write_totals
-from vdet.batch.task import Work
-from vdet.config.schema import Settings
+from vdet.batch.task import Identity
 from vdet.errors import OutputError
 from vdet.run.sinks.protocol import BatchTotal
 from vdet.run.video import Run
@@ -72,9 +71,8 @@ def test_a_file_that_ended_when_its_process_was_killed_is_made_again(tmp_path: P
     clip = write_drive(tmp_path / "clip.mp4", 3)
     outputs = [OutputSuffix("tracks", ".csv")]
     plan = make_plan([clip], tmp_path / "out", Run(Path()), outputs)
-    workers = FakeWorkers(1, deadly=plan.jobs, kills_left=1)
-    work = Work(Settings(), None, threads=1)
-    ((job, record),) = run_batch(plan, work, workers=workers)
+    workers = FakeWorkers(1, deadly=plan.runs, kills_left=1)
+    ((job, record),) = run_batch(plan, workers=workers)
     assert len(workers.calls) == 2
     assert record.error is None
     assert all(output.path.exists() for output in job.outputs)
@@ -90,7 +88,7 @@ def test_a_total_is_made_from_the_outputs_that_are_there(tmp_path: Path) -> None
         outputs[name].write_text(f"of {name}")
     total = PlannedTotal(BatchTotal("all", join), tmp_path / "all.txt", outputs)
     (tmp_path / "all.txt").write_text("of an earlier run")
-    write_totals(Plan(tmp_path, (), (), (total,)))
+    write_totals(Plan(tmp_path, Identity(""), (), (), (total,)))
     assert (tmp_path / "all.txt").read_text() == "a: of a\nb: of b\n"
 
 
@@ -101,5 +99,5 @@ def test_a_total_that_cannot_be_made_leaves_nothing(tmp_path: Path) -> None:
 
     total = PlannedTotal(BatchTotal("all", fail), tmp_path / "all.txt", {})
     with pytest.raises(OutputError, match=r"all.txt: .*No space left"):
-        write_totals(Plan(tmp_path, (), (), (total,)))
+        write_totals(Plan(tmp_path, Identity(""), (), (), (total,)))
     assert list(tmp_path.iterdir()) == []

@@ -8,36 +8,28 @@ from typing import Any
 
 import pytest
 
-from red_cars import HEIGHT, SETTINGS, WIDTH, red_finder
+from red_cars import HEIGHT, WIDTH, red_settings
 from running import names, write_drive
-from vdet.batch.task import Work, process_file, record_of_killed, result_digest
+from vdet.batch.task import Identity, process_file, record_of_killed, result_digest
 from vdet.detect.factory import load_detector
 from vdet.detect.protocol import DetectorModel
-from vdet.detect.svm.model import save_model
 from vdet.run.sinks.protocol import Output
 from vdet.run.video import Run, run_video
+
+IDENTITY = Identity("digest", "red.npz", "a")
 
 
 @pytest.fixture
 def job(tmp_path: Path) -> Run:
     source = write_drive(tmp_path / "a.mp4", 15)
     day = tmp_path / "out" / "day"
-    return Run(source, (Output("video", day / "a.mp4"), Output("tracks", day / "a.csv")))
+    outputs = Output("video", day / "a.mp4"), Output("tracks", day / "a.csv")
+    return Run(source, red_settings(tmp_path), outputs, threads=1)
 
 
-@pytest.fixture(scope="module")
-def work(tmp_path_factory: pytest.TempPathFactory) -> Work:
-    """The model that finds red cars, as a worker gets it: by the name of its file."""
-    path = tmp_path_factory.mktemp("model") / "red.npz"
-    save_model(red_finder(), path)
-    return Work(SETTINGS, path, threads=1)
-
-
-def test_the_record_says_what_was_done_and_folders_are_made(
-    job: Run, work: Work, tmp_path: Path
-) -> None:
+def test_the_record_says_what_was_done_and_folders_are_made(job: Run, tmp_path: Path) -> None:
     before = datetime.now(UTC).replace(microsecond=0)
-    record = process_file(job, work=work)
+    record = process_file(job, identity=IDENTITY)
     assert record.error is None
     assert record.input == str(job.source)
     assert record.outputs == {
@@ -52,11 +44,11 @@ def test_the_record_says_what_was_done_and_folders_are_made(
     paths = [output.path for output in job.outputs]
     assert record.sizes == {str(path): path.stat().st_size for path in paths}
     assert record.times == {str(path): path.stat().st_mtime_ns for path in paths}
-    assert record.digest == result_digest(work.digest, job.source)
+    assert record.digest == result_digest(IDENTITY, job.source)
 
 
 def test_the_detector_is_loaded_once_for_all_files(
-    job: Run, work: Work, monkeypatch: pytest.MonkeyPatch
+    job: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     loaded: list[object] = []
 
@@ -67,12 +59,12 @@ def test_the_detector_is_loaded_once_for_all_files(
     monkeypatch.setattr("vdet.batch.task.load_detector", load)
     again = replace(job, overwrite=True)
     for sha256 in ("a", "a", "b"):
-        assert process_file(again, work=replace(work, model_sha256=sha256)).error is None
-    assert loaded == [(SETTINGS.detector, work.model)] * 2
+        assert process_file(again, identity=replace(IDENTITY, model_sha256=sha256)).error is None
+    assert loaded == [(job.settings.detector,)] * 2
 
 
 def test_only_warnings_about_this_file_are_recorded(
-    job: Run, work: Work, monkeypatch: pytest.MonkeyPatch
+    job: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def warn_and_process(*arguments: object, **options: object) -> object:
         log = logging.getLogger("vdet")
@@ -83,20 +75,20 @@ def test_only_warnings_about_this_file_are_recorded(
 
     monkeypatch.setattr("vdet.batch.task.run_video", warn_and_process)
     before = list(logging.getLogger("vdet").handlers)
-    assert process_file(job, work=work).warnings == (f"{job.source}: 3 frames damaged",)
+    assert process_file(job, identity=IDENTITY).warnings == (f"{job.source}: 3 frames damaged",)
     assert logging.getLogger("vdet").handlers == before
 
 
-def test_an_error_is_recorded_without_numbers(job: Run, work: Work) -> None:
+def test_an_error_is_recorded_without_numbers(job: Run) -> None:
     job.source.write_bytes(b"no video")
-    record = process_file(job, work=work)
+    record = process_file(job, identity=IDENTITY)
     assert record.error is not None
     assert record.error.startswith(f"{job.source}: is not a video")
     assert (record.width, record.height, record.frames, record.tracks) == (None,) * 4
     assert (record.digest, record.sizes) == (None, {})
 
 
-def test_a_file_whose_process_was_killed_has_a_record(job: Run, work: Work) -> None:
-    record = record_of_killed(job, work)
+def test_a_file_whose_process_was_killed_has_a_record(job: Run) -> None:
+    record = record_of_killed(job, IDENTITY)
     assert record.error is not None
     assert record.error.startswith(f"{job.source}: its process was killed")

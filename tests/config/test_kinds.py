@@ -54,7 +54,7 @@ class TestLayers:
     ) -> None:
         text = render(load_settings((), [f"tracker.kind={printed}"]))
         assert load(path, text, f"tracker.kind={chosen}") == load_settings(
-            None, [f"tracker.kind={chosen}"]
+            (), [f"tracker.kind={chosen}"]
         )
 
     @pytest.mark.parametrize(
@@ -160,6 +160,7 @@ class TestOtherPackages:
         assert type(detector.detector).__name__ == "FakeSettings"
         assert detector.detector.model_dump() == {
             "kind": "fake",
+            "model": None,
             "searches": None,
             "stride": None,
             "foot": 0.0,

@@ -124,7 +124,7 @@ def test_a_mistake_in_the_detector_is_explained_in_one_line(
             "tracker: {kind: rules, histroy: 3}",
             "1:24: tracker.histroy: is no setting; did you mean history?",
         ),
-        ("heat: {frames: 3}", "1:1: heat: is no setting; known here: detector, tracker, regions, "),
+        ("heat: {frames: 3}", "1:1: heat: is no setting; known here: detector, tracker, camera, "),
         ("'': 1", "1:1: : is no setting; known here: detector, tracker, "),
         ("draw: {label: score}", "1:8: draw.label: should be a list (got"),
         ("draw: {label: [speed]}", "1:16: draw.label[0]: should be 'id', 'class', 'score' or "),

@@ -6,23 +6,22 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
+from vdet.config.camera import CameraSettings
 from vdet.config.loading import load_settings
-from vdet.config.places import RegionsSettings, TrafficSettings
+from vdet.config.places import TrafficSettings
+from vdet.config.schema import Settings
 from vdet.errors import ConfigError
 
-SQUARE = [[100, 100], [300, 100], [300, 300], [100, 300]]
-HD = [1280, 720]
+SQUARE = [[0.1, 0.1], [0.3, 0.1], [0.3, 0.3], [0.1, 0.3]]
 
 
-def regions(points: Any, **others: Any) -> RegionsSettings:
-    return RegionsSettings.model_validate(
-        {"size": HD, "polygons": [{"name": "road", "points": points}]} | others
-    )
+def region(points: Any, **others: Any) -> Settings:
+    return Settings.model_validate({"regions": [{"name": "road", "points": points} | others]})
 
 
 def line(**others: Any) -> TrafficSettings:
-    values = {"name": "line", "start": [0, 400], "end": [1280, 400]} | others
-    return TrafficSettings.model_validate({"size": HD, "lines": [values]})
+    values = {"name": "line", "start": [0, 0.5], "end": [1, 0.5]} | others
+    return TrafficSettings.model_validate({"lines": [values]})
 
 
 @pytest.mark.parametrize(
@@ -31,30 +30,32 @@ def line(**others: Any) -> TrafficSettings:
         (SQUARE[:2], "has 2 corners; give three or more"),
         ([*SQUARE[:2], SQUARE[0]], "has 2 corners; give three or more"),
         ([SQUARE[0], SQUARE[2], SQUARE[1], SQUARE[3]], "crosses or touches itself"),
-        ([[100, 100], [300, 300], [500, 500]], "crosses or touches itself"),
-        ([[100, 100], [1300, 100], [300, 300]], r"\[1300, 100\] lies outside 1280×72"),
-        ([[100, -1], [900, 100], [300, 300]], r"\[100, -1\] lies outside"),
-        ([[100, 100, 5], [300, 100], [300, 300]], "at most 2 items"),
+        ([[0.1, 0.1], [0.3, 0.3], [0.5, 0.5]], "crosses or touches itself"),
+        ([[0.1, 0.1], [1.3, 0.1], [0.3, 0.3]], "a point lies outside the frame; points are pix"),
+        ([[0.1, -0.1], [0.9, 0.1], [0.3, 0.3]], "a point lies outside the frame"),
+        ([[0.1, 0.1, 5], [0.3, 0.1], [0.3, 0.3]], "at most 2 items"),
     ],
 )
 def test_polygons_that_make_no_sense_are_refused(points: Any, message: str) -> None:
     with pytest.raises(ValidationError, match=message):
-        regions(points)
+        region(points)
     with pytest.raises(ValidationError, match=message):
-        TrafficSettings.model_validate({"size": HD, "zones": [{"name": "z", "points": points}]})
+        TrafficSettings.model_validate({"zones": [{"name": "z", "points": points}]})
 
 
-def test_shares_beyond_1_are_asked_for_a_size() -> None:
-    with pytest.raises(ValidationError, match=r"outside 1×1; shares are 0 to 1, and for pixels g"):
-        regions(SQUARE, size=None)
+@pytest.mark.parametrize("shape", [{"points": SQUARE, "mask": "a.png"}, {"points": None}])
+def test_a_region_has_a_polygon_or_a_mask(shape: dict[str, Any]) -> None:
+    with pytest.raises(ValidationError, match="road: needs points or mask, one of them"):
+        region(**shape)
 
 
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"start": [1280, 400]}, "start and end are one point"),
+        ({"start": [1, 0.5]}, "start and end are one point"),
         ({"left": "up", "right": "up"}, "left and right have one name"),
-        ({"end": [1280, 721]}, "lies outside"),
+        ({"end": [1, 1.01]}, "lies outside"),
+        ({"end": [0.009, 0.509]}, "line: is shorter than 1 % of the frame"),
         ({"name": ""}, "at least 1 character"),
     ],
 )
@@ -65,56 +66,79 @@ def test_lines_that_make_no_sense_are_refused(values: dict[str, Any], message: s
 
 def test_a_name_can_be_given_once() -> None:
     twice = [{"name": "a", "points": SQUARE}] * 2
-    with pytest.raises(ValidationError, match="a: this name is given twice"):
-        RegionsSettings.model_validate({"size": HD, "polygons": twice})
+    for section in ({"regions": twice}, {"traffic": {"zones": twice}}):
+        with pytest.raises(ValidationError, match="a: this name is given twice"):
+            Settings.model_validate(section)
 
 
 def test_a_closed_polygon_is_the_same_as_an_unclosed_one() -> None:
-    assert regions([*SQUARE, SQUARE[0]]) == regions(SQUARE)
+    assert region([*SQUARE, SQUARE[0]]) == region(SQUARE)
 
 
-def test_pixels_are_scaled_to_frames_of_the_same_shape_and_refused_for_others() -> None:
-    given = regions(SQUARE)
-    assert given.scales(640, 360) == (0.5, 0.5)
-    assert given.scales(1920, 1088) == pytest.approx((1.5, 1.511), abs=0.001)
+@pytest.mark.parametrize(
+    ("text", "seconds"), [(None, None), ("30s", 30), ("15min", 900), ("15 min", 900), ("1h", 3600)]
+)
+def test_an_interval_has_a_unit(text: str | None, seconds: int | None) -> None:
+    assert TrafficSettings(interval=text).seconds == seconds
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [("7min", "does not divide a day"), ("5", "match pattern"), ("0s", "match")],
+)
+def test_an_interval_divides_a_day(text: str, message: str) -> None:
+    with pytest.raises(ValidationError, match=message):
+        TrafficSettings(interval=text)
+
+
+def test_frames_of_another_shape_than_the_camera_are_refused() -> None:
+    camera = CameraSettings(size=(1280, 720))
+    for size in ((640, 360), (1920, 1088)):
+        camera.check_frames(*size)
     with pytest.raises(ConfigError, match="given for frames of 1280×720, which have another shape"):
-        given.scales(640, 480)
-    assert RegionsSettings().scales(640, 480) == (640, 480)
+        camera.check_frames(640, 480)
+    CameraSettings().check_frames(640, 480)
 
 
 def test_a_size_has_two_sides() -> None:
     with pytest.raises(ValidationError, match=r"size\.1"):
-        RegionsSettings.model_validate({"size": [1280]})
+        CameraSettings.model_validate({"size": [1280]})
 
 
-class TestFilesOfASection:
-    def test_a_file_replaces_the_places_of_a_config_and_keeps_the_rest(
-        self, tmp_path: Path
-    ) -> None:
-        config, lines = tmp_path / "my.yaml", tmp_path / "lines.yaml"
-        config.write_text(
-            "counts: {size: [9, 9], confirmed: 0.3, lines: [{name: a, start: [0, 0], end: [9, 9]}]}"
+class TestFiles:
+    def test_points_are_pixels_of_the_size_in_their_file(self, tmp_path: Path) -> None:
+        (tmp_path / "gate.yaml").write_text(
+            "camera: {size: [1280, 720], ground: [{pixel: [320, 180], metres: [5, 7]}]}\n"
+            "traffic: {lines: [{name: a, start: [0, 360], end: [1280, 360]}],"
+            " zones: [{name: z, points: [[0, 0], [640, 0], [640, 360]]}]}\n"
+            "regions: [{name: r, points: [[0, 0], [1280, 0], [1280, 720]]}]\n"
         )
-        lines.write_text("zones: [{name: z, points: [[0, 0], [1, 0], [1, 1]]}]")
-        counts = load_settings([config], ["traffic.drawn=true"], {"counts": lines}).counts
-        assert (counts.size, counts.lines, traffic.confirmed, traffic.drawn) == (
-            None,
-            (),
-            0.3,
-            True,
+        (tmp_path / "more.yaml").write_text(
+            "traffic: {lines: [{name: b, start: [0, 0.5], end: [1, 1]}]}"
         )
-        assert [zone.name for zone in counts.zones] == ["z"]
+        settings = load_settings([tmp_path / "gate.yaml", tmp_path / "more.yaml"])
+        assert settings.camera.size == (1280, 720)
+        assert settings.camera.ground[0].pixel == (0.25, 0.25)
+        assert settings.regions[0].points == ((0, 0), (1, 0), (1, 1))
+        assert settings.traffic.zones[0].points == ((0, 0), (0.5, 0), (0.5, 0.5))
+        assert [(each.name, each.end) for each in settings.traffic.lines] == [("b", (1, 1))]
+
+    def test_paths_are_relative_to_their_file(self, tmp_path: Path) -> None:
+        (tmp_path / "gate.yaml").write_text(
+            "regions: [{name: r, mask: mask.png}]\ndetector: {model: a.npz}"
+        )
+        settings = load_settings([tmp_path / "gate.yaml"], ["detector.model=b.npz"])
+        assert settings.regions[0].mask == str(tmp_path / "mask.png")
+        assert (settings.detector.kind, settings.detector.model) == ("svm", "b.npz")
+        assert load_settings([tmp_path / "gate.yaml"]).detector.model == str(tmp_path / "a.npz")
 
     def test_a_mistake_has_its_place_in_the_file(self, tmp_path: Path) -> None:
         lines = tmp_path / "lines.yaml"
-        lines.write_text("lines:\n  - {name: a, start: [0, 0], end: [1, 1], lefft: up}\n")
-        with pytest.raises(ConfigError) as caught:
-            load_settings((), (), {"counts": lines})
-        assert str(caught.value) == (
-            f"{lines}:2:43: counts.lines[0].lefft: is no setting; did you mean left?"
+        lines.write_text(
+            "traffic:\n  lines:\n  - {name: a, start: [0, 0], end: [1, 1], lefft: up}\n"
         )
-
-    def test_a_picture_is_a_mask(self, tmp_path: Path) -> None:
-        mask = tmp_path / "mask.PNG"
-        assert load_settings((), (), {"regions": mask}).regions.mask == str(mask)
-        assert load_settings((), (), {"regions": mask}).regions.polygons == ()
+        with pytest.raises(ConfigError) as caught:
+            load_settings([lines])
+        assert str(caught.value) == (
+            f"{lines}:3:43: traffic.lines[0].lefft: is no setting; did you mean left?"
+        )

@@ -34,15 +34,15 @@ class TestLinearModel:
     @pytest.mark.parametrize(
         ("settings", "file", "kinds"),
         [
-            (SvmSettings(), "their.onnx", "net, not svm"),
-            (NetworkSettings(), "mine.npz", "svm, not net"),
+            (SvmSettings(model="their.onnx"), "their.onnx", "net, not svm"),
+            (NetworkSettings(model="mine.npz"), "mine.npz", "svm, not net"),
         ],
     )
     def test_a_model_for_another_detector_than_that_of_the_settings_is_refused(
         self, settings: DetectorSettings, file: str, kinds: str
     ) -> None:
         with pytest.raises(ConfigError, match=f"^{file}: is for detector.kind: {kinds}; "):
-            load_detector(settings, Path(file))
+            load_detector(settings)
 
     @pytest.mark.parametrize("name", ["svm", "seed"])
     def test_the_shipped_model_is_the_one_with_the_features_of_the_settings(
@@ -62,13 +62,15 @@ class TestLinearModel:
 
     def test_a_model_file_is_taken_instead_of_the_shipped_one(self) -> None:
         seed = shipped_model(SvmSettings()).with_name("seed.npz")
-        assert model_file(SvmSettings(), seed) == seed
-        assert isinstance(load_detector(SvmSettings(), seed), SvmModel)
+        settings = SvmSettings(model=str(seed))
+        assert model_file(settings) == seed
+        assert isinstance(load_detector(settings), SvmModel)
 
     def test_a_model_brings_its_features_where_the_settings_leave_the_default(self) -> None:
         seed = shipped_model(SvmSettings()).with_name("seed.npz")
         image = np.zeros((720, 1280, 3), np.uint8)
-        detector = load_detector(SvmSettings(), seed).for_video(1280, 720, [image])
+        model = load_detector(SvmSettings(model=str(seed)))
+        detector = model.for_video(1280, 720, [image])
         sheet = stage_pictures_of(detector)(
             image, detector.detect(detector.search(Picture(image), None))
         )
@@ -77,19 +79,16 @@ class TestLinearModel:
     def test_features_asked_for_must_be_those_of_the_model(self) -> None:
         default = shipped_model(SvmSettings())
         with pytest.raises(ModelError, match="was trained with other features"):
-            load_detector(SvmSettings(features=OTHER), default)
+            load_detector(SvmSettings(features=OTHER, model=str(default)))
 
     def test_the_names_of_the_data_that_the_shipped_models_have_seen_are_known(self) -> None:
-        settings = SvmSettings()
-        names = trained_on(settings, model_file(settings))
+        names = trained_on(SvmSettings())
         assert {"KITTI_extracted", "GTI_Far", "mined_project_video"} <= set(names)
-        assert trained_on(settings, None) == ()
-        network = NetworkSettings()
-        assert {"idd", "project_video.mp4"} <= set(trained_on(network, model_file(network)))
+        assert {"idd", "project_video.mp4"} <= set(trained_on(NetworkSettings()))
 
     def test_a_missing_model_file_is_named(self, tmp_path: Path) -> None:
         with pytest.raises(ModelError, match=r"none\.npz: cannot be read"):
-            load_detector(SvmSettings(), tmp_path / "none.npz")
+            load_detector(SvmSettings(model=str(tmp_path / "none.npz")))
 
 
 def test_an_unknown_kind_is_refused_and_the_known_ones_are_named() -> None:

@@ -40,7 +40,11 @@ class OfModel(Protocol):
 def variant(model_path: Path) -> OfModel:
     def make(*assignments: str) -> Variant:
         chosen = settings(*assignments)
-        return Variant(chosen, load_detector(chosen.detector, model_path), assignments)
+        return Variant(
+            chosen,
+            load_detector(chosen.detector.model_copy(update={"model": str(model_path)})),
+            assignments,
+        )
 
     return make
 

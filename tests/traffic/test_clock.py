@@ -6,9 +6,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from pydantic import ValidationError
 
+from vdet.config.camera import CameraSettings, ClockSettings
+from vdet.config.schema import InputSettings, Settings
 from vdet.errors import ConfigError
-from vdet.traffic.clock import check_begin, find_clock
+from vdet.traffic.clock import find_clock
 
 
 @pytest.fixture(autouse=True)
@@ -22,9 +25,15 @@ def time_zone(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 def begin(
-    name: str, given: str | None = None, created: str | None = None, start: float = 0.0
+    name: str,
+    given: str | None = None,
+    created: str | None = None,
+    start: float = 0.0,
+    pattern: str | None = None,
 ) -> str:
-    return str(find_clock(Path("clips", name), given, created, start))
+    camera = CameraSettings(clock=ClockSettings(pattern=pattern))
+    settings = Settings(input=InputSettings(begin=given), camera=camera)
+    return str(find_clock(Path("clips", name), settings, created, start))
 
 
 def test_a_time_that_is_given_is_taken() -> None:
@@ -57,20 +66,27 @@ def test_without_a_clock_in_the_file_its_name_says_it(name: str, created: str | 
 
 @pytest.mark.parametrize("name", ["gate.mp4", "20261301_070000.mp4", "120260501_0700001.mp4"])
 def test_a_name_without_a_time_says_nothing(name: str) -> None:
-    assert find_clock(Path(name)) is None
+    assert find_clock(Path(name), Settings()) is None
 
 
 def test_a_pattern_says_how_the_time_is_written() -> None:
-    assert begin("x1 01.05.26 07h00m05.mp4", "%d.%m.%y %Hh%Mm%S").startswith("2026-05-01 07:00:05")
-    with pytest.raises(ConfigError, match=r"b\.mp4: its name has no time like %Y_%H%M"):
-        begin("b.mp4", "%Y_%H%M")
+    found = begin("x1 01.05.26 07h00m05.mp4", pattern="%d.%m.%y %Hh%Mm%S", created="2020-01-01")
+    assert found == "2026-05-01 07:00:05+02:00 (from its name)"
+    with pytest.raises(ConfigError, match=r"b\.mp4: its name has no time like %Y_%H%M: camera\.cl"):
+        begin("b.mp4", pattern="%Y_%H%M")
 
 
 def test_the_beginning_is_that_of_the_first_frame() -> None:
     assert begin("a.ts", "2026-05-01 07:00+02:00", start=1.0).startswith("2026-05-01 06:59:59")
 
 
-@pytest.mark.parametrize("text", ["7 o'clock", "0001-01-01", "%Y%q", "100%", "2026-05-01 25:00"])
-def test_a_text_that_is_neither_a_time_nor_a_pattern_is_refused(text: str) -> None:
-    with pytest.raises(ConfigError, match=r"is not a time|a pattern has only"):
-        check_begin(text)
+@pytest.mark.parametrize("text", ["7 o'clock", "0001-01-01", "2026-05-01 25:00"])
+def test_a_text_that_is_not_a_time_is_refused(text: str) -> None:
+    with pytest.raises(ValidationError, match="is not a time; give one as in"):
+        InputSettings(begin=text)
+
+
+@pytest.mark.parametrize("text", ["%Y%q", "100%", "clip"])
+def test_a_text_that_is_not_a_pattern_is_refused(text: str) -> None:
+    with pytest.raises(ValidationError, match="a pattern has only"):
+        ClockSettings(pattern=text)

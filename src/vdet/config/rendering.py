@@ -63,30 +63,27 @@ def _section(section: Section, values: Mapping[str, Any], indent: str) -> Iterat
             continue
         for paragraph in texts.get(name, "").split("\n\n"):
             yield from _comment(paragraph, indent)
-        if item := _item_section(field):
-            yield from _item_keys(item, indent)
+        yield from _item_keys(field, indent)
         plain = values.get(name)
         style, width = None if isinstance(plain, list) else False, WIDTH - len(indent)
         text = yaml.safe_dump({name: plain}, default_flow_style=style, sort_keys=False, width=width)
         yield from textwrap.indent(text, indent).splitlines()
 
 
-def _item_keys(item: type[Section], indent: str) -> Iterator[str]:
-    what = _first_line(item)
-    yield from _comment(f"Each item is {what[:1].lower()}{what[1:]}", indent)
-    texts = explanations(item)
-    for name in item.model_fields:
-        key, rest = f"{indent}#   ", f"{indent}#     "
-        yield from textwrap.wrap(
-            f"{name}: {texts.get(name, '')}", WIDTH, initial_indent=key, subsequent_indent=rest
-        )
-
-
-def _item_section(field: FieldInfo) -> type[Section] | None:
-    """Return the section that the items of a list are; None for any other field."""
-    items = get_args(field.annotation)
-    is_list = get_origin(field.annotation) is tuple
-    return items[0] if is_list and isclass(items[0]) and issubclass(items[0], Section) else None
+def _item_keys(field: FieldInfo, indent: str) -> Iterator[str]:
+    """Yield comments on the keys of the sections in a list, or of a section that may be null."""
+    for item in get_args(field.annotation):
+        if not (isclass(item) and issubclass(item, Section)):
+            continue
+        subject = "Each item" if get_origin(field.annotation) is tuple else "It"
+        what = _first_line(item)
+        yield from _comment(f"{subject} is {what[:1].lower()}{what[1:]}", indent)
+        texts = explanations(item)
+        for name in item.model_fields:
+            key, rest = f"{indent}#   ", f"{indent}#     "
+            yield from textwrap.wrap(
+                f"{name}: {texts.get(name, '')}", WIDTH, initial_indent=key, subsequent_indent=rest
+            )
 
 
 def _first_line(section: type[Section]) -> str:

@@ -13,7 +13,7 @@ from vdet.boxes import NO_BOXES
 from vdet.config.schema import Settings
 from vdet.detect.factory import as_model
 from vdet.detect.protocol import DetectorModel, stage_pictures_of
-from vdet.errors import FrameSizeError, VideoError
+from vdet.errors import FrameSizeError, VideoError, check_positive
 from vdet.files import OutputFiles
 from vdet.media.reader import VideoReader
 from vdet.progress import Progress, no_progress
@@ -73,6 +73,9 @@ class Run:
     overwrite: bool = False
     threads: int | None = None
     timeout: float = IO_TIMEOUT
+
+    def __post_init__(self) -> None:
+        check_positive(frames=self.frames, threads=self.threads)
 
     @property
     def is_part(self) -> bool:

@@ -48,9 +48,9 @@ def test_features_are_asked_for_where_they_are_given() -> None:
 
 
 def test_a_model_file_brings_its_own_features_but_not_others_than_are_asked_for() -> None:
-    path = Path("red.npz")
-    save_model(red_finder(), path)
-    load_detector(SvmSettings(), path)
-    load_detector(SvmSettings(features=red_finder().features), path)
+    path = "red.npz"
+    save_model(red_finder(), Path(path))
+    load_detector(SvmSettings(model=path))
+    load_detector(SvmSettings(features=red_finder().features, model=path))
     with pytest.raises(ModelError, match=r"red\.npz: was trained with other features"):
-        load_detector(SvmSettings(features=HSV), path)
+        load_detector(SvmSettings(features=HSV, model=path))

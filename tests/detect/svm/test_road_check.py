@@ -114,7 +114,7 @@ def test_the_shipped_model_knows_its_road_and_says_that_it_knows_no_other(
     search(load_detector(SvmSettings()), images)
     assert caplog.text.count(WARNING) == 1
     caplog.clear()
-    search(load_detector(SvmSettings(), model_file(SvmSettings())), images)
+    search(load_detector(SvmSettings(model=str(model_file(SvmSettings())))), images)
     assert not caplog.records, "a model that is given is taken to know the road"
 
 

@@ -36,7 +36,7 @@ def test_it_learns_from_pictures_labelled_in_each_form(run: Run, tmp_path: Path,
     result = run("train-net", folder, "-o", output, *QUICK)
     assert result.code == 0, result.err
     assert result.out.splitlines()[0] == "my_set: 2 pictures; 2 car"
-    assert trained_on(NetworkSettings(), output) == ("my_set",)
+    assert trained_on(NetworkSettings(model=str(output))) == ("my_set",)
     report = json.loads((tmp_path / "net.json").read_text(encoding="utf-8"))
     assert (report["steps"], report["sources"][0]["vehicles"]) == (2, {"car": 2})
     assert sorted(path.name for path in tmp_path.iterdir()) == ["my_set", "net.json", "net.onnx"]
@@ -83,7 +83,7 @@ def test_a_network_has_learnt_from_the_sets_of_its_base_too(run: Run, tmp_path: 
     command = ("train-net", write_set(tmp_path / "two"), "-o", output, *QUICK)
     result = run(*command, "--base", base)
     assert result.code == 0, result.err
-    assert trained_on(NetworkSettings(), output) == ("two", "one")
+    assert trained_on(NetworkSettings(model=str(output))) == ("two", "one")
 
 
 def test_a_base_that_is_not_there_is_said_before_the_training(run: Run, tmp_path: Path) -> None:
