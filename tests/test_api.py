@@ -48,7 +48,7 @@ def page(
 def test_the_page_runs_and_leaves_its_files(page: tuple[Path, dict[str, Any]]) -> None:
     folder, names = page
     assert sorted(path.name for path in folder.iterdir()) == [
-        *("found.png", "in.mp4", "lines.yaml", "out.csv", "out.mp4", "road.png")
+        *("found.png", "gate.yaml", "in.mp4", "out.csv", "out.mp4", "part.csv", "road.png")
     ]
     assert frames_of(folder / "out.mp4") == frames_of(folder / "in.mp4")
     assert isinstance(names["detections"], vdet.Boxes)
@@ -129,7 +129,7 @@ def test_a_run_has_its_own_part_and_settings(clip_path: Path) -> None:
 
 
 def test_a_run_is_a_value() -> None:
-    one, other = (vdet.Run(Path("a.mp4"), vdet.load_settings()) for _ in range(2))
+    one, other = (vdet.Run(Path("a.mp4"), settings=vdet.load_settings()) for _ in range(2))
     assert one == other
     assert len({one, other, pickle.loads(pickle.dumps(one))}) == 1
 
@@ -236,7 +236,7 @@ def test_detect_video_takes_what_the_command_takes(red_clip: Path, tmp_path: Pat
     changes = ["lanes.enabled=true", "input.begin='2026-05-01 07:00+02:00'"]
     run = vdet.Run(
         red_clip,
-        vdet.load_settings(assignments=changes),
+        settings=vdet.load_settings(assignments=changes),
         start=Fraction("0.08"),
         end=Fraction("0.4"),
         frames=6,

@@ -132,9 +132,9 @@ def test_the_format_is_written_counted_and_compared(
     done = vdet(package, "detect-video", clip, "--no-video", *wanted, *CHOSEN)
     assert done.returncode == 0, done.stderr
     assert len(tracks.read_text().splitlines()) == FRAMES
-    lines.write_text("lines: [{name: a, start: [0.5, 0], end: [0.5, 1]}]")
+    lines.write_text("traffic: {lines: [{name: a, start: [0.5, 0], end: [0.5, 1]}]}")
     size = ("--size", f"{WIDTH}x{HEIGHT}", "--rate", "25")
-    counted = vdet(package, "count", tracks, "--lines", lines, *size)
+    counted = vdet(package, "count", tracks, "-c", lines, *size)
     assert counted.returncode == 0, counted.stderr
     compared = vdet(package, "eval", "tracks", tracks, truth, "--json", "-")
     assert compared.returncode == 0, compared.stderr

@@ -96,7 +96,7 @@ def run_demo(
 
     def process(source: str, outputs: dict[str, str], settings: Settings) -> Path:
         paths = tuple(Output(sink, folder / name) for sink, name in outputs.items())
-        run = Run(folder / source, settings, paths, at=middle, overwrite=overwrite)
+        run = Run(folder / source, paths, settings, at=middle, overwrite=overwrite)
         run_video(run, load_detector(settings.detector), progress=partial(steps, "frames"))
         return folder / outputs["tracks"]
 

@@ -24,7 +24,7 @@ def job(tmp_path: Path) -> Run:
     source = write_drive(tmp_path / "a.mp4", 15)
     day = tmp_path / "out" / "day"
     outputs = Output("video", day / "a.mp4"), Output("tracks", day / "a.csv")
-    return Run(source, red_settings(tmp_path), outputs, threads=1)
+    return Run(source, outputs, red_settings(tmp_path), threads=1)
 
 
 def test_the_record_says_what_was_done_and_folders_are_made(job: Run, tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""`vdet count`, and `--lines` and `--counts` of `vdet detect-video`."""
+"""`vdet count`, and `--counts` and `--flows` of `vdet detect-video`."""
 
 import csv
 import json
@@ -16,11 +16,12 @@ from vdet.detect.svm.model import save_model
 from vdet.media.images import write_image
 
 LINES = """
-size: [320, 240]
-lines:
-  - {name: gate, start: [100, 0], end: [100, 240], left: out, right: in}
-zones:
-  - {name: yard, points: [[110, 0], [320, 0], [320, 240], [110, 240]]}
+camera: {size: [320, 240]}
+traffic:
+  lines:
+    - {name: gate, start: [100, 0], end: [100, 240], left: out, right: in}
+  zones:
+    - {name: yard, points: [[110, 0], [320, 0], [320, 240], [110, 240]]}
 """
 
 
@@ -50,9 +51,9 @@ def test_counting_a_file_of_tracks_gives_what_the_run_gave(
     run: Run, folder: Path, tmp_path: Path, form: str
 ) -> None:
     tracks, live, again = tmp_path / f"t.{form}", tmp_path / "live.csv", tmp_path / "again.csv"
-    lines = ("--lines", folder / "lines.yaml")
+    lines = ("-c", folder / "lines.yaml")
     wanted = ("--no-video", "--tracks", tracks, "--counts", live, *lines)
-    result = run("detect-video", folder / "red.mp4", *wanted, *options(folder))
+    result = run("detect-video", folder / "red.mp4", *options(folder), *wanted)
     assert result.code == 0, result.err
     rate = ("--rate", "25") if form == "txt" else ()
     result = run("count", tracks, *lines, "--counts", again, *rate)
@@ -66,14 +67,14 @@ def test_flows_have_clock_times_live_and_from_tracks(
     clip = tmp_path / "v_20260501_065959.mp4"
     clip.write_bytes((folder / "red.mp4").read_bytes())
     tracks = tmp_path / "v_20260501_065959.jsonl"
-    lines = ("--lines", folder / "lines.yaml", "--interval", "5min")
+    lines = ("-c", folder / "lines.yaml", "--interval", "5min")
     found = {}
     for name in ("live", "again"):
         out = tmp_path / f"{name}.csv"
         asked = ("--flows", out, "--flows", out.with_suffix(".json"), *lines)
         if name == "live":
             wanted = ("--no-video", "--tracks", tracks, *asked)
-            result = run("detect-video", clip, *wanted, *options(folder))
+            result = run("detect-video", clip, *options(folder), *wanted)
         else:
             result = run("count", tracks, *asked)
         assert result.code == 0, result.err
@@ -96,7 +97,7 @@ def write_tracks(path: Path, *, shift: int = 0) -> Path:
 
 def test_it_prints_the_totals(run: Run, folder: Path, tmp_path: Path) -> None:
     tracks = write_tracks(tmp_path / "t.csv")
-    result = run("count", tracks, "--lines", folder / "lines.yaml")
+    result = run("count", tracks, "-c", folder / "lines.yaml")
     assert result.code == 0, result.err
     assert [line.split()[1:4] for line in result.out.splitlines()[:3]] == [
         ["name", "direction", "count"], ["gate", "out", "1"], ["gate", "in", "0"],
@@ -108,12 +109,12 @@ def test_a_line_in_the_wrong_place_is_reported(run: Run, folder: Path, tmp_path:
     lines = tmp_path / "lines.yaml"
     lines.write_text(LINES.replace("[100, 0], end: [100, 240]", "[0, 50], end: [320, 50]"))
     out = tmp_path / "c.json"
-    result = run("count", write_tracks(tmp_path / "t.csv"), "--lines", lines, "--counts", out)
+    result = run("count", write_tracks(tmp_path / "t.csv"), "-c", lines, "--counts", out)
     assert "t.csv: gate: no path crosses this line; move it" in result.err
     (warning,) = json.loads(out.read_text())["warnings"]
     assert warning == "gate: no path crosses this line; move it"
-    wanted = ("--no-video", "--flows", tmp_path / "f.csv", "--lines", lines)
-    result = run("detect-video", folder / "red.mp4", *wanted, *options(folder))
+    wanted = ("--no-video", "--flows", tmp_path / "f.csv", "-c", lines)
+    result = run("detect-video", folder / "red.mp4", *options(folder), *wanted)
     assert result.err.count("gate: no path crosses this line") == 1
 
 
@@ -122,7 +123,7 @@ def test_several_files_are_counted_each_and_together(
 ) -> None:
     files = [write_tracks(tmp_path / f"{n}.csv", shift=30 * n) for n in (0, 1)]
     out = tmp_path / "all.json"
-    result = run("count", *files, "--lines", folder / "lines.yaml", "--counts", out)
+    result = run("count", *files, "-c", folder / "lines.yaml", "--counts", out)
     assert result.code == 0, result.err
     assert "all files" in result.out
     whole = json.loads(out.read_text())
@@ -135,11 +136,11 @@ def test_several_files_are_counted_each_and_together(
 
 def test_shares_need_the_size_of_the_frames(run: Run, tmp_path: Path) -> None:
     tracks, lines = write_tracks(tmp_path / "t.csv"), tmp_path / "lines.yaml"
-    lines.write_text("lines: [{name: gate, start: [0.5, 0], end: [0.5, 1]}]")
-    result = run("count", tracks, "--lines", lines)
+    lines.write_text("traffic: {lines: [{name: gate, start: [0.5, 0], end: [0.5, 1]}]}")
+    result = run("count", tracks, "-c", lines)
     assert result.code == 1
     assert "give --size, as in 1280x720" in result.err
-    result = run("count", tracks, "--lines", lines, "--size", "320x240")
+    result = run("count", tracks, "-c", lines, "--size", "320x240")
     assert result.code == 0, result.err
     assert result.out.split()[6:9] == ["gate", "left", "1"]
 
@@ -147,33 +148,36 @@ def test_shares_need_the_size_of_the_frames(run: Run, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "code", "message"),
     [
-        (["t.csv"], 2, "nothing to count at; give --lines FILE"),
-        (["t.csv", "--lines", "none.yaml"], 1, "none.yaml: cannot be read"),
-        (["t.csv", "--lines", "l.yaml", "--size", "320x200"], 1, "given for frames of 320×240"),
+        (["t.csv"], 2, "nothing to count at; give lines or zones with -c FILE"),
+        (["t.csv", "-c", "none.yaml"], 1, "none.yaml: no such file"),
+        (["t.csv", "-c", "l.yaml", "--size", "320x200"], 1, "given for frames of 320×240"),
         (
-            ["t.csv", "--lines", "l.yaml", "--size", "big"],
+            ["t.csv", "-c", "l.yaml", "--size", "big"],
             2,
             "'big' is not two numbers",
         ),
-        (["t.csv", "--lines", "l.yaml", "--counts", "c.txt"], 1, "written as .csv, .json"),
-        (["t.csv", "--lines", "l.yaml", "--counts", "t.csv"], 1, "is the input itself"),
-        (["t.txt", "--lines", "l.yaml"], 1, "has no times; give the frames per second"),
-        (["none.csv", "--lines", "l.yaml"], 1, "none.csv"),
+        (["t.csv", "-c", "l.yaml", "--counts", "c.txt"], 1, "written as .csv, .json"),
+        (["t.csv", "-c", "l.yaml", "--counts", "t.csv"], 1, "is the input itself"),
+        (["t.txt", "-c", "l.yaml"], 1, "has no times; give the frames per second"),
+        (["none.csv", "-c", "l.yaml"], 1, "none.csv"),
         (
-            ["t.csv", "--lines", "short.yaml"],
+            ["t.csv", "-c", "short.yaml"],
             1,
-            "short.yaml:1:1: counts: gate: is shorter than 1 %",
+            "short.yaml:1:1: traffic: gate: is shorter than 1 %",
         ),
-        (["t.csv", "--lines", "l.yaml", "--interval", "5min"], 2, "goes with --counts, --flows"),
-        (["t.csv", "--lines", "l.yaml", "--interval", "7min"], 2, "'7min' is no part of a day"),
-        (["t.csv", "--lines", "l.yaml", "--begin", "now"], 2, "'now' is not a time"),
-        (["t.csv", "--lines", "l.yaml", "--begin", "%Y%m%d"], 1, "t.csv: its name has no time"),
+        (["t.csv", "-c", "l.yaml", "--interval", "7min"], 1, "7min does not divide a day"),
+        (["t.csv", "-c", "l.yaml", "--begin", "now"], 1, "'now' is not a time"),
         (
-            ["t.csv", "t.csv", "--lines", "l.yaml", "--begin", "2026-05-01 07:00"],
+            ["t.csv", "-c", "l.yaml", "--set", "camera.clock.pattern=%Y%m%d"],
+            1,
+            "t.csv: its name has no time like %Y%m%d",
+        ),
+        (
+            ["t.csv", "t.csv", "-c", "l.yaml", "--begin", "2026-05-01 07:00"],
             2,
             "for several videos give a pattern",
         ),
-        (["back.csv", "--lines", "l.yaml"], 1, "back.csv:3: frame 1 is at 0.04 s; times must be"),
+        (["back.csv", "-c", "l.yaml"], 1, "back.csv:3: frame 1 is at 0.04 s; times must be"),
     ],
 )
 def test_mistakes_are_refused(
@@ -188,7 +192,9 @@ def test_mistakes_are_refused(
     write_tracks(Path("t.csv"))
     Path("t.txt").write_text("1,1,1,1,40,40,1,-1,-1,-1\n")
     Path("l.yaml").write_text(LINES)
-    Path("short.yaml").write_text("lines: [{name: gate, start: [1, 0.5], end: [0.999, 0.5]}]")
+    Path("short.yaml").write_text(
+        "traffic: {lines: [{name: gate, start: [1, 0.5], end: [0.999, 0.5]}]}"
+    )
     columns = "frame,time,id,x,y,width,height"
     Path("back.csv").write_text(f"{columns}\n0,0.08,1,1,1,40,40\n1,0.04,1,1,1,40,40\n")
     before = sorted(tmp_path.iterdir())
@@ -206,9 +212,9 @@ def test_each_video_of_a_batch_has_its_counts_and_all_have_a_total(
     for name in "ab":
         (clips / f"{name}.mp4").write_bytes((folder / "red.mp4").read_bytes())
     outputs = ("--counts", ".counts.csv", "--flows", ".flows.matrix.csv")
-    wanted = ("--no-video", *outputs, "--lines", folder / "lines.yaml")
+    wanted = ("--no-video", *outputs, "-c", folder / "lines.yaml")
     out = tmp_path / "found"
-    result = run("detect-video", clips.parent, "-d", out, *wanted, "--jobs", "1", *options(folder))
+    result = run("detect-video", clips.parent, "-d", out, *options(folder), *wanted, "--jobs", "1")
     assert result.code == 0, result.err
     own = events_of(out / "day" / "a.counts.csv")
     assert own == events_of(out / "day" / "b.counts.csv")
@@ -223,24 +229,25 @@ def test_each_video_of_a_batch_has_its_counts_and_all_have_a_total(
 class TestRegions:
     def test_roi_takes_polygons_or_a_mask(self, run: Run, folder: Path, tmp_path: Path) -> None:
         (tmp_path / "regions.yaml").write_text(
-            "size: [320, 240]\n"
-            "polygons: [{name: right, points: [[100, 0], [320, 0], [320, 240], [100, 240]]}]\n"
+            "camera: {size: [320, 240]}\n"
+            "regions: [{name: right, points: [[100, 0], [320, 0], [320, 240], [100, 240]]}]\n"
         )
         mask = np.zeros((240, 320, 3), np.uint8)
         mask[:, 100:] = 255
         write_image(tmp_path / "mask.png", mask)
+        (tmp_path / "mask.yaml").write_text("regions: [{name: right, mask: mask.png}]")
         found = {}
-        for name in ("", "regions.yaml", "mask.png"):
+        for name in ("", "regions.yaml", "mask.yaml"):
             out = tmp_path / f"found-{name}.csv"
-            roi = ("--regions", tmp_path / name) if name else ()
+            roi = ("-c", tmp_path / name) if name else ()
             wanted = ("--no-video", "--tracks", out, *roi)
-            result = run("detect-video", folder / "red.mp4", *wanted, *options(folder))
+            result = run("detect-video", folder / "red.mp4", *options(folder), *wanted)
             assert result.code == 0, result.err
             rows = list(csv.DictReader(out.read_text().splitlines()))
             found[name] = [int(row["x"]) + int(row["width"]) / 2 for row in rows]
         assert min(found[""]) < 95
         assert 100 <= min(found["regions.yaml"]) < 110
-        assert found["regions.yaml"] == found["mask.png"]
+        assert found["regions.yaml"] == found["mask.yaml"]
 
     @pytest.mark.parametrize(
         "command",
@@ -253,6 +260,6 @@ class TestRegions:
         self, run: Run, command: tuple[str, ...]
     ) -> None:
         outline = "points: [[0, 0], [1, 0], [1, 1]]"
-        result = run(*command, "--set", f"regions.polygons=[{{name: a, {outline}}}]")
+        result = run(*command, "--set", f"regions=[{{name: a, {outline}}}]")
         assert result.code == 1
         assert "regions: this command looks at whole frames" in result.err

@@ -11,9 +11,9 @@ import av
 import pytest
 
 from faults.conftest import Start
-from red_cars import SETTINGS, red_model, red_work
+from red_cars import SETTINGS, red_model, red_settings
 from running import frames_of, names, until, write_drive
-from vdet.batch.task import process_file
+from vdet.batch.task import Identity, process_file
 from vdet.errors import VideoError
 from vdet.run.sinks.protocol import Output
 from vdet.run.video import Run, run_video
@@ -47,13 +47,15 @@ def after(frames: int, happens: Callable[[], object]) -> Callable[[object], Call
 
 
 def test_a_file_that_is_removed_while_it_is_read_is_read_to_its_end(job: Run) -> None:
-    run_video(job, red_model(), SETTINGS, progress=after(5, job.source.unlink))
+    run_video(replace(job, settings=SETTINGS), red_model(), progress=after(5, job.source.unlink))
     assert frames_of(job.outputs[0].path) == COUNT
 
 
 def test_a_file_that_is_removed_before_its_turn_is_recorded(job: Run, tmp_path: Path) -> None:
     job.source.unlink()
-    record = process_file(job, work=red_work(tmp_path))
+    record = process_file(
+        replace(job, settings=red_settings(tmp_path)), identity=Identity("digest")
+    )
     assert record.error == f"{job.source}: there is no such file; check the name"
     assert record.frames is None
 
@@ -63,7 +65,7 @@ def test_a_file_that_shrinks_is_read_as_far_as_it_goes_with_a_warning(
 ) -> None:
     half = job.source.stat().st_size // 2
     shrink = after(5, lambda: os.truncate(job.source, half))
-    totals = run_video(job, red_model(), SETTINGS, progress=shrink)
+    totals = run_video(replace(job, settings=SETTINGS), red_model(), progress=shrink)
     assert COUNT // 4 < totals.frames < COUNT * 3 // 4
     assert frames_of(job.outputs[0].path) == totals.frames
     assert f"ends early: {totals.frames} of {COUNT} frames could be read" in caplog.text
@@ -110,7 +112,7 @@ def pipe(clip: Path, tmp_path: Path) -> Iterator[Pipe]:
 def test_an_input_that_stalls_is_given_up(pipe: Pipe, job: Run, tmp_path: Path) -> None:
     stalling = replace(job, source=pipe.path, timeout=1)
     with pytest.raises(VideoError, match=r"pipe\.ts: nothing was read or written for 1 s"):
-        run_video(stalling, red_model(), SETTINGS)
+        run_video(replace(stalling, settings=SETTINGS), red_model())
     assert names(tmp_path / "out") == []
     pipe.close()
     until(lambda: not any(thread.name.startswith("vdet-") for thread in threading.enumerate()))

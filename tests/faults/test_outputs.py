@@ -12,14 +12,15 @@ import pytest
 
 from conftest import Run
 from faults.conftest import Start
-from red_cars import SETTINGS, red_model, red_work
+from red_cars import SETTINGS, red_model, red_settings
 from running import names, until, write_drive
-from vdet.batch.task import process_file
+from vdet.batch.task import Identity, process_file
 from vdet.errors import VideoError
 from vdet.media import Frame
 from vdet.media.writer import VideoWriter
+from vdet.run import video
 from vdet.run.sinks.protocol import Output
-from vdet.run.video import Run, run_video
+from vdet.run.video import run_video
 from vdet.track.motion.tracker import MotionTracker
 from vdet.track.rules.tracker import RulesTracker
 
@@ -60,16 +61,16 @@ def test_a_folder_that_cannot_be_written_is_refused_before_any_work(
 
 
 @pytest.fixture
-def job(tmp_path: Path) -> Run:
+def job(tmp_path: Path) -> video.Run:
     source = write_drive(tmp_path / "clip.mp4", 150)
     outputs = {"video": "clip.mp4", "tracks": "clip.csv"}
-    return Run(
+    return video.Run(
         source, tuple(Output(sink, tmp_path / "out" / name) for sink, name in outputs.items())
     )
 
 
 def test_a_writer_that_fails_at_the_100th_frame(
-    job: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    job: video.Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     write = VideoWriter.write
     written: list[int] = []
@@ -81,14 +82,16 @@ def test_a_writer_that_fails_at_the_100th_frame(
         write(writer, frame)
 
     monkeypatch.setattr(VideoWriter, "write", write_99)
-    record = process_file(job, work=red_work(tmp_path))
+    record = process_file(
+        replace(job, settings=red_settings(tmp_path)), identity=Identity("digest")
+    )
     assert record.error == f"{job.outputs[0].path}: cannot be written: Input/output error"
     assert written == list(range(99))
     assert names(tmp_path / "out") == []
 
 
 def test_a_writer_that_hangs_at_its_end_is_given_up(
-    job: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    job: video.Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     released = threading.Event()
     leave = VideoWriter.__exit__
@@ -101,21 +104,23 @@ def test_a_writer_that_hangs_at_its_end_is_given_up(
     (tmp_path / "out").mkdir()
     few = replace(job, frames=3, timeout=1)
     with pytest.raises(VideoError, match="nothing was read or written for 1 s"):
-        run_video(few, red_model(), SETTINGS)
+        run_video(replace(few, settings=SETTINGS), red_model())
     assert names(tmp_path / "out") == []
     released.set()
     until(lambda: not any(thread.name.startswith("vdet-") for thread in threading.enumerate()))
 
 
 def test_a_tracker_that_raises(
-    run: Run, job: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    run: Run, job: video.Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def update(*_: object) -> None:
         raise ZeroDivisionError("no\nscale")
 
     monkeypatch.setattr(RulesTracker, "update", update)
     monkeypatch.setattr(MotionTracker, "observe", update)
-    record = process_file(job, work=red_work(tmp_path))
+    record = process_file(
+        replace(job, settings=red_settings(tmp_path)), identity=Identity("digest")
+    )
     assert record.error is not None
     assert "internal error, please report it (ZeroDivisionError: no scale)" in record.error
     result = run("detect-video", job.source, tmp_path / "out" / "single.mp4")

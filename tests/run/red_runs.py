@@ -1,6 +1,7 @@
 """Runs of the pipeline that find red cars, and results as they give them."""
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel, StagePictures
 from vdet.detect.svm.detector import SvmModel
 from vdet.files import OutputFiles
-from vdet.lanes.road import LaneRequest, Road
+from vdet.lanes.road import Road
 from vdet.media import Frame, Picture, VideoInfo
 from vdet.media.reader import VideoReader
 from vdet.run.loop import build, peek
@@ -19,6 +20,7 @@ from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output, SinkContext, open_sink
 from vdet.run.video import Run, RunTotals, run_video
 from vdet.track.track import Track
+from vdet.traffic.live import LiveTraffic
 
 COUNT = 60
 """Frames of the fixture `red_clip`."""
@@ -52,7 +54,7 @@ def outputs(**paths: Path) -> tuple[Output, ...]:
 
 def run_red(job: Run, settings: Settings = SETTINGS, **options: Any) -> RunTotals:
     """Run a job that finds red cars."""
-    return run_video(job, model_for(settings), settings, **options)
+    return run_video(replace(job, settings=settings), model_for(settings), **options)
 
 
 def follow(
@@ -62,13 +64,12 @@ def follow(
     width: int = WIDTH,
     height: int = HEIGHT,
     model: DetectorModel | None = None,
-    lanes: LaneRequest | None = None,
     threads: int = 1,
 ) -> Iterator[FrameResult]:
     """Find and follow red cars through some frames."""
     images, frames = peek(frames)
     model = model_for(settings) if model is None else model
-    pipeline = build(model, settings, video_info(width, height), images, lanes=lanes)
+    pipeline = build(model, settings, video_info(width, height), images)
     return pipeline.follow(frames, VIDEO.path, threads=threads)
 
 
@@ -115,9 +116,14 @@ def write(
     Without a `video` they are those of pictures. `at` is the moment that is asked for.
     """
     with OutputFiles(overwrite=True) as files:
-        context = SinkContext(files, settings, video, at=at, stage_pictures=stage_pictures)
+        traffic = LiveTraffic(settings, video.width, video.height) if video else None
+        context = SinkContext(
+            files, settings, video, at=at, traffic=traffic, stage_pictures=stage_pictures
+        )
         with open_sink(output, context) as sink:
             for result in results:
+                if traffic:
+                    traffic.add(result.frame_tracks)
                 sink.write(result)
 
 

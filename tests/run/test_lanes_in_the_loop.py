@@ -2,20 +2,27 @@
 
 import pytest
 
-from red_cars import HEIGHT, WIDTH, drive
+from red_cars import HEIGHT, SETTINGS, WIDTH, drive
 from run.red_runs import follow
-from vdet.config.camera import LensSettings
+from vdet.config.camera import CameraSettings, LensSettings
+from vdet.config.schema import LaneSettings
 from vdet.lanes.camera import Undistorter
-from vdet.lanes.road import LaneRequest
 
 LENS = LensSettings(
-    WIDTH, HEIGHT, ((240, 0, 160), (0, 240, 120), (0, 0, 1)), (-0.35, 0.1, 0.0, 0.0, 0.0), 0.4
+    width=WIDTH,
+    height=HEIGHT,
+    matrix=((240, 0, 160), (0, 240, 120), (0, 0, 1)),
+    distortion=(-0.35, 0.1, 0.0, 0.0, 0.0),
+    rms=0.4,
+)
+WITH_LANES = SETTINGS.model_copy(
+    update={"camera": CameraSettings(lens=LENS), "lanes": LaneSettings(enabled=True)}
 )
 COUNT = 10
 
 
 def test_vehicles_are_searched_in_the_original_frame() -> None:
-    with_lanes = follow(drive(15), lanes=LaneRequest(LENS))
+    with_lanes = follow(drive(15), WITH_LANES)
     without = follow(drive(15))
     for one, other in zip(with_lanes, without, strict=True):
         assert one.tracks == other.tracks
@@ -24,4 +31,4 @@ def test_vehicles_are_searched_in_the_original_frame() -> None:
 
 def test_no_whole_frame_is_undistorted(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delattr(Undistorter, "image")
-    assert all(result.road for result in follow(drive(COUNT), lanes=LaneRequest(LENS)))
+    assert all(result.road for result in follow(drive(COUNT), WITH_LANES))

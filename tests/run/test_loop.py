@@ -38,9 +38,10 @@ from vdet.errors import VdetError, VideoError
 from vdet.media import Frame
 from vdet.media.frame import Planes
 from vdet.media.images import read_image
+from vdet.run import video
 from vdet.run.loop import FIRST_FRAMES
 from vdet.run.threads import map_ordered
-from vdet.run.video import Run, run_video
+from vdet.run.video import run_video
 from vdet.track.rules.tracker import RulesTracker
 
 QUEUED = 24
@@ -121,7 +122,7 @@ class TestMemory:
                 held.append(frames_alive() - others)
 
         wanted = outputs(video=tmp_path / "out.mp4", tracks=tmp_path / "out.csv")
-        run_red(Run(red_clip, wanted, threads=2), progress=lambda _: advance)
+        run_red(video.Run(red_clip, wanted, threads=2), progress=lambda _: advance)
         assert held
         assert 0 < max(held) <= QUEUED
 
@@ -138,13 +139,13 @@ class TestRun:
 
         monkeypatch.setattr("vdet.run.video.core_count", lambda: 3)
         monkeypatch.setattr("vdet.run.loop.map_ordered", note)
-        job = Run(write_drive(tmp_path / "a.mp4", 2))
-        run_video(job, red_model(), SETTINGS)
-        run_video(replace(job, threads=2), red_model(), SETTINGS)
+        job = video.Run(write_drive(tmp_path / "a.mp4", 2))
+        run_video(replace(job, settings=SETTINGS), red_model())
+        run_video(replace(job, threads=2, settings=SETTINGS), red_model())
         assert pools == [3, 2]
 
     def test_the_totals_count_frames_and_vehicles(self, red_clip: Path, tmp_path: Path) -> None:
-        job = Run(red_clip, outputs(video=tmp_path / "out.mp4"), frames=20)
+        job = video.Run(red_clip, outputs(video=tmp_path / "out.mp4"), frames=20)
         totals = run_red(job)
         assert (totals.frames, totals.tracks) == (20, 1)
         assert (totals.width, totals.height) == (WIDTH, HEIGHT)
@@ -157,7 +158,7 @@ class TestRun:
             calls.append(total)
             return calls.append
 
-        run_red(Run(red_clip, frames=20), progress=progress)
+        run_red(video.Run(red_clip, frames=20), progress=progress)
         assert calls[0] == 20
         assert sum(advance or 0 for advance in calls[1:]) == 20
 
@@ -169,7 +170,7 @@ class TestRun:
         whole = outputs(stages=tmp_path / "whole", tracks=tmp_path / "t.csv")
         for name, wanted in {"alone": outputs(stages=tmp_path / "alone"), "whole": whole}.items():
             (tmp_path / name).mkdir()
-            totals = run_red(Run(red_clip, wanted, at=at))
+            totals = run_red(video.Run(red_clip, wanted, at=at))
             assert totals.frames == (6 if name == "alone" else COUNT)
         one, other = (read_image(tmp_path / name / "2-hits.png") for name in ("alone", "whole"))
         np.testing.assert_array_equal(one, other)
@@ -189,11 +190,11 @@ def _breaking(method: Callable[..., object], error: BaseException) -> Callable[.
 
 class TestBreakage:
     @pytest.fixture
-    def job(self, red_clip: Path, tmp_path: Path) -> Iterator[Run]:
+    def job(self, red_clip: Path, tmp_path: Path) -> Iterator[video.Run]:
         """A job of which, after the test, nothing may be left: neither files nor threads."""
         threads = threading.active_count()
         wanted = outputs(video=tmp_path / "out.mp4", tracks=tmp_path / "out.csv")
-        yield Run(red_clip, wanted)
+        yield video.Run(red_clip, wanted)
         assert list(tmp_path.iterdir()) == []
         assert threading.active_count() == threads
 
@@ -206,7 +207,7 @@ class TestBreakage:
 
         return breaks
 
-    def test_the_reader_breaks(self, job: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    def test_the_reader_breaks(self, job: video.Run, monkeypatch: pytest.MonkeyPatch) -> None:
         error = VideoError("its pixels cannot be converted")
         monkeypatch.setattr("vdet.media.reader.Planes", _breaking(Planes, error))
         with pytest.raises(VdetError, match="its pixels"):

@@ -1,6 +1,5 @@
 """The distance and the lane of vehicles, in videos and in pictures."""
 
-from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,10 +11,9 @@ from red_cars import NullDetector
 from run.red_runs import follow
 from vdet.boxes import Box, Boxes
 from vdet.config.schema import MotionTrackerSettings, Settings
-from vdet.lanes.road import LaneRequest, Road, RoadFinder
-from vdet.media import Frame, Picture
+from vdet.lanes.road import Road, RoadFinder
+from vdet.media import Picture
 from vdet.run.pictures import PictureSearch
-from vdet.run.result import FrameResult
 from vdet.run.steps import with_positions
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.render import frames, render
@@ -27,7 +25,7 @@ WIDTH, HEIGHT = 640, 360
 AHEAD = 18.0
 CAMERA = PinholeCamera.dashboard(WIDTH, HEIGHT)
 SETTINGS = Settings(
-    lanes=lane_view(CAMERA, near=6, far=42),
+    lanes=lane_view(CAMERA, near=6, far=42).model_copy(update={"enabled": True}),
     tracker=MotionTrackerSettings(needed=0.05),
 )
 SCENE = Scene(
@@ -58,12 +56,8 @@ class TrueDetector(NullDetector):
         return self
 
 
-def followed(frames: Iterable[Frame], lanes: LaneRequest | None) -> Iterator[FrameResult]:
-    return follow(frames, SETTINGS, width=WIDTH, height=HEIGHT, model=TrueDetector(), lanes=lanes)
-
-
 def roads() -> RoadFinder:
-    return RoadFinder(LaneRequest(), SETTINGS.lanes, WIDTH, HEIGHT)
+    return RoadFinder(None, SETTINGS.lanes, WIDTH, HEIGHT)
 
 
 def check(tracks: tuple[Track, ...]) -> None:
@@ -76,14 +70,14 @@ def check(tracks: tuple[Track, ...]) -> None:
 
 
 def test_vehicles_of_a_video_have_their_distance_and_lane() -> None:
-    found = list(followed(frames(SCENE), LaneRequest()))
+    found = list(follow(frames(SCENE), SETTINGS, width=WIDTH, height=HEIGHT, model=TrueDetector()))
     check(found[-1].tracks)
     assert found[-1].frame_tracks.tracks == found[-1].tracks, "all outputs get them"
 
 
 def test_vehicles_of_a_picture_have_their_distance_and_lane() -> None:
     image = render(SCENE, 0)
-    result = PictureSearch(TrueDetector(), SETTINGS, LaneRequest()).detect(Path("a.png"), image)
+    result = PictureSearch(TrueDetector(), SETTINGS).detect(Path("a.png"), image)
     check(result.tracks)
 
 

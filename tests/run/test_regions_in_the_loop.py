@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from boxing import moved_to, rounded
-from red_cars import CAR, HEIGHT, PERSPECTIVE, SETTINGS, WIDTH, drive, road
+from red_cars import CAR, PERSPECTIVE, SETTINGS, WIDTH, drive, road
 from run.red_runs import follow, model_for, outputs, run_red
-from vdet.batch.task import Work
+from vdet.batch.task import Identity
 from vdet.boxes import Box
-from vdet.config.places import RegionsSettings
+from vdet.config.camera import CameraSettings
 from vdet.config.schema import Settings
 from vdet.errors import ImageError, VideoError
 from vdet.media.images import read_image, write_image
@@ -19,15 +19,13 @@ from vdet.run.pictures import PictureJob, PictureSearch, run_picture
 from vdet.run.sinks.protocol import Output
 from vdet.run.video import Run
 
-RIGHT = [[100, 0], [320, 0], [320, 240], [100, 240]]
+RIGHT = [[100 / 320, 0], [1, 0], [1, 1], [100 / 320, 1]]
 
 
-def within(
-    points: Any = RIGHT, settings: Settings = SETTINGS, kind: str = "include", **others: Any
-) -> Settings:
-    polygons = [{"name": "right", "points": points, "kind": kind}] if points else []
-    values = {"size": (WIDTH, HEIGHT), "polygons": polygons} | others
-    return settings.model_copy(update={"regions": RegionsSettings.model_validate(values)})
+def within(settings: Settings = SETTINGS, **region: Any) -> Settings:
+    shape = {"points": RIGHT} if "mask" not in region else {}
+    regions = Settings.model_validate({"regions": [{"name": "right"} | shape | region]}).regions
+    return settings.model_copy(update={"regions": regions})
 
 
 def test_a_vehicle_is_shown_from_where_its_foot_is_in_the_region() -> None:
@@ -57,10 +55,10 @@ def test_a_picture_shows_only_what_stands_in_the_region(settings: Settings) -> N
 
 
 def test_regions_for_another_shape_name_the_file(red_clip: Path, tmp_path: Path) -> None:
-    settings = within([[0, 0], [9, 0], [9, 9]], size=(100, 100))
-    with pytest.raises(VideoError, match=r"red\.mp4: regions\.size: places are given for frames"):
+    settings = within().model_copy(update={"camera": CameraSettings(size=(100, 100))})
+    with pytest.raises(VideoError, match=r"red\.mp4: camera\.size: places are given for frames"):
         run_red(Run(red_clip, outputs(tracks=tmp_path / "t.csv")), settings)
-    with pytest.raises(ImageError, match=r"a\.png: regions\.size"):
+    with pytest.raises(ImageError, match=r"a\.png: camera\.size"):
         PictureSearch(model_for(settings), settings).detect(Path("a.png"), road(CAR))
     assert list(tmp_path.iterdir()) == []
 
@@ -81,10 +79,10 @@ def test_the_stages_show_the_regions(tmp_path: Path) -> None:
 
 def test_a_mask_that_is_drawn_anew_makes_results_out_of_date(tmp_path: Path) -> None:
     mask = tmp_path / "mask.png"
-    chosen = Settings(regions=within([], mask=str(mask)).regions)
+    run = Run(Path("a.mp4"), settings=within(Settings(), mask=str(mask)))
 
     def digest() -> str:
-        return Work.of(Run(Path("a.mp4")), ["tracks"], chosen, None, None).digest
+        return Identity.of(run, ["tracks"]).digest
 
     write_image(mask, np.zeros((24, 32, 3), np.uint8))
     before = digest()

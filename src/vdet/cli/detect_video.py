@@ -155,7 +155,7 @@ def detect_video(
 
     check_masks(settings.regions)
     inputs, part = tuple(choice.inputs(settings)), (start, end, frames, at or Fraction(0))
-    run = Run(source, settings, (), *part, inputs, overwrite, threads)
+    run = Run(source, (), settings, *part, inputs, overwrite, threads)
     if batch.folder is None:
         _process_one(replace(run, outputs=options.as_outputs(wanted)))
         return 0

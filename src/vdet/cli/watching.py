@@ -63,7 +63,7 @@ class Watched:
             for frame in read_tracks(self.tracks, rate=1.0):
                 records.add(frame)
             return records.end()
-        run = Run(clip, settings, start=self.start, end=self.end)
+        run = Run(clip, (), settings, self.start, self.end)
         model = load_detector(settings.detector)
         with progress_steps(" frames") as steps, open_video(run, model) as video:
             advance = partial(steps, "")(video.reader.expected)

@@ -63,8 +63,8 @@ class Run:
     """
 
     source: Path
-    settings: Settings = field(default_factory=Settings)
     outputs: tuple[Output, ...] = ()
+    settings: Settings = field(default_factory=Settings)
     start: Fraction | None = None
     end: Fraction | None = None
     frames: int | None = None

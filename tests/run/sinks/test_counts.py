@@ -10,6 +10,7 @@ import pytest
 from red_cars import SETTINGS
 from run.red_runs import outputs, read, result_of, run_red, write
 from vdet.boxes import Box
+from vdet.config.camera import CameraSettings
 from vdet.config.places import LineSettings, TrafficSettings, ZoneSettings
 from vdet.config.schema import Settings
 from vdet.errors import OutputError, VideoError
@@ -21,16 +22,16 @@ from vdet.run.video import Run
 from vdet.testing import check_sink
 from vdet.traffic.count_files import join_counts
 
+GATE, YARD = 100 / 320, 110 / 320
 COUNTS_AT = TrafficSettings(
-    size=(320, 240),
-    lines=(LineSettings(name="gate", start=(100, 0), end=(100, 240), left="out", right="in"),),
-    zones=(ZoneSettings(name="yard", points=((110, 0), (320, 0), (320, 240), (110, 240))),),
+    lines=(LineSettings(name="gate", start=(GATE, 0), end=(GATE, 1), left="out", right="in"),),
+    zones=(ZoneSettings(name="yard", points=((YARD, 0), (1, 0), (1, 1), (YARD, 1))),),
 )
 """The middle of the red car goes from 72 to 131 in 60 frames."""
 
 
 def with_counts(counts: TrafficSettings = COUNTS_AT) -> Settings:
-    return SETTINGS.model_copy(update={"counts": counts})
+    return SETTINGS.model_copy(update={"traffic": counts})
 
 
 @pytest.mark.parametrize("name", ["counts.csv", "counts.json"])
@@ -94,8 +95,8 @@ def test_without_lines_there_is_nothing_to_count_at(tmp_path: Path) -> None:
 
 def test_lines_for_another_shape_are_refused(red_clip: Path, tmp_path: Path) -> None:
     path = tmp_path / "c.csv"
-    settings = with_counts(COUNTS_AT.model_copy(update={"size": (320, 180)}))
-    with pytest.raises(VideoError, match=r"red\.mp4: counts\.size: places are given for .*320×180"):
+    settings = with_counts().model_copy(update={"camera": CameraSettings(size=(320, 180))})
+    with pytest.raises(VideoError, match=r"red\.mp4: camera\.size: places are given for .*320×180"):
         run_red(Run(red_clip, outputs(counts=path)), settings)
     assert not path.exists()
 

@@ -23,7 +23,11 @@ from vdet.run.sinks.drawn import Overlay, time_text
 from vdet.track.track import Track
 
 LENS = LensSettings(
-    WIDTH, HEIGHT, ((240, 0, 160), (0, 240, 120), (0, 0, 1)), (-0.35, 0.1, 0.0, 0.0, 0.0), 0.4
+    width=WIDTH,
+    height=HEIGHT,
+    matrix=((240, 0, 160), (0, 240, 120), (0, 0, 1)),
+    distortion=(-0.35, 0.1, 0.0, 0.0, 0.0),
+    rms=0.4,
 )
 LANE = Lane(
     curvature=0.0,

@@ -12,7 +12,7 @@ from red_cars import CAR, SETTINGS, road
 from run.red_runs import COUNT, outputs, result_of, run_red, video_info, write
 from running import names
 from vdet.boxes import Image
-from vdet.config.places import RegionsSettings
+from vdet.config.places import RegionSettings
 from vdet.media.images import decode_image, write_image
 from vdet.pages.video import read_facts
 from vdet.run.sinks.protocol import Output
@@ -90,8 +90,8 @@ def test_the_folders_of_a_mask_are_nobodys_business(red_clip: Path, tmp_path: Pa
     mask = tmp_path / "secret" / "mask.png"
     mask.parent.mkdir()
     write_image(mask, np.full_like(road(), 255))
-    regions = RegionsSettings(mask=str(mask))
-    settings = SETTINGS.model_copy(update={"regions": regions})
+    region = RegionSettings(name="road", mask=str(mask))
+    settings = SETTINGS.model_copy(update={"regions": (region,)})
     run_red(Run(red_clip, outputs(page=tmp_path / "page")), settings)
     text = page_of(tmp_path / "page").text
     assert "mask: mask.png" in text
