@@ -20,7 +20,7 @@ from vdet.config.loading import find_config, load_settings
 from vdet.config.schema import Settings
 from vdet.detect.factory import load_detector
 from vdet.lanes.curves import LaneCurves
-from vdet.lanes.road import LaneRequest, Road, RoadFinder
+from vdet.lanes.road import Road, RoadFinder
 from vdet.media import Frame, Picture, VideoInfo
 from vdet.run.loop import build, peek
 from vdet.run.steps import LaneStep, with_positions
@@ -79,7 +79,7 @@ class Drive:
         camera = self.scene.camera
         nearest = camera.focal * camera.above_ground / (0.97 * camera.height - camera.horizon)
         view = lane_view(camera, near=max(6.0, nearest), far=42.0)
-        return RoadFinder(LaneRequest(), view, camera.width, camera.height)
+        return RoadFinder(None, view, camera.width, camera.height)
 
 
 @dataclass(frozen=True)

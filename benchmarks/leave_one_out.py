@@ -131,11 +131,11 @@ def train(job: NetworkJob, settings: Settings) -> Path:
 
 def measure(sets: Sequence[Path], network: Path) -> ImagesResult:
     """Search the sets of a group."""
-    detector = NetworkSettings(least=_LEAST_SCORE).showing_all()
+    detector = NetworkSettings(least=_LEAST_SCORE, model=str(network)).showing_all()
     is_far = sets[0].name.partition(".")[0] in SPLITS
     counting = Counting(detector.shown_score, _FAR if is_far else _NEAR)
     labelled = [read_labelled_pictures(path) for path in sets]
-    model = load_detector(detector, network)
+    model = load_detector(detector)
     return evaluate_images(labelled, model, counting, threads=core_count())
 
 
@@ -197,7 +197,9 @@ def main() -> None:
     summaries = {name: summarize(each) for name, each in results.items()}
     print("\n".join(summary_lines(summaries, settings.train.net.score)))
     for model in arguments.model:
-        print(f"{model} has seen: {', '.join(trained_on(settings.detector, model)) or 'not known'}")
+        print(
+            f"{model} has seen: {', '.join(trained_on(NetworkSettings(model=str(model)))) or 'not known'}"
+        )
     path = arguments.work / "results.json"
     values = {name: asdict(summary) for name, summary in summaries.items()}
     path.write_text(json.dumps(values, indent=2) + "\n", encoding="utf-8")
@@ -287,7 +289,8 @@ def summarize(by_kind: ByKind) -> Summary:
 
 def video_lines(clip: tuple[Path, Path], network: Path, settings: Settings) -> list[str]:
     """Return how well a network finds and follows the vehicles of a video."""
-    variant = Variant(settings, load_detector(settings.detector, network), ())
+    model = load_detector(NetworkSettings(model=str(network)))
+    variant = Variant(settings, model, ())
     return list(result_lines(evaluate_clips([open_clip(*clip)], [variant])))
 
 

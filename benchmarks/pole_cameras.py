@@ -86,12 +86,12 @@ class Trip:
 
 @dataclass(frozen=True)
 class PoleScene:
-    """A scene, the trips of its vehicles by id, its lines and its road plane."""
+    """A scene, the trips of its vehicles by id, its settings with lines, and its road plane."""
 
     name: str
     scene: Scene
     trips: dict[int, Trip]
-    lines: TrafficSettings
+    settings: Settings
     ground: Ground
 
     def true_tracks(self, every: int = 1) -> Iterator[FrameTracks]:
@@ -215,7 +215,7 @@ def _pixels(camera: PinholeCamera, *points: tuple[float, float]) -> Float64Array
     return camera.project(np.array([(x, 0.0, z) for x, z in points], np.float64))
 
 
-def _lines(camera: PinholeCamera) -> TrafficSettings:
+def _lines(camera: PinholeCamera) -> Settings:
     above = camera.above_ground
     near, far, level = 2.2 * above, 4.0 * above, 3.0 * above
     middle, right = _lane(1) + LANE_WIDTH / 2, _lane(3) + LANE_WIDTH / 2
@@ -228,9 +228,9 @@ def _lines(camera: PinholeCamera) -> TrafficSettings:
     }
     lines = []
     for name, points in ends.items():
-        (ax, ay), (bx, by) = np.clip(_pixels(camera, *points), 0, (WIDTH, HEIGHT)).tolist()
+        (ax, ay), (bx, by) = np.clip(_pixels(camera, *points) / (WIDTH, HEIGHT), 0, 1).tolist()
         lines.append(LineSettings(name=name, start=(ax, ay), end=(bx, by)))
-    return TrafficSettings(size=(WIDTH, HEIGHT), lines=tuple(lines))
+    return Settings(traffic=TrafficSettings(lines=tuple(lines)))
 
 
 def _ground(camera: PinholeCamera) -> Ground:
@@ -269,7 +269,7 @@ def measured(
 ) -> Outcome:
     """Return what follows from the tracks that are shown."""
     found: Counter[tuple[str, str | None]] = Counter()
-    for row in count_frames(shown, scene.lines, (WIDTH, HEIGHT)).flows():
+    for row in count_frames(shown, scene.settings, (WIDTH, HEIGHT)).flows():
         found[row.origin, row.destination] += row.count
     true: Counter[tuple[str, str | None]] = Counter(trip.flow for trip in scene.trips.values())
     flows = {way: (found[way], true[way]) for way in {*found, *true} if found[way] or true[way]}

@@ -5,66 +5,49 @@ import subprocess
 import sys
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from benchmarks.plain import transcode
 from benchmarks.rounds import Task, measure_both
-from vdet.config.camera import LensSettings
-from vdet.config.places import (
-    LineSettings,
-    RegionSettings,
-    RegionsSettings,
-    TrafficSettings,
-    ZoneSettings,
-)
-from vdet.config.schema import DrawSettings, Settings, SvmSettings
-from vdet.config.section import Section
+from vdet.config.camera import CameraSettings, GroundPoint, LensSettings
+from vdet.config.places import LineSettings, RegionSettings, TrafficSettings, ZoneSettings
+from vdet.config.schema import DrawSettings, InputSettings, LaneSettings, Settings, SvmSettings
 from vdet.detect.factory import load_detector
 from vdet.detect.protocol import DetectorModel
-from vdet.lanes.ground import GroundPoint, GroundPoints, GroundRequest
-from vdet.lanes.road import LaneRequest
 from vdet.media.images import write_image
 from vdet.media.reader import VideoReader
 from vdet.run.sinks.protocol import Output
 from vdet.run.video import Run, run_video
 
 FRAMES = 250
-CAMERA = LensSettings(
-    1280, 720, ((1157, 0, 668), (0, 1153, 388), (0, 0, 1)), (-0.25, 0.0, 0.0, 0.0, 0.0), 0.0
+LENS = LensSettings(
+    width=1280,
+    height=720,
+    matrix=((1157, 0, 668), (0, 1153, 388), (0, 0, 1)),
+    distortion=(-0.25, 0.0, 0.0, 0.0, 0.0),
+    rms=0.0,
 )
 """Similar to the project video's camera; the numbers do not change the time of undistortion."""
 
+REGION = RegionSettings(name="all", points=((0, 0), (1, 0), (1, 1), (0, 1)))
+"""It leaves nothing out."""
 
-ANSWERS: dict[str, Section] = {
-    "regions": RegionsSettings(
-        polygons=(RegionSettings(name="all", points=((0, 0), (1, 0), (1, 1), (0, 1))),)
+TRAFFIC = TrafficSettings(
+    lines=tuple(
+        LineSettings(name=f"row {row}", start=(0, row), end=(1, row), left="up", right="down")
+        for row in (0.65, 0.7, 0.75)
     ),
-    "counts": TrafficSettings(
-        lines=tuple(
-            LineSettings(name=f"row {row}", start=(0, row), end=(1, row), left="up", right="down")
-            for row in (0.65, 0.7, 0.75)
-        ),
-        zones=(
-            ZoneSettings(name="near", points=((0.5, 0.6), (1, 0.6), (1, 1), (0.7, 1))),
-            ZoneSettings(name="left", points=((0, 0.6), (0.5, 0.6), (0.3, 1), (0, 1))),
-        ),
+    zones=(
+        ZoneSettings(name="near", points=((0.5, 0.6), (1, 0.6), (1, 1), (0.7, 1))),
+        ZoneSettings(name="left", points=((0, 0.6), (0.5, 0.6), (0.3, 1), (0, 1))),
     ),
-    "draw": DrawSettings(trails=2),
-}
-"""A region that leaves nothing out, three lines and two zones, and trails."""
+)
 
-
-GROUND = GroundRequest(
-    "ground.yaml",
-    GroundPoints(
-        points=tuple(
-            GroundPoint(pixel=pixel, metres=metres)
-            for pixel, metres in (
-                ((0.15, 0.95), (0, 0)), ((0.85, 0.95), (7.4, 0)),
-                ((0.58, 0.62), (7.4, 30)), ((0.44, 0.62), (0, 30)),
-            )
-        )
-    ),
+GROUND = tuple(
+    GroundPoint(pixel=pixel, metres=metres)
+    for pixel, metres in (
+        ((0.15, 0.95), (0, 0)), ((0.85, 0.95), (7.4, 0)),
+        ((0.58, 0.62), (7.4, 30)), ((0.44, 0.62), (0, 30)),
+    )
 )  # fmt: skip
 """Points on the road; the numbers do not change the time of speeds."""
 
@@ -74,15 +57,20 @@ def run_times(path: Path, folder: Path, rounds: int) -> dict[str, tuple[float, f
 
     Keys: `transcode` (decoded, and encoded with the same preset and quality), `detect` (vehicles
     detected, drawn and written), `detect with lanes`, `detect with svm`, `detect with answers`
-    (`ANSWERS`, counts and records of vehicles too), `detect with flows` (flows by the clock, and
-    speeds, at the lines of `ANSWERS`), `detect only` and `detect only with svm` (nothing written).
+    (a region, trails, counts and records of vehicles too), `detect with flows` (flows by the clock,
+    and speeds, at the lines of `TRAFFIC`), `detect only` and `detect only with svm` (nothing written).
     """
     out = folder / "out.mp4"
     video = (Output("video", out),)
     files = Output("counts", folder / "counts.csv"), Output("vehicles", folder / "cars.csv")
     default, svm = Settings(), Settings(detector=SvmSettings())
-    answering = default.model_copy(update=ANSWERS)
-    counting = default.model_copy(update={"counts": ANSWERS["counts"]})
+    lanes = Settings(camera=CameraSettings(lens=LENS), lanes=LaneSettings(enabled=True))
+    answering = Settings(regions=(REGION,), traffic=TRAFFIC, draw=DrawSettings(trails=2))
+    counting = Settings(
+        traffic=TRAFFIC,
+        camera=CameraSettings(ground=GROUND),
+        input=InputSettings(begin="2026-05-01 07:00"),
+    )
     traffic = Output("flows", folder / "flows.csv"), Output("counts", folder / "counts.csv")
     model, linear = load_detector(default.detector), load_detector(svm.detector)
 
@@ -90,21 +78,16 @@ def run_times(path: Path, folder: Path, rounds: int) -> dict[str, tuple[float, f
         detector: DetectorModel,
         outputs: tuple[Output, ...] = video,
         settings: Settings = default,
-        lanes: LaneRequest | None = None,
-        **more: Any,
     ) -> None:
-        job = Run(path, outputs, frames=FRAMES, lanes=lanes, overwrite=True, **more)
-        run_video(job, detector, settings)
+        run_video(Run(path, outputs, settings, frames=FRAMES, overwrite=True), detector)
 
     tasks: dict[str, Task] = {
         "transcode": partial(transcode, path, folder / "transcoded.mp4", FRAMES),
         "detect": partial(detect, model),
-        "detect with lanes": partial(detect, model, lanes=LaneRequest(CAMERA)),
+        "detect with lanes": partial(detect, model, settings=lanes),
         "detect with svm": partial(detect, linear, settings=svm),
         "detect with answers": partial(detect, model, (*video, *files), answering),
-        "detect with flows": partial(
-            detect, model, (*video, *traffic), counting, ground=GROUND, begin="2026-05-01 07:00"
-        ),
+        "detect with flows": partial(detect, model, (*video, *traffic), counting),
         "detect only": partial(detect, model, ()),
         "detect only with svm": partial(detect, linear, (), svm),
     }

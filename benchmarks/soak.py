@@ -13,7 +13,6 @@ from pathlib import Path
 import av
 
 from benchmarks.material import find_video
-from vdet.config.schema import Settings
 from vdet.detect.factory import load_detector
 from vdet.run.sinks.protocol import Output
 from vdet.run.video import Run, run_video
@@ -168,10 +167,8 @@ def main() -> None:
             Output("video", folder / "out.mp4"),
             Output("tracks", folder / "out.jsonl"),
         )
-        job = Run(folder / "long.mp4", outputs, frames=frames)
-        settings = Settings()
-        detector = load_detector(settings.detector)
-        totals = run_video(job, detector, settings, progress=monitor)
+        run = Run(folder / "long.mp4", outputs, frames=frames)
+        totals = run_video(run, load_detector(run.settings.detector), progress=monitor)
     print(file=sys.stderr)
     print("\n".join(table(monitor.samples)))
     first, last = tenths(monitor.samples)

@@ -7,7 +7,7 @@ from benchmarks.drawn_traffic import lane_view
 
 from vdet.config.camera import LensSettings
 from vdet.config.schema import LaneSettings
-from vdet.lanes.road import Lane, LaneRequest, RoadFinder
+from vdet.lanes.road import Lane, RoadFinder
 from vdet.media import Picture
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.render import Renderer
@@ -59,7 +59,7 @@ def drive(
 
     def find(*scenes: Scene) -> list[Lane | None]:
         camera = scenes[0].camera
-        finder = RoadFinder(LaneRequest(), settings_for(camera), camera.width, camera.height)
+        finder = RoadFinder(None, settings_for(camera), camera.width, camera.height)
         lanes: list[Lane | None] = []
         for scene in scenes:
             renderer = Renderer(scene)

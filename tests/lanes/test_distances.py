@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from benchmarks.drawn_traffic import lane_view, traffic_scene, true_places
 
-from vdet.lanes.road import LaneRequest, Road, RoadFinder
+from vdet.lanes.road import Road, RoadFinder
 from vdet.media import Picture
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.render import Renderer
@@ -67,7 +67,7 @@ def finder_of(scene: Scene) -> RoadFinder:
     camera = scene.camera
     nearest = camera.focal * camera.above_ground / (0.97 * camera.height - camera.horizon)
     view = lane_view(camera, near=max(6.0, nearest), far=42)
-    return RoadFinder(LaneRequest(), view, camera.width, camera.height)
+    return RoadFinder(None, view, camera.width, camera.height)
 
 
 def check(placed: list[Placed], *, known: float) -> None:

@@ -8,7 +8,7 @@ import pytest
 from vdet.boxes import Image
 from vdet.config.schema import LaneSettings
 from vdet.lanes.drawing import draw_lane, lane_text, stage_pictures
-from vdet.lanes.road import Lane, LaneRequest, RoadFinder
+from vdet.lanes.road import Lane, RoadFinder
 from vdet.media import Picture
 
 LANE = Lane(
@@ -58,7 +58,7 @@ def test_the_text_describes_the_bend_and_the_place_of_the_camera() -> None:
 
 @pytest.mark.parametrize("lane", [LANE, None])
 def test_every_stage_has_a_picture_with_and_without_a_lane(frame: Image, lane: Lane | None) -> None:
-    finder = RoadFinder(LaneRequest(), LaneSettings(), 1280, 720)
+    finder = RoadFinder(None, LaneSettings(), 1280, 720)
     pictures = stage_pictures(replace(finder.update(finder.observe(Picture(frame))), lane=lane))
     assert list(pictures) == ["road", "above", "mask", "fit"]
     assert pictures["road"].shape == frame.shape

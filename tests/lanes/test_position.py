@@ -14,7 +14,7 @@ from vdet.config.camera import LensSettings
 from vdet.config.schema import LaneSettings
 from vdet.lanes.camera import Undistorter
 from vdet.lanes.curves import LaneCurves
-from vdet.lanes.road import LaneRequest, Road, RoadFinder, RoadPosition, position_on_road
+from vdet.lanes.road import Road, RoadFinder, RoadPosition, position_on_road
 from vdet.lanes.top_view import TopView
 from vdet.media import Picture
 from vdet.synthetic.camera import PinholeCamera
@@ -99,7 +99,7 @@ def road(
 ) -> Road:
     """A bend of 600 m radius, without a lens."""
     scene = make_road(curvature=1 / 600, size=(640, 480), frames=1)
-    finder = RoadFinder(LaneRequest(), settings_for(scene.camera), 640, 480)
+    finder = RoadFinder(None, settings_for(scene.camera), 640, 480)
     return finder.update(finder.observe(Picture(render(scene, 0))))
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from vdet.config.schema import LaneSettings
 from vdet.lanes.calibration import Calibration, calibrate
-from vdet.lanes.road import Lane, LaneRequest, RoadFinder
+from vdet.lanes.road import Lane, RoadFinder
 from vdet.media import Picture
 from vdet.media.images import read_image
 from vdet.media.reader import VideoReader
@@ -40,11 +40,11 @@ def test_the_real_camera_is_recovered(calibration: Calibration) -> None:
 
 @pytest.fixture
 def finder(calibration: Calibration) -> RoadFinder:
-    return RoadFinder(LaneRequest(calibration.camera), LaneSettings(), 1280, 720)
+    return RoadFinder(calibration.camera, LaneSettings(), 1280, 720)
 
 
 def lane_in(calibration: Calibration, path: Path) -> Lane:
-    finder = RoadFinder(LaneRequest(calibration.camera), LaneSettings(), 1280, 720)
+    finder = RoadFinder(calibration.camera, LaneSettings(), 1280, 720)
     lane = finder.update(finder.observe(Picture(read_image(path)))).lane
     assert lane is not None, path.name
     return lane

@@ -10,7 +10,7 @@ import pytest
 
 from vdet.boxes import Float64Array, Image
 from vdet.config.schema import LaneSettings
-from vdet.lanes.road import CARRY, Lane, LaneRequest, RoadFinder
+from vdet.lanes.road import CARRY, Lane, RoadFinder
 from vdet.media import Picture
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.render import render
@@ -127,7 +127,7 @@ def test_a_pitching_camera_keeps_the_lane_and_its_width(
 ) -> None:
     scene = make_road(curvature=1 / 800)
     camera = scene.camera
-    finder = RoadFinder(LaneRequest(), settings_for(camera), camera.width, camera.height)
+    finder = RoadFinder(None, settings_for(camera), camera.width, camera.height)
     for shift in (0, 3, 6, 8, 4, -3, -6, -3):  # pixels by which the horizon moves
         pitched = replace(camera, horizon=camera.horizon + shift)
         view = finder.observe(Picture(render(replace(scene, camera=pitched), 0)))
@@ -158,7 +158,7 @@ def room() -> Image:
 
 @pytest.mark.parametrize("draw", [grey, noise, blobs, room])
 def test_a_picture_without_a_lane_has_none(draw: Callable[[], Image]) -> None:
-    finder = RoadFinder(LaneRequest(), LaneSettings(), 1280, 720)
+    finder = RoadFinder(None, LaneSettings(), 1280, 720)
     for _ in range(3):
         assert finder.update(finder.observe(Picture(draw()))).lane is None
 
@@ -166,5 +166,5 @@ def test_a_picture_without_a_lane_has_none(draw: Callable[[], Image]) -> None:
 @pytest.mark.parametrize("size", [(16, 16), (64, 36), (50, 400)])
 def test_unusual_frame_sizes_raise_no_error(size: tuple[int, int]) -> None:
     image = np.random.default_rng(0).integers(0, 256, (size[1], size[0], 3), dtype=np.uint8)
-    finder = RoadFinder(LaneRequest(), LaneSettings(), *size)
+    finder = RoadFinder(None, LaneSettings(), *size)
     assert finder.update(finder.observe(Picture(image))).lane is None

@@ -6,7 +6,9 @@ from itertools import groupby, pairwise
 from typing import Any
 
 from vdet.boxes import Box
+from vdet.config.camera import CameraSettings
 from vdet.config.places import LineSettings, TrafficSettings, ZoneSettings
+from vdet.config.schema import Settings
 from vdet.polygons import Point
 from vdet.track.track import FrameTracks, State, Track
 from vdet.traffic.counting import count_frames
@@ -98,13 +100,27 @@ def counts(
     **rule: Any,
 ) -> Counts:
     """Count at lines and zones, given in pixels of 1280×720, in frames of this size."""
-    settings = TrafficSettings(
-        size=(WIDTH, HEIGHT),
-        lines=tuple(each for each in shapes if isinstance(each, LineSettings)),
-        zones=tuple(each for each in shapes if isinstance(each, ZoneSettings)),
-        **rule,
+    return count_frames(video, settings_for(*shapes, **rule), size)
+
+
+def settings_for(*shapes: LineSettings | ZoneSettings, **rule: Any) -> Settings:
+    """Return settings with lines and zones that are given in pixels of 1280×720."""
+
+    def scaled(point: Point) -> Point:
+        return point[0] / WIDTH, point[1] / HEIGHT
+
+    lines = tuple(
+        each.model_copy(update={"start": scaled(each.start), "end": scaled(each.end)})
+        for each in shapes
+        if isinstance(each, LineSettings)
     )
-    return count_frames(video, settings, size)
+    zones = tuple(
+        each.model_copy(update={"points": tuple(map(scaled, each.points))})
+        for each in shapes
+        if isinstance(each, ZoneSettings)
+    )
+    traffic = TrafficSettings(lines=lines, zones=zones, **rule)
+    return Settings(camera=CameraSettings(size=(WIDTH, HEIGHT)), traffic=traffic)
 
 
 def events(

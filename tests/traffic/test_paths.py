@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from traffic.scenes import HEIGHT, LINE, WIDTH, ZONE, Path, frames, through
+from traffic.scenes import HEIGHT, LINE, WIDTH, ZONE, Path, frames, settings_for, through
 from vdet.boxes import Image
-from vdet.config.places import TrafficSettings
 from vdet.polygons import Point
 from vdet.traffic.borders import place
 from vdet.traffic.paths import direction_color, draw_grid, draw_paths, draw_places
@@ -55,7 +54,7 @@ def test_the_grid_has_lines_at_round_numbers_of_pixels(image: Image) -> None:
 
 
 def test_lines_and_zones_are_drawn_where_they_lie(image: Image) -> None:
-    settings = TrafficSettings(size=(WIDTH, HEIGHT), lines=(LINE,), zones=(ZONE,))
+    settings = settings_for(LINE, ZONE).traffic
     draw_places(image, *place(settings, WIDTH, HEIGHT))
     changed = (image != GREY).any(axis=2)
     assert changed[400, 210:990].all()

@@ -9,7 +9,7 @@ from track.motion.scenes import HEIGHT, WIDTH
 from track.motion.traffic import Noise, TrueVehicle, detect, random_traffic, truth_at
 from vdet.boxes import Box
 from vdet.config.places import LineSettings, TrafficSettings
-from vdet.config.schema import MotionTrackerSettings
+from vdet.config.schema import MotionTrackerSettings, Settings
 from vdet.track.motion.tracker import MotionTracker
 from vdet.track.track import FrameTracks, Track
 from vdet.traffic.counting import count_frames
@@ -23,7 +23,7 @@ SEEDS = (2, 20, 23)
 def across(frames: Sequence[FrameTracks], row: float) -> set[tuple[int, str]]:
     """Count at a line over the whole width: return the id and the direction of each event."""
     line = LineSettings(name="row", start=(0, row), end=(1, row), left="away", right="nearer")
-    counts = count_frames(frames, TrafficSettings(lines=(line,)), (WIDTH, HEIGHT))
+    counts = count_frames(frames, Settings(traffic=TrafficSettings(lines=(line,))), (WIDTH, HEIGHT))
     return {(event.id, event.direction) for event in counts.events}
 
 

@@ -6,20 +6,17 @@ from pathlib import Path as File
 
 import pytest
 
-from traffic.scenes import HEIGHT, WIDTH, Path, frames, through
-from vdet.config.places import LineSettings, TrafficSettings, ZoneSettings
+from traffic.scenes import Path, frames, settings_for, through
+from vdet.config.places import LineSettings, ZoneSettings
 from vdet.labels.formats import TrackWriter
 from vdet.labels.records import JSON_LINES
 from vdet.traffic.counting import count_files
 from vdet.traffic.counts import Counts, flow_table, zone_table
 
-SETTINGS = TrafficSettings(
-    size=(WIDTH, HEIGHT),
-    lines=(
-        LineSettings(name="west", start=(200, 200), end=(200, 600), left="out", right="in"),
-        LineSettings(name="east", start=(1000, 200), end=(1000, 600), left="out", right="in"),
-    ),
-    zones=(ZoneSettings(name="stop", points=((500, 500), (700, 500), (700, 700), (500, 700))),),
+SETTINGS = settings_for(
+    LineSettings(name="west", start=(200, 200), end=(200, 600), left="out", right="in"),
+    LineSettings(name="east", start=(1000, 200), end=(1000, 600), left="out", right="in"),
+    ZoneSettings(name="stop", points=((500, 500), (700, 500), (700, 700), (500, 700))),
 )
 GOES_EAST = through((0, 100, 400), (20, 1100, 400))  # at 600 at the seam
 ON_THE_LINE = through((0, 100, 300), (10, 199, 300), (20, 300, 300))

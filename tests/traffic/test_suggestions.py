@@ -2,8 +2,8 @@
 
 import pytest
 
-from traffic.scenes import HEIGHT, WIDTH, Path, frames, through
-from vdet.config.places import LineSettings, TrafficSettings
+from traffic.scenes import HEIGHT, WIDTH, Path, frames, settings_for, through
+from vdet.config.places import LineSettings
 from vdet.polygons import side_of
 from vdet.track.track import FrameTracks
 from vdet.traffic.counting import count_frames
@@ -28,10 +28,8 @@ def test_a_stream_gets_a_line_in_and_a_line_out_that_all_its_vehicles_cross() ->
         ("in 1", 4, "down"), ("out 1", 4, "down"),
     ]  # fmt: skip
     assert first.start[1] < last.start[1]
-    lines = tuple(
-        LineSettings(name=each.name, start=each.start, end=each.end) for each in (first, last)
-    )
-    counts = count_frames(video, TrafficSettings(size=(WIDTH, HEIGHT), lines=lines))
+    lines = (LineSettings(name=e.name, start=e.start, end=e.end) for e in (first, last))
+    counts = count_frames(video, settings_for(*lines))
     assert [(total.name, total.direction, total.count) for total in counts.totals] == [
         ("in 1", "left", 4), ("in 1", "right", 0), ("out 1", "left", 4), ("out 1", "right", 0),
     ]  # fmt: skip

@@ -11,7 +11,7 @@ from red_cars import road
 from run.red_runs import result_of, write
 from vdet.boxes import Box
 from vdet.config.schema import LaneSettings
-from vdet.lanes.road import LaneRequest, RoadFinder
+from vdet.lanes.road import RoadFinder
 from vdet.media import Picture
 from vdet.run.sinks.protocol import Output
 from vdet.track.track import Track
@@ -53,7 +53,7 @@ def test_there_is_an_item_a_picture_with_a_list_of_boxes(tmp_path: Path) -> None
 
 def test_with_lanes_boxes_have_their_distance_and_lane(tmp_path: Path) -> None:
     path = tmp_path / "boxes.json"
-    finder = RoadFinder(LaneRequest(), LaneSettings(), 320, 240)
+    finder = RoadFinder(None, LaneSettings(), 320, 240)
     bare = finder.update(finder.observe(Picture(road())))
     near = Track(1, Box.sized(1, 2, 3, 4), 0.5, state="seen", distance=23.4567, lane=-1)
     vehicles = (near, replace(near, distance=None, lane=None))

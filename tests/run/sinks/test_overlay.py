@@ -14,7 +14,7 @@ from vdet.boxes import Box, Image
 from vdet.config.camera import LensSettings
 from vdet.config.schema import DrawSettings, LaneSettings, Settings
 from vdet.draw.boxes import BLACK, color_of, draw_box, draw_label
-from vdet.lanes.road import Lane, LaneRequest, Road, RoadFinder
+from vdet.lanes.road import Lane, Road, RoadFinder
 from vdet.media import Picture, VideoInfo
 from vdet.media.coding import Coding
 from vdet.media.frame import Planes
@@ -56,7 +56,7 @@ def shown(overlay: Overlay, result: FrameResult) -> Image:
 
 
 def road_seen(camera: LensSettings | None) -> Road:
-    finder = RoadFinder(LaneRequest(camera), LaneSettings(), WIDTH, HEIGHT)
+    finder = RoadFinder(camera, LaneSettings(), WIDTH, HEIGHT)
     return finder.update(finder.observe(Picture(road(CAR))))
 
 

@@ -14,7 +14,7 @@ from run.red_runs import result_of, write
 from vdet.boxes import Box
 from vdet.config.schema import LaneSettings
 from vdet.errors import OutputError
-from vdet.lanes.road import Lane, LaneRequest, Road, RoadFinder
+from vdet.lanes.road import Lane, Road, RoadFinder
 from vdet.media import Picture
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output
@@ -95,7 +95,7 @@ def test_standard_output_gets_each_frame_at_once(monkeypatch: pytest.MonkeyPatch
 
 def road(lane: Lane | None) -> Road:
     image = np.zeros((36, 64, 3), np.uint8)
-    finder = RoadFinder(LaneRequest(), LaneSettings(), 64, 36)
+    finder = RoadFinder(None, LaneSettings(), 64, 36)
     return replace(finder.update(finder.observe(Picture(image))), lane=lane)
 
 
