@@ -113,27 +113,6 @@ def test_records_of_vehicles_have_speeds(run: Run, red: tuple[str, ...]) -> None
     assert result.code == 1
 
 
-def test_the_plane_follows_from_two_streams_and_a_length(run: Run) -> None:
-    along = np.linspace(-12, 12, 60)
-    streams = []
-    for turned in (0.5, 0.5 - np.pi / 2):
-        turn = np.array([(np.cos(turned), -np.sin(turned)), (np.sin(turned), np.cos(turned))])
-        streams += [
-            np.column_stack([np.full(60, lane), along]) @ turn.T + np.array((0, 28))
-            for lane in (-5.0, -1.7, 1.7, 5.0)
-        ]
-    write_tracks(streams)
-    (x1, y1), (x2, y2) = seen(np.array([(0.0, 22.0), (3.0, 26.0)])).tolist()
-    length = f"{x1:.1f},{y1:.1f},{x2:.1f},{y2:.1f}=5"
-    command = ("ground", "frame.png", "--tracks-from", "tracks.csv", "--length", length)
-    result = run(*command, "-o", "new.yaml")
-    assert result.code == 0, result.err
-    assert "from 8 vehicles; focal length 1" in result.out or "focal length 9" in result.out
-    ground = load_ground(Path("new.yaml")).ground(WIDTH, HEIGHT)
-    places = ground.place(seen(np.array([(0.0, 20.0), (0.0, 32.0)])) + 0.5)
-    assert float(np.hypot(*(places[1] - places[0]))) == pytest.approx(12, rel=0.03)
-
-
 def test_the_plane_follows_from_the_lane_of_the_settings(run: Run) -> None:
     result = run("ground", "frame.png", "--lane", "-o", "new.yaml")
     assert result.code == 0, result.err
@@ -171,9 +150,8 @@ def test_the_grid_in_metres_is_drawn(run: Run) -> None:
     ("arguments", "code", "message"),
     [
         (["ground.yaml", "-o", "new.yaml"], 2, "a file of points is only checked"),
-        (["frame.png", "-o", "new.yaml"], 2, "either --length or --lane"),
+        (["frame.png", "-o", "new.yaml"], 2, "give -o ground.yaml and --lane"),
         (["frame.png", "--lane"], 2, "give -o ground.yaml"),
-        (["frame.png", "--length", "1,2=3", "-o", "n.yaml"], 2, "is not X1,Y1,X2,Y2=METRES"),
         (["frame.png", "--lane", "-o", "new.txt"], 1, "written as .yaml"),
         (["frame.png", "--lane", "-o", "ground.yaml"], 1, "is there already"),
         (["none.yaml"], 1, "none.yaml: cannot be read"),
