@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from conftest import Run
-from lanes.chessboards import photographs
-from vdet.lanes.camera import CalibratedCamera, load_camera
+from lanes.chessboards import CAMERA, photographs
+from vdet.lanes.camera import load_camera
 from vdet.media.images import write_image
 
 
@@ -15,10 +15,7 @@ from vdet.media.images import write_image
 def boards(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder of six photographs of a board and one of a wall."""
     folder = tmp_path_factory.mktemp("boards")
-    camera = CalibratedCamera(
-        640, 480, ((560, 0, 322), (0, 558, 236), (0, 0, 1)), (-0.25, 0.06, 0, 0, 0), 0
-    )
-    for number, image in enumerate(photographs(camera, 6)):
+    for number, image in enumerate(photographs(CAMERA, 6)):
         write_image(folder / f"board{number}.png", image)
     write_image(folder / "wall.png", np.full((480, 640, 3), 99, np.uint8))
     return folder

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from conftest import Run
-from lanes.poles import CORNERS, HEIGHT, WIDTH, seen
+from lanes.poles import CORNERS, HEIGHT, WIDTH, ground_text, seen
 from running import write_drive
 from vdet.boxes import Float64Array
 from vdet.lanes.camera import CalibratedCamera, Undistorter, save_camera
@@ -26,20 +26,9 @@ LINES = f"size: [{WIDTH}, {HEIGHT}]\nlines:\n" + "".join(
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     write_image(tmp_path / "frame.png", np.full((HEIGHT, WIDTH, 3), 90, np.uint8))
-    write_points(CORNERS)
+    Path("ground.yaml").write_text(ground_text(seen(CORNERS), CORNERS))
     (tmp_path / "lines.yaml").write_text(LINES)
     return tmp_path
-
-
-def write_points(places: Float64Array, pixels: Float64Array | None = None) -> None:
-    lines = [
-        f"  - {{pixel: [{x:.3f}, {y:.3f}], metres: [{right}, {ahead}]}}"
-        for (x, y), (right, ahead) in zip(
-            seen(places) if pixels is None else pixels, places, strict=True
-        )
-    ]
-    text = "\n".join([f"size: [{WIDTH}, {HEIGHT}]", "points:", *lines])
-    Path("ground.yaml").write_text(text)
 
 
 def write_tracks(ways: Iterable[Float64Array]) -> None:
@@ -67,7 +56,7 @@ def test_a_file_of_points_is_checked(run: Run) -> None:
 
 
 def test_bad_points_are_refused_in_words(run: Run) -> None:
-    write_points(CORNERS, seen(CORNERS)[[0, 2, 1, 3]])
+    Path("ground.yaml").write_text(ground_text(seen(CORNERS)[[0, 2, 1, 3]], CORNERS))
     for command in (
         ("ground", "ground.yaml"),
         ("paths", "frame.png", "--ground", "ground.yaml", "-o", "grid.png"),

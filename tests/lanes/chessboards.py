@@ -6,6 +6,14 @@ import numpy as np
 from vdet.boxes import Image
 from vdet.lanes.camera import CalibratedCamera
 
+CAMERA = CalibratedCamera(
+    640,
+    480,
+    ((560.0, 0.0, 322.0), (0.0, 558.0, 236.0), (0.0, 0.0, 1.0)),
+    (-0.25, 0.06, 0.0005, -0.0004, 0.0),
+    0.5,
+)
+"""A camera with visible lens distortion."""
 PATTERN = (9, 6)
 _TEXELS = 40  # side of a square of the board, texels
 _POSES = (

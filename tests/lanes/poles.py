@@ -16,3 +16,12 @@ def seen(places: Float64Array, tilt: float = 0.25) -> Float64Array:
     sine, cosine = np.sin(tilt), np.cos(tilt)
     down, depth = cosine * ABOVE - sine * z, sine * ABOVE + cosine * z
     return np.column_stack([x / depth, down / depth]) * FOCAL + (WIDTH / 2, HEIGHT / 2)
+
+
+def ground_text(pixels: Float64Array, metres: Float64Array, *more: str) -> str:
+    """Return a file of the ground with these points, and more lines before them."""
+    points = [
+        f"  - {{pixel: [{x:.3f}, {y:.3f}], metres: [{right}, {ahead}]}}"
+        for (x, y), (right, ahead) in zip(pixels, metres, strict=True)
+    ]
+    return "\n".join([f"size: [{WIDTH}, {HEIGHT}]", *more, "points:", *points])

@@ -1,5 +1,6 @@
 """A calibrated camera, its file, and the undistortion of frames and boxes."""
 
+from dataclasses import asdict
 from pathlib import Path
 
 import cv2
@@ -9,19 +10,13 @@ import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from lanes.chessboards import CAMERA
 from vdet.boxes import Box
 from vdet.errors import ConfigError
 from vdet.lanes.camera import CalibratedCamera, Undistorter, load_camera, save_camera
 
-MATRIX = ((560.0, 0.0, 322.0), (0.0, 558.0, 236.0), (0.0, 0.0, 1.0))
-CAMERA = CalibratedCamera(640, 480, MATRIX, (-0.25, 0.06, 0.0005, -0.0004, 0.0), 0.5)
-GOOD = {
-    "width": 640,
-    "height": 480,
-    "matrix": [[560.0, 0, 322.0], [0, 558.0, 236.0], [0, 0, 1]],
-    "distortion": [-0.25, 0.06, 0.0, 0.0, 0.0],
-    "rms": 0.5,
-}
+MATRIX = CAMERA.matrix
+GOOD = asdict(CAMERA)
 
 
 @pytest.fixture(scope="module")

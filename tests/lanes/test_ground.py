@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lanes.poles import CORNERS, HEIGHT, WIDTH, seen
+from lanes.poles import CORNERS, HEIGHT, WIDTH, ground_text, seen
 from vdet.boxes import Float64Array
 from vdet.errors import ConfigError
 from vdet.lanes.camera import CalibratedCamera, Undistorter, save_camera
@@ -84,18 +84,14 @@ def test_a_point_that_does_not_fit_the_others_is_named() -> None:
         fitted(wrong, seen(metres))
 
 
-def written(folder: Path, *lines: str) -> Path:
-    points = [
-        f"  - {{pixel: [{x:.3f}, {y:.3f}], metres: [{right}, {ahead}]}}"
-        for (x, y), (right, ahead) in zip(seen(CORNERS), CORNERS, strict=True)
-    ]
+def written(folder: Path, text: str) -> Path:
     path = folder / "ground.yaml"
-    path.write_text("\n".join(lines or (f"size: [{WIDTH}, {HEIGHT}]", "points:", *points)))
+    path.write_text(text)
     return path
 
 
 def test_a_file_is_for_frames_of_any_size_and_the_same_shape(tmp_path: Path) -> None:
-    request = load_ground(written(tmp_path))
+    request = load_ground(written(tmp_path, ground_text(seen(CORNERS), CORNERS)))
     place = np.array([(2.0, 30.0)])
     half = request.ground(WIDTH // 2, HEIGHT // 2)
     assert half.place(seen(place) / 2 + EDGE) == pytest.approx(place, abs=0.01)
@@ -105,33 +101,27 @@ def test_a_file_is_for_frames_of_any_size_and_the_same_shape(tmp_path: Path) -> 
 
 def test_a_lens_that_distorts_is_corrected(tmp_path: Path) -> None:
     save_camera(CAMERA, tmp_path / "camera.yaml")
-    path = written(tmp_path)
     lens = Undistorter(CAMERA, WIDTH, HEIGHT)
-    points = [
-        f"  - {{pixel: [{x:.3f}, {y:.3f}], metres: [{right}, {ahead}]}}"
-        for (x, y), (right, ahead) in zip(lens.distorted(seen(CORNERS)), CORNERS, strict=True)
-    ]
-    path.write_text(
-        "\n".join([f"size: [{WIDTH}, {HEIGHT}]", "camera: camera.yaml", "points:", *points])
-    )
+    text = ground_text(lens.distorted(seen(CORNERS)), CORNERS, "camera: camera.yaml")
+    path = written(tmp_path, text)
     place = np.array([(2.0, 30.0)])
     ground = load_ground(path).ground(WIDTH, HEIGHT)
     assert ground.place(lens.distorted(seen(place)) + EDGE) == pytest.approx(place, abs=0.02)
 
 
 @pytest.mark.parametrize(
-    ("lines", "message"),
+    ("text", "message"),
     [
-        (("points: 3",), "ground.yaml:1:1: points: should be a valid tuple"),
-        (("size: [1280, 720]",), "points: is missing"),
-        (("points: [{pixel: [1, 2]}]",), "points[0].metres: is missing"),
-        (("point: []", "points: []"), "point: is not a key of files of the ground"),
-        (("camera: none.yaml", "points: []"), "none.yaml: cannot be read"),
+        ("points: 3", "ground.yaml:1:1: points: should be a valid tuple"),
+        ("size: [1280, 720]", "points: is missing"),
+        ("points: [{pixel: [1, 2]}]", "points[0].metres: is missing"),
+        ("point: []\npoints: []", "point: is not a key of files of the ground"),
+        ("camera: none.yaml\npoints: []", "none.yaml: cannot be read"),
     ],
 )
 def test_a_mistake_in_a_file_is_named_with_its_place(
-    tmp_path: Path, lines: tuple[str, ...], message: str
+    tmp_path: Path, text: str, message: str
 ) -> None:
     with pytest.raises(ConfigError) as error:
-        load_ground(written(tmp_path, *lines))
+        load_ground(written(tmp_path, text))
     assert message in str(error.value)
