@@ -197,9 +197,8 @@ def main() -> None:
     summaries = {name: summarize(each) for name, each in results.items()}
     print("\n".join(summary_lines(summaries, settings.train.net.score)))
     for model in arguments.model:
-        print(
-            f"{model} has seen: {', '.join(trained_on(NetworkSettings(model=str(model)))) or 'not known'}"
-        )
+        seen = trained_on(NetworkSettings(model=str(model)))
+        print(f"{model} has seen: {', '.join(seen) or 'not known'}")
     path = arguments.work / "results.json"
     values = {name: asdict(summary) for name, summary in summaries.items()}
     path.write_text(json.dumps(values, indent=2) + "\n", encoding="utf-8")

@@ -58,7 +58,8 @@ def run_times(path: Path, folder: Path, rounds: int) -> dict[str, tuple[float, f
     Keys: `transcode` (decoded, and encoded with the same preset and quality), `detect` (vehicles
     detected, drawn and written), `detect with lanes`, `detect with svm`, `detect with answers`
     (a region, trails, counts and records of vehicles too), `detect with flows` (flows by the clock,
-    and speeds, at the lines of `TRAFFIC`), `detect only` and `detect only with svm` (nothing written).
+    and speeds, at the lines of `TRAFFIC`), `detect only` and `detect only with svm` (nothing
+    written).
     """
     out = folder / "out.mp4"
     video = (Output("video", out),)

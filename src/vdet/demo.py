@@ -31,8 +31,6 @@ from vdet.synthetic.truth import write_truth
 from vdet.traffic.count_files import NOWHERE
 from vdet.traffic.counting import count_files
 
-Row = list[str]
-
 ROADS = 6
 """Drawn roads that the linear model learns from."""
 
@@ -84,60 +82,58 @@ def run_demo(
     make_folder(folder)
     if not overwrite and any(folder.iterdir()):
         raise OutputError(f"{folder}: is not empty; give another folder, or --overwrite")
-    scene, pole = demo_scene(seed), pole_scene(seed)
+
+    def draw(scene: Scene, clip: Path, truth: Path) -> None:
+        write_clip(clip, scene, overwrite=overwrite)
+        write_truth(truth, scene, overwrite=overwrite)
+
+    def find(clip: str, outputs: dict[str, str], settings: Settings) -> None:
+        paths = tuple(Output(sink, folder / name) for sink, name in outputs.items())
+        run = Run(folder / clip, paths, settings, at=middle, overwrite=overwrite)
+        run_video(run, load_detector(settings.detector), progress=partial(steps, "frames"))
+
+    scene, pole, rng = demo_scene(seed), pole_scene(seed), np.random.default_rng(seed)
+    middle = scene.frames / scene.rate / 2
     announce("1/4 drawing two roads with vehicles …")
     steps("drawing", None)
-    for drawn, clip, boxes in ((scene, ROAD, TRUTH), (pole, POLE, POLE_TRUTH)):
-        write_clip(folder / clip, drawn, overwrite=overwrite)
-        write_truth(folder / boxes, drawn, overwrite=overwrite)
+    draw(scene, folder / ROAD, folder / TRUTH)
+    draw(pole, folder / POLE, folder / POLE_TRUTH)
     write_whole(folder / GATE, _GATE, overwrite=overwrite)
-    truth, rate = read_truth(folder / TRUTH), float(scene.rate)
-    middle = scene.frames / scene.rate / 2
-
-    def process(source: str, outputs: dict[str, str], settings: Settings) -> Path:
-        paths = tuple(Output(sink, folder / name) for sink, name in outputs.items())
-        run = Run(folder / source, paths, settings, at=middle, overwrite=overwrite)
-        run_video(run, load_detector(settings.detector), progress=partial(steps, "frames"))
-        return folder / outputs["tracks"]
-
-    def find(name: str, outputs: dict[str, str], settings: Settings) -> Row:
-        tracks = process(ROAD, outputs, settings)
-        found = score(read_predictions(tracks), truth, rate=rate)
-        ratios = (found.precision, found.recall, found.f1, found.idf1)
-        return [name, *(f"{ratio:.2f}" for ratio in ratios), str(found.id_switches)]
-
     announce("2/4 finding and counting the vehicles with the network …")
-    by_network = find("network", _BY_NETWORK, load_settings())
-    process(POLE, _ON_POLE, load_settings([folder / GATE]))
+    find(ROAD, _BY_NETWORK, load_settings())
+    counting = load_settings([folder / GATE])
+    find(POLE, _ON_POLE, counting)
     announce(f"3/4 drawing {ROADS} more roads, and training a linear model on patches of them …")
     linear = load_settings(assignments=["train.mine.probability=0"], detector="svm")
-    training, rng = folder / "training", np.random.default_rng(seed)
-    make_folder(training)
-    roads = [training / f"road{number}.mp4" for number in range(1, ROADS + 1)]
+    make_folder(folder / "training")
+    roads = [folder / "training" / f"road{number}.mp4" for number in range(1, ROADS + 1)]
     sources = [VideoSource(road, road.with_suffix(".txt"), every=2) for road in roads]
     for source in sources:
-        busy = busy_road(rng)
-        write_clip(source.path, busy, overwrite=overwrite)
-        write_truth(source.truth, busy, overwrite=overwrite)
+        draw(busy_road(rng), source.path, source.truth)
     model = load_svm(linear.svm, None)  # only the places of its windows matter
     mine(sources, folder / PATCHES, linear, model, most=_MOST, overwrite=overwrite, steps=steps)
     learnt, metrics = train(find_patches([folder / PATCHES]), linear, steps=steps)
     save_model(learnt, folder / MODEL, overwrite=overwrite)
     metrics.write(folder / METRICS, overwrite=overwrite)
     announce("4/4 finding the vehicles with the linear model …")
-    own = load_settings(assignments=[f"detector.model={json.dumps(str(folder / MODEL))}"])
-    by_model = find(f"linear model {MODEL}", _BY_MODEL, own)
-    scores = table(("", "precision", "recall", "F1", "IDF1", "id switches"), [by_network, by_model])
-    return [*scores, "", *table(("from", "to", "vehicles", "in truth"), _flows(folder, pole))]
+    model_file = f"detector.model={json.dumps(str(folder / MODEL))}"
+    find(ROAD, _BY_MODEL, load_settings(assignments=[model_file]))
+    truth, scores = read_truth(folder / TRUTH), []
+    for name, outputs in (("network", _BY_NETWORK), (f"linear model {MODEL}", _BY_MODEL)):
+        found = score(read_predictions(folder / outputs["tracks"]), truth, rate=float(scene.rate))
+        ratios = (found.precision, found.recall, found.f1, found.idf1)
+        scores.append([name, *(f"{ratio:.2f}" for ratio in ratios), str(found.id_switches)])
+    compared = table(("", "precision", "recall", "F1", "IDF1", "id switches"), scores)
+    flows = _flows(folder, pole, counting)
+    return [*compared, "", *table(("from", "to", "vehicles", "in truth"), flows)]
 
 
-def _flows(folder: Path, scene: Scene) -> list[Row]:
+def _flows(folder: Path, scene: Scene, settings: Settings) -> list[list[str]]:
     """Return the flows from the pole: how many vehicles were found, and how many are true."""
-    settings = load_settings([folder / GATE])
-    size, rate = (scene.camera.width, scene.camera.height), float(scene.rate)
-    found: dict[tuple[str, str], list[int]] = {}
+    size = scene.camera.width, scene.camera.height
+    flows: dict[tuple[str, str], list[int]] = {}
     for number, name in enumerate((_ON_POLE["tracks"], POLE_TRUTH)):
-        (video,) = count_files([folder / name], settings, size, rate).values()
+        (video,) = count_files([folder / name], settings, size, float(scene.rate)).values()
         for row in video.flows():
-            found.setdefault((row.origin, row.destination or NOWHERE), [0, 0])[number] += row.count
-    return [[*way, *map(str, numbers)] for way, numbers in found.items()]
+            flows.setdefault((row.origin, row.destination or NOWHERE), [0, 0])[number] += row.count
+    return [[*way, *map(str, numbers)] for way, numbers in flows.items()]

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from conftest import Run
-from lanes.chessboards import photographs
-from vdet.config.camera import LensSettings
-from vdet.lanes.camera import load_camera
+from lanes.chessboards import CAMERA, photographs
+from vdet.config.loading import load_settings
 from vdet.media.images import write_image
 
 
@@ -16,10 +15,7 @@ from vdet.media.images import write_image
 def boards(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder of six photographs of a board and one of a wall."""
     folder = tmp_path_factory.mktemp("boards")
-    camera = LensSettings(
-        640, 480, ((560, 0, 322), (0, 558, 236), (0, 0, 1)), (-0.25, 0.06, 0, 0, 0), 0
-    )
-    for number, image in enumerate(photographs(camera, 6)):
+    for number, image in enumerate(photographs(CAMERA, 6)):
         write_image(folder / f"board{number}.png", image)
     write_image(folder / "wall.png", np.full((480, 640, 3), 99, np.uint8))
     return folder
@@ -30,7 +26,8 @@ def test_makes_a_camera_of_a_folder_and_names_what_it_skipped(
 ) -> None:
     result = run("calibrate", boards, "-o", tmp_path / "camera.yaml")
     assert result.code == 0, result.err
-    camera = load_camera(tmp_path / "camera.yaml")
+    camera = load_settings([tmp_path / "camera.yaml"]).camera.lens
+    assert camera is not None
     assert camera.matrix[0][0] == pytest.approx(560, rel=0.01)
     assert "wall.png: not used: no board of 9×6 inner corners is seen" in result.err
     assert "640×480, focal length 56" in result.out

@@ -1,4 +1,4 @@
-"""`vdet ground`, and `--ground` of the commands that measure."""
+"""`vdet ground`, and points of the ground in the commands that measure."""
 
 import csv
 from collections.abc import Iterable
@@ -8,15 +8,12 @@ import numpy as np
 import pytest
 
 from conftest import Run
-from lanes.poles import CORNERS, HEIGHT, WIDTH, seen
+from lanes.poles import CORNERS, HEIGHT, WIDTH, ground_text, seen
 from running import write_drive
 from vdet.boxes import Float64Array
-from vdet.config.camera import LensSettings
-from vdet.lanes.camera import Undistorter, save_camera
-from vdet.lanes.ground import load_ground
 from vdet.media.images import write_image
 
-LINES = f"size: [{WIDTH}, {HEIGHT}]\nlines:\n" + "".join(
+LINES = "\ntraffic:\n  lines:\n" + "".join(
     f"  - {{name: {name}, start: {start}, end: {end}}}\n"
     for name, metres in (("near", 20.0), ("far", 40.0))
     for start, end in [seen(np.array([(-6.0, metres), (6.0, metres)])).round(1).tolist()]
@@ -27,20 +24,8 @@ LINES = f"size: [{WIDTH}, {HEIGHT}]\nlines:\n" + "".join(
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     write_image(tmp_path / "frame.png", np.full((HEIGHT, WIDTH, 3), 90, np.uint8))
-    write_points(CORNERS)
-    (tmp_path / "lines.yaml").write_text(LINES)
+    Path("gate.yaml").write_text(ground_text(seen(CORNERS), CORNERS) + LINES)
     return tmp_path
-
-
-def write_points(places: Float64Array, pixels: Float64Array | None = None) -> None:
-    lines = [
-        f"  - {{pixel: [{x:.3f}, {y:.3f}], metres: [{right}, {ahead}]}}"
-        for (x, y), (right, ahead) in zip(
-            seen(places) if pixels is None else pixels, places, strict=True
-        )
-    ]
-    text = "\n".join([f"size: [{WIDTH}, {HEIGHT}]", "points:", *lines])
-    Path("ground.yaml").write_text(text)
 
 
 def write_tracks(ways: Iterable[Float64Array]) -> None:
@@ -60,30 +45,31 @@ def ahead(speed: float, aside: float = 1.0) -> Float64Array:
     return np.column_stack([np.full(len(times), aside), 14 + speed * times])
 
 
-def test_a_file_of_points_is_checked(run: Run) -> None:
-    result = run("ground", "ground.yaml")
+def test_the_points_are_checked(run: Run) -> None:
+    result = run("ground", "-c", "gate.yaml")
     assert result.code == 0, result.err
-    assert "ground.yaml: 4 points, off by 0.00 m" in result.out
+    assert "4 points, off by 0.00 m" in result.out
     assert "the area is 38 m long" in result.out
+    without = run("ground")
+    assert (without.code, "camera.ground: has no points" in without.err) == (1, True)
 
 
 def test_bad_points_are_refused_in_words(run: Run) -> None:
-    write_points(CORNERS, seen(CORNERS)[[0, 2, 1, 3]])
+    Path("gate.yaml").write_text(ground_text(seen(CORNERS)[[0, 2, 1, 3]], CORNERS) + LINES)
     for command in (
-        ("ground", "ground.yaml"),
-        ("paths", "frame.png", "--ground", "ground.yaml", "-o", "grid.png"),
-        ("count", "tracks.csv", "--lines", "lines.yaml", "--ground", "ground.yaml"),
+        ("ground",),
+        ("paths", "frame.png", "-o", "grid.png"),
+        ("count", "tracks.csv"),
     ):
         write_tracks([ahead(12)])
-        result = run(*command)
+        result = run(*command, "-c", "gate.yaml")
         assert result.code == 1
-        assert "ground.yaml: points: the horizon would run between them" in result.err
+        assert "camera.ground: the horizon would run between them" in result.err
 
 
 def test_counts_have_the_speeds_at_their_lines(run: Run) -> None:
     write_tracks([ahead(12), ahead(9.0, -2.0)])
-    places = ("--lines", "lines.yaml", "--ground", "ground.yaml")
-    result = run("count", "tracks.csv", *places, "--counts", "counts.csv")
+    result = run("count", "tracks.csv", "-c", "gate.yaml", "--counts", "counts.csv")
     assert result.code == 0, result.err
     with Path("counts.csv").open() as file:
         rows = [row for row in csv.DictReader(file) if row["id"] == "1"]
@@ -101,86 +87,18 @@ def test_records_of_vehicles_have_speeds(run: Run, red: tuple[str, ...]) -> None
         f"  - {{pixel: [{x}, {y}], metres: [{x / 10}, {-y / 10}]}}\n"
         for x, y in ((0, 0), (320, 0), (320, 240), (0, 240))
     )
-    Path("plan.yaml").write_text(f"size: [320, 240]\npoints:\n{points}")
-    outputs = ("--no-video", "--vehicles", "cars.csv", "--ground", "plan.yaml")
-    result = run("detect-video", "in.mp4", *outputs, *red)
+    Path("plan.yaml").write_text(f"camera:\n  size: [320, 240]\n  ground:\n{points}")
+    outputs = ("--no-video", "--vehicles", "cars.csv")
+    result = run("detect-video", "in.mp4", *outputs, *red, "-c", "plan.yaml")
     assert result.code == 0, result.err
     with Path("cars.csv").open() as file:
         [row] = csv.DictReader(file)
     assert float(row["speed"]) == pytest.approx(3.6 * 2.5, rel=0.2)  # a pixel a frame, 0.1 m
     assert float(row["metres"]) == pytest.approx(0.1 * float(row["length"]), rel=0.3)
     assert float(row["speed_85"]) >= float(row["speed"])
-    result = run("detect-video", "in.mp4", "--no-video", "--vehicles", "plan.yaml", *outputs[3:])
-    assert result.code == 1
-
-
-def test_the_plane_follows_from_two_streams_and_a_length(run: Run) -> None:
-    along = np.linspace(-12, 12, 60)
-    streams = []
-    for turned in (0.5, 0.5 - np.pi / 2):
-        turn = np.array([(np.cos(turned), -np.sin(turned)), (np.sin(turned), np.cos(turned))])
-        streams += [
-            np.column_stack([np.full(60, lane), along]) @ turn.T + np.array((0, 28))
-            for lane in (-5.0, -1.7, 1.7, 5.0)
-        ]
-    write_tracks(streams)
-    (x1, y1), (x2, y2) = seen(np.array([(0.0, 22.0), (3.0, 26.0)])).tolist()
-    length = f"{x1:.1f},{y1:.1f},{x2:.1f},{y2:.1f}=5"
-    command = ("ground", "frame.png", "--tracks-from", "tracks.csv", "--length", length)
-    result = run(*command, "-o", "new.yaml")
-    assert result.code == 0, result.err
-    assert "from 8 vehicles; focal length 1" in result.out or "focal length 9" in result.out
-    ground = load_ground(Path("new.yaml")).ground(WIDTH, HEIGHT)
-    places = ground.place(seen(np.array([(0.0, 20.0), (0.0, 32.0)])) + 0.5)
-    assert float(np.hypot(*(places[1] - places[0]))) == pytest.approx(12, rel=0.03)
-
-
-def test_the_plane_follows_from_the_lane_of_the_settings(run: Run) -> None:
-    result = run("ground", "frame.png", "--lane", "-o", "new.yaml")
-    assert result.code == 0, result.err
-    ground = load_ground(Path("new.yaml")).ground(WIDTH, HEIGHT)
-    corners = np.array([(0.2086, 0.93), (0.7898, 0.93), (0.4602, 0.63)]) * (WIDTH, HEIGHT)
-    places = ground.place(corners + 0.5)
-    assert float(np.hypot(*(places[1] - places[0]))) == pytest.approx(3.7, rel=0.01)
-    assert float(places[2][1] - places[0][1]) == pytest.approx(37, rel=0.01)
-
-
-def test_the_camera_of_a_lens_is_named_in_the_file(run: Run) -> None:
-    matrix = ((1000.0, 0.0, 640.0), (0.0, 1000.0, 360.0), (0.0, 0.0, 1.0))
-    camera = LensSettings(WIDTH, HEIGHT, matrix, (-0.2, 0.0, 0.0, 0.0, 0.0), 0.2)
-    save_camera(camera, Path("my: camera.yaml"))
-    result = run("ground", "frame.png", "--lane", "--camera", "my: camera.yaml", "-o", "new.yaml")
-    assert result.code == 0, result.err
-    request = load_ground(Path("new.yaml"))
-    assert request.camera == camera
-    lens = Undistorter(camera, WIDTH, HEIGHT)
-    corners = np.array([(0.2086, 0.93), (0.7898, 0.93)]) * (WIDTH, HEIGHT)
-    places = request.ground(WIDTH, HEIGHT).place(lens.distorted(corners) + 0.5)
-    assert float(np.hypot(*(places[1] - places[0]))) == pytest.approx(3.7, rel=0.01)
-    arguments = ("ground", "frame.png", "--lane", "--camera", "my: camera.yaml", "--overwrite")
-    refused = run(*arguments, "-o", "my: camera.yaml")
-    assert (refused.code, "is the input itself" in refused.err) == (1, True)
 
 
 def test_the_grid_in_metres_is_drawn(run: Run) -> None:
-    for name, more in (("plain.png", ()), ("grid.png", ("--ground", "ground.yaml"))):
+    for name, more in (("plain.png", ()), ("grid.png", ("-c", "gate.yaml"))):
         assert run("paths", "frame.png", "-o", name, *more).code == 0
     assert Path("plain.png").read_bytes() != Path("grid.png").read_bytes()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "code", "message"),
-    [
-        (["ground.yaml", "-o", "new.yaml"], 2, "a file of points is only checked"),
-        (["frame.png", "-o", "new.yaml"], 2, "either --length or --lane"),
-        (["frame.png", "--lane"], 2, "give -o ground.yaml"),
-        (["frame.png", "--length", "1,2=3", "-o", "n.yaml"], 2, "is not X1,Y1,X2,Y2=METRES"),
-        (["frame.png", "--lane", "-o", "new.txt"], 1, "written as .yaml"),
-        (["frame.png", "--lane", "-o", "ground.yaml"], 1, "is there already"),
-        (["none.yaml"], 1, "none.yaml: cannot be read"),
-    ],
-)
-def test_wrong_use_is_refused(run: Run, arguments: list[str], code: int, message: str) -> None:
-    result = run("ground", *arguments)
-    assert result.code == code
-    assert message in result.err

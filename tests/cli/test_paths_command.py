@@ -10,7 +10,10 @@ from conftest import Run
 from running import write_drive
 from vdet.config.loading import load_settings
 
-LINES = "size: [320, 240]\nlines: [{name: gate, start: [100, 20], end: [100, 220]}]\n"
+LINES = """
+camera: {size: [320, 240]}
+traffic: {lines: [{name: gate, start: [100, 20], end: [100, 220]}]}
+"""
 
 
 @pytest.fixture
@@ -54,7 +57,7 @@ def test_saved_tracks_need_only_a_picture(run: Run, clip: Path, tracks: Path) ->
 
 def test_lines_are_shown_without_a_run(run: Run, clip: Path) -> None:
     run("paths", clip, "--no-paths", "-o", "empty.png")
-    result = run("paths", clip, "--no-paths", "--lines", "lines.yaml", "-o", "preview.png")
+    result = run("paths", clip, "--no-paths", "-c", "lines.yaml", "-o", "preview.png")
     assert (result.code, result.out) == (0, "preview.png: 320×240\n"), result.err
     changed = (pixels("preview.png") != pixels("empty.png")).any(axis=2)
     assert changed[60:200, 100].all()
@@ -63,7 +66,7 @@ def test_lines_are_shown_without_a_run(run: Run, clip: Path) -> None:
 @pytest.mark.parametrize("size", ["[320, 100]", "null"])
 def test_lines_for_another_frame_are_refused(run: Run, clip: Path, size: str) -> None:
     Path("other.yaml").write_text(LINES.replace("[320, 240]", size))
-    result = run("paths", clip, "--no-paths", "--lines", "other.yaml", "-o", "preview.png")
+    result = run("paths", clip, "--no-paths", "-c", "other.yaml", "-o", "preview.png")
     assert result.code == 1
     assert not Path("preview.png").exists()
 
@@ -72,9 +75,9 @@ def test_proposed_lines_work_at_once(run: Run, clip: Path, tracks: Path) -> None
     result = run("suggest-lines", clip, "--tracks-from", tracks, "-o", "new.yaml")
     assert (result.code, result.out) == (0, "new.yaml: 2 lines, 3 vehicles\n"), result.err
     assert "# 3 vehicles, going right in the picture" in Path("new.yaml").read_text()
-    counts = load_settings(places={"counts": Path("new.yaml")}).counts
-    assert [line.name for line in counts.lines] == ["in 1", "out 1"]
-    counted = run("count", tracks, "--lines", "new.yaml")
+    traffic = load_settings([Path("new.yaml")]).traffic
+    assert [line.name for line in traffic.lines] == ["in 1", "out 1"]
+    counted = run("count", tracks, "-c", "new.yaml")
     rows = [line.split()[1:5] for line in counted.out.splitlines()]
     assert ["in", "1", "along", "3"] in rows
     assert ["out", "1", "along", "3"] in rows

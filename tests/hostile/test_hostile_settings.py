@@ -14,7 +14,6 @@ from quick import only_windows
 from vdet.config.document import MAX_BYTES, MAX_MISTAKES
 from vdet.config.loading import load_settings
 from vdet.errors import ConfigError
-from vdet.lanes.camera import load_camera
 
 SETTINGS = """\
 # for one picture
@@ -54,15 +53,17 @@ input: {max_damaged: 0.1, frame_rate: 30}
 output: {scores: true}
 """
 CAMERA = """\
-# frame size, pixels
-width: 1280
-height: 720
-matrix:
-  - [1157.0, 0.0, 668.0]
-  - [0.0, 1153.5, 388.25]
-  - [0.0, 0.0, 1.0]
-distortion: [-0.25, 1e-2, 0.0, 0.0, 0.0]
-rms: 0.7
+camera:
+  lens:
+    # frame size, pixels
+    width: 1280
+    height: 720
+    matrix:
+      - [1157.0, 0.0, 668.0]
+      - [0.0, 1153.5, 388.25]
+      - [0.0, 0.0, 1.0]
+    distortion: [-0.25, 1e-2, 0.0, 0.0, 0.0]
+    rms: 0.7
 """
 TOKENS = (
     *("&a ", "*a", "<<: *a", "!!python/object/apply:os.system [id]", "!!binary x", "!!set {a, b}"),
@@ -95,16 +96,16 @@ def test_damaged_yaml_files_are_read_or_refused(tmp_path: Path, picture: Path) -
     settings = mutated(SETTINGS.encode(), seed=1, count=60, tokens=TOKENS)
     settings += with_other_words(SETTINGS, NUMBERS, seed=2, count=60)
     settings += with_other_words(MOTION, NUMBERS, seed=5, count=20)
+    few = only_windows("size: 160, overlap: 0.5, top: 380, bottom: 600")
     cameras = mutated(CAMERA.encode(), seed=3, count=20, tokens=TOKENS)
     cameras += with_other_words(CAMERA, NUMBERS, seed=4, count=40)
-    few = only_windows("size: 160, overlap: 0.5, top: 380, bottom: 600")
     runs: list[list[str | Path]] = []
     for number, data in enumerate(settings + cameras):
         path = inside / f"{number}.yaml"
         path.write_bytes(data)
         runs.append(["detect-image", picture, "-o", out / f"{number}.png"])
         of_settings = number < len(settings)
-        runs[-1] += ["-c", path] if of_settings else ["--lanes", "--camera", path, *few]
+        runs[-1] += ["-c", path] if of_settings else ["--lanes", *few, "-c", path]
     assert len(runs) == 200
     before = files_in(inside)
     trials = try_all(runs, seconds=SECONDS)
@@ -158,17 +159,6 @@ def test_hostile_yaml_is_refused_with_a_reason(tmp_path: Path, name: str) -> Non
     path.write_text(text, encoding="utf-8")
     with pytest.raises(ConfigError, match=words) as error:
         load_settings([path], detector="svm")
-    lines = str(error.value).splitlines()
-    assert 1 <= len(lines) <= MAX_MISTAKES + 1
-    assert all(line.isprintable() and len(line) < 1000 for line in lines)
-
-
-@pytest.mark.parametrize("name", HOSTILE)
-def test_hostile_yaml_is_no_camera_either(tmp_path: Path, name: str) -> None:
-    path = tmp_path / "camera.yaml"
-    path.write_text(HOSTILE[name][0][:20_000], encoding="utf-8")
-    with pytest.raises(ConfigError) as error:
-        load_camera(path)
     lines = str(error.value).splitlines()
     assert 1 <= len(lines) <= MAX_MISTAKES + 1
     assert all(line.isprintable() and len(line) < 1000 for line in lines)

@@ -6,6 +6,14 @@ import numpy as np
 from vdet.boxes import Image
 from vdet.config.camera import LensSettings
 
+CAMERA = LensSettings(
+    width=640,
+    height=480,
+    matrix=((560.0, 0.0, 322.0), (0.0, 558.0, 236.0), (0.0, 0.0, 1.0)),
+    distortion=(-0.25, 0.06, 0.0005, -0.0004, 0.0),
+    rms=0.5,
+)
+"""A camera with visible lens distortion."""
 PATTERN = (9, 6)
 _TEXELS = 40  # side of a square of the board, texels
 _POSES = (

@@ -5,7 +5,6 @@ from collections.abc import Callable
 import pytest
 from benchmarks.drawn_traffic import lane_view
 
-from vdet.config.camera import LensSettings
 from vdet.config.schema import LaneSettings
 from vdet.lanes.road import Lane, RoadFinder
 from vdet.media import Picture
@@ -68,15 +67,3 @@ def drive(
         return lanes
 
     return find
-
-
-@pytest.fixture(scope="session")
-def wide_camera() -> LensSettings:
-    """A camera with visible lens distortion."""
-    return LensSettings(
-        640,
-        480,
-        ((560.0, 0, 322.0), (0, 558.0, 236.0), (0, 0, 1)),
-        (-0.25, 0.06, 0.0005, -0.0004, 0.0),
-        0.5,
-    )

@@ -16,3 +16,12 @@ def seen(places: Float64Array, tilt: float = 0.25) -> Float64Array:
     sine, cosine = np.sin(tilt), np.cos(tilt)
     down, depth = cosine * ABOVE - sine * z, sine * ABOVE + cosine * z
     return np.column_stack([x / depth, down / depth]) * FOCAL + (WIDTH / 2, HEIGHT / 2)
+
+
+def ground_text(pixels: Float64Array, metres: Float64Array) -> str:
+    """Return a file of settings with these points of the ground."""
+    points = [
+        f"  - {{pixel: [{x:.3f}, {y:.3f}], metres: [{right}, {ahead}]}}"
+        for (x, y), (right, ahead) in zip(pixels, metres, strict=True)
+    ]
+    return "\n".join(["camera:", f"  size: [{WIDTH}, {HEIGHT}]", "  ground:", *points])

@@ -8,24 +8,28 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from lanes.chessboards import PATTERN, photographs
+from lanes.chessboards import CAMERA, PATTERN, photographs
 from vdet.config.camera import LensSettings
 from vdet.errors import ImageError
-from vdet.lanes.calibration import Calibration, calibrate, find_corners
+from vdet.lanes.calibration import calibrate, find_corners
 from vdet.lanes.camera import Undistorter
 from vdet.media.images import read_image, write_image
 
 LARGE = LensSettings(
-    2560, 1920, ((2240, 0, 1289.5), (0, 2232, 945.5), (0, 0, 1)), (0, 0, 0, 0, 0), 0
+    width=2560,
+    height=1920,
+    matrix=((2240, 0, 1289.5), (0, 2232, 945.5), (0, 0, 1)),
+    distortion=(0, 0, 0, 0, 0),
+    rms=0,
 )
 
 
 @pytest.fixture(scope="module")
-def photos(wide_camera: LensSettings, tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+def photos(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     folder = tmp_path_factory.mktemp("boards")
     return [
         written(image, folder / f"board{number}.png")
-        for number, image in enumerate(photographs(wide_camera))
+        for number, image in enumerate(photographs(CAMERA))
     ]
 
 
@@ -34,31 +38,22 @@ def written(image: npt.NDArray[Any], path: Path) -> Path:
     return path
 
 
-@pytest.fixture(scope="module")
-def calibration(photos: list[Path]) -> Calibration:
-    return calibrate(photos, PATTERN)
-
-
-def test_the_camera_is_recovered(
-    calibration: Calibration, wide_camera: LensSettings, photos: list[Path]
-) -> None:
+def test_the_camera_is_recovered(photos: list[Path]) -> None:
+    calibration = calibrate(photos, PATTERN)
     camera = calibration.camera
     assert (camera.width, camera.height) == (640, 480)
-    for row, truth in zip(camera.matrix, wide_camera.matrix, strict=True):
+    for row, truth in zip(camera.matrix, CAMERA.matrix, strict=True):
         assert row == pytest.approx(truth, abs=5)
     assert camera.rms < 0.2
     assert [photo.path for photo in calibration.photos] == photos
     assert calibration.skipped == {}
     pixels = np.mgrid[40:620:8j, 40:450:8j].reshape(2, -1).T
-    found, true = (Undistorter(each, 640, 480).points(pixels) for each in (camera, wide_camera))
+    found, true = (Undistorter(each, 640, 480).points(pixels) for each in (camera, CAMERA))
     assert np.abs(found - true).max() < 2.5
 
 
-@pytest.mark.parametrize("large", [False, True])
-def test_corners_are_found_to_a_fraction_of_a_pixel(
-    wide_camera: LensSettings, *, large: bool
-) -> None:
-    camera = LARGE if large else wide_camera
+@pytest.mark.parametrize("camera", [CAMERA, LARGE])
+def test_corners_are_found_to_a_fraction_of_a_pixel(camera: LensSettings) -> None:
     corners = find_corners(photographs(camera, 1)[0], PATTERN)
     assert corners is not None
     board = np.zeros((54, 3))
@@ -102,10 +97,8 @@ def test_too_few_photographs_with_a_board_are_refused(photos: list[Path]) -> Non
         calibrate(photos[:2], (8, 4))
 
 
-def test_boards_that_are_all_seen_from_the_front_are_refused(
-    wide_camera: LensSettings, tmp_path: Path
-) -> None:
-    front = photographs(wide_camera, 1)[0]
+def test_boards_that_are_all_seen_from_the_front_are_refused(tmp_path: Path) -> None:
+    front = photographs(CAMERA, 1)[0]
     same = []
     for number in range(5):
         moved = np.array([[1, 0, 4.0 * number], [0, 1, 3.0 * number]])

@@ -9,25 +9,23 @@ import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from lanes.chessboards import CAMERA
 from vdet.boxes import Box
 from vdet.config.camera import LensSettings
+from vdet.config.loading import load_settings
 from vdet.errors import ConfigError
-from vdet.lanes.camera import Undistorter, load_camera, save_camera
+from vdet.lanes.camera import Undistorter, save_camera
 
-MATRIX = ((560.0, 0.0, 322.0), (0.0, 558.0, 236.0), (0.0, 0.0, 1.0))
-CAMERA = LensSettings(640, 480, MATRIX, (-0.25, 0.06, 0.0005, -0.0004, 0.0), 0.5)
-GOOD = {
-    "width": 640,
-    "height": 480,
-    "matrix": [[560.0, 0, 322.0], [0, 558.0, 236.0], [0, 0, 1]],
-    "distortion": [-0.25, 0.06, 0.0, 0.0, 0.0],
-    "rms": 0.5,
-}
+MATRIX = CAMERA.matrix
+GOOD = CAMERA.model_dump(mode="json")
 
 
 @pytest.fixture(scope="module")
 def undistorter() -> Undistorter:
     return Undistorter(CAMERA, 640, 480)
+
+
+PLAIN = CAMERA.model_copy(update={"distortion": (0, 0, 0, 0, 0)})
 
 
 def test_a_frame_of_twice_the_size_is_undistorted_in_the_same_way(undistorter: Undistorter) -> None:
@@ -41,7 +39,7 @@ def test_a_frame_of_twice_the_size_is_undistorted_in_the_same_way(undistorter: U
 
 def test_an_aspect_ratio_may_differ_by_rounding_only() -> None:
     matrix = ((1150, 0, 640), (0, 1150, 360), (0, 0, 1))
-    camera = LensSettings(1280, 720, matrix, (0, 0, 0, 0, 0), 1)
+    camera = LensSettings(width=1280, height=720, matrix=matrix, distortion=(0, 0, 0, 0, 0), rms=1)
     assert camera.matrix_for(854, 480)[0, 0] == pytest.approx(767, abs=1)
     for size in ((640, 480), (720, 1280), (1320, 720)):
         with pytest.raises(ConfigError, match=r"is for 1280×720, not"):
@@ -89,7 +87,7 @@ def test_a_box_is_clipped_to_the_frame(undistorter: Undistorter) -> None:
     assert undistorter.box(Box.sized(0, 0, 12, 12)).area == 0
 
 
-@pytest.mark.parametrize("camera", [None, LensSettings(640, 480, MATRIX, (0, 0, 0, 0, 0), 0)])
+@pytest.mark.parametrize("camera", [None, PLAIN])
 def test_without_distortion_nothing_changes(camera: LensSettings | None) -> None:
     undistorter = Undistorter(camera, 640, 480)
     image = np.random.default_rng(0).integers(0, 256, (480, 640, 3), dtype=np.uint8)
@@ -104,9 +102,10 @@ def path(tmp_path: Path) -> Path:
 
 
 def refusal(path: Path, values: object) -> str:
-    path.write_text(yaml.safe_dump(values, sort_keys=False), encoding="utf-8")
+    text = yaml.safe_dump({"camera": {"lens": values}}, sort_keys=False)
+    path.write_text(text, encoding="utf-8")
     with pytest.raises(ConfigError) as error:
-        load_camera(path)
+        load_settings([path])
     return str(error.value).replace(str(path), "camera.yaml")
 
 
@@ -128,25 +127,29 @@ def test_every_camera_is_read_with_all_its_digits(
     rms: float,
 ) -> None:
     matrix = ((focal[0], 0.0, center[0]), (0.0, focal[1], center[1]), (0.0, 0.0, 1.0))
-    camera = LensSettings(640, 480, matrix, distortion, rms)
+    camera = LensSettings(width=640, height=480, matrix=matrix, distortion=distortion, rms=rms)
     save_camera(camera, path, overwrite=True)
-    assert load_camera(path) == camera
+    assert load_settings([path]).camera.lens == camera
 
 
 @pytest.mark.parametrize(
     ("key", "value", "message"),
     [
-        ("width", "wide", "camera.yaml:1:1: width: should be a valid integer"),
-        ("height", 0, "camera.yaml:2:1: height: should be greater than or equal to 16"),
-        ("matrix", [[1, 2], [3, 4]], "camera.yaml:4:3: matrix[0][2]: is missing"),
-        ("matrix", 7, "camera.yaml:3:1: matrix: should be a valid tuple"),
-        ("matrix", [[560, 3, 322], [0, 558, 236], [0, 0, 1]], "3:1: matrix: should be [[fx, 0, c"),
+        ("width", "wide", "camera.yaml:3:5: camera.lens.width: should be a valid integer"),
+        ("height", 0, "camera.yaml:4:5: camera.lens.height: should be greater than or equal to 16"),
+        ("matrix", [[1, 2], [3, 4]], "camera.yaml:6:7: camera.lens.matrix[0][2]: is missing"),
+        ("matrix", 7, "camera.yaml:5:5: camera.lens.matrix: should be a list"),
+        (
+            "matrix",
+            [[560, 3, 322], [0, 558, 236], [0, 0, 1]],
+            "5:5: camera.lens.matrix: should be [[fx, 0, c",
+        ),
         ("matrix", [[1, 0, 322], [0, 558, 236], [0, 0, 1]], "with focal lengths of 0.1 to 100 t"),
         ("matrix", [[560, 0, 322], [0, 1e6, 236], [0, 0, 1]], "with focal lengths of 0.1 to 100"),
         ("matrix", [[560, 0, 322], [0, 558, 500], [0, 0, 1]], "the principal point in the frame"),
         ("distortion", [0, 0, 0, 0, float("nan")], "distortion[4]: should be a finite number"),
         ("rms", -1, "rms: should be greater than or equal to 0"),
-        ("colour", "red", "colour: is not a key of camera files"),
+        ("colour", "red", "camera.lens.colour: is no setting"),
     ],
 )
 def test_each_mistake_is_named_with_its_place(
@@ -157,9 +160,4 @@ def test_each_mistake_is_named_with_its_place(
 
 def test_all_mistakes_are_named_at_once(path: Path) -> None:
     assert len(refusal(path, GOOD | {"width": "wide", "rms": -1}).split("\n")) == 2
-    assert "1:1: matrix: is missing; `vdet calibrate`" in refusal(path, {"width": 640})
-
-
-def test_a_file_that_cannot_be_read_is_named(path: Path) -> None:
-    with pytest.raises(ConfigError, match=r"camera\.yaml: cannot be read"):
-        load_camera(path)
+    assert "camera.lens.matrix: is missing" in refusal(path, {"width": 640})

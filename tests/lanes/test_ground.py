@@ -5,18 +5,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lanes.poles import CORNERS, HEIGHT, WIDTH, seen
+from lanes.poles import CORNERS, HEIGHT, WIDTH, ground_text, seen
 from vdet.boxes import Float64Array
-from vdet.config.camera import LensSettings
+from vdet.config.camera import CameraSettings, LensSettings
+from vdet.config.loading import load_settings
 from vdet.errors import ConfigError
-from vdet.lanes.camera import Undistorter, save_camera
-from vdet.lanes.ground import Ground, fit_ground, load_ground
+from vdet.lanes.camera import Undistorter
+from vdet.lanes.ground import Ground, fit_ground, ground_of
 
 PLAIN = Undistorter(None, WIDTH, HEIGHT)
 EDGE = 0.5
 """Whole numbers are middles of pixels in a file, and edges of pixels in boxes."""
 CAMERA = LensSettings(
-    WIDTH, HEIGHT, ((1000, 0, 640), (0, 1000, 360), (0, 0, 1)), (-0.25, 0.05, 0, 0, 0), 0.2
+    width=WIDTH,
+    height=HEIGHT,
+    matrix=((1000, 0, 640), (0, 1000, 360), (0, 0, 1)),
+    distortion=(-0.25, 0.05, 0, 0, 0),
+    rms=0.2,
 )
 
 
@@ -62,7 +67,7 @@ def test_the_order_of_the_points_does_not_matter() -> None:
 @pytest.mark.parametrize(
     ("metres", "pixels", "message"),
     [
-        (CORNERS[:3], seen(CORNERS[:3]), "points: 3 are given; give four or more"),
+        (CORNERS[:3], seen(CORNERS[:3]), "camera.ground: 3 are given; give four or more"),
         (CORNERS * (0, 1), seen(CORNERS * (0, 1)), "lie on a line (pixel)"),
         (np.array([(0, 14), (0, 20), (0, 30), (5, 30)]), None, "or all but one, lie on a line"),
         (CORNERS * (0, 1), seen(CORNERS), "lie on a line (metres)"),
@@ -81,58 +86,34 @@ def test_a_point_that_does_not_fit_the_others_is_named() -> None:
     metres = np.vstack([CORNERS, [(0.0, 30.0), (3.0, 20.0)]])
     wrong = metres.copy()
     wrong[4] = 5.0, 30.0
-    with pytest.raises(ConfigError, match=r"points\[4\]: lies .* m from where the others say"):
+    with pytest.raises(
+        ConfigError, match=r"camera\.ground\[4\]: lies .* m from where the others say"
+    ):
         fitted(wrong, seen(metres))
 
 
-def written(folder: Path, *lines: str) -> Path:
-    points = [
-        f"  - {{pixel: [{x:.3f}, {y:.3f}], metres: [{right}, {ahead}]}}"
-        for (x, y), (right, ahead) in zip(seen(CORNERS), CORNERS, strict=True)
-    ]
+def camera_of(folder: Path, text: str) -> CameraSettings:
     path = folder / "ground.yaml"
-    path.write_text("\n".join(lines or (f"size: [{WIDTH}, {HEIGHT}]", "points:", *points)))
-    return path
+    path.write_text(text)
+    return load_settings([path]).camera
+
+
+def test_without_points_there_is_no_ground() -> None:
+    assert ground_of(CameraSettings(), 640, 360) is None
 
 
 def test_a_file_is_for_frames_of_any_size_and_the_same_shape(tmp_path: Path) -> None:
-    request = load_ground(written(tmp_path))
+    camera = camera_of(tmp_path, ground_text(seen(CORNERS), CORNERS))
     place = np.array([(2.0, 30.0)])
-    half = request.ground(WIDTH // 2, HEIGHT // 2)
+    half = ground_of(camera, WIDTH // 2, HEIGHT // 2)
+    assert half is not None
     assert half.place(seen(place) / 2 + EDGE) == pytest.approx(place, abs=0.01)
-    with pytest.raises(ConfigError, match=r"ground\.yaml: size: .* another shape"):
-        request.ground(640, 640)
 
 
 def test_a_lens_that_distorts_is_corrected(tmp_path: Path) -> None:
-    save_camera(CAMERA, tmp_path / "camera.yaml")
-    path = written(tmp_path)
     lens = Undistorter(CAMERA, WIDTH, HEIGHT)
-    points = [
-        f"  - {{pixel: [{x:.3f}, {y:.3f}], metres: [{right}, {ahead}]}}"
-        for (x, y), (right, ahead) in zip(lens.distorted(seen(CORNERS)), CORNERS, strict=True)
-    ]
-    path.write_text(
-        "\n".join([f"size: [{WIDTH}, {HEIGHT}]", "camera: camera.yaml", "points:", *points])
-    )
+    camera = camera_of(tmp_path, ground_text(lens.distorted(seen(CORNERS)), CORNERS))
     place = np.array([(2.0, 30.0)])
-    ground = load_ground(path).ground(WIDTH, HEIGHT)
+    ground = ground_of(camera.model_copy(update={"lens": CAMERA}), WIDTH, HEIGHT)
+    assert ground is not None
     assert ground.place(lens.distorted(seen(place)) + EDGE) == pytest.approx(place, abs=0.02)
-
-
-@pytest.mark.parametrize(
-    ("lines", "message"),
-    [
-        (("points: 3",), "ground.yaml:1:1: points: should be a valid tuple"),
-        (("size: [1280, 720]",), "points: is missing"),
-        (("points: [{pixel: [1, 2]}]",), "points[0].metres: is missing"),
-        (("point: []", "points: []"), "point: is not a key of files of the ground"),
-        (("camera: none.yaml", "points: []"), "none.yaml: cannot be read"),
-    ],
-)
-def test_a_mistake_in_a_file_is_named_with_its_place(
-    tmp_path: Path, lines: tuple[str, ...], message: str
-) -> None:
-    with pytest.raises(ConfigError) as error:
-        load_ground(written(tmp_path, *lines))
-    assert message in str(error.value)

@@ -32,7 +32,11 @@ from vdet.synthetic.scene import Scene
 
 WIDTH, HEIGHT, COUNT = 640, 480, 10
 LENS = LensSettings(
-    WIDTH, HEIGHT, ((480, 0, 320), (0, 480, 240), (0, 0, 1)), (-0.35, 0.1, 0.0, 0.0, 0.0), 0.4
+    width=WIDTH,
+    height=HEIGHT,
+    matrix=((480, 0, 320), (0, 480, 240), (0, 0, 1)),
+    distortion=(-0.35, 0.1, 0.0, 0.0, 0.0),
+    rms=0.4,
 )
 CAR = Box.sized(500, 300, 64, 56)  # in the distorted frame, near its edge
 CORNER = np.s_[400:, 600:]
@@ -261,7 +265,9 @@ def test_a_picture_of_another_aspect_ratio_does_not_stop_the_others(
 def test_a_video_of_another_aspect_ratio_is_refused(run: Run, files: Files, tmp_path: Path) -> None:
     wide = tmp_path / "wide.yaml"
     matrix = ((960, 0, 640), (0, 960, 360), (0, 0, 1))
-    save_camera(LensSettings(1280, 720, matrix, (0, 0, 0, 0, 0), 0), wide)
+    save_camera(
+        LensSettings(width=1280, height=720, matrix=matrix, distortion=(0, 0, 0, 0, 0), rms=0), wide
+    )
     outputs = (tmp_path / "out.mp4", "--tracks", tmp_path / "t.csv")
     result = run("detect-video", files.clip, *outputs, *files.red, "--lanes", "--camera", wide)
     assert result.code == 1

@@ -9,8 +9,8 @@ from benchmarks.drawn_traffic import lane_view
 from hypothesis import given
 from hypothesis import strategies as st
 
+from lanes import chessboards
 from vdet.boxes import Box
-from vdet.config.camera import LensSettings
 from vdet.config.schema import LaneSettings
 from vdet.lanes.camera import Undistorter
 from vdet.lanes.curves import LaneCurves
@@ -113,8 +113,8 @@ def test_a_foot_is_at_the_edge_of_a_pixel_as_boxes_are(road: Road) -> None:
     assert position.lane == 0
 
 
-def test_feet_are_undistorted(road: Road, wide_camera: LensSettings) -> None:
-    lens = Undistorter(wide_camera, 640, 480)
+def test_feet_are_undistorted(road: Road) -> None:
+    lens = Undistorter(chessboards.CAMERA, 640, 480)
     [[x, y]] = lens.points(np.array([[560.0, 400.0]])).tolist()
     assert abs(y - 400) > 5
     found = replace(road, undistorter=lens).position((560.5, 400.5))

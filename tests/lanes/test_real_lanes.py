@@ -38,13 +38,12 @@ def test_the_real_camera_is_recovered(calibration: Calibration) -> None:
     assert camera.rms < 1.0
 
 
-@pytest.fixture
-def finder(calibration: Calibration) -> RoadFinder:
+def finder_of(calibration: Calibration) -> RoadFinder:
     return RoadFinder(calibration.camera, LaneSettings(), 1280, 720)
 
 
 def lane_in(calibration: Calibration, path: Path) -> Lane:
-    finder = RoadFinder(calibration.camera, LaneSettings(), 1280, 720)
+    finder = finder_of(calibration)
     lane = finder.update(finder.observe(Picture(read_image(path)))).lane
     assert lane is not None, path.name
     return lane
@@ -67,7 +66,8 @@ def test_straight_roads_are_straight(calibration: Calibration, real_data: Path) 
         assert lane.width == pytest.approx(3.7, abs=0.2)
 
 
-def test_the_lane_is_steady_on_pale_concrete(finder: RoadFinder, real_data: Path) -> None:
+def test_the_lane_is_steady_on_pale_concrete(calibration: Calibration, real_data: Path) -> None:
+    finder = finder_of(calibration)
     with VideoReader(real_data / "test_video.mp4") as reader:
         lanes = [finder.update(finder.observe(frame.picture)).lane for frame in reader]
     shown = [lane for lane in lanes if lane]

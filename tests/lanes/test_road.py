@@ -61,10 +61,10 @@ def test_finds_straight_roads_and_bends_to_both_sides(
 
 
 LIGHT = Light(noise=3.0, shadows=SHADOWS)
-DASHED, WORN = (
-    (LaneLine(-1.85, dash=dash, strength=strength), LaneLine(1.85, dash=3.0, strength=strength))
-    for dash, strength in ((3.0, 1.0), (None, 0.3))
-)
+PALE = 129, 128, 126
+"""The colour of a worn line: 70 % of it is asphalt."""
+DASHED = LaneLine(-1.85, dash=3.0), LaneLine(1.85, dash=3.0)
+WORN = LaneLine(-1.85, PALE), LaneLine(1.85, PALE, dash=3.0)
 
 
 @pytest.mark.parametrize(

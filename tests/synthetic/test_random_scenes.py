@@ -7,47 +7,43 @@ from vdet.synthetic.scene import Scene
 from vdet.synthetic.truth import TrueBox, must_be_found, true_boxes
 
 
-def history(scene: Scene, number: int) -> list[tuple[int, TrueBox]]:
-    """Return the frame numbers and boxes of a vehicle, for every fifth frame."""
-    return [
-        (index, box)
-        for index in range(0, scene.frames, 5)
-        for box in true_boxes(scene, index)
-        if box.id == number
-    ]
-
-
-@pytest.fixture(params=[0, 1, 2])
+@pytest.fixture(scope="module", params=[0, 1, 2])
 def scene(request: pytest.FixtureRequest) -> Scene:
     return demo_scene(request.param)
 
 
-def test_one_vehicle_leaves_at_the_right_edge(scene: Scene) -> None:
-    seen = history(scene, 3)
-    assert seen[0][0] == 0
-    assert seen[0][1].hidden == 0
-    assert seen[-1][0] < scene.frames - 50
-    assert seen[-1][1].box.x2 == scene.camera.width
+@pytest.fixture(scope="module")
+def seen(scene: Scene) -> dict[int, tuple[TrueBox, ...]]:
+    """The true boxes in every fifth frame."""
+    return {index: true_boxes(scene, index) for index in range(0, scene.frames, 5)}
 
 
-def test_one_vehicle_enters_at_the_right_edge_and_stays(scene: Scene) -> None:
-    seen = history(scene, 4)
-    assert seen[0][0] > 25
-    assert seen[0][1].box.x2 == scene.camera.width
-    assert seen[-1][0] == scene.frames - 5
+def test_vehicles_leave_enter_and_are_hidden(
+    scene: Scene, seen: dict[int, tuple[TrueBox, ...]]
+) -> None:
+    leaves, enters, passed = (
+        [(index, box) for index, boxes in seen.items() for box in boxes if box.id == number]
+        for number in (3, 4, 2)
+    )
+    assert leaves[0][0] == 0
+    assert leaves[0][1].hidden == 0
+    assert leaves[-1][0] < scene.frames - 50
+    assert leaves[-1][1].box.x2 == scene.camera.width, "at the right edge"
+    assert enters[0][0] > 25
+    assert enters[0][1].box.x2 == scene.camera.width
+    assert enters[-1][0] == scene.frames - 5, "and stays"
+    hidden = [box.hidden for index, box in passed if index > 110]
+    assert hidden[0] < 0.1
+    assert max(hidden) > 0.9, "while another vehicle passes"
+    assert hidden[-1] < 0.1
 
 
-def test_one_vehicle_is_hidden_while_another_passes(scene: Scene) -> None:
-    late = [box.hidden for index, box in history(scene, 2) if index > 110]
-    assert late[0] < 0.1
-    assert max(late) > 0.9
-    assert late[-1] < 0.1
-
-
-def test_vehicles_in_full_view_have_the_sizes_that_the_window_sets_cover(scene: Scene) -> None:
+def test_vehicles_in_full_view_have_the_sizes_that_the_window_sets_cover(
+    scene: Scene, seen: dict[int, tuple[TrueBox, ...]]
+) -> None:
     unit = scene.camera.height / 720
-    for index in range(0, scene.frames, 5):
-        for vehicle in true_boxes(scene, index):
+    for boxes in seen.values():
+        for vehicle in boxes:
             box = vehicle.box
             if vehicle.hidden == 0 and box.x1 > 0 and box.x2 < scene.camera.width:
                 assert 55 * unit < box.width < 420 * unit

@@ -30,10 +30,6 @@ def drawn_box(scene: Scene) -> Box:
     return Box.sized(*cv2.boundingRect(drawn(scene).astype(np.uint8)))
 
 
-def sides(box: Box) -> tuple[int, int, int, int]:
-    return box.pixels
-
-
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize(("ahead", "lateral"), [(9.0, 0.0), (12.0, 3.7), (25.0, -3.7)])
 def test_the_true_box_bounds_what_is_drawn(
@@ -45,7 +41,7 @@ def test_the_true_box_bounds_what_is_drawn(
 ) -> None:
     scene = make_scene(parked(1, ahead, lateral), size=size)
     [found] = true_boxes(scene, 0)
-    assert sides(found.box) == pytest.approx(sides(drawn_box(scene)), abs=2)
+    assert found.box.pixels == pytest.approx(drawn_box(scene).pixels, abs=2)
     assert found.hidden == 0
 
 
@@ -55,7 +51,7 @@ def test_a_vehicle_may_drive_in_any_direction(
 ) -> None:
     turned = replace(parked(1, 15.0, 0.0), path=(Waypoint(0.0, 18.0, -1.0, heading),))
     [found] = true_boxes(make_scene(turned), 0)
-    assert sides(found.box) == pytest.approx(sides(drawn_box(make_scene(turned))), abs=2)
+    assert found.box.pixels == pytest.approx(drawn_box(make_scene(turned)).pixels, abs=2)
     length = abs(math.sin(heading)) * turned.body.length
     assert found.box.width / found.box.height > 1 + length / 5
 
@@ -68,7 +64,7 @@ def test_a_vehicle_beside_the_camera_is_clipped_to_the_frame(
     [found] = true_boxes(scene, 0)
     assert found.box.x2 == 1280
     # below, the shadow on the ground shows too
-    assert sides(found.box)[:3] == pytest.approx(sides(drawn_box(scene))[:3], abs=2)
+    assert found.box.pixels[:3] == pytest.approx(drawn_box(scene).pixels[:3], abs=2)
     assert found.hidden == 0
 
 

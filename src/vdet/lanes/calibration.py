@@ -76,19 +76,19 @@ def calibrate(paths: Iterable[Path], pattern: Pattern) -> Calibration:
     photos = _without(skipped, photos, pattern)
     camera, errors = _fit(photos, pattern, size)
     median = float(np.median(errors))
-    if max(errors) > OUTLIER_RATIO * median:
-        for photo, error in zip(photos, errors, strict=True):
-            if error > OUTLIER_RATIO * median:
-                skipped[photo.path] = f"is an outlier: error {error:.2f} px, median {median:.2f} px"
-        photos = _without(skipped, photos, pattern)
-        camera, _ = _fit(photos, pattern, size)
+    for photo, error in zip(photos, errors, strict=True):
+        if error > OUTLIER_RATIO * median:
+            skipped[photo.path] = f"is an outlier: error {error:.2f} px, median {median:.2f} px"
+    used = _without(skipped, photos, pattern)
+    if len(used) < len(photos):
+        camera, _ = _fit(used, pattern, size)
     if camera is None:
         raise ImageError(
             "the focal length cannot be found: all photographs show the board from much the same "
             f"side; take some with the board slanted by {MIN_ANGLE:.0f}° or more, to the left and "
             "to the right, up and down"
         )
-    return Calibration(camera, photos, skipped)
+    return Calibration(camera, used, skipped)
 
 
 def find_corners(image: Image, pattern: Pattern) -> Float32Array | None:

@@ -134,13 +134,9 @@ def _rows(
     paint: LinePaint, side: tuple[int, int], position: float, guess: LaneCurves
 ) -> Float64Array:
     """Return the coefficients of the five parameters at each painted row, and its x, `(n, 6)`."""
-    rows = np.empty((len(paint.z), 6))
-    rows[:, 0] = paint.z**2 / pitch_scale(paint.z, guess.pitch)
-    rows[:, 1] = paint.z
-    rows[:, 2:4] = side
-    rows[:, _PITCH] = -position * paint.z
-    rows[:, -1] = paint.x
-    return rows
+    bend = paint.z**2 / pitch_scale(paint.z, guess.pitch)
+    sides = np.tile(np.array(side, np.float64), (len(paint.z), 1))
+    return np.column_stack([bend, paint.z, sides, -position * paint.z, paint.x])
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,9 +184,8 @@ def _fit(mask: Image, top_view: TopView, positions: LinePositions, guess: LaneCu
     right_seen = _is_seen(right, top_view, positions[1])
     if left_seen != right_seen:  # fit again without the paint near the unseen line
         none = LinePaint(np.empty(0), np.empty(0))
-        equations = normal_equations(
-            left if left_seen else none, right if right_seen else none, guess
-        )
+        left, right = left if left_seen else none, right if right_seen else none
+        equations = normal_equations(left, right, guess)
         guess = solve(equations, width)
     return FrameFit(guess, equations, (left_seen, right_seen))
 

@@ -114,7 +114,6 @@ def fit_ground(pixels: Float64Array, metres: Float64Array, undistorter: Undistor
     back = np.asarray(np.linalg.inv(to_metres), np.float64)
     pixel_off = np.hypot(*(_mapped(back, metres) - straight).T)
     area = cv2.convexHull(metres.astype(np.float32))[:, 0].astype(np.float64)
-    area = area[:: 1 if cv2.contourArea(area.astype(np.float32), oriented=True) > 0 else -1]
     error, pixel_error = (float(np.sqrt(np.mean(each**2))) for each in (off, pixel_off))
     if error > _MOST_ERROR * _length(area):
         worst = int(np.argmax(pixel_off))
@@ -128,9 +127,8 @@ def fit_ground(pixels: Float64Array, metres: Float64Array, undistorter: Undistor
 
 def _mapped(matrix: Float64Array, points: Float64Array) -> Float64Array:
     """Apply a homography to points `(n, 2)`; NaN where its last row is not positive."""
-    depths = points @ matrix[2, :2] + matrix[2, 2]
-    depths = np.where(depths > 0, depths, np.nan)
-    return np.asarray((points @ matrix[:2, :2].T + matrix[:2, 2]) / depths[:, None], np.float64)
+    moved = points @ matrix[:, :2].T + matrix[:, 2]
+    return np.asarray(moved[:, :2] / np.where(moved[:, 2:] > 0, moved[:, 2:], np.nan))
 
 
 def _is_thin(points: Float64Array) -> bool:

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from vdet.boxes import Float64Array, Image
 from vdet.draw.paint import Color
@@ -48,10 +47,9 @@ class PinholeCamera:
     def project(self, points: Float64Array) -> Float64Array:
         """Return the pixels `(n, 2)` of points `(n, 3)`, all of them ahead of the camera."""
         x, y, z = points.T
-        pixels = np.empty((len(points), 2))
-        pixels[:, 0] = self.width / 2 + self.focal * (x / z + self.curvature * z / 2)
-        pixels[:, 1] = self.horizon + self.focal * (self.above_ground - y) / z
-        return pixels
+        columns = self.width / 2 + self.focal * (x / z + self.curvature * z / 2)
+        rows = self.horizon + self.focal * (self.above_ground - y) / z
+        return np.column_stack([columns, rows])
 
     def draw(self, image: Image, polygon: Float64Array, color: Color) -> None:
         """Fill the part of a polygon `(n, 3)` beyond `NEAR`."""
@@ -64,8 +62,8 @@ def beyond_near(polygon: Float64Array) -> Float64Array:
     if ahead.all():
         return polygon
     kept = []
-    for i in range(len(polygon)):
-        previous, current = polygon[i - 1], polygon[i]
+    for i, current in enumerate(polygon):
+        previous = polygon[i - 1]
         if ahead[i - 1] != ahead[i]:
             share = (NEAR - previous[2]) / (current[2] - previous[2])
             kept.append(previous + share * (current - previous))
@@ -74,21 +72,14 @@ def beyond_near(polygon: Float64Array) -> Float64Array:
     return np.array(kept).reshape(-1, 3)
 
 
-def distances(start: float, end: float) -> Float64Array:
-    """Return distances from `start` to `end`, 5 % apart, which is enough to follow any bend."""
-    return np.geomspace(start, end, 2 + int(20 * np.log(end / start)))
+def fill(image: Image, outline: Float64Array, color: Color, *, smooth: bool = True) -> None:
+    """Fill an outline of pixels `(n, 2)`; an empty outline changes nothing.
 
-
-def fill(image: Image, outline: Float64Array, color: Color) -> None:
-    """Fill an outline of pixels `(n, 2)` with smooth edges; an empty outline changes nothing."""
+    The edges are smooth, or all pixels that they touch have the colour.
+    """
     if len(outline):
-        cv2.fillPoly(image, [_fixed(outline)], color, cv2.LINE_AA, _SHIFT)
-
-
-def fill_mask(mask: Image, outline: Float64Array) -> None:
-    """Set the pixels `(H, W)` inside an outline to 255, its border included."""
-    if len(outline):
-        cv2.fillPoly(mask, [_fixed(outline)], 255, cv2.LINE_8, _SHIFT)
+        fixed = np.rint(outline * (1 << _SHIFT)).astype(np.int32)
+        cv2.fillPoly(image, [fixed], color, cv2.LINE_AA if smooth else cv2.LINE_8, _SHIFT)
 
 
 def shaded(color: Color, factor: float) -> Color:
@@ -101,7 +92,3 @@ def mixed(color: Color, other: Color, share: float) -> Color:
     """Return a colour with this `share` of another one, 0 to 1."""
     blue, green, red = (round(a + (b - a) * share) for a, b in zip(color, other, strict=True))
     return blue, green, red
-
-
-def _fixed(outline: Float64Array) -> npt.NDArray[np.int32]:
-    return np.rint(outline * (1 << _SHIFT)).astype(np.int32)

@@ -7,18 +7,19 @@ ground, plants and vehicles are drawn in each frame.
 from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
-from vdet.boxes import Float32Array, Image
+from vdet.boxes import Float32Array, Float64Array, Image
 from vdet.config.schema import OutputSettings
 from vdet.files import staged
 from vdet.media import Frame, Picture, VideoInfo
 from vdet.media.writer import VideoWriter, may_replace_video
-from vdet.synthetic.camera import NEAR, distances, mixed, shaded
-from vdet.synthetic.scene import LINE_WIDTH, PERIOD, Carriageway, LaneLine, Scene
+from vdet.synthetic.camera import NEAR, shaded
+from vdet.synthetic.scene import LINE_WIDTH, PERIOD, LaneLine, Scene
 from vdet.synthetic.vehicle import draw_vehicle
 
 _CRF = 20  # of the video; it is material to be searched, so it is finer than what is shown
@@ -41,33 +42,34 @@ class Renderer:
     """Draws the frames of one scene; sky and resting parts of the ground are painted once."""
 
     def __init__(self, scene: Scene) -> None:
+        camera, road = scene.camera, scene.road
         self._scene = scene
-        camera = scene.camera
         self._noise = _sensor_noise(scene)
         self._top = int(camera.horizon) + 2
-        rows = np.arange(self._top, camera.height, dtype=np.float32)
-        self._distance = camera.focal * camera.above_ground / (rows - np.float32(camera.horizon))
+        """The first row of the ground."""
+        rows = np.arange(self._top, camera.height, dtype=np.float32)[:, None]
+        distance = camera.focal * camera.above_ground / (rows - np.float32(camera.horizon))
         columns = np.arange(camera.width, dtype=np.float32) - camera.width / 2
-        distance = self._distance[:, None]
         bend = camera.curvature * distance**2 / 2
-        self._lateral = (columns[None, :] * distance / camera.focal - bend).astype(np.float32)
-        self._levels = list(self._textures())
-        self._background: Image = np.zeros((camera.height, camera.width, 3), np.uint8)
-        _paint_sky(self._background, scene)
-        self._background[self._top :] = _colors(scene.road, self._lateral, distance / camera.focal)
-        for line in scene.road.lines:
+        lateral = (columns * distance / camera.focal - bend).astype(np.float32)
+        self._levels = _levels(scene, lateral, distance)
+        inside = np.minimum(lateral - road.left, road.right - lateral)
+        paved = np.clip(inside / (distance / camera.focal) + 0.5, 0, 1)[..., None]
+        asphalt, verge = (np.array(color, np.float32) for color in (road.asphalt, road.verge))
+        ground = paved * asphalt + (1 - paved) * verge
+        self._background = np.concatenate([_sky(scene)[: self._top], ground]).astype(np.uint8)
+        for line in road.lines:
             if line.dash is None:
                 _draw_stripe(self._background, scene, line, NEAR, 6 * _FAR)
 
     def image(self, index: int) -> Image:
         """Return frame `index`, BGR uint8 `(H, W, 3)`."""
         scene = self._scene
-        station, time = scene.station(index), scene.time(index)
         image = self._background.copy()
-        self._draw_ground(image, station)
-        _draw_plants(image, scene, station)
-        for _, vehicle in reversed(scene.nearest_first(time)):
-            draw_vehicle(image, vehicle, scene, time)
+        self._draw_ground(image, scene.station(index))
+        _draw_plants(image, scene, scene.station(index))
+        for place, vehicle in reversed(scene.nearest_first(scene.time(index))):
+            draw_vehicle(image, vehicle, place, scene)
         return self._expose(image, index)
 
     def _draw_ground(self, image: Image, station: float) -> None:
@@ -86,36 +88,12 @@ class Renderer:
 
     def _expose(self, image: Image, index: int) -> Image:
         """Return the image with the blur of a lens, and the exposure and noise of a sensor."""
-        light = self._scene.light
         soft = cv2.GaussianBlur(image, (3, 3), 0.6)
-        exposed = cv2.convertScaleAbs(soft, alpha=light.gain)
-        if not light.noise:
-            return np.asarray(exposed, dtype=np.uint8)
+        exposed = cv2.convertScaleAbs(soft, alpha=self._scene.light.gain)
         x, y = np.random.default_rng([self._scene.seed, 4, index]).integers(0, _SHIFT, 2)
         height, width = image.shape[:2]
         noise = self._noise[y : y + height, x : x + width]
         return np.asarray(cv2.add(exposed, noise, dtype=cv2.CV_8U), dtype=np.uint8)
-
-    def _textures(self) -> Iterator[_Level]:
-        """Yield the levels of the texture that rows of the image show, the farthest rows first.
-
-        A row has the level at which it skips no texels; those of a level are four times as large
-        as those of the level before.
-        """
-        levels = [_texture(self._scene)]
-        for _ in range(2):
-            size = levels[-1].shape[1] // 4, levels[-1].shape[0] // 4
-            smaller = cv2.resize(levels[-1], size, interpolation=cv2.INTER_AREA)
-            levels.append(np.asarray(smaller, np.uint8))
-        camera = self._scene.camera
-        step = self._distance**2 / (camera.focal * camera.above_ground)  # of a row, metres
-        coarse, fine = np.searchsorted(-step, [-16 * _TEXEL, -4 * _TEXEL]).tolist()
-        for level, start, end in ((2, 0, coarse), (1, coarse, fine), (0, fine, len(step))):
-            if start < end:
-                texel = _TEXEL * 4**level
-                x = np.asarray((self._lateral[start:end] + _HALF_WIDTH) / texel, np.float32)
-                y = np.repeat(self._distance[start:end, None] / texel, x.shape[1], axis=1)
-                yield levels[level], texel, x, np.asarray(y, np.float32)
 
 
 def render(scene: Scene, index: int) -> Image:
@@ -156,16 +134,15 @@ def _sensor_noise(scene: Scene) -> npt.NDArray[np.int16]:
     return np.asarray(np.rint(noise), np.int16)
 
 
-def _paint_sky(image: Image, scene: Scene) -> None:
-    """Paint sky, clouds and hills above the horizon, and down to the first rows of the ground."""
+def _sky(scene: Scene) -> Float64Array:
+    """Return sky, clouds and hills down to the first rows of the ground, BGR `(rows, width, 3)`."""
     rng = np.random.default_rng([scene.seed, 3])
-
-    def noise(rows: int, columns: int) -> npt.NDArray[np.float64]:
-        coarse = rng.standard_normal((rows, columns))
-        return np.asarray(cv2.resize(coarse, (width, height), interpolation=cv2.INTER_CUBIC))
-
     horizon, width, unit = scene.camera.horizon, scene.camera.width, scene.camera.height / 720
     height = int(horizon) + 3
+
+    def noise(rows: int, columns: int) -> Float64Array:
+        return _enlarged(rng.standard_normal((rows, columns)), height, width)
+
     up = np.linspace(1, 0, height)[:, None, None]
     sky = up * np.array([168, 118, 78]) + (1 - up) * np.array([206, 186, 165])
     clouds = 0.25 * (noise(6, 10) + 0.4 * noise(18, 40) - rng.uniform(-0.5, 1.5))
@@ -176,7 +153,29 @@ def _paint_sky(image: Image, scene: Scene) -> None:
         hills = np.clip(np.arange(height)[:, None] - skyline, 0, 1)[..., None]
         grain = 1 + 0.16 * noise(height // 4, width // 4)[..., None]
         sky = (1 - hills) * sky + hills * grain * color
-    image[:height] = np.clip(sky, 0, 255)
+    return np.asarray(np.clip(sky, 0, 255))
+
+
+def _levels(scene: Scene, lateral: Float32Array, distance: Float32Array) -> list[_Level]:
+    """Return the levels of the texture that rows of the image show, the farthest rows first.
+
+    A row has the level at which it skips no texels; those of a level are four times as large as
+    those of the level before. `lateral` `(rows, columns)` and `distance` `(rows, 1)` are where on
+    the ground the pixels are, metres.
+    """
+    step = distance[:, 0] ** 2 / (scene.camera.focal * scene.camera.above_ground)  # metres a row
+    texture, texel, end = _texture(scene), _TEXEL, len(step)
+    levels: list[_Level] = []
+    for finest in (4 * _TEXEL, 16 * _TEXEL, np.inf):
+        start = int(np.searchsorted(-step, -finest))
+        if start < end:
+            x = (lateral[start:end] + _HALF_WIDTH) / texel
+            y = np.repeat(distance[start:end] / texel, x.shape[1], axis=1)
+            levels.insert(0, (texture, texel, x, y))
+        size = texture.shape[1] // 4, texture.shape[0] // 4
+        texture = np.asarray(cv2.resize(texture, size, interpolation=cv2.INTER_AREA), np.uint8)
+        texel, end = 4 * texel, start
+    return levels
 
 
 def _texture(scene: Scene) -> Image:
@@ -186,9 +185,13 @@ def _texture(scene: Scene) -> Image:
     """
     rng = np.random.default_rng([scene.seed, 1])
     rows, columns = int(PERIOD / _TEXEL), int(2 * _HALF_WIDTH / _TEXEL)
-    grain = _noise(rng, rows, columns, 1)
-    patches = _noise(rng, rows, columns, 12)
-    tracks = cv2.resize(_noise(rng, 1, columns, 6), (columns, rows))
+
+    def noise(coarse_rows: int, coarse_columns: int, high: int = rows) -> Float32Array:
+        coarse = rng.standard_normal((coarse_rows, coarse_columns), dtype=np.float32)
+        return _enlarged(coarse, high, columns)
+
+    grain, patches = noise(rows, columns), noise(rows // 12, columns // 12)
+    tracks = noise(1, columns // 6, 1)
     lateral = np.linspace(-_HALF_WIDTH, _HALF_WIDTH, columns)
     paved = (lateral > scene.road.left) & (lateral < scene.road.right)
     gain = 1 + np.where(paved, 0.04, 0.12) * grain + np.where(paved, 0.04, 0.14) * patches
@@ -200,28 +203,20 @@ def _texture(scene: Scene) -> Image:
     return np.clip(gain * _NEUTRAL, 0, 255).astype(np.uint8)
 
 
-def _noise(rng: np.random.Generator, rows: int, columns: int, grain: int) -> Float32Array:
-    """Return smooth noise, mean 0 and deviation about 1, `(rows, columns)`."""
-    shape = (max(1, rows // grain), max(1, columns // grain))
-    noise = rng.standard_normal(shape, dtype=np.float32)
+def _enlarged(noise: npt.NDArray[Any], rows: int, columns: int) -> npt.NDArray[Any]:
+    """Return smooth noise `(rows, columns)`, mean 0 and deviation about 1."""
     return np.asarray(cv2.resize(noise, (columns, rows), interpolation=cv2.INTER_CUBIC))
 
 
-def _colors(road: Carriageway, lateral: Float32Array, pixel: Float32Array) -> Float32Array:
-    """Return the colour at each lateral position; `pixel` is a pixel's width in metres."""
-    inside = np.minimum(lateral - road.left, road.right - lateral) / pixel + 0.5
-    paved = np.clip(inside, 0, 1)[..., None]
-    asphalt, verge = (np.array(color, np.float32) for color in (road.asphalt, road.verge))
-    return np.asarray(paved * asphalt + (1 - paved) * verge, np.float32)
-
-
 def _draw_stripe(image: Image, scene: Scene, line: LaneLine, start: float, end: float) -> None:
-    """Draw a lane line from `start` to `end`, metres ahead."""
-    z = distances(start, end)
+    """Draw a lane line from `start` to `end`, metres ahead.
+
+    Its corners are 5 % apart, which is enough to follow any bend.
+    """
+    z = np.geomspace(start, end, 2 + int(20 * np.log(end / start)))
     x = line.lateral + np.repeat([-0.5, 0.5], len(z)) * LINE_WIDTH
-    z = np.concatenate([z, z[::-1]])
-    stripe = np.stack([x, np.zeros_like(z), z], axis=1)
-    scene.camera.draw(image, stripe, mixed(scene.road.asphalt, line.color, line.strength))
+    stripe = np.column_stack([x, np.zeros_like(x), np.concatenate([z, z[::-1]])])
+    scene.camera.draw(image, stripe, line.color)
 
 
 def _draw_plants(image: Image, scene: Scene, station: float) -> None:
@@ -235,5 +230,5 @@ def _draw_plants(image: Image, scene: Scene, station: float) -> None:
         for size, brightness in _CROWN:
             x = plant.lateral + size * ragged * np.cos(angles) * plant.width / 2
             y = np.maximum(0, plant.height * (1 + size * ragged * np.sin(angles)) / 2)
-            crown = np.stack([x, y, np.full_like(x, ahead)], axis=1)
+            crown = np.column_stack([x, y, np.full_like(x, ahead)])
             scene.camera.draw(image, crown, shaded(plant.color, brightness))

@@ -22,13 +22,12 @@ LINE_WIDTH = 0.15
 
 @dataclass(frozen=True, slots=True)
 class LaneLine:
-    """A lane line along the road, solid or dashed; a worn line has a `strength` below 1."""
+    """A lane line along the road, solid or dashed."""
 
     lateral: float
     color: Color = (225, 230, 230)
     dash: float | None = None
     """Length of a dash, which begins every 12 m; None for a solid line."""
-    strength: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)

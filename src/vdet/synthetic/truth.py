@@ -8,7 +8,7 @@ import numpy as np
 
 from vdet.boxes import Box
 from vdet.files import write_whole
-from vdet.synthetic.camera import fill_mask
+from vdet.synthetic.camera import fill
 from vdet.synthetic.scene import Scene
 from vdet.synthetic.vehicle import outlines
 
@@ -16,6 +16,7 @@ SMALLEST = (40, 24)
 """Least width and height, in pixels of a 720-row frame, of a vehicle that must be found."""
 
 _CAR = 3  # class number in MOTChallenge
+_WHITE = 255, 255, 255
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,13 +34,13 @@ class TrueBox:
 
 def true_boxes(scene: Scene, index: int) -> tuple[TrueBox, ...]:
     """Return the vehicles of which a part lies inside frame `index`, ordered by id."""
-    camera, time = scene.camera, scene.time(index)
+    camera = scene.camera
     covered = np.zeros((camera.height, camera.width), np.uint8)
     found = []
-    for _, vehicle in scene.nearest_first(time):
+    for place, vehicle in scene.nearest_first(scene.time(index)):
         mask = np.zeros_like(covered)
-        for outline, _color in outlines(vehicle, camera, time):
-            fill_mask(mask, outline)
+        for outline, _ in outlines(vehicle, place, camera):
+            fill(mask, outline, _WHITE, smooth=False)
         if inside := cv2.countNonZero(mask):
             hidden = cv2.countNonZero(mask & covered) / inside
             found.append(TrueBox(vehicle.id, Box.sized(*cv2.boundingRect(mask)), hidden))
@@ -74,8 +75,7 @@ def write_truth(path: Path, scene: Scene, *, overwrite: bool = False) -> None:
     for index in range(scene.frames):
         for vehicle in true_boxes(scene, index):
             x, y, width, height = vehicle.box.xywh
-            place = f"{x + 1},{y + 1},{width},{height}"
             flag = int(must_be_found(vehicle, scene.camera.height))
-            last = f"{flag},{_CAR},{1 - vehicle.hidden:.3f}\n"
-            lines.append(f"{index + 1},{vehicle.id},{place},{last}")
+            place = f"{index + 1},{vehicle.id},{x + 1},{y + 1},{width},{height}"
+            lines.append(f"{place},{flag},{_CAR},{1 - vehicle.hidden:.3f}\n")
     write_whole(path, "".join(lines), overwrite=overwrite)

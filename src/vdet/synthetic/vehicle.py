@@ -11,9 +11,9 @@ from itertools import pairwise
 import cv2
 import numpy as np
 
-from vdet.boxes import Float64Array, Image
+from vdet.boxes import Float64Array, Image, Int64Array
 from vdet.draw.paint import Color
-from vdet.synthetic.camera import NEAR, PinholeCamera, beyond_near, fill, mixed, shaded
+from vdet.synthetic.camera import PinholeCamera, beyond_near, fill, mixed, shaded
 from vdet.synthetic.scene import Body, Scene, SceneVehicle, Waypoint
 
 _SHADOW: Color = (34, 32, 32)
@@ -39,69 +39,62 @@ _Facet = tuple[Float64Array, Color]
 
 
 def outlines(
-    vehicle: SceneVehicle, camera: PinholeCamera, time: float
+    vehicle: SceneVehicle, place: Waypoint, camera: PinholeCamera
 ) -> list[tuple[Float64Array, Color]]:
-    """Return the pixels `(n, 2)` and colour of each visible facet, in painting order.
-
-    The list is empty while the vehicle does not exist.
-    """
-    position = vehicle.position(time)
-    if position is None:
-        return []
-    facets = _facets(vehicle.body, vehicle.color)
-    ends = np.cumsum([len(corners) for corners, _ in facets])[:-1]
-    placed = _placed(np.concatenate([corners for corners, _ in facets]), position)
-    if placed[:, 2].min() >= NEAR:
-        pixels = np.split(camera.project(placed), ends)
-    else:
-        pixels = [camera.project(beyond_near(corners)) for corners in np.split(placed, ends)]
+    """Return the pixels `(n, 2)` and colour of each visible facet, in painting order."""
+    corners, ends, colors = _facets(vehicle.body, vehicle.color)
+    parts = [beyond_near(part) for part in np.split(_placed(corners, place), ends)]
+    pixels = camera.project(np.concatenate(parts))
+    ends = np.cumsum([len(part) for part in parts])[:-1]
     return [
         (outline, color)
-        for outline, (_, color) in zip(pixels, facets, strict=True)
+        for outline, color in zip(np.split(pixels, ends), colors, strict=True)
         if len(outline) and cv2.contourArea(outline.astype(np.float32), oriented=True) > 0
     ]
 
 
-def draw_vehicle(image: Image, vehicle: SceneVehicle, scene: Scene, time: float) -> None:
+def draw_vehicle(image: Image, vehicle: SceneVehicle, place: Waypoint, scene: Scene) -> None:
     """Draw a vehicle and the shadow below it onto a frame."""
-    position = vehicle.position(time)
-    if position is None:
-        return
     half, sun = vehicle.body.width / 2, scene.light.sun
     front = vehicle.body.length - STANDS
     left, right = min(0.0, sun) - half, max(0.0, sun) + half
     shadow = _quad((left, 0, STANDS), (right, 0, STANDS), (right, 0, front), (left, 0, front))
-    scene.camera.draw(image, _placed(shadow, position), _SHADOW)
-    light = scene.brightness(scene.speed * time + position.ahead)
-    for outline, color in outlines(vehicle, scene.camera, time):
+    scene.camera.draw(image, _placed(shadow, place), _SHADOW)
+    light = scene.brightness(scene.speed * place.time + place.ahead)
+    for outline, color in outlines(vehicle, place, scene.camera):
         fill(image, outline, shaded(color, light))
 
 
-def _placed(corners: Float64Array, position: Waypoint) -> Float64Array:
+def _placed(corners: Float64Array, place: Waypoint) -> Float64Array:
     """Return corners `(n, 3)` of a vehicle in the coordinates of the camera."""
-    sine, cosine = np.sin(position.heading), np.cos(position.heading)
+    sine, cosine = np.sin(place.heading), np.cos(place.heading)
     turn = np.array([[cosine, 0.0, -sine], [0.0, 1.0, 0.0], [sine, 0.0, cosine]])
-    return np.asarray(corners @ turn + (position.lateral, 0.0, position.ahead))
+    return np.asarray(corners @ turn + (place.lateral, 0.0, place.ahead))
 
 
 @lru_cache(maxsize=512)
-def _facets(body: Body, color: Color) -> list[_Facet]:
-    """Return the facets of a vehicle in painting order; of two that overlap, one is hidden."""
-    lower = _underside(body) + _lower_body(body, color) + _wheels(body, color)
-    return lower + _rear(body, color) + _front(body, color) + _cabin(body, color)
+def _facets(body: Body, color: Color) -> tuple[Float64Array, Int64Array, list[Color]]:
+    """Return the corners of all facets in painting order, where each ends, and their colours.
+
+    Of two facets that overlap, one is hidden.
+    """
+    facets = _underside(body) + _lower_body(body, color) + _wheels(body, color)
+    facets += _rear(body, color) + _front(body, color) + _cabin(body, color)
+    ends = np.cumsum([len(corners) for corners, _ in facets])[:-1]
+    return np.concatenate([corners for corners, _ in facets]), ends, [color for _, color in facets]
 
 
 def _underside(body: Body) -> list[_Facet]:
     half, top = body.width / 2, _SILL + 0.05
-    axle = body.length - STANDS
-    return [
-        (_upright(half - 0.1, -half + 0.1, 0.1, top, axle), _UNDERSIDE),
-        (_upright(-half + 0.28, -half + 0.04, 0.0, top, axle), _TYRE),
-        (_upright(half - 0.04, half - 0.28, 0.0, top, axle), _TYRE),
-        (_upright(-half + 0.1, half - 0.1, 0.1, top, STANDS), _UNDERSIDE),
-        (_upright(-half + 0.04, -half + 0.28, 0.0, top, STANDS), _TYRE),
-        (_upright(half - 0.28, half - 0.04, 0.0, top, STANDS), _TYRE),
-    ]
+    parts = []
+    for side, z in ((-1, body.length - STANDS), (1, STANDS)):  # seen from ahead, and from behind
+        for left, right, bottom, color in (
+            (-half + 0.1, half - 0.1, 0.1, _UNDERSIDE),
+            (-half + 0.04, -half + 0.28, 0.0, _TYRE),
+            (half - 0.28, half - 0.04, 0.0, _TYRE),
+        ):
+            parts.append((_upright(side * left, side * right, bottom, top, z), color))
+    return parts
 
 
 def _lower_body(body: Body, color: Color) -> list[_Facet]:
@@ -134,16 +127,15 @@ def _rear(body: Body, color: Color) -> list[_Facet]:
     """Paint bumper, boot, plate and lights onto the rear."""
     half, belt = body.width / 2, min(body.belt, _HIGHEST_LIGHT)
     bumper = _SILL + 0.32
-    parts = [
+    light = mixed(_LIGHT, shaded(color, 0.5), 0.2)
+    return [
         (_upright(-half + 0.05, half - 0.05, _SILL, _SILL + 0.1, -0.01), shaded(color, 0.4)),
         (_upright(-half, half, bumper, bumper + 0.03, -0.01), shaded(color, 0.5)),
         (_upright(-half + 0.1, half - 0.1, belt - 0.05, belt, -0.01), shaded(color, 1.12)),
         (_upright(-0.27, 0.27, bumper + 0.05, bumper + 0.17, -0.02), _PLATE),
+        (_upright(-half + 0.02, -half + 0.36, belt - 0.24, belt - 0.06, -0.02), light),
+        (_upright(half - 0.36, half - 0.02, belt - 0.24, belt - 0.06, -0.02), light),
     ]
-    for left in (-half + 0.02, half - 0.36):
-        box = (left, left + 0.34, belt - 0.24, belt - 0.06)
-        parts.append((_upright(*box, -0.02), mixed(_LIGHT, shaded(color, 0.5), 0.2)))
-    return parts
 
 
 def _front(body: Body, color: Color) -> list[_Facet]:
@@ -154,9 +146,9 @@ def _front(body: Body, color: Color) -> list[_Facet]:
         (_upright(half - 0.05, -half + 0.05, _SILL, _SILL + 0.12, z), shaded(color, 0.4)),
         (_upright(half - 0.5, -half + 0.5, bumper, belt - 0.12, z), shaded(_GLASS, 0.6)),
         (_upright(0.26, -0.26, bumper, bumper + 0.12, z + 0.01), _PLATE),
+        (_upright(half - 0.04, half - 0.44, belt - 0.28, belt - 0.1, z), _HEADLIGHT),
+        (_upright(-half + 0.44, -half + 0.04, belt - 0.28, belt - 0.1, z), _HEADLIGHT),
     ]
-    lights = (half - 0.04, -half + 0.44)
-    parts += [(_upright(x, x - 0.4, belt - 0.28, belt - 0.1, z), _HEADLIGHT) for x in lights]
     if body.belt > _HIGHEST_LIGHT:
         parts.append((_upright(half - 0.15, -half + 0.15, 1.5, 2.5, z), _GLASS))
     return parts
@@ -169,12 +161,8 @@ def _cabin(body: Body, color: Color) -> list[_Facet]:
     rear_low, rear_high = body.boot, body.boot + body.slope
     front_low = max(rear_high + 1.2, body.length - 1.3)
     front_high = max(rear_high + 0.8, front_low - 0.8)
-    right = _quad(
-        (low, belt, rear_low),
-        (high, roof, rear_high),
-        (high, roof, front_high),
-        (low, belt, front_low),
-    )
+    ends = rear_low, rear_high, front_high, front_low
+    right = np.column_stack([(low, high, high, low), (belt, roof, roof, belt), ends])
     left = right * (-1, 1, 1)
     rear = np.array([left[0], left[1], right[1], right[0]])
     parts = [(np.array([left[1], left[2], right[2], right[1]]), shaded(color, 1.1))]
