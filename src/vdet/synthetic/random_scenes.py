@@ -76,9 +76,9 @@ def pole_scene(seed: int) -> Scene:
     for number in range(8):
         lateral, comes = (number % 4 - 1) * LANE_WIDTH, number % 4 < 2
         start, speed = 2.4 * (number // 4) + rng.uniform(0, 0.5), rng.uniform(13, 16)
-        ahead, ends = ((90.0, -10.0), (-10.0, 90.0))[not comes], (start, start + 100 / speed)
-        points = zip(ends, ahead, strict=True)
-        path = tuple(Waypoint(*point, lateral, np.pi * comes) for point in points)
+        first, last = (90.0, -10.0) if comes else (-10.0, 90.0)
+        ends = (start, first), (start + 100 / speed, last)
+        path = tuple(Waypoint(time, ahead, lateral, np.pi * comes) for time, ahead in ends)
         vehicles.append(SceneVehicle(number + 1, path, random_paint(rng), random_body(rng)))
     still = replace(scene, roadside=(), speed=0.0, rate=Fraction(25, 2), frames=125)
     return replace(still, vehicles=tuple(vehicles))

@@ -117,11 +117,8 @@ class SceneVehicle:
         times = [point.time for point in self.path]
         if not times[0] <= time <= times[-1]:
             return None
-        values = [(point.ahead, point.lateral, point.heading) for point in self.path]
-        ahead, lateral, heading = (
-            float(np.interp(time, times, v)) for v in zip(*values, strict=True)
-        )
-        return Waypoint(time, ahead, lateral, heading)
+        places = zip(*((each.ahead, each.lateral, each.heading) for each in self.path), strict=True)
+        return Waypoint(time, *(float(np.interp(time, times, each)) for each in places))
 
 
 @dataclass(frozen=True, slots=True)
