@@ -2,23 +2,22 @@
 
 import os
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from fractions import Fraction
-from itertools import islice
 from pathlib import Path
-from typing import BinaryIO
 
 import av
 from av.container import InputContainer
 from av.packet import Packet
-from av.stream import Disposition, Stream
+from av.stream import Discard, Disposition, Stream
 from av.video.stream import VideoStream
 
 from vdet.errors import ImageError, VideoError
 from vdet.media.coding import HDR_TRANSFERS, Coding
 from vdet.media.frame import ColorTags, Tags, VideoInfo
 from vdet.media.images import PICTURE_SUFFIXES, Orientation, read_header
+from vdet.media.mp4 import check_index, first_bytes
 from vdet.media.numbered import ASSUMED_RATE, find_sequence
 
 MAX_PIXELS = 8192 * 4608
@@ -40,28 +39,13 @@ _FORMATS = (
 )  # fmt: skip
 
 
-_MAX_SAMPLES = 4_000_000  # always accepted: 44 hours of video
-_MAX_BOXES = 200_000  # that are read; ten hours of one-second fragments have as many
-
-_PARENTS = {b"moov", b"trak", b"mdia", b"minf", b"stbl", b"moof", b"traf"}
-_FIRST_BOXES = {
-    *(b"ftyp", b"styp", b"moov", b"moof", b"mdat"),
-    *(b"free", b"skip", b"wide", b"sidx", b"uuid"),
-}
-_OWN_FIELDS = 0xF00  # flags of a track run: each sample has fields of its own in the file
-
-
-def open_input(
-    path: Path, frame_rate: float | None = None, *, for_tags: bool = False
-) -> InputContainer:
+def open_input(path: Path, frame_rate: float | None = None) -> InputContainer:
     """Open a video file, or numbered pictures (`img_%04d.png`, or a folder), for reading.
 
     Parameters
     ----------
     frame_rate
         Of numbered pictures, per second; None: `ASSUMED_RATE`.
-    for_tags
-        Only the tags of the file are wanted: no frame is decoded to learn more of its streams.
 
     Raises
     ------
@@ -86,13 +70,11 @@ def open_input(
         if not os.path.exists(path):  # noqa: PTH110  # False, too, where it cannot be looked at
             hint = ", or give numbered pictures as img_%04d.png" if "%" in path.name else ""
             raise VideoError(f"{path}: there is no such file; check the name{hint}")
-        check_mp4_index(path)
+        check_index(path)
         if _is_raw_mjpeg(path):
             kind = "mjpeg"  # FFmpeg may take it for a pipe of pictures, which is not read
     try:
         options["max_pixels"] = str(MAX_PIXELS)  # the file is probed with decoders
-        if for_tags:
-            options["codec_whitelist"] = "none"
         return av.open(name, "r", kind, options, metadata_errors="replace")  # tags: any encoding
     except (av.PermissionError, av.error.MemoryError) as error:
         raise VideoError(f"{path}: cannot be opened: {error.strerror}") from error
@@ -119,21 +101,24 @@ def is_pipe(path: Path) -> bool:
 
 def _is_raw_mjpeg(path: Path) -> bool:
     """Return whether a file begins with a JPEG picture, and is not named as a single one."""
-    is_jpeg = path.is_file() and first_bytes(path).startswith(b"\xff\xd8\xff")
+    is_jpeg = first_bytes(path).startswith(b"\xff\xd8\xff")
     return is_jpeg and path.suffix.lower() not in PICTURE_SUFFIXES
 
 
 def packets(
-    container: InputContainer, *streams: Stream, on_error: Callable[[], None]
+    container: InputContainer, streams: Iterable[Stream], on_error: Callable[[], None]
 ) -> "Iterator[Packet[Stream]]":
-    """Yield the packets of `streams` in file order; skip what cannot be read.
+    """Yield the packets of `streams` in file order; skip what cannot be read, and other streams.
 
     `on_error` is called at each place where something had to be skipped.
     """
+    wanted = {stream.index: stream for stream in streams}
+    for other in set(container.streams) - set(wanted.values()):
+        other.discard = Discard.all
     failures = 0
     while failures < _MAX_FAILURES:
         try:
-            for packet in container.demux(list(streams)):
+            for packet in container.demux(*wanted.values()):
                 failures = 0
                 if packet.size:  # an empty one would end the decoder
                     yield packet
@@ -144,68 +129,6 @@ def packets(
             failures += 1
             if failures == 1:
                 on_error()
-
-
-def check_mp4_index(path: Path) -> None:
-    """Refuse an MP4 or MOV file that claims far more samples than it has bytes.
-
-    An index can claim any number of samples of one size in a few bytes, and the demultiplexer makes
-    an entry for each: a file of 5 kB can ask for gigabytes of memory.
-
-    Raises
-    ------
-    VideoError
-        It does. A file that cannot be read passes: `open_input` refuses it.
-    """
-    if not path.is_file():  # reading from a pipe would consume its content
-        return
-    try:
-        with path.open("rb") as file:
-            size = file.seek(0, 2)
-            claimed = sum(islice(_claims(file, size), _MAX_BOXES))
-    except OSError:
-        return
-    if claimed > max(_MAX_SAMPLES, size):
-        raise VideoError(f"{path}: is damaged: {claimed:,} samples in {size:,} bytes")
-
-
-def begins_like_mp4(path: Path) -> bool:
-    """Return whether the first bytes of a file are those of an MP4 or MOV file."""
-    return first_bytes(path)[4:] in _FIRST_BOXES
-
-
-def first_bytes(path: Path) -> bytes:
-    """Return the first 8 bytes of a file; none where it cannot be read."""
-    try:
-        with path.open("rb") as file:
-            return file.read(8)
-    except OSError:
-        return b""
-
-
-def _claims(file: BinaryIO, size: int) -> Iterator[int]:
-    """Yield the number of samples of one size that each box claims."""
-    position = 0
-    while position + 8 <= size:
-        file.seek(position)
-        head = file.read(24)
-        length, kind, inside = int.from_bytes(head[:4]), head[4:8], 8
-        if position == 0 and kind not in _FIRST_BOXES:
-            return
-        if length == 1:
-            length, inside = int.from_bytes(head[8:16]), 16
-        yield _claim(kind, head)
-        if kind not in _PARENTS and length < inside:  # 0: to the end of the file; else damaged
-            return
-        position += inside if kind in _PARENTS else length
-
-
-def _claim(kind: bytes, head: bytes) -> int:
-    if kind == b"stsz" and len(head) >= 20 and any(head[12:16]):
-        return int.from_bytes(head[16:20])
-    if kind == b"trun" and len(head) >= 16 and not int.from_bytes(head[9:12]) & _OWN_FIELDS:
-        return int.from_bytes(head[12:16])
-    return 0
 
 
 _DEFAULT_RATE = Fraction(25)
@@ -295,14 +218,15 @@ def _tags(container: InputContainer, stream: VideoStream) -> Tags:
 
 
 def stated_duration(stream: VideoStream, start: Fraction) -> Fraction | None:
-    """Return the duration of the picture stream that the file declares, seconds, or None.
+    """Return the time from the first frame to the end of the stream, as the file declares it.
 
-    Matroska, in a tag, and ASF declare the end of the stream; `start` is the time of its first
-    frame.
+    In seconds; None where it declares none. `start` is the time of the first frame. In MP4, frames
+    may be hidden before it. Matroska, in a tag, and ASF declare the time of the end.
     """
-    if stream.duration and stream.time_base:
-        before = start if stream.container.format.name == "asf" else 0
-        return stream.duration * stream.time_base - before
+    form, unit = stream.container.format.name, _time_base(stream)
+    if stream.duration:
+        hidden = (stream.start_time or 0) * unit - start if form.startswith("mov") else 0
+        return stream.duration * unit + (-start if form == "asf" else hidden)
     try:
         hours, minutes, seconds = stream.metadata["DURATION"].split(":")
         end = Fraction(hours) * 3600 + Fraction(minutes) * 60 + Fraction(seconds)

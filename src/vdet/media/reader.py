@@ -4,7 +4,6 @@ import itertools
 import logging
 import math
 from collections.abc import Generator, Iterator
-from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
 from typing import Self
@@ -17,12 +16,12 @@ from vdet.boxes import Image
 from vdet.config.schema import InputSettings
 from vdet.errors import VideoError
 from vdet.media.coding import HDR_TRANSFERS, Coding, StandardRange
-from vdet.media.decoder import Decoder, UncountableError
+from vdet.media.decoder import Decoder
 from vdet.media.demux import MAX_PIXELS, check_size, describe, moving_streams, stated_duration
 from vdet.media.frame import Frame, Picture, Planes, VideoInfo, bgr_of
 from vdet.media.images import Orientation, upright
+from vdet.media.mp4 import joined_videos
 from vdet.media.numbered import ASSUMED_RATE, find_sequence
-from vdet.media.restarts import restarts_clock
 
 _log = logging.getLogger("vdet")
 _DEFAULTS = InputSettings()
@@ -97,7 +96,7 @@ class VideoReader:
             check_size(path, first.width, first.height)
             container, stream = self._decoder.container, self._decoder.stream
             self.info: VideoInfo = describe(path, container, stream, first)
-            if not restarts_clock(container):
+            if not self._decoder.clock.may_restart:
                 self.length = stated_duration(stream, self.info.start)
             hdr = first.color_trc in HDR_TRANSFERS
             self._standard_range = StandardRange(first.color_trc) if hdr else None
@@ -150,6 +149,9 @@ class VideoReader:
         streams = len(moving_streams(self._decoder.container))
         if streams > 1:
             yield f"has {streams} video streams; only the first is used"
+        videos = joined_videos(self.info.path)
+        if videos > 1:
+            yield f"is {videos} videos joined to one file; only the first is sure to be read whole"
 
     def _begin(self, first: av.VideoFrame) -> av.VideoFrame:
         """Return the picture at which decoding begins."""
@@ -157,11 +159,10 @@ class VideoReader:
         is_countable = self._decoder.is_countable and not first.interlaced_frame
         if not is_countable or first.pts is None or time <= first.pts:
             return first
-        decoder = Decoder(self.info.path, self._frame_rate, (first.pts, time))
-        pictures, picture = decoder.pictures(), None
-        with suppress(UncountableError):
-            picture = next(pictures, None)
-        if picture is None or decoder.damage.evident:
+        decoder = Decoder(self.info.path, self._frame_rate)
+        pictures = decoder.pictures()
+        picture = next(pictures, None) if decoder.skip_to(time, first.pts) else None
+        if picture is None or decoder.damage.is_evident:
             decoder.close()
             return first
         self._decoder.close()
@@ -224,19 +225,18 @@ class VideoReader:
         assert time is not None
         shown = max(period, picture.duration * self.info.time_base)
         declared, self.length = self.length, time + shown - self.info.start
-        if declared:
-            self._check_length(index + 1, declared, self.length)
+        if declared and (lack := declared - self.length) > max(2 * period, declared * _TOLERANCE):
+            self._end_early(index + 1, lack)
         if self._end is not None and self.length + period < self._end:
             end = f"{float(self._end):.2f} s"
             self._faults.append(f"ends at {float(self.length):.2f} s, before the end given, {end}")
 
-    def _check_length(self, frames: int, declared: Fraction, found: Fraction) -> None:
-        """Note a file that ends earlier than it declares; both lengths in seconds."""
-        lack = declared - found
-        if lack <= max(2 / self.info.rate, declared * _TOLERANCE):
-            return
-        missing = round(lack * self.info.rate)
-        if not self._decoder.damage.end(missing, self._decoder.container.size):
+    def _end_early(self, frames: int, lack: Fraction) -> None:
+        """Note that `lack` seconds are missing at the end, after so many frames."""
+        decoder = self._decoder
+        if decoder.damage.goes_on(decoder.container.size):
+            decoder.damage.lost_at_end += round(lack * self.info.rate)
+        else:
             self._faults.append(f"ends early: {frames} of {self.info.frames} frames could be read")
 
     def _report(self) -> None:
@@ -248,7 +248,7 @@ class VideoReader:
             raise VideoError(
                 f"{self.info.path}: {self._faults[0]}, more than input.max_damaged allows; raise it"
             )
-        restarts = self._decoder.restarts
+        restarts = self._decoder.clock.restarts
         if restarts:
             times = "once" if restarts == 1 else f"{restarts} times"
             self._faults.append(f"its clock restarts {times}; the parts follow one another")

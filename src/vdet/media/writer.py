@@ -14,15 +14,16 @@ import av
 from av.audio.stream import AudioStream
 from av.container import OutputContainer
 from av.packet import Packet
-from av.stream import Discard, Stream
+from av.stream import Stream
 from av.video.reformatter import ColorRange
 
 from vdet.config.schema import OutputSettings
 from vdet.errors import OutputError, VideoError
+from vdet.media.clock import ClockUnwrapper
 from vdet.media.coding import Coding
-from vdet.media.demux import begins_like_mp4, is_pipe, open_input, packets, picture_stream
+from vdet.media.demux import is_pipe, open_input, packets, picture_stream
 from vdet.media.frame import UNSPECIFIED, Frame, Picture, Planes, VideoInfo
-from vdet.media.restarts import continuous_packets, restarts_clock
+from vdet.media.mp4 import is_mp4
 from vdet.version import __version__
 
 _log = logging.getLogger("vdet")
@@ -48,11 +49,11 @@ class SoundCopy:
     def __init__(self, source: Path, target: OutputContainer, origin: Fraction) -> None:
         self._path = source
         self._target = target
-        self._left_out = 0  # packets
         self._origin = origin
+        self._left_out = 0  # packets
         self._source = open_input(source)
         try:
-            self._pictures = picture_stream(self._source, source)
+            self._clock = ClockUnwrapper(self._source, picture_stream(self._source, source))
             self._streams = self._add_streams()
         except BaseException:
             self._source.close()
@@ -81,11 +82,8 @@ class SoundCopy:
         """Add streams to the target; return them by their index in the source."""
         kind = self._target.format.name
         streams = {}
-        for stream in self._source.streams:
-            if not isinstance(stream, AudioStream):
-                if stream.index != self._pictures.index or not restarts_clock(self._source):
-                    stream.discard = Discard.all
-            elif _can_hold(kind, self._path, stream.index):
+        for stream in self._source.streams.audio:
+            if _can_hold(kind, self._path, stream.index):
                 streams[stream.index] = self._target.add_stream_from_template(stream)
                 if stream.language:
                     streams[stream.index].metadata["language"] = stream.language
@@ -99,10 +97,12 @@ class SoundCopy:
         """Yield the packets to copy, with their times and their stream in the target."""
         if not self._streams:
             return
-        wanted = [stream for stream in self._source.streams if stream.index in self._streams]
+        needed = self._clock.streams if self._clock.may_restart else ()
+        sounds = [self._source.streams[index] for index in self._streams]
+        found = packets(self._source, (*needed, *sounds), on_error=lambda: None)
         last: dict[int, int] = {}
-        for packet in continuous_packets(self._source, self._pictures, *wanted):
-            index, pts, dts = packet.stream.index, packet.pts, packet.dts
+        for packet in self._clock.unwrap(found):
+            index, pts, dts = packet.stream_index, packet.pts, packet.dts
             if index not in self._streams:
                 continue
             if pts is None or dts is None or dts <= last.get(index, dts - 1):
@@ -111,15 +111,11 @@ class SoundCopy:
             last[index] = dts
             shift = round(self._origin / packet.time_base)
             packet.pts, packet.dts = pts - shift, dts - shift
-            if not self._is_early(packet):
+            can_hide = self._target.format.name != "matroska"
+            heard_until = packet.pts + (packet.duration or 0) * can_hide
+            if heard_until >= 0:
                 packet.stream = self._streams[index]
                 yield packet
-
-    def _is_early(self, packet: "Packet[Stream]") -> bool:
-        begin = _begin(packet)
-        if self._target.format.name == "matroska":
-            return begin < 0
-        return begin + (packet.duration or 0) * packet.time_base < 0
 
 
 def _begin(packet: "Packet[Stream]") -> Fraction:
@@ -133,11 +129,8 @@ def _can_hold(kind: str, path: Path, index: int) -> bool:
     and there they would cost the picture too.
     """
     with open_input(path) as source:
-        sound = source.streams[index]
-        for stream in source.streams:
-            if stream is not sound:
-                stream.discard = Discard.all
-        for packet in islice(packets(source, sound, on_error=lambda: None), _MAX_TRIALS):
+        found = packets(source, [source.streams[index]], on_error=lambda: None)
+        for packet in islice(found, _MAX_TRIALS):
             try:
                 with av.open(io.BytesIO(), "w", kind) as trial:
                     packet.stream = trial.add_stream_from_template(packet.stream)
@@ -174,10 +167,10 @@ def may_replace_video(path: Path) -> bool:
     if not path.is_file():
         return path.is_symlink()  # it leads nowhere
     try:
-        with open_input(path, for_tags=True) as container:
+        with open_input(path) as container:
             tags = {key.lower(): value for key, value in container.metadata.items()}
     except VideoError:
-        return not begins_like_mp4(path)
+        return not is_mp4(path)
     return tags.get("comment", "").startswith(_MARK)
 
 

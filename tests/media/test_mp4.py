@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from vdet.errors import VideoError
-from vdet.media.demux import check_mp4_index
+from vdet.media.mp4 import check_index
 from vdet.media.reader import VideoReader
 
 Writer = Callable[..., Path]
@@ -43,7 +43,7 @@ def test_fragments_that_claim_too_many_samples_together_are_refused(
     data = box(b"ftyp", b"isom") + box(b"moof", box(b"traf", run)) * parts
     (tmp_path / "bomb.mp4").write_bytes(data)
     with pytest.raises(VideoError, match="is damaged: 90,000,000 samples"):
-        check_mp4_index(tmp_path / "bomb.mp4")
+        check_index(tmp_path / "bomb.mp4")
 
 
 def test_an_index_after_a_box_with_a_64_bit_size_is_checked(tmp_path: Path) -> None:
@@ -51,7 +51,7 @@ def test_an_index_after_a_box_with_a_64_bit_size_is_checked(tmp_path: Path) -> N
     table = box(b"moov", box(b"trak", box(b"stsz", struct.pack(">III", 0, 1, MANY))))
     (tmp_path / "bomb.mov").write_bytes(large + table)
     with pytest.raises(VideoError, match="is damaged: 90,000,000"):
-        check_mp4_index(tmp_path / "bomb.mov")
+        check_index(tmp_path / "bomb.mov")
 
 
 def test_whole_clips_pass(tmp_path: Path, write_clip: Writer) -> None:
@@ -61,4 +61,4 @@ def test_whole_clips_pass(tmp_path: Path, write_clip: Writer) -> None:
         ("mp4", {"movflags": "+frag_keyframe+empty_moov"}),
         ("mkv", {}),
     ):
-        check_mp4_index(write_clip(tmp_path / f"clip.{suffix}", **options))
+        check_index(write_clip(tmp_path / f"clip.{suffix}", **options))
