@@ -221,20 +221,17 @@ def grid(sweeps: Sequence[str]) -> list[tuple[str, ...]]:
     ConfigError
         There is no `=`, a value is empty, or a key is swept twice.
     """
-    axes = [_axis(text) for text in sweeps]
-    keys = [axis[0].partition("=")[0] for axis in axes]
-    for key in keys:
-        if keys.count(key) > 1:
+    axes: dict[str, list[str]] = {}
+    for text in sweeps:
+        key, equals, values = (part.strip() for part in text.partition("="))
+        found = [value.strip() for value in _split(values)]
+        if not (key and equals and all(found)):
+            expected = "expected KEY=VALUE,VALUE, as in tracker.needed=0.1,0.2"
+            raise ConfigError(f"--sweep {text}: {expected}")
+        if key in axes:
             raise ConfigError(f"--sweep {key}: is given twice; put all its values in one")
-    return list(itertools.product(*axes))
-
-
-def _axis(text: str) -> list[str]:
-    key, equals, values = (part.strip() for part in text.partition("="))
-    found = [value.strip() for value in _split(values)]
-    if not (key and equals and all(found)):
-        raise ConfigError(f"--sweep {text}: expected KEY=VALUE,VALUE, as in tracker.needed=0.1,0.2")
-    return [f"{key}={value}" for value in dict.fromkeys(found)]
+        axes[key] = [f"{key}={value}" for value in dict.fromkeys(found)]
+    return list(itertools.product(*axes.values()))
 
 
 def _split(values: str) -> list[str]:

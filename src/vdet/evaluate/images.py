@@ -104,9 +104,10 @@ def _widths(boxes: Float64Array) -> Float64Array:
 class SizeScores:
     """Counts and ratios of the vehicles of one size; a ratio is None without vehicles.
 
-    A false positive has the size of its own box.
+    A false positive has the size of its own box. `width` is one of `SIZE_NAMES`.
     """
 
+    width: str
     vehicles: int
     matches: int
     false_positives: int
@@ -191,7 +192,8 @@ class ImagesResult:
     def mean(self) -> ImageScores:
         """The mean over the sources."""
         scores = [source.scores for source in self.sources]
-        sizes = tuple(map(_mean, zip(*(each.sizes for each in scores), strict=True)))
+        columns = zip(SIZE_NAMES, *(each.sizes for each in scores), strict=True)
+        sizes = tuple(_mean(column, width=name) for name, *column in columns)
         best_f1, best_score = _best([source.ranked for source in self.sources])
         return _mean(scores, best_f1=best_f1, best_score=best_score, sizes=sizes)
 
@@ -296,7 +298,7 @@ def _by_size(images: Sequence[MeasuredImage]) -> tuple[SizeScores, ...]:
             kinds = vehicles, vehicles[frame.rows], wrong
             counts += [np.histogram(widths, (0, *SIZES, np.inf))[0] for widths in kinds]
     found = []
-    for count, matches, alarms in counts.T.tolist():
+    for name, (count, matches, alarms) in zip(SIZE_NAMES, counts.T.tolist(), strict=True):
         ratios = ratio(matches, count), ratio(2 * matches, matches + alarms + count)
-        found.append(SizeScores(count, matches, alarms, *(ratios if count else (None, None))))
+        found.append(SizeScores(name, count, matches, alarms, *(ratios if count else (None, None))))
     return tuple(found)

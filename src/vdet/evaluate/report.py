@@ -73,28 +73,21 @@ def images_report(result: ImagesResult, run: RunName) -> Report:
     head = [*run.lines(), _counting_line(result)]
     scores = _score_table("source", OF_PICTURES, rows)
     tables = [each for each in (_size_table(rows), _class_table(result)) if each[1]]
-    others = [line for source in result.sources for line in _others(source)]
-    values = {
-        **run.values(),
-        **asdict(result.counting),
-        "mean": _image_values(mean),
-        "sources": [
-            {
-                "source": source.labelled.name,
-                **_image_values(source.scores),
-                "not_vehicles": dict(source.labelled.others),
-            }
-            for source in result.sources
-        ],
-        "classes": list(map(asdict, result.classes())),
-    }
+    notes = [line for source in result.sources for line in _others(source)]
+    sources = []
+    for source in result.sources:
+        others = {"not_vehicles": dict(source.labelled.others)}
+        sources.append({"source": source.labelled.name, **asdict(source.scores), **others})
+    classes = list(map(asdict, result.classes()))
+    measured = {"mean": asdict(mean), "sources": sources, "classes": classes}
+    values = {**run.values(), **asdict(result.counting), **measured}
 
     def page() -> str:
         sheets = [(source.labelled.name, worst_tiles(source)) for source in result.sources]
         parts = {"plot": _f1_plot(result), "tables": tables, "sheets": sheets}
-        return _page("eval_images.html", "; ".join(head), scores, others, **parts)
+        return _page("eval_images.html", "; ".join(head), scores, notes, **parts)
 
-    lines = _paragraphs(head, *(table(*each) for each in (scores, *tables)), others)
+    lines = _paragraphs(head, *(table(*each) for each in (scores, *tables)), notes)
     return Report(lines, values, page)
 
 
@@ -194,11 +187,6 @@ def _others(source: MeasuredSet) -> Iterator[str]:
         named = ", ".join(f"{printable(name)} ({count})" for name, count in shown)
         more = ", …" if len(labelled.others) > _MOST_OTHERS else ""
         yield f"not vehicles in {labelled.name}: {named}{more}"
-
-
-def _image_values(scores: ImageScores) -> dict[str, Any]:
-    sizes = zip(SIZE_NAMES, map(asdict, scores.sizes), strict=True)
-    return {**asdict(scores), "sizes": [{"width": name, **size} for name, size in sizes]}
 
 
 def _f1_plot(result: ImagesResult) -> Plot:
