@@ -25,11 +25,9 @@ from vdet.config.loading import load_settings
 from vdet.config.schema import NetworkSettings, Settings
 from vdet.config.train import NetworkScoreSettings
 from vdet.detect.factory import load_detector, trained_on
-from vdet.evaluate.average_precision import rank_predictions
-from vdet.evaluate.comparison import pool
 from vdet.evaluate.images import Counting, ImagesResult, MeasuredSet, evaluate_images
 from vdet.evaluate.output import figure, share, table
-from vdet.evaluate.show_video import result_lines
+from vdet.evaluate.report import result_lines
 from vdet.evaluate.video import Variant, evaluate_clips, open_clip
 from vdet.labels.reading import read_labelled_pictures
 from vdet.learn.net.run import NetworkJob, read_sources, train_to_file
@@ -141,9 +139,9 @@ def measure(sets: Sequence[Path], network: Path) -> ImagesResult:
 
 def ranked_logits(sources: Sequence[MeasuredSet]) -> tuple[Float64Array, BoolArray]:
     """Return the logit of each detection's score, and whether the detection finds a vehicle."""
-    ranked = [rank_predictions(pool([i.every for i in each.images])) for each in sources]
-    scores = np.clip(np.concatenate([each.scores for each in ranked]), 1e-6, 1 - 1e-6)
-    return np.log(scores / (1 - scores)), np.concatenate([each.right[0] for each in ranked])
+    scores = np.concatenate([source.ranked.scores for source in sources]).clip(1e-6, 1 - 1e-6)
+    right = np.concatenate([source.ranked.right[0] for source in sources])
+    return np.log(scores / (1 - scores)), right
 
 
 def fit_calibration(logits: Float64Array, right: BoolArray) -> tuple[float, float]:
@@ -258,7 +256,7 @@ def summarize(by_kind: ByKind) -> Summary:
     """Return the scores at one score for all groups, and fit the calibration to all detections."""
     results = [result for each in by_kind.values() for result in each]
     sources = [source for result in results for source in result.sources]
-    scores = np.unique(np.concatenate([source.curve.scores for source in sources]))
+    scores = np.unique(np.concatenate([each.ranked.f1_curve()[0] for each in sources]))
     common = scores[np.argmax(_mean_f1(results, scores))]
     slope, offset = fit_calibration(*ranked_logits(sources))
     means = {}
@@ -270,7 +268,7 @@ def summarize(by_kind: ByKind) -> Summary:
             SetScores(
                 Path(source.labelled.name).name,
                 source.scores.vehicles,
-                float(source.curve.at(common)),
+                float(source.ranked.f1_at(common)),
                 source.scores.best_f1,
                 source.scores.best_score,
                 source.scores.ap50,
@@ -290,15 +288,15 @@ def video_lines(clip: tuple[Path, Path], network: Path, settings: Settings) -> l
     """Return how well a network finds and follows the vehicles of a video."""
     model = load_detector(NetworkSettings(model=str(network)))
     variant = Variant(settings, model, ())
-    return list(result_lines(evaluate_clips([open_clip(*clip)], [variant])))
+    return result_lines(evaluate_clips([open_clip(*clip)], [variant]))
 
 
 def _mean_f1(results: Sequence[ImagesResult], scores: Float64Array) -> Float64Array:
     """Return the mean F1 of groups at each of `scores`; of a group, that of its sets."""
     groups = []
     for result in results:
-        curves = [source.curve for source in result.sources if source.scores.vehicles]
-        groups.append(np.mean([curve.at(scores) for curve in curves], axis=0))
+        known = [source.ranked for source in result.sources if source.ranked.vehicles]
+        groups.append(np.mean([ranked.f1_at(scores) for ranked in known], axis=0))
     return np.asarray(np.mean(groups, axis=0))
 
 

@@ -4,26 +4,12 @@ from vdet.cli.evaluate import grid
 from vdet.errors import ConfigError
 
 
-def test_the_values_of_a_key_in_their_order() -> None:
-    assert grid(("detector.heat.threshold=4,1, 2",)) == [
-        ("detector.heat.threshold=4",),
-        ("detector.heat.threshold=1",),
-        ("detector.heat.threshold=2",),
-    ]
-
-
-def test_several_keys_make_a_grid() -> None:
-    assert grid(("a=1,2", "b=x,y")) == [
-        *(("a=1", "b=x"), ("a=1", "b=y")),
-        *(("a=2", "b=x"), ("a=2", "b=y")),
-    ]
-
-
-def test_a_comma_in_brackets_belongs_to_the_value() -> None:
-    values = "detector.search.windows=[{size: 64, top: 1}],[{size: 96, top: 2}]"
-    assert grid((values,)) == [
-        ("detector.search.windows=[{size: 64, top: 1}]",),
-        ("detector.search.windows=[{size: 96, top: 2}]",),
+def test_every_combination_of_the_values_in_their_order() -> None:
+    assert grid(()) == [()]
+    assert grid(("a=4,1, 2,4",)) == [("a=4",), ("a=1",), ("a=2",)]
+    assert grid(("a=1,2", "b=[{c: 6, d: 1}],[{c: 9, d: 2}]")) == [
+        *(("a=1", "b=[{c: 6, d: 1}]"), ("a=1", "b=[{c: 9, d: 2}]")),
+        *(("a=2", "b=[{c: 6, d: 1}]"), ("a=2", "b=[{c: 9, d: 2}]")),
     ]
 
 

@@ -5,24 +5,51 @@ from pathlib import Path
 import pytest
 
 from vdet.cli.results import Results
-from vdet.errors import OutputError
+from vdet.errors import OutputError, VideoError
 
 
-def test_the_folder_of_a_page_is_made_and_an_earlier_page_is_kept(tmp_path: Path) -> None:
-    folder = tmp_path / "a" / "b"
-    Results(None, page=folder, overwrite=False).check()
-    (folder / "page.html").write_text("precious")
-    with pytest.raises(OutputError, match=r"page\.html: is there already; give --overwrite"):
-        Results(None, page=folder, overwrite=False).check()
-    Results(None, page=folder, overwrite=True).check()
-    with pytest.raises(OutputError, match="cannot be made a folder"):
-        Results(None, page=folder / "page.html", overwrite=True).check()
-
-
-def test_earlier_numbers_and_inputs_are_kept(tmp_path: Path) -> None:
-    target = tmp_path / "a.json"
-    Results(str(target), overwrite=False).print(["F1"], {"f1": 0.5})
-    with pytest.raises(OutputError, match="is there already"):
-        Results(str(target), overwrite=False).check()
+def test_a_page_and_numbers_that_cannot_be_written_are_refused_before_any_work(
+    tmp_path: Path,
+) -> None:
+    folder, target = tmp_path / "a" / "b", tmp_path / "a.json"
+    results = Results(str(target), page=folder, overwrite=False)
+    results.check()
+    assert not list(tmp_path.iterdir()), "a run that fails leaves no folder"
+    results.print(["F1"], {"f1": 0.5}, lambda: "precious")
+    for kept in (results, Results(str(target), overwrite=False), Results(None, False, folder)):
+        with pytest.raises(OutputError, match="is there already; give --overwrite"):
+            kept.check()
+    Results(str(target), page=folder, overwrite=True).check()
     with pytest.raises(OutputError, match="is the input itself"):
         Results(str(target), overwrite=True).check([target])
+    with pytest.raises(OutputError, match=r"the folder .*page\.html is no folder"):
+        Results(None, page=folder / "page.html", overwrite=True).check()
+    with pytest.raises(OutputError, match="is given for two outputs"):
+        Results(str(folder / "page.html"), page=folder, overwrite=True).check()
+
+
+def test_numbers_may_lie_in_the_new_folder_of_the_page(tmp_path: Path) -> None:
+    results = Results(str(tmp_path / "a" / "a.json"), page=tmp_path / "a", overwrite=False)
+    results.check()
+    results.print([], {"f1": 0.5}, lambda: "html")
+    assert {file.name for file in (tmp_path / "a").iterdir()} == {"a.json", "page.html"}
+
+
+def test_numbers_and_page_appear_together_or_not_at_all(tmp_path: Path) -> None:
+    results = Results(str(tmp_path / "a.json"), page=tmp_path / "page", overwrite=False)
+
+    def fail() -> str:
+        raise VideoError("in.mp4: is gone")
+
+    def write_meanwhile() -> str:
+        (tmp_path / "page").mkdir()
+        (tmp_path / "page" / "page.html").write_text("of another")
+        return "ours"
+
+    with pytest.raises(VideoError):
+        results.print([], {}, fail)
+    assert not list(tmp_path.iterdir())
+    with pytest.raises(OutputError, match="has appeared during the run"):
+        results.print([], {}, write_meanwhile)
+    assert [each.name for each in tmp_path.iterdir()] == ["page"]
+    assert (tmp_path / "page" / "page.html").read_text() == "of another"

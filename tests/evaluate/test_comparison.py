@@ -5,7 +5,6 @@ from labels.saving import row
 from vdet.evaluate.comparison import compare, pool
 from vdet.evaluate.scores import score_comparison
 from vdet.labels.label import NO_ID, Label
-from vdet.labels.video import LabelledVideo
 
 
 def box(id_: int, x: float, width: float = 100, frame: int = 1) -> Label:
@@ -16,36 +15,27 @@ def region(x: float, width: float, id_: int = NO_ID) -> Label:
     return row(0, 1, id_, x, 0, width, 100, ignored=True)
 
 
-def kept_tracks(prediction: LabelledVideo, truth: LabelledVideo) -> list[int]:
-    comparison = compare(prediction, truth)
-    return [int(comparison.track_ids[track]) for f in comparison.frames for track in f.tracks]
+IGNORED = [box(id_, x)._replace(ignored=True) for id_, x in ((5, 0), (6, 300))]
 
 
-def test_a_prediction_in_an_ignore_region_is_dropped() -> None:
-    assert kept_tracks(video([box(5, 300)]), video([region(250, 500)])) == []
-
-
-def test_less_than_half_of_the_own_area_is_not_enough() -> None:
-    assert kept_tracks(video([box(5, 149)]), video([region(200, 500)])) == [5]
-
-
-def test_parts_in_two_regions_are_not_added_up() -> None:
-    regions = video([region(0, 140), region(160, 140)])
-    assert kept_tracks(video([box(5, 100)]), regions) == [5]
-
-
-def test_a_prediction_that_finds_a_vehicle_in_a_region_is_kept() -> None:
-    assert kept_tracks(video([box(5, 300)]), video([box(1, 310), region(250, 500)])) == [5]
-
-
-def test_of_two_predictions_on_a_vehicle_in_a_region_the_worse_one_is_dropped() -> None:
-    found = video([box(5, 320), box(6, 300)])
-    assert kept_tracks(found, video([box(1, 300), region(250, 500)])) == [6]
-
-
-def test_an_ignored_prediction_counts_only_if_it_finds_a_vehicle() -> None:
-    found = [box(id_, x)._replace(ignored=True) for id_, x in ((5, 0), (6, 300))]
-    assert kept_tracks(video(found), video([box(1, 10)])) == [5]
+@pytest.mark.parametrize(
+    ("found", "truth", "kept"),
+    [
+        pytest.param([box(5, 300)], [region(250, 500)], [], id="in a region"),
+        pytest.param([box(5, 149)], [region(200, 500)], [5], id="less than half in a region"),
+        pytest.param([box(5, 100)], [region(0, 140), region(160, 140)], [5], id="in parts of two"),
+        pytest.param([box(5, 300)], [box(1, 310), region(250, 500)], [5], id="finds a vehicle"),
+        pytest.param(
+            [box(5, 320), box(6, 300)], [box(1, 300), region(250, 500)], [6], id="the worse of two"
+        ),
+        pytest.param(IGNORED, [box(1, 10)], [5], id="itself ignored"),
+    ],
+)
+def test_predictions_that_count_beside_ignore_regions(
+    found: list[Label], truth: list[Label], kept: list[int]
+) -> None:
+    comparison = compare(video(found), video(truth))
+    assert [int(comparison.track_ids[t]) for f in comparison.frames for t in f.tracks] == kept
 
 
 def test_frames_with_nothing_that_counts_are_left_out() -> None:

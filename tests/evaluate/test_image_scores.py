@@ -16,7 +16,6 @@ from vdet.evaluate.images import (
     ImagesResult,
     MeasuredImage,
     MeasuredSet,
-    mean_scores,
     score_source,
 )
 from vdet.labels.label import Label
@@ -119,7 +118,7 @@ def test_vehicles_are_counted_by_their_class_and_the_class_of_their_detection() 
     measured = score_source(
         LabelledPictures("set", (picture,)), [MeasuredImage.of(picture, WIDTH, found, PLAIN)]
     )
-    car, truck = ImagesResult(PLAIN, (measured,), measured.scores).classes()
+    car, truck = ImagesResult(PLAIN, (measured,)).classes()
     assert car == ClassResult("car", 1, 0.5, 1, 2 / 3, {"car": 1, "truck": 0})
     assert truck == ClassResult("truck", 2, 0, 0, 0, {"car": 1, "truck": 0})
 
@@ -167,7 +166,7 @@ class TestMean:
         empty = source(Searched([], [(0.9, at(0))]))
         assert empty.scores.f1 is None
         assert empty.scores.false_positives == 1
-        mean = mean_scores([good, bad, empty])
+        mean = ImagesResult(PLAIN, (good, bad, empty)).mean
         assert (mean.images, mean.vehicles, mean.matches, mean.false_positives) == (3, 4, 1, 1)
         assert (mean.recall, mean.f1) == (0.5, 0.5)
         assert mean.sizes[2].recall == 0.5
@@ -176,6 +175,6 @@ class TestMean:
         low = source(Searched([at(0)], [(0.3, at(0)), (0.1, at(500))]))
         high = source(Searched([at(0)], [(0.8, at(0)), (0.6, at(500)), (0.5, at(700))]))
         assert (low.scores.best_score, high.scores.best_score) == (0.3, 0.8)
-        mean = mean_scores([low, high])
+        mean = ImagesResult(PLAIN, (low, high)).mean
         assert mean.best_score == 0.3
         assert mean.best_f1 == pytest.approx((1 + 0.5) / 2)

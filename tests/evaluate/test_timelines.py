@@ -13,6 +13,8 @@ from vdet.evaluate.timelines import (
 )
 from vdet.labels.video import LabelledVideo
 
+TRUE = (8, 5, 0.0), (9, 7, 300.0), (10, 5, 600.0)  # id, first frame, place
+
 
 def found_mistakes(found: LabelledVideo, truth: LabelledVideo) -> tuple[Stretch, ...]:
     return mistakes(stretches(compare(found, truth)))
@@ -29,19 +31,13 @@ def test_each_track_has_its_own_stretch() -> None:
 
 
 def test_the_delay_is_from_the_first_true_frame_to_the_first_match() -> None:
-    truth = video(drive(8, range(5, 20)), drive(9, range(7, 20), x=300))
-    found = video(drive(1, range(12, 20)), drive(2, range(7, 20), x=300))
+    truth = video(*(drive(id_, range(start, 20), x) for id_, start, x in TRUE))
+    found = video(drive(1, range(12, 20)), drive(2, range(7, 20), x=300), drive(3, TEN, x=900))
     scores = score(found, truth)
-    assert scores.first_detections == (FirstDetection(8, 5, 12), FirstDetection(9, 7, 7))
-    assert [each.delay for each in scores.first_detections] == [7, 0]
-    assert scores.mean_delay == 3.5
-
-
-def test_a_vehicle_never_found_has_no_delay() -> None:
-    scores = score(video(drive(1, range(1, 5), x=300)), video(drive(8, range(1, 5))))
-    assert scores.first_detections == (FirstDetection(8, 1, None),)
-    assert scores.first_detections[0].delay is None
-    assert scores.never_found == 1
+    first = FirstDetection(8, 5, 12), FirstDetection(9, 7, 7), FirstDetection(10, 5, None)
+    assert scores.first_detections == first
+    assert [each.delay for each in first] == [7, 0, None]
+    assert (scores.mean_delay, scores.never_found) == (3.5, 1)
 
 
 def test_a_track_that_goes_on_after_its_vehicle_is_shown_too_long() -> None:

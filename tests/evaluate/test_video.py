@@ -24,6 +24,7 @@ from vdet.synthetic.scene import Scene
 from vdet.synthetic.truth import write_truth
 
 FRAMES = 10
+AHEAD = MotionTrackerSettings(look_ahead=0.3)  # longer than a few frames
 
 
 def settings(*assignments: str) -> Settings:
@@ -112,16 +113,19 @@ def searched(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 def test_settings_that_search_alike_share_the_search(
     clip_path: Path, variant: OfModel, searched: list[int]
 ) -> None:
+    motion = replace(variant(), settings=settings().model_copy(update={"tracker": AHEAD}))
     variants = [
         variant(),
         variant("detector.heat.threshold=1"),
         variant("tracker.history=2"),
+        motion,
         variant("detector.search.probability=0.9"),
     ]
-    with VideoReader(clip_path, frames=3) as reader:
+    with VideoReader(clip_path, frames=FRAMES) as reader:
         results = list(follow_together(variants, reader, reader.info))
-    assert [len(each) for each in results] == [4, 4, 4]
-    assert sorted(searched) == [0, 0, 1, 1, 2, 2], "two searches a frame for four settings"
+    assert [len(each) for each in results] == [5] * FRAMES
+    twice = [index for index in range(FRAMES) for _ in range(2)]
+    assert sorted(searched) == twice, "two searches a frame for five settings"
 
 
 class ListingSettings(DetectorSettings):

@@ -12,7 +12,6 @@ from vdet.cli.command import command
 from vdet.cli.messages import progress_steps
 from vdet.cli.results import Results, results_options
 from vdet.errors import ConfigError
-from vdet.version import __version__
 
 
 @command(
@@ -51,7 +50,7 @@ def images(
     from vdet.detect.factory import load_detector
     from vdet.evaluate.images import Counting, evaluate_images
     from vdet.evaluate.output import RunName
-    from vdet.evaluate.show_images import images_page, lines, plain
+    from vdet.evaluate.report import images_report
     from vdet.labels.reading import read_labelled_pictures
     from vdet.labels.roles import Roles
     from vdet.workers import PICTURES, core_count, return_freed_memory
@@ -66,7 +65,7 @@ def images(
         progress = partial(steps, "")
         result = evaluate_images(sets, model, counting, threads=core_count(), progress=progress)
     run = RunName.of(detector, choice.name, choice.assignments)
-    results.print(lines(result, run), plain(result, run), lambda: images_page(result, run))
+    results.print(*images_report(result, run))
 
 
 @command(
@@ -137,7 +136,7 @@ def tracks(
     PRED is a file of vdet detect-video --tracks. TRUTH is MOTChallenge gt.txt, KITTI tracking
     labels, CVAT for video 1.1, COCO or YOLO with tracks, or a .csv or .jsonl of vdet.
     """
-    from vdet.evaluate.show_video import plain_clip, result_lines, video_page
+    from vdet.evaluate.report import tracks_report
     from vdet.evaluate.video import score_files
     from vdet.labels.roles import Roles
 
@@ -146,8 +145,7 @@ def tracks(
     with progress_steps("") as steps:
         steps("comparing", None)
         run = score_files(prediction, truth, roles, until=until, rate=rate)
-    what = f"compared with {truth} by vdet {__version__}"
-    results.print(result_lines([run]), plain_clip(run.clips[0]), lambda: video_page([run], what))
+    results.print(*tracks_report(run, truth))
 
 
 @command(
@@ -185,7 +183,7 @@ def video(
     base = choice.read()
     from vdet.detect.factory import load_detector
     from vdet.evaluate.output import RunName
-    from vdet.evaluate.show_video import plain, result_lines, video_page
+    from vdet.evaluate.report import video_report
     from vdet.evaluate.video import Variant, evaluate_clips, open_clip
     from vdet.labels.roles import Roles
     from vdet.regions import check_masks
@@ -204,8 +202,7 @@ def video(
     with progress_steps(" frames") as steps:
         runs = evaluate_clips(clips, variants, partial(steps, ""))
     name = RunName.of(detectors[0], choice.name, choice.assignments)
-    text = [*name.lines(), *result_lines(runs)]
-    results.print(text, plain(runs, name), lambda: video_page(runs, "; ".join(name.lines())))
+    results.print(*video_report(runs, name))
 
 
 def grid(sweeps: Sequence[str]) -> list[tuple[str, ...]]:
@@ -226,20 +223,17 @@ def grid(sweeps: Sequence[str]) -> list[tuple[str, ...]]:
     ConfigError
         There is no `=`, a value is empty, or a key is swept twice.
     """
-    axes = [_axis(text) for text in sweeps]
-    keys = [axis[0].partition("=")[0] for axis in axes]
-    for key in keys:
-        if keys.count(key) > 1:
+    axes: dict[str, list[str]] = {}
+    for text in sweeps:
+        key, equals, values = (part.strip() for part in text.partition("="))
+        found = [value.strip() for value in _split(values)]
+        if not (key and equals and all(found)):
+            expected = "expected KEY=VALUE,VALUE, as in tracker.needed=0.1,0.2"
+            raise ConfigError(f"--sweep {text}: {expected}")
+        if key in axes:
             raise ConfigError(f"--sweep {key}: is given twice; put all its values in one")
-    return list(itertools.product(*axes))
-
-
-def _axis(text: str) -> list[str]:
-    key, equals, values = (part.strip() for part in text.partition("="))
-    found = [value.strip() for value in _split(values)]
-    if not (key and equals and all(found)):
-        raise ConfigError(f"--sweep {text}: expected KEY=VALUE,VALUE, as in tracker.needed=0.1,0.2")
-    return [f"{key}={value}" for value in dict.fromkeys(found)]
+        axes[key] = [f"{key}={value}" for value in dict.fromkeys(found)]
+    return list(itertools.product(*axes.values()))
 
 
 def _split(values: str) -> list[str]:

@@ -1,5 +1,6 @@
 """Where a command puts what it found out: text, JSON and a page."""
 
+import json
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,7 +8,8 @@ from typing import Any
 
 from vdet.cli.messages import print_lines, progress_steps
 from vdet.cli.options import bundle, option, overwrite_option
-from vdet.files import check_output, make_folder, write_json, write_whole
+from vdet.errors import OutputError
+from vdet.files import OutputFiles, check_output, output_errors, write_json, write_text
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,20 +21,33 @@ class Results:
     page: Path | None = None
 
     def check(self, inputs: Iterable[Path] = ()) -> None:
-        """Refuse outputs that could not be written, before any work; make the folder of the page.
+        """Refuse outputs that could not be written, before any work.
 
         Raises
         ------
         OutputError
-            A file is there already (and not `overwrite`), or cannot be written.
+            A file is there already (and not `overwrite`), is an input, or cannot be written; or
+            both outputs are one file.
         """
-        if self.page is not None:
-            from vdet.pages.render import PAGE_NAME
+        paths = [path for path in (self._json_file, self._page_file) if path]
+        if len({path.resolve() for path in paths}) < len(paths):
+            raise OutputError(f"{paths[0]}: is given for two outputs; name another file for one")
+        inputs = list(inputs)
+        for path in paths:
+            makes_folder = self.page is not None and self.page.is_relative_to(path.parent)
+            check_output(path, overwrite=self.overwrite, inputs=inputs, makes_folder=makes_folder)
 
-            make_folder(self.page)
-            check_output(self.page / PAGE_NAME, overwrite=self.overwrite)
-        if self.json_target not in (None, "-"):
-            check_output(Path(str(self.json_target)), overwrite=self.overwrite, inputs=inputs)
+    @property
+    def _json_file(self) -> Path | None:
+        return None if self.json_target in (None, "-") else Path(str(self.json_target))
+
+    @property
+    def _page_file(self) -> Path | None:
+        if self.page is None:
+            return None
+        from vdet.pages.render import PAGE_NAME
+
+        return self.page / PAGE_NAME
 
     def print(
         self,
@@ -40,18 +55,24 @@ class Results:
         values: Mapping[str, Any],
         make_page: Callable[[], str] = lambda: "",
     ) -> None:
-        """Print lines of text, and write the files. Raises `OutputError`."""
+        """Print lines of text, and write the files, which appear together. Raises `OutputError`."""
         to_stderr = self.json_target == "-"
         print_lines(*lines, err=to_stderr)
-        if self.json_target is not None:
-            write_json(values, self.json_target, overwrite=self.overwrite)
-        if self.page is not None:
-            from vdet.pages.render import PAGE_NAME
-
+        texts: dict[Path, str] = {}
+        if self._json_file:
+            texts[self._json_file] = json.dumps(values, indent=2, allow_nan=False) + "\n"
+        if self._page_file:
             with progress_steps("") as steps:
                 steps("writing the page", None)
-                write_whole(self.page / PAGE_NAME, make_page(), overwrite=self.overwrite)
-            print_lines("", f"{self.page / PAGE_NAME}: the page", err=to_stderr)
+                texts[self._page_file] = make_page()
+        with OutputFiles(overwrite=self.overwrite) as files:
+            for path, text in texts.items():
+                with output_errors(path):
+                    write_text(files.stage_folder(path.parent) / path.name, text)
+            if to_stderr:
+                write_json(values, "-")
+        if self._page_file:
+            print_lines("", f"{self._page_file}: the page", err=to_stderr)
 
 
 _json_option = option(

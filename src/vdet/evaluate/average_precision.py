@@ -45,6 +45,21 @@ class RankedPredictions:
         precisions = [_average_precision(row, self.vehicles) for row in self.right]
         return precisions[0], float(np.mean(precisions))
 
+    def f1_curve(self) -> tuple[Float64Array, Float64Array]:
+        """Return each score, descending, and F1 where it is the lowest that counts.
+
+        float64 `(k,)` each; without a point if there are no vehicles.
+        """
+        f1 = 2 * np.cumsum(self.right[0]) / (np.arange(len(self.scores)) + 1 + self.vehicles)
+        last = np.append(self.scores[1:] != self.scores[:-1], True)[: len(self.scores)]
+        last &= self.vehicles > 0
+        return self.scores[last], f1[last]
+
+    def f1_at(self, scores: Float64Array) -> Float64Array:
+        """Return F1 where predictions with at least each of these scores count."""
+        known, f1 = self.f1_curve()
+        return np.concatenate([[0.0], f1])[np.searchsorted(-known, -scores, side="right")]
+
 
 def rank_predictions(comparison: Comparison) -> RankedPredictions:
     """Sort the predictions by descending score, and mark those that are right."""
@@ -65,17 +80,11 @@ def _right_predictions(frame: ComparedFrame) -> BoolArray:
     for row, threshold in zip(right, IOU_THRESHOLDS, strict=True):
         free = overlaps.copy()
         for column in np.flatnonzero(overlaps.max(axis=0, initial=0) >= threshold).tolist():
-            row[column] = _take(free, column, threshold)
+            best = len(free) - 1 - int(np.argmax(free[::-1, column]))  # the last of equals: COCO
+            if free[best, column] >= threshold:
+                row[column] = True
+                free[best] = -1
     return right
-
-
-def _take(free: Float64Array, column: int, threshold: float) -> bool:
-    """Take the best free vehicle for a prediction, if one overlaps enough."""
-    best = len(free) - 1 - int(np.argmax(free[::-1, column]))  # the last of equals, as in COCO
-    if free[best, column] < threshold:
-        return False
-    free[best] = -1
-    return True
 
 
 def _average_precision(right: BoolArray, vehicles: int) -> float:

@@ -1,9 +1,9 @@
 """Scores of a detector in labelled pictures: at one score, at every score, and by size."""
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any, Self
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any, Self, TypeVar
 
 import numpy as np
 
@@ -104,9 +104,10 @@ def _widths(boxes: Float64Array) -> Float64Array:
 class SizeScores:
     """Counts and ratios of the vehicles of one size; a ratio is None without vehicles.
 
-    A false positive has the size of its own box.
+    A false positive has the size of its own box. `width` is one of `SIZE_NAMES`.
     """
 
+    width: str
     vehicles: int
     matches: int
     false_positives: int
@@ -170,52 +171,31 @@ class ClassResult:
     named: dict[str, int]
 
 
-_COUNTS = ("images", "vehicles", "matches", "false_positives")
-_RATIOS = ("precision", "recall", "f1", "mean_iou", "ap50", "ap50_95")
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class F1Curve:
-    """F1 at every score: `scores`, descending, and `f1`, float64 `(n,)` each.
-
-    Detections are taken by descending score, as for the average precision.
-    """
-
-    scores: Float64Array
-    f1: Float64Array
-
-    @classmethod
-    def of(cls, ranked: RankedPredictions) -> Self:
-        """Return the curve; without a point where there are no vehicles."""
-        scores, count = ranked.scores, len(ranked.scores)
-        f1 = 2 * np.cumsum(ranked.right[0]) / (np.arange(1, count + 1) + ranked.vehicles)
-        last = np.append(scores[1:] != scores[:-1], True)[:count]  # of each score
-        last &= ranked.vehicles > 0
-        return cls(scores[last], f1[last])
-
-    def at(self, scores: Float64Array) -> Float64Array:
-        """Return F1 where detections with at least each of these scores count."""
-        rows = np.searchsorted(-self.scores, -scores, side="right")
-        return np.concatenate([[0.0], self.f1])[rows]
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasuredSet:
-    """The pictures of one source, as labelled and as measured, their curve and their scores."""
+    """The pictures of one source, as labelled and as measured, all detections, and the scores."""
 
     labelled: LabelledPictures
     images: tuple[MeasuredImage, ...]
-    curve: F1Curve
+    ranked: RankedPredictions
     scores: ImageScores
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ImagesResult:
-    """The sources of pictures with their scores, the mean of these, and the rule for counting."""
+    """The sources of pictures with their scores, and the rule for counting."""
 
     counting: Counting
     sources: tuple[MeasuredSet, ...]
-    mean: ImageScores
+
+    @property
+    def mean(self) -> ImageScores:
+        """The mean over the sources."""
+        scores = [source.scores for source in self.sources]
+        columns = zip(SIZE_NAMES, *(each.sizes for each in scores), strict=True)
+        sizes = tuple(_mean(column, width=name) for name, *column in columns)
+        best_f1, best_score = _best([source.ranked for source in self.sources])
+        return _mean(scores, best_f1=best_f1, best_score=best_score, sizes=sizes)
 
     def classes(self) -> Iterator[ClassResult]:
         """Yield the scores of each class that has vehicles; none if detections have no class."""
@@ -225,14 +205,11 @@ class ImagesResult:
         known = OUR_NAMES[:-1]
         for name in known if names else ():
             counts = {each: pairs[name, each] for each in names}
-            right, missed = pairs[name, name], pairs[name, None]
+            right, vehicles = pairs[name, name], pairs[name, None] + sum(counts.values())
             shown = sum(pairs[true, name] for true in (*known, None))
-            if vehicles := missed + sum(counts.values()):
-                ratios = (
-                    ratio(right, shown),
-                    ratio(right, vehicles),
-                    ratio(2 * right, shown + vehicles),
-                )
+            if vehicles:
+                f1 = ratio(2 * right, shown + vehicles)
+                ratios = ratio(right, shown), ratio(right, vehicles), f1
                 yield ClassResult(name, vehicles, *ratios, counts)
 
 
@@ -274,56 +251,41 @@ def evaluate_images(
                 measured.append(result)
                 advance(1)
         sources.append(score_source(each, measured))
-    return ImagesResult(counting, tuple(sources), mean_scores(sources))
+    return ImagesResult(counting, tuple(sources))
 
 
 def score_source(labelled: LabelledPictures, images: Sequence[MeasuredImage]) -> MeasuredSet:
     """Return the scores of one source."""
     found = score_detections(pool([image.shown for image in images]))
     ranked = rank_predictions(pool([image.every for image in images]))
-    curve = F1Curve.of(ranked)
-    best_f1, best_score = _best([curve])
-    ap50, ap50_95 = ranked.average_precisions()
-    ratios = asdict(found) | {"ap50": ap50, "ap50_95": ap50_95}
-    scores = ImageScores(
-        images=len(images),
-        vehicles=ranked.vehicles,
-        matches=found.matches,
-        false_positives=found.false_positives,
-        best_f1=best_f1,
-        best_score=best_score,
-        sizes=_by_size(images),
-        **{name: ratios[name] if ranked.vehicles else None for name in _RATIOS},
-    )
-    return MeasuredSet(labelled, tuple(images), curve, scores)
+    counts = len(images), ranked.vehicles, found.matches, found.false_positives
+    ratios = found.precision, found.recall, found.f1, found.mean_iou, *ranked.average_precisions()
+    scores = ImageScores(*counts, *ratios, *_best([ranked]), _by_size(images))
+    unknown: dict[str, Any] = {} if ranked.vehicles else dict.fromkeys(_RATIOS)
+    return MeasuredSet(labelled, tuple(images), ranked, replace(scores, **unknown))
 
 
-def mean_scores(sources: Sequence[MeasuredSet]) -> ImageScores:
-    """Return the mean over sources."""
-    scores = [source.scores for source in sources]
-    best_f1, best_score = _best([each.curve for each in sources if each.scores.vehicles])
-    columns = zip(*(each.sizes for each in scores), strict=True)
-    sizes = tuple(SizeScores(**_mean(column, SizeScores.__slots__)) for column in columns)
-    means = _mean(scores, (*_COUNTS, *_RATIOS))
-    return ImageScores(best_f1=best_f1, best_score=best_score, sizes=sizes, **means)
+_RATIOS = ("precision", "recall", "f1", "mean_iou", "ap50", "ap50_95")
+_Scores = TypeVar("_Scores", ImageScores, SizeScores)
 
 
-def _mean(scores: Sequence[Any], names: Iterable[str]) -> dict[str, Any]:
-    """Return the sum of each count and the mean of each ratio that is known."""
-    means: dict[str, float | None] = {}
-    for name in names:
+def _mean(scores: Sequence[_Scores], **given: Any) -> _Scores:
+    """Return the sum of each count and the mean of each ratio that is known, and what is given."""
+    means = dict(given)
+    for name in (field.name for field in fields(scores[0]) if field.name not in given):
         known = [value for each in scores if (value := getattr(each, name)) is not None]
         total = sum(known)
         means[name] = (total if isinstance(total, int) else total / len(known)) if known else None
-    return means
+    return type(scores[0])(**means)
 
 
-def _best(curves: Sequence[F1Curve]) -> tuple[float | None, float | None]:
+def _best(sources: Sequence[RankedPredictions]) -> tuple[float | None, float | None]:
     """Return the highest mean F1 at any one score, and that score; None without vehicles."""
-    scores = np.unique(np.concatenate([np.empty(0), *(curve.scores for curve in curves)]))[::-1]
-    if not len(scores):
+    known = [ranked for ranked in sources if ranked.vehicles and len(ranked.scores)]
+    if not known:
         return None, None
-    means = np.mean([curve.at(scores) for curve in curves], axis=0)
+    scores = np.unique(np.concatenate([ranked.scores for ranked in known]))[::-1]
+    means = np.mean([ranked.f1_at(scores) for ranked in known], axis=0)
     return float(means.max()), float(scores[np.argmax(means)])
 
 
@@ -333,12 +295,10 @@ def _by_size(images: Sequence[MeasuredImage]) -> tuple[SizeScores, ...]:
         for frame in image.shown.frames:
             vehicles = _widths(frame.vehicle_boxes) / image.width
             wrong = _widths(np.delete(frame.track_boxes, frame.columns, axis=0)) / image.width
-            for kind, widths in enumerate((vehicles, vehicles[frame.rows], wrong)):
-                sizes = np.searchsorted(SIZES, widths, side="right")
-                counts[kind] += np.bincount(sizes, minlength=len(SIZE_NAMES))
+            kinds = vehicles, vehicles[frame.rows], wrong
+            counts += [np.histogram(widths, (0, *SIZES, np.inf))[0] for widths in kinds]
     found = []
-    for count, matches, alarms in counts.T.tolist():
-        recall, f1 = ratio(matches, count), ratio(2 * matches, matches + alarms + count)
-        known = (recall, f1) if count else (None, None)
-        found.append(SizeScores(count, matches, alarms, *known))
+    for name, (count, matches, alarms) in zip(SIZE_NAMES, counts.T.tolist(), strict=True):
+        ratios = ratio(matches, count), ratio(2 * matches, matches + alarms + count)
+        found.append(SizeScores(name, count, matches, alarms, *(ratios if count else (None, None))))
     return tuple(found)

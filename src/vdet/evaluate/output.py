@@ -1,6 +1,6 @@
 """What evaluations show as text: tables, ratios, and the detector that was measured."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -51,29 +51,6 @@ class RunName:
             "set": list(self.assignments),
             "trained_on": list(self.trained_on),
         }
-
-
-Table = tuple[Sequence[str], Sequence[Sequence[str]]]
-"""Headings and rows of text, for the terminal and for pages."""
-
-Columns = Sequence[tuple[str, str]]
-"""Headings, and the attribute of the scores below each."""
-
-
-def score_table(first: str, columns: Columns, scores: Iterable[tuple[str, object]]) -> Table:
-    """Return a table of scores.
-
-    Parameters
-    ----------
-    first
-        Heading of the names.
-    columns
-        The other headings, and the attribute of the scores below each.
-    scores
-        The name and the scores of each row.
-    """
-    rows = [[name, *(figure(getattr(each, key)) for _, key in columns)] for name, each in scores]
-    return (first, *(heading for heading, _ in columns)), rows
 
 
 def figure(value: float | None) -> str:

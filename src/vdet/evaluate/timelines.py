@@ -1,11 +1,11 @@
 """When each vehicle was found and by which track, and when it was missed or was a false alarm."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import groupby
 from typing import Literal
 
-from vdet.boxes import Int64Array
-from vdet.evaluate.comparison import ComparedFrame, Comparison
+from vdet.evaluate.comparison import Comparison
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +39,17 @@ class Stretch:
         return self.last - self.first + 1
 
     @property
+    def name(self) -> str:
+        """What the mistake is, as text."""
+        missed = self.kind == "missed"
+        return f"vehicle {self.id} missed" if missed else f"false alarm, track {self.id}"
+
+    @property
+    def span(self) -> str:
+        """The first and the last frame, as text."""
+        return f"{self.first}–{self.last}" if self.boxes > 1 else str(self.first)
+
+    @property
     def middle(self) -> int:
         """Number of the middle frame."""
         return (self.first + self.last) // 2
@@ -66,10 +77,9 @@ def first_detections(comparison: Comparison) -> tuple[FirstDetection, ...]:
     """Return when each vehicle was first found, in the order of `vehicle_ids`."""
     appears: dict[int, int] = {}
     found: dict[int, int] = {}
-    for frame in comparison.frames:
-        for vehicles, first in ((frame.vehicles, appears), (frame.found, found)):
-            for vehicle in vehicles.tolist():
-                first.setdefault(vehicle, frame.number)
+    for frame in reversed(comparison.frames):  # so the first frame is the one that stays
+        appears |= dict.fromkeys(frame.vehicles.tolist(), frame.number)
+        found |= dict.fromkeys(frame.found.tolist(), frame.number)
     ids = enumerate(comparison.vehicle_ids.tolist())
     return tuple(FirstDetection(id_, appears[row], found.get(row)) for row, id_ in ids)
 
@@ -80,20 +90,21 @@ def frames_too_long(comparison: Comparison) -> tuple[int, ...]:
     These are the frames in which its last track is a false alarm, until that track has a vehicle
     again. Vehicles are in the order of `vehicle_ids`.
     """
-    last: dict[int, int] = {}
-    last_track: dict[int, int] = {}
+    tracks: dict[int, int] = {}  # the last one of each vehicle that was found
+    extra: dict[int, int] = {}
+    ended: set[int] = set()  # vehicles whose track has another vehicle
     for frame in comparison.frames:
-        last.update(dict.fromkeys(frame.vehicles.tolist(), frame.number))
-        last_track.update(zip(frame.found.tolist(), frame.found_by.tolist(), strict=True))
-    extra = dict.fromkeys(last_track, 0)
-    gone = dict(last_track)
-    for frame in comparison.frames:
-        shown, used = set(frame.tracks.tolist()), set(frame.found_by.tolist())
-        for vehicle, track in list(gone.items()):
-            if frame.number > last[vehicle]:
-                extra[vehicle] += track in shown - used
-                if track in used:
-                    del gone[vehicle]
+        tracks |= zip(frame.found.tolist(), frame.found_by.tolist(), strict=True)
+        there, shown = set(frame.vehicles.tolist()), set(frame.tracks.tolist())
+        used = set(frame.found_by.tolist())
+        for vehicle, track in tracks.items():
+            if vehicle in there:
+                extra[vehicle] = 0
+                ended.discard(vehicle)
+            elif track in used:
+                ended.add(vehicle)
+            elif track in shown and vehicle not in ended:
+                extra[vehicle] += 1
     return tuple(extra[vehicle] for vehicle in sorted(extra))
 
 
@@ -102,41 +113,37 @@ def stretches(comparison: Comparison) -> tuple[Stretch, ...]:
 
     Frames in which a vehicle or a track does not count are in no stretch.
     """
-    ids = comparison.vehicle_ids, comparison.track_ids
-    of_vehicles = _stretches(comparison.frames, *ids)
-    of_tracks = _stretches([_swapped(frame) for frame in comparison.frames], *ids[::-1])
-    alarms = [replace(each, kind="false alarm") for each in of_tracks if each.partner is None]
-    return *of_vehicles, *alarms
+    vehicles: dict[int, list[_Seen]] = {id_: [] for id_ in comparison.vehicle_ids.tolist()}
+    alarms: dict[int, list[_Seen]] = {id_: [] for id_ in comparison.track_ids.tolist()}
+    for frame in comparison.frames:
+        ids = comparison.vehicle_ids[frame.vehicles].tolist()
+        track_ids = comparison.track_ids[frame.tracks].tolist()
+        pairs = zip(frame.rows.tolist(), frame.columns.tolist(), strict=True)
+        partners = {ids[row]: track_ids[column] for row, column in pairs}
+        for id_, overlap in zip(ids, frame.iou.max(axis=1, initial=0).tolist(), strict=True):
+            vehicles[id_].append((frame.number, partners.get(id_), overlap))
+        used = set(partners.values())
+        for id_, overlap in zip(track_ids, frame.iou.max(axis=0, initial=0).tolist(), strict=True):
+            if id_ not in used:
+                alarms[id_].append((frame.number, None, overlap))
+    return *_stretches(vehicles, "missed"), *_stretches(alarms, "false alarm")
 
 
-def _swapped(frame: ComparedFrame) -> ComparedFrame:
-    """Return a frame with its tracks as vehicles."""
-    swapped = replace(frame, vehicles=frame.tracks, tracks=frame.vehicles, iou=frame.iou.T)
-    return replace(swapped, rows=frame.columns, columns=frame.rows)
+_Seen = tuple[int, int | None, float]
+"""A frame in which a vehicle or a track is, its partner there, and its best IoU."""
 
 
 def _stretches(
-    frames: Sequence[ComparedFrame], ids: Int64Array, others: Int64Array
-) -> list[Stretch]:
-    seen: list[list[tuple[int, int | None, float]]] = [[] for _ in ids]
-    for frame in frames:
-        partners = dict(zip(frame.found.tolist(), others[frame.found_by].tolist(), strict=True))
-        overlaps = frame.iou.max(axis=1, initial=0).tolist()
-        for vehicle, overlap in zip(frame.vehicles.tolist(), overlaps, strict=True):
-            seen[vehicle].append((frame.number, partners.get(vehicle), overlap))
-    found: list[Stretch] = []
-    for id_, each in zip(ids.tolist(), seen, strict=True):
-        runs: list[list[tuple[int, int | None, float]]] = []
-        for number, partner, overlap in each:
-            if not runs or runs[-1][-1][:2] != (number - 1, partner):
-                runs.append([])
-            runs[-1].append((number, partner, overlap))
-        for run in runs:
-            (first, partner, _), (last, *_) = run[0], run[-1]
-            mean = sum(overlap for *_, overlap in run) / len(run)
-            kind: Literal["found", "missed"] = "missed" if partner is None else "found"
-            found.append(Stretch(kind, id_, first, last, partner, mean))
-    return found
+    seen: Mapping[int, Sequence[_Seen]], mistake: Literal["missed", "false alarm"]
+) -> Iterator[Stretch]:
+    for id_, boxes in seen.items():
+        # Numbers of consecutive frames are at one distance from their places in the list.
+        runs = groupby(enumerate(boxes), lambda each: (each[1][0] - each[0], each[1][1]))
+        for (_, partner), run in runs:
+            numbers, _, overlaps = zip(*(box for _, box in run), strict=True)
+            kind = mistake if partner is None else "found"
+            overlap = sum(overlaps) / len(overlaps)
+            yield Stretch(kind, id_, numbers[0], numbers[-1], partner, overlap)
 
 
 def mistakes(found: Sequence[Stretch]) -> tuple[Stretch, ...]:

@@ -10,7 +10,7 @@ Multi-Object Tracking", IJCV 2021.
 import numpy as np
 
 from vdet.boxes import Float64Array, Int64Array
-from vdet.evaluate.comparison import MATCH_IOU, UNMATCHED, Comparison, assign, at_least, joined
+from vdet.evaluate.comparison import MATCH_IOU, UNMATCHED, Comparison, assign, at_least
 
 ALPHAS = np.arange(0.05, 0.99, 0.05)
 """The overlap thresholds of HOTA, 0.05 … 0.95; the metrics are the mean over them."""
@@ -62,38 +62,24 @@ def hota(comparison: Comparison) -> tuple[float, float, float]:
         return 0.0, 0.0, 0.0
     lengths = comparison.vehicle_lengths()[:, np.newaxis] + comparison.track_lengths()
     boxes = int(comparison.vehicle_lengths().sum() + comparison.track_lengths().sum())
-    vehicles, tracks, iou = _hota_pairs(comparison, lengths)
-    chosen = [at_least(iou, alpha) for alpha in ALPHAS]
-    pairs = [_hota_accuracies(lengths, boxes, vehicles[some], tracks[some]) for some in chosen]
-    accuracies = np.array(pairs)
-    deta, assa = accuracies.mean(axis=0)
-    return float(np.sqrt(accuracies.prod(axis=1)).mean()), float(deta), float(assa)
-
-
-def _hota_accuracies(
-    lengths: Int64Array, boxes: int, vehicles: Int64Array, tracks: Int64Array
-) -> tuple[float, float]:
-    """Return detection and association accuracy of the pairs that count."""
-    together = np.zeros(lengths.shape)
-    np.add.at(together, (vehicles, tracks), 1)
-    matches = len(vehicles)
-    agreement = float(np.sum(together**2 / (lengths - together)))
-    return matches / (boxes - matches), agreement / max(matches, 1)
-
-
-def _hota_pairs(
-    comparison: Comparison, lengths: Int64Array
-) -> tuple[Int64Array, Int64Array, Float64Array]:
-    """Pair boxes in every frame by overlap and alignment: vehicles, tracks and their IoU."""
     alignment = _alignment(comparison, lengths)
-    vehicles, tracks, iou = [], [], []
+    pairs = []
     for frame in comparison.frames:
         aligned = alignment[np.ix_(frame.vehicles, frame.tracks)]
         rows, columns = assign(aligned * frame.iou)
-        vehicles.append(frame.vehicles[rows])
-        tracks.append(frame.tracks[columns])
-        iou.append(frame.iou[rows, columns])
-    return joined(vehicles), joined(tracks), np.concatenate(iou)
+        pairs.append((frame.vehicles[rows], frame.tracks[columns], frame.iou[rows, columns]))
+    vehicles, tracks, iou = map(np.concatenate, zip(*pairs, strict=True))
+    found = []
+    for alpha in ALPHAS:
+        chosen = at_least(iou, alpha)
+        together = np.zeros(lengths.shape)
+        np.add.at(together, (vehicles[chosen], tracks[chosen]), 1)
+        matches = int(np.count_nonzero(chosen))
+        agreement = float(np.sum(together**2 / (lengths - together)))
+        found.append((matches / (boxes - matches), agreement / max(matches, 1)))
+    accuracies = np.array(found)
+    deta, assa = accuracies.mean(axis=0)
+    return float(np.sqrt(accuracies.prod(axis=1)).mean()), float(deta), float(assa)
 
 
 def _alignment(comparison: Comparison, lengths: Int64Array) -> Float64Array:

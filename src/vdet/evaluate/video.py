@@ -8,7 +8,6 @@ import itertools
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -31,9 +30,6 @@ from vdet.progress import Progress, no_progress
 from vdet.regions import Regions, lay_regions
 from vdet.run.loop import build, named_errors, peek
 from vdet.run.result import FrameResult
-
-_KEPT = 4
-"""Searches that are kept for the other settings; each runs at most two ahead of the results."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -180,8 +176,7 @@ def score_files(
     last = until or true.last_frame
     compared = found.until(last)
     result = score_video(str(prediction), compared, true.until(last), rate=rate)
-    result = replace(result, until=last, left_out=len(found) - len(compared))
-    return RunResult.of((), [result])
+    return RunResult.of((), [replace(result, left_out=len(found) - len(compared))])
 
 
 def best(runs: Sequence[RunResult]) -> RunResult:
@@ -242,19 +237,20 @@ def follow_together(
     Errors as of `vdet.run.loop.build`.
     """
     images, read = peek(frames)
-    searches: list[tuple[object, _Search]] = []  # and what each depends on
-    pipelines = []
-    for each in variants:
-        own = build(each.model, each.settings, video, images)
-        key = each.settings.detector.search_key, own.rate, each.settings.regions
-        search = next((search for other, search in searches if other == key), None)
-        if search is None:
-            search = _shared(own.detector.search)
-            searches.append((key, search))
-        pipelines.append(replace(own, detector=_Sharing(search, own.detector.detect)))
+    pipelines = [build(each.model, each.settings, video, images) for each in variants]
     del images  # else they stay in memory for the whole run
-    copies = itertools.tee(read, len(pipelines))
-    runs = [each.follow(copy, video.path) for each, copy in zip(pipelines, copies, strict=True)]
+    keys = [  # what a search depends on
+        (each.settings.detector.search_key, each.settings.regions, own.rate)
+        for each, own in zip(variants, pipelines, strict=True)
+    ]
+    searches: dict[int, _Search] = {}  # by the first of the variants that share it
+    runs = []
+    for own, key, copy in zip(pipelines, keys, itertools.tee(read, len(keys)), strict=True):
+        first = keys.index(key)
+        if first not in searches:
+            searches[first] = _shared(own.detector.search, keys.count(key))
+        detector = _Sharing(searches[first], own.detector.detect)
+        runs.append(replace(own, detector=detector).follow(copy, video.path))
     yield from zip(*runs, strict=True)
 
 
@@ -269,13 +265,22 @@ class _Sharing:
     detect: Callable[[Any], Boxes]
 
 
-def _shared(search: _Search) -> _Search:
-    """Return a search that runs once for each frame, also if several threads ask for it."""
-    cached, lock = lru_cache(_KEPT)(search), threading.Lock()
+def _shared(search: _Search, users: int) -> _Search:
+    """Return a search that runs once for each frame, also if several threads ask for it.
+
+    What it finds is kept until all users have asked for it.
+    """
+    lock = threading.Lock()
+    found: dict[int | None, list[Any]] = {}  # candidates, once for each user who will still ask
 
     def locked(picture: Picture, index: int | None) -> Any:
         with lock:
-            return cached(picture, index)
+            if index not in found:
+                found[index] = [search(picture, index)] * users
+            candidates = found[index].pop()
+            if not found[index]:
+                del found[index]
+            return candidates
 
     return locked
 
