@@ -32,11 +32,13 @@ from vdet.detect.protocol import DetectorModel, VideoDetector
 from vdet.errors import VdetError, check_positive
 from vdet.evaluate.scores import Scores
 from vdet.evaluate.video import score_files
+from vdet.files import record_input, recorded_inputs
 from vdet.lanes.camera import load_camera
 from vdet.lanes.ground import GroundRequest, load_ground
 from vdet.lanes.road import LaneRequest
 from vdet.media import Frame, Picture
 from vdet.progress import no_progress, reporting
+from vdet.regions import check_mask
 from vdet.run.pictures import PictureJob, PictureSearch, run_picture
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output, SinkContext, SinkKind, check_sinks
@@ -203,6 +205,7 @@ def follow(
         yield from video.results
 
 
+@recorded_inputs()
 def detect_video(
     source: PathName,
     video: PathName | None = None,
@@ -257,14 +260,15 @@ def detect_video(
     settings, loaded, tracker = _resolved(settings, model, detector, tracker)
     wanted = _outputs({"video": video, "tracks": tracks, **(outputs or {})})
     part = _exact(start), _exact(end), frames, Fraction(str(at))
-    request, inputs = _lanes(lanes, camera), _inputs(model, camera, ground, settings.regions.mask)
-    job = VideoJob(Path(source), wanted, *part, request, inputs, overwrite, threads)
+    check_mask(settings.regions)
+    job = VideoJob(Path(source), wanted, *part, _lanes(lanes, camera), overwrite, threads)
     job = replace(job, begin=begin, interval=interval, ground=_ground(ground))
     check_job(job)
     reported = reporting(progress) if progress else no_progress
     return run_video(job, loaded, settings, tracker=tracker, steps=steps, progress=reported)
 
 
+@recorded_inputs()
 def detect_image(
     source: PathName,
     picture: PathName | None = None,
@@ -281,8 +285,9 @@ def detect_image(
     """
     settings, loaded, _ = _resolved(settings, model, detector, None)
     job = PictureJob(Path(source), _outputs({"picture": picture, **(outputs or {})}))
-    inputs = [job.source, *_inputs(model, settings.regions.mask)]
-    check_sinks(job.outputs, overwrite=overwrite, inputs=inputs)
+    check_mask(settings.regions)
+    record_input(job.source)
+    check_sinks(job.outputs, overwrite=overwrite)
     return run_picture(job, PictureSearch(loaded, settings), overwrite=overwrite).detections
 
 
@@ -370,10 +375,6 @@ def _outputs(named: Mapping[str, Paths | None]) -> tuple[Output, ...]:
         if paths is not None
         for path in ([paths] if isinstance(paths, str | PathLike) else paths)
     )
-
-
-def _inputs(*files: PathName | None) -> tuple[Path, ...]:
-    return tuple(Path(file) for file in files if file is not None)
 
 
 def _lanes(lanes: bool, camera: PathName | None) -> LaneRequest | None:

@@ -6,6 +6,7 @@ import pytest
 
 from vdet.cli.results import Results
 from vdet.errors import OutputError
+from vdet.files import record_input, recorded_inputs
 
 
 def test_the_folder_of_a_page_is_made_and_an_earlier_page_is_kept(tmp_path: Path) -> None:
@@ -24,5 +25,7 @@ def test_earlier_numbers_and_inputs_are_kept(tmp_path: Path) -> None:
     Results(str(target), overwrite=False).print(["F1"], {"f1": 0.5})
     with pytest.raises(OutputError, match="is there already"):
         Results(str(target), overwrite=False).check()
-    with pytest.raises(OutputError, match="is the input itself"):
-        Results(str(target), overwrite=True).check([target])
+    with recorded_inputs():
+        record_input(target)
+        with pytest.raises(OutputError, match="is the input itself"):
+            Results(str(target), overwrite=True).check()

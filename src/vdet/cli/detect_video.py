@@ -167,9 +167,8 @@ def detect_video(
     from vdet.run.video import VideoJob
 
     check_mask(settings.regions)
-    inputs = tuple(choice.inputs(settings, settings.detector, camera))
     part = start, end, frames, at or Fraction(0)
-    job = VideoJob(source, (), *part, request, inputs, overwrite, ground=choice.ground())
+    job = VideoJob(source, (), *part, request, overwrite, ground=choice.ground())
     job = replace(job, begin=counting.begin, interval=counting.interval)
     if batch.folder is None:
         job = replace(job, outputs=options.as_outputs(wanted), threads=threads)

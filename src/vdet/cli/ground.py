@@ -38,7 +38,7 @@ def _parse_length(text: str) -> Known:
     "vdet ground in.mp4 --length 412,655,868,655=7.2 -o ground.yaml",
     "vdet ground in.mp4 --lane --camera camera.yaml -o ground.yaml",
 )
-@click.argument("source", type=options.PATH, metavar="FILE|CLIP")
+@click.argument("source", type=options.INPUT, metavar="FILE|CLIP")
 @options.option("-o, --output FILE", "File of the ground to write, .yaml, for --ground.")
 @options.option(
     "--length X1,Y1,X2,Y2=METRES",
@@ -76,9 +76,8 @@ def ground(
     if output is None or (length is None) != lane:
         raise click.UsageError("for a clip give -o ground.yaml, and either --length or --lane")
     options.check_suffix(output, *_YAML, what="files of the ground")
-    settings = choice.read()
-    inputs = [source, *choice.inputs(settings, camera=camera)]
-    check_output(output, overwrite=overwrite, inputs=inputs)
+    choice.read()
+    check_output(output, overwrite=overwrite)
     pixels, metres, size, how = _fit(source, length, watched, camera, choice)
     pairs = zip(pixels.round(2).tolist(), metres.round(3).tolist(), strict=True)
     values = {

@@ -16,6 +16,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from vdet.errors import ConfigError, OutputError
+from vdet.files import record_input
 
 if TYPE_CHECKING:
     from vdet.config.schema import DetectorSettings, Settings
@@ -24,8 +25,18 @@ if TYPE_CHECKING:
     from vdet.lanes.road import LaneRequest
     from vdet.run.sinks.protocol import Output
 
+
+class _Input(click.Path):
+    def convert(self, value: Any, option: Any, context: Any) -> Any:
+        path = Path(super().convert(value, option, context))  # type: ignore[arg-type]
+        record_input(path)
+        return path
+
+
 PATH = click.Path(path_type=Path)
 """A path; whether something is there is checked later."""
+INPUT = _Input(path_type=Path)
+"""The path of a file that is read: no output takes its place."""
 POSITIVE = click.IntRange(1, 1_000_000_000)
 PROCESSES = click.IntRange(1, 256)
 """Number of threads or processes."""
@@ -97,7 +108,8 @@ def option(
     text
         Its help.
     kind
-        Type of the value; None for text, and for a path where the placeholder is FILE or DIR.
+        Type of the value; None for text, for the path of an input where the placeholder is FILE,
+        and for any path where it is DIR.
     name
         The argument of the command; by default called as the option.
     more
@@ -108,8 +120,8 @@ def option(
     metavar = " ".join(words[len(flags) :])
     if not metavar:
         more["is_flag"] = True
-    elif kind is None and metavar in ("FILE", "DIR"):
-        kind = PATH
+    elif kind is None:
+        kind = {"FILE": INPUT, "DIR": PATH}.get(metavar)
     if "default" in more:
         more["show_default"] = True
     names = [*flags, *([name] if name else [])]
@@ -162,7 +174,7 @@ def jobs_option(text: str = "Work in N processes.") -> Callable[[F], F]:
 
 def output_file_option(text: str) -> Callable[[F], F]:
     """Add `-o FILE`, which is required."""
-    return option("-o, --output FILE", text, required=True)
+    return option("-o, --output FILE", text, PATH, required=True)
 
 
 def check_suffix(output: Path, *suffixes: str, what: str) -> None:
@@ -221,24 +233,6 @@ class SettingsChoice:
         from vdet.detect.factory import load_detector
 
         return load_detector(settings, self.model_path)
-
-    def inputs(
-        self,
-        settings: "Settings",
-        detector: "DetectorSettings | None" = None,
-        camera: Path | None = None,
-    ) -> list[Path]:
-        """Return the files of these settings, the model file of a detector, and a camera file."""
-        from vdet.detect.factory import model_file
-
-        config: Path | None = None
-        if self.config_name:
-            from vdet.config.loading import find_config
-
-            config = find_config(self.config_name)
-        model = detector and model_file(detector, self.model_path)
-        places = self.regions, self.lines, self.ground_file, settings.regions.mask
-        return [Path(each) for each in (config, *places, model, camera) if each]
 
     def read_for_whole_frames(self, *more: str, detector: str | None = None) -> "Settings":
         """Read them for a command that looks at whole frames; refuse regions as a `ConfigError`."""

@@ -18,7 +18,7 @@ class Results:
     overwrite: bool
     page: Path | None = None
 
-    def check(self, inputs: Iterable[Path] = ()) -> None:
+    def check(self) -> None:
         """Refuse outputs that could not be written, before any work; make the folder of the page.
 
         Raises
@@ -32,7 +32,7 @@ class Results:
             make_folder(self.page)
             check_output(self.page / PAGE_NAME, overwrite=self.overwrite)
         if self.json_target not in (None, "-"):
-            check_output(Path(str(self.json_target)), overwrite=self.overwrite, inputs=inputs)
+            check_output(Path(str(self.json_target)), overwrite=self.overwrite)
 
     def print(
         self,

@@ -16,6 +16,7 @@ from av.stream import Disposition, Stream
 from av.video.stream import VideoStream
 
 from vdet.errors import ImageError, VideoError
+from vdet.files import record_input
 from vdet.media.coding import HDR_TRANSFERS, Coding
 from vdet.media.frame import ColorTags, Tags, VideoInfo
 from vdet.media.images import PICTURE_SUFFIXES, Orientation, read_header
@@ -93,6 +94,8 @@ def open_input(
         options["max_pixels"] = str(MAX_PIXELS)  # the file is probed with decoders
         if for_tags:
             options["codec_whitelist"] = "none"
+        else:
+            record_input(path)
         return av.open(name, "r", kind, options, metadata_errors="replace")  # tags: any encoding
     except (av.PermissionError, av.error.MemoryError) as error:
         raise VideoError(f"{path}: cannot be opened: {error.strerror}") from error

@@ -15,7 +15,7 @@ from vdet.config.schema import Settings
 from vdet.detect.factory import as_model
 from vdet.detect.protocol import DetectorModel, stage_pictures_of
 from vdet.errors import FrameSizeError, VideoError
-from vdet.files import OutputFiles
+from vdet.files import OutputFiles, record_input, recorded_inputs
 from vdet.media.reader import VideoReader
 from vdet.progress import Progress, no_progress
 from vdet.run.loop import Pipeline, build, named_errors, peek
@@ -57,8 +57,6 @@ class VideoJob:
         If given, the lane is found too.
     ground
         If given, the speeds of the vehicles are measured.
-    inputs
-        Other files that are read, such as settings; outputs never replace them.
     overwrite
         Replace outputs that are there already.
     threads
@@ -82,7 +80,6 @@ class VideoJob:
     frames: int | None = None
     at: Fraction = Fraction(0)
     lanes: "LaneRequest | None" = None
-    inputs: tuple[Path, ...] = ()
     overwrite: bool = False
     threads: int | None = None
     codec_threads: int | None = None
@@ -137,7 +134,8 @@ class OpenVideo:
 
 def check_job(job: VideoJob) -> None:
     """Refuse a job whose outputs cannot be written, before any work. Raises `OutputError`."""
-    check_sinks(job.outputs, overwrite=job.overwrite, inputs=[job.source, *job.inputs])
+    record_input(job.source)
+    check_sinks(job.outputs, overwrite=job.overwrite)
 
 
 @contextmanager
@@ -187,6 +185,7 @@ def _reader_and_frames(job: VideoJob, settings: Settings) -> Generator[Any]:
         yield from reader
 
 
+@recorded_inputs()
 def run_video(
     job: VideoJob,
     model: DetectorModel,
