@@ -18,8 +18,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vdet.errors import ConfigError, OutputError, printable
-from vdet.files import OutputFiles, check_output, read_whole, staged
-from vdet.temporary import _HOST, remove_stale
+from vdet.files import (
+    _HOST,
+    OutputFiles,
+    check_output,
+    read_whole,
+    record_input,
+    recorded_inputs,
+    remove_stale,
+    staged,
+)
+from vdet.run.threads import map_ordered, prefetch
 
 DIGITS = "1a2b3c4d" * 2
 
@@ -195,11 +204,41 @@ def test_writing_a_file_removes_stale_files_in_its_folder(tmp_path: Path) -> Non
     assert [path.name for path in tmp_path.iterdir()] == ["b.mp4"]
 
 
-def test_an_input_is_known_by_device_and_inode(tmp_path: Path) -> None:
+@pytest.mark.parametrize("overwrite", [True, False])
+def test_what_will_be_read_is_refused_before_any_work_under_each_of_its_names(
+    tmp_path: Path, overwrite: bool
+) -> None:
     (tmp_path / "in.json").touch()
     (tmp_path / "out.json").hardlink_to(tmp_path / "in.json")
-    with pytest.raises(OutputError, match="is the input itself"):
-        check_output(tmp_path / "out.json", overwrite=True, inputs=[tmp_path / "in.json"])
+    with recorded_inputs():
+        record_input(tmp_path / "in.json", tmp_path / "missing", Path("\0"))
+        with pytest.raises(OutputError, match="is the input itself"):
+            check_output(tmp_path / "out.json", overwrite=overwrite)
+    check_output(tmp_path / "out.json", overwrite=True)  # another run does not read it
+
+
+def test_what_was_read_in_a_run_is_kept(tmp_path: Path) -> None:
+    """Threads of a run and runs inside it add to its record; another run has its own."""
+    for name in ("a.txt", "b.txt", "of-an-earlier-run.txt"):
+        (tmp_path / name).write_text("precious")
+    with recorded_inputs(), map_ordered(read_all, [tmp_path / "a.txt"], 1) as first:
+        list(first)
+        with recorded_inputs(), prefetch(map(read_all, [tmp_path / "b.txt"])) as second:
+            list(second)
+            read_all(tmp_path / "of-an-earlier-run.txt")
+        for name in ("a.txt", "b.txt"):
+            files = OutputFiles(overwrite=True)
+            for path in (tmp_path / "0.txt", tmp_path / name):
+                files.stage(path).write_text("new")
+            with pytest.raises(OutputError, match=rf"{name}: is the input itself"), files:
+                pass
+        with OutputFiles(overwrite=True) as files:
+            files.stage_folder(tmp_path, TEXTS)
+        assert names(tmp_path) == ["a.txt", "b.txt", "of-an-earlier-run.txt"]
+        assert {path.read_text() for path in tmp_path.iterdir()} == {"precious"}
+    with staged(tmp_path / "a.txt", overwrite=True) as temporary:
+        temporary.write_text("new")
+    assert (tmp_path / "a.txt").read_text() == "new"
 
 
 def test_a_link_of_such_a_name_is_not_followed(tmp_path: Path) -> None:
@@ -254,6 +293,10 @@ def read(path: Path, most: int) -> bytes:
     return read_whole(path, most=most, what="letter", error=ConfigError)
 
 
+def read_all(path: Path) -> bytes:
+    return read(path, 1000)
+
+
 def test_a_larger_file_is_refused_with_the_error_of_the_caller(tmp_path: Path) -> None:
     path = tmp_path / "file"
     path.write_bytes(b"x" * 1001)
@@ -279,13 +322,6 @@ def test_a_name_is_shown_on_one_line_without_control_characters(name: str) -> No
 
 
 TEXTS = re.compile(r"[a-z0-9-]+\.txt")
-
-
-def test_a_system_without_file_locks_is_refused_in_one_line() -> None:
-    code = "import sys; sys.modules['fcntl'] = None; from vdet.__main__ import main; main()"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert done.returncode == 1
-    assert done.stderr == "vdet: files cannot be locked here; on Windows, use WSL\n"
 
 
 class TestFolder:

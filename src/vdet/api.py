@@ -33,8 +33,10 @@ from vdet.detect.protocol import DetectorModel, VideoDetector
 from vdet.errors import VdetError
 from vdet.evaluate.scores import Scores
 from vdet.evaluate.video import score_files
+from vdet.files import record_input, recorded_inputs
 from vdet.media import Frame, Picture
 from vdet.progress import no_progress, reporting
+from vdet.regions import check_masks
 from vdet.run.pictures import PictureJob, PictureSearch, run_picture
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output, SinkContext, SinkKind, check_sinks
@@ -191,6 +193,7 @@ def follow(
         yield from video.results
 
 
+@recorded_inputs()
 def detect_video(
     source: PathName | Run,
     video: PathName | None = None,
@@ -229,19 +232,19 @@ def detect_video(
     chosen, loaded, tracker = _resolved(_settings(source, settings), detector, tracker)
     run = _run(source)
     wanted = _outputs({"video": video or (), "tracks": tracks, **(outputs or {})})
-    files = [*_files(chosen), *run.inputs]
     run = replace(
         run,
         settings=chosen,
         outputs=run.outputs + wanted,
-        inputs=tuple(files),
         overwrite=overwrite or run.overwrite,
     )
+    check_masks(chosen.regions)
     check_run(run)
     reported = reporting(progress) if progress else no_progress
     return run_video(run, loaded, tracker=tracker, steps=steps, progress=reported)
 
 
+@recorded_inputs()
 def detect_image(
     source: PathName,
     picture: PathName | None = None,
@@ -257,8 +260,9 @@ def detect_image(
     """
     settings, loaded, _ = _resolved(settings, detector, None)
     job = PictureJob(Path(source), _outputs({"picture": picture or (), **(outputs or {})}))
-    inputs = [job.source, *_files(settings)]
-    check_sinks(job.outputs, overwrite=overwrite, inputs=inputs)
+    check_masks(settings.regions)
+    record_input(job.source)
+    check_sinks(job.outputs, overwrite=overwrite)
     return run_picture(job, PictureSearch(loaded, settings), overwrite=overwrite).detections
 
 
@@ -342,12 +346,6 @@ def _resolved(
     chosen = (settings or Settings()).model_copy(update=changes)
     model = load_detector(chosen.detector) if detector is None else as_model(detector)
     return chosen, model, tracker
-
-
-def _files(settings: Settings) -> list[Path]:
-    """Return the files that settings name."""
-    files = [settings.detector.model, *(each.mask for each in settings.regions)]
-    return [Path(each) for each in files if each]
 
 
 def _outputs(named: Mapping[str, Paths]) -> tuple[Output, ...]:

@@ -54,10 +54,6 @@ class FrameSizeError(ImageError):
     """Frames or pictures of this size are too small to be searched."""
 
 
-class UnsupportedSystemError(VdetError, ImportError):
-    """The operating system is not supported."""
-
-
 class VideoError(VdetError, OSError):
     """A video cannot be read or written."""
 

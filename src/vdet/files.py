@@ -1,27 +1,37 @@
-"""Files: outputs that appear only when they are complete, and inputs read up to a limit."""
+"""Files: outputs that appear only when they are complete, and never in the place of an input.
+
+Outputs are written into temporary folders beside the place where they will appear, which are named
+`.vdet-`, the host, and 16 digits. The writer holds a lock on its folder, which the system releases
+when the process ends, in whatever way. A lock of another host may not be seen on a shared file
+system, so what a killed run left is removed by the next run on its host.
+"""
 
 import contextlib
 import json
 import os
+import platform
 import re
+import shutil
 import stat
 import sys
-from collections.abc import Callable, Iterable, Iterator, Set
+from collections.abc import Callable, Iterator
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Any, Self
 
 from vdet.errors import OutputError, VdetError
-from vdet.temporary import create_folder, remove_stale, sync, try_to_remove
+from vdet.system import locked_folder
 
 _CHUNK = 1_000_000  # bytes
+_HOST = re.sub(r"[^a-z0-9]", "", platform.node().lower())[:16]
+_TEMPORARY = re.compile(rf"\.vdet-{_HOST}-[0-9a-f]{{16}}")
 _ASIDE = ".older"  # folder in a temporary one, for files that are replaced
-
-
-FileId = tuple[int, int]
-"""Device and inode of a file: the same for all its names."""
 
 MayReplace = Callable[[Path], bool]
 """Returns whether an existing file may be replaced, if the user asks for it."""
+
+_FileId = tuple[int, int]  # device and inode: the same for all names of a file
+_inputs: ContextVar[set[_FileId] | None] = ContextVar("inputs", default=None)
 
 
 def any_file(_: Path) -> bool:
@@ -29,11 +39,49 @@ def any_file(_: Path) -> bool:
     return True
 
 
+@contextlib.contextmanager
+def recorded_inputs() -> Iterator[None]:
+    """Record each file that is read in the block; no output of it takes the place of one.
+
+    A block inside another one has the record of that one. Threads have that of the context in which
+    they run (`contextvars`), and so have those of `vdet.run.threads`. Worker processes have none.
+    """
+    record = _inputs.get()
+    token = _inputs.set(set() if record is None else record)
+    try:
+        yield
+    finally:
+        _inputs.reset(token)
+
+
+def record_input(*files: Path | int) -> None:
+    """Record files that are read, by their names or as descriptors; links are followed.
+
+    Whatever opens a file for reading calls this. A name can be recorded before that, so that an
+    output of this name is refused before any work.
+    """
+    record = _inputs.get()
+    if record is not None:
+        record.update(found for file in files if (found := _id(file)))
+
+
+def is_input(path: Path) -> bool:
+    """Return whether `path` is a file that this run reads: see `recorded_inputs`."""
+    return _id(path) in (_inputs.get() or ())
+
+
+def _id(file: Path | int) -> _FileId | None:
+    try:
+        status = os.stat(file)  # noqa: PTH116  # it may be a descriptor
+    except (OSError, ValueError):  # ValueError: a name that no file can have
+        return None
+    return status.st_dev, status.st_ino
+
+
 def check_output(
     path: Path,
     *,
     overwrite: bool,
-    inputs: Iterable[Path] = (),
     makes_folder: bool = False,
     may_replace: MayReplace = any_file,
 ) -> None:
@@ -41,8 +89,6 @@ def check_output(
 
     Parameters
     ----------
-    inputs
-        Files that the work reads; they are never overwritten.
     makes_folder
         The work makes the folder of the output if it is missing.
     may_replace
@@ -54,7 +100,6 @@ def check_output(
         `path` is an input, is a folder, is there already (without `overwrite`) or may not be
         replaced, or its folder cannot be written to.
     """
-    refuse_input(path, file_ids(inputs))
     if path.is_dir():
         raise OutputError(f"{path}: is a folder; give the name of a file")
     if os.path.lexists(path):
@@ -71,23 +116,9 @@ def check_output(
         raise OutputError(f"{path}: the folder {folder} cannot be written to")
 
 
-def refuse_input(path: Path, inputs: Set[FileId]) -> None:
-    """Raise `OutputError` if an output is one of the inputs."""
-    if inputs and file_ids([path]) & inputs:
-        raise OutputError(f"{path}: is the input itself; give another output")
-
-
-def file_ids(paths: Iterable[Path]) -> set[FileId]:
-    """Return the identities of the files that exist; links are followed."""
-    ids = set()
-    for path in paths:
-        with contextlib.suppress(OSError):
-            status = path.stat()
-            ids.add((status.st_dev, status.st_ino))
-    return ids
-
-
 def _check_replaceable(path: Path, may_replace: MayReplace) -> None:
+    if is_input(path):
+        raise OutputError(f"{path}: is the input itself; give another output")
     if not (path.is_file() or path.is_symlink()):
         raise OutputError(f"{path}: is no ordinary file, and is kept; give another output")
     if not may_replace(path):
@@ -112,9 +143,9 @@ class OutputFiles:
     Parameters
     ----------
     overwrite
-        Replace files that have these names, and keep their permissions. A link is replaced, and
-        not what it leads to. Without it every file that is there is kept, also one that appears
-        while the run writes.
+        Replace files that have these names, but for inputs, and keep their permissions. A link is
+        replaced, and not what it leads to. Without it every file that is there is kept, also one
+        that appears while the run writes.
 
     Raises
     ------
@@ -171,7 +202,7 @@ class OutputFiles:
         if path not in self._folders:
             path.mkdir(parents=True, exist_ok=True)
             remove_stale(path)
-            self._folders[path] = create_folder(path, self._cleanup)
+            self._folders[path] = _make_temporary(path, self._cleanup)
         return self._folders[path]
 
     def __enter__(self) -> Self:
@@ -195,31 +226,30 @@ class OutputFiles:
             for file in sorted(folder.iterdir())
         }
         for path, file in files.items():
-            with output_errors(path):
-                sync(file)
-        earlier = [
-            old
-            for path, names in (self._names.items() if self._overwrite else ())
-            for old in path.iterdir()
-            if names.fullmatch(old.name) and old not in files
-        ]
+            with output_errors(path), file.open("rb+") as written:
+                os.fsync(written.fileno())
         # An interrupt may come at any time, so how to undo a step is noted before the step.
         with contextlib.ExitStack() as undo:
             for path, file in files.items():
                 with output_errors(path):
                     if self._overwrite and os.path.lexists(path):
-                        _check_replaceable(path, self._may_replace.get(path, any_file))
-                        if not path.is_symlink():
-                            file.chmod(stat.S_IMODE(path.stat().st_mode))
-                        self._set_aside(path, undo)
-                        file.replace(path)
+                        self._replace(path, file, undo)
                     else:
-                        _add_name(file, path, undo)
-            for old in earlier:
-                with contextlib.suppress(OSError):
-                    self._set_aside(old, undo)
-                    old.unlink(missing_ok=True)
+                        _add_name(path, file, undo)
+            for folder, names in self._names.items() if self._overwrite else ():
+                for old in list(folder.iterdir()):
+                    if names.fullmatch(old.name) and old not in files and not is_input(old):
+                        with contextlib.suppress(OSError):
+                            self._set_aside(old, undo)
+                            old.unlink(missing_ok=True)
             undo.pop_all()
+
+    def _replace(self, path: Path, file: Path, undo: contextlib.ExitStack) -> None:
+        _check_replaceable(path, self._may_replace.get(path, any_file))
+        if not path.is_symlink():
+            file.chmod(stat.S_IMODE(path.stat().st_mode))
+        self._set_aside(path, undo)
+        file.replace(path)
 
     def _set_aside(self, path: Path, undo: contextlib.ExitStack) -> None:
         """Keep the file that is there in the temporary folder, under a second name if possible."""
@@ -237,32 +267,48 @@ def _put_back(aside: Path, path: Path) -> None:
         aside.replace(path)
 
 
-def _add_name(temporary: Path, path: Path, undo: contextlib.ExitStack) -> None:
+def _add_name(path: Path, file: Path, undo: contextlib.ExitStack) -> None:
     """Give a file its final name, unless there is a file of this name; in one step of the system.
 
-    Raises
-    ------
-    OutputError
-        There is one.
+    Raises `OutputError` if there is one.
     """
-    undo.callback(_remove_if_same, path, temporary.stat())
+    undo.callback(_remove_if_same, path, file.stat())
     try:
-        try:
-            os.link(temporary, path)
-        except FileExistsError:
-            raise
-        except OSError:  # a file system without hard links: an empty file takes the name
-            path.touch(exist_ok=False)
-            undo.callback(try_to_remove, path)
-            temporary.replace(path)
-    except FileExistsError:
-        raise OutputError(f"{path}: has appeared during the run; give another output") from None
+        os.link(file, path)
+    except OSError:
+        if os.path.lexists(path):
+            raise OutputError(f"{path}: has appeared during the run; give another output") from None
+        path.touch(exist_ok=False)  # a file system without hard links: an empty file takes the name
+        undo.callback(_remove_if_same, path, path.stat())
+        file.replace(path)
 
 
 def _remove_if_same(path: Path, status: os.stat_result) -> None:
     with contextlib.suppress(OSError):
         if os.path.samestat(path.lstat(), status):
             path.unlink()
+
+
+def _make_temporary(parent: Path, cleanup: contextlib.ExitStack) -> Path:
+    """Make an empty, locked folder in `parent` and return it; `cleanup` unlocks and removes it."""
+    while True:
+        folder = parent / f".vdet-{_HOST}-{os.urandom(8).hex()}"
+        # An interrupt may come as soon as the folder is there.
+        cleanup.callback(shutil.rmtree, folder, ignore_errors=True)
+        folder.mkdir(0o700)  # what is private stays so while it is written
+        with contextlib.suppress(FileNotFoundError, BlockingIOError):  # it was taken for stale
+            cleanup.enter_context(locked_folder(folder))
+            folder.lstat()
+            return folder
+
+
+def remove_stale(folder: Path) -> None:
+    """Remove the temporary folders in `folder` whose writers have ended."""
+    with contextlib.suppress(OSError):
+        for name in filter(_TEMPORARY.fullmatch, os.listdir(folder)):  # noqa: PTH208  # thousands
+            with contextlib.suppress(OSError), locked_folder(folder / name) as is_locked:
+                if is_locked:
+                    shutil.rmtree(folder / name)
 
 
 @contextlib.contextmanager
@@ -320,12 +366,12 @@ def write_json(values: Any, target: str, *, overwrite: bool = False) -> None:
     if target == "-":
         with output_errors(Path("standard output")):
             print_now(text)
-        return
-    write_whole(Path(target), text, overwrite=overwrite)
+    else:
+        write_whole(Path(target), text, overwrite=overwrite)
 
 
 def read_whole(path: Path, *, most: int, what: str, error: type[VdetError]) -> bytes:
-    """Return the content of a file.
+    """Return the content of a file, and record it as an input.
 
     Parameters
     ----------
@@ -339,6 +385,7 @@ def read_whole(path: Path, *, most: int, what: str, error: type[VdetError]) -> b
     data = bytearray()
     try:
         with path.open("rb") as file:
+            record_input(file.fileno())
             # A single read would set memory aside for all of `most`.
             while len(data) <= most and (chunk := file.read(min(_CHUNK, most + 1 - len(data)))):
                 data += chunk

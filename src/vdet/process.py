@@ -11,10 +11,9 @@ import time
 from typing import Any, NoReturn
 
 from vdet.errors import INTERRUPTED, VdetError, in_one_line
-from vdet.workers import SINGLE_THREADED
+from vdet.system import CAN_WAKE, ENDING_SIGNALS
+from vdet.workers import CLEANUP_TIMEOUT, SINGLE_THREADED
 
-SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
-CLEANUP_TIMEOUT = 10.0  # seconds between a signal and a forced exit
 _SENT_AGAIN = 20
 _STDOUT, _STDERR = 1, 2
 
@@ -28,7 +27,8 @@ def run() -> NoReturn:
     sys.warnoptions.append("ignore::UserWarning:loky.backend.resource_tracker")
     for number in _signals():
         signal.signal(number, _interrupt)
-    _watch_for_signals()
+    if CAN_WAKE:
+        _watch_for_signals()
     try:
         from vdet.cli import main
 
@@ -76,9 +76,8 @@ def prepare_streams() -> None:
 
 
 def _signals() -> list[signal.Signals]:
-    """Return those of `SIGNALS` that this system has and that are not ignored, as by `nohup`."""
-    numbers = [signal.Signals[name] for name in SIGNALS if name in signal.Signals.__members__]
-    return [number for number in numbers if signal.getsignal(number) is not signal.SIG_IGN]
+    """Return the signals that end the program and are not ignored, as by `nohup`."""
+    return [number for number in ENDING_SIGNALS if signal.getsignal(number) is not signal.SIG_IGN]
 
 
 def _ignore_signals() -> None:

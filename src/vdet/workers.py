@@ -19,19 +19,16 @@ from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, 
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from vdet.errors import INTERRUPTED, ClusterError, check_positive
 from vdet.version import __version__
-
-if TYPE_CHECKING:
-    import distributed
 
 T = TypeVar("T")
 R = TypeVar("R")
 
 PARENT_CHECK_INTERVAL = 0.5  # seconds
-CLEANUP_TIMEOUT = 10.0  # seconds between SIGTERM and a forced exit
+CLEANUP_TIMEOUT = 10.0  # seconds between a signal and a forced exit
 SINGLE_THREADED = {"OPENBLAS_NUM_THREADS": "1", "OPENCV_FOR_THREADS_NUM": "1"}
 """Variables that limit libraries to one thread a call: frames and files are done in parallel."""
 ENVIRONMENT = {
@@ -49,8 +46,6 @@ QUOTAS = (
     (_GROUPS / "cpu/cpu.cfs_quota_us", _GROUPS / "cpu/cpu.cfs_period_us"),
 )
 """The files of quota and period of this process's control group: version 2, version 1."""
-
-TASKS_PER_MESSAGE = 1000  # to the scheduler; it begins while the next ones are on their way
 
 
 class WorkerKilledError(BrokenExecutor):
@@ -184,7 +179,7 @@ class LocalProcesses:
 def _ignored_sigint() -> Iterator[None]:
     """Let processes start that ignore Ctrl-C."""
     if threading.current_thread() is not threading.main_thread():
-        yield
+        yield  # only the main thread may say what a signal does
         return
     handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
@@ -222,13 +217,12 @@ def _run_task(function: Callable[[T], R], item: T) -> R:
 class DaskCluster:
     """All workers of the Dask scheduler at `address`; they find inputs and outputs by their paths.
 
-    The scheduler has `connect_timeout` seconds to answer, and then `worker_timeout` seconds to have
-    a worker. While there is work, it may be without workers for `lost_timeout` seconds.
+    The scheduler has `timeout` seconds to answer, and then as many to have a worker. While there is
+    work, it may be without workers for `lost_timeout` seconds.
     """
 
     address: str
-    connect_timeout: float = 10.0
-    worker_timeout: float = 10.0
+    timeout: float = 10.0
     lost_timeout: float = 60.0
 
     def map(self, function: Callable[[T], R], items: Sequence[T]) -> Generator[tuple[int, R]]:
@@ -245,47 +239,41 @@ class DaskCluster:
             Dask is not installed, the scheduler does not answer, it has no worker, a worker has
             another version of vdet, or the scheduler or all workers end while there is work.
         """
-        with _connection(self.address, self.connect_timeout) as client:
-            _check_workers(client, self.address, self.worker_timeout)
+        with _connection(self.address, self.timeout) as client:
             from distributed import KilledWorker, as_completed
 
-            call = partial(_call_limited, function)
-            futures = client.map(call, items, pure=False, batch_size=TASKS_PER_MESSAGE)
+            futures = client.map(partial(_call_limited, function), items, pure=False)
             numbers = {future.key: number for number, future in enumerate(futures)}
             lost = []
-            ended = as_completed(futures, loop=client.loop)  # type: ignore[no-untyped-call]
+            ended = as_completed(futures, loop=client.loop)
             del futures  # so that the workers drop each result once it was read
-            while not ended.is_empty():  # type: ignore[no-untyped-call]
+            while not ended.is_empty():
                 self._wait(ended, client)
                 future = next(ended)
-                number = numbers[future.key]
                 try:
-                    result = self._result(future)
+                    result = future.result()
                 except KilledWorker:
-                    lost.append(number)
+                    lost.append(numbers[future.key])
+                except (CancelledError, OSError) as error:
+                    if future.status == "error":
+                        raise  # an OSError of the function
+                    message = f"{self.address}: the scheduler has ended; run again"
+                    raise ClusterError(message) from error
                 else:
-                    yield number, result
+                    yield numbers[future.key], result
             if lost:
                 raise WorkerKilledError(lost)
 
-    def _wait(self, ended: "distributed.as_completed", client: "distributed.Client") -> None:
+    def _wait(self, ended: Any, client: Any) -> None:
         """Wait until an item has ended; raise `ClusterError` if there is no worker for long."""
         seen = time.monotonic()
-        while not ended.has_ready():  # type: ignore[no-untyped-call]
+        while not ended.has_ready():
             time.sleep(0.05)
             with contextlib.suppress(OSError):  # the scheduler has ended, and so have all items
-                if client.nthreads():  # type: ignore[no-untyped-call]
+                if client.nthreads():
                     seen = time.monotonic()
             if time.monotonic() > seen + self.lost_timeout:
                 raise ClusterError(f"{self.address}: all workers have ended; start others")
-
-    def _result(self, future: "distributed.Future[R]") -> R:
-        try:
-            return future.result()
-        except (CancelledError, OSError) as error:
-            if future.status == "error":
-                raise  # an OSError of the function
-            raise ClusterError(f"{self.address}: the scheduler has ended; run again") from error
 
 
 def _call_limited(function: Callable[[T], R], item: T) -> R:
@@ -303,7 +291,7 @@ def is_repeated() -> bool:
     from distributed import Event, get_worker
 
     try:
-        begun: Any = partial(Event, f"vdet-{get_worker().get_current_task()}")()
+        begun = Event(f"vdet-{get_worker().get_current_task()}")
     except ValueError:  # this is no worker
         return False
     was_begun = bool(begun.is_set())
@@ -312,7 +300,8 @@ def is_repeated() -> bool:
 
 
 @contextlib.contextmanager
-def _connection(address: str, timeout: float) -> "Iterator[distributed.Client]":
+def _connection(address: str, timeout: float) -> Iterator[Any]:
+    """Give a client of a scheduler whose workers all have this version of vdet."""
     try:
         from distributed import Client
         from distributed.versions import VersionMismatchWarning
@@ -321,28 +310,24 @@ def _connection(address: str, timeout: float) -> "Iterator[distributed.Client]":
     for name in ("distributed", "distributed.client"):
         logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # errors are raised
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", VersionMismatchWarning)  # see `_check_workers`
+        warnings.simplefilter("ignore", VersionMismatchWarning)  # that of vdet counts
         try:
-            client = Client(address, timeout=timeout, set_as_default=False)  # type: ignore[no-untyped-call]
+            client = Client(address, timeout=timeout, set_as_default=False)
         except (OSError, ValueError) as error:  # ValueError: not the form of an address
             raise ClusterError(
                 f"{address}: no Dask scheduler answers there; start one with `dask scheduler`"
             ) from error
     with client:
+        try:
+            client.wait_for_workers(1, timeout=timeout)
+        except TimeoutError as error:
+            raise ClusterError(f"{address}: has no worker; start some (dask worker)") from error
+        for worker, version in client.run(_version, on_error="return").items():
+            if version != __version__:
+                has = f"vdet {version}" if isinstance(version, str) else f"no vdet ({version})"
+                here = f"here is vdet {__version__}; install one version everywhere"
+                raise ClusterError(f"{worker}: has {has}, {here}")
         yield client
-
-
-def _check_workers(client: "distributed.Client", address: str, timeout: float) -> None:
-    try:
-        client.wait_for_workers(1, timeout=timeout)
-    except TimeoutError as error:
-        raise ClusterError(f"{address}: has no worker; start some (dask worker)") from error
-    for worker, version in client.run(_version, on_error="return").items():
-        if version != __version__:
-            has = f"vdet {version}" if isinstance(version, str) else f"no vdet ({version})"
-            raise ClusterError(
-                f"{worker}: has {has}, here is vdet {__version__}; install one version everywhere"
-            )
 
 
 def _version() -> str:

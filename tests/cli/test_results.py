@@ -6,6 +6,7 @@ import pytest
 
 from vdet.cli.results import Results
 from vdet.errors import OutputError, VideoError
+from vdet.files import record_input, recorded_inputs
 
 
 def test_a_page_and_numbers_that_cannot_be_written_are_refused_before_any_work(
@@ -20,8 +21,10 @@ def test_a_page_and_numbers_that_cannot_be_written_are_refused_before_any_work(
         with pytest.raises(OutputError, match="is there already; give --overwrite"):
             kept.check()
     Results(str(target), page=folder, overwrite=True).check()
-    with pytest.raises(OutputError, match="is the input itself"):
-        Results(str(target), overwrite=True).check([target])
+    with recorded_inputs():
+        record_input(target)
+        with pytest.raises(OutputError, match="is the input itself"):
+            Results(str(target), overwrite=True).check()
     with pytest.raises(OutputError, match=r"the folder .*page\.html is no folder"):
         Results(None, page=folder / "page.html", overwrite=True).check()
     with pytest.raises(OutputError, match="is given for two outputs"):

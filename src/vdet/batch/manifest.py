@@ -12,7 +12,7 @@ from typing import BinaryIO
 
 from vdet.errors import OutputError
 from vdet.files import output_errors
-from vdet.temporary import try_to_lock
+from vdet.system import lock
 from vdet.version import __version__
 
 _FLAGS = sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY"))
@@ -122,8 +122,11 @@ def open_manifest(path: Path) -> Iterator[Callable[[Record], None]]:
     with output_errors(path):
         descriptor = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT | _FLAGS, 0o666)
     with os.fdopen(descriptor, "r+b", buffering=0) as file:
-        if not try_to_lock(descriptor):
-            raise OutputError(f"{path}: another batch writes here; wait, or give another folder")
+        try:
+            lock(descriptor)
+        except BlockingIOError:
+            message = f"{path}: another batch writes here; wait, or give another folder"
+            raise OutputError(message) from None
 
         def add(record: Record) -> None:
             line = json.dumps(asdict(record), allow_nan=False) + "\n"

@@ -10,7 +10,7 @@ from vdet.batch.inputs import InputVideo, find_sources, matches_in
 from vdet.batch.manifest import Written, check_manifest, read_written
 from vdet.batch.task import Identity, result_digest
 from vdet.errors import BatchError, OutputError
-from vdet.files import check_output, file_ids
+from vdet.files import check_output, is_input, record_input
 from vdet.run.sinks.protocol import BatchTotal, Output, check_sinks, output_state, sink_kind
 from vdet.run.video import Run
 
@@ -190,12 +190,12 @@ def _refuse_nested(clips: Iterable[Path], sources: Iterable[InputVideo], folder:
 
 def _refuse_shared(runs: Iterable[Run], totals: Iterable[PlannedTotal], folder: Path) -> None:
     """Refuse an output with the name of another output, of a total, the manifest or an input."""
-    inputs = file_ids(path for run in runs for path in (run.source, *run.inputs))
+    record_input(*(run.source for run in runs))
     owners = {folder / MANIFEST: "the manifest"}
     makers = [(total.path, "the outputs of all videos") for total in totals]
     makers += [(output.path, str(run.source)) for run in runs for output in run.outputs]
     for path, maker in makers:
-        if file_ids([path]) & inputs:
+        if is_input(path):
             raise OutputError(f"{path}: is an input itself; give another folder")
         if path in owners:
             raise BatchError(f"{owners[path]} and {maker}: both would become {path}; rename one")

@@ -10,9 +10,8 @@ from typing import TypeVar
 from vdet.batch.manifest import Record, open_manifest
 from vdet.batch.plan import Plan
 from vdet.batch.task import Identity, process_file, record_of_killed
-from vdet.files import OutputFiles, make_folder, output_errors
+from vdet.files import OutputFiles, make_folder, output_errors, remove_stale
 from vdet.run.video import Run
-from vdet.temporary import remove_stale
 from vdet.workers import WorkerKilledError, Workers, is_repeated
 
 T = TypeVar("T")

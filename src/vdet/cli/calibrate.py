@@ -40,7 +40,7 @@ def calibrate(
         raise click.UsageError("--pattern: give 3 to 999 inner corners, as in 9x6")
     options.check_suffix(output, ".yaml", ".yml", what="cameras")
     found = find_images(photos)
-    check_output(output, overwrite=overwrite, inputs=found)
+    check_output(output, overwrite=overwrite)
     with progress_steps("") as steps:
         steps(f"searching {counted(len(found), 'photograph')}", None)
         result = fit(found, pattern)

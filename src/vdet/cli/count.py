@@ -25,7 +25,7 @@ log = logging.getLogger("vdet")
     "vdet count tracks.jsonl -c gate.yaml --flows flows.csv --interval 15min",
     "vdet count found/*.tracks.csv -c gate.yaml --counts counts.json",
 )
-@click.argument("tracks", nargs=-1, required=True, type=options.PATH, metavar="TRACKS...")
+@click.argument("tracks", nargs=-1, required=True, type=options.INPUT, metavar="TRACKS...")
 @counting_options()
 @options.option(
     "--size WIDTHxHEIGHT",
@@ -63,9 +63,7 @@ def count(
     from vdet.traffic.counting import count_files
 
     outputs = options.as_outputs(options.wanted_outputs())
-    check_sinks(
-        outputs, overwrite=overwrite, inputs=[*tracks, *choice.inputs(settings, with_model=False)]
-    )
+    check_sinks(outputs, overwrite=overwrite)
     gc.disable()  # it takes a third of the time, and finds nothing: boxes are in no circles
     try:
         with progress_steps(" files") as steps:

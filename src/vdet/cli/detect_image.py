@@ -60,9 +60,8 @@ def detect_image(
     model = load_detector(settings.detector)
     sources = find_images(images)
     shared = options.as_outputs(options.wanted_outputs())
-    inputs = [*sources, *choice.inputs(settings)]
-    check_sinks(shared, overwrite=overwrite, inputs=inputs)
-    jobs = plan_pictures(sources, output, stages, overwrite=overwrite, inputs=inputs)
+    check_sinks(shared, overwrite=overwrite)
+    jobs = plan_pictures(sources, output, stages, overwrite=overwrite)
     is_printed = not (output or stages or shared)
     with progress_steps(" pictures") as steps:
         failures = run_pictures(

@@ -154,8 +154,8 @@ def detect_video(
     from vdet.run.video import Run
 
     check_masks(settings.regions)
-    inputs, part = tuple(choice.inputs(settings)), (start, end, frames, at or Fraction(0))
-    run = Run(source, (), settings, *part, inputs, overwrite, threads)
+    part = start, end, frames, at or Fraction(0)
+    run = Run(source, (), settings, *part, overwrite, threads)
     if batch.folder is None:
         _process_one(replace(run, outputs=options.as_outputs(wanted)))
         return 0

@@ -18,7 +18,7 @@ from vdet.errors import ConfigError
     "vdet eval images pictures/",
     "vdet eval images city/ motorway/ --model their.onnx --least-width 0.03",
 )
-@click.argument("data", nargs=-1, required=True, type=options.PATH, metavar="DATA...")
+@click.argument("data", nargs=-1, required=True, type=options.INPUT, metavar="DATA...")
 @options.option(
     "--score SCORE",
     "Count boxes with at least this score, 0 to 1.",
@@ -57,9 +57,9 @@ def images(
 
     return_freed_memory(*PICTURES)
     model = load_detector(detector.showing_all())
-    results.check([*data, *choice.inputs(settings)])
     roles = Roles.from_settings(settings)
     sets = [read_labelled_pictures(path, roles) for path in data]
+    results.check()
     counting = Counting(detector.shown_score if score is None else score, least_width)
     with progress_steps(" pictures") as steps:
         progress = partial(steps, "")
@@ -72,7 +72,7 @@ def images(
     "vdet eval patches vehicles.zip non-vehicles.zip --page page",
     "vdet eval patches patches/ --model model.npz",
 )
-@click.argument("data", nargs=-1, required=True, type=options.PATH, metavar="DATA...")
+@click.argument("data", nargs=-1, required=True, type=options.INPUT, metavar="DATA...")
 @options.short_form(
     "--model FILE",
     "detector.model",
@@ -101,7 +101,7 @@ def patches(
 
     model_path = Path(settings.svm.model) if settings.svm.model else None
     model = load_model(model_path, requested_features(settings.svm)) if model_path else None
-    results.check([*data, *([model_path] if model_path else [])])
+    results.check()
     files = find_patches(data)
     with progress_steps("") as steps:
         result = patch_eval.evaluate_patches(files, settings, model, jobs=jobs, steps=steps)
@@ -112,8 +112,8 @@ def patches(
 
 
 @command("vdet eval tracks out.txt gt.txt --page page")
-@click.argument("prediction", type=options.PATH, metavar="PRED")
-@click.argument("truth", type=options.PATH, metavar="TRUTH")
+@click.argument("prediction", type=options.INPUT, metavar="PRED")
+@click.argument("truth", type=options.INPUT, metavar="TRUTH")
 @options.until_option
 @options.option(
     "--rate FPS",
@@ -141,7 +141,7 @@ def tracks(
     from vdet.labels.roles import Roles
 
     roles = Roles.from_settings(choice.read())
-    results.check([prediction, truth])
+    results.check()
     with progress_steps("") as steps:
         steps("comparing", None)
         run = score_files(prediction, truth, roles, until=until, rate=rate)
@@ -152,7 +152,7 @@ def tracks(
     "vdet eval video in.mp4 --truth gt.txt --page page",
     "vdet eval video in.mp4 --truth gt.txt --sweep tracker.needed=0.1,0.3",
 )
-@click.argument("videos", nargs=-1, required=True, type=options.PATH, metavar="IN...")
+@click.argument("videos", nargs=-1, required=True, type=options.INPUT, metavar="IN...")
 @options.truth_option
 @options.until_option
 @options.option(
@@ -195,8 +195,7 @@ def video(
         model = load_detector(settings.detector)
         variants.append(Variant(settings, model, extra))
     detectors = [variant.settings.detector for variant in variants]
-    files = [path for each in variants for path in choice.inputs(each.settings)]
-    results.check([*videos, *truths, *files])
+    results.check()
     roles = Roles.from_settings(base)
     clips = [open_clip(*pair, until, roles) for pair in zip(videos, truths, strict=True)]
     with progress_steps(" frames") as steps:

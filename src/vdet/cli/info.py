@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from vdet.cli.command import command
-from vdet.cli.options import PATH
+from vdet.cli.options import INPUT
 from vdet.cli.results import Results, facts_options
 from vdet.errors import printable
 
@@ -16,7 +16,7 @@ Facts = dict[str, Any]
 
 
 @command("vdet info in.mp4", "vdet info in.mp4 --json -", "vdet info model.npz")
-@click.argument("path", type=PATH, metavar="FILE")
+@click.argument("path", type=INPUT, metavar="FILE")
 @facts_options
 def info(path: Path, results: Results) -> None:
     """Describe a video, a picture or a model file.
@@ -27,7 +27,7 @@ def info(path: Path, results: Results) -> None:
     """
     from vdet.media.images import is_picture_name
 
-    results.check([path])
+    results.check()
     describe = {".npz": _linear_model, ".onnx": _network}.get(path.suffix.lower())
     if describe is None:
         describe = _picture if is_picture_name(path) and "%" not in path.name else _video

@@ -15,7 +15,7 @@ from vdet.files import check_output
     "vdet mine in.mp4 --truth gt.txt -o mined.zip",
     "vdet mine a.mp4 b.mp4 --truth a.txt --truth b.txt pictures/ -o mined.zip",
 )
-@click.argument("sources", nargs=-1, required=True, type=options.PATH, metavar="SOURCE...")
+@click.argument("sources", nargs=-1, required=True, type=options.INPUT, metavar="SOURCE...")
 @options.truth_option
 @options.output_file_option("Zip file to write.")
 @options.option("--every N", "Use every N-th frame of a video.", options.POSITIVE, default=4)
@@ -56,8 +56,7 @@ def mine(
     from vdet.labels.reading import holds_labelled_pictures
     from vdet.learn.svm import mining
 
-    inputs = [*sources, *truths, *choice.inputs(settings)]
-    check_output(output, overwrite=overwrite, inputs=inputs)
+    check_output(output, overwrite=overwrite)
     videos = [path for path in sources if not holds_labelled_pictures(path)]
     if len(videos) != len(truths):
         given = f"videos: {len(videos)}, truths: {len(truths)}"

@@ -16,13 +16,24 @@ import click
 from click.shell_completion import CompletionItem
 
 from vdet.errors import ConfigError, OutputError
+from vdet.files import record_input
 
 if TYPE_CHECKING:
     from vdet.config.schema import Settings
     from vdet.run.sinks.protocol import Output
 
+
+class _Input(click.Path):
+    def convert(self, value: Any, option: Any, context: Any) -> Any:
+        path = Path(super().convert(value, option, context))  # type: ignore[arg-type]
+        record_input(path)
+        return path
+
+
 PATH = click.Path(path_type=Path)
 """A path; whether something is there is checked later."""
+INPUT = _Input(path_type=Path)
+"""The path of a file that is read: no output takes its place."""
 POSITIVE = click.IntRange(1, 1_000_000_000)
 PROCESSES = click.IntRange(1, 256)
 """Number of threads or processes."""
@@ -92,7 +103,8 @@ def option(
     text
         Its help.
     kind
-        Type of the value; None for text, and for a path where the placeholder is FILE or DIR.
+        Type of the value; None for text, for the path of an input where the placeholder is FILE,
+        and for any path where it is DIR.
     name
         The argument of the command; by default called as the option.
     more
@@ -103,8 +115,8 @@ def option(
     metavar = " ".join(words[len(flags) :])
     if not metavar:
         more["is_flag"] = True
-    elif kind is None and metavar in ("FILE", "DIR"):
-        kind = PATH
+    elif kind is None:
+        kind = {"FILE": INPUT, "DIR": PATH}.get(metavar)
     if "default" in more:
         more["show_default"] = True
     names = [*flags, *([name] if name else [])]
@@ -141,7 +153,7 @@ def jobs_option(text: str = "Work in N processes.") -> Callable[[F], F]:
 
 def output_file_option(text: str) -> Callable[[F], F]:
     """Add `-o FILE`, which is required."""
-    return option("-o, --output FILE", text, required=True)
+    return option("-o, --output FILE", text, PATH, required=True)
 
 
 def check_suffix(output: Path, *suffixes: str, what: str) -> None:
@@ -210,14 +222,6 @@ class SettingsChoice:
     def name(self) -> str | None:
         """The names of the files as the user gave them; None for the defaults."""
         return " ".join(self.configs) or None
-
-    def inputs(self, settings: "Settings", *, with_model: bool = True) -> list[Path]:
-        """Return the files that the settings are read from and those that they name."""
-        from vdet.detect.factory import model_file
-
-        model = model_file(settings.detector) if with_model else None
-        masks = [Path(each.mask) for each in settings.regions if each.mask]
-        return [*self._files(), *masks, *([model] if model else [])]
 
     def read_for_whole_frames(self, *, detector: str | None = None) -> "Settings":
         """Read them for a command that looks at whole frames; refuse regions as a `ConfigError`."""

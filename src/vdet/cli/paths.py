@@ -17,7 +17,7 @@ from vdet.files import check_output
     "vdet paths in.mp4 --tracks-from tracks.jsonl -c gate.yaml -o paths.jpg",
     "vdet paths in.mp4 --no-paths -c gate.yaml -o preview.jpg",
 )
-@click.argument("clip", type=options.PATH, metavar="CLIP")
+@click.argument("clip", type=options.INPUT, metavar="CLIP")
 @options.output_file_option("Picture to write, .jpg or .png.")
 @options.option("--no-paths", "Search nothing: draw only the grid, lines and zones.")
 @watch_options
@@ -45,8 +45,7 @@ def paths(
 
     settings = choice.read()
     options.check_suffix(output, ".jpg", *sorted(PICTURE_SUFFIXES), what="pictures")
-    inputs = [clip, *choice.inputs(settings), *([watched.tracks] if watched.tracks else [])]
-    check_output(output, overwrite=overwrite, inputs=inputs)
+    check_output(output, overwrite=overwrite)
     image = watched.first_image(clip, settings).copy()
     height, width = image.shape[:2]
     lines, zones = place(settings.traffic, width, height)

@@ -20,7 +20,7 @@ class Results:
     overwrite: bool
     page: Path | None = None
 
-    def check(self, inputs: Iterable[Path] = ()) -> None:
+    def check(self) -> None:
         """Refuse outputs that could not be written, before any work.
 
         Raises
@@ -32,10 +32,9 @@ class Results:
         paths = [path for path in (self._json_file, self._page_file) if path]
         if len({path.resolve() for path in paths}) < len(paths):
             raise OutputError(f"{paths[0]}: is given for two outputs; name another file for one")
-        inputs = list(inputs)
         for path in paths:
             makes_folder = self.page is not None and self.page.is_relative_to(path.parent)
-            check_output(path, overwrite=self.overwrite, inputs=inputs, makes_folder=makes_folder)
+            check_output(path, overwrite=self.overwrite, makes_folder=makes_folder)
 
     @property
     def _json_file(self) -> Path | None:

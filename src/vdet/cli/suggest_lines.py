@@ -16,7 +16,7 @@ from vdet.files import check_output, write_whole
     "vdet suggest-lines in.mp4 -o gate.yaml",
     "vdet suggest-lines in.mp4 --tracks-from tracks.jsonl -o gate.yaml",
 )
-@click.argument("clip", type=options.PATH, metavar="CLIP")
+@click.argument("clip", type=options.INPUT, metavar="CLIP")
 @options.output_file_option("Settings with the lines, .yaml, for -c.")
 @watch_options
 @options.settings_options("detector.stride=2", options.model_option)
@@ -38,7 +38,7 @@ def suggest_lines(
 
     settings = choice.read()
     options.check_suffix(output, ".yaml", ".yml", what="lines")
-    check_output(output, overwrite=overwrite, inputs=[clip, *choice.inputs(settings)])
+    check_output(output, overwrite=overwrite)
     height, width = watched.first_image(clip, settings).shape[:2]
     records = watched.records(clip, width, settings)
     lines = suggest(records, width, height)

@@ -14,7 +14,7 @@ from vdet.files import check_output
     "vdet train vehicles.zip non-vehicles.zip mined.zip -o model.npz",
     "vdet train patches/ -o model.npz --set train.svm.C=1e-3",
 )
-@click.argument("data", nargs=-1, required=True, type=options.PATH, metavar="DATA...")
+@click.argument("data", nargs=-1, required=True, type=options.INPUT, metavar="DATA...")
 @options.output_file_option("Model file to write, .npz.")
 @options.settings_options("train.svm.C=1e-4")
 @options.jobs_option()
@@ -41,9 +41,7 @@ def train(
     options.check_suffix(output, ".npz", what="models")
     metrics_path = output.with_suffix(".json")
     for path in (output, metrics_path):
-        check_output(
-            path, overwrite=overwrite, inputs=[*data, *choice.inputs(settings, with_model=False)]
-        )
+        check_output(path, overwrite=overwrite)
     from vdet.detect.svm.model import save_model
     from vdet.learn.svm.dataset import find_patches
     from vdet.learn.svm.training import train as fit_model

@@ -15,12 +15,12 @@ from vdet.files import check_output
     "vdet train-net pictures/city pictures/motorway -o mine.onnx",
     "vdet train-net pictures/ -o mine.onnx --video drive.mp4 drive-truth.txt",
 )
-@click.argument("data", nargs=-1, type=options.PATH, metavar="[DATA]...")
+@click.argument("data", nargs=-1, type=options.INPUT, metavar="[DATA]...")
 @options.output_file_option("Network to write, .onnx.")
 @options.option(
     "--video CLIP TRUTH",
     "Learn from every fourth frame of a labelled video too. Can be repeated.",
-    options.PATH,
+    options.INPUT,
     name="clips",
     nargs=2,
     multiple=True,
@@ -55,11 +55,11 @@ def train_net(
 
     limit_library_threads()
     job = NetworkJob(data, clips, output, base, overwrite)
-    inputs = [*data, *([base] if base else []), *(path for clip in clips for path in clip)]
-    inputs += choice.inputs(settings, with_model=False)
     for path in (job.output, job.metrics):
-        check_output(path, overwrite=overwrite, inputs=inputs)
+        check_output(path, overwrite=overwrite)
     sources = read_sources(job, settings)
+    for path in (job.output, job.metrics):  # one may be among the files that were read now
+        check_output(path, overwrite=overwrite)
     print_lines(*source_lines([report for _, report in sources]), "")
     with live_bar(total=settings.train.net.steps, unit=" steps") as bar:
 

@@ -19,6 +19,7 @@ from pydantic import AfterValidator, Field, TypeAdapter
 from pydantic.dataclasses import dataclass
 
 from vdet.errors import TruthError, printable
+from vdet.files import record_input
 from vdet.labels.formats import UNKNOWN, Format, SourceVideo, best_classes
 from vdet.labels.json_stream import JsonLists
 from vdet.labels.label import Label, from_size, limited, line_error
@@ -248,6 +249,7 @@ def read_coco_pictures(path: Path) -> Iterator[LabelledPicture]:
     """
     try:
         with path.open("rb") as file:
+            record_input(file.fileno())
             document = _Document(path, file, "COCO", _Picture, _Annotation)
     except OSError as error:
         raise TruthError(f"{path}: cannot be read: {error.strerror}") from error

@@ -14,6 +14,7 @@ from av.stream import Discard, Disposition, Stream
 from av.video.stream import VideoStream
 
 from vdet.errors import ImageError, VideoError
+from vdet.files import record_input
 from vdet.media.coding import HDR_TRANSFERS, Coding
 from vdet.media.frame import ColorTags, Tags, VideoInfo
 from vdet.media.images import PICTURE_SUFFIXES, Orientation, read_header
@@ -39,13 +40,17 @@ _FORMATS = (
 )  # fmt: skip
 
 
-def open_input(path: Path, frame_rate: float | None = None) -> InputContainer:
+def open_input(
+    path: Path, frame_rate: float | None = None, *, for_tags: bool = False
+) -> InputContainer:
     """Open a video file, or numbered pictures (`img_%04d.png`, or a folder), for reading.
 
     Parameters
     ----------
     frame_rate
         Of numbered pictures, per second; None: `ASSUMED_RATE`.
+    for_tags
+        Only the tags of the file are wanted: no frame is decoded to learn more of its streams.
 
     Raises
     ------
@@ -75,6 +80,10 @@ def open_input(path: Path, frame_rate: float | None = None) -> InputContainer:
             kind = "mjpeg"  # FFmpeg may take it for a pipe of pictures, which is not read
     try:
         options["max_pixels"] = str(MAX_PIXELS)  # the file is probed with decoders
+        if for_tags:
+            options["codec_whitelist"] = "none"
+        else:
+            record_input(path)
         return av.open(name, "r", kind, options, metadata_errors="replace")  # tags: any encoding
     except (av.PermissionError, av.error.MemoryError) as error:
         raise VideoError(f"{path}: cannot be opened: {error.strerror}") from error

@@ -10,6 +10,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from vdet.errors import VideoError, printable
+from vdet.files import record_input
 from vdet.media.images import is_picture_name
 
 _PATTERN = re.compile(r"((?:[^%]|%%)*)%(?:0([1-9]\d*))?d((?:[^%]|%%)*)", re.ASCII)
@@ -71,6 +72,7 @@ def find_sequence(path: Path) -> PictureSequence | None:
             raise VideoError(f"{path}: picture {number + step} is missing; put a copy of {number}")
     if step > 1 and len({len(name % number) for number in (numbers[0], numbers[-1])}) > 1:
         raise VideoError(f"{path}: numbers that rise by {step} need one length; fill with zeros")
+    record_input(*(folder / (name % number) for number in numbers))
     return PictureSequence(f"{_doubled(str(folder.absolute()))}/{name}", numbers[0], step)
 
 

@@ -167,7 +167,7 @@ def may_replace_video(path: Path) -> bool:
     if not path.is_file():
         return path.is_symlink()  # it leads nowhere
     try:
-        with open_input(path) as container:
+        with open_input(path, for_tags=True) as container:
             tags = {key.lower(): value for key, value in container.metadata.items()}
     except VideoError:
         return not is_mp4(path)

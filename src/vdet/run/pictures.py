@@ -10,7 +10,7 @@ from vdet.boxes import Boxes, Image
 from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel, stage_pictures_of
 from vdet.errors import ImageError
-from vdet.files import OutputFiles
+from vdet.files import OutputFiles, record_input
 from vdet.media import Frame, Picture
 from vdet.media.images import PICTURE_SUFFIXES, is_picture_name, read_image
 from vdet.progress import Progress, no_progress
@@ -31,7 +31,7 @@ class PictureJob:
 def find_images(paths: Sequence[Path]) -> list[Path]:
     """Return the pictures that `paths` name: files, and the pictures in folders.
 
-    Folders inside these folders are not searched.
+    Folders inside these folders are not searched. The pictures are recorded as inputs.
 
     Raises
     ------
@@ -50,6 +50,7 @@ def find_images(paths: Sequence[Path]) -> list[Path]:
             found.append(path)
         else:
             raise ImageError(f"{path}: no such file or folder")
+    record_input(*found)
     return list(dict.fromkeys(found))
 
 
@@ -59,7 +60,6 @@ def plan_pictures(
     stages: Path | None,
     *,
     overwrite: bool,
-    inputs: Sequence[Path] = (),
 ) -> list[PictureJob]:
     """Choose the outputs of each picture, and check them before any work.
 
@@ -70,8 +70,6 @@ def plan_pictures(
         in which the pictures keep their names. None: no pictures.
     stages
         Folder of the stage pictures; of several sources, each gets a folder in it. None: none.
-    inputs
-        Other files that are read; outputs never replace them.
 
     Raises
     ------
@@ -89,8 +87,7 @@ def plan_pictures(
 
     jobs = [PictureJob(source, tuple(wanted(source))) for source in sources]
     outputs = [output for job in jobs for output in job.outputs]
-    inputs = [*sources, *inputs]
-    check_sinks(outputs, overwrite=overwrite, inputs=inputs, makes_folder=not is_file)
+    check_sinks(outputs, overwrite=overwrite, makes_folder=not is_file)
     return jobs
 
 

@@ -12,6 +12,7 @@ from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import AbstractContextManager, contextmanager
+from contextvars import copy_context
 from functools import partial
 from typing import Any, Self, TypeVar
 
@@ -50,7 +51,7 @@ class _Thread(threading.Thread):
 
     def submit(self, call: Callable[..., R], *arguments: Any) -> Future[R]:
         future: Future[R] = Future()
-        self._calls.put((future, partial(call, *arguments)))
+        self._calls.put((future, partial(copy_context().run, call, *arguments)))
         return future
 
     def run(self) -> None:
@@ -161,7 +162,8 @@ def map_ordered(
         def pairs() -> Iterator[tuple[T, Any]]:
             work = 0
             for item in items:
-                running.append((item, pool.submit(function, item) if is_work(item) else None))
+                call = partial(copy_context().run, function, item)
+                running.append((item, pool.submit(call) if is_work(item) else None))
                 work += running[-1][1] is not None
                 while work > threads or len(running) > _AHEAD * threads:
                     first, future = running.popleft()

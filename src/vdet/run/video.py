@@ -14,7 +14,7 @@ from vdet.config.schema import Settings
 from vdet.detect.factory import as_model
 from vdet.detect.protocol import DetectorModel, stage_pictures_of
 from vdet.errors import FrameSizeError, VideoError, check_positive
-from vdet.files import OutputFiles
+from vdet.files import OutputFiles, record_input, recorded_inputs
 from vdet.media.reader import VideoReader
 from vdet.progress import Progress, no_progress
 from vdet.run.loop import Pipeline, build, named_errors, peek
@@ -50,8 +50,6 @@ class Run:
     at
         Time of the stage pictures, seconds from the first frame. If no output needs more, only the
         frames from 2 s before it are processed.
-    inputs
-        Other files that are read, such as settings; outputs never replace them.
     overwrite
         Replace outputs that are there already.
     threads
@@ -69,7 +67,6 @@ class Run:
     end: Fraction | None = None
     frames: int | None = None
     at: Fraction = Fraction(0)
-    inputs: tuple[Path, ...] = ()
     overwrite: bool = False
     threads: int | None = None
     timeout: float = IO_TIMEOUT
@@ -124,7 +121,8 @@ class OpenVideo:
 
 def check_run(run: Run) -> None:
     """Refuse a run whose outputs cannot be written, before any work. Raises `OutputError`."""
-    check_sinks(run.outputs, overwrite=run.overwrite, inputs=[run.source, *run.inputs])
+    record_input(run.source)
+    check_sinks(run.outputs, overwrite=run.overwrite)
 
 
 @contextmanager
@@ -174,6 +172,7 @@ def _reader_and_frames(run: Run) -> Generator[Any]:
         yield from reader
 
 
+@recorded_inputs()
 def run_video(
     run: Run,
     model: DetectorModel,

@@ -11,15 +11,7 @@ from typing import Any, Literal, Protocol, Self
 from vdet.config.schema import Settings
 from vdet.detect.protocol import StagePictures
 from vdet.errors import OutputError
-from vdet.files import (
-    MayReplace,
-    OutputFiles,
-    any_file,
-    check_output,
-    file_ids,
-    output_errors,
-    refuse_input,
-)
+from vdet.files import MayReplace, OutputFiles, any_file, check_output, output_errors
 from vdet.media import VideoInfo
 from vdet.plugins import SINKS, load_plugin
 from vdet.run.result import FrameResult
@@ -194,13 +186,7 @@ def sink_kind(name: str) -> SinkKind:
     return kind
 
 
-def check_sinks(
-    outputs: Sequence[Output],
-    *,
-    overwrite: bool,
-    inputs: Sequence[Path] = (),
-    makes_folder: bool = False,
-) -> None:
+def check_sinks(outputs: Sequence[Output], *, overwrite: bool, makes_folder: bool = False) -> None:
     """Refuse outputs that cannot be written, before any work; arguments as in `check_output`.
 
     Raises
@@ -212,7 +198,6 @@ def check_sinks(
         There is no sink with such a name.
     """
     seen: set[Path] = set()
-    ids = file_ids(inputs)
     for output in outputs:
         kind, path = _kind_for(output), output.path
         if path.resolve() in seen:
@@ -222,7 +207,6 @@ def check_sinks(
             continue
         if kind.marker:
             path = min(path.glob(kind.marker), default=path / kind.marker)
-        refuse_input(path, ids)
         check_output(
             path,
             overwrite=overwrite,

@@ -1,0 +1,53 @@
+"""What only some systems have. Where it is missing, its protection is left out, here alone."""
+
+import contextlib
+import os
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
+
+_ENDING = ("SIGINT", "SIGTERM", "SIGHUP")
+ENDING_SIGNALS = [signal.Signals[name] for name in _ENDING if hasattr(signal, name)]
+"""The signals that end the program: of Ctrl-C, of `kill`, and of a terminal that closes."""
+
+CAN_WAKE = hasattr(signal, "pthread_kill")
+"""Whether a thread can send the main thread a signal, which ends a wait."""
+
+
+def lock(descriptor: int) -> bool:
+    """Lock a file for this process until it is closed.
+
+    Returns False where files have no locks: on some systems, and on some network disks.
+
+    Raises
+    ------
+    BlockingIOError
+        Another process has locked it.
+    """
+    if fcntl is None:
+        return False
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise
+    except OSError:
+        return False
+    return True
+
+
+@contextlib.contextmanager
+def locked_folder(folder: Path) -> Iterator[bool]:
+    """Lock a folder in the block, and give whether it is locked; errors as of `lock`."""
+    if fcntl is None:
+        yield False
+        return
+    descriptor = os.open(folder, os.O_RDONLY | os.O_NOFOLLOW | os.O_DIRECTORY)
+    try:
+        yield lock(descriptor)
+    finally:
+        os.close(descriptor)

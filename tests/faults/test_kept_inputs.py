@@ -1,0 +1,62 @@
+"""No output takes the place of a file that the run reads, in whatever way that was found."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from conftest import Run
+from labels.writers import Boxed, Labelled, show, write_coco, write_yolo
+from red_cars import CAR, HEIGHT, WIDTH, road
+from running import write_drive
+
+KEPT = "is the input itself; give another output"
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Sets of labelled pictures, numbered ones, a clip and a mask, in the current folder."""
+    monkeypatch.chdir(tmp_path)
+    boxes = (Boxed("car", (CAR.x1, CAR.y1, CAR.width, CAR.height)),)
+    pictures = {name: Labelled(WIDTH, HEIGHT, boxes) for name in "ab"}
+    write_coco(tmp_path / "set", pictures)
+    write_yolo(tmp_path / "yset", pictures)
+    (tmp_path / "frames").mkdir()
+    for number in range(1, 4):
+        show(tmp_path / "frames" / f"img_{number:04d}.png", road(CAR))
+    shutil.copy(tmp_path / "frames" / "img_0001.png", tmp_path / "mask.png")
+    (tmp_path / "settings.yaml").write_text("regions: {mask: mask.png}\n")
+    (tmp_path / "link.png").symlink_to("mask.png")
+    write_drive(tmp_path / "in.mp4", 3)
+    return tmp_path
+
+
+def contents(folder: Path) -> dict[Path, bytes]:
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        "eval images set --json set/annotations.json",
+        "eval images set --json set/a.png",
+        "eval images yset --json yset/data.yaml",
+        "eval images yset --json yset/labels/a.txt",
+        "paths frames --no-paths -o frames/img_0001.png",
+        "info frames/img_%04d.png --json frames/img_0001.png",
+        "info frames --json frames/img_0003.png",
+        "detect-image frames --json frames/img_0002.png",
+        "detect-image frames -o frames",
+        "detect-image set/a.png -c settings.yaml --json link.png",
+        "detect-video in.mp4 in.mp4",
+        "detect-video frames --no-video -c settings.yaml --sink picture=mask.png",
+        "train-net set -o set/annotations.onnx --set train.net.steps=1",
+    ],
+)
+def test_inputs_are_kept_also_with_overwrite(run: Run, folder: Path, arguments: str) -> None:
+    before = contents(folder)
+    if arguments.startswith("train-net"):
+        pytest.importorskip("torch")
+    result = run(*arguments.split(), "--overwrite")
+    assert contents(folder) == before, "files were changed, or others were left"
+    assert (result.code, KEPT in result.err) == (1, True), result.err

@@ -1,0 +1,66 @@
+"""Systems that lack what others have: Windows, macOS."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+from running import names, with_modules
+
+LACKING = """
+import os, signal, sys
+
+for name in ("fcntl", "resource"):
+    sys.modules[name] = None
+for module, names in (
+    (os, "fork forkpty register_at_fork sched_getaffinity getuid O_NOFOLLOW O_DIRECTORY"),
+    (signal, "SIGHUP pthread_kill"),
+):
+    for name in names.split():
+        delattr(module, name)
+"""
+
+USES_THE_API = """
+from pathlib import Path
+import numpy as np
+import vdet
+
+clip, lines = Path("in.mp4"), Path("lines.yaml")
+assert vdet.Detector().detect(np.full((360, 640, 3), 90, np.uint8)) is not None
+results = list(vdet.follow(clip, frames=8))
+assert len(results) == 8 and results[-1].tracks
+for overwrite in (False, True):
+    vdet.detect_video(clip, "out.mp4", tracks=["t.csv", "t.jsonl"], frames=8, overwrite=overwrite)
+visits = vdet.count_tracks("t.csv", lines).totals
+assert max(total.count for total in visits) == len(results[-1].tracks)
+vdet.evaluate_tracks("t.csv", "t.csv")
+"""
+
+USES_THE_PROGRAM = """
+import sys
+from vdet.process import run
+
+sys.argv = ["vdet", "count", "t.jsonl", "--lines", "lines.yaml", "--counts", "counts.csv"]
+run()
+"""
+
+LINES = "{size: [8, 8], zones: [{name: road, points: [[0, 0], [8, 0], [8, 8], [0, 8]]}]}"
+
+
+def test_without_locks_limits_and_forks_vehicles_are_found_followed_and_counted(
+    clip_path: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "sitecustomize.py").write_text(LACKING)
+    (tmp_path / "in.mp4").symlink_to(clip_path)
+    (tmp_path / "lines.yaml").write_text(LINES)
+    for code in (USES_THE_API, USES_THE_PROGRAM):
+        done = subprocess.run(
+            [sys.executable, "-c", code],
+            cwd=tmp_path,
+            env=with_modules(tmp_path),
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert (done.returncode, done.stderr) == (0, ""), done.stderr
+    made = {"out.mp4", "t.csv", "t.jsonl", "counts.csv"}
+    assert set(names(tmp_path)) == made | {"in.mp4", "lines.yaml", "sitecustomize.py"}
