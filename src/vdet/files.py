@@ -73,7 +73,7 @@ def is_input(path: Path) -> bool:
 def _id(file: Path | int) -> _FileId | None:
     try:
         status = os.stat(file)  # noqa: PTH116  # it may be a descriptor
-    except (OSError, ValueError):  # ValueError: a name that no file can have
+    except OSError:  # there is none
         return None
     return status.st_dev, status.st_ino
 
