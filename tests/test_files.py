@@ -227,6 +227,16 @@ def test_what_was_read_in_a_run_is_kept(tmp_path: Path) -> None:
     assert (tmp_path / "a.txt").read_text() == "new"
 
 
+def test_what_a_run_writes_itself_is_no_input_of_it(tmp_path: Path) -> None:
+    """It may have the number of an input that was deleted, as the state of a long training."""
+    with recorded_inputs():
+        for text in ("first", "second"):
+            with staged(tmp_path / "a.txt", overwrite=True) as temporary:
+                temporary.write_text(text)
+                record_input(temporary)
+    assert (tmp_path / "a.txt").read_text() == "second"
+
+
 @pytest.mark.parametrize("stem", ["x" * 250, "ü" * 125, "\udcff" * 250])
 def test_names_may_have_any_length(tmp_path: Path, stem: str) -> None:
     path = tmp_path / f"{stem}.mp4"

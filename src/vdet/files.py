@@ -228,6 +228,8 @@ class OutputFiles:
         for path, file in files.items():
             with output_errors(path), file.open("rb+") as written:
                 os.fsync(written.fileno())
+        # New files are no inputs, though one may have the number of an input that was deleted.
+        (_inputs.get() or set()).difference_update(map(_id, files.values()))
         # An interrupt may come at any time, so how to undo a step is noted before the step.
         with contextlib.ExitStack() as undo:
             for path, file in files.items():
