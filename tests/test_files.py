@@ -25,7 +25,6 @@ from vdet.files import (
     read_whole,
     record_input,
     recorded_inputs,
-    remove_stale,
     staged,
 )
 from vdet.run.threads import map_ordered, prefetch
@@ -37,24 +36,18 @@ def names(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
 
-def test_the_file_appears_only_when_the_block_ends_without_an_error(tmp_path: Path) -> None:
-    with staged(tmp_path / "out.txt") as temporary:
-        temporary.write_text("whole")
-        assert not (tmp_path / "out.txt").exists()
-    assert (tmp_path / "out.txt").read_text() == "whole"
-    assert names(tmp_path) == ["out.txt"]
-
-
-def test_a_complete_file_replaces_the_older_one_if_asked_and_keeps_its_permissions(
+def test_a_file_appears_when_the_block_ends_and_replaces_an_older_one_only_if_asked(
     tmp_path: Path,
 ) -> None:
     path = tmp_path / "out.txt"
-    path.write_text("older")
-    path.chmod(0o440)
-    with staged(path, overwrite=True) as temporary:
-        temporary.write_text("newer")
-        assert temporary.parent.stat().st_mode & 0o777 == 0o700, "others can read what is private"
-    assert path.read_text() == "newer"
+    for text, overwrite in (("older", False), ("newer", True)):
+        with staged(path, overwrite=overwrite) as temporary:
+            temporary.write_text(text)
+            assert temporary.parent.stat().st_mode & 0o777 == 0o700, "others can read it too soon"
+            assert path.exists() == overwrite
+        assert (names(tmp_path), path.read_text()) == (["out.txt"], text)
+        if not overwrite:
+            path.chmod(0o440)
     assert path.stat().st_mode & 0o777 == 0o440
 
 
@@ -197,13 +190,6 @@ def interrupt_after(steps: int, folder: Path, patch: pytest.MonkeyPatch) -> None
         patch.setattr(os, name, partial(interrupted, getattr(os, name)))
 
 
-def test_writing_a_file_removes_stale_files_in_its_folder(tmp_path: Path) -> None:
-    leave_one(tmp_path / "a.csv")
-    with staged(tmp_path / "b.mp4"):
-        pass
-    assert [path.name for path in tmp_path.iterdir()] == ["b.mp4"]
-
-
 @pytest.mark.parametrize("overwrite", [True, False])
 def test_what_will_be_read_is_refused_before_any_work_under_each_of_its_names(
     tmp_path: Path, overwrite: bool
@@ -211,7 +197,7 @@ def test_what_will_be_read_is_refused_before_any_work_under_each_of_its_names(
     (tmp_path / "in.json").touch()
     (tmp_path / "out.json").hardlink_to(tmp_path / "in.json")
     with recorded_inputs():
-        record_input(tmp_path / "in.json", tmp_path / "missing", Path("\0"))
+        record_input(tmp_path / "in.json", tmp_path / "missing")
         with pytest.raises(OutputError, match="is the input itself"):
             check_output(tmp_path / "out.json", overwrite=overwrite)
     check_output(tmp_path / "out.json", overwrite=True)  # another run does not read it
@@ -241,11 +227,14 @@ def test_what_was_read_in_a_run_is_kept(tmp_path: Path) -> None:
     assert (tmp_path / "a.txt").read_text() == "new"
 
 
-def test_a_link_of_such_a_name_is_not_followed(tmp_path: Path) -> None:
-    (tmp_path / "precious").touch()
-    (tmp_path / f".vdet-{_HOST}-{DIGITS}").symlink_to("precious")
-    remove_stale(tmp_path)
-    assert (tmp_path / "precious").exists()
+def test_what_a_run_writes_itself_is_no_input_of_it(tmp_path: Path) -> None:
+    """It may have the number of an input that was deleted, as the state of a long training."""
+    with recorded_inputs():
+        for text in ("first", "second"):
+            with staged(tmp_path / "a.txt", overwrite=True) as temporary:
+                temporary.write_text(text)
+                record_input(temporary)
+    assert (tmp_path / "a.txt").read_text() == "second"
 
 
 @pytest.mark.parametrize("stem", ["x" * 250, "ü" * 125, "\udcff" * 250])
@@ -256,29 +245,19 @@ def test_names_may_have_any_length(tmp_path: Path, stem: str) -> None:
     assert path.read_text() == "whole"
 
 
-def test_an_existing_output_is_refused_without_overwrite(tmp_path: Path) -> None:
-    path = tmp_path / "out.txt"
+def test_what_may_not_be_replaced_is_refused_before_any_work(tmp_path: Path) -> None:
+    """The message invites to replace only what may be replaced."""
+    path, pipe, kept = tmp_path / "out.txt", tmp_path / "pipe", "so it is kept; give another output"
     path.touch()
-    with pytest.raises(OutputError, match="give --overwrite"):
-        check_output(path, overwrite=False)
+    os.mkfifo(pipe)
     check_output(path, overwrite=True)
-
-
-@pytest.mark.parametrize("overwrite", [True, False])
-def test_what_is_no_ordinary_file_is_never_replaced(tmp_path: Path, overwrite: bool) -> None:
-    os.mkfifo(tmp_path / "pipe")
-    with pytest.raises(OutputError, match="is no ordinary file, and is kept"):
-        check_output(tmp_path / "pipe", overwrite=overwrite)
-
-
-@pytest.mark.parametrize("overwrite", [True, False])
-def test_the_message_does_not_invite_to_replace_what_may_not_be(
-    tmp_path: Path, overwrite: bool
-) -> None:
-    (tmp_path / "out.txt").touch()
-    with pytest.raises(OutputError) as caught:
-        check_output(tmp_path / "out.txt", overwrite=overwrite, may_replace=lambda _: False)
-    assert "vdet did not write it, so it is kept; give another output" in str(caught.value)
+    with pytest.raises(OutputError, match="is there already; give --overwrite"):
+        check_output(path, overwrite=False)
+    for overwrite in (True, False):
+        with pytest.raises(OutputError, match="is no ordinary file, and is kept"):
+            check_output(pipe, overwrite=overwrite)
+        with pytest.raises(OutputError, match=f"vdet did not write it, {kept}"):
+            check_output(path, overwrite=overwrite, may_replace=lambda _: False)
 
 
 def test_a_folder_that_the_work_makes_may_be_missing(tmp_path: Path) -> None:
@@ -368,15 +347,18 @@ class TestFolder:
             files.stage_folder(path)
         assert path.is_dir(), "a run that ends well leaves it, also without a file"
 
-    def test_that_of_a_killed_run_is_removed_and_that_of_a_running_one_is_kept(
-        self, tmp_path: Path
-    ) -> None:
-        left = tmp_path / f".vdet-{_HOST}-{DIGITS}"
-        left.mkdir()
-        (left / "a.txt").touch()
-        with OutputFiles() as files:
-            mine = files.stage_folder(tmp_path, TEXTS)
-            with OutputFiles() as others:
-                others.stage_folder(tmp_path, TEXTS)
-                assert mine.is_dir()
-            assert not left.exists()
+
+def test_what_a_killed_run_left_is_removed_and_that_of_a_running_one_is_kept(
+    tmp_path: Path,
+) -> None:
+    leave_one(tmp_path / "a.csv")
+    (tmp_path / "precious").mkdir()
+    (tmp_path / f".vdet-{_HOST}-{DIGITS}").symlink_to("precious")
+    with OutputFiles() as files:
+        mine = files.stage_folder(tmp_path)
+        with staged(tmp_path / "b.mp4"):
+            assert mine.is_dir()
+        assert len(list(tmp_path.glob(".vdet-*"))) == 2, "mine, and the link, which is no folder"
+    assert (tmp_path / "precious").is_dir()
+    assert "b.mp4" in names(tmp_path)
+    assert "a.csv" not in names(tmp_path)

@@ -73,7 +73,7 @@ def is_input(path: Path) -> bool:
 def _id(file: Path | int) -> _FileId | None:
     try:
         status = os.stat(file)  # noqa: PTH116  # it may be a descriptor
-    except (OSError, ValueError):  # ValueError: a name that no file can have
+    except OSError:  # there is none
         return None
     return status.st_dev, status.st_ino
 
@@ -228,6 +228,8 @@ class OutputFiles:
         for path, file in files.items():
             with output_errors(path), file.open("rb+") as written:
                 os.fsync(written.fileno())
+        # New files are no inputs, though one may have the number of an input that was deleted.
+        (_inputs.get() or set()).difference_update(map(_id, files.values()))
         # An interrupt may come at any time, so how to undo a step is noted before the step.
         with contextlib.ExitStack() as undo:
             for path, file in files.items():

@@ -140,7 +140,10 @@ class ThisProcess:
 
 @dataclass(frozen=True, slots=True)
 class LocalProcesses:
-    """`count` processes of this machine; even a `count` of 1 is a process of its own."""
+    """`count` processes of this machine; even a `count` of 1 is a process of its own.
+
+    Only the main thread can start them, so that Ctrl-C is left to it.
+    """
 
     count: int
 
@@ -160,8 +163,11 @@ class LocalProcesses:
                 in_work[executor.submit(_run_task, function, item)] = number
 
         try:
-            with _ignored_sigint():
+            handler = signal.signal(signal.SIGINT, signal.SIG_IGN)  # for the processes that start
+            try:
                 begin(self.count)
+            finally:
+                signal.signal(signal.SIGINT, handler)
             while in_work:
                 for future in wait(in_work, return_when=FIRST_COMPLETED).done:
                     result = future.result()
@@ -175,22 +181,8 @@ class LocalProcesses:
             executor.shutdown(kill_workers=bool(in_work))
 
 
-@contextlib.contextmanager
-def _ignored_sigint() -> Iterator[None]:
-    """Let processes start that ignore Ctrl-C."""
-    if threading.current_thread() is not threading.main_thread():
-        yield  # only the main thread may say what a signal does
-        return
-    handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, handler)
-
-
 def _initialize_worker(parent: int) -> None:
-    """Run in a new worker process: ignore Ctrl-C, and end when the process `parent` has ended."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """Run in a new worker process: end when the process `parent` has ended."""
     threading.Thread(target=_end_after, args=(parent,), name="vdet-watch", daemon=True).start()
 
 
@@ -217,12 +209,13 @@ def _run_task(function: Callable[[T], R], item: T) -> R:
 class DaskCluster:
     """All workers of the Dask scheduler at `address`; they find inputs and outputs by their paths.
 
-    The scheduler has `timeout` seconds to answer, and then as many to have a worker. While there is
-    work, it may be without workers for `lost_timeout` seconds.
+    The scheduler has `connect_timeout` seconds to answer, and then `worker_timeout` seconds to have
+    a worker. While there is work, it may be without workers for `lost_timeout` seconds.
     """
 
     address: str
-    timeout: float = 10.0
+    connect_timeout: float = 10.0
+    worker_timeout: float = 10.0
     lost_timeout: float = 60.0
 
     def map(self, function: Callable[[T], R], items: Sequence[T]) -> Generator[tuple[int, R]]:
@@ -239,7 +232,7 @@ class DaskCluster:
             Dask is not installed, the scheduler does not answer, it has no worker, a worker has
             another version of vdet, or the scheduler or all workers end while there is work.
         """
-        with _connection(self.address, self.timeout) as client:
+        with _connection(self) as client:
             from distributed import KilledWorker, as_completed
 
             futures = client.map(partial(_call_limited, function), items, pure=False)
@@ -300,8 +293,9 @@ def is_repeated() -> bool:
 
 
 @contextlib.contextmanager
-def _connection(address: str, timeout: float) -> Iterator[Any]:
-    """Give a client of a scheduler whose workers all have this version of vdet."""
+def _connection(cluster: DaskCluster) -> Iterator[Any]:
+    """Give a client of a cluster whose workers all have this version of vdet."""
+    address = cluster.address
     try:
         from distributed import Client
         from distributed.versions import VersionMismatchWarning
@@ -312,14 +306,14 @@ def _connection(address: str, timeout: float) -> Iterator[Any]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", VersionMismatchWarning)  # that of vdet counts
         try:
-            client = Client(address, timeout=timeout, set_as_default=False)
+            client = Client(address, timeout=cluster.connect_timeout, set_as_default=False)
         except (OSError, ValueError) as error:  # ValueError: not the form of an address
             raise ClusterError(
                 f"{address}: no Dask scheduler answers there; start one with `dask scheduler`"
             ) from error
     with client:
         try:
-            client.wait_for_workers(1, timeout=timeout)
+            client.wait_for_workers(1, timeout=cluster.worker_timeout)
         except TimeoutError as error:
             raise ClusterError(f"{address}: has no worker; start some (dask worker)") from error
         for worker, version in client.run(_version, on_error="return").items():

@@ -113,7 +113,7 @@ def test_a_cluster_without_workers_is_given_up_and_a_repeated_item_knows_it(tmp_
     with scheduler(tmp_path, allowed_failures=1) as (cluster, _):
         worker = dask("worker", "--nworkers", "1", folder=tmp_path)
         try:
-            dask_cluster = DaskCluster(cluster.address, timeout=SOON, lost_timeout=0.1)
+            dask_cluster = DaskCluster(cluster.address, worker_timeout=SOON, lost_timeout=0.1)
             slow = replace(dask_cluster, lost_timeout=SOON)
             assert list(slow.map(eval, [first])) == [(0, True)]
             results = dask_cluster.map(eval, ["1", "__import__('time').sleep(300)"])
@@ -204,7 +204,7 @@ def test_a_scheduler_that_has_no_worker_and_one_that_ends(tmp_path: Path) -> Non
     out = tmp_path / "out"
     with scheduler(tmp_path) as (cluster, process):
         with pytest.raises(ClusterError, match="has no worker"):
-            next(DaskCluster(cluster.address, timeout=0.1).map(abs, [1]))
+            next(DaskCluster(cluster.address, worker_timeout=0.1).map(abs, [1]))
         worker = dask("worker", "--no-nanny", folder=tmp_path)
         try:
             until(lambda: registered(tmp_path) == 1)
@@ -227,7 +227,7 @@ def test_a_scheduler_that_has_no_worker_and_one_that_ends(tmp_path: Path) -> Non
 )
 def test_no_scheduler_there(address: str) -> None:
     with pytest.raises(ClusterError, match="no Dask scheduler answers there"):
-        next(DaskCluster(address, timeout=0.5).map(abs, [1]))
+        next(DaskCluster(address, connect_timeout=0.5).map(abs, [1]))
 
 
 def test_without_dask_the_error_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
