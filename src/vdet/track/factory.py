@@ -2,7 +2,10 @@
 
 from collections.abc import Callable
 from dataclasses import astuple, dataclass, replace
+from math import inf
 from typing import Any
+
+import numpy as np
 
 from vdet.boxes import Box, Boxes
 from vdet.config.schema import MotionTrackerSettings, Settings, TrackerSettings
@@ -10,6 +13,8 @@ from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
 from vdet.config.tracker import RulesTrackerSettings
 from vdet.media import Picture
 from vdet.plugins import TRACKERS, load_plugin
+from vdet.track.motion.tracker import MotionTracker
+from vdet.track.rules.tracker import RulesTracker
 from vdet.track.track import State, TimedTracker, Track, VideoTracker
 
 
@@ -71,12 +76,10 @@ class InterpolatingTracker:
         """Return the vehicles shown at a time; as `TimedTracker.at`."""
         while len(self._searched) > 1 and self._searched[1][0] <= time:
             del self._searched[0]
-        (begin, tracks), *later = self._searched[:2]
+        begin, tracks = self._searched[0]
         if time <= begin:
             return tracks
-        if not later:
-            return [_moved(track, track, 0.0) for track in tracks]
-        end, following = later[0]
+        end, following = self._searched[1] if len(self._searched) > 1 else (inf, tracks)
         ends = {track.id: track for track in following}
         share = (time - begin) / (end - begin)
         return [_moved(track, ends[track.id], share) for track in tracks if track.id in ends]
@@ -84,27 +87,15 @@ class InterpolatingTracker:
 
 def _moved(track: Track, end: Track, share: float) -> Track:
     """Return a track that has done this share of its way to `end`."""
-
-    def mixed(one: tuple[float, ...], other: tuple[float, ...]) -> list[float]:
-        return [a + (b - a) * share for a, b in zip(one, other, strict=True)]
-
-    x, y = mixed(track.foot, end.foot)
-    box = Box(*mixed(astuple(track.box), astuple(end.box)))
+    first, last = (np.array([*each.foot, *astuple(each.box)]) for each in (track, end))
+    x, y, *sides = (first + (last - first) * share).tolist()
     state: State = "lost" if track.state == "lost" else "between"
-    return replace(track, box=box, whole_foot=(x, y), state=state)
+    return replace(track, box=Box(*sides), whole_foot=(x, y), state=state)
 
 
-def _make_motion(settings: MotionTrackerSettings, width: int, height: int) -> VideoTracker:
-    from vdet.track.motion.tracker import MotionTracker
-
-    return MotionTracker(settings, width, height)
-
-
-def _make_rules(settings: RulesTrackerSettings, width: int, height: int) -> VideoTracker:  # noqa: ARG001
-    from vdet.track.rules.tracker import RulesTracker
-
+def _make_rules(settings: RulesTrackerSettings, _width: int, height: int) -> RulesTracker:
     return RulesTracker(scale_lengths(settings, height / REFERENCE_HEIGHT))
 
 
-MOTION = TrackerKind(MotionTrackerSettings, _make_motion)
+MOTION = TrackerKind(MotionTrackerSettings, MotionTracker)
 RULES = TrackerKind(RulesTrackerSettings, _make_rules)

@@ -1,46 +1,12 @@
-"""Which detection belongs to which vehicle, and which vehicles are the same one."""
+"""Which tracks follow the same vehicle."""
 
 import numpy as np
 import pytest
 
 from vdet.boxes import Float64Array
 from vdet.config.schema import MotionTrackerSettings
-from vdet.track.motion.association import (
-    buffered_iou,
-    pair,
-    take_over_ids,
-    without_duplicates,
-)
+from vdet.track.motion.association import take_over_ids, without_duplicates
 from vdet.track.motion.vehicle import Look, Observation, Vehicle
-
-# How well boxes fit
-
-EXPECTED = np.array([[100.0, 100, 200, 160], [400, 100, 450, 150]])
-BESIDE = np.array([[210.0, 100, 310, 160]])
-
-
-def buffers(x: float, y: float) -> Float64Array:
-    return np.tile([x, y], (2, 1)).astype(np.float64)
-
-
-def test_boxes_that_do_not_touch_fit_where_the_motion_is_unknown() -> None:
-    assert buffered_iou(EXPECTED, buffers(0.05, 0.05), BESIDE)[0, 0] == 0
-    assert buffered_iou(EXPECTED, buffers(0.5, 0.1), BESIDE)[0, 0] == pytest.approx(40 / 260)
-
-
-# Pairs
-
-
-def matrix(*rows: list[float]) -> Float64Array:
-    return np.array(rows, np.float64)
-
-
-def test_a_later_round_has_what_the_earlier_ones_left() -> None:
-    values = matrix([0.9, 0.4], [0.3, 0.0])
-    assert pair(values, [[1], [0]]) == {1: 0, 0: 1}
-
-
-# Vehicles that are the same one
 
 SIZE = (1000, 500)
 BOX = np.array([400.0, 200.0, 500.0, 260.0])
@@ -120,7 +86,7 @@ def test_of_two_lost_vehicles_the_nearest_is_taken_and_only_by_one() -> None:
 
 
 def without(*vehicles: Vehicle) -> list[Vehicle]:
-    return without_duplicates(vehicles, SIZE)
+    return without_duplicates(vehicles, np.array([each.state.box for each in vehicles]))
 
 
 @pytest.mark.parametrize(("first", "second", "kept"), [(1, 2, 1), (2, 1, 1), (3, None, 3)])

@@ -20,16 +20,16 @@ def offset(x: float, y: float, width: float, height: float) -> Float64Array:
     return sized(100 + x, 50 + y, 40 + width, 20 + height)
 
 
-def still(box: Float64Array = BOX, noise: float = 0.1, velocity: float = 2.5) -> MotionState:
-    return MotionState.at_rest(box, noise, velocity)
+def still(box: Float64Array = BOX, noise: float = 0.1) -> MotionState:
+    return MotionState.at_rest(box, noise, LARGE)
 
 
 def after(boxes: list[Float64Array], noise: float = 0.1) -> MotionState:
     """Follow boxes, one a frame; the state is that expected for the next."""
     state = still(boxes[0], noise)
     for box in boxes[1:]:
-        state = state.predicted(FRAME, 1.0).corrected(box, noise, LARGE)
-    return state.predicted(FRAME, 1.0)
+        state = state.predicted(FRAME).corrected(box, noise, LARGE)
+    return state.predicted(FRAME)
 
 
 def test_a_steady_motion_is_predicted_without_lag() -> None:
@@ -58,7 +58,7 @@ SIZE = (1000, 500)
 
 
 def expecting(*box: float) -> MotionState:
-    return MotionState.at_rest(sized(*box), 0.1, 2.5)
+    return MotionState.at_rest(sized(*box), 0.1, SIZE)
 
 
 def corrected(state: MotionState, *box: float) -> Float64Array:
@@ -91,7 +91,7 @@ def test_entering_gives_the_velocity_of_the_inner_edge_and_no_growth() -> None:
     state = expecting(960, 200, 40, 50)
     for left in range(955, 900, -5):
         box = sized(left, 200, 1000 - left, 50)
-        state = state.predicted(FRAME, 1.0).corrected(box, 0.1, SIZE)
+        state = state.predicted(FRAME).corrected(box, 0.1, SIZE)
     assert state.mean[0, 1] == pytest.approx(-5 / FRAME, abs=0.5 / FRAME)
     assert state.mean[2, 1] == 0
 

@@ -7,10 +7,7 @@ from seed import SEED_TRACKER
 from textured_road import textured_road
 from vdet.boxes import Box, Image
 from vdet.config.tracker import RulesTrackerSettings
-from vdet.track.rules.association import (
-    Association,
-    combine,
-)
+from vdet.track.rules.association import Association, combine
 from vdet.track.rules.car import Car, Region
 
 SETTINGS = SEED_TRACKER

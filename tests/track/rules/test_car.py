@@ -4,7 +4,7 @@ import pytest
 from boxing import moved_to
 from seed import SEED_TRACKER, tracker_but
 from vdet.boxes import Box, Image
-from vdet.track.rules.car import Car, Region, find_template
+from vdet.track.rules.car import Car, Region
 
 BOX = Box.sized(100, 60, 80, 60)
 FRAME = np.random.default_rng(0).integers(0, 256, (240, 320, 3), dtype=np.uint8)
@@ -17,10 +17,6 @@ def seen(times: int = 1) -> Car:
     return car
 
 
-def shifted(frame: Image, dx: int, dy: int) -> Image:
-    return np.roll(frame, (dy, dx), axis=(0, 1))
-
-
 def test_box_and_centroid_are_averages_over_the_last_ten_detections() -> None:
     car = seen()
     for i in range(10):
@@ -31,9 +27,9 @@ def test_box_and_centroid_are_averages_over_the_last_ten_detections() -> None:
 
 def test_matches_in_a_row_are_ended_by_a_region_and_not_by_a_miss() -> None:
     car = seen()
-    car.see_match(BOX, FRAME)
+    car.see(Region(BOX, (140, 90), 2.0), FRAME, by_match=True)
     car.miss()
-    car.see_match(BOX, FRAME)
+    car.see(Region(BOX, (140, 90), 2.0), FRAME, by_match=True)
     assert car.matches == 2
     car.see(Region(BOX, (140, 90), 2.0), FRAME)
     assert car.matches == 0
@@ -42,76 +38,63 @@ def test_matches_in_a_row_are_ended_by_a_region_and_not_by_a_miss() -> None:
 def test_the_latest_image_is_searched_around_the_latest_box() -> None:
     car = Car(SEED_TRACKER)
     car.see(Region(Box.sized(0, 0, 60, 60), (30, 30), 2.0), FRAME)
-    car.see(Region(BOX, (140, 90), 2.0), FRAME)
-    assert car.find_in(shifted(FRAME, 7, -4)) == moved_to(BOX, 107, 56)
+    car.see(Region(BOX, (141, 92), 2.0, 0.7, "car"), FRAME)
+    found = car.find_in(np.roll(FRAME, (-4, 7), axis=(0, 1)))
+    assert found == Region(moved_to(BOX, 107, 56), (148, 88), 2.0, 0.7, "car")
 
 
-# The search for a template
+# The search for its image
 
-BACKGROUND = 90
-
-
-def texture(width: int, height: int, seed: int = 0) -> Image:
-    rng = np.random.default_rng(seed)
-    return rng.integers(0, 256, (height, width, 3), dtype=np.uint8)
+GREY = np.full((200, 300, 3), 90, np.uint8)
+PLACE = Box.sized(100, 80, 60, 40)
 
 
-def frame_with(piece: Image, x: int, y: int, width: int = 300, height: int = 200) -> Image:
-    frame = np.full((height, width, 3), BACKGROUND, np.uint8)
-    frame[y : y + piece.shape[0], x : x + piece.shape[1]] = piece
+def texture(seed: int = 0) -> Image:
+    return np.random.default_rng(seed).integers(0, 256, (40, 60, 3), dtype=np.uint8)
+
+
+def frame_with(piece: Image, x: float, y: float) -> Image:
+    frame = GREY.copy()
+    moved_to(PLACE, x, y).cut(frame)[:] = piece
     return frame
 
 
 def search(
-    frame: Image,
-    template: Image,
-    near: Box,
-    *,
-    distance: int = 50,
-    min_score: float = 0.5,
+    frame: Image, piece: Image | None = None, near: Box = PLACE, **changes: object
 ) -> Box | None:
-    settings = tracker_but(match_distance=distance, match_score=min_score)
-    return find_template(frame, Region(near, near.center, 0, image=template), settings)
+    """Search a car that was seen at `near` before, where it looked like `piece`."""
+    car = Car(tracker_but(**changes))
+    before = frame_with(texture() if piece is None else piece, near.x1, near.y1)
+    car.see(Region(near, near.center, 0), before)
+    found = car.find_in(frame)
+    return found.box if found else None
 
 
-def test_a_moved_template_is_found_to_the_pixel_with_a_perfect_score() -> None:
-    piece = texture(60, 40)
-    found = search(frame_with(piece, 120, 77), piece, Box.sized(100, 80, 60, 40), min_score=1)
+def test_a_moved_image_is_found_to_the_pixel_with_a_perfect_score() -> None:
+    found = search(frame_with(texture(), 120, 77), match_score=1)
     assert found == Box.sized(120, 77, 60, 40)
 
 
 def test_a_score_below_the_least_one_is_no_match() -> None:
-    frame = frame_with(texture(60, 40, seed=1), 100, 80)
-    assert search(frame, texture(60, 40), Box.sized(100, 80, 60, 40), min_score=0.95) is None
+    assert search(frame_with(texture(seed=1), 100, 80), match_score=0.95) is None
 
 
-def test_the_distance_is_the_longest_way_and_a_straight_line() -> None:
-    piece = texture(60, 40)
-    near = Box.sized(100, 80, 60, 40)
-    assert search(frame_with(piece, 130, 120), piece, near, distance=50) == Box.sized(
-        130, 120, 60, 40
-    )
-    assert search(frame_with(piece, 130, 120), piece, near, distance=49) is None
-    assert search(frame_with(piece, 140, 120), piece, near, distance=50) is None
+@pytest.mark.parametrize(
+    ("x", "distance", "is_found"), [(130, 50, True), (130, 49, False), (140, 50, False)]
+)
+def test_the_distance_is_the_longest_way_and_a_straight_line(
+    x: int, distance: int, is_found: bool
+) -> None:
+    found = search(frame_with(texture(), x, 120), match_distance=distance)
+    assert found == (Box.sized(x, 120, 60, 40) if is_found else None)
 
 
-def test_a_place_partly_outside_the_frame_is_searched_where_it_is_inside() -> None:
-    piece = texture(60, 40)
-    assert search(frame_with(piece, 0, 0), piece, Box.sized(-20, -10, 60, 40)) == Box.sized(
-        0, 0, 60, 40
-    )
+def test_near_the_border_only_the_frame_is_searched() -> None:
+    found = search(frame_with(texture(), 0, 0), near=moved_to(PLACE, 20, 10))
+    assert found == Box.sized(0, 0, 60, 40)
 
 
-@pytest.mark.parametrize(("width", "height"), [(301, 40), (60, 201)])
-def test_a_template_larger_than_the_frame_has_no_match(width: int, height: int) -> None:
-    frame = np.full((200, 300, 3), BACKGROUND, np.uint8)
-    assert (
-        search(frame, texture(width, height), Box.sized(0, 0, width, height), min_score=0) is None
-    )
-
-
-@pytest.mark.parametrize("color", [(0, 0, 0), (BACKGROUND,) * 3, (10, 200, 90)])
-def test_a_template_of_one_colour_has_no_match(color: tuple[int, int, int]) -> None:
+@pytest.mark.parametrize("color", [(0, 0, 0), (90, 90, 90), (10, 200, 90)])
+def test_an_image_of_one_colour_has_no_match(color: tuple[int, int, int]) -> None:
     piece = np.full((40, 60, 3), color, np.uint8)
-    frame = frame_with(piece, 100, 80)
-    assert search(frame, piece, Box.sized(100, 80, 60, 40)) is None
+    assert search(frame_with(piece, 100, 80), piece) is None

@@ -63,6 +63,6 @@ def _mean(picture: Picture, box: Float64Array) -> list[float]:
 
 def _part(image: Image, box: Float64Array) -> Image:
     """Return the pixels in a box, at least one."""
-    x, y = np.minimum(box[:2], np.array(image.shape[1::-1]) - 1).astype(int)
-    right, bottom = np.maximum(np.rint(box[2:]).astype(int), (x + 1, y + 1))
-    return image[y:bottom, x:right]
+    x1, y1, x2, y2 = box.tolist()
+    x, y = min(int(x1), image.shape[1] - 1), min(int(y1), image.shape[0] - 1)
+    return image[y : max(round(y2), y + 1), x : max(round(x2), x + 1)]

@@ -1,29 +1,21 @@
-"""Which detection belongs to which vehicle, and which vehicles are the same one.
+"""Which vehicles hide others, and which tracks follow the same vehicle.
 
 On a flat road what is nearer stands lower in the picture. So of two vehicles that overlap the one
 with the lower bottom hides the other, and two boxes that overlap and stand level are of one
 vehicle: two would be in the same place.
-
-Source: the order of the rounds is the matching cascade of Wojke, Bewley and Paulus, "Simple Online
-and Realtime Tracking with a Deep Association Metric", 2017; the buffered intersection over union is
-that of Yang et al., "Hard to Track Objects with Irregular Motions and Similar Appearances? Make It
-Easier by Buffering the Matching Space", 2023.
 """
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum, auto
 
 import numpy as np
 
-from vdet.boxes import BoolArray, Float64Array, coverage, iou, visible
+from vdet.boxes import BoolArray, Float64Array, coverage, iou_matrix
 from vdet.track.motion.appearance import differences
-from vdet.track.motion.assignment import assign
+from vdet.track.motion.history import carried
 from vdet.track.motion.vehicle import Vehicle
-
-Pairs = dict[int, int]
-
-WIDEST_BUFFER = 0.25
-"""Most that a box is widened by on each side, shares of its size."""
 
 _REACH = 0.75
 _REACH_GROWTH = 0.35
@@ -95,18 +87,6 @@ def are_hidden(boxes: Float64Array, present: BoolArray) -> BoolArray:
     return np.asarray(hiding.any(axis=1))
 
 
-def is_same(box: Float64Array, other: Float64Array, least: float) -> bool:
-    """Return whether two boxes, `(4,)`, show the same vehicle.
-
-    `least` is the share of one that lies in the other, if they are level.
-    """
-    one, two = box[np.newaxis], other[np.newaxis]
-    height = min(box[3] - box[1], other[3] - other[1])
-    is_level = abs(other[3] - box[3]) < _LEVEL * height
-    overlap = max(coverage(one, two), coverage(two, one))
-    return bool(iou(box, other) > _ALIKE or (is_level and overlap > least))
-
-
 def are_parts(boxes: Float64Array, scores: Float64Array) -> BoolArray:
     """Return for each box, `(n, 4)`, whether most of it lies in one that scores higher.
 
@@ -118,58 +98,6 @@ def are_parts(boxes: Float64Array, scores: Float64Array) -> BoolArray:
     """
     weaker = scores[:, np.newaxis] < CLEAR * scores
     return np.asarray(((coverage(boxes, boxes) > PART) & weaker).any(axis=1))
-
-
-def is_part(box: Float64Array, other: Float64Array) -> bool:
-    """Return whether most of `box`, `(4,)`, lies in `other`."""
-    return bool(coverage(box[np.newaxis], other[np.newaxis]) > PART)
-
-
-def buffered_iou(
-    expected: Float64Array, buffers: Float64Array, found: Float64Array
-) -> Float64Array:
-    """Return how well each expected box fits each found one, 0 to 1, `(n, m)`.
-
-    Both boxes are widened by the buffer of the expected one, in shares of their own sizes. So two
-    boxes that do not touch may still belong together where little is known of the motion.
-
-    Parameters
-    ----------
-    expected, found
-        Shapes `(n, 4)` and `(m, 4)`: x1, y1, x2, y2 in pixels, each with an area.
-    buffers
-        Shape `(n, 2)`: shares of width and height by which a box is widened on each side.
-    """
-    shares = np.minimum(buffers, WIDEST_BUFFER)[:, np.newaxis]
-    return iou(_widened(expected[:, np.newaxis], shares), _widened(found, shares))
-
-
-def _widened(boxes: Float64Array, shares: Float64Array) -> Float64Array:
-    near, far = boxes[..., :2], boxes[..., 2:]
-    margin = (far - near) * shares
-    return np.concatenate([near - margin, far + margin], axis=-1)
-
-
-def pair(values: Float64Array, rounds: Sequence[Sequence[int]]) -> Pairs:
-    """Pair rows with columns, each at most once.
-
-    Parameters
-    ----------
-    values
-        Shape `(n, m)`: what a pair is worth; 0 where it must not be.
-    rounds
-        Rows: those of a later round may only have what the earlier ones left.
-
-    Returns
-    -------
-    The column of each paired row: in each round the pairs with the largest sum of values.
-    """
-    left = values.copy()
-    pairs: Pairs = {}
-    for rows in rounds:
-        pairs |= {rows[row]: column for row, column in assign(left[list(rows)])}
-        left[:, list(pairs.values())] = 0
-    return pairs
 
 
 def take_over_ids(vehicles: Sequence[Vehicle]) -> list[Vehicle]:
@@ -194,16 +122,50 @@ def take_over_ids(vehicles: Sequence[Vehicle]) -> list[Vehicle]:
     return left
 
 
-def without_duplicates(vehicles: Sequence[Vehicle], size: tuple[int, int]) -> list[Vehicle]:
+class Case(Enum):
+    """What a track is beside another one that is higher in rank."""
+
+    APART = auto()
+    """Each follows a vehicle of its own."""
+    DUPLICATE = auto()
+    """Both follow one vehicle: they become one track."""
+    PART = auto()
+    """It is not confirmed, and shows the other's vehicle or a part of it: it is dropped."""
+    EMERGING = auto()
+    """It may be a hidden vehicle that comes out from behind the other one."""
+    HIDDEN = auto()
+    """It was apart, and follows the vehicle now that hides its own: it is lost."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Overlap:
+    """How the box of a track lies to that of another one.
+
+    `inside` is the share of it in the other box. `one` is how much the two show one vehicle: the
+    share of the smaller one in the other if they are level, 1 if they are `alike`, or else 0.
+    """
+
+    inside: float
+    one: float
+    alike: bool
+
+
+def without_duplicates(vehicles: Sequence[Vehicle], boxes: Float64Array) -> list[Vehicle]:
     """Leave one track for each vehicle: the one with the highest score, or else the oldest one.
 
     It keeps the id that was not lost for longer. A track that is not confirmed replaces no other
-    one; it stays beside it while its score is higher. Of two tracks that were apart before, the
-    weaker one follows the vehicle that hides its own: it is lost.
+    one; it stays beside it while its score is higher.
+
+    Parameters
+    ----------
+    boxes
+        Their visible parts, `(n, 4)`.
     """
-    boxes = visible(np.reshape([vehicle.state.box for vehicle in vehicles], (-1, 4)), size)
-    inside = coverage(boxes, boxes)
-    overlaps = np.maximum(inside, inside.T) > _LEVEL_OVERLAP
+    inside, alike = coverage(boxes, boxes), iou_matrix(boxes, boxes) > _ALIKE
+    overlaps = np.maximum(inside, inside.T)
+    bottoms, heights = boxes[:, 3], boxes[:, 3] - boxes[:, 1]
+    level = abs(bottoms - bottoms[:, None]) < _LEVEL * np.minimum(heights, heights[:, None])
+    one = np.where(alike, 1.0, overlaps * level)
     hidden = [vehicle for vehicle in vehicles if vehicle.hidden]
     kept: list[int] = []
 
@@ -213,41 +175,41 @@ def without_duplicates(vehicles: Sequence[Vehicle], size: tuple[int, int]) -> li
 
     for row in sorted(range(len(vehicles)), key=rank):
         vehicle = vehicles[row]
-        for other in kept if not vehicle.unseen else ():
-            same = vehicles[other]
-            is_shown = overlaps[row, other] and same.confirmed and not same.unseen
-            if is_shown and _are_same(vehicle, same, boxes[row], boxes[other], hidden):
-                if vehicle.confirmed and min(vehicle.age, same.age) > _APART:
+        near = [] if vehicle.unseen else [at for at in kept if overlaps[row, at] > _LEVEL_OVERLAP]
+        for at in near:
+            other = vehicles[at]
+            if other.unseen or not other.confirmed:
+                continue
+            overlap = _Overlap(inside[row, at], one[row, at], alike[row, at])
+            match _case(vehicle, other, overlap, hidden):
+                case Case.DUPLICATE:
+                    other.merge(vehicle)
+                    break
+                case Case.PART:
+                    break
+                case Case.HIDDEN:
                     vehicle.lose()
                     kept.append(row)
-                elif vehicle.confirmed:
-                    same.merge(vehicle)
-                break
-        else:
+                    break
+        else:  # apart from all of them, or emerging
             kept.append(row)
     return [vehicles[row] for row in sorted(kept)]
 
 
-def _are_same(
-    vehicle: Vehicle,
-    other: Vehicle,
-    box: Float64Array,
-    other_box: Float64Array,
-    hidden: Sequence[Vehicle],
-) -> bool:
-    """Return whether a track shows the same vehicle as another one, higher in rank.
-
-    One that may be a `hidden` vehicle that comes out is no part of the vehicle before it. One
-    that has been followed for a while is the same only if most of one lies in the other.
-    """
-    is_weaker = vehicle.confirmed or vehicle.scores.value <= other.scores.value
+def _case(vehicle: Vehicle, other: Vehicle, overlap: _Overlap, hidden: Sequence[Vehicle]) -> Case:
+    """Return what a track is beside another one, higher in rank, that it overlaps; both see."""
     if min(vehicle.age, other.age) > _APART:
-        return bool(iou(box, other_box) > _ALIKE)
-    is_known = vehicle.confirmed and max(vehicle.age, other.age) > _APART
-    if is_weaker and is_same(box, other_box, PART if is_known else _LEVEL_OVERLAP):
-        return True
-    may_be_part = not vehicle.confirmed and is_part(box, other_box)
-    return may_be_part and not _comes_out(vehicle, other, hidden)
+        if not overlap.alike:
+            return Case.APART
+        return Case.HIDDEN if vehicle.confirmed else Case.PART
+    if vehicle.confirmed:
+        share = PART if max(vehicle.age, other.age) > _APART else _LEVEL_OVERLAP
+        return Case.DUPLICATE if overlap.one > share else Case.APART
+    if vehicle.scores.value <= other.scores.value and overlap.one > _LEVEL_OVERLAP:
+        return Case.PART
+    if overlap.inside > PART:
+        return Case.EMERGING if _comes_out(vehicle, other, hidden) else Case.PART
+    return Case.APART
 
 
 def _comes_out(vehicle: Vehicle, nearer: Vehicle, hidden: Sequence[Vehicle]) -> bool:
@@ -263,16 +225,13 @@ def _may_be(lost: Vehicle, new: Vehicle) -> bool:
     It is where that one should be by then, looks like it, does not drive the other way, and was not
     there before.
     """
-    across, down = lost.history.last_velocity * new.history.last_velocity
+    beside = lost.history.last_seen.time - new.begin
+    if beside >= _BESIDE or _astray(lost, new) >= _REACH + _REACH_GROWTH * lost.hidden:
+        return False
+    across, down = lost.history.last_seen.state.velocity * new.history.last_seen.state.velocity
     turned = across + down < -_OPPOSED or down < -_UP_AND_DOWN
-    beside = lost.history.last_seen - new.begin
     unlike = _MOST_UNLIKE if beside < 0 else _BESIDE_UNLIKE
-    return (
-        beside < _BESIDE
-        and not turned
-        and bool(differences(lost.appearance, new.appearance) < unlike)
-        and _astray(lost, new) < _REACH + _REACH_GROWTH * lost.hidden
-    )
+    return not turned and bool(differences(lost.appearance, new.appearance) < unlike)
 
 
 def _astray(lost: Vehicle, new: Vehicle) -> float:
@@ -281,7 +240,9 @@ def _astray(lost: Vehicle, new: Vehicle) -> float:
     Where it is now counts too if only a part was seen first: of one that was hidden, or where the
     first box has another size.
     """
-    then = _distance(lost.history.expected(new.history.begin), new.history.first)
+    last, first = lost.history.last_seen, new.history.moments[0]
+    expected = carried(last.state.mean, max(first.time - last.time, 0.0))
+    then = _distance(expected, new.history.means()[0][:, 0])
     now = _distance(lost.state.mean[:, 0], new.state.mean[:, 0])
     return min(then, now) if lost.hidden or math.isinf(then) else then
 

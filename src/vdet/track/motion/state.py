@@ -9,7 +9,7 @@ uncertainty is in shares of the vehicle's size, so that near and far vehicles, a
 frames, are treated alike; times are seconds.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -22,7 +22,13 @@ _MOST_NEARER = 0.3
 _MOST_NEARER_RATE = 0.75
 """The same of a second: what comes out from behind another vehicle seems to come nearer faster."""
 
-BORDER = 0.005
+_ACCELERATION = 0.8
+"""Standard deviation of the change of velocity in a second, sizes of the vehicle a second."""
+
+_VELOCITY = 2.5
+"""Standard deviation of a new vehicle's velocity, sizes of the vehicle a second."""
+
+_BORDER = 0.005
 """A box that ends this near to the frame's side, as a share of the frame, touches it."""
 
 
@@ -38,17 +44,29 @@ class MotionState:
     covariance
         float64 `(4, 2, 2)`: of each of the four and its change; lengths in shares of the vehicle's
         width (x) and height (y).
+    expected
+        The mean before what this frame showed; None in the first frame.
+    gain
+        How a correction of this state corrects that of the frame before, `(4, 2, 2)`; None in the
+        first frame.
+    ways_in
+        For x and y the way into the frame, 1 or -1, if one of its sides cuts off the box that was
+        taken in; 0 where no side does, or both.
     """
 
     mean: Float64Array
     covariance: Float64Array
+    expected: Float64Array | None = None
+    gain: Float64Array | None = None
+    ways_in: tuple[int, int] = (0, 0)
 
     @classmethod
-    def at_rest(cls, box: Float64Array, noise: float, velocity: float) -> Self:
-        """Start at `box` with velocity 0; `noise` and `velocity` are their standard deviations."""
+    def at_rest(cls, box: Float64Array, noise: float, size: tuple[int, int]) -> Self:
+        """Start at `box` with velocity 0; arguments as of `corrected`."""
         mean = np.zeros((4, 2))
         mean[:, 0] = _measurement(box)
-        return cls(mean, np.tile(np.diag([noise**2, velocity**2]), (4, 1, 1)))
+        covariance = np.tile(np.diag([noise**2, _VELOCITY**2]), (4, 1, 1))
+        return cls(mean, covariance, ways_in=_ways_in(box, size))
 
     @property
     def box(self) -> Float64Array:
@@ -56,34 +74,37 @@ class MotionState:
         return whole_box(self.mean[:, 0])
 
     @property
+    def velocity(self) -> Float64Array:
+        """Velocity of the centre, x and y in sizes of the vehicle a second, `(2,)`."""
+        return np.asarray(self.mean[:2, 1] / np.exp(self.mean[2:, 0]))
+
+    @property
     def deviation(self) -> Float64Array:
         """Standard deviation of the centre's x and y, `(2,)`, shares of width and height."""
         return np.sqrt(self.covariance[:2, 0, 0])
 
-    def predicted(self, seconds: float, acceleration: float) -> "MotionState":
-        """Go on by `seconds`; `acceleration` is the deviation of the velocity after one second.
+    def moved(self, seconds: float) -> Float64Array:
+        """Return the mean so many seconds later.
 
         What moves evenly on the road comes near as its size grows, and ever faster in the picture:
         with a distance of Z, size and place change by 1 / Z and velocity by 1 / Z².
         """
-        step = np.array([[1.0, seconds], [0.0, 1.0]])
         most = min(_MOST_NEARER, _MOST_NEARER_RATE * seconds)
         nearer = float(np.clip(np.mean(self.mean[2:, 1]) * seconds, -most, most))
         growth = 1 / (1 - nearer)
-        mean = self.mean @ step.T
+        mean = self.mean @ np.array([[1.0, 0.0], [seconds, 1.0]])
         mean[:2, 0] += self.mean[:2, 1] * seconds * (growth - 1)
         mean[:2, 1] *= growth**2
+        return np.asarray(mean)
+
+    def predicted(self, seconds: float) -> "MotionState":
+        """Return what is expected of the next frame, `seconds` later."""
+        step = np.array([[1.0, seconds], [0.0, 1.0]])
         drift = np.array([[seconds**3 / 3, seconds**2 / 2], [seconds**2 / 2, seconds]])
-        covariance = step @ self.covariance @ step.T + acceleration**2 * drift
-        return MotionState(mean, covariance)
-
-    def gain_from(self, expected: "MotionState", seconds: float) -> Float64Array:
-        """Return how a correction of the state `seconds` later corrects this one, `(4, 2, 2)`.
-
-        `expected` is that later state as `predicted` gives it.
-        """
-        step = np.array([[1.0, 0.0], [seconds, 1.0]])
-        return np.asarray(self.covariance @ step @ np.linalg.inv(expected.covariance))
+        covariance = step @ self.covariance @ step.T + _ACCELERATION**2 * drift
+        gain = self.covariance @ step.T @ np.linalg.inv(covariance)
+        mean = self.moved(seconds)
+        return MotionState(mean, covariance, mean, gain)
 
     def corrected(self, box: Float64Array, noise: float, size: tuple[int, int]) -> "MotionState":
         """Take in a detected box.
@@ -97,7 +118,8 @@ class MotionState:
         size
             Width and height of the frame, pixels.
         """
-        mean, measured, seen = _measured(self.mean, box, size)
+        ways_in = _ways_in(box, size)
+        mean, measured, seen = _measured(self.mean, box, ways_in)
         unit = np.array([*np.exp(mean[2:, 0]), 1.0, 1.0])
         error = (measured - mean[:, 0]) / unit
         gain = self.covariance[:, :, 0] / (self.covariance[:, 0, 0] + noise**2)[:, np.newaxis]
@@ -105,42 +127,27 @@ class MotionState:
         return MotionState(
             mean + gain * (error * unit)[:, np.newaxis],
             self.covariance - gain[:, :, np.newaxis] * self.covariance[:, np.newaxis, 0],
+            mean,
+            self.gain,
+            ways_in,
         )
-
-    def enlarged(self, box: Float64Array, size: tuple[int, int]) -> "MotionState":
-        """Return the state with the size that a box shows at least; parameters as of `corrected`.
-
-        Of a vehicle that the frame's side cuts off, the inner edge stays where it is.
-        """
-        return replace(self, mean=_measured(self.mean, box, size)[0])
 
     def slowed(self, motion: float, growth: float) -> "MotionState":
         """Multiply the velocity by `motion`, the change of the size by `growth`."""
-        factors = np.array([[1, motion], [1, motion], [1, growth], [1, growth]])
-        return replace(self, mean=self.mean * factors)
+        mean = self.mean * np.array([[1, motion], [1, motion], [1, growth], [1, growth]])
+        return MotionState(mean, self.covariance, mean, self.gain)
 
 
 def whole_box(mean: Float64Array) -> Float64Array:
-    """Return x1, y1, x2, y2 in pixels of a centre x and y and log width and height, both `(4,)`."""
-    half = np.exp(mean[2:]) / 2
-    return np.concatenate([mean[:2] - half, mean[:2] + half])
+    """Return x1, y1, x2, y2 in pixels of centre x and y and log width and height, `(…, 4)`."""
+    half = np.exp(mean[..., 2:]) / 2
+    return np.concatenate([mean[..., :2] - half, mean[..., :2] + half], axis=-1)
 
 
-def side_cut(box: Float64Array, size: tuple[int, int]) -> tuple[int, int] | None:
-    """Return the axis on which one side of the frame cuts a box off, and the way into the frame.
-
-    The axis is 0 for x or 1 for y, the way is 1 or -1. None if no side, or both of an axis, do.
-    """
-    for axis, span in enumerate(size):
-        cut_before, cut_behind = _cuts(box, axis, span)
-        if cut_before != cut_behind:
-            return axis, 1 if cut_before else -1
-    return None
-
-
-def _cuts(box: Float64Array, axis: int, span: int) -> tuple[bool, bool]:
-    """Return whether the near and the far side of the frame cut a box off."""
-    return bool(box[axis] <= BORDER * span), bool(box[axis + 2] >= span - BORDER * span)
+def _ways_in(box: Float64Array, size: tuple[int, int]) -> tuple[int, int]:
+    (width, height), (x1, y1, x2, y2) = size, box.tolist()
+    across = (x1 <= _BORDER * width) - (x2 >= width - _BORDER * width)
+    return across, (y1 <= _BORDER * height) - (y2 >= height - _BORDER * height)
 
 
 def _measurement(box: Float64Array) -> Float64Array:
@@ -149,7 +156,7 @@ def _measurement(box: Float64Array) -> Float64Array:
 
 
 def _measured(
-    expected: Float64Array, box: Float64Array, size: tuple[int, int]
+    expected: Float64Array, box: Float64Array, ways_in: tuple[int, int]
 ) -> tuple[Float64Array, Float64Array, Float64Array]:
     """Return the mean to correct, the measurement, and for each of the four 1 if it was seen, or 0.
 
@@ -159,18 +166,16 @@ def _measured(
     itself. Above and below it is the same with the height.
     """
     mean, measured, seen = expected.copy(), _measurement(box), np.ones(4)
-    for axis, span in enumerate(size):
-        first, last = box[axis], box[axis + 2]
-        cut_before, cut_behind = _cuts(box, axis, span)
-        if cut_before == cut_behind:
+    for axis, way in enumerate(ways_in):
+        if not way:
             continue
-        outward = 1 if cut_behind else -1
-        length = np.exp(mean[axis + 2, 0])
-        if last - first > length:
-            mean[axis, 0] += outward * (last - first - length) / 2  # the inner edge stays
+        inner = box[axis + 2] if way > 0 else box[axis]
+        visible, length = box[axis + 2] - box[axis], np.exp(mean[axis + 2, 0])
+        if visible > length:
+            mean[axis, 0] -= way * (visible - length) / 2  # the inner edge stays
             mean[axis + 2, 0] = measured[axis + 2]
-            length = last - first
+            length = visible
         mean[axis + 2, 1] = 0
-        measured[axis] = (first if cut_behind else last) + outward * length / 2
+        measured[axis] = inner - way * length / 2
         seen[axis + 2] = 0
     return mean, measured, seen

@@ -9,15 +9,10 @@ from vdet.boxes import BoolArray, Box, Boxes, Float64Array, are_nested, visible
 from vdet.config.schema import MotionTrackerSettings
 from vdet.media import Picture
 from vdet.track.motion.appearance import appearances, differences
-from vdet.track.motion.association import (
-    are_hidden,
-    are_parts,
-    buffered_iou,
-    pair,
-    take_over_ids,
-    without_duplicates,
-)
+from vdet.track.motion.association import are_hidden, are_parts, take_over_ids, without_duplicates
 from vdet.track.motion.history import Place
+from vdet.track.motion.pairing import buffered_iou, pair
+from vdet.track.motion.state import whole_box
 from vdet.track.motion.vehicle import Look, Observation, Vehicle
 from vdet.track.track import Track
 
@@ -69,94 +64,93 @@ class MotionTracker:
         observations = self._observations(detections, picture)
         seconds = FIRST_STEP if self._time is None else time - self._time
         self._time, look = time, Look(time, seconds, self._size)
-        self._predict(seconds)
+        longest = self._settings.remembered + self._settings.remembered_hidden
+        self._keep([v for v in self._vehicles if v.unseen + seconds <= longest])
+        for vehicle in self._vehicles:
+            vehicle.predict(seconds)
+        self._keep(self._staying())
         pairs = self._pair(observations)
         for row, vehicle in enumerate(self._vehicles):
             if row in pairs:
                 vehicle.see(observations[pairs[row]], look)
             else:
                 vehicle.miss(look)
-        left = [o for number, o in enumerate(observations) if number not in pairs.values()]
         self._keep(self._staying())
-        new = [Vehicle(o, look, self._settings) for o in left if self._adds_evidence(o)]
-        self._vehicles = without_duplicates(take_over_ids(self._vehicles + new), self._size)
-        for vehicle, hidden in zip(self._vehicles, self._hidden(self._boxes()), strict=True):
+        left = [o for number, o in enumerate(observations) if number not in pairs.values()]
+        # One whose score is below the leak would never make a vehicle, however often it is seen.
+        new = [Vehicle(o, look, self._settings) for o in left if o.score > self._settings.leak]
+        vehicles = take_over_ids(self._vehicles + new)
+        self._vehicles = without_duplicates(vehicles, self._boxes(vehicles))
+        before = time - 2 * self._settings.look_ahead
+        self._gone = [each for each in self._gone if each.history.last_seen.time >= before]
+        for vehicle, hidden in zip(self._vehicles, self._hidden(), strict=True):
             vehicle.hidden += seconds * (bool(hidden) and vehicle.unseen > 0)
-        self._forget(time - 2 * self._settings.look_ahead)
+            vehicle.history.forget(before)
 
     def at(self, time: float) -> list[Track]:
         """Return the vehicles shown at a time; as `TimedTracker.at`."""
         known = [*self._gone, *(vehicle for vehicle in self._vehicles if vehicle.confirmed)]
-        found = [(v, place) for v in known if (place := self._place(v, time)) is not None]
-        if not found:
-            return []
-        boxes = visible(np.reshape([place.box for _, place in found], (-1, 4)), self._size)
-        keep = [row for row, box in enumerate(boxes) if _least_side(box) >= 1]
-        found, boxes = [found[row] for row in keep], boxes[keep]
-        scores = [vehicle.history.scores(time) for vehicle, _ in found]
-        is_here = np.array([place.state != "lost" for _, place in found], bool)
-        hidden = are_hidden(boxes, is_here)
-        shown = [
-            row
-            for row, (_, place) in enumerate(found)
-            if self._is_clear(found[row][0], boxes[row], scores[row][0])
-            and not (hidden[row] and (place.bridges or place.state == "lost"))
-        ]
-        nested = are_nested(boxes[shown], [scores[row][1] for row in shown])
+        placed = [(v, place) for v in known if (place := self._place(v, time)) is not None]
+        every_box = self._visible([place.mean for _, place in placed])
+        rows = np.flatnonzero(_are_large(every_box))
+        placed, boxes = [placed[row] for row in rows], every_box[rows]
+        hidden = are_hidden(boxes, np.array([place.state != "lost" for _, place in placed], bool))
+        shown: list[tuple[Vehicle, Place, Float64Array, float]] = []
+        for (vehicle, place), box, is_hidden in zip(placed, boxes, hidden, strict=True):
+            seen_score, score = vehicle.history.scores(time)
+            is_guess = place.bridges or place.state == "lost"
+            if self._is_clear(vehicle, box, seen_score) and not (is_hidden and is_guess):
+                shown.append((vehicle, place, box, score))
+        shown_boxes = np.reshape([box for _, _, box, _ in shown], (-1, 4))
+        nested = are_nested(shown_boxes, [score for *_, score in shown])
         tracks = [
-            self._track(*found[row], boxes[row], scores[row][1])
-            for row, is_nested in zip(shown, nested, strict=True)
-            if not is_nested
+            self._track(*each) for each, inner in zip(shown, nested, strict=True) if not inner
         ]
         return sorted(tracks, key=lambda track: track.id)
 
     def _place(self, vehicle: Vehicle, time: float) -> Place | None:
         """Return where a vehicle is at a time, if it is to be shown then."""
         assert self._time is not None
-        place = vehicle.history.at(time, self._settings.look_ahead)
-        if place is not None or time < vehicle.history.last_seen or vehicle in self._gone:
+        history = vehicle.history
+        place = history.at(time, self._settings.look_ahead)
+        if place is not None or time < history.last_seen.time or vehicle in self._gone:
             return place
         if not vehicle.is_present:
             return None
-        state = vehicle.state.predicted(time - self._time, 0.0)
-        return Place(state.mean[:, 0], "lost" if vehicle.unseen else "between")
-
-    def _predict(self, seconds: float) -> None:
-        """Move all vehicles on; forget those not seen for too long, and those out of the frame."""
-        longest = self._settings.remembered + self._settings.remembered_hidden
-        self._keep([v for v in self._vehicles if v.unseen + seconds <= longest])
-        for vehicle in self._vehicles:
-            vehicle.predict(seconds)
-        self._keep(self._staying())
+        mean = vehicle.state.moved(time - self._time)
+        return Place(mean[:, 0], "lost" if vehicle.unseen else "between")
 
     def _keep(self, vehicles: list[Vehicle]) -> None:
         """Follow only these vehicles; those that are confirmed can be shown at earlier times."""
         self._gone += [v for v in self._vehicles if v.confirmed and v not in vehicles]
         self._vehicles = vehicles
 
-    def _forget(self, before: float) -> None:
-        self._gone = [each for each in self._gone if each.history.last_seen >= before]
-        for vehicle in self._vehicles:
-            vehicle.history.forget(before)
+    def _staying(self) -> list[Vehicle]:
+        """Return the vehicles that are neither over nor out of the frame."""
+        are_inside = _are_large(self._boxes(self._vehicles))
+        each = zip(self._vehicles, are_inside, strict=True)
+        return [vehicle for vehicle, is_inside in each if is_inside and not vehicle.is_over]
 
     def _observations(self, detections: Boxes, picture: Picture | None) -> list[Observation]:
         boxes = visible(detections.sides, self._size)
-        seen = appearances(picture, boxes)
+        each = zip(boxes, detections, appearances(picture, boxes), _are_large(boxes), strict=True)
         return [
-            Observation(box, each.score, each.class_name, appearance)
-            for box, each, appearance in zip(boxes, detections, seen, strict=True)
-            if _least_side(box) >= 1
+            Observation(box, detection.score, detection.class_name, appearance)
+            for box, detection, appearance, is_large in each
+            if is_large
         ]
 
-    def _boxes(self) -> Float64Array:
-        """Return the visible parts of all vehicles, `(n, 4)`."""
-        boxes = [vehicle.state.box for vehicle in self._vehicles]
-        return visible(np.array(boxes).reshape(-1, 4), self._size)
+    def _visible(self, means: Sequence[Float64Array]) -> Float64Array:
+        """Return the part in the frame of each centre and size, `(n, 4)`; see `Place`."""
+        return visible(whole_box(np.reshape(means, (-1, 4))), self._size)
 
-    def _staying(self) -> list[Vehicle]:
-        """Return the vehicles that are neither over nor out of the frame."""
-        each = zip(self._vehicles, self._boxes(), strict=True)
-        return [vehicle for vehicle, box in each if _least_side(box) >= 1 and not vehicle.is_over]
+    def _boxes(self, vehicles: Sequence[Vehicle]) -> Float64Array:
+        """Return the visible parts of vehicles, `(n, 4)`."""
+        return self._visible([vehicle.state.mean[:, 0] for vehicle in vehicles])
+
+    def _hidden(self) -> BoolArray:
+        present = np.array([each.is_present for each in self._vehicles], bool)
+        return are_hidden(self._boxes(self._vehicles), present)
 
     def _pair(self, observations: Sequence[Observation]) -> dict[int, int]:
         """Pair rows of vehicles with numbers of observations; present vehicles choose first.
@@ -166,31 +160,21 @@ class MotionTracker:
         """
         if not (self._vehicles and observations):
             return {}
-        present = [row for row, each in enumerate(self._vehicles) if each.is_present]
-        new = [row for row, each in enumerate(self._vehicles) if not each.confirmed]
-        expected = self._boxes()
-        boxes = np.reshape([observation.box for observation in observations], (-1, 4))
-        buffers = np.reshape([v.state.deviation for v in self._vehicles], (-1, 2))
-        values = buffered_iou(expected, buffers, boxes)
+        vehicles = self._vehicles
+        present = [row for row, each in enumerate(vehicles) if each.is_present]
+        new = [row for row, each in enumerate(vehicles) if not each.confirmed]
+        found = np.array([observation.box for observation in observations])
+        buffers = np.array([vehicle.state.deviation for vehicle in vehicles])
+        values = buffered_iou(self._boxes(vehicles), buffers, found)
         values[values < _OVERLAP] = 0
-        values *= np.exp(-(self._differences(observations) ** 2))
-        scores = np.array([[vehicle.detection_scores.value] for vehicle in self._vehicles])
+        known = np.array([[vehicle.appearance] for vehicle in vehicles])
+        looks = np.array([observation.appearance for observation in observations])
+        values *= np.exp(-(differences(known, looks) ** 2))
+        scores = np.array([[vehicle.detection_scores.value] for vehicle in vehicles])
         values *= 1 - _UNSURE * (1 - scores)
-        parts = are_parts(boxes, np.array([observation.score for observation in observations]))
-        values[np.ix_(self._hidden(expected), parts)] = 0  # parts of the vehicle that hides it
+        parts = are_parts(found, np.array([observation.score for observation in observations]))
+        values[np.ix_(self._hidden(), parts)] = 0  # parts of the vehicle that hides it
         return pair(values**2, [present, new])
-
-    def _differences(self, observations: Sequence[Observation]) -> Float64Array:
-        """Return how much the appearances of vehicles and observations differ, `(n, m)`."""
-        known = np.reshape([vehicle.appearance for vehicle in self._vehicles], (-1, 1, 2, 3))
-        return differences(known, np.reshape([o.appearance for o in observations], (-1, 2, 3)))
-
-    def _adds_evidence(self, observation: Observation) -> bool:
-        """Return whether such a detection, repeated in each frame, would make a vehicle."""
-        return observation.score > self._settings.leak
-
-    def _hidden(self, boxes: Float64Array) -> BoolArray:
-        return are_hidden(boxes, np.array([each.is_present for each in self._vehicles], bool))
 
     def _is_clear(self, vehicle: Vehicle, box: Float64Array, score: float) -> bool:
         """Return whether a vehicle is wide enough and likely enough to be shown.
@@ -209,9 +193,10 @@ class MotionTracker:
             score,
             place.state,
             class_name=vehicle.classes.best,
-            whole_foot=Box(*place.box.tolist()).foot,
+            whole_foot=Box(*whole_box(place.mean).tolist()).foot,
         )
 
 
-def _least_side(box: Float64Array) -> float:
-    return float(min(box[2:] - box[:2]))
+def _are_large(boxes: Float64Array) -> BoolArray:
+    """Return for each box, `(n, 4)`, whether no side is below a pixel."""
+    return np.asarray((boxes[:, 2:] - boxes[:, :2] >= 1).all(axis=1))

@@ -13,7 +13,7 @@ from vdet.config.schema import MotionTrackerSettings
 from vdet.detect.classes import ClassScores
 from vdet.track.motion.appearance import unknown_appearance
 from vdet.track.motion.history import SCORE_TIME, History, Moment
-from vdet.track.motion.state import MotionState, side_cut
+from vdet.track.motion.state import MotionState
 
 LONGEST_LOOK = 0.1
 """Seconds for which one frame counts as evidence at most: a single frame must not be enough."""
@@ -30,14 +30,21 @@ _APPEARANCE_TIME = 0.3
 _NOISE = 0.12
 """Standard deviation of the sides of a detection with score 1, as a share of the vehicle's size."""
 
-_ACCELERATION = 0.8
-"""Standard deviation of the change of velocity in a second, sizes of the vehicle a second."""
-
-_VELOCITY = 2.5
-"""Standard deviation of a new vehicle's velocity, sizes of the vehicle a second."""
-
 _LEAST_SCORE = 0.05
 """Below this score the box of a detection is not taken to be any less exact."""
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """A frame that is searched.
+
+    `time` and `seconds`, those since the searched frame before, are seconds; `size` is width and
+    height in pixels.
+    """
+
+    time: float
+    seconds: float
+    size: tuple[int, int]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,19 +64,6 @@ class Observation:
     def noise(self) -> float:
         """Standard deviation of the box: its variance grows as the score falls."""
         return float(_NOISE / max(self.score, _LEAST_SCORE) ** 0.5)
-
-
-@dataclass(frozen=True, slots=True)
-class Look:
-    """A frame that is searched.
-
-    `time` and `seconds`, those since the searched frame before, are seconds; `size` is width and
-    height in pixels.
-    """
-
-    time: float
-    seconds: float
-    size: tuple[int, int]
 
 
 @dataclass(eq=False, slots=True)
@@ -131,12 +125,10 @@ class Vehicle:
 
     def __init__(self, first: Observation, look: Look, settings: MotionTrackerSettings) -> None:
         self._settings = settings
-        self.state = MotionState.at_rest(first.box, first.noise, _VELOCITY)
-        entering = side_cut(first.box, look.size)
+        self.state = MotionState.at_rest(first.box, first.noise, look.size)
+        self.history = History(Moment(look.time, self.state, first.score))
         self.begin = self.since = look.time
         self.appearance = first.appearance
-        self.history = History([Moment(look.time, self.state, first.score, entering=entering)])
-        self._gain: Float64Array | None = None
         self.evidence = self.unseen = self.hidden = 0.0
         self.confirmed = False
         self.id: int | None = None
@@ -152,7 +144,7 @@ class Vehicle:
     @property
     def age(self) -> float:
         """Seconds since its first detection."""
-        return self.history.latest - self.begin
+        return self.history.moments[-1].time - self.begin
 
     @property
     def is_over(self) -> bool:
@@ -165,18 +157,12 @@ class Vehicle:
 
     def predict(self, seconds: float) -> None:
         """Move on to the next frame, `seconds` later."""
-        expected = self.state.predicted(seconds, _ACCELERATION)
-        self._gain = self.state.gain_from(expected, seconds)
-        self.state = expected
+        self.state = self.state.predicted(seconds)
 
     def see(self, observation: Observation, look: Look) -> None:
         """Take in its detection in a frame."""
-        box, score = observation.box, observation.score
-        expected = self.state.enlarged(box, look.size)
-        self.state = expected.corrected(box, observation.noise, look.size)
-        entering = side_cut(box, look.size)
-        moment = Moment(look.time, self.state, score, expected.mean, self._gain, entering)
-        self.history.add(moment)
+        self.state = self.state.corrected(observation.box, observation.noise, look.size)
+        self.history.add(Moment(look.time, self.state, observation.score))
         if not self.is_present:
             self.since = look.time
         self.unseen = self.hidden = 0.0
@@ -186,13 +172,12 @@ class Vehicle:
 
     def miss(self, look: Look) -> None:
         """Note a frame without a detection of it."""
-        seconds = look.seconds
-        self.unseen += seconds
+        self.unseen += look.seconds
         lost = self.unseen > self._settings.carried
-        motion = math.exp(-seconds / _SLOWING_TIME) if lost else 1.0
-        self.state = self.state.slowed(motion, math.exp(-seconds / _SETTLING_TIME))
-        self.history.add(Moment(look.time, self.state, None, self.state.mean, self._gain))
-        self._weigh(0.0, seconds)
+        motion = math.exp(-look.seconds / _SLOWING_TIME) if lost else 1.0
+        self.state = self.state.slowed(motion, math.exp(-look.seconds / _SETTLING_TIME))
+        self.history.add(Moment(look.time, self.state))
+        self._weigh(0.0, look.seconds)
 
     def lose(self) -> None:
         """Take it for lost: the latest detection shows another vehicle."""

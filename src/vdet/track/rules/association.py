@@ -29,7 +29,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import combinations
 
-from vdet.boxes import Box, Image
+from vdet.boxes import Image
 from vdet.config.tracker import RulesTrackerSettings
 from vdet.track.rules.car import Car, Region
 
@@ -50,6 +50,8 @@ class Association:
 
     Attributes
     ----------
+    cars
+        The cars after this frame: those known that live on, then those created.
     places
         The cars that have a place in this frame; its `box` and `centroid` are the detection.
     """
@@ -61,8 +63,8 @@ class Association:
         image: Image,
         settings: RulesTrackerSettings,
     ) -> None:
+        self.cars = list(cars)
         self.places: dict[Car, Region] = {}
-        self._known = list(cars)
         self._created: list[Car] = []
         self._unused = list(regions)
         self._image = image
@@ -71,82 +73,69 @@ class Association:
         for region in without_car:
             if region in self._unused:
                 self._place_near(region)
-
-    @property
-    def cars(self) -> list[Car]:
-        """The cars after this frame: those known that live on, then those created."""
-        return self._known + self._created
+        self.cars += self._created
 
     def _place_inside(self, region: Region) -> bool:
         """Rules 2 to 7; False where no car is inside the region."""
-        free = [car for car in self._known if car not in self.places]
-        inside = [car for car in free if region.box.contains(car.centroid)]
+        inside = [
+            car for car in self.cars if car not in self.places and region.box.contains(car.centroid)
+        ]
         found = {car: car.find_in(self._image) for car in inside} if len(inside) > 1 else {}
-        matches = {car: box for car, box in found.items() if box is not None}
+        matches = {car: match for car, match in found.items() if match is not None}
         if len(matches) > 1:
             self._merge_or_separate(region, matches)
         elif inside:
             car = min(matches or inside, key=lambda each: _distance(each, region))
             car.trust(region.peak)
-            if car.is_filled_by(region.box):
+            if car.is_filled_by(region):
                 self._place(car, region)
         return bool(inside)
 
-    def _merge_or_separate(self, region: Region, matches: dict[Car, Box]) -> None:
+    def _merge_or_separate(self, region: Region, matches: dict[Car, Region]) -> None:
         """Rules 4 and 5."""
-        if any_overlap(list(matches.values()), self._settings.merge_overlap):
+        if _any_overlap(matches.values(), self._settings.merge_overlap):
             ids = [car.id for car in matches if car.id is not None]
-            self._forget(matches)
-            self._create_vouched(region, min(ids, default=None))
+            self._forget(*matches)
+            self._create(region, min(ids, default=None)).vouch()
             return
-        for car, box in matches.items():
-            self._place(car, replace(region, box=box, centroid=car.centroid_at(box)), region)
+        for car, match in matches.items():
+            place = replace(region, box=match.box, centroid=match.centroid)
+            self._place(car, place, region)
 
     def _place_near(self, region: Region) -> None:
         """Rules 8 to 11."""
-        car = self._near_car(region)
+        gaps = {car: car.box.gap(region.box) for car in self.cars}
+        car = min(
+            (car for car, gap in gaps.items() if gap <= self._settings.near),
+            key=lambda car: (car in self.places, gaps[car], _distance(car, region)),
+            default=None,
+        )
         if car is not None and self._place_combined(region, car):
             return
         if car is None or car in self.places:
             self._create(region).trust(region.peak)
-        elif car.is_filled_by(region.box):
+        elif car.is_filled_by(region):
             self._place(car, region)
-
-    def _near_car(self, region: Region) -> Car | None:
-        gaps = {car: car.box.gap(region.box) for car in self._known}
-        near = [car for car, gap in gaps.items() if gap <= self._settings.near]
-        return min(
-            near,
-            key=lambda car: (car in self.places, gaps[car], _distance(car, region)),
-            default=None,
-        )
 
     def _place_combined(self, region: Region, car: Car) -> bool:
         """Rules 9 and 10; False where no other region makes up the car together with this one."""
-        other = self._other_region(region, car)
-        if other is None:
-            return False
-        combined = combine(region, other)
-        if not car.is_as_wide_as(combined.box):
-            return False
-        if combined.box.width < self._settings.max_combined:
-            self._place(car, combined, region, other)
-            return True
-        self._forget([car])
-        near, far = sorted((region, other), key=lambda each: _distance(car, each))
-        self._create_vouched(near, car.id)
-        self._create_vouched(far, None)
-        return True
-
-    def _other_region(self, region: Region, car: Car) -> Region | None:
-        if car in self.places:
-            return self.places[car]
         near = [
             other
             for other in self._unused
             if other is not region and car.box.gap(other.box) <= self._settings.near
         ]
-        return min(near, key=lambda other: _distance(car, other), default=None)
+        nearest = min(near, key=lambda other: _distance(car, other), default=None)
+        other = self.places.get(car, nearest)
+        if other is None or not car.is_as_wide_as(combined := combine(region, other)):
+            return False
+        if combined.box.width < self._settings.max_combined:
+            self._place(car, combined, region, other)
+            return True
+        self._forget(car)
+        closer, farther = sorted((region, other), key=lambda each: _distance(car, each))
+        self._create(closer, car.id).vouch()
+        self._create(farther).vouch()
+        return True
 
     def _create(self, region: Region, number: int | None = None) -> Car:
         car = Car(self._settings, number)
@@ -154,19 +143,15 @@ class Association:
         self._place(car, region)
         return car
 
-    def _create_vouched(self, region: Region, number: int | None) -> None:
-        self._create(region, number).vouch()
-
-    def _forget(self, cars: Iterable[Car]) -> None:
+    def _forget(self, *cars: Car) -> None:
         for car in cars:
-            self._known.remove(car)
+            self.cars.remove(car)
             self.places.pop(car, None)
 
-    def _place(self, car: Car, place: Region, *used: Region) -> None:
-        """Give the car a place, made of the regions `used`; without them it is a region itself."""
+    def _place(self, car: Car, place: Region, *parts: Region) -> None:
+        """Give the car a place, made of these regions; without them it is a region itself."""
         self.places[car] = place
-        for region in used or [place]:
-            self._unused = [each for each in self._unused if each is not region]
+        self._unused = [each for each in self._unused if each not in (parts or (place,))]
 
 
 def _distance(car: Car, region: Region) -> float:
@@ -182,7 +167,7 @@ def combine(first: Region, second: Region) -> Region:
     return replace(higher, box=first.box.union(second.box), centroid=centroid)
 
 
-def any_overlap(boxes: Sequence[Box], pixels: int) -> bool:
-    """Return whether two of the boxes overlap by more than `pixels`, across and down (rule 4)."""
-    common = (a.intersection(b) for a, b in combinations(boxes, 2))
+def _any_overlap(regions: Iterable[Region], pixels: int) -> bool:
+    """Return whether two regions overlap by more than `pixels`, across and down (rule 4)."""
+    common = (one.box.intersection(other.box) for one, other in combinations(regions, 2))
     return any(box.width > pixels and box.height > pixels for box in common)

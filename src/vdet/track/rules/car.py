@@ -1,7 +1,7 @@
 """One car of the original system: where it was detected lately, and for how long."""
 
 from collections import deque
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from statistics import fmean, multimode
 
 import cv2
@@ -12,31 +12,29 @@ from vdet.config.tracker import RulesTrackerSettings
 
 Point = tuple[float, float]
 
-_NO_IMAGE: Image = np.empty((0, 0, 3), np.uint8)
-
 
 @dataclass(frozen=True, slots=True)
 class Region:
-    """A detection inside the frame, in whole pixels; `peak` is its strength.
-
-    `image` is the part of the frame that it shows, once a car is detected there. A detection by
-    match has the score and the class of the one before it.
-    """
+    """A detection inside the frame, in whole pixels; `peak` is its strength."""
 
     box: Box
     centroid: Point
     peak: float
     score: float = 1.0
     class_name: str | None = None
-    image: Image = field(default_factory=lambda: _NO_IMAGE, compare=False)
+
+    def moved(self, x: float, y: float) -> "Region":
+        """Return it with the top left corner of its box at another place."""
+        centroid = self.centroid[0] + x - self.box.x1, self.centroid[1] + y - self.box.y1
+        box = Box.sized(x, y, self.box.width, self.box.height)
+        return replace(self, box=box, centroid=centroid)
 
 
 class Car:
     """What is remembered of a car.
 
-    Every detection, by region or by match, adds a rectangle, a centroid and the image cut from
-    that frame at the rectangle; the last `history` of each are kept. `box`, `centroid` and `score`
-    are their averages, so they exist from the first detection on.
+    Every detection, by region or by match, adds a region, of which the last `history` are kept.
+    `box`, `centroid` and `score` are their averages, so they exist from the first detection on.
 
     Attributes
     ----------
@@ -53,43 +51,31 @@ class Car:
         not end the row, a region does.
     misses
         Frames in a row without a detection.
-    detections
-        The last `history` detections.
+    box
+        Average rectangle, rounded to whole pixels.
+    centroid
+        Average centroid, `(x, y)`.
     """
+
+    box: Box
+    centroid: Point
 
     def __init__(self, settings: RulesTrackerSettings, number: int | None = None) -> None:
         self._settings = settings
         self.id = number
         self.needed = settings.detections_needed
         self.in_a_row = self.count = self.matches = self.misses = 0
-        self.detections: deque[Region] = deque(maxlen=settings.history)
-
-    @property
-    def box(self) -> Box:
-        """Average rectangle, rounded to whole pixels."""
-        boxes = [detection.box for detection in self.detections]
-        return Box.sized(
-            round(fmean(box.x1 for box in boxes)),
-            round(fmean(box.y1 for box in boxes)),
-            round(fmean(box.width for box in boxes)),
-            round(fmean(box.height for box in boxes)),
-        )
-
-    @property
-    def centroid(self) -> Point:
-        """Average centroid, `(x, y)`."""
-        xs, ys = zip(*(detection.centroid for detection in self.detections), strict=True)
-        return fmean(xs), fmean(ys)
+        self._seen: deque[Region] = deque(maxlen=settings.history)
 
     @property
     def score(self) -> float:
         """Average score, 0 to 1."""
-        return fmean(detection.score for detection in self.detections)
+        return fmean(region.score for region in self._seen)
 
     @property
     def class_name(self) -> str | None:
         """The most frequent class of the detections, the earliest one among equals."""
-        return multimode(detection.class_name for detection in self.detections)[0]
+        return multimode(region.class_name for region in self._seen)[0]
 
     @property
     def is_shown(self) -> bool:
@@ -103,25 +89,28 @@ class Car:
         is_only_matched = self.matches >= self._settings.max_matches
         return is_young_and_missed or is_only_matched or self.misses >= self._settings.max_misses
 
-    def is_filled_by(self, region: Box) -> bool:
+    def is_filled_by(self, region: Region) -> bool:
         """Return whether a region is wide enough to be all of the car (rules 7 and 8)."""
         least = min(self._settings.wide, self._settings.good_fraction * self.box.width)
-        return region.width > least
+        return region.box.width > least
 
-    def is_as_wide_as(self, region: Box) -> bool:
+    def is_as_wide_as(self, region: Region) -> bool:
         """Return whether two combined regions are about as wide as the car (rules 9 and 10)."""
         width = self.box.width
-        return abs(region.width - width) <= self._settings.combined_tolerance * width
+        return abs(region.box.width - width) <= self._settings.combined_tolerance * width
 
-    def see(self, region: Region, image: Image) -> None:
-        """Add a detection by a region of the frame `image`; the region lies in it."""
-        self.matches = 0
-        self._add(region, image)
-
-    def see_match(self, box: Box, image: Image) -> None:
-        """Add a detection by template match alone, in the frame `image`."""
-        self.matches += 1
-        self._add(replace(self.detections[-1], box=box, centroid=self.centroid_at(box)), image)
+    def see(self, region: Region, image: Image, *, by_match: bool = False) -> None:
+        """Add a detection in the frame `image`; the region lies in it."""
+        self._image = region.box.cut(image).copy()
+        self._seen.append(region)
+        sides = zip(*(each.box.xywh for each in self._seen), strict=True)
+        self.box = Box.sized(*(round(fmean(values)) for values in sides))
+        xs, ys = zip(*(each.centroid for each in self._seen), strict=True)
+        self.centroid = fmean(xs), fmean(ys)
+        self.matches = self.matches + 1 if by_match else 0
+        self.in_a_row += 1
+        self.count += 1
+        self.misses = 0
 
     def miss(self) -> None:
         """Note a frame without a detection."""
@@ -138,57 +127,24 @@ class Car:
         self.in_a_row = max(self.in_a_row, self._settings.detections_needed)
         self.count = max(self.count, self._settings.detections_needed)
 
-    def find_in(self, image: Image) -> Box | None:
-        """Search the latest cut-out around the latest rectangle of the frame `image`."""
-        return find_template(image, self.detections[-1], self._settings)
+    def find_in(self, image: Image) -> Region | None:
+        """Return the latest detection where its image fits the frame `image` best.
 
-    def centroid_at(self, box: Box) -> Point:
-        """Return the latest centroid, moved as the latest rectangle moved to `box`."""
-        last = self.detections[-1]
-        x, y = last.centroid
-        return x + box.x1 - last.box.x1, y + box.y1 - last.box.y1
-
-    def _add(self, region: Region, image: Image) -> None:
-        self.detections.append(replace(region, image=region.box.cut(image).copy()))
-        self.in_a_row += 1
-        self.count += 1
-        self.misses = 0
-
-
-def find_template(image: Image, template: Region, settings: RulesTrackerSettings) -> Box | None:
-    """Return where the image of a region fits `image` best, if it fits well enough.
-
-    Parameters
-    ----------
-    image
-        BGR uint8 `(H, W, 3)`.
-    template
-        Its top left corner may have moved by `match_distance` pixels in a straight line. Nothing
-        outside its box, grown by this distance, is searched.
-
-    Returns
-    -------
-    The place, of the template's size and inside the image. None where nothing scores
-    `match_score`, where the template does not fit into the searched area, and for a template of
-    one colour, which fits anything flat.
-    """
-    distance, near = settings.match_distance, template.box
-    height, width = template.image.shape[:2]
-    grown = Box.sized(
-        near.x1 - distance, near.y1 - distance, width + 2 * distance, height + 2 * distance
-    )
-    area = grown.clipped(image.shape[1], image.shape[0])
-    if area.width < width or area.height < height or _is_flat(template.image):
-        return None
-    found = cv2.matchTemplate(area.cut(image), template.image, cv2.TM_CCOEFF_NORMED)
-    scores = np.asarray(found, np.float32)
-    dy, dx = np.ogrid[: scores.shape[0], : scores.shape[1]]
-    scores[np.hypot(area.x1 + dx - near.x1, area.y1 + dy - near.y1) > distance] = -1
-    y, x = np.unravel_index(int(scores.argmax()), scores.shape)
-    if round(float(scores[y, x]), 4) < settings.match_score:  # a perfect fit may score 0.9999998
-        return None
-    return Box.sized(area.x1 + int(x), area.y1 + int(y), width, height)
-
-
-def _is_flat(image: Image) -> bool:
-    return image.size == 0 or bool((image == image[0, 0]).all())
+        It may have moved by `match_distance` pixels in a straight line; nothing farther around it
+        is searched. None where nothing scores `match_score`, and for an image of one colour, which
+        fits anything flat.
+        """
+        last, distance = self._seen[-1], self._settings.match_distance
+        if (self._image == self._image[0, 0]).all():
+            return None
+        x1, y1, x2, y2 = last.box.pixels
+        around = Box(x1 - distance, y1 - distance, x2 + distance, y2 + distance)
+        area = around.clipped(image.shape[1], image.shape[0])
+        found = cv2.matchTemplate(area.cut(image), self._image, cv2.TM_CCOEFF_NORMED)
+        scores = np.asarray(found, np.float32)
+        dy, dx = np.ogrid[: scores.shape[0], : scores.shape[1]]
+        scores[np.hypot(area.x1 + dx - x1, area.y1 + dy - y1) > distance] = -1
+        y, x = np.unravel_index(int(scores.argmax()), scores.shape)
+        if round(float(scores[y, x]), 4) < self._settings.match_score:  # a perfect fit: 0.9999998
+            return None
+        return last.moved(area.x1 + int(x), area.y1 + int(y))

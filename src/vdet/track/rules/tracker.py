@@ -72,11 +72,11 @@ class RulesTracker:
 
     def _search(self, car: Car, image: Image) -> None:
         """Rule 13: the image of a shown car is searched in the frame."""
-        box = None if car.id is None else car.find_in(image)
-        if box is None:
+        found = None if car.id is None else car.find_in(image)
+        if found is None:
             car.miss()
         else:
-            car.see_match(box, image)
+            car.see(found, image, by_match=True)
 
     def _track(self, car: Car) -> Track:
         """Return what is shown of a car; it gets its id when it is first shown."""

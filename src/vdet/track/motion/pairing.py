@@ -1,0 +1,108 @@
+"""Which detection belongs to which vehicle.
+
+Source: the order of the rounds is the matching cascade of Wojke, Bewley and Paulus, "Simple Online
+and Realtime Tracking with a Deep Association Metric", 2017; the buffered intersection over union is
+that of Yang et al., "Hard to Track Objects with Irregular Motions and Similar Appearances? Make It
+Easier by Buffering the Matching Space", 2023.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from vdet.boxes import Float64Array, iou
+
+WIDEST_BUFFER = 0.25
+"""Most that a box is widened by on each side, shares of its size."""
+
+_FREE = -1
+
+
+def buffered_iou(
+    expected: Float64Array, buffers: Float64Array, found: Float64Array
+) -> Float64Array:
+    """Return how well each expected box fits each found one, 0 to 1, `(n, m)`.
+
+    Both boxes are widened by the buffer of the expected one, in shares of their own sizes. So two
+    boxes that do not touch may still belong together where little is known of the motion.
+
+    Parameters
+    ----------
+    expected, found
+        Shapes `(n, 4)` and `(m, 4)`: x1, y1, x2, y2 in pixels, each with an area.
+    buffers
+        Shape `(n, 2)`: shares of width and height by which a box is widened on each side.
+    """
+    shares = np.minimum(buffers, WIDEST_BUFFER)[:, np.newaxis]
+    return iou(_widened(expected[:, np.newaxis], shares), _widened(found, shares))
+
+
+def _widened(boxes: Float64Array, shares: Float64Array) -> Float64Array:
+    near, far = boxes[..., :2], boxes[..., 2:]
+    margin = (far - near) * shares
+    return np.concatenate([near - margin, far + margin], axis=-1)
+
+
+def pair(values: Float64Array, rounds: Sequence[Sequence[int]]) -> dict[int, int]:
+    """Pair rows with columns, each at most once.
+
+    Parameters
+    ----------
+    values
+        Shape `(n, m)`: what a pair is worth; 0 where it must not be.
+    rounds
+        Rows: those of a later round may only have what the earlier ones left.
+
+    Returns
+    -------
+    The column of each paired row: in each round the pairs with the largest sum of values.
+    """
+    left = values.copy()
+    pairs: dict[int, int] = {}
+    for rows in rounds:
+        pairs |= {rows[row]: column for row, column in assign(left[list(rows)])}
+        left[:, list(pairs.values())] = 0
+    return pairs
+
+
+def assign(values: Float64Array) -> list[tuple[int, int]]:
+    """Return the pairs of row and column, each used at most once, with the largest sum.
+
+    `scipy.optimize.linear_sum_assignment` does the same, but importing it costs every run about
+    50 MB and a part of its start. Source: Jonker and Volgenant, "A Shortest Augmenting Path
+    Algorithm for Dense and Sparse Linear Assignment Problems", 1987, without its first phases.
+
+    Parameters
+    ----------
+    values
+        Float64 `(n, m)`, at least 0; pairs of value 0 are left out.
+    """
+    rows, columns = values.shape
+    if rows > columns:
+        return sorted((row, column) for column, row in assign(values.T))
+    costs, row_of = -values, np.full(columns, _FREE)
+    of_rows, of_columns = np.zeros(rows), np.zeros(columns)  # the dual variables
+    for row in range(rows):
+        # Search the cheapest path from this row to a free column.
+        lengths, previous = np.full(columns, np.inf), np.full(columns, _FREE)
+        is_open = np.ones(columns, np.bool_)
+        current, column, shortest = row, _FREE, 0.0
+        while current != _FREE:
+            reached = shortest + costs[current] - of_rows[current] - of_columns
+            shorter = is_open & (reached < lengths)
+            lengths[shorter], previous[shorter] = reached[shorter], column
+            column = int(np.where(is_open, lengths, np.inf).argmin())
+            shortest, is_open[column] = float(lengths[column]), False
+            current = int(row_of[column])
+        passed = np.flatnonzero(~is_open & (row_of != _FREE))
+        change = shortest - lengths[passed]
+        of_rows[row] += shortest
+        of_rows[row_of[passed]] += change
+        of_columns[passed] -= change
+        # The rows along the path change their columns.
+        while column != _FREE:
+            before = int(previous[column])
+            row_of[column] = row if before == _FREE else row_of[before]
+            column = before
+    pairs = ((int(row), column) for column, row in enumerate(row_of) if row != _FREE)
+    return sorted((row, column) for row, column in pairs if values[row, column] > 0)
