@@ -23,7 +23,7 @@ from vdet.files import record_input
 from vdet.labels.formats import UNKNOWN, Format, SourceVideo, best_classes
 from vdet.labels.json_stream import JsonLists
 from vdet.labels.label import Label, from_size, limited, line_error
-from vdet.labels.parsing import LIMIT, Index, Number, checked_times, first_mistake
+from vdet.labels.parsing import LIMIT, Index, Number, Times, checked_times
 from vdet.labels.pictures import MAX_BOXES, MAX_PICTURES, LabelledPicture
 from vdet.labels.video import SavedTracks
 from vdet.track.track import FrameTracks, State
@@ -142,62 +142,52 @@ class _Info:
 class _Document:
     """The needed content of a COCO file.
 
-    `images` and `categories` are by id; `annotations` are by the id of their image, each with its
-    number in the file. `unlabelled` are the classes that the file does not label although they may
-    be there: `unlabelled_classes` of its `info`, a key of our own. Raises `TruthError`.
+    `entries` are the images and the categories by their id; `annotations` are by the id of their
+    image, each with its number in the file. `unlabelled` are the classes that the file does not
+    label although they may be there: `unlabelled_classes` of its `info`, a key of our own.
     """
 
-    def __init__(
-        self, path: Path, file: BinaryIO, form: str, image: type, annotation: type
-    ) -> None:
+    def __init__(self, path: Path, file: BinaryIO, form: str, image: type, entry: type) -> None:
         self.path = path
-        self.images: dict[int, Any] = {}
-        self.categories: dict[int, Any] = {}
+        self.entries: dict[str, dict[int, Any]] = {"images": {}, "categories": {}}
         self.annotations: dict[int, list[tuple[int, Any]]] = defaultdict(list)
         self.unlabelled: tuple[str, ...] = ()
-        kinds = {"images": image, "annotations": annotation, "categories": _Category}
-        adapters = {name: TypeAdapter[Any](kind) for name, kind in kinds.items()}
-        adapters["info"] = TypeAdapter(_Info)
-        lists = JsonLists(file)
+        kinds = {"images": image, "annotations": entry, "categories": _Category, "info": _Info}
+        lists = JsonLists(file.read, {name: TypeAdapter[Any](kind) for name, kind in kinds.items()})
         try:
-            for name, number, text in lists.entries(adapters):
-                self._add(name, number, adapters[name].validate_json(text, strict=True))
-            if missing := kinds.keys() - lists.found:
+            for name, number, value in lists:
+                self._add(name, number, value)
+            if missing := kinds.keys() - lists.found - {"info"}:
                 raise ValueError(f"the list {min(missing)} is missing")
-        except ValueError as error:  # also a ValidationError
-            place = f": {lists.place}" if lists.place else ""
-            raise TruthError(f"{path}: is not {form}{place}: {first_mistake(error)}") from error
+        except ValueError as error:
+            raise TruthError(f"{path}: is not {form}: {error}") from error
 
-    def _add(self, name: str, number: int, entry: Any) -> None:
-        if name == "info":
-            self.unlabelled = entry.unlabelled_classes
-            return
+    def _add(self, name: str, number: int, value: Any) -> None:
         if number == (MAX_PICTURES if name == "images" else MAX_BOXES):
             raise ValueError(f"there are more than {number:,} {name}; cut the file into parts")
-        if name == "annotations":
-            self.annotations[entry.image_id].append((number, entry))
-            return
-        known = self.images if name == "images" else self.categories
-        if entry.id in known:
-            raise ValueError(f"the id {entry.id} is there already")
-        known[entry.id] = entry
+        if name == "info":
+            self.unlabelled = value.unlabelled_classes
+        elif name == "annotations":
+            self.annotations[value.image_id].append((number, value))
+        elif self.entries[name].setdefault(value.id, value) is not value:
+            raise ValueError(f"{name}.{number}: the id {value.id} is there already")
 
     def labels(self) -> Iterator[tuple[Any, list[tuple[Any, Label]]]]:
         """Yield each image with its annotations, each also as a label. Raises `TruthError`."""
-        for image_id in self.annotations.keys() - self.images.keys():
+        images, categories = self.entries["images"], self.entries["categories"]
+        for image_id in self.annotations.keys() - images.keys():
             number, _ = self.annotations[image_id][0]
             raise line_error(self.path, f"annotations.{number}", f"no image has the id {image_id}")
-        for image in self.images.values():
-            found = self.annotations.pop(image.id, ())
-            yield image, [(each, self._label(number, each)) for number, each in found]
-
-    def _label(self, number: int, annotation: _Annotation) -> Label:
-        place = f"annotations.{number}"
-        category = self.categories.get(annotation.category_id)
-        if category is None:
-            raise line_error(self.path, place, f"no category has the id {annotation.category_id}")
-        box = from_size(*annotation.bbox)
-        return Label(place, box, category.name, ignored=bool(annotation.iscrowd))
+        for image in images.values():
+            found = []
+            for number, each in self.annotations.pop(image.id, ()):
+                place, category = f"annotations.{number}", categories.get(each.category_id)
+                if category is None:
+                    what = f"no category has the id {each.category_id}"
+                    raise line_error(self.path, place, what)
+                box, ignored = from_size(*each.bbox), bool(each.iscrowd)
+                found.append((each, Label(place, box, category.name, ignored=ignored)))
+            yield image, found
 
 
 def read_coco(path: Path, data: bytes) -> SavedTracks:
@@ -212,7 +202,7 @@ def read_coco(path: Path, data: bytes) -> SavedTracks:
     """
     form = "COCO with tracks"
     document = _Document(path, io.BytesIO(data), form, _Frame, _TrackAnnotation)
-    images: list[_Frame] = list(document.images.values())
+    images: list[_Frame] = list(document.entries["images"].values())
     if len({image.video_id for image in images}) > 1:
         raise TruthError(f"{path}: has images of several videos; give a file for each")
     frames = {each.frame_index: (f"images.{number}", each) for number, each in enumerate(images)}
@@ -226,7 +216,9 @@ def read_coco(path: Path, data: bytes) -> SavedTracks:
                 state: State = "lost" if each.attributes.get("occluded") else "seen"
                 yield label._replace(frame=frame, id=id_, score=score, state=state)
 
-    times = {n: (place, each.time) for n, (place, each) in frames.items() if each.time is not None}
+    times: Times = {
+        n: (place, each.time) for n, (place, each) in frames.items() if each.time is not None
+    }
     listed, size = tuple(sorted(frames)), images[0].size if images else None
     return SavedTracks(tuple(limited(path, labels())), listed, checked_times(path, times), size)
 
@@ -253,7 +245,9 @@ def read_coco_pictures(path: Path) -> Iterator[LabelledPicture]:
             document = _Document(path, file, "COCO", _Picture, _Annotation)
     except OSError as error:
         raise TruthError(f"{path}: cannot be read: {error.strerror}") from error
-    folder = _picture_folder(path, [image.file_name for image in document.images.values()])
+    folder = _picture_folder(
+        path, [image.file_name for image in document.entries["images"].values()]
+    )
     for image, annotations in document.labels():
         labels, picture = tuple(label for _, label in annotations), folder / image.file_name
         yield LabelledPicture(picture, path, labels, image.size, document.unlabelled)

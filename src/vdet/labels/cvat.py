@@ -15,7 +15,7 @@ from xml.sax.saxutils import escape, quoteattr
 from vdet.errors import TruthError, escaped
 from vdet.labels.formats import Format, SourceVideo, best_classes
 from vdet.labels.label import Label, limited
-from vdet.labels.parsing import archive_texts, parse_number, parse_whole, text_of
+from vdet.labels.parsing import archive_members, parse_number, parse_whole
 from vdet.labels.video import SavedTracks
 from vdet.labels.xml_reader import Element, read_xml
 from vdet.track.track import FrameTracks, State, Track
@@ -95,17 +95,18 @@ def read_cvat(path: Path, data: bytes) -> SavedTracks:
             case ["annotations", "meta", _, "original_size"]:
                 size[0] = opened[-1].size
 
-    read_xml(path, _text(path, data), "annotations", take)
+    read_xml(path, _content(path, data), "annotations", take)
     return SavedTracks(tuple(limited(path, labels)), size=size[0])
 
 
-def _text(path: Path, data: bytes) -> str:
+def _content(path: Path, data: bytes) -> bytes:
+    """Return the XML, also from the zip file."""
     if not data.startswith(b"PK"):
-        return text_of(path, data)
-    texts = archive_texts(path, data, lambda name: str(name) == _MEMBER)
-    if not texts:
+        return data
+    members = archive_members(path, data, lambda name: str(name) == _MEMBER)
+    if not members:
         raise TruthError(f"{path}: has no {_MEMBER}; export the task as 'CVAT for video 1.1'")
-    return texts[_MEMBER]
+    return members[_MEMBER]
 
 
 def _labels(track: Element, box: Element) -> Iterator[Label]:

@@ -13,7 +13,7 @@ from typing import BinaryIO
 
 from vdet.detect.classes import ClassScores
 from vdet.errors import TruthError
-from vdet.labels.parsing import numbered_lines, text_of
+from vdet.labels.parsing import numbered_lines
 from vdet.labels.pictures import LabelledPicture
 from vdet.labels.video import SavedTracks
 from vdet.plugins import FORMATS, PICTURE_FORMATS, load_plugin, plugin_names
@@ -185,7 +185,7 @@ def _content(path: Path, data: bytes) -> str | None:
     """Return the name under which the format of a file is registered; None if it is empty."""
     if data.startswith(b"PK"):
         return "cvat" if b"annotations.xml" in data else "yolo"
-    _, first = next(numbered_lines(text_of(path, data)), (0, ""))
+    _, first = next(numbered_lines(path, data), (0, ""))
     match first[:1]:
         case "":
             return None

@@ -1,82 +1,111 @@
-"""Large JSON documents, read piece by piece, so that a file need not be held in memory."""
+"""Large JSON documents, read piece by piece, so that a file need not be held in memory.
+
+`ijson` reads such lists too, but takes twice as long for several lists of one file, and has no
+limit for an entry.
+"""
 
 import codecs
 import itertools
 import json
-from collections.abc import Container, Iterator
-from typing import BinaryIO
+import re
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+from pydantic import TypeAdapter
+
+from vdet.labels.parsing import first_mistake
 
 MAX_ENTRY = 16_000_000
 """Largest size of an entry of a list, in characters."""
 
+_MAX_KEYS = 1000
 _CHUNK = 1_000_000  # bytes
-_SPACE = " \t\n\r"
-_ENDS = _SPACE + ",:]}"  # what may follow a value
+_NO_SPACE = re.compile(r"[^ \t\n\r]")
+_ENDS = " \t\n\r,:]}"  # what may follow a value
+_DECODER = json.JSONDecoder()
 
 
 class JsonLists:
     """The lists in the JSON object that a binary file holds; they are read once.
 
+    Parameters
+    ----------
+    read
+        The `read` of the file.
+    kinds
+        What the entries of a list are, by its name, which is "data.detections" for a list in the
+        object "data". An object of such a name is one entry.
+
     Attributes
     ----------
-    place
-        The entry that is being read, as "annotations.3"; "" outside the lists.
     found
         The names of the lists that were found.
     """
 
-    def __init__(self, file: BinaryIO) -> None:
-        self.place = ""
+    def __init__(self, read: Callable[[int], bytes], kinds: Mapping[str, TypeAdapter[Any]]) -> None:
         self.found: set[str] = set()
-        self._file = file
+        self._read, self._kinds = read, kinds
+        self._parents = {name.rpartition(".")[0] for name in kinds} - {""}
         self._decode = codecs.getincrementaldecoder("utf-8-sig")().decode
         self._text, self._at, self._ended = "", 0, False
 
-    def entries(self, names: Container[str]) -> Iterator[tuple[str, int, str]]:
-        """Yield the name of the list, the number and the text of each entry of the lists `names`.
-
-        An object of such a name is one entry.
+    def __iter__(self) -> Iterator[tuple[str, int, Any]]:
+        """Yield the name of the list, the number and the value of each entry.
 
         Raises
         ------
         ValueError
-            The file is not UTF-8 or not a JSON object, or an entry is larger than `MAX_ENTRY`.
+            The file is not UTF-8 or not a JSON object, an object on the way to the lists has too
+            many keys, an entry is larger than `MAX_ENTRY`, or it is not of its kind.
         """
-        self._take("{")
-        while True:
-            name = str(json.loads(self._value()))
-            self._take(":")
-            if name in names and self._next() == "[":
-                self.found.add(name)
-                yield from self._list(name)
-            elif (text := self._value()).startswith("{") and name in names:
-                yield name, 0, text
-            if self._take(",}") == "}":
-                break
+        yield from self._object("")
         if self._next():
             raise ValueError("invalid JSON: more text follows the object")
 
-    def _list(self, name: str) -> Iterator[tuple[str, int, str]]:
-        self._take("[")
-        if self._next() == "]":
-            self._take("]")
+    def _object(self, parent: str) -> Iterator[tuple[str, int, Any]]:
+        for count in self._items("{", "}"):
+            if count == _MAX_KEYS:
+                raise ValueError(f"an object has more than {_MAX_KEYS:,} keys")
+            name = parent + str(json.loads(self._value()))
+            self._take(":")
+            match self._next():
+                case "{" if name in self._parents:
+                    yield from self._object(f"{name}.")
+                case "[" if name in self._kinds:
+                    self.found.add(name)
+                    for number in self._items("[", "]"):
+                        yield name, number, self._entry(name, f"{name}.{number}")
+                case "{" if name in self._kinds:
+                    yield name, 0, self._entry(name, name)
+                case _:
+                    self._value()
+
+    def _items(self, begin: str, end: str) -> Iterator[int]:
+        """Yield the number of each item of a list or an object; the caller reads the item."""
+        self._take(begin)
+        if self._next() == end:
+            self._take(end)
             return
         for number in itertools.count():
-            self.place = f"{name}.{number}"
-            yield name, number, self._value()
-            if self._take(",]") == "]":
-                break
-        self.place = ""
+            yield number
+            if self._take(f",{end}") == end:
+                return
+
+    def _entry(self, name: str, place: str) -> Any:
+        try:
+            return self._kinds[name].validate_json(self._value(), strict=True)
+        except ValueError as error:  # also a ValidationError
+            raise ValueError(f"{place}: {first_mistake(error)}") from error
 
     def _next(self) -> str:
         """Go to the next character that is no space and return it; "" at the end."""
-        while True:
-            while self._at == len(self._text) and not self._ended:
-                self._read_on()
-            char = self._text[self._at : self._at + 1]
-            if not char or char not in _SPACE:
-                return char
-            self._at += 1
+        while not (found := _NO_SPACE.search(self._text, self._at)):
+            self._at = len(self._text)
+            if self._ended:
+                return ""
+            self._read_on()
+        self._at = found.start()
+        return found[0]
 
     def _take(self, wanted: str) -> str:
         char = self._next()
@@ -108,9 +137,6 @@ class JsonLists:
 
     def _read_on(self) -> None:
         # As much again as there is, so that a long entry is not decoded too often.
-        part = self._file.read(max(_CHUNK, len(self._text) - self._at))
+        part = self._read(max(_CHUNK, len(self._text) - self._at))
         self._text = self._text[self._at :] + self._decode(part, not part)
         self._at, self._ended = 0, not part
-
-
-_DECODER = json.JSONDecoder()

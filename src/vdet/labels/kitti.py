@@ -10,7 +10,7 @@ from pathlib import Path
 
 from vdet.labels.formats import Format, PictureFormat
 from vdet.labels.label import Label, limited
-from vdet.labels.parsing import label_lines, parse_number, parse_whole, read_text, text_of
+from vdet.labels.parsing import label_lines, parse_number, parse_whole, read_bytes
 from vdet.labels.pictures import LabelledPicture, labelled_pairs
 from vdet.labels.video import SavedTracks
 from vdet.track.track import FrameTracks
@@ -43,9 +43,7 @@ def read_kitti(path: Path, data: bytes) -> SavedTracks:
         not a number.
     """
     counts = _TRACK_COLUMNS, _TRACK_COLUMNS + 1
-    labels = label_lines(
-        path, text_of(path, data), _track_label, form="KITTI tracking", counts=counts
-    )
+    labels = label_lines(path, data, _track_label, form="KITTI tracking", counts=counts)
     return SavedTracks(tuple(limited(path, labels)))
 
 
@@ -72,7 +70,7 @@ def read_kitti_pictures(folder: Path) -> Iterator[LabelledPicture]:
     """
     parse = partial(label_lines, parse=_object_label, form="KITTI", counts=[_OBJECT_COLUMNS])
     for file, picture in labelled_pairs(folder / "label_2", ".txt", folder / "image_2"):
-        yield LabelledPicture(picture, file, tuple(parse(file, read_text(file))))
+        yield LabelledPicture(picture, file, tuple(parse(file, read_bytes(file))))
 
 
 KITTI = Format("KITTI tracking", ".kitti.txt", read_kitti, _lines)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from vdet.labels.formats import Format
 from vdet.labels.label import Label, from_size, limited
-from vdet.labels.parsing import label_lines, parse_number, parse_whole, text_of
+from vdet.labels.parsing import label_lines, parse_number, parse_whole
 from vdet.labels.video import SavedTracks
 from vdet.track.track import FrameTracks
 
@@ -38,9 +38,7 @@ def read_mot(path: Path, data: bytes) -> SavedTracks:
         not a number, or a flag is neither 0 nor 1.
     """
     counts = _TRUTH_COLUMNS, _RESULT_COLUMNS
-    labels = label_lines(
-        path, text_of(path, data), _label, form="MOTChallenge", counts=counts, separator=","
-    )
+    labels = label_lines(path, data, _label, form="MOTChallenge", counts=counts, separator=",")
     return SavedTracks(tuple(limited(path, labels)))
 
 

@@ -5,18 +5,20 @@ and their middle before; times are seconds since 1970 from version 1.2 on, and t
 """
 
 import bz2
+import io
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime, timedelta
 from pathlib import Path, PurePath
 from typing import Annotated, Any, BinaryIO
 
-from pydantic import AliasPath, BaseModel, BeforeValidator, Field
+from pydantic import BaseModel, BeforeValidator, Field, TypeAdapter
 
 from vdet.errors import TruthError
 from vdet.labels.formats import UNKNOWN, Format, SourceVideo, best_classes
-from vdet.labels.label import Label, from_size, limited
-from vdet.labels.parsing import MAX_BYTES, Index, Number, checked_times, first_mistake
+from vdet.labels.json_stream import JsonLists
+from vdet.labels.label import Corners, Label, from_size, limited
+from vdet.labels.parsing import MAX_BYTES, Index, Number, Times, checked_times
 from vdet.labels.video import SavedTracks
 from vdet.track.track import FrameTracks
 from vdet.version import __version__
@@ -78,6 +80,8 @@ def _metadata(video: SourceVideo, frames: Sequence[FrameTracks], zero: float) ->
 
 def _seconds(value: Any) -> Any:
     """Return the seconds since 1970 of a time that is written as text."""
+    if not isinstance(value, str):
+        return value
     try:
         return float(value)
     except ValueError:
@@ -100,42 +104,71 @@ class _Box(BaseModel):
     id: Index = Field(alias="track-id")
 
 
-_VIDEO = "metadata", "video"
+class _Video(BaseModel):
+    width: Index = 0
+    height: Index = 0
+    begin: _Time = Field(alias="recorded_start_date")
 
 
-class _Document(BaseModel):
-    version: str = Field(
-        validation_alias=AliasPath("metadata", "otdet_version"), pattern=r"^\d{1,4}\.\d"
-    )
-    width: Index = Field(0, validation_alias=AliasPath(*_VIDEO, "width"))
-    height: Index = Field(0, validation_alias=AliasPath(*_VIDEO, "height"))
-    begin: _Time = Field(validation_alias=AliasPath(*_VIDEO, "recorded_start_date"))
-    boxes: list[_Box] = Field(validation_alias=AliasPath("data", "detections"))
+class _Metadata(BaseModel):
+    version: str = Field(alias="otdet_version", pattern=r"^\d{1,4}\.\d")
+    video: _Video
+
+
+_KINDS = {"metadata": TypeAdapter[Any](_Metadata), "data.detections": TypeAdapter[Any](_Box)}
 
 
 def read_ottrk(path: Path, data: bytes) -> SavedTracks:
     """Read tracks of any version. Raises `TruthError` if it is damaged, or of another form."""
+    metadata: list[_Metadata] = []
+    moments: Times = {}
     try:
-        expander = bz2.BZ2Decompressor()
-        text = expander.decompress(data, MAX_BYTES)
-        if not expander.eof:
-            raise ValueError(f"is cut off, or larger than {MAX_BYTES:,} bytes")
-        document = _Document.model_validate_json(text)
-    except (OSError, ValueError) as error:  # also a ValidationError
-        what = error if isinstance(error, OSError) else first_mistake(error)
+        labels = tuple(limited(path, _labels(data, metadata, moments)))
+        if not metadata:
+            raise ValueError("metadata: Field required")
+    except TruthError:
+        raise
+    except (EOFError, OSError, ValueError) as error:
+        what = "is cut off" if isinstance(error, EOFError) else error
         raise TruthError(f"{path}: is not OTVision's tracks: {what}") from error
-    share = 0.5 if document.version.startswith(_CENTRED) else 0.0
-    labels: list[Label] = []
-    times: dict[int, tuple[int | str, float]] = {}
-    for number, box in enumerate(document.boxes):
-        place = f"data.detections.{number}"
-        corners = from_size(box.x - share * box.w, box.y - share * box.h, box.w, box.h)
-        known = box.name, box.frame, box.id, box.confidence, False
-        labels.append(Label(place, corners, *known, "between" if box.is_interpolated else "seen"))
-        times[box.frame - 1] = place, box.occurrence - document.begin
-    shape = document.width, document.height
-    size, begin = shape if all(shape) else None, datetime.fromtimestamp(document.begin, UTC)
-    return SavedTracks(tuple(limited(path, labels)), (), checked_times(path, times), size, begin)
+    video = metadata[0].video
+    if metadata[0].version.startswith(_CENTRED):
+        labels = tuple(each._replace(box=_around(each.box)) for each in labels)
+    times = {frame: (place, moment - video.begin) for frame, (place, moment) in moments.items()}
+    size = (video.width, video.height) if video.width and video.height else None
+    begin = datetime.fromtimestamp(video.begin, UTC)
+    return SavedTracks(labels, (), checked_times(path, times), size, begin)
+
+
+def _labels(data: bytes, metadata: list[_Metadata], moments: Times) -> Iterator[Label]:
+    """Yield the boxes, put the metadata into a list and the seconds since 1970 into `moments`.
+
+    Boxes begin at x and y, as in the later versions. Errors are those of `bz2` and of `JsonLists`.
+    """
+    unpacked, left = bz2.BZ2File(io.BytesIO(data)), MAX_BYTES
+
+    def read(size: int) -> bytes:
+        nonlocal left
+        part = unpacked.read(size)
+        left -= len(part)
+        if left < 0:
+            raise ValueError(f"is larger than {MAX_BYTES:,} bytes")
+        return part
+
+    for name, number, entry in JsonLists(read, _KINDS):
+        if name == "metadata":
+            metadata.append(entry)
+            continue
+        place, corners = f"{name}.{number}", from_size(entry.x, entry.y, entry.w, entry.h)
+        known = entry.name, entry.frame, entry.id, entry.confidence, False
+        yield Label(place, corners, *known, "between" if entry.is_interpolated else "seen")
+        moments[entry.frame - 1] = place, entry.occurrence
+
+
+def _around(box: Corners) -> Corners:
+    """Return a box around the corner of another, of the same size."""
+    x, y, right, bottom = box
+    return from_size(x - (right - x) / 2, y - (bottom - y) / 2, right - x, bottom - y)
 
 
 OTTRK = Format("OTVision tracks", ".ottrk", read_ottrk, whole=_write)

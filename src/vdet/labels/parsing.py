@@ -1,8 +1,9 @@
-"""Strict readers of text files, archives, and the numbers in them."""
+"""The limits of all files of boxes, and strict readers of their texts and numbers."""
 
+import codecs
 import io
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path, PurePosixPath
 from typing import Annotated, TextIO
 
@@ -17,7 +18,14 @@ LIMIT = 10_000_000
 """Largest frame number, id or pixel coordinate. Larger numbers are damage, and would overflow."""
 
 MAX_BYTES = 300_000_000
-"""Largest size of a file of boxes."""
+"""Largest size of a file of boxes, unpacked."""
+
+MAX_PART = 1_000_000
+"""Bytes that a line, an XML tag, or an object of a JSON list of tracks may always have; no text has
+twice as many."""
+
+MAX_LINES = 10_000_000
+"""Largest number of lines in a file of boxes."""
 
 _LATEST = 1e11
 """Largest time in seconds, three thousand years of wall-clock time."""
@@ -25,6 +33,9 @@ _LATEST = 1e11
 Number = Annotated[float, Field(ge=-LIMIT, le=LIMIT, allow_inf_nan=False)]
 Index = Annotated[int, Field(ge=0, le=LIMIT)]
 """Fields of JSON documents and of tables."""
+
+Times = dict[int, tuple[int | str, float]]
+"""The place in the file and the time, seconds, of each frame, counted from 0."""
 
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
@@ -34,43 +45,52 @@ def read_bytes(path: Path) -> bytes:
     return read_whole(path, most=MAX_BYTES, what="file of boxes", error=TruthError)
 
 
-def text_of(path: Path, data: bytes) -> str:
-    """Return the text of the content of a file. Raises `TruthError` if it is not UTF-8."""
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        text = "\0"
-    if "\0" in text:
-        raise TruthError(f"{path}: is not text (UTF-8); give a file of boxes")
-    return text
-
-
-def read_text(path: Path) -> str:
-    """Return the text of a UTF-8 file.
+def check_parts(path: Path, data: bytes, what: str, ends: Sequence[bytes]) -> None:
+    """Refuse UTF-8 with a part of more than twice `MAX_PART` bytes before one of its `ends`.
 
     Raises
     ------
     TruthError
-        The file cannot be read, is larger than `MAX_BYTES` or is not text.
+        There is such a part, or the content is not text.
     """
-    return text_of(path, read_bytes(path))
+    decode = codecs.getincrementaldecoder("utf-8")().decode
+    for start in range(0, len(data), MAX_PART):
+        part = data[start : start + MAX_PART]
+        try:
+            decode(part, start + MAX_PART >= len(data))
+        except UnicodeDecodeError:
+            part = b"\0"
+        if b"\0" in part:
+            raise TruthError(f"{path}: is not text (UTF-8); give a file of boxes")
+        if len(part) == MAX_PART and not any(end in part for end in ends):
+            line = data.count(b"\n", 0, start) + 1
+            raise line_error(path, line, f"{what} is longer than {MAX_PART:,} bytes")
 
 
-def text_file(text: str, newline: str | None = None) -> TextIO:
-    """Return a text as a file; `io.StringIO` would take four bytes for each character."""
-    return io.TextIOWrapper(io.BytesIO(text.encode()), "utf-8", newline=newline)
+def text_file(path: Path, data: bytes, newline: str | None = None) -> TextIO:
+    """Return the content of a file as a file of text, whose memory is that of `data`.
+
+    Raises
+    ------
+    TruthError
+        It is not UTF-8, has more than `MAX_LINES`, or one that is too long.
+    """
+    check_parts(path, data, "the line", (b"\n", b"\r"))
+    if max(data.count(b"\n"), data.count(b"\r")) > MAX_LINES:
+        raise TruthError(f"{path}: has more than {MAX_LINES:,} lines; cut it into parts")
+    return io.TextIOWrapper(io.BytesIO(data), "utf-8-sig", newline=newline)
 
 
-def numbered_lines(text: str) -> Iterator[tuple[int, str]]:
-    """Yield every line that is not blank, stripped, with its number from 1."""
-    for number, line in enumerate(text_file(text), start=1):
+def numbered_lines(path: Path, data: bytes) -> Iterator[tuple[int, str]]:
+    """Yield every line that is not blank, stripped, with its number from 1; errors as above."""
+    for number, line in enumerate(text_file(path, data), start=1):
         if stripped := line.strip():
             yield number, stripped
 
 
 def label_lines(
     path: Path,
-    text: str,
+    data: bytes,
     parse: Callable[[int | str, list[str]], Label],
     *,
     form: str,
@@ -92,14 +112,14 @@ def label_lines(
     separator
         Text between columns; None for spaces.
     member
-        Name of the file in the archive `path`; empty if the text is that of `path`.
+        Name of the file in the archive `path`; empty if the content is that of `path`.
 
     Raises
     ------
     TruthError
-        A line has another number of columns, or cannot be parsed.
+        The content is not text, a line has another number of columns, or it cannot be parsed.
     """
-    for line, content in numbered_lines(text):
+    for line, content in numbered_lines(path, data):
         columns = content.split(separator)
         place: int | str = f"{member}:{line}" if member else line
         if counts is not None and len(columns) not in counts:
@@ -146,8 +166,8 @@ def parse_whole(text: str) -> int:
     return int(value)
 
 
-def checked_times(path: Path, times: Mapping[int, tuple[int | str, float]]) -> dict[int, float]:
-    """Return the time of each frame; `times` has the place in the file and the time by frame.
+def checked_times(path: Path, times: Times) -> dict[int, float]:
+    """Return the time of each frame.
 
     Times may be those of a wall clock. The first one may be negative, as in videos.
 
@@ -165,16 +185,16 @@ def checked_times(path: Path, times: Mapping[int, tuple[int | str, float]]) -> d
     return {frame: time for frame, (_, time) in times.items()}
 
 
-def archive_texts(
+def archive_members(
     path: Path, data: bytes, is_wanted: Callable[[PurePosixPath], bool]
-) -> dict[str, str]:
-    """Return the texts of the members of a zip file that are wanted, by their names.
+) -> dict[str, bytes]:
+    """Return the members of a zip file that are wanted, by their names.
 
     Raises
     ------
     TruthError
         The archive is damaged, a name in it leads out of it, or the members are larger than
-        `MAX_BYTES` together, or are not text.
+        `MAX_BYTES` together.
     """
     try:
         names = [name for name in list_members(io.BytesIO(data)) if is_wanted(PurePosixPath(name))]
@@ -182,10 +202,9 @@ def archive_texts(
             if sum(archive.getinfo(name).file_size for name in names) > MAX_BYTES:
                 what = f"its labels are larger than {MAX_BYTES:,} bytes; cut the video into parts"
                 raise ArchiveError(what)
-            members = {name: read_member(archive, name, most=MAX_BYTES) for name in names}
+            return {name: read_member(archive, name, most=MAX_BYTES) for name in names}
     except ArchiveError as error:
         raise TruthError(f"{path}: {error}") from error
-    return {name: text_of(path, member) for name, member in members.items()}
 
 
 def first_mistake(error: ValueError) -> str:

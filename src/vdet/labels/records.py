@@ -6,24 +6,39 @@ JSON lines have a record for each frame, even one without a box. CSV has a row f
 import csv
 import io
 import json
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import islice
+from operator import itemgetter
 from pathlib import Path
 from typing import Annotated, Any, get_type_hints
 
-from pydantic import Field, TypeAdapter, ValidationError
+from pydantic import FailFast, Field, TypeAdapter, ValidationError
 from typing_extensions import TypedDict
 
 from vdet.errors import TruthError
-from vdet.labels import parsing
 from vdet.labels.formats import Format
 from vdet.labels.label import MAX_LABELS, Label, from_size, limited, line_error
-from vdet.labels.parsing import Index, Number
+from vdet.labels.parsing import (
+    LIMIT,
+    Index,
+    Number,
+    Times,
+    checked_times,
+    first_mistake,
+    numbered_lines,
+    text_file,
+)
 from vdet.labels.video import SavedTracks
 from vdet.track.track import FrameTracks, State, Track
 
 _NEEDED = ("frame", "time", "id", "x", "y", "width", "height")
 _OPTIONAL = ("score", "state", "class", "foot_x", "foot_y", "distance", "lane")
+_COLUMNS = _NEEDED + _OPTIONAL
+_BLOCK = 300
+"""Rows of a table that are checked at once; they fit into the cache."""
+_MAX_COLUMNS = 1000
+_MAX_ROW = 100
+"""Lines of a row of a table, whose cells may contain line ends."""
 
 
 # Dictionaries are read twice as fast as models, and an hour of video has a million boxes.
@@ -35,7 +50,7 @@ _Known = TypedDict(
         "class": str | None,
         "foot": tuple[Number, Number] | None,
         "distance": Number | None,
-        "lane": Annotated[int, Field(ge=-parsing.LIMIT, le=parsing.LIMIT)] | None,
+        "lane": Annotated[int, Field(ge=-LIMIT, le=LIMIT)] | None,
     },
     total=False,
 )
@@ -52,26 +67,20 @@ class _Track(_Known):
 class _Record(TypedDict):
     frame: Index
     time: float
-    tracks: list[_Track]
+    tracks: Annotated[list[_Track], FailFast()]
 
 
-_RECORD = TypeAdapter(_Record)
-_KINDS = {"frame": Index, "time": float, "foot_x": Number, "foot_y": Number}
-_CELLS: dict[str, TypeAdapter[Any]] = {
-    name: TypeAdapter(list[kind | None])  # type: ignore[valid-type]
-    for name, kind in {**get_type_hints(_Track, include_extras=True), **_KINDS}.items()
+_KINDS = get_type_hints(_Track, include_extras=True) | {
+    "frame": Index,
+    "time": float,
+    "foot_x": Number,
+    "foot_y": Number,
 }
-"""The columns of a table; an empty cell is None."""
-_BLOCK = 300
-"""Rows of a table that are read at once, column by column; they fit into the cache."""
-
-
-def _label(line: int, frame: int, track: _Track) -> Label:
-    """Return the label in a frame, counted from 0."""
-    box = from_size(track["x"], track["y"], track["width"], track["height"])
-    score, state = track.get("score", 1.0), track.get("state", "seen")
-    known = track.get("class") or None, frame + 1, track["id"], score, False, state
-    return Label(line, box, *known, track.get("foot"), track.get("distance"), track.get("lane"))
+_RECORD = TypeAdapter(_Record)
+_Row: Any = tuple[  # type: ignore[misc]
+    (*(_KINDS[each] for each in _NEEDED), *(_KINDS[each] | None for each in _OPTIONAL))
+]
+_ROWS: TypeAdapter[list[Any]] = TypeAdapter(list[_Row])
 
 
 def _json_lines(frame: FrameTracks) -> Iterator[str]:
@@ -119,33 +128,33 @@ def read_json_lines(path: Path, data: bytes) -> SavedTracks:
     TruthError
         The file is empty, a line is not such a record, frames do not ascend, or a time is wrong.
     """
-    times: _Times = {}
-    labels = tuple(limited(path, _json_labels(path, parsing.text_of(path, data), times)))
+    times: Times = {}
+    labels = tuple(limited(path, _json_labels(path, data, times)))
     if not times:
         raise TruthError(f"{path}: is empty; it should have a record for every frame")
-    return SavedTracks(labels, listed=tuple(times), times=parsing.checked_times(path, times))
+    return SavedTracks(labels, listed=tuple(times), times=checked_times(path, times))
 
 
-_Times = dict[int, tuple[int | str, float]]
-"""The line and the time of each frame."""
-
-
-def _json_labels(path: Path, text: str, times: _Times) -> Iterator[Label]:
+def _json_labels(path: Path, data: bytes, times: Times) -> Iterator[Label]:
     """Yield the boxes of every record, and put the time of every frame into `times`."""
     last = -1
-    for line, content in parsing.numbered_lines(text):
+    for line, content in numbered_lines(path, data):
         if len(times) == MAX_LABELS:
             raise line_error(path, line, f"has more than {MAX_LABELS:,} frames; cut it into parts")
         try:
             record = _RECORD.validate_json(content, strict=True)
         except ValidationError as error:
-            raise line_error(path, line, parsing.first_mistake(error)) from error
+            raise line_error(path, line, first_mistake(error)) from error
         if record["frame"] <= last:
             raise line_error(path, line, f"frame {record['frame']} comes after frame {last}")
         last = record["frame"]
         times[last] = line, record["time"]
         for each in record["tracks"]:
-            yield _label(line, last, each)
+            box = from_size(each["x"], each["y"], each["width"], each["height"])
+            score, state = each.get("score", 1.0), each.get("state", "seen")
+            known = each.get("class") or None, last + 1, each["id"], score, False, state
+            place = each.get("foot"), each.get("distance"), each.get("lane")
+            yield Label(line, box, *known, *place)
 
 
 def read_csv(path: Path, data: bytes) -> SavedTracks:
@@ -159,63 +168,71 @@ def read_csv(path: Path, data: bytes) -> SavedTracks:
         A column is missing or appears twice, a row has another number of cells, a cell is not what
         its column needs, or a time is wrong.
     """
-    times: _Times = {}
-    labels = tuple(limited(path, _csv_labels(path, parsing.text_of(path, data), times)))
-    return SavedTracks(labels, times=parsing.checked_times(path, times))
+    times: Times = {}
+    labels = tuple(limited(path, _csv_labels(path, data, times)))
+    return SavedTracks(labels, times=checked_times(path, times))
 
 
-def _csv_labels(path: Path, text: str, times: _Times) -> Iterator[Label]:
+def _csv_labels(path: Path, data: bytes, times: Times) -> Iterator[Label]:
     """Yield the label of every row, and put the time of its frame into `times`."""
-    table = csv.reader(parsing.text_file(text, ""), strict=True, skipinitialspace=True)
+    rows = _rows(path, data)
+    while block := list(islice(rows, _BLOCK)):
+        lines, cells = zip(*block, strict=True)
+        try:
+            values = _ROWS.validate_python(cells)
+        except ValidationError as error:
+            number, column = error.errors()[0]["loc"][:2]
+            what = f"{_COLUMNS[int(column)]}: {error.errors()[0]['msg']}"
+            raise line_error(path, lines[int(number)], what) from error
+        for line, row in zip(lines, values, strict=True):
+            frame, time, id_, x, y, width, height, score, state, name, *foot, metres, lane = row
+            times[frame] = line, time
+            box, score = from_size(x, y, width, height), 1.0 if score is None else score
+            place = None if None in foot else tuple(foot)
+            yield Label(
+                line, box, name, frame + 1, id_, score, False, state or "seen", place, metres, lane
+            )
+
+
+def _rows(path: Path, data: bytes) -> Iterator[tuple[int, list[str | None]]]:
+    """Yield the line of each row and its cells in the order of `_COLUMNS`; None is an empty one."""
+    numbered = enumerate(text_file(path, data, ""))
+    before = 0  # the line before the row that is read
+
+    def lines() -> Iterator[str]:
+        for number, line in numbered:
+            if number - before > _MAX_ROW:
+                raise ValueError(f"the row has more than {_MAX_ROW} lines; a quote may be missing")
+            yield line
+
+    table = csv.reader(lines(), strict=True, skipinitialspace=True)
     try:
         names = next(table, [])
-        if any(names.count(name) != 1 for name in _NEEDED):
-            needed = ", ".join(_NEEDED)
-            raise ValueError(f"the header must name each of these columns once: {needed}")
-        rows = ((table.line_num, cells) for cells in table if cells)
-        while block := list(islice(rows, _BLOCK)):
-            yield from _block_labels(path, names, block, times)
+        pick = _picker(names)
+        for cells in table:
+            before = table.line_num
+            if not cells:
+                continue
+            if len(cells) != len(names):
+                raise ValueError(f"this line has not the {len(names)} columns of the header")
+            cells.append("")
+            yield before, [cell or None for cell in pick(cells)]
     except (ValueError, csv.Error) as error:
         raise line_error(path, max(1, table.line_num), str(error)) from error
 
 
-def _block_labels(
-    path: Path, names: Sequence[str], block: Sequence[tuple[int, list[str]]], times: _Times
-) -> Iterator[Label]:
-    """Return the labels of rows, which come with their lines."""
-    for line, cells in block:
-        if len(cells) != len(names):
-            what = f"this line has not the {len(names)} columns of the header"
-            raise line_error(path, line, what)
-    lines, rows = zip(*block, strict=True)
-    known = dict.fromkeys(_CELLS, [None] * len(lines)) | {
-        name: _values(path, name, column, lines)
-        for name, column in zip(names, zip(*rows, strict=True), strict=True)
-        if name in _CELLS
-    }
-    frames, feet = known["frame"], zip(known["foot_x"], known["foot_y"], strict=True)
-    times.update(zip(frames, zip(lines, known["time"], strict=True), strict=True))
-    boxes = map(from_size, *(known[name] for name in ("x", "y", "width", "height")))
-    scores = [1.0 if score is None else score for score in known["score"]]
-    facts = scores, [False] * len(lines), [state or "seen" for state in known["state"]]
-    places = [None if None in foot else foot for foot in feet], known["distance"], known["lane"]
-    numbers = [frame + 1 for frame in frames], known["id"]
-    columns = lines, boxes, known["class"], *numbers, *facts, *places
-    return map(Label._make, zip(*columns, strict=True))
+def _picker(names: Sequence[str]) -> Callable[[list[str]], tuple[str, ...]]:
+    """Return a function that orders the cells of a row as `_COLUMNS`.
 
-
-def _values(path: Path, name: str, cells: Sequence[str], lines: Sequence[int]) -> list[Any]:
-    """Return the values of a column."""
-    given = [cell or None for cell in cells] if "" in cells else cells
-    if name in _NEEDED and None in given:
-        raise line_error(path, lines[given.index(None)], f"{name}: this cell is empty")
-    try:
-        values: list[Any] = _CELLS[name].validate_python(given)
-    except ValidationError as error:
-        first = error.errors(include_url=False, include_input=False)[0]
-        raise line_error(path, lines[int(first["loc"][0])], f"{name}: {first['msg']}") from error
-    return values
+    `names` is the header; a column that it does not name is the last cell of the row.
+    """
+    if len(names) > _MAX_COLUMNS:
+        raise ValueError(f"the header has more than {_MAX_COLUMNS:,} columns")
+    if any(names.count(name) != 1 for name in _NEEDED):
+        needed = ", ".join(_NEEDED)
+        raise ValueError(f"the header must name each of these columns once: {needed}")
+    return itemgetter(*(names.index(each) if each in names else -1 for each in _COLUMNS))
 
 
 JSON_LINES = Format("JSON lines", ".jsonl", read_json_lines, _json_lines)
-CSV = Format("CSV", ".csv", read_csv, _csv_lines, _csv_line([*_NEEDED, *_OPTIONAL]))
+CSV = Format("CSV", ".csv", read_csv, _csv_lines, _csv_line(_COLUMNS))

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from vdet.labels.formats import PictureFormat
 from vdet.labels.label import Label
-from vdet.labels.parsing import parse_number, read_text
+from vdet.labels.parsing import parse_number, read_bytes
 from vdet.labels.pictures import LabelledPicture, labelled_pairs
 from vdet.labels.xml_reader import Element, read_xml
 
@@ -42,7 +42,7 @@ def _labelled(picture: Path, file: Path) -> LabelledPicture:
             case ["annotation", "size"]:
                 size[0] = opened[-1].size
 
-    read_xml(file, read_text(file), "annotation", take)
+    read_xml(file, read_bytes(file), "annotation", take)
     return LabelledPicture(picture, file, tuple(labels), size[0])
 
 

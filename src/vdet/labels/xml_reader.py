@@ -5,11 +5,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from xml.parsers import expat
 
-from vdet.labels.label import line_error
-from vdet.labels.parsing import parse_whole
+from vdet.labels.label import MAX_LABELS, line_error
+from vdet.labels.parsing import check_parts, parse_whole
 
 MAX_DEPTH = 32
 """Largest number of nested XML elements; label files have 5."""
+
+MAX_NAMES = 1000
+"""Largest number of different names of elements and attributes; label files have 50."""
 
 _MAX_TEXT = 1000  # characters
 
@@ -18,7 +21,7 @@ _MAX_TEXT = 1000  # characters
 class Element:
     """An open element; its `text` is complete when it ends.
 
-    `values` are the texts of the elements that have ended in it, by their names.
+    `values` are the texts of the elements that have ended in it, by their names, two of each name.
     """
 
     name: str
@@ -49,7 +52,7 @@ class Element:
         return texts[0].strip()
 
 
-def read_xml(path: Path, text: str, root: str, take: Callable[[list[Element]], None]) -> None:
+def read_xml(path: Path, data: bytes, root: str, take: Callable[[list[Element]], None]) -> None:
     """Read the XML of the file `path`.
 
     Document types, and with them entities, are refused, so that a small file cannot expand into a
@@ -66,45 +69,53 @@ def read_xml(path: Path, text: str, root: str, take: Callable[[list[Element]], N
     Raises
     ------
     TruthError
-        The XML is broken, declares a document type, is nested deeper than `MAX_DEPTH`, has another
-        root, or `take` has raised a ValueError.
+        The XML is broken, declares a document type, has another root, or is beyond a limit: of
+        depth, of names, of elements, or of the length of a tag. Or `take` has raised a ValueError.
     """
-    if "<!DOCTYPE" in text:
-        line = text.count("\n", 0, text.index("<!DOCTYPE")) + 1
-        what = "the XML declares a document type, which labels do not need; remove it"
-        raise line_error(path, line, what)
-    parser = _parser(root, take)
+    check_parts(path, data, "an XML tag or text", (b"<",))
+    reader = _Reader(root, take)
     try:
-        parser.Parse(text, True)
+        reader.parser.Parse(data, True)
     except expat.ExpatError as error:
         what = f"broken XML: {expat.ErrorString(error.code)}"
         raise line_error(path, error.lineno, what) from error
     except ValueError as error:
-        raise line_error(path, parser.CurrentLineNumber, str(error)) from error
+        raise line_error(path, reader.parser.CurrentLineNumber, str(error)) from error
 
 
-def _parser(root: str, take: Callable[[list[Element]], None]) -> expat.XMLParserType:
-    parser = expat.ParserCreate()
-    opened: list[Element] = []
+class _Reader:
+    """What happens at each tag, and at each text."""
 
-    def start(name: str, attributes: dict[str, str]) -> None:
-        if not opened and name != root:
-            raise ValueError(f"<{name:.40}> where the format has <{root}>")
-        if len(opened) == MAX_DEPTH:
+    def __init__(self, root: str, take: Callable[[list[Element]], None]) -> None:
+        self._names: dict[str, str] = {}  # of all elements and attributes
+        self._opened: list[Element] = []
+        self._root, self._take, self._count = root, take, 0
+        self.parser = expat.ParserCreate("utf-8", intern=self._names)
+        self.parser.buffer_text = True
+        self.parser.StartElementHandler = self._start
+        self.parser.EndElementHandler = self._end
+        self.parser.CharacterDataHandler = self._add_text
+        self.parser.StartDoctypeDeclHandler = self._refuse_type
+
+    def _start(self, name: str, attributes: dict[str, str]) -> None:
+        self._count += 1
+        if not self._opened and name != self._root:
+            raise ValueError(f"<{name:.40}> where the format has <{self._root}>")
+        if len(self._opened) == MAX_DEPTH:
             raise ValueError(f"more than {MAX_DEPTH} nested elements")
-        opened.append(Element(name, attributes, parser.CurrentLineNumber))
+        if len(self._names) > MAX_NAMES or self._count > MAX_LABELS:
+            raise ValueError(f"more than {MAX_NAMES:,} names or {MAX_LABELS:,} elements")
+        self._opened.append(Element(name, attributes, self.parser.CurrentLineNumber))
 
-    def add_text(part: str) -> None:
-        opened[-1].text += part[: _MAX_TEXT - len(opened[-1].text)]
+    def _add_text(self, part: str) -> None:
+        element = self._opened[-1]
+        element.text += part[: _MAX_TEXT - len(element.text)]
 
-    def end(_: str) -> None:
-        take(opened)
-        element = opened.pop()
-        if opened:
-            opened[-1].values.setdefault(element.name, []).append(element.text)
+    def _end(self, _: str) -> None:
+        self._take(self._opened)
+        element = self._opened.pop()
+        if self._opened and len(texts := self._opened[-1].values.setdefault(element.name, [])) < 2:
+            texts.append(element.text)
 
-    parser.buffer_text = True
-    parser.StartElementHandler = start
-    parser.EndElementHandler = end
-    parser.CharacterDataHandler = add_text
-    return parser
+    def _refuse_type(self, *_: object) -> None:
+        raise ValueError("the XML declares a document type, which labels do not need; remove it")

@@ -24,7 +24,7 @@ from vdet.errors import ConfigError, ImageError, TruthError, escaped, printable
 from vdet.labels import parsing
 from vdet.labels.formats import UNKNOWN, Format, PictureFormat, SourceVideo
 from vdet.labels.label import Label, limited
-from vdet.labels.parsing import label_lines, parse_number, parse_whole, read_text
+from vdet.labels.parsing import archive_members, label_lines, parse_number, parse_whole, read_bytes
 from vdet.labels.pictures import LabelledPicture, pictures_below
 from vdet.labels.video import SavedTracks
 from vdet.media.images import read_header
@@ -84,34 +84,36 @@ def read_yolo(path: Path, data: bytes) -> SavedTracks:
         `data.yaml` with names and the size of the frames, two files are of one frame, or a line is
         not of this form.
     """
-    texts = parsing.archive_texts(path, data, _is_wanted)
-    described = [name for name in texts if PurePosixPath(name).name == _DATA]
+    members = archive_members(path, data, _is_wanted)
+    described = [name for name in members if PurePosixPath(name).name == _DATA]
     if not described:
         raise TruthError(f"{path}: needs {_DATA} with the names of the classes")
     first = min(described, key=lambda name: (name.count("/"), name))
     where = f"{path}:{printable(first)}"
-    values = _values(texts[first], where)
+    values = _values(members[first], where)
     names = _class_names(values, where)
     size: Any = values.get("width"), values.get("height")
     if not all(isinstance(side, int) and 0 < side <= parsing.LIMIT for side in size):
         raise TruthError(f"{where}: needs the size of the frames, as width: 1280, height: 720")
-    frames = _frames(path, [name for name in texts if name not in described])
+    frames = _frames(path, [name for name in members if name not in described])
     read = partial(label_lines, form="YOLO with tracks", counts=(_COLUMNS + 1, _COLUMNS + 2))
 
     def labels() -> Iterator[Label]:
         for index, name in sorted(frames.items()):
             parse = partial(_track_label, names=names, size=size, frame=index + 1)
-            yield from read(path, texts[name], parse, member=printable(name))
+            yield from read(path, members[name], parse, member=printable(name))
 
     return SavedTracks(tuple(limited(path, labels())), listed=tuple(sorted(frames)), size=size)
 
 
-def _values(text: str, where: str) -> Mapping[str, Any]:
+def _values(data: bytes, where: str) -> Mapping[str, Any]:
     """Return the values of `data.yaml`."""
-    if len(text) > MAX_BYTES:
+    if len(data) > MAX_BYTES:
         raise TruthError(f"{where}: is larger than {MAX_BYTES:,} bytes")
     try:
-        return parse_document(text, where).values
+        return parse_document(data.decode("utf-8-sig"), where).values
+    except UnicodeDecodeError as error:
+        raise TruthError(f"{where}: is not text (UTF-8)") from error
     except ConfigError as error:
         raise TruthError(str(error).splitlines()[0]) from error
 
@@ -193,7 +195,7 @@ def read_yolo_pictures(folder: Path) -> Iterator[LabelledPicture]:
     data = next((p for p in (folder / _DATA, folder.parent / _DATA) if p.is_file()), None)
     if data is None:
         raise TruthError(f"{folder}: needs {_DATA} with the names of the classes, here or above")
-    names = _class_names(_values(read_text(data), str(data)), str(data))
+    names = _class_names(_values(read_bytes(data), str(data)), str(data))
     images, labels = folder / "images", folder / "labels"
     files = {file for file in labels.rglob("*.txt") if file.name != _NO_LABELS}
     for picture in pictures_below(images):
@@ -213,7 +215,7 @@ def _labelled(picture: Path, file: Path, names: Sequence[str]) -> LabelledPictur
     except ImageError as error:
         raise TruthError(str(error)) from error
     parse = partial(_label, names=names, size=size)
-    labels = label_lines(file, read_text(file), parse, form="YOLO", counts=None)
+    labels = label_lines(file, read_bytes(file), parse, form="YOLO", counts=None)
     return LabelledPicture(picture, file, tuple(labels), size)
 
 
