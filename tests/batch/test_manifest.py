@@ -39,6 +39,7 @@ def test_a_record_is_there_as_soon_as_it_is_added(tmp_path: Path) -> None:
         "digest": None,
         "sizes": {},
         "times": {},
+        "summaries": {},
         "program": "vdet 1.2",
         "model": None,
         "model_sha256": None,

@@ -12,7 +12,7 @@ from vdet.batch.plan import OutputSuffix, Plan, PlannedTotal, make_plan
 from vdet.batch.run import each_once, run_batch, write_totals
 from vdet.batch.task import Identity
 from vdet.errors import OutputError
-from vdet.run.sinks.protocol import BatchTotal
+from vdet.run.sinks.protocol import BatchTotal, VideoPart
 from vdet.run.video import Run
 from vdet.workers import WorkerKilledError
 
@@ -78,8 +78,9 @@ def test_a_file_that_ended_when_its_process_was_killed_is_made_again(tmp_path: P
     assert all(output.path.exists() for output in job.outputs)
 
 
-def join(outputs: Mapping[str, Path], target: Path) -> None:
-    target.write_text("".join(f"{name}: {path.read_text()}\n" for name, path in outputs.items()))
+def join(parts: Mapping[str, VideoPart], target: Path) -> None:
+    lines = (f"{name}: {part.path.read_text()} in {part.place}\n" for name, part in parts.items())
+    target.write_text("".join(lines))
 
 
 def test_a_total_is_made_from_the_outputs_that_are_there(tmp_path: Path) -> None:
@@ -89,11 +90,11 @@ def test_a_total_is_made_from_the_outputs_that_are_there(tmp_path: Path) -> None
     total = PlannedTotal(BatchTotal("all", join), tmp_path / "all.txt", outputs)
     (tmp_path / "all.txt").write_text("of an earlier run")
     write_totals(Plan(tmp_path, Identity(""), (), (), (total,)))
-    assert (tmp_path / "all.txt").read_text() == "a: of a\nb: of b\n"
+    assert (tmp_path / "all.txt").read_text() == "a: of a in a.txt\nb: of b in b.txt\n"
 
 
 def test_a_total_that_cannot_be_made_leaves_nothing(tmp_path: Path) -> None:
-    def fail(_: Mapping[str, Path], target: Path) -> None:
+    def fail(_: Mapping[str, VideoPart], target: Path) -> None:
         target.write_text("half")
         raise OSError(28, "No space left on device")
 

@@ -3,10 +3,12 @@
 import csv
 import json
 from pathlib import Path
+from urllib.parse import unquote
 
 import pytest
 
 from conftest import Run
+from pages.html import Elements
 from running import names, write_drive
 
 NASTY = "<img src=x onerror=alert(1)>"
@@ -21,6 +23,10 @@ def clips(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     write_drive(folder / "day" / "a.mp4", 8)
     monkeypatch.chdir(tmp_path)
     return folder
+
+
+def html_of(page: Path) -> Elements:
+    return Elements(page.read_text(encoding="utf-8"))
 
 
 def test_one_video(run: Run, clips: Path, tmp_path: Path, red: tuple[str, ...]) -> None:
@@ -55,7 +61,11 @@ def test_many_videos_have_their_own_and_a_table_and_a_page_over_all(
     }
     with Path("found/all.cars.csv").open() as file:
         assert [row["video"] for row in csv.DictReader(file)] == [NASTY, "day/a"]
-    assert "day/a.page/page.html" in Path("found/index.html").read_text()
+    for page in Path("found").rglob("*.html"):
+        addresses = [each for each in html_of(page).addresses() if not each.startswith("data:")]
+        assert addresses
+        for address in addresses:
+            assert (page.parent / unquote(address.partition("#")[0])).is_file(), address
 
     before = {name: (tmp_path / "found" / name).stat().st_mtime_ns for name in found}
     Path("found/index.html").unlink()  # as if the batch had been interrupted before it

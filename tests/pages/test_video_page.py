@@ -16,9 +16,8 @@ from pages.html import Elements
 from run.red_runs import video_info
 from traffic.passing import HEIGHT, WIDTH, frame, passing, summarize, track
 from vdet.boxes import Box
-from vdet.errors import OutputError
 from vdet.pages.render import jpeg_uri, link_to
-from vdet.pages.video import Player, VideoPage, read_facts, write_index
+from vdet.pages.video import Player, VideoPage, write_index
 from vdet.track.track import FrameTracks
 from vdet.traffic.counts import Counts, Event
 from vdet.traffic.records import VehicleRecord
@@ -184,40 +183,18 @@ class TestVideoPage:
         html.encode("utf-8")
 
 
-class TestFacts:
-    def test_they_are_read_back(self, tmp_path: Path) -> None:
-        counts = counted(*[("</script><b>", "in", 1)] * 8)
-        html = replace(page(), counts=counts).html()
-        assert Elements(html).all("b", id="x") == []
-        (tmp_path / "page.html").write_text(html, encoding="utf-8")
-        facts = read_facts(tmp_path / "page.html")
-        assert (facts.frames, facts.vehicles, facts.most) == (52, 2, 1)
-        assert facts.counts == {"</script><b>: in": 8}
-
-    @pytest.mark.parametrize(
-        "text", ["", "<html></html>", '<script type="application/json" id="vdet">{</script>']
-    )
-    def test_another_page_is_refused(self, tmp_path: Path, text: str) -> None:
-        (tmp_path / "a.html").write_text(text)
-        with pytest.raises(OutputError, match=r"a\.html: is no page of vdet on a video; remove"):
-            read_facts(tmp_path / "a.html")
-
-    def test_changed_facts_are_refused(self, tmp_path: Path) -> None:
-        for old, new in (("data:image/jpeg;base64,", "https://example.org/"), (": 52", ": -1")):
-            (tmp_path / "a.html").write_text(page().html().replace(old, new), encoding="utf-8")
-            with pytest.raises(OutputError, match="is no page of vdet"):
-                read_facts(tmp_path / "a.html")
+def test_the_facts_have_the_counts() -> None:
+    counts = counted(*[("</script><b>", "in", 1)] * 8)
+    facts = replace(page(), counts=counts).facts
+    assert (facts.frames, facts.vehicles, facts.most) == (52, 2, 1)
+    assert facts.counts == {"</script><b>: in": 8}
 
 
 class TestIndex:
     def index(self, folder: Path, *names: str) -> Elements:
-        """Write the page of each video, and the page over all."""
-        outputs = {name: folder / f"{name}.page" for name in names}
-        for place in outputs.values():
-            place.mkdir(parents=True)
-            (place / "page.html").write_text(page().html(), encoding="utf-8")
-        outputs["failed"] = folder / "failed.page"
-        write_index(outputs, folder / "index.html")
+        """Write the page over these videos."""
+        pages = [(name, Path(f"{name}.page", "page.html"), page().facts) for name in names]
+        write_index(pages, folder / "index.html")
         return Elements((folder / "index.html").read_text(encoding="utf-8"))
 
     def test_it_links_each_page_and_adds_up(self, tmp_path: Path) -> None:

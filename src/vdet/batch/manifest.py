@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO, NamedTuple
 
 from vdet.errors import OutputError
 from vdet.files import output_errors
@@ -44,6 +44,8 @@ class Record:
     sizes, times
         Bytes of each output and the time of its last change (nanoseconds since 1970), by its path;
         of a folder the sum and the latest of the files in it.
+    summaries
+        What the sinks say of the outputs, by their paths: see `BatchTotal`.
     program
         The program with its version.
     model, model_sha256
@@ -64,13 +66,19 @@ class Record:
     digest: str | None = None
     sizes: Mapping[str, int] = field(default_factory=dict)
     times: Mapping[str, int] = field(default_factory=dict)
+    summaries: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     program: str = f"vdet {__version__}"
     model: str | None = None
     model_sha256: str | None = None
 
 
-Written = tuple[str, int, int]
-"""What the manifest says about an output: digest, size and time, as in `Record`."""
+class Written(NamedTuple):
+    """What the manifest says about an output, as in `Record`."""
+
+    digest: str | None
+    size: int
+    time: int
+    summary: Mapping[str, Any] | None
 
 
 def check_manifest(path: Path) -> None:
@@ -103,7 +111,9 @@ def read_written(path: Path) -> dict[str, Written]:
             with suppress(ValueError, TypeError, KeyError, AttributeError):
                 line = json.loads(text)
                 for name, size in line["sizes"].items():
-                    found[os.path.realpath(name)] = line["digest"], size, line["times"][name]
+                    summary = line.get("summaries", {}).get(name)
+                    written = Written(line["digest"], size, line["times"][name], summary)
+                    found[os.path.realpath(name)] = written
     return found
 
 

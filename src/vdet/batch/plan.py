@@ -158,7 +158,7 @@ def _is_done(run: Run, identity: Identity, written: Mapping[str, Written]) -> bo
     digest = result_digest(identity, run.source)
     for output in run.outputs:
         state, known = output_state(output), written.get(os.path.realpath(output.path))
-        if state is None or known is None or known[:2] != (digest, state[0]):
+        if state is None or known is None or (known.digest, known.size) != (digest, state[0]):
             return False
     return True
 
@@ -172,8 +172,8 @@ def _replacing_ours(run: Run, written: Mapping[str, Written]) -> Run:
         One is there that has another size or time than the manifest says, and is not empty.
     """
     for output in run.outputs:
-        state = output_state(output)
-        if state and state[0] and written.get(os.path.realpath(output.path), ())[1:] != state:
+        state, known = output_state(output), written.get(os.path.realpath(output.path))
+        if state and state[0] and (known is None or (known.size, known.time) != state):
             raise BatchError(f"{output.path}: is not as vdet wrote it; remove it, or --overwrite")
     return replace(run, overwrite=any(os.path.lexists(output.path) for output in run.outputs))
 

@@ -5,12 +5,14 @@ from collections.abc import Callable, Generator, Sequence
 from contextlib import closing, suppress
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import TypeVar
 
-from vdet.batch.manifest import Record, open_manifest
+from vdet.batch.manifest import Record, open_manifest, read_written
 from vdet.batch.plan import Plan
 from vdet.batch.task import Identity, process_file, record_of_killed
 from vdet.files import OutputFiles, make_folder, output_errors, remove_stale
+from vdet.run.sinks.protocol import VideoPart
 from vdet.run.video import Run
 from vdet.workers import WorkerKilledError, Workers, is_repeated
 
@@ -54,11 +56,17 @@ def run_batch(
 
 
 def write_totals(plan: Plan) -> None:
-    """Write the files over all videos, from the outputs that are there. Raises `OutputError`."""
-    for total in plan.totals:  # a name may be too long for `Path.exists`
-        there = {name: path for name, path in total.outputs.items() if os.path.exists(path)}  # noqa: PTH110
+    """Write the files over all videos, from the outputs that exist. Raises `OutputError`."""
+    written = read_written(plan.manifest)
+    for total in plan.totals:
+        parts = {}
+        for name, path in total.outputs.items():
+            if os.path.exists(path):  # noqa: PTH110  # a name may be too long for `Path.exists`
+                place = Path(os.path.relpath(path, total.path.parent))
+                known = written.get(os.path.realpath(path))
+                parts[name] = VideoPart(path, place, known and known.summary)
         with OutputFiles(overwrite=True) as files, output_errors(total.path):
-            total.made_by.write(there, files.stage(total.path))
+            total.made_by.write(parts, files.stage(total.path))
 
 
 def _process(run: Run, *, identity: Identity) -> Record:

@@ -144,6 +144,9 @@ def _process(run: Run, identity: Identity) -> dict[str, Any]:
         "begin": str(totals.clock) if totals.clock else None,
         "sizes": {path: size for path, (size, _) in states.items()},
         "times": {path: changed for path, (_, changed) in states.items()},
+        "summaries": {
+            str(Path(path).absolute()): summary for path, summary in totals.summaries.items()
+        },
     }
 
 

@@ -1,21 +1,20 @@
 """The page of a video: when vehicles were there, where, what they looked like; and an index."""
 
 import math
-import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from vdet.boxes import Image
-from vdet.errors import OutputError, named
+from vdet.errors import named
 from vdet.files import write_text
 from vdet.media import VideoInfo
 from vdet.pages import charts
 from vdet.pages.charts import Axis, Plot, Span, Timeline, clock
-from vdet.pages.render import PAGE_NAME, jpeg_uri, link_to, render
+from vdet.pages.render import jpeg_uri, link_to, render
 from vdet.pages.traffic import counts_by_interval, traffic_part
 from vdet.traffic.counts import Counts
 from vdet.traffic.paths import draw_paths
@@ -26,11 +25,10 @@ _MOST_VEHICLES = 300  # that are shown one by one
 _SPEED_STEP = 5  # km/h, of the classes of speeds
 _SMALL = 200  # columns of the still in the pages over many videos
 _NO_PICTURE = "data:image/jpeg;base64,"
-_BLOCK = re.compile(r'<script type="application/json" id="vdet">(.*?)</script>', re.DOTALL)
 
 
 class VideoFacts(BaseModel):
-    """A video in numbers, as data in its page: pages over many videos are made from it.
+    """A video in numbers: pages over many videos are made from it.
 
     `seconds` is how much of the video was searched, `most` how many vehicles were shown at once.
     `counts` are by name; `still` is a small picture as a data URI.
@@ -109,9 +107,10 @@ class VideoPage:
     gaps: Sequence[tuple[float, float]] = ()
     zero: float | None = None
 
-    def html(self) -> str:
-        """Return the page; it loads nothing but the video."""
-        facts = VideoFacts(
+    @property
+    def facts(self) -> VideoFacts:
+        """The video in numbers."""
+        return VideoFacts(
             seconds=max(0.0, self.seconds),
             frames=self.frames,
             vehicles=len(self.records),
@@ -119,8 +118,11 @@ class VideoPage:
             still=_NO_PICTURE if self.poster is None else jpeg_uri(self.poster, _SMALL),
             counts=self._totals,
         )
+
+    def html(self) -> str:
+        """Return the page; it loads nothing but the video."""
         traffic = traffic_part(self.counts, self.records, self.poster) if self.counts else None
-        return render("video.html", page=self, traffic=traffic, facts=facts.model_dump())
+        return render("video.html", page=self, traffic=traffic)
 
     @property
     def _totals(self) -> dict[str, int]:
@@ -221,33 +223,10 @@ def _spans(record: VehicleRecord, row: int) -> list[Span]:
     ]
 
 
-def read_facts(page: Path) -> VideoFacts:
-    """Return what a page knows. Raises `OutputError` if it is no page of a video."""
-    try:
-        found = _BLOCK.search(page.read_text(encoding="utf-8"))
-        return VideoFacts.model_validate_json(found.group(1) if found else "")
-    except (UnicodeDecodeError, ValidationError) as error:
-        message = f"{page}: is no page of vdet on a video; remove it, and run again"
-        raise OutputError(message) from error
-
-
-def write_index(outputs: Mapping[str, Path], target: Path) -> None:
-    """Write the page over many videos; `outputs` are the folders of their pages by their names.
-
-    A folder without a page is left out.
-
-    Raises
-    ------
-    OutputError
-        A page was not written by this program.
-    """
-    pages = {name: folder / PAGE_NAME for name, folder in outputs.items()}
-    videos = [
-        (name, link_to(page, target.parent), read_facts(page))
-        for name, page in pages.items()
-        if page.is_file()
-    ]
+def write_index(videos: Sequence[tuple[str, Path, VideoFacts]], target: Path) -> None:
+    """Write the page over many videos: each has a name, a page as seen from it, and facts."""
     counts: Counter[str] = Counter()
     for _, _, facts in videos:
         counts.update(facts.counts)
-    write_text(target, render("index.html", videos=videos, counts=counts))
+    linked = [(name, link_to(page, Path()), facts) for name, page, facts in videos]
+    write_text(target, render("index.html", videos=linked, counts=counts))

@@ -124,7 +124,7 @@ class PictureSearch:
         return finish
 
     @contextmanager
-    def open_sinks(self, outputs: Sequence[Output], *, overwrite: bool) -> Iterator[list[Sink]]:
+    def open_sinks(self, outputs: Sequence[Output], *, overwrite: bool) -> Iterator[Sequence[Sink]]:
         """Give the sinks of outputs that appear together at the end of the block."""
 
         def stage_pictures(image: Image, detections: Boxes) -> dict[str, Image]:

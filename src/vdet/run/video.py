@@ -2,7 +2,7 @@
 
 import logging
 import time
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -99,6 +99,8 @@ class RunTotals:
         Wall time.
     clock
         When the video was recorded, if that is known.
+    summaries
+        What sinks say of their outputs, by the path of the output.
     """
 
     width: int
@@ -107,6 +109,7 @@ class RunTotals:
     tracks: int
     seconds: float
     clock: Clock | None = None
+    summaries: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -240,7 +243,9 @@ def run_video(
         "%s: finding the vehicles took %.1f s, drawing and writing them %.1f s",
         *(run.source, seconds - writing, writing),
     )
-    return RunTotals(info.width, info.height, frames, len(ids), seconds, context.clock)
+    pairs = zip(run.outputs, sinks, strict=True)
+    summaries = {str(output.path): sink.summary for output, sink in pairs if sink.summary}
+    return RunTotals(info.width, info.height, frames, len(ids), seconds, context.clock, summaries)
 
 
 def _context(run: Run, files: OutputFiles, video: OpenVideo) -> SinkContext:

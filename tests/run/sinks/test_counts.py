@@ -15,7 +15,6 @@ from vdet.config.places import LineSettings, TrafficSettings, ZoneSettings
 from vdet.config.schema import Settings
 from vdet.errors import OutputError, VideoError
 from vdet.pages.render import PAGE_NAME
-from vdet.pages.video import read_facts
 from vdet.run.sinks.data import COUNTS
 from vdet.run.sinks.protocol import Output
 from vdet.run.video import Run
@@ -121,7 +120,10 @@ def test_a_batch_has_a_file_over_all_videos(suffix: str, red_clip: Path, tmp_pat
 
 
 def test_a_page_shows_the_counts(red_clip: Path, tmp_path: Path) -> None:
-    run_red(Run(red_clip, outputs(page=tmp_path / "page")), with_counts())
-    facts = read_facts(tmp_path / "page" / PAGE_NAME)
-    assert facts.counts == {"gate: out": 1, "yard: enter": 1, "yard: vanish": 1}
+    totals = run_red(Run(red_clip, outputs(page=tmp_path / "page")), with_counts())
+    assert totals.summaries[str(tmp_path / "page")]["counts"] == {
+        "gate: out": 1,
+        "yard: enter": 1,
+        "yard: vanish": 1,
+    }
     assert "gate: out" in (tmp_path / "page" / PAGE_NAME).read_text()

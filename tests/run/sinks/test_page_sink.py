@@ -14,7 +14,6 @@ from running import names
 from vdet.boxes import Image
 from vdet.config.places import RegionSettings
 from vdet.media.images import decode_image, write_image
-from vdet.pages.video import read_facts
 from vdet.run.sinks.protocol import Output
 from vdet.run.video import Run
 
@@ -36,13 +35,13 @@ def test_a_run_writes_a_page_that_shows_the_video_of_the_run(
     red_clip: Path, tmp_path: Path
 ) -> None:
     wanted = outputs(video=tmp_path / "out.mp4", page=tmp_path / "page")
-    run_red(Run(red_clip, wanted))
+    totals = run_red(Run(red_clip, wanted))
     made = page_of(tmp_path / "page")
     (video,) = made.all("video")
     assert video["src"] == "../out.mp4"
-    facts = read_facts(tmp_path / "page" / "page.html")
-    assert (facts.frames, facts.vehicles, facts.most) == (COUNT, 1, 1)
-    assert facts.seconds == pytest.approx(COUNT / 25)
+    facts = totals.summaries[str(tmp_path / "page")]
+    assert (facts["frames"], facts["vehicles"], facts["most"]) == (COUNT, 1, 1)
+    assert facts["seconds"] == pytest.approx(COUNT / 25)
     (thumbnail,) = (each for each in made.all("img") if each.get("alt") == "vehicle 1")
     blue, _, red = picture(thumbnail["src"]).reshape(-1, 3).mean(axis=0)
     assert red > blue + 50

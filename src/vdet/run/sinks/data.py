@@ -16,7 +16,7 @@ from vdet.files import print_now
 from vdet.labels.formats import SourceVideo, TrackWriter, format_for, track_suffixes
 from vdet.labels.records import JSON_LINES, track_record
 from vdet.run.result import FrameResult
-from vdet.run.sinks.protocol import STANDARD_OUTPUT, BaseSink, BatchTotal, SinkContext, SinkKind
+from vdet.run.sinks.protocol import STANDARD_OUTPUT, BaseSink, SinkContext, SinkKind, of_files
 from vdet.traffic import count_files
 from vdet.traffic.records import VehicleRecords, join_records, write_records
 from vdet.traffic.tables import SUFFIXES
@@ -127,8 +127,9 @@ class VehicleSink(BaseSink):
         self._records.add(result.frame_tracks)
 
 
-_RECORDS = BatchTotal("all", join_records)
-VEHICLES = SinkKind(VehicleSink, SUFFIXES, "records of vehicles", takes="videos", total=_RECORDS)
+VEHICLES = SinkKind(
+    VehicleSink, SUFFIXES, "records of vehicles", takes="videos", total=of_files(join_records)
+)
 
 
 class CountsSink(BaseSink):
@@ -157,7 +158,7 @@ class CountsSink(BaseSink):
 
 
 COUNTS, FLOWS = (
-    SinkKind(partial(CountsSink, write), ends, what, takes="videos", total=BatchTotal("all", join))
+    SinkKind(partial(CountsSink, write), ends, what, takes="videos", total=of_files(join))
     for what, write, ends, join in (
         ("counts", count_files.write_counts, count_files.COUNT_SUFFIXES, count_files.join_counts),
         ("flows", count_files.write_flows, count_files.FLOW_SUFFIXES, count_files.join_flows),

@@ -1,6 +1,7 @@
 """The sinks that fill a folder: `stages` of one frame, `crops` of vehicles, and the `page`."""
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 
 from vdet.boxes import Image
@@ -11,11 +12,11 @@ from vdet.lanes.drawing import stage_pictures
 from vdet.media import Picture
 from vdet.media.images import encode_image, is_picture_name
 from vdet.pages.render import PAGE_NAME, jpeg_uri, link_to
-from vdet.pages.video import Player, VideoPage, write_index
+from vdet.pages.video import Player, VideoFacts, VideoPage, write_index
 from vdet.regions import lay_regions
 from vdet.run.result import FrameResult
 from vdet.run.sinks.drawn import PICTURE_LABEL, label_text
-from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
+from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind, VideoPart
 from vdet.traffic.overview import BestCrops, Crop
 from vdet.traffic.records import VehicleRecords
 
@@ -115,7 +116,9 @@ class PageSink(BaseSink):
     def finish(self) -> None:
         """Write the page."""
         self._keep(self._crops.end())
-        write_text(self._file, self._page().html())
+        page = self._page()
+        self.summary = page.facts.model_dump()
+        write_text(self._file, page.html())
 
     def write(self, result: FrameResult) -> None:
         """Add a frame."""
@@ -163,5 +166,10 @@ class PageSink(BaseSink):
         return Player(path.name, link_to(path, self.path), bool(drawn), start)
 
 
-_INDEX = BatchTotal("index", write_index, suffix=".html")
+def _write_index(parts: Mapping[str, VideoPart], target: Path) -> None:
+    pages = [(name, part.place / PAGE_NAME, part.summary) for name, part in parts.items()]
+    write_index([(name, page, VideoFacts(**facts)) for name, page, facts in pages if facts], target)
+
+
+_INDEX = BatchTotal("index", _write_index, suffix=".html")
 PAGE = SinkKind(PageSink, what="pages", marker=PAGE_NAME, takes="videos", total=_INDEX)

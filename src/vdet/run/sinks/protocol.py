@@ -84,7 +84,12 @@ class SinkContext:
 
 
 class BaseSink:
-    """What most sinks have in common: they finish where the run ends without an error."""
+    """What most sinks have in common: they finish where the run ends without an error.
+
+    `summary` is what a batch keeps of the output in its manifest, as values for JSON.
+    """
+
+    summary: Mapping[str, Any] | None = None
 
     def __init__(self, path: Path, context: SinkContext) -> None:
         self.path = path
@@ -108,6 +113,25 @@ class BaseSink:
 
 
 @dataclass(frozen=True, slots=True)
+class VideoPart:
+    """An output of one video of a batch, from which a `BatchTotal` is made.
+
+    Attributes
+    ----------
+    path
+        The output.
+    place
+        Where it lies as seen from the folder of the total.
+    summary
+        What the sink returned as its `summary`; None if it is not known.
+    """
+
+    path: Path
+    place: Path
+    summary: Mapping[str, Any] | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class BatchTotal:
     """A file over all videos of a batch, made from the outputs of each.
 
@@ -116,14 +140,14 @@ class BatchTotal:
     name
         Its name in the folder of the batch, without suffix.
     write
-        Function that gets the outputs that are there, by the name of their video (as in the folder
-        of the batch, without suffix), and the file to write.
+        Function that gets the outputs that exist, by the name of their video (as in the folder of
+        the batch, without suffix), and the file to write.
     suffix
         Suffix of the file; None for that of the outputs.
     """
 
     name: str
-    write: Callable[[Mapping[str, Path], Path], None]
+    write: Callable[[Mapping[str, VideoPart], Path], None]
     suffix: str | None = None
 
 
@@ -228,7 +252,7 @@ def output_state(output: Output) -> tuple[int, int] | None:
     return sum(s.st_size for s in states), max((s.st_mtime_ns for s in states), default=0)
 
 
-def open_sink(output: Output, context: SinkContext) -> Sink:
+def open_sink(output: Output, context: SinkContext) -> "_NamedSink":
     """Open the sink of an output. An `OSError` of the sink becomes an `OutputError` with its path.
 
     Raises
@@ -248,10 +272,19 @@ def open_sink(output: Output, context: SinkContext) -> Sink:
 
 
 @contextmanager
-def open_sinks(outputs: Iterable[Output], context: SinkContext) -> Iterator[list[Sink]]:
+def open_sinks(outputs: Iterable[Output], context: SinkContext) -> Iterator[list["_NamedSink"]]:
     """Open the sinks of several outputs; errors as of `open_sink`."""
     with ExitStack() as stack:
         yield [stack.enter_context(open_sink(output, context)) for output in outputs]
+
+
+def of_files(join: Callable[[Mapping[str, Path], Path], None]) -> BatchTotal:
+    """Return the total `all` that a function makes from the files of all videos."""
+
+    def write(parts: Mapping[str, VideoPart], target: Path) -> None:
+        join({name: part.path for name, part in parts.items()}, target)
+
+    return BatchTotal("all", write)
 
 
 class _NamedSink:
@@ -273,6 +306,10 @@ class _NamedSink:
     def write(self, result: FrameResult) -> None:
         with output_errors(self._path):
             self._sink.write(result)
+
+    @property
+    def summary(self) -> Mapping[str, Any] | None:
+        return getattr(self._sink, "summary", None)
 
 
 def _kind_for(output: Output) -> SinkKind:
