@@ -329,6 +329,33 @@ class TestFaults:
             assert len(list(reader)) == reader.expected == 30
         assert warnings() == []
 
+    def test_an_mp4_may_begin_within_a_group_of_pictures(
+        self, tmp_path: Path, write_clip: Writer, read_number: Number, warnings: Warnings
+    ) -> None:
+        source, path = write_clip(tmp_path / "whole.mp4", **GOPS), tmp_path / "part.mp4"
+        with av.open(str(source)) as whole, av.open(str(path), "w") as part:
+            copy = part.add_stream_from_template(whole.streams.video[0])
+            for packet in [each for each in whole.demux(video=0) if each.size][4:]:
+                packet.stream = copy
+                part.mux(packet)
+        with VideoReader(path) as reader:
+            assert [read_number(frame.image) for frame in reader] == list(range(10, 60))
+            assert reader.length == 2
+        assert warnings() == []
+
+    @pytest.mark.parametrize("flags", ["", "+faststart"])
+    def test_videos_joined_byte_by_byte_are_reported(
+        self, flags: str, tmp_path: Path, write_clip: Writer, warnings: Warnings
+    ) -> None:
+        path = write_clip(tmp_path / "joined.mp4", movflags=flags)
+        path.write_bytes(path.read_bytes() * 2)
+        with VideoReader(path) as reader:
+            assert len(list(reader)) == 12
+        (warning,) = warnings()
+        assert warning == (
+            f"{path}: is 2 videos joined to one file; only the first is sure to be read whole"
+        )
+
     def test_an_mp4_without_its_index_is_refused(self, tmp_path: Path, write_clip: Writer) -> None:
         path = cut_off(write_clip(tmp_path / "cut.mp4", **GOPS), 0.3)
         with pytest.raises(VideoError, match=r"cut\.mp4: is not a video, or was cut off"):

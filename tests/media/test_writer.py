@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable, Iterable
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -228,11 +228,31 @@ class TestPlanes:
                 np.testing.assert_array_equal(planes_of(other).luma, planes_of(one).luma)
 
 
+def write_on(writer: VideoWriter, frames: Iterable[Frame]) -> None:
+    """Write frames also after an error, as where a thread has the next ones waiting."""
+    for frame in frames:
+        with suppress(OutputError):
+            writer.write(frame)
+
+
 class TestAllOrNothing:
     def test_no_frames_make_no_file(self, tmp_path: Path) -> None:
         with pytest.raises(VideoError, match=r"out\.mp4: there was no frame to write"):
             write(tmp_path / "out.mp4", [])
         assert listing(tmp_path) == []
+
+    @pytest.mark.parametrize("suffix", [".mp4", ".mov", ".mkv"])
+    def test_where_no_byte_can_be_written_the_last_call_says_so(
+        self, suffix: str, frames: list[Frame], tmp_path: Path
+    ) -> None:
+        path = tmp_path / f"out{suffix}"
+        path.symlink_to("/dev/full")
+        full = f"out{suffix}: cannot be written: No space left on device"
+        with (
+            pytest.raises(OutputError, match=full),
+            VideoWriter(path, INFO, FAST, threads=1) as writer,
+        ):
+            write_on(writer, frames)
 
 
 class TestRefusals:
