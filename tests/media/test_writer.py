@@ -13,8 +13,7 @@ import numpy as np
 import pytest
 
 import vdet
-from clips import write_clip
-from vdet.boxes import Image
+from clips import draw_frame, read_number, write_clip
 from vdet.config.schema import OutputSettings
 from vdet.errors import OutputError, VideoError
 from vdet.files import staged
@@ -24,13 +23,12 @@ from vdet.media.frame import Planes, Tags
 from vdet.media.reader import VideoReader
 from vdet.media.writer import VideoWriter, may_replace_video
 
-Draw = Callable[[int, int, int], Image]
 FAST = OutputSettings(preset="ultrafast")
 INFO = VideoInfo(Path("unused"), 160, 96, Fraction(25), Fraction(1, 12_800))
 
 
 @pytest.fixture
-def frames(draw_frame: Draw) -> list[Frame]:
+def frames() -> list[Frame]:
     """Twelve frames, the first at 7 s."""
     return [
         Frame(index, 7 + Fraction(index, 25), Picture(draw_frame(index, 160, 96)))
@@ -87,11 +85,7 @@ class TestMark:
 class TestFile:
     @pytest.mark.parametrize("suffix", [".mp4", ".mov", ".mkv", ".MP4"])
     def test_the_first_frame_is_at_second_0(
-        self,
-        suffix: str,
-        frames: list[Frame],
-        tmp_path: Path,
-        read_number: Callable[[Image], int],
+        self, suffix: str, frames: list[Frame], tmp_path: Path
     ) -> None:
         written = read(write(tmp_path / f"out{suffix}", frames))
         assert [read_number(frame.image) for frame in written] == list(range(12))
