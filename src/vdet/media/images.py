@@ -3,7 +3,8 @@
 import io
 import logging
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
@@ -193,16 +194,23 @@ def _is_cut_off(data: bytes) -> bool:
     return data.startswith(b"\xff\xd8") and data.rfind(_JPEG_END) < data.rfind(_JPEG_SCAN)
 
 
-def _open(data: bytes, path: Path) -> ImageFile:
-    """Read the header of a picture. Raises `ImageError`, which names `path`."""
+@contextmanager
+def _refusing(path: Path) -> Iterator[None]:
+    """Turn what Pillow raises into an `ImageError` that names `path`."""
     try:
-        picture = pillow.open(io.BytesIO(data), formats=_FORMATS)
-    except (pillow.DecompressionBombError, pillow.DecompressionBombWarning) as error:
-        raise ImageError(f"{path}: {_TOO_LARGE}") from error
+        yield
     except MemoryError:
         raise
-    except Exception as error:  # Pillow raises a dozen kinds on damaged data
+    except (pillow.DecompressionBombError, pillow.DecompressionBombWarning) as error:
+        raise ImageError(f"{path}: {_TOO_LARGE}") from error
+    except Exception as error:  # a dozen kinds on damaged data
         raise ImageError(f"{path}: {_NO_PICTURE}") from error
+
+
+def _open(data: bytes, path: Path) -> ImageFile:
+    """Read the header of a picture. Raises `ImageError`, which names `path`."""
+    with _refusing(path):
+        picture = pillow.open(io.BytesIO(data), formats=_FORMATS)
     if max(picture.size) > MAX_PICTURE_SIDE or math.prod(picture.size) > MAX_PICTURE_PIXELS:
         raise ImageError(f"{path}: {_TOO_LARGE}")
     return picture
@@ -220,12 +228,8 @@ def _orientation(picture: ImageFile) -> Orientation:
 def _decode(data: bytes, path: Path) -> Image:
     picture = _open(data + _JPEG_END if _is_cut_off(data) else data, path)
     turn = Orientation() if picture.format == _TURNED_BY_PILLOW else _orientation(picture)
-    try:
+    with _refusing(path):
         return upright(_to_bgr(picture, data), turn)
-    except MemoryError:
-        raise
-    except Exception as error:  # as in `_open`
-        raise ImageError(f"{path}: {_NO_PICTURE}") from error
 
 
 def _to_bgr(picture: ImageFile, data: bytes) -> Image:
