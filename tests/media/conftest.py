@@ -1,26 +1,8 @@
-"""Clips drawn in code, as fixtures."""
+"""The warnings of a run, as a fixture."""
 
 from collections.abc import Callable
-from pathlib import Path
 
 import pytest
-
-import clips
-
-
-@pytest.fixture(scope="session")
-def draw_frame() -> Callable[[int, int, int], clips.Image]:
-    return clips.draw_frame
-
-
-@pytest.fixture(scope="session")
-def read_number() -> Callable[[clips.Image], int]:
-    return clips.read_number
-
-
-@pytest.fixture(scope="session")
-def write_clip() -> Callable[..., Path]:
-    return clips.write_clip
 
 
 @pytest.fixture

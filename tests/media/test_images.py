@@ -1,8 +1,10 @@
 """Pictures: read from any common format, upright, and written whole."""
 
 import io
+import os
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import cv2
@@ -49,6 +51,23 @@ def test_16_bit_values_are_rounded() -> None:
     image = decode_image(encoded(".png", deep))
     assert image is not None
     assert image[0, :, 0].tolist() == [0, 0, 1, 254, 255, 255]
+
+
+@pytest.mark.parametrize("suffix", [".png", ".tiff"])
+@pytest.mark.parametrize("channels", [slice(0, 3), 0])
+@pytest.mark.parametrize("white", [4095, 65_535])
+def test_12_bit_values_in_16_bits_are_as_bright_as_others(
+    tmp_path: Path, suffix: str, channels: slice | int, *, white: int
+) -> None:
+    path = tmp_path / f"0001{suffix}"
+    deep = np.rint(PICTURE[..., channels] / 255 * white).astype(np.uint16)
+    deep.flat[0] = white
+    path.write_bytes(encoded(suffix, deep))
+    expected = np.rint(deep / white * 255).reshape(24, 32, -1) * np.ones(3)
+    np.testing.assert_array_equal(read_image(path), expected)
+    with VideoReader(tmp_path) as reader:
+        (frame,) = reader
+        np.testing.assert_array_equal(frame.image, expected)
 
 
 def test_a_grey_picture_has_three_equal_channels() -> None:
@@ -139,6 +158,13 @@ def test_the_error_names_a_file_that_is_no_picture(tmp_path: Path, data: bytes) 
     path.write_bytes(data)
     with pytest.raises(ImageError, match=r"broken\.png: is not a picture, or is damaged"):
         read_image(path)
+
+
+@pytest.mark.parametrize("read", [read_image, read_header])
+def test_a_pipe_is_refused_at_once(tmp_path: Path, read: Callable[[Path], object]) -> None:
+    os.mkfifo(tmp_path / "pipe.png")
+    with pytest.raises(ImageError, match=r"pipe\.png: can be read only once; write it into a file"):
+        read(tmp_path / "pipe.png")
 
 
 @pytest.mark.parametrize("name", ["picture.xyz", "picture", "picture.txt"])

@@ -1,16 +1,15 @@
 """An index that claims more samples than a file can have is refused before it costs memory."""
 
 import struct
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from clips import write_clip
 from vdet.errors import VideoError
 from vdet.media.mp4 import check_index
 from vdet.media.reader import VideoReader
 
-Writer = Callable[..., Path]
 MANY = 90_000_000
 
 
@@ -27,7 +26,7 @@ def with_claim(path: Path, count: int, size: int = 1) -> Path:
     return path
 
 
-def test_more_samples_than_bytes_are_refused(tmp_path: Path, write_clip: Writer) -> None:
+def test_more_samples_than_bytes_are_refused(tmp_path: Path) -> None:
     path = with_claim(write_clip(tmp_path / "bomb.mp4"), MANY)
     with pytest.raises(
         VideoError, match=r"bomb\.mp4: is damaged: 90,000,000 samples in \d,\d+ bytes"
@@ -54,7 +53,7 @@ def test_an_index_after_a_box_with_a_64_bit_size_is_checked(tmp_path: Path) -> N
         check_index(tmp_path / "bomb.mov")
 
 
-def test_whole_clips_pass(tmp_path: Path, write_clip: Writer) -> None:
+def test_whole_clips_pass(tmp_path: Path) -> None:
     for suffix, options in (
         ("mp4", {"sounds": ["aac"]}),
         ("mov", {"sounds": ["pcm_s16le"], "sound_seconds": 100, "count": 2}),

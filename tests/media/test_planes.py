@@ -1,26 +1,18 @@
 """Pictures as planes: which decoded ones come so, and how an image becomes planes."""
 
 import av
-import av.filter
+import cv2
 import numpy as np
+import numpy.typing as npt
 import pytest
 from av.video.reformatter import ColorRange
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from codings import CODINGS, in_any_coding
 from vdet.boxes import Image
-from vdet.media.coding import Coding
+from vdet.media.coding import Coding, Layers
 from vdet.media.frame import Planes
-
-CODINGS = [
-    Coding("bt601"),
-    Coding("bt709"),
-    Coding("bt601", full_range=True),
-    Coding("bt709", full_range=True),
-]
-NAMES = [f"{each.matrix} {'full' if each.full_range else 'limited'}" for each in CODINGS]
-each_coding = pytest.mark.parametrize("coding", CODINGS, ids=NAMES)
 
 
 def decoded(
@@ -65,7 +57,7 @@ class TestCoding:
 
 
 class TestCopy:
-    @each_coding
+    @in_any_coding
     def test_has_the_same_values_and_coding_in_memory_of_its_own(self, coding: Coding) -> None:
         original = Planes.of_image(slopes(64, 48), coding)
         copied = original.copy()
@@ -81,7 +73,7 @@ class TestCopy:
 
 
 class TestOfImage:
-    @given(st.integers(1, 70), st.integers(1, 70), st.sampled_from(CODINGS))
+    @given(st.integers(1, 70), st.integers(1, 70), st.sampled_from(list(CODINGS.values())))
     def test_sides_are_even(self, width: int, height: int, coding: Coding) -> None:
         planes = Planes.of_image(np.zeros((height, width, 3), np.uint8), coding)
         assert planes.shape == (height + height % 2, width + width % 2)
@@ -89,7 +81,7 @@ class TestOfImage:
         assert planes.coding == coding
         assert planes.is_own
 
-    @each_coding
+    @in_any_coding
     def test_an_odd_side_grows_by_its_last_row_or_column(self, coding: Coding) -> None:
         image = np.zeros((5, 7, 3), np.uint8)
         image[4:, :] = image[:, 6:] = 200
@@ -99,7 +91,7 @@ class TestOfImage:
         assert (luma[:, 7] == luma[:, 6]).all()
         assert luma[5, 7] > luma[0, 0]
 
-    @each_coding
+    @in_any_coding
     def test_a_picture_is_the_same_as_planes_and_back(self, coding: Coding) -> None:
         image = slopes(96, 64)
         difference = np.abs(Planes.of_image(image, coding).to_image().astype(int) - image)
@@ -107,7 +99,7 @@ class TestOfImage:
         assert difference.mean() < 2.5
 
 
-def exact_image(planes: Planes) -> NDArray[np.float64]:
+def exact_image(planes: Planes) -> npt.NDArray[np.float64]:
     """Return what ITU-R BT.601 or BT.709 say of planes, BGR from 0 to 255, not rounded."""
     of_red, of_blue = (0.2126, 0.0722) if planes.coding.matrix == "bt709" else (0.299, 0.114)
     base, luma_steps, chroma_steps = (0, 255, 255) if planes.coding.full_range else (16, 219, 224)
@@ -137,7 +129,7 @@ def blocks_of_any_colour(width: int, height: int, coding: Coding) -> Planes:
 
 
 class TestToImage:
-    @each_coding
+    @in_any_coding
     @pytest.mark.parametrize("size", [(64, 48), (33, 48), (64, 47), (7, 5)])
     def test_is_what_the_standard_says(self, coding: Coding, size: tuple[int, int]) -> None:
         width, height = size
@@ -148,3 +140,65 @@ class TestToImage:
         differences = np.abs(image - exact_image(planes))
         assert differences.max() < 3.5
         assert differences.mean() < 1
+
+
+# `Coding.to_common`: planes of all codings have the values that the models were trained with.
+
+
+def common(image: Image, coding: Coding) -> Layers:
+    return coding.to_common(Planes.of_image(image, coding).layers)
+
+
+def apart(ours: Layers, other: Layers) -> list[npt.NDArray[np.int64]]:
+    """Return how many levels each value of luma, blue and red differs."""
+    return [np.abs(a.astype(np.int64) - b) for a, b in zip(ours, other, strict=True)]
+
+
+def squares() -> Image:
+    """Return an image of 16 × 24 squares of 16 pixels, each of one colour."""
+    colours = np.random.default_rng(0).integers(0, 256, (16, 24, 3), dtype=np.uint8)
+    return colours.repeat(16, 0).repeat(16, 1)
+
+
+def middles(layers: Layers) -> Layers:
+    """Return a value of each of the squares, away from their edges."""
+    luma, blue, red = layers
+    return luma[8::16, 8::16], blue[4::8, 4::8], red[4::8, 4::8]
+
+
+@in_any_coding
+def test_colours_become_those_of_opencv(coding: Coding) -> None:
+    image = squares()
+    luma, red, blue = cv2.split(cv2.cvtColor(image[8::16, 8::16], cv2.COLOR_BGR2YCrCb))
+    expected = tuple(np.asarray(each, np.uint8) for each in (luma, blue, red))
+    for each in apart(middles(common(image, coding)), (expected[0], expected[1], expected[2])):
+        assert each.max() <= 2
+        assert each.mean() < 1
+
+
+@in_any_coding
+@pytest.mark.parametrize(("height", "width"), [(48, 64), (47, 64), (48, 63), (47, 63)])
+def test_chroma_may_have_half_the_size_or_that_of_luma(
+    coding: Coding, height: int, width: int
+) -> None:
+    whole_luma, *chroma = Planes.of_image(squares()[4:60, 4:76], coding).layers
+    luma = whole_luma[:height, :width]
+    blue, red = (each[: -(-height // 2), : -(-width // 2)] for each in chroma)
+    half = coding.to_common((luma, blue, red))
+    blue, red = (each.repeat(2, 0).repeat(2, 1)[:height, :width] for each in (blue, red))
+    whole = coding.to_common((luma, blue, red))
+    np.testing.assert_array_equal(half[0], whole[0])
+    for ours, other in zip(half[1:], whole[1:], strict=True):
+        np.testing.assert_array_equal(ours.repeat(2, 0).repeat(2, 1)[:height, :width], other)
+
+
+@in_any_coding
+def test_grey_is_grey_from_black_to_white(coding: Coding) -> None:
+    black, white = (0, 255) if coding.full_range else (16, 235)
+    steps = np.arange(black, white + 1)
+    luma = steps.astype(np.uint8)[np.newaxis]
+    grey = np.full_like(luma, 128)
+    ours, blue, red = coding.to_common((luma, grey, grey))
+    np.testing.assert_allclose(ours[0], (steps - black) * 255 / (white - black), atol=0.5)
+    assert (blue == 128).all()
+    assert (red == 128).all()

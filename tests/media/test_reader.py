@@ -14,6 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from clips import read_number, write_clip
 from vdet.config.schema import InputSettings
 from vdet.errors import VideoError
 from vdet.media import Frame
@@ -23,10 +24,8 @@ from vdet.media.images import Orientation
 from vdet.media.reader import VideoReader, next_time
 
 Image = NDArray[np.uint8]
-Number = Callable[[Image], int]
-Writer = Callable[..., Path]
 Warnings = Callable[[], list[str]]
-GOPS = {"options": {"g": "10", "bf": "2"}, "count": 60}
+GOPS: dict[str, Any] = {"options": {"g": "10", "bf": "2"}, "count": 60}
 DAMAGED: dict[str, dict[str, Any]] = {
     "mp4": {"movflags": "+faststart"},
     "webm": {"codec": "libvpx-vp9", "options": {"deadline": "realtime", "g": "10"}},
@@ -94,14 +93,7 @@ class TestRange:
     )
     @pytest.mark.parametrize("suffix", ["mp4", "ts"])
     def test_frames_from_start_to_before_end(
-        self,
-        limits: dict[str, Any],
-        expected: range,
-        suffix: str,
-        *,
-        tmp_path: Path,
-        write_clip: Writer,
-        read_number: Number,
+        self, limits: dict[str, Any], expected: range, suffix: str, *, tmp_path: Path
     ) -> None:
         path = write_clip(tmp_path / f"clip.{suffix}")  # the first frame of a .ts is not at 0
         with VideoReader(path, **limits) as reader:
@@ -129,9 +121,7 @@ FLIP = np.array([[-1, 0], [0, 1]])
 
 @pytest.mark.parametrize("turns", range(4))
 @pytest.mark.parametrize("mirrored", [False, True])
-def test_all_eight_orientations_are_upright(
-    turns: int, mirrored: bool, tmp_path: Path, write_clip: Writer
-) -> None:
+def test_all_eight_orientations_are_upright(turns: int, mirrored: bool, tmp_path: Path) -> None:
     path = write_clip(tmp_path / "clip.mp4", count=1)
     with VideoReader(path) as reader:
         stored = next(iter(reader)).image
@@ -145,9 +135,7 @@ def test_all_eight_orientations_are_upright(
     np.testing.assert_array_equal(image, expected)
 
 
-def test_other_video_streams_are_reported(
-    tmp_path: Path, write_clip: Writer, read_number: Number, warnings: Warnings
-) -> None:
+def test_other_video_streams_are_reported(tmp_path: Path, warnings: Warnings) -> None:
     source, path = write_clip(tmp_path / "front.mp4"), tmp_path / "both.mp4"
     with av.open(str(source)) as front, av.open(str(path), "w") as target:
         copies = [target.add_stream_from_template(front.streams.video[0]) for _ in range(2)]
@@ -230,7 +218,7 @@ class TestPlanes:
     @pytest.mark.parametrize("kind", PLANAR)
     @pytest.mark.parametrize("start", [None, Fraction(5, 25)])
     def test_are_those_of_the_decoder(
-        self, kind: str, start: Fraction | None, *, tmp_path: Path, write_clip: Writer
+        self, kind: str, start: Fraction | None, *, tmp_path: Path
     ) -> None:
         suffix, spec, coding = PLANAR[kind]
         path = write_clip(tmp_path / f"clip.{suffix}", **spec)
@@ -254,7 +242,7 @@ class TestPlanes:
             assert np.abs(frame.image - other).mean() < 3
 
 
-def test_info_is_what_the_file_declares(tmp_path: Path, write_clip: Writer) -> None:
+def test_info_is_what_the_file_declares(tmp_path: Path) -> None:
     rate = Fraction(30_000, 1001)
     path = write_clip(tmp_path / "a.mp4", rate=rate, matrix=1, sounds=["aac"])
     with VideoReader(path) as reader:
@@ -269,30 +257,18 @@ def test_info_is_what_the_file_declares(tmp_path: Path, write_clip: Writer) -> N
 
 class TestFaults:
     @pytest.mark.parametrize(
-        ("suffix", "options"),
-        [
-            ("mkv", {}),
-            ("mp4", {"movflags": "+faststart"}),
-            ("mp4", {"movflags": "+frag_keyframe+empty_moov"}),
-            ("ts", {}),
-        ],
+        ("suffix", "flags"),
+        [("mkv", ""), ("mp4", "+faststart"), ("mp4", "+frag_keyframe+empty_moov"), ("ts", "")],
     )
     def test_a_clip_cut_off_gives_the_frames_before_the_cut(
-        self,
-        suffix: str,
-        options: dict[str, str],
-        *,
-        tmp_path: Path,
-        write_clip: Writer,
-        read_number: Number,
-        warnings: Warnings,
+        self, suffix: str, flags: str, *, tmp_path: Path, warnings: Warnings
     ) -> None:
-        path = cut_off(write_clip(tmp_path / f"cut.{suffix}", **GOPS, **options), 0.6)
+        path = cut_off(write_clip(tmp_path / f"cut.{suffix}", **GOPS, movflags=flags), 0.6)
         with VideoReader(path) as reader:
             numbers = [read_number(frame.image) for frame in reader]
         assert numbers[:20] == list(range(20))
         assert numbers == sorted(set(numbers))  # B-frames just before the cut may be missing
-        if suffix == "mkv" or options.get("movflags") == "+faststart":  # these declare their length
+        if suffix == "mkv" or flags == "+faststart":  # these declare their length
             (warning,) = warnings()
             assert warning.startswith(f"{path}: ")
             assert f"ends early: {len(numbers)} of 60 frames could be read" in warning
@@ -302,9 +278,13 @@ class TestFaults:
     @pytest.mark.parametrize("share", [0.3, 0.6, 0.9])
     @pytest.mark.parametrize("suffix", ["mkv", "ts"])
     def test_a_file_that_was_cut_through_a_frame_gives_the_frames_before_it(
-        self, suffix: str, share: float, *, tmp_path: Path, write_clip: Writer, warnings: Warnings
+        self, suffix: str, share: float, *, tmp_path: Path, warnings: Warnings
     ) -> None:
-        large = {"codec": "mpeg2video", "size": (320, 192), "options": {"qscale": "2", "g": "1"}}
+        large: dict[str, Any] = {
+            "codec": "mpeg2video",
+            "size": (320, 192),
+            "options": {"qscale": "2", "g": "1"},
+        }
         path = write_clip(tmp_path / f"cut.{suffix}", count=40, **large)
         with VideoReader(cut_off(path, share)) as reader:
             assert abs(len(list(reader)) - 40 * share) < 3
@@ -321,22 +301,47 @@ class TestFaults:
             assert reader.damaged == 0
         assert warnings() == []
 
-    def test_a_late_first_frame_is_no_early_end(
-        self, tmp_path: Path, write_clip: Writer, warnings: Warnings
-    ) -> None:
-        late = {"codec": "wmv2", "begin": Fraction(10), "count": 30}
+    def test_a_late_first_frame_is_no_early_end(self, tmp_path: Path, warnings: Warnings) -> None:
+        late: dict[str, Any] = {"codec": "wmv2", "begin": Fraction(10), "count": 30}
         with VideoReader(write_clip(tmp_path / "late.wmv", **late)) as reader:
             assert len(list(reader)) == reader.expected == 30
         assert warnings() == []
 
-    def test_an_mp4_without_its_index_is_refused(self, tmp_path: Path, write_clip: Writer) -> None:
+    def test_an_mp4_may_begin_within_a_group_of_pictures(
+        self, tmp_path: Path, warnings: Warnings
+    ) -> None:
+        source, path = write_clip(tmp_path / "whole.mp4", **GOPS), tmp_path / "part.mp4"
+        with av.open(str(source)) as whole, av.open(str(path), "w") as part:
+            copy = part.add_stream_from_template(whole.streams.video[0])
+            for packet in [each for each in whole.demux(video=0) if each.size][4:]:
+                packet.stream = copy
+                part.mux(packet)
+        with VideoReader(path) as reader:
+            assert [read_number(frame.image) for frame in reader] == list(range(10, 60))
+            assert reader.length == 2
+        assert warnings() == []
+
+    @pytest.mark.parametrize("flags", ["", "+faststart"])
+    def test_videos_joined_byte_by_byte_are_reported(
+        self, flags: str, tmp_path: Path, warnings: Warnings
+    ) -> None:
+        path = write_clip(tmp_path / "joined.mp4", movflags=flags)
+        path.write_bytes(path.read_bytes() * 2)
+        with VideoReader(path) as reader:
+            assert len(list(reader)) == 12
+        (warning,) = warnings()
+        assert warning == (
+            f"{path}: is 2 videos joined to one file; only the first is sure to be read whole"
+        )
+
+    def test_an_mp4_without_its_index_is_refused(self, tmp_path: Path) -> None:
         path = cut_off(write_clip(tmp_path / "cut.mp4", **GOPS), 0.3)
         with pytest.raises(VideoError, match=r"cut\.mp4: is not a video, or was cut off"):
             VideoReader(path)
 
     @pytest.mark.parametrize("kind", DAMAGED)
     def test_damage_is_counted_and_every_run_gives_the_same_frames(
-        self, kind: str, tmp_path: Path, write_clip: Writer, warnings: Warnings
+        self, kind: str, tmp_path: Path, warnings: Warnings
     ) -> None:
         path = write_clip(tmp_path / f"damaged.{kind}", **(GOPS | DAMAGED[kind]))
         overwrite(path, 4 if kind == "mp4" else 2)
@@ -352,7 +357,7 @@ class TestFaults:
 
 
 def test_pixels_that_cannot_be_converted_are_one_error(
-    tmp_path: Path, write_clip: Writer, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(*_: object) -> Image:
         raise av.error.InvalidDataError(1, "no such conversion")

@@ -7,16 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import av
-import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from clips import read_number, write_clip
 from vdet.config.schema import OutputSettings
 from vdet.media.reader import VideoReader
 from vdet.media.writer import VideoWriter
 
-Number = Callable[[NDArray[np.uint8]], int]
-Writer = Callable[..., Path]
 Warnings = Callable[[], list[str]]
 KINDS: dict[str, dict[str, Any]] = {
     "ts": {"codec": "libx264", "sounds": ["aac"], "options": {"g": "10", "bf": "2"}},
@@ -32,7 +29,7 @@ def join(path: Path, *parts: Path) -> Path:
     return path
 
 
-def copy(source: Path, read_number: Number) -> tuple[list[int], list[Fraction], Path]:
+def copy(source: Path) -> tuple[list[int], list[Fraction], Path]:
     """Copy a clip; return the numbers of its frames, their times, and the copy."""
     target = source.with_name("copy.mkv")
     with (
@@ -54,7 +51,7 @@ def sound(path: Path) -> list[tuple[Fraction, bytes]]:
     return [((each.pts or 0) * each.time_base, bytes(each)[header:]) for each in found]
 
 
-def part(folder: Path, write_clip: Writer, kind: str, begin: int = 0) -> Path:
+def part(folder: Path, kind: str, begin: int = 0) -> Path:
     name = f"{begin}.{kind}"
     return write_clip(folder / name, count=COUNT, begin=Fraction(begin), **KINDS[kind])
 
@@ -69,17 +66,11 @@ def part(folder: Path, write_clip: Writer, kind: str, begin: int = 0) -> Path:
     ],
 )
 def test_all_frames_and_all_sound_follow_one_another(
-    kind: str,
-    begins: list[int],
-    *,
-    tmp_path: Path,
-    write_clip: Writer,
-    read_number: Number,
-    warnings: Warnings,
+    kind: str, begins: list[int], *, tmp_path: Path, warnings: Warnings
 ) -> None:
-    parts = [part(tmp_path, write_clip, kind, begin) for begin in begins]
+    parts = [part(tmp_path, kind, begin) for begin in begins]
     source = join(tmp_path / f"joined.{kind}", *parts)
-    numbers, times, target = copy(source, read_number)
+    numbers, times, target = copy(source)
     assert numbers == list(range(COUNT)) * len(parts)
     steps = [later - earlier for earlier, later in pairwise(times)]
     within = [step for number, step in enumerate(steps, start=1) if number % COUNT]
@@ -98,11 +89,9 @@ def test_all_frames_and_all_sound_follow_one_another(
     assert warnings() == [f"{source}: its clock restarts {often}; the parts follow one another"]
 
 
-def test_picture_and_sound_of_each_part_stay_in_step(
-    tmp_path: Path, write_clip: Writer, read_number: Number
-) -> None:
-    clip = part(tmp_path, write_clip, "ts")
-    _, times, target = copy(join(tmp_path / "joined.ts", clip, clip), read_number)
+def test_picture_and_sound_of_each_part_stay_in_step(tmp_path: Path) -> None:
+    clip = part(tmp_path, "ts")
+    _, times, target = copy(join(tmp_path / "joined.ts", clip, clip))
     alone = sound(clip)
     with VideoReader(clip) as reader:
         lead = alone[0][0] - reader.info.start
@@ -111,25 +100,25 @@ def test_picture_and_sound_of_each_part_stay_in_step(
 
 
 def test_a_pause_of_the_pictures_is_kept_while_the_sound_goes_on(
-    tmp_path: Path, write_clip: Writer, read_number: Number, warnings: Warnings
+    tmp_path: Path, warnings: Warnings
 ) -> None:
     times = [Fraction(index, 25) + (12 if index >= 20 else 0) for index in range(COUNT)]
     clip = write_clip(tmp_path / "pause.ts", times=times, **KINDS["ts"])
-    numbers, found, _ = copy(clip, read_number)
+    numbers, found, _ = copy(clip)
     assert numbers == list(range(COUNT))
     assert found == times
     assert not any("clock" in warning for warning in warnings())
 
 
 def test_sound_without_times_of_its_own_is_left_out_with_a_warning(
-    tmp_path: Path, write_clip: Writer, read_number: Number, warnings: Warnings
+    tmp_path: Path, warnings: Warnings
 ) -> None:
-    clip = part(tmp_path, write_clip, "ts")
+    clip = part(tmp_path, "ts")
     data = clip.read_bytes()
     cells = [data[first : first + 188] for first in range(0, len(data), 188)]
     heard = [cell for cell in cells if int.from_bytes(cell[1:3]) & 0x1FFF == 0x101]
     repeated = tmp_path / "repeated.ts"
     repeated.write_bytes(data + b"".join(heard[-9:]))  # the last sound once more
-    copy(repeated, read_number)
+    copy(repeated)
     (warning,) = warnings()
     assert "sound packets left out: damaged, or without a time of their own" in warning

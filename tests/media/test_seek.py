@@ -1,6 +1,5 @@
 """A part of a video has the frames of the whole, wherever decoding begins."""
 
-from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -8,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from clips import write_clip
 from vdet.media import Frame
 from vdet.media.decoder import Decoder
 from vdet.media.reader import VideoReader
 
-Writer = Callable[..., Path]
 GOPS: dict[str, Any] = {"options": {"g": "10", "bf": "2"}, "count": 60}
 OPEN = {"g": "10", "bf": "2", "x264-params": "open-gop=1"}
 FRAGMENTS = {"movflags": "+frag_keyframe+empty_moov"}
@@ -36,10 +35,7 @@ NOT_SURE: dict[str, tuple[str, dict[str, Any]]] = {
     "no times": ("h264", {}),
     "avi": ("avi", {}),
     "hidden frames": ("webm", {"codec": "libvpx", "options": {"auto-alt-ref": "1", "g": "10"}}),
-    "interlaced": (
-        "mp4",
-        {"options": {"g": "10", "flags": "+ildct+ilme", "x264-params": "tff=1"}},
-    ),
+    "interlaced": ("mp4", {"options": {"g": "10", "flags": "+ildct+ilme", "x264-params": "tff=1"}}),
 }
 
 
@@ -72,7 +68,7 @@ def assert_part(part: list[Frame], whole: list[Frame], start: Fraction) -> None:
 
 @pytest.mark.parametrize("name", CLIPS)
 def test_a_part_is_that_of_the_whole_and_the_frames_before_are_not_decoded(
-    name: str, tmp_path: Path, write_clip: Writer, decoded: list[None]
+    name: str, tmp_path: Path, decoded: list[None]
 ) -> None:
     suffix, spec = CLIPS[name]
     path = write_clip(tmp_path / f"clip.{suffix}", **GOPS | spec)
@@ -86,7 +82,7 @@ def test_a_part_is_that_of_the_whole_and_the_frames_before_are_not_decoded(
 
 @pytest.mark.parametrize("name", NOT_SURE)
 def test_where_frames_cannot_be_counted_all_are_decoded(
-    name: str, tmp_path: Path, write_clip: Writer, decoded: list[None]
+    name: str, tmp_path: Path, decoded: list[None]
 ) -> None:
     suffix, spec = NOT_SURE[name]
     path = write_clip(tmp_path / f"clip.{suffix}", **GOPS | spec)
@@ -97,9 +93,7 @@ def test_where_frames_cannot_be_counted_all_are_decoded(
     assert len(decoded) >= 60
 
 
-def test_a_start_after_a_clock_that_restarts(
-    tmp_path: Path, write_clip: Writer, decoded: list[None]
-) -> None:
+def test_a_start_after_a_clock_that_restarts(tmp_path: Path, decoded: list[None]) -> None:
     clip = write_clip(tmp_path / "clip.ts", sounds=["aac"], **GOPS)
     path = tmp_path / "joined.ts"
     path.write_bytes(clip.read_bytes() * 2)
@@ -110,9 +104,7 @@ def test_a_start_after_a_clock_that_restarts(
 
 
 @pytest.mark.parametrize("suffix", ["mp4", "mkv"])
-def test_a_start_beyond_the_end_gives_no_frame_and_the_length(
-    suffix: str, tmp_path: Path, write_clip: Writer
-) -> None:
+def test_a_start_beyond_the_end_gives_no_frame_and_the_length(suffix: str, tmp_path: Path) -> None:
     path = write_clip(tmp_path / f"clip.{suffix}", **GOPS)
     with VideoReader(path, start=Fraction(10**13)) as reader:
         assert list(reader) == []

@@ -10,11 +10,11 @@ import av
 import numpy as np
 import pytest
 
+from clips import write_clip
 from vdet.config.schema import OutputSettings
 from vdet.media.reader import VideoReader
 from vdet.media.writer import VideoWriter
 
-Writer = Callable[..., Path]
 Warnings = Callable[[], list[str]]
 Sound = list[tuple[Fraction, bytes]]
 FAST = OutputSettings(preset="ultrafast")
@@ -56,7 +56,7 @@ def assert_same(sound: Sound, original: Sound) -> None:
     ("codec", "suffix"), [("aac", "mp4"), ("ac3", "mov"), ("aac", "mkv"), ("libmp3lame", "mkv")]
 )
 def test_sound_is_copied_bit_for_bit(
-    codec: str, suffix: str, tmp_path: Path, write_clip: Writer, warnings: Warnings
+    codec: str, suffix: str, tmp_path: Path, warnings: Warnings
 ) -> None:
     source = write_clip(tmp_path / "in.mp4", sounds=[codec], sound_seconds=1)
     written = sound(copy(source, tmp_path / f"out.{suffix}"))
@@ -66,7 +66,7 @@ def test_sound_is_copied_bit_for_bit(
     assert warnings() == []
 
 
-def test_every_sound_stream_is_copied_with_its_language(tmp_path: Path, write_clip: Writer) -> None:
+def test_every_sound_stream_is_copied_with_its_language(tmp_path: Path) -> None:
     source = write_clip(tmp_path / "in.mkv", sounds=["aac", "libmp3lame"])
     with av.open(str(source)) as original, av.open(str(tmp_path / "tagged.mkv"), "w") as tagged:
         streams = {s.index: tagged.add_stream_from_template(s) for s in original.streams}
@@ -83,7 +83,7 @@ def test_every_sound_stream_is_copied_with_its_language(tmp_path: Path, write_cl
         assert [stream.language for stream in container.streams.audio] == [None, "fra"]
 
 
-def test_a_part_has_the_sound_of_that_part(tmp_path: Path, write_clip: Writer) -> None:
+def test_a_part_has_the_sound_of_that_part(tmp_path: Path) -> None:
     source = write_clip(tmp_path / "in.mp4", sounds=["aac"], count=40)
     target = copy(source, tmp_path / "out.mp4", first=10, last=30, whole=False)
     begin, end = Fraction(10, 25), Fraction(30, 25)
@@ -95,9 +95,7 @@ def test_a_part_has_the_sound_of_that_part(tmp_path: Path, write_clip: Writer) -
     assert_same(sound(target), expected)
 
 
-def test_damaged_sound_does_not_affect_the_picture(
-    tmp_path: Path, write_clip: Writer, warnings: Warnings
-) -> None:
+def test_damaged_sound_does_not_affect_the_picture(tmp_path: Path, warnings: Warnings) -> None:
     source = write_clip(tmp_path / "in.ts", sounds=["aac"], count=50)
     data = bytearray(source.read_bytes())
     rng = np.random.default_rng(0)
@@ -115,9 +113,7 @@ def test_damaged_sound_does_not_affect_the_picture(
     assert sound(target)
 
 
-def test_the_sound_of_a_pipe_is_left_out_with_a_warning(
-    tmp_path: Path, write_clip: Writer, warnings: Warnings
-) -> None:
+def test_the_sound_of_a_pipe_is_left_out_with_a_warning(tmp_path: Path, warnings: Warnings) -> None:
     source, pipe = write_clip(tmp_path / "in.ts", sounds=["aac"]), tmp_path / "pipe.ts"
     os.mkfifo(pipe)
     feeder = threading.Thread(target=lambda: pipe.write_bytes(source.read_bytes()))

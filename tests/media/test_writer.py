@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable, Iterable
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -13,8 +13,7 @@ import numpy as np
 import pytest
 
 import vdet
-from clips import write_clip
-from vdet.boxes import Image
+from clips import draw_frame, read_number, write_clip
 from vdet.config.schema import OutputSettings
 from vdet.errors import OutputError, VideoError
 from vdet.files import staged
@@ -24,13 +23,12 @@ from vdet.media.frame import Planes, Tags
 from vdet.media.reader import VideoReader
 from vdet.media.writer import VideoWriter, may_replace_video
 
-Draw = Callable[[int, int, int], Image]
 FAST = OutputSettings(preset="ultrafast")
 INFO = VideoInfo(Path("unused"), 160, 96, Fraction(25), Fraction(1, 12_800))
 
 
 @pytest.fixture
-def frames(draw_frame: Draw) -> list[Frame]:
+def frames() -> list[Frame]:
     """Twelve frames, the first at 7 s."""
     return [
         Frame(index, 7 + Fraction(index, 25), Picture(draw_frame(index, 160, 96)))
@@ -87,11 +85,7 @@ class TestMark:
 class TestFile:
     @pytest.mark.parametrize("suffix", [".mp4", ".mov", ".mkv", ".MP4"])
     def test_the_first_frame_is_at_second_0(
-        self,
-        suffix: str,
-        frames: list[Frame],
-        tmp_path: Path,
-        read_number: Callable[[Image], int],
+        self, suffix: str, frames: list[Frame], tmp_path: Path
     ) -> None:
         written = read(write(tmp_path / f"out{suffix}", frames))
         assert [read_number(frame.image) for frame in written] == list(range(12))
@@ -228,11 +222,31 @@ class TestPlanes:
                 np.testing.assert_array_equal(planes_of(other).luma, planes_of(one).luma)
 
 
+def write_on(writer: VideoWriter, frames: Iterable[Frame]) -> None:
+    """Write frames also after an error, as where a thread has the next ones waiting."""
+    for frame in frames:
+        with suppress(OutputError):
+            writer.write(frame)
+
+
 class TestAllOrNothing:
     def test_no_frames_make_no_file(self, tmp_path: Path) -> None:
         with pytest.raises(VideoError, match=r"out\.mp4: there was no frame to write"):
             write(tmp_path / "out.mp4", [])
         assert listing(tmp_path) == []
+
+    @pytest.mark.parametrize("suffix", [".mp4", ".mov", ".mkv"])
+    def test_where_no_byte_can_be_written_the_last_call_says_so(
+        self, suffix: str, frames: list[Frame], tmp_path: Path
+    ) -> None:
+        path = tmp_path / f"out{suffix}"
+        path.symlink_to("/dev/full")
+        full = f"out{suffix}: cannot be written: No space left on device"
+        with (
+            pytest.raises(OutputError, match=full),
+            VideoWriter(path, INFO, FAST, threads=1) as writer,
+        ):
+            write_on(writer, frames)
 
 
 class TestRefusals:

@@ -103,7 +103,8 @@ class ClockUnwrapper:
             return number
         begin = ticks * packet.time_base
         if not self._parts[number].goes_on(stream, begin):
-            number = self._part_of[stream] = newest + (number >= newest)
+            # A stream follows the pictures, or comes to the part after theirs, and not further.
+            number = self._part_of[stream] = newest if number < newest else newest + 1
             if number == len(self._parts):
                 self._parts.append(_Part())
         duration = packet.duration or (self._period if stream == self._pictures else 0)

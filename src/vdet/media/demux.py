@@ -190,7 +190,9 @@ def describe(
     time_base = _time_base(stream)
     rate = _first_sensible(stream.average_rate, stream.guessed_rate)
     start = (first.pts or 0) * time_base
-    duration = stated_duration(stream, start) or _longest(container)
+    # The longest stream may be longer than the picture.
+    longest = Fraction(container.duration, av.time_base) if container.duration else None
+    duration = stated_duration(stream, start) or longest
     turn = _orientation(path, first)
     is_hdr = first.color_trc in HDR_TRANSFERS
     colors = ColorTags(first.color_primaries, first.color_trc, first.colorspace)
@@ -233,20 +235,18 @@ def stated_duration(stream: VideoStream, start: Fraction) -> Fraction | None:
     may be hidden before it. Matroska, in a tag, and ASF declare the time of the end.
     """
     form, unit = stream.container.format.name, _time_base(stream)
+    if stream.duration and form == "asf":
+        return stream.duration * unit - start
+    if stream.duration and form.startswith("mov"):
+        return ((stream.start_time or 0) + stream.duration) * unit - start
     if stream.duration:
-        hidden = (stream.start_time or 0) * unit - start if form.startswith("mov") else 0
-        return stream.duration * unit + (-start if form == "asf" else hidden)
+        return stream.duration * unit
     try:
         hours, minutes, seconds = stream.metadata["DURATION"].split(":")
         end = Fraction(hours) * 3600 + Fraction(minutes) * 60 + Fraction(seconds)
     except (KeyError, ValueError, ZeroDivisionError):
         return None
     return end - start if end > start else None
-
-
-def _longest(container: InputContainer) -> Fraction | None:
-    """Return the duration of the longest stream, seconds; that of the picture may be shorter."""
-    return Fraction(container.duration, av.time_base) if container.duration else None
 
 
 def period_of(stream: VideoStream) -> Fraction:

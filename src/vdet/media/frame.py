@@ -11,7 +11,7 @@ import numpy as np
 
 from vdet.boxes import Image
 from vdet.media.coding import Coding, Layers
-from vdet.media.images import Orientation, split_channels
+from vdet.media.images import Orientation, from_16_bits, split_channels
 
 if TYPE_CHECKING:
     import av
@@ -145,13 +145,20 @@ class Picture:
         return self.pixels.to_image() if isinstance(self.pixels, Planes) else self.pixels
 
 
+_16_BITS = ("gray16", "ya16", "rgb48", "rgba64")
+"""Beginnings of the names of formats of 16-bit pictures, as in PNG and TIFF."""
+
+
 def bgr_of(picture: "av.VideoFrame") -> Image:
     """Return a decoded picture as BGR uint8 `(H, W, 3)`.
 
-    Colour matrix and range are those of its tags; without tags, BT.601 and limited.
+    Colour matrix and range are those of its tags; without tags, BT.601 and limited. For 16-bit
+    values see `from_16_bits`.
     """
     if coding := Coding.of(picture):
         return Planes(picture, coding).to_image()
+    if picture.format.name.startswith(_16_BITS):
+        return from_16_bits(picture.to_ndarray(format="bgr48le", threads=1).astype(np.uint16))
     image = np.asarray(picture.to_ndarray(format="bgr24", threads=1), np.uint8)
     return image.copy() if picture.format.name == "bgr24" else np.ascontiguousarray(image)
 

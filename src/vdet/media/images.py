@@ -3,7 +3,8 @@
 import io
 import logging
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
@@ -11,6 +12,8 @@ from typing import TYPE_CHECKING, cast
 import cv2
 import numpy as np
 import numpy.typing as npt
+from PIL import Image as pillow  # noqa: N813
+from PIL.ImageFile import ImageFile
 
 from vdet.boxes import Image
 from vdet.errors import ImageError
@@ -18,7 +21,6 @@ from vdet.files import read_whole, staged
 
 if TYPE_CHECKING:
     import av
-    from PIL.Image import Image as PillowImage
 
 MAX_PICTURE_PIXELS = 2**25
 """A picture of more pixels is not read: an 8K frame has fewer, a decompression bomb far more."""
@@ -33,8 +35,9 @@ _TOO_LARGE = (
     f"has more than {MAX_PICTURE_PIXELS:,} pixels, or a side of more than {MAX_PICTURE_SIDE:,}; "
     "make it smaller"
 )
-_WHITE = {"I;16": 65_535, "I;16B": 65_535, "F": 1}
-"""The value of white in Pillow's modes of grey with more than 8 bits."""
+_12_BITS, _16_BITS = 4095, 65_535
+"""The values of white."""
+_ALL_BITS = cv2.IMREAD_COLOR | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
 _JPEG_SCAN, _JPEG_END = b"\xff\xda", b"\xff\xd9"  # markers, ITU-T T.81, annex B
 _TURNED_BY_PILLOW = "TIFF"
 _ORIENTATION = 274  # EXIF tag
@@ -106,16 +109,16 @@ def read_image(path: Path) -> Image:
     Returns
     -------
     BGR uint8 of shape `(H, W, 3)`. Grey becomes three equal channels, 16-bit values are scaled to
-    8 bits, an alpha channel is dropped.
+    8 bits (see `from_16_bits`), an alpha channel is dropped.
 
     Raises
     ------
     ImageError
-        The file cannot be read, is not a PNG, JPEG, BMP, TIFF or WebP picture, or is larger than
-        `MAX_BYTES`; the picture has more than `MAX_PICTURE_PIXELS`, or a side longer than
-        `MAX_PICTURE_SIDE`.
+        The file cannot be read, is a pipe, is not a PNG, JPEG, BMP, TIFF or WebP picture, or is
+        larger than `MAX_BYTES`; the picture has more than `MAX_PICTURE_PIXELS`, or a side longer
+        than `MAX_PICTURE_SIDE`.
     """
-    data = read_whole(path, most=MAX_BYTES, what="picture", error=ImageError)
+    data = _read(path)
     image = _decode(data, path)
     if _is_cut_off(data):
         log.warning("%s: was cut off, and is read as far as it goes", path)
@@ -137,7 +140,7 @@ def read_header(path: Path) -> tuple[tuple[int, int], Orientation]:
     ImageError
         As `read_image`.
     """
-    picture = _open(read_whole(path, most=MAX_BYTES, what="picture", error=ImageError), path)
+    picture = _open(_read(path), path)
     width, height = picture.size
     turn = _orientation(picture)
     if turn.is_sideways and picture.format != _TURNED_BY_PILLOW:
@@ -171,34 +174,52 @@ def write_image(path: Path, image: Image, *, overwrite: bool = False) -> None:
         temporary.write_bytes(data)
 
 
+def from_16_bits(values: npt.NDArray[np.uint16]) -> Image:
+    """Scale 16-bit values to 8 bits.
+
+    Where none is above 4095, they are those of a camera with 12 bits, whose white is 4095.
+    """
+    white = _12_BITS if values.max(initial=0) <= _12_BITS else _16_BITS
+    return np.asarray(cv2.convertScaleAbs(values, alpha=255 / white), np.uint8)
+
+
+def _read(path: Path) -> bytes:
+    if path.is_fifo():  # it may never end, or never begin
+        raise ImageError(f"{path}: can be read only once; write it into a file first")
+    return read_whole(path, most=MAX_BYTES, what="picture", error=ImageError)
+
+
 def _is_cut_off(data: bytes) -> bool:
     """Return whether a JPEG file ends within its picture. It may hold others, as thumbnails."""
     return data.startswith(b"\xff\xd8") and data.rfind(_JPEG_END) < data.rfind(_JPEG_SCAN)
 
 
-def _open(data: bytes, path: Path) -> "PillowImage":
-    """Read the header of a picture. Raises `ImageError`, which names `path`."""
-    from PIL import Image as pillow  # noqa: N813
-
+@contextmanager
+def _refusing(path: Path) -> Iterator[None]:
+    """Turn what Pillow raises into an `ImageError` that names `path`."""
     try:
-        picture = pillow.open(io.BytesIO(data), formats=_FORMATS)
-    except (pillow.DecompressionBombError, pillow.DecompressionBombWarning) as error:
-        raise ImageError(f"{path}: {_TOO_LARGE}") from error
+        yield
     except MemoryError:
         raise
-    except Exception as error:  # Pillow raises a dozen kinds on damaged data
+    except (pillow.DecompressionBombError, pillow.DecompressionBombWarning) as error:
+        raise ImageError(f"{path}: {_TOO_LARGE}") from error
+    except Exception as error:  # a dozen kinds on damaged data
         raise ImageError(f"{path}: {_NO_PICTURE}") from error
+
+
+def _open(data: bytes, path: Path) -> ImageFile:
+    """Read the header of a picture. Raises `ImageError`, which names `path`."""
+    with _refusing(path):
+        picture = pillow.open(io.BytesIO(data), formats=_FORMATS)
     if max(picture.size) > MAX_PICTURE_SIDE or math.prod(picture.size) > MAX_PICTURE_PIXELS:
         raise ImageError(f"{path}: {_TOO_LARGE}")
     return picture
 
 
-def _orientation(picture: "PillowImage") -> Orientation:
-    from PIL.Image import Image as PillowImage
-
+def _orientation(picture: ImageFile) -> Orientation:
     try:
         # The method of a PNG picture would decode it, in search of EXIF data behind it.
-        number = PillowImage.getexif(picture).get(_ORIENTATION, 1)
+        number = pillow.Image.getexif(picture).get(_ORIENTATION, 1)
     except Exception:  # of many kinds, where the EXIF data are damaged
         return Orientation()
     return Orientation.of_exif(number) if number in range(1, 9) else Orientation()
@@ -207,18 +228,19 @@ def _orientation(picture: "PillowImage") -> Orientation:
 def _decode(data: bytes, path: Path) -> Image:
     picture = _open(data + _JPEG_END if _is_cut_off(data) else data, path)
     turn = Orientation() if picture.format == _TURNED_BY_PILLOW else _orientation(picture)
-    try:
-        picture.load()
-        return upright(_to_bgr(picture), turn)
-    except MemoryError:
-        raise
-    except Exception as error:  # as in `_open`
-        raise ImageError(f"{path}: {_NO_PICTURE}") from error
+    with _refusing(path):
+        return upright(_to_bgr(picture, data), turn)
 
 
-def _to_bgr(picture: "PillowImage") -> Image:
-    if white := _WHITE.get(picture.mode):
-        values = np.nan_to_num(np.asarray(picture, np.float32)) * (255 / white)
+def _to_bgr(picture: ImageFile, data: bytes) -> Image:
+    """Decode and convert a picture, which was opened from `data`."""
+    has_16_bits = any(";16" in str(tile.args) for tile in picture.tile)
+    picture.load()
+    if has_16_bits:  # of which Pillow keeps 8
+        values = cv2.imdecode(np.frombuffer(data, np.uint8), _ALL_BITS)
+        return from_16_bits(np.asarray(values, np.uint16))
+    if picture.mode == "F":  # grey, white is 1
+        values = np.nan_to_num(np.asarray(picture)) * 255
         grey = np.rint(values.clip(0, 255)).astype(np.uint8)
         return np.asarray(cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR), np.uint8)
     picture.info.pop("transparency", None)  # it is dropped; Pillow would warn of some kinds

@@ -1,6 +1,7 @@
 """What the boxes of an MP4 or MOV file say before FFmpeg reads them (ISO/IEC 14496-12)."""
 
 from collections.abc import Iterator
+from contextlib import suppress
 from itertools import islice
 from pathlib import Path
 
@@ -24,12 +25,10 @@ def is_mp4(path: Path) -> bool:
 
 def first_bytes(path: Path) -> bytes:
     """Return the first 8 bytes of a file; none where it cannot be read, or only once."""
-    try:
+    with suppress(OSError):
         if path.is_file():
             with path.open("rb") as file:
                 return file.read(8)
-    except OSError:
-        pass
     return b""
 
 

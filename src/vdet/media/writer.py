@@ -237,6 +237,7 @@ class VideoWriter:
         self._origin: Fraction | None = None  # time of the first frame
         self._last = -1
         self._sound: SoundCopy | None = None
+        self._failure: OutputError | None = None
         self.size = 0
         with self._naming_the_file():
             self._container = av.open(
@@ -248,7 +249,10 @@ class VideoWriter:
         self._stream = self._add_picture(info, settings, threads)
 
     def write(self, frame: Frame) -> None:
-        """Encode the next frame, and copy the sound up to it; times must increase."""
+        """Encode the next frame, and copy the sound up to it; times must increase.
+
+        After an error, every call raises it again.
+        """
         with self._naming_the_file():
             if self._origin is None:
                 self._origin = frame.time
@@ -276,15 +280,15 @@ class VideoWriter:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        with self._naming_the_file():
-            try:
-                if kind is None:
+        try:
+            if kind is None:
+                with self._naming_the_file():
                     self._finish()
-            finally:
-                with contextlib.suppress(av.FFmpegError):
-                    self._container.close()
-                if self._sound:
-                    self._sound.close()
+        finally:
+            with contextlib.suppress(av.FFmpegError):
+                self._container.close()
+            if self._sound:
+                self._sound.close()
 
     def _finish(self) -> None:
         """Write what is left: frames that the encoder holds back, sound, the file's index."""
@@ -298,10 +302,13 @@ class VideoWriter:
 
     @contextlib.contextmanager
     def _naming_the_file(self) -> Iterator[None]:
+        if self._failure:  # FFmpeg crashes where packets come after its header failed
+            raise self._failure
         try:
             yield
         except av.FFmpegError as error:
-            raise OutputError(f"{self._name}: cannot be written: {error.strerror}") from error
+            self._failure = OutputError(f"{self._name}: cannot be written: {error.strerror}")
+            raise self._failure from error
 
     def _open_sound(self, origin: Fraction) -> SoundCopy | None:
         """Return a copy of the sound of the source, if it has any that can be read again."""
