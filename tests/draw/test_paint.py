@@ -10,18 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from vdet.boxes import Box, Image
+from vdet.boxes import Box
 from vdet.draw.boxes import BLACK, draw_box, draw_label, draw_line, draw_zone
-from vdet.draw.paint import (
-    Color,
-    Surface,
-    blend,
-    draw_arrow,
-    draw_lines,
-    fill,
-    shade,
-    write_text,
-)
+from vdet.draw.paint import Color, Surface, draw_arrow, draw_lines, fill, shade, write_text
 from vdet.media.coding import Coding
 from vdet.media.frame import Planes
 
@@ -42,12 +33,6 @@ def ground(coding: Coding, width: int = WIDTH, height: int = HEIGHT) -> Planes:
     return planes
 
 
-def triangle() -> Image:
-    mask = np.zeros((101, 151), np.uint8)
-    cv2.fillPoly(mask, [np.array([[0, 0], [150, 20], [60, 100]], np.int32)], 255)
-    return mask
-
-
 CORNERS = np.array([[11, 21], [151, 61], [90, 200]], np.int32)
 BEYOND = np.array([[-30, 21], [151, 61], [400, 300]], np.int32)
 Draw = Callable[[Surface], object]
@@ -55,7 +40,6 @@ AREAS: dict[str, Draw] = {
     "fill": lambda surface: fill(surface, Box.sized(30, 40, 120, 76), RED),
     "fill, odd corners": lambda surface: fill(surface, Box.sized(31, 41, 120, 77), RED),
     "fill, over the last corner": lambda surface: fill(surface, Box.sized(251, 201, 120, 77), RED),
-    "blend": lambda surface: blend(surface, triangle(), (76, 50), RED),
     "shade": lambda surface: shade(surface, CORNERS.tolist(), RED, 0.5),
 }
 """Drawings with hardly an edge."""

@@ -71,10 +71,8 @@ def draw_box(
         Factor of the width of the outline.
     """
     width = line_width(surface, thickness)
-    dash = _DASH * width if dashed else None
-    for side in _sides(box.rounded, width):
-        for part in _dashes(side, dash) if dash else [side]:
-            paint.fill(surface, part, color)
+    for part in _outline(box.rounded, width, _DASH * width if dashed else None):
+        paint.fill(surface, part, color)
     if label:
         draw_label(surface, label, (box.x1, box.y1), color)
 
@@ -118,25 +116,29 @@ def text_color(background: Color) -> Color:
     return BLACK if luminance**2 > 0.05 * 1.05 else WHITE
 
 
-def _sides(box: Box, width: int) -> Iterator[Box]:
-    """Give the four sides of an outline just inside a box; those of a small box overlap."""
+def _outline(box: Box, width: int, dash: int | None) -> Iterator[Box]:
+    """Yield the parts of an outline just inside a box; those of a small box overlap."""
     across, down = min(width, box.width), min(width, box.height)
-    yield Box(box.x1, box.y1, box.x2, box.y1 + down)
-    yield Box(box.x1, box.y2 - down, box.x2, box.y2)
-    yield Box(box.x1, box.y1, box.x1 + across, box.y2)
-    yield Box(box.x2 - across, box.y1, box.x2, box.y2)
+    for start, length in _dashes(box.width, dash):
+        yield Box.sized(box.x1 + start, box.y1, length, down)
+        yield Box.sized(box.x1 + start, box.y2 - down, length, down)
+    for start, length in _dashes(box.height, dash):
+        yield Box.sized(box.x1, box.y1 + start, across, length)
+        yield Box.sized(box.x2 - across, box.y1 + start, across, length)
 
 
-def _dashes(side: Box, dash: int) -> Iterator[Box]:
-    """Cut a side into dashes of about `dash` pixels and equal gaps, with a dash at each end."""
-    length = int(max(side.width, side.height))
+def _dashes(side: float, dash: int | None) -> list[tuple[int, int]]:
+    """Return starts and lengths of the dashes of a side, with one at each end; None for none.
+
+    They are about `dash` pixels long, and so are the gaps.
+    """
+    length = int(side)
+    if dash is None:
+        return [(0, length)]
     gaps = max(1, round((length - dash) / (2 * dash)))
     dash = min(dash, max(1, length // 3))
-    for start in np.linspace(0, length - dash, gaps + 1).round().astype(int).tolist():
-        if side.width > side.height:
-            yield Box.sized(side.x1 + start, side.y1, dash, side.height)
-        else:
-            yield Box.sized(side.x1, side.y1 + start, side.width, dash)
+    starts = np.linspace(0, length - dash, gaps + 1).round().astype(int).tolist()
+    return [(start, dash) for start in starts]
 
 
 def draw_zone(surface: Surface, corners: Sequence[Point], label: str) -> None:

@@ -29,9 +29,6 @@ _HALF = 127
 _FARTHEST = 2**15
 """Pixels from the picture's corner; OpenCV takes no coordinates much larger."""
 
-_Layer = tuple[Image, Sequence[int], int]
-"""A layer of a surface, the value of a colour in it, and how often its sides are halved."""
-
 
 def fill(surface: Surface, box: Box, color: Color) -> None:
     """Fill the part of a box that lies in the surface."""
@@ -69,10 +66,17 @@ def write_text(
 
     `scale` is the size as OpenCV counts it.
     """
-    x1, y1, x2, y2 = _visible(surface, within)
-    if x1 < x2 and y1 < y2:
-        place = round(origin[0]) - x1, round(origin[1]) - y1
-        blend(surface, _text_mask(text, place, scale, (y2 - y1, x2 - x1)), (x1, y1), color)
+    x1, y1, x2, y2 = corners = _visible(surface, within)
+    if x1 >= x2 or y1 >= y2:
+        return
+    place = round(origin[0]) - x1, round(origin[1]) - y1
+    mask = _text_mask(text, place, scale, (y2 - y1, x2 - x1))
+    masks = [mask, _halved(mask, x1, y1) if isinstance(surface, Planes) else mask]
+    for layer, value, halved in _layers(surface, color):
+        part = _part(layer, corners, halved)
+        covered = masks[halved].reshape(part.shape[:2] + (1,) * (part.ndim - 2))
+        shares = covered * np.float32(1 / 255)
+        part[:] = np.rint(part + (np.array(value, np.float32) - part) * shares)
 
 
 @lru_cache(maxsize=256)
@@ -109,26 +113,6 @@ def shade(surface: Surface, corners: Sequence[Point], color: Color, opacity: flo
         cv2.copyTo(mixed, (covered > _HALF).view(np.uint8), part)
 
 
-def blend(surface: Surface, mask: Image, corner: tuple[int, int], color: Color) -> None:
-    """Mix a colour into the pixels of a mask.
-
-    Parameters
-    ----------
-    mask
-        uint8 `(h, w)`, not empty: how much of a pixel is covered, 0 to 255. It lies in the surface.
-    corner
-        x and y of its first pixel.
-    """
-    x, y = corner
-    height, width = mask.shape
-    small = _halved(mask, x, y) if isinstance(surface, Planes) else mask
-    for layer, value, halved in _layers(surface, color):
-        part = _part(layer, (x, y, x + width, y + height), halved)
-        covered = small if halved else mask
-        shares = covered.reshape(part.shape[:2] + (1,) * (part.ndim - 2)) * np.float32(1 / 255)
-        part[:] = np.rint(part + (np.array(value, np.float32) - part) * shares)
-
-
 def _halved(mask: Image, x: int, y: int) -> Image:
     """Return a mask whose first pixel is at `(x, y)` at the resolution of chroma."""
     height, width = mask.shape
@@ -141,12 +125,11 @@ def _halved(mask: Image, x: int, y: int) -> Image:
 def _visible(surface: Surface, box: Box) -> tuple[int, int, int, int]:
     """Return the sides of the part of a box that lies in the surface."""
     height, width = surface.shape[:2]
-    x1, y1, x2, y2 = box.pixels
-    x1, y1 = max(0, x1), max(0, y1)
-    return x1, y1, max(x1, min(x2, width)), max(y1, min(y2, height))
+    return box.rounded.clipped(width, height).pixels
 
 
-def _layers(surface: Surface, color: Color) -> Iterator[_Layer]:
+def _layers(surface: Surface, color: Color) -> Iterator[tuple[Image, Sequence[int], int]]:
+    """Yield each layer, the value of a colour in it, and how often its sides are halved."""
     if isinstance(surface, Planes):
         yield from zip(surface.layers, _coded(color, surface.coding), (0, 1, 1), strict=True)
     else:
