@@ -33,16 +33,6 @@ def meeting(path: Segment, segment: Segment) -> float | None:
     return along if 0 <= along <= 1 and 0 <= across <= 1 else None
 
 
-def distance_to(segment: Segment, point: Point) -> float:
-    """Return the distance of a point from the nearest point of a segment."""
-    (ax, ay), (bx, by) = segment
-    ux, uy = bx - ax, by - ay
-    length = ux * ux + uy * uy
-    share = ((point[0] - ax) * ux + (point[1] - ay) * uy) / length if length else 0.0
-    share = min(max(share, 0.0), 1.0)
-    return math.hypot(point[0] - ax - share * ux, point[1] - ay - share * uy)
-
-
 def sides(corners: Sequence[Point]) -> list[Segment]:
     """Return the sides of a polygon; the last one leads back to the first corner."""
     return [(corners[i - 1], corner) for i, corner in enumerate(corners)]
@@ -56,21 +46,14 @@ def crosses_itself(corners: Sequence[Point]) -> bool:
     if len(set(corners)) < len(corners):
         return True
     pairs = [(side, corner) for side in sides(corners) for corner in corners if corner not in side]
-    return any(distance_to(side, corner) == 0 for side, corner in pairs) or any(
+    return any(_lies_on(side, corner) for side, corner in pairs) or any(
         meeting(first, second) is not None
         for first, second in combinations(sides(corners), 2)
         if not set(first) & set(second)
     )
 
 
-def contains(corners: Sequence[Point], point: Point) -> bool:
-    """Return whether a point lies in a polygon; one on a side may count as in or out.
-
-    It is in where a ray from it meets an odd number of sides (Shimrat 1962).
-    """
-    x, y = point
-    met = (
-        (ay > y) != (by > y) and x < ax + (y - ay) / (by - ay) * (bx - ax)
-        for (ax, ay), (bx, by) in sides(corners)
-    )
-    return sum(met) % 2 == 1
+def _lies_on(side: Segment, point: Point) -> bool:
+    (ax, ay), (bx, by), (x, y) = *side, point
+    is_between = (x - ax) * (x - bx) + (y - ay) * (y - by) <= 0
+    return is_between and (bx - ax) * (y - ay) == (by - ay) * (x - ax)

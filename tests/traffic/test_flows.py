@@ -138,6 +138,48 @@ class TestSeveralVideos:
         assert row.mean == pytest.approx(4 / 20, abs=0.01)
 
 
+class TestIntervals:
+    """There is a row for each interval in which there is video, and for no other."""
+
+    def test_a_video_that_ends_at_a_border_before_a_pause(self) -> None:
+        begin = datetime.fromisoformat("2026-05-01 07:04:50+02:00")  # its last frame is at 07:05
+        first = at(counts(frames(GOES_EAST), ZONE), begin)
+        second = at(first, begin + timedelta(minutes=13))
+        rows = zone_table([first, replace(second, events=())], 300)
+        assert [(f"{row.start:%H:%M}", row.entered, row.mean) for row in rows] == [
+            ("07:00", 1, pytest.approx(0.4, abs=0.01)), ("07:05", 0, 0), ("07:15", 0, 0),
+        ]  # fmt: skip
+
+    def test_a_video_without_a_box_beside_one_with_some(self) -> None:
+        first, night = at(counts(frames(GOES_EAST), ZONE)), at(counts([], ZONE))
+        rows = zone_table(
+            [first, replace(night, clock=Clock(BEGINS + timedelta(hours=3), ""))], 3600
+        )
+        assert [(f"{row.start:%H:%M}", row.entered, row.mean) for row in rows] == [
+            ("07:00", 1, pytest.approx(0.4, abs=0.01)), ("10:00", 0, 0),
+        ]  # fmt: skip
+
+    def test_a_jump_of_the_times_has_no_intervals(self) -> None:
+        late = [
+            replace(each, index=each.index + 251, time=each.time + 1.77e9)
+            for each in frames(TURNS_BACK)
+        ]
+        counted = counts([*frames(GOES_EAST), *numbered(late, 2)], WEST, ZONE)
+        assert [row.start for row in counted.zone_use(3600)] == [0, 1.77e9 // 3600 * 3600]
+        assert [(row.start, row.origin, row.count) for row in counted.flows(60) if row.count] == [
+            (0, "west", 1), (1.77e9, "west", 1),
+        ]  # fmt: skip
+
+    def test_frames_that_a_file_leaves_out_are_video(self) -> None:
+        """A file of boxes has no frames of a quiet hour."""
+        late = [
+            replace(each, index=each.index + 90_000, time=each.time + 3600)
+            for each in frames(TURNS_BACK)
+        ]
+        rows = counts([*frames(GOES_EAST), *numbered(late, 2)], ZONE).zone_use(1200)
+        assert [row.start for row in rows] == [0, 1200, 2400, 3600]
+
+
 class TestFiles:
     @staticmethod
     def table(path: Path) -> list[dict[str, str]]:

@@ -6,11 +6,11 @@ from dataclasses import replace
 import pytest
 
 from traffic.scenes import counts, events, feet, frames, joined, numbered, through, track, ways
+from vdet.boxes import Float64Array
 from vdet.config.places import LineSettings
 from vdet.errors import TruthError
-from vdet.polygons import Point
 from vdet.track.track import FrameTracks
-from vdet.traffic import counter
+from vdet.traffic import linking
 
 DOWN = through((0, 600, 300), (4, 600, 500))
 
@@ -90,13 +90,13 @@ class TestNewIds:
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         asked: list[float] = []
-        expected = counter._Vehicle.expected
+        onward = linking._Vehicle.onward
 
-        def ask(vehicle: counter._Vehicle, now: float) -> Point:
+        def ask(vehicle: linking._Vehicle, now: float) -> Float64Array:
             asked.append(now)
-            return expected(vehicle, now)
+            return onward(vehicle, now)
 
-        monkeypatch.setattr(counter._Vehicle, "expected", ask)
+        monkeypatch.setattr(linking._Vehicle, "onward", ask)
         there = [(number, 30.0 + 40 * number) for number in range(30)]
         video = [
             FrameTracks(n, n / 25, tuple(track((x, y), first + number) for number, x in there))

@@ -127,7 +127,7 @@ def _write_json(
 ) -> None:
     facts: dict[str, Any] = {}
     for name, each in videos.items():
-        begin = plain_moment(each.clock and each.clock.at(each.first))
+        begin = plain_moment(each.clock and each.clock.at(each.spans[0][0]))
         facts[name] = {"begin": begin, "warnings": list(each.warnings)}
         if events:
             facts[name]["events"] = [

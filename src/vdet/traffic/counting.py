@@ -15,6 +15,7 @@ from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Clock, find_clock
 from vdet.traffic.counter import VehicleCounter
 from vdet.traffic.counts import Counts, Event
+from vdet.traffic.intervals import Span
 from vdet.traffic.speeds import SpeedMeter, with_speeds
 
 _SEAM = 2.0
@@ -102,20 +103,19 @@ def _size(settings: Settings, size: tuple[int, int] | None) -> tuple[int, int]:
 class _Video:
     """A video of a group.
 
-    `first` and `last` are the times of its frames; `shift` turns them into those of the group.
+    `spans` are those of `Counts`; `shift` turns its times into those of the group.
     """
 
     name: str
     clock: Clock | None
-    first: float
-    last: float
+    spans: tuple[Span, ...]
     shift: float
     meter: SpeedMeter | None
 
     @property
     def end(self) -> float:
         """When it ends in the group, seconds."""
-        return self.last + self.shift
+        return self.spans[-1][1] + self.shift
 
 
 class _Group:
@@ -143,7 +143,7 @@ class _Group:
         before = self._videos[-1]
         if not (clock and before.clock and first is not None and size == self._size):
             return False
-        gap = clock.at(first) - before.clock.at(before.last)
+        gap = clock.at(first) - before.clock.at(before.spans[-1][1])
         return gap.total_seconds() >= -_SEAM
 
     def add(
@@ -159,7 +159,7 @@ class _Group:
             if first + shift - before.end < _SEAM:
                 shift = before.end + _STEP - first
             self._counter.start_video()
-        latest = -math.inf
+        begun, latest = len(self._counter.spans), -math.inf
         for frame in frames:
             if not latest <= frame.time < math.inf:
                 raise TruthError(
@@ -169,7 +169,11 @@ class _Group:
             self._counter.update(replace(frame, time=latest + shift) if shift else frame)
             if meter:
                 meter.add(frame)
-        self._videos.append(_Video(name, clock, first, max(first, latest), shift, meter))
+        spans = [
+            (round(begin - shift, 6), round(end - shift, 6))
+            for begin, end in self._counter.spans[begun:]
+        ]
+        self._videos.append(_Video(name, clock, tuple(spans) or ((first, first),), shift, meter))
 
     def counts(self) -> dict[str, Counts]:
         """Return the counts of each video, with its own times; the last one has ended."""
@@ -185,8 +189,7 @@ class _Group:
                 replace(
                     whole,
                     events=tuple(own),
-                    first=video.first,
-                    last=video.last,
+                    spans=video.spans,
                     clock=video.clock,
                     warnings=whole.warnings if video is self._videos[0] else (),
                 ),

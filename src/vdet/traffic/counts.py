@@ -1,26 +1,21 @@
 """Events, and what follows from them: totals, flows, and the use of zones, by interval and class.
 
-Tables cover the whole video, or intervals of it. With a clock, intervals begin at round times of
-the day. Several videos have one table, with a clock in each.
+Tables cover the whole video, or intervals of it. Several videos have one table.
 """
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from datetime import datetime, timedelta, timezone
-from itertools import accumulate, groupby, pairwise
+from itertools import accumulate, pairwise
 from typing import TypeVar
 
-from vdet.errors import ConfigError
 from vdet.labels.formats import UNKNOWN
 from vdet.traffic.borders import APPEAR, ENTER, EXIT, VANISH
 from vdet.traffic.clock import Clock
+from vdet.traffic.intervals import Intervals, Moment, Span
 
 Way = tuple[str, str]
 """Name of a line or zone, and a direction."""
-
-Moment = datetime | float | None
-"""The moment on the clock; seconds in a video without; None in several without."""
 
 _IN, _OUT = (ENTER, APPEAR), (EXIT, VANISH)
 
@@ -148,8 +143,8 @@ class Counts:
         Each direction of each line and zone.
     zones
         The names of the zones.
-    first, last
-        Times of the first and the last frame, seconds.
+    spans
+        From when to when there is video, seconds.
     clock
         None where it is not known.
     warnings
@@ -159,8 +154,7 @@ class Counts:
     events: tuple[Event, ...]
     ways: tuple[Way, ...]
     zones: tuple[str, ...]
-    first: float = 0.0
-    last: float = 0.0
+    spans: tuple[Span, ...] = ((0.0, 0.0),)
     clock: Clock | None = None
     warnings: tuple[str, ...] = ()
 
@@ -206,13 +200,14 @@ def count_table(videos: Sequence[Counts], interval: int | None = None) -> list[C
     ConfigError
         There are intervals, and several videos of which one has no clock.
     """
-    axis = _Axis(videos, interval)
-    timed = [
-        (axis.number(which, each.time), (each.name, each.direction), each.class_name)
+    intervals = _intervals(videos, interval)
+    found: _Found = Counter(
+        (intervals.number(which, each.time), (each.name, each.direction), _class_of(each))
         for which, video in enumerate(videos)
         for each in video.events
-    ]
-    return _rows(CountRow, axis, timed, dict.fromkeys(way for each in videos for way in each.ways))
+    )
+    ways = dict.fromkeys(way for each in videos for way in each.ways)
+    return _rows(CountRow, intervals, found, ways)
 
 
 def flow_table(videos: Sequence[Counts], interval: int | None = None) -> list[FlowRow]:
@@ -222,19 +217,19 @@ def flow_table(videos: Sequence[Counts], interval: int | None = None) -> list[Fl
     it comes back. It counts in the interval of the first. Parameters and errors as of
     `count_table`.
     """
-    axis = _Axis(videos, interval)
+    intervals = _intervals(videos, interval)
     visits: dict[int, list[tuple[int, Event]]] = {}
     for which, video in enumerate(videos):
         for trip in vehicle_trips(video):
             visits.setdefault(trip[0].vehicle, []).extend((which, each) for each in trip)
-    timed = []
+    found: _Found = Counter()
     for (which, first), *others in visits.values():
-        last = others[-1][-1].name if others else None
-        timed.append((axis.number(which, first.time), (first.name, last), first.class_name))
+        flow = first.name, others[-1][-1].name if others else None
+        found[intervals.number(which, first.time), flow, _class_of(first)] += 1
     names = dict.fromkeys(name for each in videos for name, _ in each.ways)
     order = {name: number for number, name in enumerate((*names, None))}
-    flows = sorted({way for _, way, _ in timed}, key=lambda way: [order[name] for name in way])
-    return _rows(FlowRow, axis, timed, flows)
+    flows = sorted({way for _, way, _ in found}, key=lambda way: [order[name] for name in way])
+    return _rows(FlowRow, intervals, found, flows)
 
 
 def vehicle_trips(video: Counts) -> list[list[Event]]:
@@ -248,137 +243,74 @@ def vehicle_trips(video: Counts) -> list[list[Event]]:
 
 def zone_table(videos: Sequence[Counts], interval: int | None = None) -> list[ZoneRow]:
     """Return the use of each zone in each interval; parameters and errors as of `count_table`."""
-    axis = _Axis(videos, interval)
+    intervals = _intervals(videos, interval)
     rows = []
     for name in dict.fromkeys(name for each in videos for name in each.zones):
-        # Who leaves makes room for who enters then.
-        events = sorted(
-            (
-                (axis.seconds(which, each.time), each.direction in _IN, each.seconds)
-                for which, video in enumerate(videos)
-                for each in video.events
-                if each.name == name
-            ),
-            key=lambda event: event[:2],
-        )
-        by_number = {
-            number: list(some) for number, some in groupby(events, lambda e: axis.number_at(e[0]))
-        }
+        visits: dict[int, list[_Visit]] = {number: [] for number in intervals.numbers}
+        for which, video in enumerate(videos):
+            for event in (each for each in video.events if each.name == name):
+                time, change = (
+                    intervals.seconds(which, event.time),
+                    1 if event.direction in _IN else -1,
+                )
+                visits[intervals.number_at(time)].append((time, change, event.seconds))
         inside = 0
-        for number in axis.numbers:
-            here = by_number.get(number, [])
-            rows.append(_zone_row(name, axis, number, here, inside))
-            inside += sum(1 if enters else -1 for _, enters, _ in here)
+        for number, some in visits.items():
+            rows.append(_zone_row(name, intervals, number, some, inside))
+            inside += sum(change for _, change, _ in some)
     return rows
 
 
+_Visit = tuple[float, int, float | None]
+"""When a vehicle enters (1) or leaves (-1) a zone, and how long it was in it if it leaves."""
+
+
 def _zone_row(
-    name: str,
-    axis: "_Axis",
-    number: int,
-    events: Sequence[tuple[float, bool, float | None]],
-    inside: int,
+    name: str, intervals: Intervals, number: int, visits: Sequence[_Visit], inside: int
 ) -> ZoneRow:
     """Return the use in one interval, at whose start so many vehicles are inside."""
-    begin, end = axis.limits(number)
-    changes = [1 if enters else -1 for _, enters, _ in events]
-    levels = list(accumulate(changes, initial=inside))
-    times = [begin, *(time for time, _, _ in events), end]
+    begin, end = intervals.limits(number)
+    visits = sorted(visits, key=lambda visit: visit[:2])  # who leaves makes room for who enters
+    levels = list(accumulate((change for _, change, _ in visits), initial=inside))
+    times = [begin, *(time for time, _, _ in visits), end]
     used = sum(n * (b - a) for n, (a, b) in zip(levels, pairwise(times), strict=True))
-    stays = [stay for _, _, stay in events if stay is not None]
+    covered = intervals.covered(number)  # nothing, where only one frame is in the interval
+    stays = [stay for _, _, stay in visits if stay is not None]
     return ZoneRow(
-        *axis.moments(number),
+        *intervals.moments(number),
         name,
-        changes.count(1),
-        changes.count(-1),
-        round(used / axis.covered(number), 3) if end > begin else float(inside),
+        sum(change > 0 for _, change, _ in visits),
+        sum(change < 0 for _, change, _ in visits),
+        round(used / covered, 3) if covered else float(inside),
         max(levels),
         round(sum(stays) / len(stays), 3) if stays else None,
         max(stays, default=None),
     )
 
 
-class _Axis:
-    """The intervals of one or several videos, by their numbers.
+def _intervals(videos: Sequence[Counts], interval: int | None) -> Intervals:
+    return Intervals([(each.clock, each.spans) for each in videos], interval)
 
-    Its seconds are those of the video, of the clock's local time since 1970, or of several videos
-    without clocks one after the other.
-    """
 
-    def __init__(self, videos: Sequence[Counts], interval: int | None) -> None:
-        self._interval = interval
-        self._origin: datetime | None = None
-        self._is_timed = True
-        self._zeros = [0.0]
-        clocks = [each.clock for each in videos if each.clock]
-        if clocks and len(clocks) == len(videos):
-            offset = clocks[0].zero.utcoffset() or timedelta()
-            self._origin = datetime(1970, 1, 1, tzinfo=timezone(offset))
-            self._zeros = [(clock.zero - self._origin).total_seconds() for clock in clocks]
-        elif len(videos) > 1:
-            if interval is not None:
-                raise ConfigError(
-                    "intervals over several videos need the time at which each begins; give --begin"
-                )
-            self._is_timed = False
-            ends = accumulate(each.last - each.first for each in videos)
-            self._zeros = [end - each.last for end, each in zip(ends, videos, strict=True)]
-        self._spans = [(z + v.first, z + v.last) for z, v in zip(self._zeros, videos, strict=True)]
-        self._first = min(first for first, _ in self._spans)
-        self._last = max(last for _, last in self._spans)
-        ranges = (map(self.number_at, span) for span in self._spans)
-        self.numbers = sorted({n for first, last in ranges for n in range(first, last + 1)})
+def _class_of(event: Event) -> str:
+    return event.class_name or UNKNOWN
 
-    def seconds(self, which: int, time: float) -> float:
-        """Return a time in one of the videos in seconds of the axis."""
-        return self._zeros[which] + time
 
-    def number(self, which: int, time: float) -> int:
-        """Return the number of the interval of a time in one of the videos."""
-        return self.number_at(self.seconds(which, time))
-
-    def number_at(self, seconds: float) -> int:
-        """Return the number of an interval."""
-        within = min(max(seconds, self._first), self._last)  # events are interpolated
-        return 0 if self._interval is None else int(within // self._interval)
-
-    def limits(self, number: int) -> tuple[float, float]:
-        """Return the part of an interval between the first and the last frame of all videos."""
-        if self._interval is None:
-            return self._first, self._last
-        begin = number * self._interval
-        return max(begin, self._first), min(begin + self._interval, self._last)
-
-    def covered(self, number: int) -> float:
-        """Return the seconds of video in an interval."""
-        begin, end = self.limits(number)
-        return sum(max(0.0, min(end, last) - max(begin, first)) for first, last in self._spans)
-
-    def moments(self, number: int) -> tuple[Moment, Moment]:
-        """Return the start and the end of an interval."""
-        start, end = self._first, self._last
-        if self._interval is not None:
-            start, end = (float(each * self._interval) for each in (number, number + 1))
-        return self._moment(start), self._moment(end)
-
-    def _moment(self, seconds: float) -> Moment:
-        if self._origin:
-            return self._origin + timedelta(milliseconds=round(1000 * seconds))
-        return round(seconds, 3) if self._is_timed else None
+_Found = Counter[tuple[int, tuple[str, str | None], str]]
+"""How many vehicles: by the number of the interval, the way or flow, and the class."""
 
 
 def _rows(
     make: Callable[..., R],
-    axis: _Axis,
-    timed: Sequence[tuple[int, tuple[str, str | None], str | None]],
+    intervals: Intervals,
+    found: _Found,
     ways: Iterable[tuple[str, str | None]],
 ) -> list[R]:
     """Return a row for each interval, way and class that occurs, also where its count is 0."""
-    found = Counter((number, way, name or UNKNOWN) for number, way, name in timed)
     classes = sorted({name for _, _, name in found}) or [UNKNOWN]
     keys = [(way, name) for way in ways for name in classes]
     return [
-        make(*axis.moments(number), *way, name, found[number, way, name])
-        for number in axis.numbers
+        make(*intervals.moments(number), *way, name, found[number, way, name])
+        for number in intervals.numbers
         for way, name in keys
     ]

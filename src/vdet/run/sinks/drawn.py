@@ -137,12 +137,13 @@ def _class_number(name: str | None) -> int:
 
 def draw_running_counts(surface: Surface, counter: "VehicleCounter") -> None:
     """Draw the lines and zones, and what is counted so far; vehicles are drawn over them."""
+    found = counter.so_far()
     for zone in counter.zones:
-        boxes.draw_zone(surface, zone.corners, f"{zone.name}: {counter.present(zone)}")
+        enter, leave, appear, vanish = (found[zone.name, way] for way in zone.directions)
+        inside = enter + appear - leave - vanish
+        boxes.draw_zone(surface, zone.corners, f"{zone.name}: {inside}")
     for line in counter.lines:
-        left, right = (
-            f"{line.name} {way}: {counter.count(line.name, way)}" for way in line.directions
-        )
+        left, right = (f"{line.name} {way}: {found[line.name, way]}" for way in line.directions)
         boxes.draw_line(surface, line.start, line.end, (left, right))
 
 

@@ -1,0 +1,302 @@
+"""From tracks to paths: which tracks one vehicle has, and where it was in each frame.
+
+Rule 8 of `vdet.traffic` is here.
+"""
+
+import math
+from array import array
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from vdet.boxes import Box, Float64Array
+from vdet.detect.classes import ClassScores
+from vdet.track.track import FrameTracks, Track
+
+GAP = 1.0
+"""Longest time between the end of a track and the start of one that continues it, seconds."""
+REMEMBERED = 10.0
+"""Seconds for which a vehicle that is not shown is remembered; trackers keep ids for less."""
+DURATION_DIGITS = 4
+"""Decimals of a duration in seconds that are compared: times are rounded."""
+
+_LEAVES = 0.1
+"""Lowest speed of a vehicle that leaves the frame, in heights of its box per second."""
+_OUT_OF_SIGHT = 0.5
+"""Seconds that a vehicle is not shown before it is looked at whether it is the same one."""
+_JUDGED = 1.0
+"""Seconds after which that is clear."""
+_TURNED, _OPPOSITE = 0.15, 0.6
+"""Way back after which it is another one: in heights of its box, and as a share of all its way."""
+_REACH = 0.5
+"""Farthest that the next track begins from where the last one ended or would be, in heights."""
+_MOST_GROWTH = 2.0
+"""Largest ratio of the heights of the last box of a track and the first one of the next."""
+_ONWARD = 0.2, 0.3
+"""Seconds after which a lost vehicle is taken to have driven on; two places settle a crossing."""
+_LATEST = 20
+"""Number of places that its velocity follows from; each step counts half as much as the next."""
+_COLUMNS = 7
+"""Numbers that are kept of a frame: time, x and y of the foot, y1 and y2 of the box, score, and the
+number of the frame.
+"""
+_STAY, _STANDS = 250, 0.05
+"""Number of places of which only the first and the last are kept where a vehicle stands: where all
+lie within this share of the height of its box. So memory does not grow with parked vehicles.
+"""
+
+
+_Size = tuple[int, int]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class VehiclePath:
+    """Where a vehicle was, from all its tracks; a row for each frame that shows it.
+
+    Attributes
+    ----------
+    vehicle
+        Its number.
+    class_name
+        That with the highest sum of scores over all its frames; None if it has none.
+    tracks
+        From when it had which track: times and ids.
+    seen
+        Number of frames that show it. Rows after these are where it would have driven on.
+    times
+        Seconds, `(n,)`, as are the others.
+    points
+        Feet, pixels, `(n, 2)`.
+    heights
+        Of its box, pixels.
+    scores, frames
+        Scores of its tracks, and numbers of the frames.
+    """
+
+    vehicle: int
+    class_name: str | None
+    tracks: tuple[tuple[float, int], ...]
+    seen: int
+    times: Float64Array
+    points: Float64Array
+    heights: Float64Array
+    scores: Float64Array
+    frames: Float64Array
+
+    @property
+    def seconds(self) -> float:
+        """From when it was first seen to when it was last seen."""
+        return round(float(self.times[self.seen - 1] - self.times[0]), DURATION_DIGITS)
+
+    def track_at(self, row: int) -> int:
+        """Return the id of its track in a row."""
+        return next(key for since, key in reversed(self.tracks) if since <= self.times[row])
+
+
+def link_tracks(frames: Iterable[FrameTracks], width: int, height: int) -> list[VehiclePath]:
+    """Return the path of each vehicle; `width` and `height` are the size of the frames, pixels."""
+    linker = TrackLinker(width, height)
+    ended = [path for frame in frames for path in linker.add(frame)]
+    return [*ended, *linker.open_paths()]
+
+
+class TrackLinker:
+    """Links tracks to paths from frame to frame.
+
+    Attributes
+    ----------
+    begun
+        How many vehicles have begun. The numbers of vehicles go on from that of another linker.
+    """
+
+    def __init__(self, width: int, height: int, begun: int = 0) -> None:
+        self.begun = begun
+        self._size = width, height
+        self._now = -math.inf
+        self._vehicles: dict[int, _Vehicle] = {}  # by the id of the track
+
+    def add(self, frame: FrameTracks) -> list[VehiclePath]:
+        """Add the next frame; return the paths that have ended."""
+        self._now = round(frame.time, 6)  # as files hold it
+        oldest = self._now - REMEMBERED
+        ended = [key for key, each in self._vehicles.items() if each.shown < oldest]
+        paths = [self._vehicles.pop(key).path(self._now) for key in ended]
+        shown = {track.id for track in frame.tracks}
+        lost = None if shown <= self._vehicles.keys() else self._lost(shown)
+        for track in frame.tracks:
+            vehicle = self._vehicles.get(track.id) or self._begin(track, lost)
+            vehicle.see(track, self._now, frame.index)
+            if vehicle.back is not None and vehicle.is_judged():
+                if vehicle.is_another():
+                    paths.append(self._split(track.id))
+                vehicle.back = None
+            self._vehicles[track.id].classes.add(track.class_name, track.score)
+        return paths
+
+    def start_video(self) -> None:
+        """Take the ids of the next frames for those of other tracks: they are of another video."""
+        self._vehicles = {-each.number: each for each in self._vehicles.values()}
+
+    def open_paths(self) -> list[VehiclePath]:
+        """Return the paths so far of the vehicles that may still be shown again."""
+        return [each.path(self._now) for each in self._vehicles.values()]
+
+    def _lost(self, shown: set[int]) -> "_Lost":
+        """Return the vehicles that have just ended inside the frame; those of `shown` go on."""
+        vehicles = {
+            key: each
+            for key, each in self._vehicles.items()
+            if key not in shown
+            and self._now - each.shown <= GAP
+            and not each.is_leaving(*self._size)
+        }
+        return _Lost(vehicles, self._now, self._size)
+
+    def _begin(self, track: Track, lost: "_Lost | None") -> "_Vehicle":
+        """Remember a new vehicle, or one that goes on under a new id."""
+        key = lost.take(track) if lost else None
+        if key is None:
+            self.begun += 1
+            vehicle = _Vehicle(self.begun, track.box, self._now)
+        else:
+            vehicle = self._vehicles.pop(key)
+        vehicle.tracks.append((self._now, track.id))
+        self._vehicles[track.id] = vehicle
+        return vehicle
+
+    def _split(self, key: int) -> VehiclePath:
+        """Return the path until a vehicle was out of sight; since then it is another one."""
+        self.begun += 1
+        vehicle = self._vehicles[key]
+        at = _COLUMNS * (vehicle.back or 0)
+        self._vehicles[key] = _Vehicle(
+            self.begun, vehicle.box, self._now, vehicle.tracks.copy(), vehicle.rows[at:]
+        )
+        del vehicle.rows[at:]
+        return vehicle.path(self._now)
+
+
+@dataclass(slots=True)
+class _Vehicle:
+    """A vehicle that may still be shown again.
+
+    Attributes
+    ----------
+    box, shown
+        Its last box, and when it was shown, seconds.
+    tracks
+        Those of `VehiclePath`.
+    rows
+        All that was seen of it, one frame after the other: see `_table`.
+    back
+        Number of the first row after it was out of sight, until it is judged.
+    """
+
+    number: int
+    box: Box
+    shown: float
+    tracks: list[tuple[float, int]] = field(default_factory=list)
+    rows: "array[float]" = field(default_factory=lambda: array("d"))
+    classes: ClassScores = field(default_factory=ClassScores)
+    back: int | None = None
+
+    def see(self, track: Track, time: float, frame: int) -> None:
+        """Add the next frame that shows it."""
+        if time - self.shown > _OUT_OF_SIGHT:
+            self.back = len(self.rows) // _COLUMNS
+        self.box, self.shown = track.box, time
+        self.rows.extend((time, *track.foot, self.box.y1, self.box.y2, track.score, frame))
+        if len(self.rows) % (_STAY * _COLUMNS) == 0 and self.back is None:
+            stay = _table(self.rows[-_STAY * _COLUMNS :])
+            if np.ptp(stay[:, 1:3], axis=0).max() <= _STANDS * stay[-1, 3]:
+                del self.rows[(1 - _STAY) * _COLUMNS : -_COLUMNS]
+
+    def is_judged(self) -> bool:
+        """Return whether it is clear whether one that was out of sight is another one."""
+        return self.shown - self.rows[_COLUMNS * (self.back or 0)] >= _JUDGED
+
+    def is_another(self) -> bool:
+        """Return whether it drives the other way than before it was out of sight."""
+        at = _COLUMNS * (self.back or 0)
+        before, (first, *_, last) = _velocity(self.rows[:at]), _table(self.rows[at:])
+        way, speed, height = complex(*(last - first)[1:3]), abs(before), last[3]
+        onward = (way * before.conjugate()).real / max(speed, 1e-9)
+        back = max(_TURNED * height, _OPPOSITE * abs(way))
+        return bool(speed > _LEAVES * height and onward < -back)
+
+    def is_leaving(self, width: int, height: int) -> bool:
+        """Return whether it moves out at the edge of the frame, and so was not lost."""
+        x1, y1, x2, y2 = self.box.pixels
+        outward = complex((x2 >= width - 1) - (x1 <= 1), (y2 >= height - 1) - (y1 <= 1))
+        return (_velocity(self.rows) * outward.conjugate()).real > _LEAVES * (y2 - y1)
+
+    def onward(self, *times: float) -> Float64Array:
+        """Return its last row, and those of later times if it moves on."""
+        rows = np.repeat(_table(self.rows[-_COLUMNS:]), 1 + len(times), axis=0)
+        rows[1:, 0] = times
+        velocity = _velocity(self.rows)
+        rows[:, 1:3] += (rows[:, :1] - rows[0, 0]) * (velocity.real, velocity.imag)
+        return rows
+
+    def path(self, now: float) -> VehiclePath:
+        """Return its path; if it was lost, it drives on for a moment."""
+        rows = _table(self.rows)
+        seen, last = len(rows), rows[-1]
+        if now - last[0] > GAP and math.dist(last[1:3], rows[0, 1:3]) > last[3]:
+            rows = np.concatenate([rows, self.onward(*np.add(last[0], _ONWARD))[1:]])
+        columns = rows[:, 0], rows[:, 1:3], *rows[:, 3:].T
+        return VehiclePath(self.number, self.classes.best, tuple(self.tracks), seen, *columns)
+
+
+def _table(rows: "array[float]") -> Float64Array:
+    """Return times, x and y of feet, heights of boxes, scores and frames: `(n, 6)`.
+
+    They are as exact as files of tracks hold them, so that both count alike.
+    """
+    times, x, y, top, bottom, scores, frames = np.array(rows).reshape(-1, _COLUMNS).T
+    heights = np.maximum(1, np.floor(bottom + 0.5) - np.floor(top + 0.5))
+    feet = np.rint(100 * x) / 100, np.rint(100 * y) / 100
+    return np.column_stack([times, *feet, heights, scores, frames])
+
+
+def _velocity(rows: "array[float]") -> complex:
+    """Return the velocity at the end of a path, x and y in pixels a second."""
+    steps = np.diff(_table(rows[-_LATEST * _COLUMNS :])[:, :3], axis=0)
+    steps = steps[steps[:, 0] > 0]
+    if not len(steps):
+        return 0j
+    weights = 0.5 ** np.arange(len(steps), 0, -1)
+    weights[0] *= 2
+    return complex(*(weights @ (steps[:, 1:] / steps[:, :1])))
+
+
+class _Lost:
+    """Vehicles that may go on under a new id: those that have just ended inside the frame.
+
+    One that would be outside it now has left: who comes in there is another. Each has two rows, for
+    the place where it was last and for that where it would be now.
+    """
+
+    def __init__(self, vehicles: dict[int, _Vehicle], now: float, size: _Size) -> None:
+        rows = [
+            (*row[1:4], key)
+            for key, each in vehicles.items()
+            for places in [each.onward(now).tolist()]
+            if 0 <= places[1][1] <= size[0] and 0 <= places[1][2] <= size[1]
+            for row in places
+        ]
+        self._keys: list[int] = [key for *_, key in rows]
+        self._x, self._y, self._heights = np.array([row[:3] for row in rows]).reshape(-1, 3).T
+
+    def take(self, track: Track) -> int | None:
+        """Return the key of the nearest vehicle that goes on as a track, each only once."""
+        (x, y), (*_, height) = track.written_foot, track.box.xywh
+        larger, smaller = np.maximum(self._heights, height), np.minimum(self._heights, height)
+        distances = np.hypot(self._x - x, self._y - y)
+        fits = (larger <= _MOST_GROWTH * smaller) & (distances <= _REACH * larger)
+        if not fits.any():
+            return None
+        key = self._keys[int(np.argmin(np.where(fits, distances, np.inf)))]
+        self._heights[[each == key for each in self._keys]] = np.inf  # it is taken
+        return key

@@ -1,0 +1,82 @@
+"""Paths, and crossings as a function of them: asking changes nothing."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from traffic.scenes import (
+    HEIGHT,
+    LINE,
+    WIDTH,
+    ZONE,
+    feet,
+    frames,
+    joined,
+    numbered,
+    settings_for,
+    through,
+)
+from vdet.track.track import FrameTracks
+from vdet.traffic.borders import Border, place
+from vdet.traffic.counter import VehicleCounter
+from vdet.traffic.crossings import crossings
+from vdet.traffic.linking import VehiclePath, link_tracks
+
+SETTINGS = settings_for(LINE, ZONE).traffic
+DOWN = through((0, 600, 250), (5, 600, 550))  # in the zone at 0.83 s, on the line at 2.5 s
+
+
+def rounded(path: VehiclePath, border: Border) -> list[tuple[float, int, str, float | None]]:
+    """Return the crossings, with the number of the frame."""
+    return [
+        (round(e.time, 2), int(path.frames[e.row]), e.direction, e.seconds and round(e.seconds, 2))
+        for e in crossings(path, border)
+    ]
+
+
+def test_the_path_of_a_vehicle_has_the_rows_of_all_its_tracks() -> None:
+    old = frames(through((0, 600, 250), (2, 600, 370)), seconds=2)
+    new = numbered(frames(through((2.2, 600, 382), (5, 600, 550))), 7)
+    (path,) = link_tracks(joined(old, new), WIDTH, HEIGHT)
+    assert (path.vehicle, path.tracks, path.seconds) == (1, ((0.0, 1), (2.2, 7)), 5)
+    assert path.points[[0, path.seen - 1]].tolist() == [[600, 250], [600, 550]]
+    line, zone = (each for (each,) in place(SETTINGS, WIDTH, HEIGHT))
+    assert rounded(path, line) == [(2.5, 63, "here", None)]
+    assert rounded(path, zone) == [(0.83, 21, "enter", None), (4.17, 105, "exit", 3.33)]
+
+
+def test_counts_in_the_middle_of_a_video_change_nothing() -> None:
+    asked, silent = (VehicleCounter(SETTINGS, WIDTH, HEIGHT) for _ in range(2))
+    gone = through((0, 700, 250), (3, 700, 450), (5, 700, 350), (6, 700, 250), gone=[(3, 4)])
+    for frame in frames(DOWN, gone):
+        asked.update(frame)
+        silent.update(frame)
+        asked.counts()
+        asked.so_far()
+    assert asked.counts() == asked.counts() == silent.counts()
+    assert len(silent.counts().events) > 5
+
+
+def test_the_counts_so_far_have_those_inside_a_zone() -> None:
+    counter = VehicleCounter(SETTINGS, WIDTH, HEIGHT)
+    inside = []
+    for frame in frames(DOWN, through((2, 300, 350), (4, 500, 350))):
+        counter.update(frame)
+        found = counter.so_far()
+        inside.append(found["zone", "enter"] - found["zone", "exit"] - found["zone", "vanish"])
+    assert [inside[25 * second] for second in (0, 2, 4, 6)] == [0, 1, 2, 0]
+    assert found["line", "here"] == 1
+
+
+def test_a_vehicle_that_stands_for_long_takes_no_memory() -> None:
+    def stands() -> Iterator[FrameTracks]:
+        drives = [(600.0, 300.0 + 2 * n) for n in range(50)]
+        waits = [(600.0 + n % 2, 399.0 - n % 3) for n in range(20_000)]
+        yield from feet(*drives, *waits, *((600.0, 400.0 + 2 * n) for n in range(50)))
+
+    (path,) = link_tracks(stands(), WIDTH, HEIGHT)
+    assert len(path.times) < 1000
+    assert path.seconds == pytest.approx(20_099 / 25)
+    line, _ = (each for (each,) in place(SETTINGS, WIDTH, HEIGHT))
+    (event,) = crossings(path, line)
+    assert (event.direction, path.frames[event.row]) == ("here", 20_050)
