@@ -13,7 +13,7 @@ from vdet.synthetic.scene import Scene
 FRAMES = 60
 NAMES = {
     *("road.mp4", "truth.txt", "found.mp4", "found.csv"),
-    *("pole.mp4", "pole.txt", "lines.yaml", "counted.mp4", "pole.csv", "flows.csv", "page"),
+    *("pole.mp4", "pole.txt", "gate.yaml", "counted.mp4", "pole.csv", "flows.csv", "page"),
     *("training", "patches.zip", "model.npz", "model.json", "model.csv", "stages"),
 }
 

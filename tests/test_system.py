@@ -29,8 +29,9 @@ assert vdet.Detector().detect(np.full((360, 640, 3), 90, np.uint8)) is not None
 results = list(vdet.follow(clip, frames=8))
 assert len(results) == 8 and results[-1].tracks
 for overwrite in (False, True):
-    vdet.detect_video(clip, "out.mp4", tracks=["t.csv", "t.jsonl"], frames=8, overwrite=overwrite)
-visits = vdet.count_tracks("t.csv", lines).totals
+    run = vdet.Run(clip, frames=8, overwrite=overwrite)
+    vdet.detect_video(run, "out.mp4", tracks=["t.csv", "t.jsonl"])
+visits = vdet.count_tracks("t.csv", vdet.load_settings(lines)).totals
 assert max(total.count for total in visits) == len(results[-1].tracks)
 vdet.evaluate_tracks("t.csv", "t.csv")
 """
@@ -39,11 +40,14 @@ USES_THE_PROGRAM = """
 import sys
 from vdet.process import run
 
-sys.argv = ["vdet", "count", "t.jsonl", "--lines", "lines.yaml", "--counts", "counts.csv"]
+sys.argv = ["vdet", "count", "t.jsonl", "-c", "lines.yaml", "--counts", "counts.csv"]
 run()
 """
 
-LINES = "{size: [8, 8], zones: [{name: road, points: [[0, 0], [8, 0], [8, 8], [0, 8]]}]}"
+LINES = """
+camera: {size: [320, 180]}
+traffic: {zones: [{name: road, points: [[0, 0], [320, 0], [320, 180], [0, 180]]}]}
+"""
 
 
 def test_without_locks_limits_and_forks_vehicles_are_found_followed_and_counted(

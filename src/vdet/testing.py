@@ -21,6 +21,7 @@ from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import SinkContext, SinkKind
 from vdet.run.steps import StepContext, make_steps
 from vdet.track.track import TimedTracker, Track, VideoTracker
+from vdet.traffic.live import LiveTraffic
 
 RATE = 25
 """Frames a second of the scenes that the checks make."""
@@ -135,12 +136,16 @@ def _write(kind: SinkKind, path: Path, settings: Settings, *, still: bool, fails
     video = None if still else VideoInfo(Path("check.mp4"), WIDTH, HEIGHT, rate, 1 / rate, frames=3)
     steps = make_steps(StepContext(settings, WIDTH, HEIGHT, video))
     with OutputFiles() as files:
-        context = SinkContext(files, settings, video, stage_pictures=lambda i, _: {"frame": i})
+        traffic = LiveTraffic(settings, WIDTH, HEIGHT)
+        context = SinkContext(
+            files, settings, video, traffic=traffic, stage_pictures=lambda i, _: {"frame": i}
+        )
         with kind.open(path, context) as sink:
             for index in range(1 if still else 3):
                 result = _result(index)
                 for step in steps:
                     result = step.apply(result)
+                traffic.add(result.frame_tracks)
                 sink.write(result)
                 assert (result.frame.image == _scene(index)).all(), "the sink changed the frame"
             assert not _content(path), "the output is there before the run has ended"

@@ -168,14 +168,14 @@ def test_shares_need_the_size_of_the_frames(run: Run, tmp_path: Path) -> None:
         (["t.csv", "-c", "l.yaml", "--interval", "7min"], 1, "7min does not divide a day"),
         (["t.csv", "-c", "l.yaml", "--begin", "now"], 1, "'now' is not a time"),
         (
-            ["t.csv", "-c", "l.yaml", "--set", "camera.clock.pattern=%Y%m%d"],
+            ["t.csv", "-c", "l.yaml", "--set", "camera.clock.pattern='%Y%m%d'"],
             1,
             "t.csv: its name has no time like %Y%m%d",
         ),
         (
             ["t.csv", "t.csv", "-c", "l.yaml", "--begin", "2026-05-01 07:00"],
             2,
-            "for several videos give a pattern",
+            "for several give a pattern of their names",
         ),
         (["back.csv", "-c", "l.yaml"], 1, "back.csv:3: frame 1 is at 0.04 s; times must be"),
     ],

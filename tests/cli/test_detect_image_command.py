@@ -27,7 +27,8 @@ def test_never_writes_over_a_mask_that_it_reads(run: Run, picture: Path, tmp_pat
     mask = tmp_path / "mask.png"
     write_image(mask, read_image(picture))
     before = mask.read_bytes()
-    result = run("detect-image", picture, "--regions", mask, "-o", mask, "--overwrite")
+    regions = ("--set", f"regions=[{{name: a, mask: {mask}}}]")
+    result = run("detect-image", picture, *regions, "-o", mask, "--overwrite")
     assert (result.code, "is the input itself" in result.err) == (1, True)
     assert mask.read_bytes() == before
 

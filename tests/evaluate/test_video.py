@@ -159,7 +159,7 @@ def test_vehicles_outside_the_regions_do_not_count(
     clip = open_clip(clip_path, truth_path)
     middle = 220  # of 320 pixels; two of the three vehicles are to the left of it
     left = "{name: left, points: [[0, 0], [0.6875, 0], [0.6875, 1], [0, 1]]}"
-    (result,) = evaluate_clip(clip, [variant(f"regions.polygons=[{left}]")], no_progress)
+    (result,) = evaluate_clip(clip, [variant(f"regions=[{left}]")], no_progress)
     for frame in result.comparison.frames:
         for boxes in (frame.vehicle_boxes, frame.track_boxes):
             assert (boxes[:, [0, 2]].mean(axis=1) <= middle).all()

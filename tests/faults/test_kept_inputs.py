@@ -25,7 +25,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for number in range(1, 4):
         show(tmp_path / "frames" / f"img_{number:04d}.png", road(CAR))
     shutil.copy(tmp_path / "frames" / "img_0001.png", tmp_path / "mask.png")
-    (tmp_path / "settings.yaml").write_text("regions: {mask: mask.png}\n")
+    (tmp_path / "settings.yaml").write_text("regions: [{name: road, mask: mask.png}]\n")
     (tmp_path / "link.png").symlink_to("mask.png")
     write_drive(tmp_path / "in.mp4", 3)
     return tmp_path

@@ -71,7 +71,7 @@ class Files:
     @property
     def lanes(self) -> tuple[str | Path, ...]:
         """The options that find red cars and the lane."""
-        return *self.red, "--lanes", "--camera", self.camera
+        return *self.red, "-c", self.camera, "--lanes"
 
 
 @pytest.fixture(scope="module")
@@ -237,7 +237,7 @@ def test_without_a_camera_no_distortion_is_corrected_and_one_warning_says_so(
     check_lane(plain["lane"], road.camera, Undistorter(None, WIDTH, HEIGHT))
     assert bare["lane"] is None
     assert result.err.count("warning") == 1
-    assert "--lanes without --camera: lens distortion is not corrected" in result.err
+    assert "lanes.enabled without camera.lens: lens distortion is not corrected" in result.err
     assert (read_image(out / "bare.png") == read_image(files.bare)).all()
 
 
@@ -258,7 +258,7 @@ def test_a_picture_of_another_aspect_ratio_does_not_stop_the_others(
     write_image(other, read_image(files.plain)[:400])
     result = run("detect-image", other, files.picture, "-o", out, *files.lanes)
     assert result.code == 3
-    assert "other.png: camera: is for 640×480" in result.err
+    assert "other.png: camera.lens: is for 640×480" in result.err
     assert [path.name for path in out.iterdir()] == ["frame.png"]
 
 
@@ -269,9 +269,9 @@ def test_a_video_of_another_aspect_ratio_is_refused(run: Run, files: Files, tmp_
         LensSettings(width=1280, height=720, matrix=matrix, distortion=(0, 0, 0, 0, 0), rms=0), wide
     )
     outputs = (tmp_path / "out.mp4", "--tracks", tmp_path / "t.csv")
-    result = run("detect-video", files.clip, *outputs, *files.red, "--lanes", "--camera", wide)
+    result = run("detect-video", files.clip, *outputs, *files.red, "-c", wide, "--lanes")
     assert result.code == 1
-    assert f"{files.clip}: camera: is for 1280×720" in result.err
+    assert f"{files.clip}: camera.lens: is for 1280×720" in result.err
     assert list(tmp_path.iterdir()) == [wide]
 
 
@@ -281,11 +281,8 @@ def test_wrong_cameras_are_refused(run: Run, files: Files, tmp_path: Path, comma
     source, outputs = files.clip, [out]
     if command == "detect-image":
         source, outputs = files.picture, [Path("-o"), tmp_path / "out.png"]
-    result = run(command, source, *outputs, "--camera", files.camera)
-    assert result.code == 2
-    assert "--camera goes with --lanes" in result.err
-    path.write_text("width: 640\nheight: 480\n")
-    result = run(command, source, *outputs, "--lanes", "--camera", path)
+    path.write_text("camera: {lens: {width: 640, height: 480}}")
+    result = run(command, source, *outputs, "--lanes", "-c", path)
     assert result.code == 1
-    assert "matrix: is missing" in result.err
+    assert "camera.lens.matrix: is missing" in result.err
     assert list(tmp_path.iterdir()) == [path]

@@ -37,7 +37,11 @@ def run_batch(
         The cluster of `workers` cannot be used, or its scheduler has ended.
     """
     make_folder(plan.folder)
-    runs = [replace(run, threads=run.threads or threads) for run in plan.runs]
+    runs = [
+        replace(run, threads=number, codec_threads=number)
+        for run in plan.runs
+        for number in (run.threads or threads,)
+    ]
     function = partial(_process, identity=plan.identity)
     try:
         with (

@@ -149,6 +149,7 @@ def detect_video(
     if no_video and not wanted:
         raise click.UsageError("nothing would be written; give an output, such as --tracks")
     settings = choice.read()
+    options.warn_of_lens(settings)
     check_counting(settings, several=batch.folder is not None)
     from vdet.regions import check_masks
     from vdet.run.video import Run

@@ -76,7 +76,7 @@ def images(
 @options.short_form(
     "--model FILE",
     "detector.model",
-    "Test this model on all of DATA; without one, a new model is tested on the last patches of "
+    "Test this model on all of DATA. Without one, a new model is tested on the last patches of "
     "each folder.",
 )
 @options.settings_options("train.svm.C=1e-4")

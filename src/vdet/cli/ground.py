@@ -7,7 +7,7 @@ from vdet.errors import ConfigError, counted
 
 
 @command("vdet ground -c gate.yaml")
-@options.settings_options("camera.size=[1280, 720]")
+@options.settings_options("camera.size=[960,540]")
 def ground(choice: options.SettingsChoice) -> None:
     """Check the points of the ground, which turn pixels into metres.
 

@@ -4,6 +4,7 @@ A *bundle* adds several options to a command, which gets their values as one arg
 """
 
 import json
+import logging
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields
@@ -40,6 +41,8 @@ PROCESSES = click.IntRange(1, 256)
 RATE = click.FloatRange(min=0, min_open=True)
 SHARE = click.FloatRange(0, 1)
 TIME_FORM = "[[HH:]MM:]SS"
+
+log = logging.getLogger("vdet")
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -183,7 +186,6 @@ model_option = short_form(
     "--model FILE",
     "detector.model",
     "Model of the detector: .npz from vdet train, or .onnx. It decides which detector runs.",
-    str,
 )
 lanes_option = short_form("--lanes", "lanes.enabled", "Find the lane too, and draw it.")
 
@@ -201,7 +203,7 @@ class SettingsChoice:
         Raises `ConfigError`.
         """
         short = click.get_current_context().meta.get(_SHORT, [])
-        given = (f"{key}={json.dumps(value)}" for key, value in short)
+        given = (f"{key}={json.dumps(value, default=str)}" for key, value in short)
         assignments = (*self.assignments, *given, *more)
         if not (self.configs or assignments or detector):
             from vdet.config.schema import Settings
@@ -231,6 +233,12 @@ class SettingsChoice:
         return settings
 
 
+def warn_of_lens(settings: "Settings") -> None:
+    """Warn if the lane is looked for in frames whose lens is not known."""
+    if settings.lanes.enabled and settings.camera.lens is None:
+        log.warning("lanes.enabled without camera.lens: lens distortion is not corrected")
+
+
 def settings_options(example: str, *more: Callable[..., Any]) -> Callable[[F], F]:
     """Add `-c FILE`, `--set KEY=VALUE` and `more` options: `choice`, a `SettingsChoice`.
 
@@ -239,7 +247,7 @@ def settings_options(example: str, *more: Callable[..., Any]) -> Callable[[F], F
     config = option(
         "-c, --config FILE",
         "Read settings from a YAML file, or from a shipped one: default, svm or seed. Can be "
-        "repeated; later files win.",
+        "repeated. Later files win.",
         str,
         name="configs",
         multiple=True,

@@ -4,8 +4,6 @@ import re
 from datetime import datetime
 from typing import Annotated
 
-import numpy as np
-import numpy.typing as npt
 from pydantic import Field, field_validator
 from pydantic_core.core_schema import ValidationInfo
 
@@ -62,8 +60,8 @@ class LensSettings(Section):
                 )
         return matrix
 
-    def matrix_for(self, width: int, height: int) -> npt.NDArray[np.float64]:
-        """Return the camera matrix `(3, 3)` for frames of another size, but the same aspect ratio.
+    def matrix_for(self, width: int, height: int) -> tuple[_Row, _Row, _Row]:
+        """Return the camera matrix for frames of another size, but the same aspect ratio.
 
         Raises
         ------
@@ -78,7 +76,7 @@ class LensSettings(Section):
             )
         (fx, _, cx), (_, fy, cy), last = self.matrix
         x, y = (cx + 0.5) * across - 0.5, (cy + 0.5) * down - 0.5
-        return np.array([(fx * across, 0, x), (0, fy * down, y), last])
+        return (fx * across, 0.0, x), (0.0, fy * down, y), last
 
 
 class GroundPoint(Section):

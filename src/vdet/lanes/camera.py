@@ -39,7 +39,7 @@ class Undistorter:
         self._camera = camera
         if camera:
             self._size = width, height
-            self._matrix = camera.matrix_for(width, height)
+            self._matrix = np.array(camera.matrix_for(width, height))
             self._to_rays = np.linalg.inv(self._matrix)
             self._distortion = np.array(camera.distortion)
 

@@ -53,7 +53,9 @@ class Run:
     overwrite
         Replace outputs that are there already.
     threads
-        Number of threads that search, and of the encoder; None for one per core.
+        Number of threads that search; None for one per core.
+    codec_threads
+        Number of threads of the encoder; None for one per core.
     timeout
         Seconds in which the next frame must be read or written. After that the run fails, so that
         a disk or a network that hangs does not stop a batch. Reading gets the duration of the part
@@ -69,6 +71,7 @@ class Run:
     at: Fraction = Fraction(0)
     overwrite: bool = False
     threads: int | None = None
+    codec_threads: int | None = None
     timeout: float = IO_TIMEOUT
 
     def __post_init__(self) -> None:
@@ -256,7 +259,7 @@ def _context(run: Run, files: OutputFiles, video: OpenVideo) -> SinkContext:
         info,
         is_part=run.is_part,
         at=run.at,
-        threads=run.threads or core_count(),
+        threads=run.codec_threads or core_count(),
         clock=find_clock(run.source, run.settings, info.tags.creation_time, float(info.start)),
         timeout=run.timeout,
         outputs=run.outputs,

@@ -1,11 +1,14 @@
 """What counts vehicles and measures their speeds while a video is processed."""
 
+from typing import TYPE_CHECKING
+
 from vdet.config.schema import Settings
-from vdet.lanes.ground import ground_of
 from vdet.track.track import FrameTracks
-from vdet.traffic.counter import VehicleCounter
-from vdet.traffic.counts import Counts
-from vdet.traffic.speeds import SpeedMeter, with_speeds
+
+if TYPE_CHECKING:  # most runs need neither
+    from vdet.traffic.counter import VehicleCounter
+    from vdet.traffic.counts import Counts
+    from vdet.traffic.speeds import SpeedMeter
 
 
 class LiveTraffic:
@@ -24,17 +27,32 @@ class LiveTraffic:
         The ground does not fit the frames, `width` × `height` pixels.
     """
 
+    counter: "VehicleCounter | None" = None
+    speeds: "SpeedMeter | None" = None
+
     def __init__(self, settings: Settings, width: int, height: int) -> None:
-        counts, ground = settings.traffic, ground_of(settings.camera, width, height)
-        self.counter = VehicleCounter(counts, width, height) if counts else None
-        self.speeds = SpeedMeter(ground, width, height) if ground else None
+        if settings.traffic:
+            from vdet.traffic.counter import VehicleCounter
+
+            self.counter = VehicleCounter(settings.traffic, width, height)
+        if settings.camera.ground:
+            from vdet.lanes.ground import ground_of
+            from vdet.traffic.speeds import SpeedMeter
+
+            if ground := ground_of(settings.camera, width, height):
+                self.speeds = SpeedMeter(ground, width, height)
 
     def add(self, frame: FrameTracks) -> None:
         """Add the tracks of the next frame."""
-        for reader in (self.counter and self.counter.update, self.speeds and self.speeds.add):
-            if reader:
-                reader(frame)
+        if self.counter:
+            self.counter.update(frame)
+        if self.speeds:
+            self.speeds.add(frame)
 
-    def counts(self) -> Counts | None:
-        """Return all counts, with the speeds that are known; the video has ended."""
-        return with_speeds(self.counter.counts(), self.speeds) if self.counter else None
+    def counts(self) -> "Counts | None":
+        """Return all counts so far, with the speeds that are known."""
+        if self.counter is None:
+            return None
+        from vdet.traffic.speeds import with_speeds
+
+        return with_speeds(self.counter.counts(), self.speeds)
