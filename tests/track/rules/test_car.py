@@ -10,15 +10,12 @@ BOX = Box.sized(100, 60, 80, 60)
 FRAME = np.random.default_rng(0).integers(0, 256, (240, 320, 3), dtype=np.uint8)
 
 
-def seen(times: int = 1) -> Car:
-    car = Car(SEED_TRACKER)
-    for _ in range(times):
-        car.see(Region(BOX, (140, 90), 2.0), FRAME)
-    return car
+SEEN = Region(BOX, (140, 90), 2.0)
 
 
 def test_box_and_centroid_are_averages_over_the_last_ten_detections() -> None:
-    car = seen()
+    car = Car(SEED_TRACKER)
+    car.see(SEEN, FRAME)
     for i in range(10):
         car.see(Region(Box.sized(10 * i, 20 + i, 60 + 2 * i, 51), (10.0 * i, 5.0), 2.0), FRAME)
     assert car.box == Box.sized(45, 24, 69, 51)
@@ -26,12 +23,12 @@ def test_box_and_centroid_are_averages_over_the_last_ten_detections() -> None:
 
 
 def test_matches_in_a_row_are_ended_by_a_region_and_not_by_a_miss() -> None:
-    car = seen()
-    car.see(Region(BOX, (140, 90), 2.0), FRAME, by_match=True)
+    car = Car(SEED_TRACKER)
+    car.see(SEEN, FRAME, by_match=True)
     car.miss()
-    car.see(Region(BOX, (140, 90), 2.0), FRAME, by_match=True)
+    car.see(SEEN, FRAME, by_match=True)
     assert car.matches == 2
-    car.see(Region(BOX, (140, 90), 2.0), FRAME)
+    car.see(SEEN, FRAME)
     assert car.matches == 0
 
 

@@ -170,13 +170,6 @@ def test_a_car_whose_last_detections_all_were_matches_is_deleted(max_matches: in
     assert ids(see(cars, SEDAN)[0]) == [2]
 
 
-def test_a_region_in_between_ends_the_row_of_matches() -> None:
-    cars = RulesTracker(tracker_but(max_matches=3))
-    show(cars, SEDAN)
-    for boxes in ([], [], [SEDAN], [], []):
-        assert ids(update(cars, road(SEDAN), *boxes)) == [1]
-
-
 @pytest.mark.parametrize(
     ("misses", "max_misses", "id_after"), [(4, 5, 1), (5, 5, 2), (2, 2, 2), (1, 2, 1)]
 )
@@ -198,20 +191,6 @@ def test_ids_follow_the_order_in_which_cars_are_first_shown() -> None:
     see(cars, SEDAN, VAN, frames=5)
     shown = see(cars, VAN, SEDAN, frames=5)
     assert [(track.id, track.box) for track in shown[-1]] == [(1, SEDAN), (2, VAN)]
-
-
-def test_a_shown_box_is_the_average_of_the_last_ten() -> None:
-    cars = RulesTracker(SEED_TRACKER)
-    for x in range(100, 124, 2):
-        tracks = update(cars, road(), moved_to(SEDAN, x, 200))
-    assert tracks == [Track(1, moved_to(SEDAN, 113, 200), 1.0, state="seen")]
-
-
-def test_the_two_cars_that_one_becomes_are_shown_in_the_same_frame() -> None:
-    cars = RulesTracker(SEED_TRACKER)
-    see(cars, Box.sized(100, 200, 260, 100), frames=10)
-    (tracks,) = see(cars, Box.sized(70, 200, 120, 100), Box.sized(250, 200, 110, 100))
-    assert [(track.id, track.box.x1) for track in tracks] == [(1, 250), (2, 70)]
 
 
 # Scores, classes, and the frame

@@ -3,7 +3,7 @@
 For each vehicle a Kalman filter (`state`) estimates where it is in the next frame. Then
 
 1.  a detection belongs to the vehicle whose expected box it overlaps most, all pairs taken
-    together (`association`). The less certain the expected box is, the farther off its detection
+    together (`pairing`). The less certain the expected box is, the farther off its detection
     may be. The less they look alike (`appearance`), the less an overlap is worth. Present vehicles
     choose first, then those not yet sure;
 2.  a box that is cut off by the frame's side is measured by its inner edge only (`state`);

@@ -31,18 +31,13 @@ def appearances(picture: Picture | None, boxes: Float64Array) -> Float64Array:
     float64 `(n, 2, 3)`: levels from 0 to 255, as the planes hold them; NaN without a picture.
     """
     if picture is None or not len(boxes):
-        return np.tile(unknown_appearance(), (len(boxes), 1, 1))
+        return np.full((len(boxes), 2, 3), np.nan)
     sides = _MARGIN * (boxes[:, 2:] - boxes[:, :2])
     inner = boxes + np.concatenate([sides, -sides], axis=1)
     halves = np.stack([inner, inner], axis=1)
     halves[:, 0, 3] = halves[:, 1, 1] = inner[:, [1, 3]].mean(axis=1)
     means = [_mean(picture, half) for half in halves.reshape(-1, 4)]
     return np.reshape(means, (-1, 2, 3))
-
-
-def unknown_appearance() -> Float64Array:
-    """Return an appearance, `(2, 3)`, that differs from none."""
-    return np.full((2, 3), np.nan)
 
 
 def differences(some: Float64Array, others: Float64Array) -> Float64Array:

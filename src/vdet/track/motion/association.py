@@ -70,7 +70,7 @@ CLEAR = 0.8
 """A detection on a nearer vehicle that scores less than this share of its score is a part of it."""
 
 
-def are_hidden(boxes: Float64Array, present: BoolArray) -> BoolArray:
+def are_hidden(boxes: Float64Array, present: Sequence[bool]) -> BoolArray:
     """Return for each box whether another one covers more than half of it and is not farther.
 
     Parameters
@@ -78,11 +78,11 @@ def are_hidden(boxes: Float64Array, present: BoolArray) -> BoolArray:
     boxes
         Shape `(n, 4)`: x1, y1, x2, y2 in pixels, each with an area.
     present
-        Shape `(n,)`: those that can hide others.
+        For each whether it can hide others.
     """
     bottoms = boxes[:, 3]
     farther = bottoms < (bottoms - _LEVEL * (bottoms - boxes[:, 1]))[:, np.newaxis]
-    hiding = (coverage(boxes, boxes) > HIDDEN) & present & ~farther
+    hiding = (coverage(boxes, boxes) > HIDDEN) & np.array(present, bool) & ~farther
     np.fill_diagonal(hiding, val=False)
     return np.asarray(hiding.any(axis=1))
 

@@ -94,7 +94,7 @@ class MotionTracker:
         every_box = self._visible([place.mean for _, place in placed])
         rows = np.flatnonzero(_are_large(every_box))
         placed, boxes = [placed[row] for row in rows], every_box[rows]
-        hidden = are_hidden(boxes, np.array([place.state != "lost" for _, place in placed], bool))
+        hidden = are_hidden(boxes, [place.state != "lost" for _, place in placed])
         shown: list[tuple[Vehicle, Place, Float64Array, float]] = []
         for (vehicle, place), box, is_hidden in zip(placed, boxes, hidden, strict=True):
             seen_score, score = vehicle.history.scores(time)
@@ -103,9 +103,8 @@ class MotionTracker:
                 shown.append((vehicle, place, box, score))
         shown_boxes = np.reshape([box for _, _, box, _ in shown], (-1, 4))
         nested = are_nested(shown_boxes, [score for *_, score in shown])
-        tracks = [
-            self._track(*each) for each, inner in zip(shown, nested, strict=True) if not inner
-        ]
+        each = zip(shown, nested, strict=True)
+        tracks = [self._track(*which) for which, is_nested in each if not is_nested]
         return sorted(tracks, key=lambda track: track.id)
 
     def _place(self, vehicle: Vehicle, time: float) -> Place | None:
@@ -149,7 +148,8 @@ class MotionTracker:
         return self._visible([vehicle.state.mean[:, 0] for vehicle in vehicles])
 
     def _hidden(self) -> BoolArray:
-        present = np.array([each.is_present for each in self._vehicles], bool)
+        """Return for each vehicle whether one that is present hides it."""
+        present = [each.is_present for each in self._vehicles]
         return are_hidden(self._boxes(self._vehicles), present)
 
     def _pair(self, observations: Sequence[Observation]) -> dict[int, int]:

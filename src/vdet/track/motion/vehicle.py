@@ -8,10 +8,11 @@ It is measured in seconds of detections with score 1, so that it does not depend
 import math
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from vdet.boxes import Float64Array
 from vdet.config.schema import MotionTrackerSettings
 from vdet.detect.classes import ClassScores
-from vdet.track.motion.appearance import unknown_appearance
 from vdet.track.motion.history import SCORE_TIME, History, Moment
 from vdet.track.motion.state import MotionState
 
@@ -58,7 +59,7 @@ class Observation:
     box: Float64Array
     score: float
     class_name: str | None = None
-    appearance: Float64Array = field(default_factory=unknown_appearance)
+    appearance: Float64Array = field(default_factory=lambda: np.full((2, 3), np.nan))
 
     @property
     def noise(self) -> float:
