@@ -24,6 +24,8 @@ class Stretch:
         Mean over the frames of the best IoU with any box of the other side. Of a mistake, near 0:
         there is no such box. Below 0.5: the box fits badly. Above: the box is matched with another
         one.
+    step
+        Frames from one that is compared to the next.
     """
 
     kind: Literal["found", "missed", "false alarm"]
@@ -32,11 +34,12 @@ class Stretch:
     last: int
     partner: int | None
     overlap: float
+    step: int = 1
 
     @property
     def boxes(self) -> int:
         """Number of boxes."""
-        return self.last - self.first + 1
+        return (self.last - self.first) // self.step + 1
 
     @property
     def middle(self) -> int:
@@ -103,8 +106,9 @@ def stretches(comparison: Comparison) -> tuple[Stretch, ...]:
     Frames in which a vehicle or a track does not count are in no stretch.
     """
     ids = comparison.vehicle_ids, comparison.track_ids
-    of_vehicles = _stretches(comparison.frames, *ids)
-    of_tracks = _stretches([_swapped(frame) for frame in comparison.frames], *ids[::-1])
+    step = comparison.step
+    of_vehicles = _stretches(comparison.frames, *ids, step)
+    of_tracks = _stretches([_swapped(frame) for frame in comparison.frames], *ids[::-1], step)
     alarms = [replace(each, kind="false alarm") for each in of_tracks if each.partner is None]
     return *of_vehicles, *alarms
 
@@ -116,7 +120,7 @@ def _swapped(frame: ComparedFrame) -> ComparedFrame:
 
 
 def _stretches(
-    frames: Sequence[ComparedFrame], ids: Int64Array, others: Int64Array
+    frames: Sequence[ComparedFrame], ids: Int64Array, others: Int64Array, step: int
 ) -> list[Stretch]:
     seen: list[list[tuple[int, int | None, float]]] = [[] for _ in ids]
     for frame in frames:
@@ -128,14 +132,14 @@ def _stretches(
     for id_, each in zip(ids.tolist(), seen, strict=True):
         runs: list[list[tuple[int, int | None, float]]] = []
         for number, partner, overlap in each:
-            if not runs or runs[-1][-1][:2] != (number - 1, partner):
+            if not runs or runs[-1][-1][:2] != (number - step, partner):
                 runs.append([])
             runs[-1].append((number, partner, overlap))
         for run in runs:
             (first, partner, _), (last, *_) = run[0], run[-1]
             mean = sum(overlap for *_, overlap in run) / len(run)
             kind: Literal["found", "missed"] = "missed" if partner is None else "found"
-            found.append(Stretch(kind, id_, first, last, partner, mean))
+            found.append(Stretch(kind, id_, first, last, partner, mean, step))
     return found
 
 
