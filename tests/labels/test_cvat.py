@@ -28,6 +28,12 @@ def track(content: str, label: str = "car") -> str:
     return document(f'<track id="3" label="{label}" source="manual">{content}</track>')
 
 
+def task(start: int, stop: int, boxes: str, rule: str = "") -> bytes:
+    meta = f"<start_frame>{start}</start_frame><stop_frame>{stop}</stop_frame>"
+    meta += f"<frame_filter>{rule}</frame_filter>"
+    return track(boxes).replace("<size>", f"{meta}<size>").encode()
+
+
 def rows(text: str) -> tuple[Label, ...]:
     return read_cvat(FILE, text.encode()).labels
 
@@ -43,6 +49,21 @@ class TestReading:
     def test_the_size_of_the_frames_is_read(self) -> None:
         assert read_cvat(FILE, document("").encode()).size == (640, 360)
         assert read_cvat(FILE, b"<annotations/>").size is None
+
+    def test_a_box_moves_to_the_next_one_until_one_is_outside(self) -> None:
+        keys = "".join(
+            f'<box frame="{frame}" outside="{outside}" xtl="{x}" ytl="0" xbr="{x + 9}" ybr="9"/>'
+            for frame, outside, x in ((2, 0, 10), (4, 0, 30), (6, 1, 30), (98, 0, 50))
+        )
+        read = read_cvat(FILE, task(0, 99, keys))
+        places = [(each.frame - 1, each.box[0]) for each in read.labels]
+        assert places == [(2, 10), (3, 20), (4, 30), (5, 30), (98, 50), (99, 50)]
+
+    def test_only_frames_of_the_task_are_read(self) -> None:
+        keys = BOX.replace('frame="0"', 'frame="40"') + BOX.replace('frame="0"', 'frame="50"')
+        read = read_cvat(FILE, task(40, 60, keys, "step=5"))
+        assert [each.frame - 1 for each in read.labels] == [40, 45, 50, 55, 60]
+        assert list(read.known or ()) == [40, 45, 50, 55, 60]
 
     def test_the_zip_file_that_cvat_exports_is_read(self, tmp_path: Path) -> None:
         path = tmp_path / "task.zip"
@@ -113,6 +134,15 @@ class TestWriting:
         (track(BOX.replace(' xtl="10"', "")), "5: <box> without its 'xtl'"),
         (track(BOX.replace("10", "NaN")), "5: 'NaN' is not a number"),
         (track(BOX.replace("/>", ' rotation="30"/>')), "5: the box is rotated"),
+        (task(0, 9, BOX, "step=x").decode(), "4: the frame filter 'step=x' is unknown"),
+        (
+            task(1, 9, BOX, "step=2").decode(),
+            "5: the box is in frame 0, which the task does not have; it has every 2. frame from 1",
+        ),
+        (
+            document("<meta><job/></meta>"),
+            " has several tasks; export each as 'CVAT for video 1.1'",
+        ),
         (document("").replace("640", "wide"), "4: 'wide' is not a number"),
         (document("").replace("640", "6" * 2000), "4: '66666"),
     ],

@@ -3,11 +3,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from labels.saving import car, frame, written
+from labels.saving import car, checked_video, frame, row, written
 from vdet.errors import TruthError
+from vdet.evaluate.comparison import compare
+from vdet.evaluate.timelines import stretches
 from vdet.labels import mot
 from vdet.labels.formats import Format, track_formats
 from vdet.labels.reading import read_truth
+from vdet.labels.video import spread_frames
 
 MOT = "1,7,11,21,30,40,1,3,1\n2,7,11,21,30,40,1,3,1\n"
 KITTI = "".join(
@@ -86,3 +89,34 @@ def test_tracks_of_every_format_can_be_truth(tmp_path: Path, form: Format) -> No
     assert np.allclose(video.boxes, [[10, 20, 40, 60]] * 3, atol=0.01)
     assert video.scores.tolist() == [1, 1, 1]
     assert video.ignored.tolist() == [False, False, True]
+
+
+STEPPED = {
+    "cvat": (
+        "<annotations><meta><task><start_frame>0</start_frame><stop_frame>10</stop_frame>"
+        '<frame_filter>step=5</frame_filter></task></meta><track id="1" label="car">'
+        + "".join(
+            f'<box frame="{f}" outside="0" xtl="1" ytl="1" xbr="9" ybr="9"/>' for f in (0, 5, 10)
+        )
+        + "</track></annotations>"
+    ),
+    "a.jsonl": "".join(
+        f'{{"frame": {f}, "time": {f}, "tracks": '
+        '[{"id": 1, "x": 1, "y": 1, "width": 8, "height": 8}]}\n'
+        for f in (0, 5, 10)
+    ),
+}
+
+
+@pytest.mark.parametrize("name", STEPPED)
+def test_only_frames_that_the_truth_is_about_are_compared(tmp_path: Path, name: str) -> None:
+    path = tmp_path / name
+    path.write_text(STEPPED[name])
+    truth = read_truth(path)
+    found = checked_video([row(0, n, 1, 1, 1, 8, 8) for n in range(1, 12) if n != 6])
+    comparison = compare(found, truth)
+    assert [frame.number for frame in comparison.frames] == [1, 6, 11]
+    kinds = [(each.kind, each.first, each.last, each.boxes) for each in stretches(comparison)]
+    assert kinds == [("found", 1, 1, 1), ("missed", 6, 6, 1), ("found", 11, 11, 1)]
+    assert truth.known is not None
+    assert spread_frames(truth.known.tolist(), 4, 1, 11) == {1, 6, 11}

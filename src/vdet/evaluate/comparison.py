@@ -89,12 +89,15 @@ class Comparison:
         int64: the id in its file of every vehicle and track that has a box in `frames`.
     seconds
         Length of the video, None if it is not known.
+    step
+        Frames from one that the truth is about to the next; the smallest such number.
     """
 
     frames: tuple[ComparedFrame, ...]
     vehicle_ids: Int64Array
     track_ids: Int64Array
     seconds: float | None
+    step: int = 1
 
     def vehicle_lengths(self) -> Int64Array:
         """Return the number of boxes of every vehicle, int64."""
@@ -116,9 +119,9 @@ def compare(
     Source: Bernardin and Stiefelhagen, "Evaluating Multiple Object Tracking Performance: The CLEAR
     MOT Metrics", 2008.
 
-    The video is taken to end with the last frame that either of them knows. If the truth covers
-    only a part of the video, cut the predictions with `until` first; otherwise all later ones are
-    false alarms.
+    Predictions in frames that the truth is not about are left out. The video is taken to end with
+    the last frame that either of them knows. If the truth covers only a part of the video, cut the
+    predictions with `until` first; otherwise all later ones are false alarms.
 
     Parameters
     ----------
@@ -130,6 +133,10 @@ def compare(
     TruthError
         There are more than `MAX_IDS`, `MAX_IN_FRAME` or `MAX_PAIRS`, far more than on any road.
     """
+    step = 1
+    if truth.known is not None:
+        prediction = prediction.where(np.isin(prediction.frames, truth.known))
+        step = int(np.diff(truth.known).min(initial=truth.last_frame or 1))
     _check_size(prediction, truth)
     numbers = np.union1d(prediction.frames, truth.frames).tolist()
     kept = [_apply_regions(prediction.frame(number), truth.frame(number)) for number in numbers]
@@ -152,7 +159,7 @@ def compare(
                 partners[frame.found] = frame.found_by
     rate = rate or prediction.rate or truth.rate
     seconds = max(prediction.last_frame, truth.last_frame) / rate if rate else None
-    return Comparison(tuple(frames), vehicle_ids, track_ids, seconds)
+    return Comparison(tuple(frames), vehicle_ids, track_ids, seconds, step)
 
 
 def pool(comparisons: Sequence[Comparison]) -> Comparison:

@@ -24,6 +24,8 @@ class Stretch:
         Mean over the frames of the best IoU with any box of the other side. Of a mistake, near 0:
         there is no such box. Below 0.5: the box fits badly. Above: the box is matched with another
         one.
+    step
+        Frames from one that is compared to the next.
     """
 
     kind: Literal["found", "missed", "false alarm"]
@@ -32,11 +34,12 @@ class Stretch:
     last: int
     partner: int | None
     overlap: float
+    step: int = 1
 
     @property
     def boxes(self) -> int:
         """Number of boxes."""
-        return self.last - self.first + 1
+        return (self.last - self.first) // self.step + 1
 
     @property
     def name(self) -> str:
@@ -126,7 +129,8 @@ def stretches(comparison: Comparison) -> tuple[Stretch, ...]:
         for id_, overlap in zip(track_ids, frame.iou.max(axis=0, initial=0).tolist(), strict=True):
             if id_ not in used:
                 alarms[id_].append((frame.number, None, overlap))
-    return *_stretches(vehicles, "missed"), *_stretches(alarms, "false alarm")
+    step = comparison.step
+    return *_stretches(vehicles, "missed", step), *_stretches(alarms, "false alarm", step)
 
 
 _Seen = tuple[int, int | None, float]
@@ -134,16 +138,16 @@ _Seen = tuple[int, int | None, float]
 
 
 def _stretches(
-    seen: Mapping[int, Sequence[_Seen]], mistake: Literal["missed", "false alarm"]
+    seen: Mapping[int, Sequence[_Seen]], mistake: Literal["missed", "false alarm"], step: int
 ) -> Iterator[Stretch]:
     for id_, boxes in seen.items():
-        # Numbers of consecutive frames are at one distance from their places in the list.
-        runs = groupby(enumerate(boxes), lambda each: (each[1][0] - each[0], each[1][1]))
+        # Numbers of frames that follow one another are at one distance from their places.
+        runs = groupby(enumerate(boxes), lambda each: (each[1][0] - step * each[0], each[1][1]))
         for (_, partner), run in runs:
             numbers, _, overlaps = zip(*(box for _, box in run), strict=True)
             kind = mistake if partner is None else "found"
             overlap = sum(overlaps) / len(overlaps)
-            yield Stretch(kind, id_, numbers[0], numbers[-1], partner, overlap)
+            yield Stretch(kind, id_, numbers[0], numbers[-1], partner, overlap, step)
 
 
 def mistakes(found: Sequence[Stretch]) -> tuple[Stretch, ...]:

@@ -71,10 +71,11 @@ def read_predictions(path: Path) -> LabelledVideo:
 
 def read_truth(path: Path, roles: Roles = DEFAULT_ROLES) -> LabelledVideo:
     """Read the truth of a video from any format of tracks, as `read_true_labels` does."""
-    return LabelledVideo.of(read_true_labels(path, roles))
+    saved = read_true_labels(path, roles)
+    return LabelledVideo.of(saved.labels, known=saved.known)
 
 
-def read_true_labels(path: Path, roles: Roles) -> tuple[Label, ...]:
+def read_true_labels(path: Path, roles: Roles) -> SavedTracks:
     """Read the vehicles and ignore regions of a video from any format of tracks.
 
     Boxes without a label are vehicles. In MOTChallenge flag 0 marks an ignore region, also in the
@@ -95,10 +96,11 @@ def read_true_labels(path: Path, roles: Roles) -> tuple[Label, ...]:
         names = ", ".join(each.name for each in track_formats())
         raise TruthError(f"{path}: is empty; give {names}")
     form = recognise(path, data)
-    labels: Iterable[Label] = form.read(path, data).labels
+    saved = form.read(path, data)
+    labels: Iterable[Label] = saved.labels
     if form is MOT:  # in the older form, the column of the score is the flag
         labels = (each._replace(ignored=each.score == 0 or each.ignored) for each in labels)
-    return checked_labels(path, _with_roles(path, labels, roles))
+    return replace(saved, labels=checked_labels(path, _with_roles(path, labels, roles)))
 
 
 def _with_roles(path: Path, labels: Iterable[Label], roles: Roles) -> Iterator[Label]:

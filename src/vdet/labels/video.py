@@ -2,7 +2,7 @@
 
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from operator import attrgetter
@@ -28,6 +28,8 @@ class SavedTracks:
     listed
         The frames that the file lists, also those without a box, counted from 0, ascending; empty
         where it lists only boxes.
+    covered
+        The frames that the file is about, where it has a rule for them; the others are not known.
     times
         Seconds of each frame with a time in the file; empty if the format has no times.
     size
@@ -41,6 +43,12 @@ class SavedTracks:
     times: Mapping[int, float] = field(default_factory=dict)
     size: tuple[int, int] | None = None
     begin: datetime | None = None
+    covered: range | None = None
+
+    @property
+    def known(self) -> Sequence[int] | None:
+        """The frames that the file is about, from 0; None: all up to its last box."""
+        return self.covered if self.covered is not None else self.listed or None
 
     @property
     def frame_count(self) -> int | None:
@@ -95,6 +103,19 @@ def _track(label: Label) -> Track:
     return Track(number, whole, score, state, named, foot, distance, lane)
 
 
+def spread_frames(known: Iterable[int] | None, every: int, first: int, last: int) -> set[int]:
+    """Return numbers of frames from `first` to `last`, each at least `every` after the one before.
+
+    Only the `known` ones are taken, which ascend; None: any.
+    """
+    chosen, wanted = set(), first
+    for number in range(first, last + 1) if known is None else known:
+        if wanted <= number <= last:
+            chosen.add(number)
+            wanted = number + every
+    return chosen
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class LabelledVideo:
     """The boxes of a video, one row each, ordered by frame.
@@ -116,6 +137,9 @@ class LabelledVideo:
         Number of frames of the video, None if it is not known.
     rate
         Frames per second, None if they are not known.
+    known
+        int64: numbers of the frames that the labels are about, ascending; of the others nothing is
+        known. None: all frames.
     """
 
     frames: Int64Array
@@ -125,12 +149,20 @@ class LabelledVideo:
     ignored: BoolArray
     frame_count: int | None = None
     rate: float | None = None
+    known: Int64Array | None = None
 
     @staticmethod
     def of(
-        labels: Iterable[Label], *, frame_count: int | None = None, rate: float | None = None
+        labels: Iterable[Label],
+        *,
+        frame_count: int | None = None,
+        rate: float | None = None,
+        known: Sequence[int] | None = None,
     ) -> "LabelledVideo":
-        """Order labels by frame, without checks; those of one frame keep their order."""
+        """Order labels by frame, without checks; those of one frame keep their order.
+
+        `known` are the frames that they are about, from 0.
+        """
         ordered = sorted(labels, key=lambda label: label.frame)
         return LabelledVideo(
             frames=np.array([label.frame for label in ordered], np.int64),
@@ -140,6 +172,7 @@ class LabelledVideo:
             ignored=np.array([label.ignored for label in ordered], np.bool_),
             frame_count=frame_count,
             rate=rate,
+            known=None if known is None else np.array(known, np.int64) + 1,
         )
 
     def __len__(self) -> int:

@@ -15,6 +15,7 @@ from vdet.labels.label import Label
 from vdet.labels.pictures import LabelledPicture, LabelledPictures
 from vdet.labels.reading import read_labelled_pictures, read_true_labels
 from vdet.labels.roles import Roles
+from vdet.labels.video import spread_frames
 from vdet.media.reader import VideoReader
 
 MAX_PIXELS = 640_000
@@ -141,13 +142,16 @@ def clip_source(video: Path, truth_file: Path, settings: Settings) -> Source:
     """
     frames: dict[int, list[Label]] = defaultdict(list)
     roles = Roles.for_training(settings)
-    for label in read_true_labels(truth_file, roles):
+    truth = read_true_labels(truth_file, roles)
+    for label in truth.labels:
         name = roles.class_of(label.name or "car") or "vehicle"
         frames[label.frame].append(label._replace(name=name))
-    samples = []
-    with VideoReader(video, frames=max(frames, default=0), settings=settings.input) as reader:
+    samples, last = [], max(frames, default=0)
+    known = None if truth.known is None else (index + 1 for index in truth.known)
+    used = spread_frames(known, EVERY, EVERY, last)
+    with VideoReader(video, frames=last, settings=settings.input) as reader:
         for number, frame in enumerate(reader, start=1):
-            if number % EVERY == 0:
+            if number in used:
                 labelled = LabelledPicture(video, truth_file, tuple(frames[number]))
                 samples.append(_sample(frame.image, labelled, settings.train.net.classes))
     source, classes = NetSource(video.name, samples), settings.train.net.classes

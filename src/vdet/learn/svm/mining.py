@@ -24,7 +24,7 @@ from vdet.errors import DataError, ImageError, TruthError, VideoError
 from vdet.labels.pictures import LabelledPicture
 from vdet.labels.reading import read_labelled_pictures, read_truth
 from vdet.labels.roles import Roles
-from vdet.labels.video import LabelledVideo
+from vdet.labels.video import LabelledVideo, spread_frames
 from vdet.learn.svm.choosing import MOST, Most, PatchKind, choose_windows, cut_sides
 from vdet.learn.svm.dataset import patch_archive
 from vdet.media import Picture
@@ -62,9 +62,9 @@ class LabelledFrame:
 class VideoSource:
     """A labelled video.
 
-    Of the frames `first` to `last`, counted from 1, every `every`-th is used. Those in which a side
-    of the frame cuts a vehicle off are rare and hard to learn, so all of them are used. If `last`
-    is None, it is the last frame of the truth.
+    Of the frames `first` to `last`, counted from 1, that the truth is about, every `every`-th is
+    used. Those in which a side of the frame cuts a vehicle off are rare and hard to learn, so all
+    of them are used. If `last` is None, it is the last frame of the truth.
     """
 
     path: Path
@@ -90,6 +90,8 @@ class VideoSource:
         last = min(self.last or truth.last_frame, truth.last_frame)
         if last < self.first:
             raise TruthError(f"{self.truth}: ends at frame {truth.last_frame}; begin earlier")
+        known = None if truth.known is None else truth.known.tolist()
+        regular = spread_frames(known, self.every, self.first, last)
         number = 0
         with VideoReader(self.path, frames=last, settings=settings.input) as reader:
             info, advance = reader.info, progress(last)
@@ -99,18 +101,17 @@ class VideoSource:
             for frame in frames:
                 number = frame.index + 1
                 labels = truth.frame(number)
-                if self._uses(number, labels, info.width):
+                if number in regular or self._cuts_off(number, labels, info.width):
                     image, name = frame.image, f"frame{number:06}"
                     yield LabelledFrame(name, frame.index, image, search(image), labels)
                 advance(1)
         if number < last:
             truth.check_end(self.truth, number)
 
-    def _uses(self, number: int, labels: LabelledVideo, width: int) -> bool:
-        """Return whether a frame is used: every n-th, and those that cut a vehicle off."""
-        is_regular = (number - self.first) % self.every == 0
-        cuts_off = any(cut_sides(box, width).any() for box in labels.boxes[~labels.ignored])
-        return number >= self.first and (is_regular or cuts_off)
+    def _cuts_off(self, number: int, labels: LabelledVideo, width: int) -> bool:
+        """Return whether a frame that may be used cuts a vehicle off."""
+        vehicles = labels.boxes[~labels.ignored]
+        return number >= self.first and any(cut_sides(box, width).any() for box in vehicles)
 
 
 @dataclass(frozen=True, slots=True)
