@@ -155,7 +155,7 @@ ground_option = option(
 lines_option = option("--lines FILE", "Lines and zones at which vehicles are counted (.yaml).")
 
 
-def jobs_option(text: str = "Work in N processes.") -> Callable[[F], F]:
+def jobs_option(text: str) -> Callable[[F], F]:
     """Add `--jobs N`."""
     return option("--jobs N", text, PROCESSES, show_default="one for each core")
 
