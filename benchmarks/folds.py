@@ -10,7 +10,6 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import astuple, dataclass, field, replace
 from fractions import Fraction
-from functools import partial
 from pathlib import Path
 
 import joblib
@@ -28,8 +27,7 @@ from vdet.evaluate.scores import score
 from vdet.labels.label import Label
 from vdet.labels.reading import read_truth
 from vdet.labels.video import LabelledVideo
-from vdet.learn.svm.augmentation import augment
-from vdet.learn.svm.box_regression import extract_box_patches, fit_split_boxes
+from vdet.learn.svm.box_regression import fit_boxes
 from vdet.learn.svm.dataset import PatchFile, find_patches
 from vdet.learn.svm.extraction import LabelledVectors, extract
 from vdet.learn.svm.fitting import fit
@@ -37,7 +35,7 @@ from vdet.media import Frame, Picture
 from vdet.media.reader import VideoReader
 from vdet.run.loop import Pipeline, SearchRate, peek
 from vdet.track.factory import make_tracker
-from vdet.workers import limit_library_threads, make_workers
+from vdet.workers import limit_library_threads
 
 BLOCKS = 5
 LEAST = 0.2  # probability of the windows that are kept for the sweeps
@@ -140,24 +138,15 @@ def _models(sources: Sequence[Path], last: int, settings: Settings) -> list[Line
     patches = find_patches(sources)
     files = [file for file in patches if not file.is_boxed]
     boxed = [file for file in patches if file.is_boxed]
-    training = settings.train.svm
-    workers = make_workers()
-    data = extract(
-        files,
-        settings.svm.features,
-        training,
-        workers=workers,
-        augmenter=partial(augment, settings=training.augmentation),
-    )
-    boxes = extract_box_patches(files, boxed, settings, workers=workers)
-    assert boxes is not None
+    features = settings.svm.features
+    data, boxes = (extract(each, features, settings.train.svm) for each in (files, boxed))
 
     def without(block: int) -> LinearModel:
         def held_out(some: LabelledVectors) -> BoolArray:
             return np.equal(_block_of(_frames_of(some.files), last), block)
 
         model = fit(data.of(~held_out(data)), settings)
-        return replace(model, box_regression=fit_split_boxes(data, boxes, held_out, settings)[0])
+        return replace(model, box_regression=fit_boxes((data, boxes), held_out, features)[0])
 
     at_once = joblib.Parallel(n_jobs=2, prefer="threads", verbose=5)
     return list(at_once(joblib.delayed(without)(block) for block in range(BLOCKS)))

@@ -15,7 +15,6 @@ from vdet.config.svm import (
     FeatureSettings,
     HeatSettings,
     HistogramSettings,
-    HogSettings,
     PerspectiveSettings,
     ScoreSettings,
     SearchSettings,
@@ -31,9 +30,7 @@ WIDTH, HEIGHT = 320, 240
 SCALE = REFERENCE_HEIGHT / HEIGHT
 CAR = Box.sized(96, 120, 64, 48)
 BINS = 8
-COLOUR = FeatureSettings(
-    color_space="RGB", hog=HogSettings(channels=()), histogram=HistogramSettings(bins=BINS)
-)
+COLOUR = FeatureSettings(color_space="RGB", histogram=HistogramSettings(bins=BINS))
 BAND = WindowSettings(size=32, overlap=0.75, top=96, bottom=192)
 SETTINGS = Settings(
     detector=SvmSettings(
@@ -62,7 +59,7 @@ def by_perspective(horizon: float | None, *sizes: float) -> Settings:
 
     Rows are right for a horizon of 0.35; at None it is looked for.
     """
-    perspective = PerspectiveSettings(sizes=sizes, horizon=horizon, highest=0.9, lowest=2.1, step=2)
+    perspective = PerspectiveSettings(sizes=sizes, horizon=horizon, highest=0.9, lowest=2.1)
     return Settings(
         detector=SvmSettings(
             stride=1,
@@ -82,8 +79,8 @@ THREE_SETS = by_perspective(0.35, 0.15, 0.2, 0.25)
 
 def red_finder() -> LinearModel:
     """Give a model that is sure of a window where 44 % of the pixels are bright red."""
-    weights = np.zeros((1, 3 * BINS), np.float32)
-    weights[0, BINS - 1] = 1 / COLOUR.patch**2
+    weights = np.zeros((1, COLOUR.length), np.float32)
+    weights[0, COLOUR.hog_length + BINS - 1] = 1 / COLOUR.patch**2
     return LinearModel(
         COLOUR,
         weights,

@@ -13,9 +13,7 @@ from pathlib import Path
 import pytest
 
 from conftest import Run
-from drawn_patches import write_patches
 from running import SOON, Gate, frames_of, names, start, until, with_modules, write_drive
-from vdet.detect.svm.model import load_model
 from vdet.errors import ClusterError
 from vdet.workers import DaskCluster, WorkerKilledError
 
@@ -175,18 +173,6 @@ def test_when_a_worker_is_killed_its_file_is_done_again(cluster: Cluster, tmp_pa
     assert result.code == 0, result.err
     assert names(out) == ["long.mp4", "manifest.jsonl"]
     assert frames_of(out / "long.mp4") == 150
-
-
-def test_training_on_a_cluster_gives_the_same_model(run: Run, address: str, tmp_path: Path) -> None:
-    patches = tmp_path / "patches"
-    write_patches(patches, seed=5, vehicles=80, non_vehicles=80)
-    cheap = ("--set", "detector.features.hog.channels=[0]")
-    there, here = tmp_path / "there.npz", tmp_path / "here.npz"
-    assert run("train", patches, "-o", there, *cheap, "--scheduler", address).code == 0
-    assert run("train", patches, "-o", here, *cheap, "--jobs", "1").code == 0
-    first, second = load_model(there), load_model(here)
-    assert (first.weights == second.weights).all()
-    assert first.provenance["data_sha256"] == second.provenance["data_sha256"]
 
 
 def test_workers_with_another_version_are_refused(

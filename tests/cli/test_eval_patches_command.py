@@ -21,7 +21,7 @@ def test_trains_a_model_and_tests_it(run: Run, patches_path: Path, tmp_path: Pat
     assert found["test"]["patches"] == 65
     assert found["test"]["accuracy"]["value"] > 0.9
     html = (folder / "page.html").read_text()
-    for words in ("ROC curve", "Worst mistakes", "<svg"):
+    for words in ("By class and by group", "Worst mistakes"):
         assert words in html
 
 

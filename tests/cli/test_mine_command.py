@@ -19,7 +19,7 @@ from vdet.synthetic.scene import Scene
 from vdet.synthetic.truth import write_truth
 
 SETS = ", ".join(
-    f"{{size: {size}, step: 1, top: {top}, bottom: {bottom}}}"
+    f"{{size: {size}, overlap: 0.875, top: {top}, bottom: {bottom}}}"
     for size, top, bottom in ((40, 400, 500), (80, 380, 520), (160, 360, 600))
 )
 WINDOWS = (
@@ -28,7 +28,7 @@ WINDOWS = (
     "--set",
     f"detector.search.windows=[{SETS}]",
 )
-BELOW = "detector.search.windows=[{size: 80, step: 1, top: 900, bottom: 990}]"
+BELOW = "detector.search.windows=[{size: 80, overlap: 0.875, top: 900, bottom: 990}]"
 NAME = re.compile(r"frame(\d{6})_x(-?\d+)_y(\d+)_s(\d{4})\.png")
 
 
@@ -71,7 +71,7 @@ def test_mines_patches_that_train_learns_from(
         f"{counts['non-vehicles/mined_road']} false alarms, "
         f"{counts['non-vehicles/mined_road_parts']} more on parts of vehicles; from 3 frames\n"
     )
-    quick = ("--jobs", "1", "--set", "detector.features.hog.channels=[0]")
+    quick = ("--jobs", "1")
     learnt = run("train", patches_path, target, "-o", model_path, *quick)
     assert learnt.code == 0, learnt.err
     for group, count in counts.items():

@@ -151,7 +151,7 @@ def test_a_byte_order_mark_is_skipped(tmp_path: Path) -> None:
         ("train.svm.C=1e-3", {"train": {"svm": {"C": 0.001}}}),
         ("a=b=c", {"a": "b=c"}),
         ("heat={frames: 3, blur: 0}", {"heat": {"frames": 3, "blur": 0}}),
-        ("features.hog.channels=[0, 2]", {"features": {"hog": {"channels": [0, 2]}}}),
+        ("features.halved=[0, 2]", {"features": {"halved": [0, 2]}}),
         ("heat=", {"heat": None}),
     ],
 )

@@ -67,8 +67,6 @@ finite = st.floats(allow_nan=False, allow_infinity=False)
 def windows(draw: st.DrawFn) -> WindowSettings:
     size, top = draw(st.integers(10, 500)), draw(st.integers(0, 1000))
     bottom = top + size + draw(st.integers(0, 1000))
-    if draw(st.booleans()):
-        return WindowSettings(size=size, step=draw(st.integers(1, 99)), top=top, bottom=bottom)
     return WindowSettings(size=size, overlap=draw(st.floats(0, 0.85)), top=top, bottom=bottom)
 
 
@@ -77,7 +75,7 @@ detectors = st.builds(
     features=st.builds(
         FeatureSettings,
         color_space=st.sampled_from(["YCrCb", "RGB", "LUV"]),
-        hog=st.builds(HogSettings, channels=st.sampled_from([(), (0,), (2, 0), (0, 1, 2)])),
+        hog=st.builds(HogSettings, orientations=st.integers(2, 32)),
         histogram=st.builds(HistogramSettings, bins=st.sampled_from([8, 256])),
     ),
     search=st.builds(

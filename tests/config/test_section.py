@@ -8,7 +8,7 @@ from vdet.config.section import scale_lengths
 from vdet.config.svm import HeatSettings, SearchSettings, WindowSettings
 from vdet.config.tracker import RulesTrackerSettings
 
-WINDOWS = (WindowSettings(size=64, step=1, top=400, bottom=500),)
+WINDOWS = (WindowSettings(size=64, overlap=0.5, top=400, bottom=500),)
 BOTH = Settings(
     detector=SvmSettings(search=SearchSettings(windows=WINDOWS)), tracker=RulesTrackerSettings()
 )

@@ -17,17 +17,14 @@ import pytest
 from hostile.mutations import mutated, with_other_words
 from hostile.trials import broken_promises, files_in, try_all
 from vdet.config.svm import FeatureSettings, HistogramSettings, HogSettings
-from vdet.detect.svm.features import Layout
 from vdet.detect.svm.model import FORMAT_VERSION, load_model
 from vdet.errors import ModelError
 
 FEATURES = FeatureSettings(
     patch=16,
-    hog=HogSettings(orientations=4, cell=8, block=1, channels=(0,)),
+    hog=HogSettings(orientations=4, cell=8, block=1),
     histogram=HistogramSettings(bins=8),
 )
-LENGTH = Layout.of(FEATURES).length
-HOG_LENGTH = Layout.of(FEATURES).hog_length
 HEADER = json.dumps(
     {
         "format": "vdet model",
@@ -72,11 +69,11 @@ def members(header: str | bytes = HEADER) -> dict[str, bytes]:
     rng = np.random.default_rng(0)
     return {
         "header": npy(np.frombuffer(text, np.uint8)),
-        "weights": npy(rng.normal(size=(1, LENGTH)).astype(np.float32)),
+        "weights": npy(rng.normal(size=(1, FEATURES.length)).astype(np.float32)),
         "biases": npy(ones),
         "slopes": npy(-ones),
         "offsets": npy(ones),
-        "box_weights": npy(rng.normal(0, 0.1, (4, HOG_LENGTH)).astype(np.float32)),
+        "box_weights": npy(rng.normal(0, 0.1, (4, FEATURES.hog_length)).astype(np.float32)),
         "box_biases": npy(np.array([-0.4, -0.3, 0.4, 0.3], np.float32)),
     }
 
@@ -106,7 +103,7 @@ def bad_models() -> Iterator[bytes]:
         yield zipped({other: part for other, part in whole.items() if other != name})
     for _ in range(20):
         name, kind = rng.choice(names), str(rng.choice(KINDS))
-        data = npy_header(kind, SHAPES[rng.integers(len(SHAPES))]) + bytes(4 * LENGTH)
+        data = npy_header(kind, SHAPES[rng.integers(len(SHAPES))]) + bytes(4 * FEATURES.length)
         yield zipped(whole | {name: data})
     for _ in range(17):
         name = rng.choice(names[1:])
@@ -152,7 +149,7 @@ def bombs() -> dict[str, tuple[bytes, str]]:
     many = FEATURES.model_dump(mode="json") | {
         "patch": 256,
         "halved": [],
-        "hog": {"orientations": 32, "cell": 2, "block": 8, "channels": [0, 1, 2]},
+        "hog": {"orientations": 32, "cell": 2, "block": 8},
     }
     asking = json.dumps(json.loads(HEADER) | {"features": many})
     file = io.BytesIO()
@@ -169,7 +166,7 @@ def bombs() -> dict[str, tuple[bytes, str]]:
         ),
         "ninety million features, asked for": (
             zipped(members(asking)),
-            r"has weights of shape \(1, 40\) instead of \(1, 89\d{6}\)",
+            r"has weights of shape \(1, 72\) instead of \(1, 89\d{6}\)",
         ),
         "more than it claims to be": (
             claiming(zipped({"header": bytes(300_000_000)}), 1000),

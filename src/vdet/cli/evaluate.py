@@ -80,7 +80,7 @@ def images(
     "each folder.",
 )
 @options.settings_options("train.svm.C=1e-4")
-@options.jobs_option()
+@options.jobs_option("Describe patches in N threads.")
 @results_options
 def patches(
     data: tuple[Path, ...],

@@ -149,7 +149,7 @@ start_option = option(
 end_option = option(f"--end {TIME_FORM}", "Stop before this time.", parse_time)
 
 
-def jobs_option(text: str = "Work in N processes.") -> Callable[[F], F]:
+def jobs_option(text: str) -> Callable[[F], F]:
     """Add `--jobs N`."""
     return option("--jobs N", text, PROCESSES, show_default="one for each core")
 

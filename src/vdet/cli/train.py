@@ -17,15 +17,13 @@ from vdet.files import check_output
 @click.argument("data", nargs=-1, required=True, type=options.INPUT, metavar="DATA...")
 @options.output_file_option("Model file to write, .npz.")
 @options.settings_options("train.svm.C=1e-4")
-@options.jobs_option()
-@options.scheduler_option
+@options.jobs_option("Describe patches in N threads.")
 @options.overwrite_option
 def train(
     data: tuple[Path, ...],
     output: Path,
     choice: options.SettingsChoice,
     jobs: int | None,
-    scheduler: str | None,
     overwrite: bool,
 ) -> None:
     """Train a linear model on labelled patches.
@@ -35,8 +33,6 @@ def train(
     is; vdet mine writes it. With it the model learns where the sides of vehicles are. The metrics
     are printed, and written beside the model as JSON.
     """
-    if jobs and scheduler:
-        raise click.UsageError("--jobs is for this machine; leave it out, or --scheduler")
     settings = choice.read(detector="svm")
     options.check_suffix(output, ".npz", what="models")
     metrics_path = output.with_suffix(".json")
@@ -46,11 +42,9 @@ def train(
     from vdet.learn.svm.dataset import find_patches
     from vdet.learn.svm.training import train as fit_model
 
-    if scheduler:  # the workers were started in other folders
-        data = tuple(path.absolute() for path in data)
     files = find_patches(data)
     with progress_steps("") as steps:
-        model, metrics = fit_model(files, settings, jobs=jobs, scheduler=scheduler, steps=steps)
+        model, metrics = fit_model(files, settings, jobs=jobs, steps=steps)
     save_model(model, output, overwrite=overwrite)
     metrics.write(metrics_path, overwrite=overwrite)
     print_lines(*metrics.lines(), "", f"{output}: the model; {metrics_path}: the metrics")

@@ -11,9 +11,6 @@ from vdet.config.section import FRAME_LENGTH, Pixels, Section, Share
 ColorSpace = Literal["YCrCb", "HSV", "LUV", "HLS", "YUV", "RGB"]
 
 
-ChannelNumbers = Annotated[tuple[Literal[0, 1, 2], ...], Field(max_length=3)]
-
-
 class HogSettings(Section):
     """Histograms of oriented gradients (Dalal & Triggs 2005), as cv2.HOGDescriptor gives them."""
 
@@ -23,15 +20,13 @@ class HogSettings(Section):
     """Side of a cell, in pixels of the patch."""
     block: int = Field(2, ge=1, le=8)
     """Side of a block, in cells."""
-    channels: ChannelNumbers = (0, 1, 2)
-    """Channels of the colour space that have HOG features."""
 
 
 class HistogramSettings(Section):
     """Colour histogram of each channel."""
 
-    bins: Literal[8, 16, 32, 64, 128, 256] | None = 32
-    """Number of equal bins for values of 0 to 255. null: no histogram."""
+    bins: Literal[8, 16, 32, 64, 128, 256] = 32
+    """Number of equal bins for values of 0 to 255."""
 
 
 class FeatureSettings(Section):
@@ -41,7 +36,7 @@ class FeatureSettings(Section):
     """Side of a patch, in pixels."""
     color_space: ColorSpace = "YCrCb"
     """Colour space: YCrCb, HSV, LUV, HLS, YUV or RGB."""
-    halved: ChannelNumbers = (1, 2)
+    halved: Annotated[tuple[Literal[0, 1, 2], ...], Field(max_length=3)] = (1, 2)
     """Channels that are described at half their size, with HOG cells of half the side. Video has
     chroma at half size.
     """
@@ -50,18 +45,28 @@ class FeatureSettings(Section):
 
     @model_validator(mode="after")
     def _cells_fill_the_patch(self) -> "FeatureSettings":
-        if not (self.hog.channels or self.histogram.bins):
-            raise ValueError("at least one of hog and histogram must be on")
-        if self.hog.channels:
-            if self.patch % self.hog.cell:
-                raise ValueError(f"patch must be a multiple of hog.cell ({self.hog.cell})")
-            if self.hog.block * self.hog.cell > self.patch:
-                raise ValueError("hog.block × hog.cell must not exceed patch")
-            if self.halved and (self.hog.cell % 2 or self.hog.cell < 4):
-                raise ValueError("hog.cell must be even, and 4 or more, or halved must be []")
-        if self.halved and self.patch % 2:
-            raise ValueError("patch must be even, or halved must be []")
+        if self.patch % self.hog.cell:
+            raise ValueError(f"patch must be a multiple of hog.cell ({self.hog.cell})")
+        if self.hog.block * self.hog.cell > self.patch:
+            raise ValueError("hog.block × hog.cell must not exceed patch")
+        if self.halved and (self.hog.cell % 2 or self.hog.cell < 4):
+            raise ValueError("hog.cell must be even, and 4 or more, or halved must be []")
         return self
+
+    @property
+    def blocks(self) -> int:
+        """Number of blocks across a patch; blocks are a cell apart."""
+        return self.patch // self.hog.cell - self.hog.block + 1
+
+    @property
+    def hog_length(self) -> int:
+        """Number of HOG features, which come first; 4,704 for the seed's settings."""
+        return 3 * self.blocks**2 * self.hog.block**2 * self.hog.orientations
+
+    @property
+    def length(self) -> int:
+        """Number of all features; 4,800 for the seed's settings."""
+        return self.hog_length + 3 * self.histogram.bins
 
     def shrink(self, channel: int) -> int:
         """Return how many times smaller than the patch a channel is described: 1 or 2."""
@@ -73,10 +78,8 @@ class WindowSettings(Section):
 
     size: Annotated[int, Field(ge=8, le=100_000), FRAME_LENGTH]
     """Side of a window, in pixels."""
-    overlap: float | None = Field(None, ge=0, lt=1)
-    """Share of a window that the next one covers too. Give either overlap or step."""
-    step: int | None = Field(None, ge=1)
-    """Distance to the next window, in cells of the patch. Faster than overlap."""
+    overlap: float = Field(ge=0, lt=1)
+    """Share of a window that the next one covers too."""
     top: Pixels
     """First row of the band."""
     bottom: Pixels
@@ -86,9 +89,7 @@ class WindowSettings(Section):
     def _fits_its_band(self) -> "WindowSettings":
         if self.bottom - self.top < self.size:
             raise ValueError("bottom must be at least top + size")
-        if (self.overlap is None) == (self.step is None):
-            raise ValueError("one of overlap and step must be given, the other left out or null")
-        if self.overlap is not None and int(self.size * (1 - self.overlap)) < 1:
+        if int(self.size * (1 - self.overlap)) < 1:
             raise ValueError("overlap leaves a step of less than a pixel")
         return self
 
@@ -117,8 +118,6 @@ class PerspectiveSettings(Section):
     """
     beyond: Share = 0.7
     """Share of a window that may lie beyond the left or right of the frame."""
-    step: int = Field(1, ge=1, le=64)
-    """Distance to the next window, in cells of the patch."""
 
     @model_validator(mode="after")
     def _is_in_order(self) -> "PerspectiveSettings":

@@ -33,8 +33,6 @@ class SvmTrainingSettings(Section):
     """
     seed: int = Field(0, ge=0, le=2**32 - 1)
     """Seed of the split, the folds and the augmentation."""
-    max_broken: Share = 0.01
-    """Largest accepted share of unreadable patches."""
     ensemble: bool = False
     """true: keep an SVM for each fold of the calibration and average their probabilities. false:
     fit one SVM to everything.

@@ -46,8 +46,8 @@ class EngineResults:
 def compare(model: LinearModel, grids: list[WindowGrid], pixels: Image | Planes) -> EngineResults:
     """Search a frame with both engines."""
     frame = _pyramid(pixels, model.features, grids)
-    dense = [DenseSearch(model, grid).search(frame).probabilities for grid in grids]
-    patch = [PatchSearch(model, grid).search(frame).probabilities for grid in grids]
+    dense = [DenseSearch(model, grid).search(frame, 0.5).probabilities for grid in grids]
+    patch = [PatchSearch(model, grid).search(frame, 0.5).probabilities for grid in grids]
     return EngineResults(log_odds(np.concatenate(dense)), log_odds(np.concatenate(patch)))
 
 
@@ -85,7 +85,7 @@ def with_boxes(model: LinearModel) -> LinearModel:
     crops = [_crop(*each, rng) for each in zip(patches, zooms, strict=True)]
     extractor = FeatureExtractor(model.features)
     vectors = extractor.describe_all(to_patch(crop, model.features.patch) for crop, _ in crops)
-    hogs = vectors[:, : extractor.layout.hog_length].astype(np.float64)
+    hogs = vectors[:, : model.features.hog_length].astype(np.float64)
     targets = np.array([sides for _, sides in crops])
     weights, biases = _ridge(hogs, targets - targets.mean(axis=0))
     biases = biases + targets.mean(axis=0)
@@ -131,7 +131,7 @@ def cars() -> Image:
     return road()[360:560, 560:1000]
 
 
-def grid_of(size: int, *, overlap: float | None = None, step: int | None = None) -> WindowGrid:
-    """Lay windows of 48 to 128 pixels over `cars`; a patch has eight cells."""
-    settings = WindowSettings(size=size, overlap=overlap, step=step, top=8, bottom=size + 52)
-    return lay_grid(settings, 440, 200, 8)
+def grid_of(size: int, *, overlap: float) -> WindowGrid:
+    """Lay windows of 48 to 128 pixels over `cars`; an eighth of a window is a cell."""
+    settings = WindowSettings(size=size, overlap=overlap, top=8, bottom=size + 52)
+    return lay_grid(settings, 440, 200)

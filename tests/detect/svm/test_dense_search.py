@@ -3,6 +3,7 @@
 A texture that is drawn into one window must be found in that window.
 """
 
+from dataclasses import replace
 from fractions import Fraction
 
 import cv2
@@ -11,17 +12,15 @@ import pytest
 from benchmarks.patch_search import PatchSearch
 
 from vdet.boxes import Image
-from vdet.config.svm import FeatureSettings, HistogramSettings, HogSettings
+from vdet.config.svm import FeatureSettings, HogSettings
 from vdet.detect.svm.dense_search import DenseSearch
 from vdet.detect.svm.features import FeatureExtractor
-from vdet.detect.svm.model import LinearModel
+from vdet.detect.svm.model import BoxRegression, LinearModel
 from vdet.detect.svm.pyramid import FramePyramid
-from vdet.detect.svm.windows import WindowGrid
+from vdet.detect.svm.windows import WINDOW_SIDES, WindowGrid
 from vdet.media import Picture
 
-FEATURES = FeatureSettings(
-    patch=64, hog=HogSettings(cell=8), histogram=HistogramSettings(bins=None)
-)
+FEATURES = FeatureSettings(patch=64, hog=HogSettings(cell=8))
 GRIDS = [  # whole cells, one and a half, and other distances
     (64, 8),
     (64, 16),
@@ -46,6 +45,7 @@ def texture(side: int) -> Image:
 def texture_finder(members: int) -> LinearModel:
     """Return a model for which the texture is the most probable vehicle."""
     vector = FeatureExtractor(FEATURES).describe(texture(64))
+    vector[FEATURES.hog_length :] = 0
     weights = np.tile(vector / np.linalg.norm(vector) ** 2, (members, 1))
     return LinearModel(
         FEATURES,
@@ -70,7 +70,7 @@ def test_a_texture_is_most_probable_in_the_window_that_it_fills(
         x, y, w, h = grid.boxes[index].tolist()
         frame = np.full((2 * size + 6 * step, 2 * size + 8 * step, 3), 100, np.uint8)
         frame[y : y + h, x : x + w] = texture(size)
-        found = search.search(FramePyramid(Picture(frame), FEATURES)).probabilities
+        found = search.search(FramePyramid(Picture(frame), FEATURES), 1).probabilities
         assert found.shape == (35,)
         assert found.dtype == np.float32
         assert int(found.argmax()) == index
@@ -85,20 +85,26 @@ def test_a_grid_may_be_a_window_a_row_or_a_column(
     model = texture_finder(1)
     frame = FramePyramid(Picture(texture(256)), FEATURES)
     search = DenseSearch(model, grid)
-    expected = PatchSearch(model, grid).search(frame).probabilities
-    np.testing.assert_allclose(search.search(frame).probabilities, expected, atol=0.1)
+    expected = PatchSearch(model, grid).search(frame, 1).probabilities
+    np.testing.assert_allclose(search.search(frame, 1).probabilities, expected, atol=0.1)
 
 
 @pytest.mark.parametrize(("size", "step"), GRIDS)
-def test_the_hog_features_of_a_window_give_its_probability(size: int, step: int) -> None:
+def test_the_sides_in_a_hit_are_those_of_its_hog_features(size: int, step: int) -> None:
+    """The regression repeats the model, so the sides of a hit give its decision value."""
     grid = WindowGrid(size, Fraction(step), Fraction(4), Fraction(6), 7, 5)
-    model = texture_finder(2)
-    search = DenseSearch(model, grid)
-    found = search.search(FramePyramid(Picture(texture(400)), FEATURES))
-    numbers = np.random.default_rng(1).permutation(len(grid))
-    hogs = found.hogs(numbers)
-    assert hogs.shape == (len(grid), FeatureExtractor(FEATURES).layout.hog_length)
-    assert hogs.dtype == np.float32
-    expected = model.probabilities(hogs)  # there are no other features
-    np.testing.assert_allclose(found.probabilities[numbers], expected, atol=1e-5)
-    assert len(np.unique(expected.round(4))) > len(grid) / 2
+    model = texture_finder(1)
+    weights = np.repeat(model.weights[:, : FEATURES.hog_length], 4, axis=0)
+    regression = BoxRegression(weights, np.repeat(model.biases, 4))
+    search = DenseSearch(replace(model, box_regression=regression), grid)
+    frame = FramePyramid(Picture(texture(400)), FEATURES)
+    least = float(np.median(search.search(frame, 1).probabilities))
+    found = search.search(frame, least)
+    hits = found.probabilities >= least
+    assert found.sides.shape == (35, 4)
+    assert found.sides.dtype == np.float32
+    for side in found.sides[hits].T:
+        expected = model.to_probabilities(side[:, np.newaxis])
+        np.testing.assert_allclose(found.probabilities[hits], expected, atol=1e-5)
+    assert len(np.unique(found.sides[hits].round(4))) > 8
+    np.testing.assert_array_equal(found.sides[~hits], np.tile(WINDOW_SIDES, (17, 1)))

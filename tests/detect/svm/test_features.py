@@ -7,10 +7,9 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from seed import SEED
-from vdet.config.svm import ColorSpace, FeatureSettings, HistogramSettings, HogSettings
+from vdet.config.svm import ColorSpace, FeatureSettings
 from vdet.detect.svm.features import (
     FeatureExtractor,
-    Layout,
     cut_window,
     halve,
     histogram,
@@ -20,7 +19,6 @@ from vdet.detect.svm.features import (
 
 PATCH = np.random.default_rng(0).integers(0, 256, (64, 64, 3), dtype=np.uint8)
 FEATURES = SEED.svm.features
-NO_HOG = HogSettings(channels=())
 
 
 def seed_but(**changes: object) -> FeatureSettings:
@@ -30,17 +28,9 @@ def seed_but(**changes: object) -> FeatureSettings:
 
 def test_a_vector_of_the_seed_settings_has_4800_features() -> None:
     extractor = FeatureExtractor(FEATURES)
-    assert extractor.layout == Layout.of(FEATURES)
-    assert extractor.layout.length == 3 * 1568 + 96 == 4800
+    assert (FEATURES.hog_length, FEATURES.length) == (3 * 1568, 4800)
     assert extractor.describe(PATCH).shape == (4800,)
     assert extractor.describe(PATCH).dtype == np.float32
-
-
-def test_the_layout_names_the_parts_of_a_vector() -> None:
-    layout = Layout.of(FEATURES)
-    assert layout.hog == (slice(0, 1568), slice(1568, 3136), slice(3136, 4704))
-    assert layout.histogram == slice(4704, 4800)
-    assert layout.length == 4800
 
 
 def test_the_hog_part_is_what_opencv_gives_for_each_channel_of_ycrcb() -> None:
@@ -69,17 +59,6 @@ def test_every_colour_space_is_that_of_opencv(space: ColorSpace) -> None:
     np.testing.assert_array_equal(split(PATCH, settings), converted.transpose(2, 0, 1))
 
 
-@pytest.mark.parametrize("channels", [(0,), (2, 0), (1, 2)])
-def test_hog_may_be_of_some_channels_in_any_order(channels: tuple[int, ...]) -> None:
-    some = FEATURES.hog.model_copy(update={"channels": channels})
-    extractor = FeatureExtractor(seed_but(hog=some, histogram=HistogramSettings(bins=None)))
-    everything = FeatureExtractor(FEATURES).describe(PATCH)[:4704].reshape(3, 1568)
-    assert extractor.layout.length == 1568 * len(channels)
-    np.testing.assert_array_equal(
-        extractor.describe(PATCH).reshape(-1, 1568), everything[list(channels)]
-    )
-
-
 def test_a_halved_channel_is_described_at_half_its_size() -> None:
     features = seed_but(halved=(1, 2))
     _, red, blue = split(PATCH, FEATURES)
@@ -87,18 +66,9 @@ def test_a_halved_channel_is_described_at_half_its_size() -> None:
     hogs = [np.ravel(descriptor.compute(halve(channel))) for channel in (red, blue)]
     counts = [histogram(halve(channel), 32) for channel in (red, blue)]
     whole, vector = (FeatureExtractor(each).describe(PATCH) for each in (FEATURES, features))
-    assert Layout.of(features) == Layout.of(FEATURES)
     np.testing.assert_array_equal(vector[:1568], whole[:1568])
     np.testing.assert_array_equal(vector[1568:4704], np.concatenate(hogs))
     np.testing.assert_array_equal(vector[4704:], [*whole[4704:4736], *np.concatenate(counts)])
-
-
-def test_without_hog_only_the_histogram_is_left() -> None:
-    extractor = FeatureExtractor(seed_but(hog=NO_HOG))
-    assert extractor.layout.hog == ()
-    assert extractor.layout.histogram == slice(0, 96)
-    assert extractor.layout.length == 96
-    assert extractor.describe(PATCH).sum() == 3 * 64 * 64
 
 
 @pytest.mark.parametrize("side", [33, 48, 63, 65, 100, 128])

@@ -101,7 +101,7 @@ def test_by_coverage_a_hit_adds_its_probability_times_its_share() -> None:
 @pytest.mark.parametrize("overlap", [0, 0.5, 0.75])
 def test_by_coverage_heat_does_not_depend_on_overlap(overlap: float) -> None:
     settings = WindowSettings(size=20, overlap=overlap, top=0, bottom=60)
-    grid = lay_grid(settings, 100, 60, 8)
+    grid = lay_grid(settings, 100, 60)
     shares = np.full(len(grid), grid.share, np.float32)
     ones, boxes = np.ones(len(grid), np.float32), grid.boxes
     windows = Windows(boxes, ones, shares, boxes.astype(np.float32))

@@ -17,19 +17,17 @@ from vdet.config.svm import FeatureSettings, HistogramSettings, HogSettings
 from vdet.detect.svm.model import BoxRegression, LinearModel, load_model, save_model
 from vdet.errors import ModelError
 
-# 8 bins a channel and nothing else: 24 features
-SMALL = FeatureSettings(hog=HogSettings(channels=()), histogram=HistogramSettings(bins=8))
-# 4 × 4 cells, each a block of its own, 2 directions: 32 features, and 24 of the histogram
-WITH_HOG = FeatureSettings(
+# 4 × 4 cells, each a block of its own, 2 directions: 96 features, and 24 of the histogram
+SMALL = FeatureSettings(
     patch=16,
-    hog=HogSettings(cell=4, block=1, orientations=2, channels=(0,)),
+    hog=HogSettings(cell=4, block=1, orientations=2),
     histogram=HistogramSettings(bins=8),
 )
 
 
-def model_of(members: int, features: FeatureSettings = SMALL, length: int = 24) -> LinearModel:
+def model_of(members: int, features: FeatureSettings = SMALL) -> LinearModel:
     rng = np.random.default_rng(members)
-    weights = rng.normal(size=(members, length)).astype(np.float32)
+    weights = rng.normal(size=(members, features.length)).astype(np.float32)
     biases, slopes, offsets = rng.normal(size=(3, members)).astype(np.float32)
     provenance = {"data": "drawn", "accuracy": 0.5}
     return LinearModel(features, weights, biases, slopes, offsets, provenance)
@@ -37,9 +35,9 @@ def model_of(members: int, features: FeatureSettings = SMALL, length: int = 24) 
 
 def model_with_boxes() -> LinearModel:
     rng = np.random.default_rng(9)
-    weights, biases = rng.normal(size=(4, 32)), rng.normal(size=4)
+    weights, biases = rng.normal(size=(4, 96)), rng.normal(size=4)
     boxes = BoxRegression(weights.astype(np.float32), biases.astype(np.float32))
-    return replace(model_of(2, WITH_HOG, 56), box_regression=boxes)
+    return replace(model_of(2), box_regression=boxes)
 
 
 def boxes_of(model: LinearModel) -> BoxRegression:
@@ -74,8 +72,7 @@ def box_arrays() -> dict[str, npt.NDArray[Any]]:
 
 
 def write_with_boxes(path: Path, **changes: npt.NDArray[Any]) -> Path:
-    arrays = arrays_of(model_with_boxes()) | box_arrays() | changes
-    return write_npz(path, header_of(WITH_HOG), **arrays)
+    return write_npz(path, header_of(), **box_arrays() | changes)
 
 
 def write_members(path: Path, members: Mapping[str, bytes]) -> Path:
@@ -141,8 +138,8 @@ def test_a_saved_model_is_loaded_bit_for_bit(path: Path, members: int) -> None:
 
 
 def test_the_features_of_a_model_come_with_it(path: Path) -> None:
-    features = FeatureSettings(color_space="HLS", hog=HogSettings(channels=(1,)))
-    save_model(model_of(1, features, 1568 + 96), path)
+    features = FeatureSettings(color_space="HLS")
+    save_model(model_of(1, features), path)
     assert load_model(path).features == features
     assert load_model(path, features).features == features
 
@@ -152,6 +149,7 @@ def test_a_model_that_does_not_say_which_channels_are_halved_has_none(path: Path
     header = header_of(features)
     del header["features"]["halved"]
     header["features"]["spatial"] = {"size": 0}  # as older versions wrote it
+    header["features"]["hog"]["channels"] = [0, 1, 2]
     write_npz(path, header)
     assert load_model(path).features == features
 
@@ -166,7 +164,7 @@ def test_the_sides_of_a_box_are_linear_in_the_hog() -> None:
 def test_the_regression_of_boxes_is_kept_bit_for_bit(path: Path) -> None:
     saved = model_with_boxes()
     save_model(saved, path)
-    loaded = load_model(path, WITH_HOG)
+    loaded = load_model(path, SMALL)
     np.testing.assert_array_equal(loaded.weights, saved.weights)
     for name in ("weights", "biases"):
         array = getattr(boxes_of(loaded), name)
@@ -179,14 +177,14 @@ def test_the_regression_of_boxes_is_kept_bit_for_bit(path: Path) -> None:
     [
         (
             "box_weights",
-            np.zeros((4, 31), np.float32),
+            np.zeros((4, 95), np.float32),
             "box_weights are damaged; train it",
         ),
-        ("box_weights", np.zeros((4, 56), np.float32), "box_weights are damaged"),
-        ("box_weights", np.zeros((3, 32), np.float32), "box_weights are damaged"),
-        ("box_weights", np.zeros(128, np.float32), "box_weights are damaged"),
-        ("box_weights", np.zeros((4, 32)), "box_weights are damaged"),
-        ("box_weights", np.full((4, 32), np.nan, np.float32), "box_weights are damaged"),
+        ("box_weights", np.zeros((4, 120), np.float32), "box_weights are damaged"),
+        ("box_weights", np.zeros((3, 96), np.float32), "box_weights are damaged"),
+        ("box_weights", np.zeros(384, np.float32), "box_weights are damaged"),
+        ("box_weights", np.zeros((4, 96)), "box_weights are damaged"),
+        ("box_weights", np.full((4, 96), np.nan, np.float32), "box_weights are damaged"),
         ("box_biases", np.zeros(3, np.float32), "box_biases are damaged"),
         ("box_biases", np.zeros((4, 1), np.float32), "box_biases are damaged"),
         ("box_biases", np.zeros(4, "S4"), "box_biases are damaged"),
@@ -204,16 +202,16 @@ def test_a_regression_that_does_not_fit_is_refused(
 def test_a_regression_with_one_of_its_two_arrays_is_damaged(path: Path, missing: str) -> None:
     arrays = {name: array for name, array in box_arrays().items() if name != missing}
     with pytest.raises(ModelError, match="damaged"):
-        load_model(write_npz(path, header_of(WITH_HOG), **arrays_of(model_with_boxes()), **arrays))
+        load_model(write_npz(path, header_of(), **arrays))
 
 
 def test_a_model_asked_for_other_features_says_which_differ(path: Path) -> None:
     save_model(model_of(1), path)
-    asked = SMALL.model_copy(update={"color_space": "HSV", "patch": 48})
+    asked = SMALL.model_copy(update={"color_space": "HSV", "patch": 32})
     with pytest.raises(ModelError, match="trained with other features") as error:
         load_model(path, asked)
     assert "detector.features.color_space: YCrCb, asked for HSV" in str(error.value)
-    assert "detector.features.patch: 32, asked for 48" in str(error.value)
+    assert "detector.features.patch: 16, asked for 32" in str(error.value)
     assert "features.hog" not in str(error.value)
 
 
@@ -280,12 +278,12 @@ def test_a_model_without_one_of_its_parts_is_damaged(path: Path, missing: str) -
 @pytest.mark.parametrize(
     ("name", "array", "message"),
     [
-        ("weights", np.zeros((2, 23), np.float32), r"shape \(2, 23\) instead of \(2, 24\)"),
-        ("weights", np.zeros((3, 24), np.float32), r"shape \(3, 24\) instead of \(2, 24\)"),
-        ("weights", np.zeros(24, np.float32), "instead of"),
-        ("weights", np.zeros((2, 24, 1), np.float32), "instead of"),
-        ("weights", np.zeros((2, 24)), "weights are damaged"),
-        ("weights", np.full((2, 24), np.nan, np.float32), "weights are damaged"),
+        ("weights", np.zeros((2, 119), np.float32), r"shape \(2, 119\) instead of \(2, 120\)"),
+        ("weights", np.zeros((3, 120), np.float32), r"shape \(3, 120\) instead of \(2, 120\)"),
+        ("weights", np.zeros(120, np.float32), "instead of"),
+        ("weights", np.zeros((2, 120, 1), np.float32), "instead of"),
+        ("weights", np.zeros((2, 120)), "weights are damaged"),
+        ("weights", np.full((2, 120), np.nan, np.float32), "weights are damaged"),
         ("biases", np.zeros((2, 1), np.float32), "instead of"),
         ("biases", np.array([0, np.inf], np.float32), "biases are damaged"),
         ("biases", np.zeros(2, "S4"), "biases are damaged"),
@@ -307,7 +305,7 @@ def test_an_array_that_does_not_fit_is_refused(
 @pytest.mark.parametrize("members", [0, 21])
 def test_no_members_and_too_many_are_refused(path: Path, members: int) -> None:
     arrays = {name: np.zeros(members, np.float32) for name in ("biases", "slopes", "offsets")}
-    weights = np.zeros((members, 24), np.float32)
+    weights = np.zeros((members, 120), np.float32)
     with pytest.raises(ModelError, match="train it again"):
         load_model(write_npz(path, header_of(), weights=weights, **arrays))
 

@@ -106,10 +106,9 @@ class TestHalving:
             lengths = (grid.size, grid.left, grid.top, grid.step)
             assert [Fraction(length) % divisor for length in lengths] == [0, 0, 0, 0]
 
-    @pytest.mark.parametrize("step", [1, 2, 5])
-    def test_steps_are_counted_in_cells(self, step: int) -> None:
-        for grid in laid(step=step):
-            assert grid.step == step * grid.size / 8
+    def test_a_step_is_a_cell(self) -> None:
+        for grid in laid():
+            assert grid.step == Fraction(grid.size, 8)
 
 
 @pytest.mark.parametrize(

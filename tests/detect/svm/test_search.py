@@ -10,13 +10,11 @@ from vdet.config.section import scale_lengths
 from vdet.config.svm import (
     FeatureSettings,
     HistogramSettings,
-    HogSettings,
     PerspectiveSettings,
     SearchSettings,
     WindowSettings,
 )
 from vdet.detect.svm.dense_search import DenseSearch
-from vdet.detect.svm.features import Layout
 from vdet.detect.svm.horizon import DEFAULT_HORIZON
 from vdet.detect.svm.model import BoxRegression, LinearModel
 from vdet.detect.svm.search import Engine, FrameSearch
@@ -27,17 +25,17 @@ from vdet.media import Picture
 Sides = tuple[float, float, float, float]
 
 SEED = seed.SEED.svm
-COLOUR = FeatureSettings(hog=HogSettings(channels=()), histogram=HistogramSettings(bins=8))
-SMALL = FeatureSettings(patch=16, hog=HogSettings(channels=(0,)))
+COLOUR = FeatureSettings(histogram=HistogramSettings(bins=8))
+SMALL = FeatureSettings(patch=16, halved=())
 FRAME = np.random.default_rng(0).integers(0, 256, (120, 160, 3), dtype=np.uint8)
 SETS = (
-    WindowSettings(size=32, step=1, top=24, bottom=88),
+    WindowSettings(size=32, overlap=0.75, top=24, bottom=88),
     WindowSettings(size=48, overlap=0.5, top=8, bottom=120),
 )
 
 
 def model_of(features: FeatureSettings) -> LinearModel:
-    weights = np.random.default_rng(1).normal(scale=0.02, size=(1, Layout.of(features).length))
+    weights = np.random.default_rng(1).normal(scale=0.02, size=(1, features.length))
     one = np.ones(1, np.float32)
     return LinearModel(features, weights.astype(np.float32), 0 * one, -one, 0 * one)
 
@@ -74,8 +72,7 @@ def by_perspective() -> FrameSearch:
 
 def with_sides(sides: Sides, probability: float | None = None) -> FrameSearch:
     """Return a search whose regression gives equal sides for all hits, half of the windows."""
-    length = Layout.of(SMALL).hog_length
-    boxes = BoxRegression(np.zeros((4, length), np.float32), np.array(sides, np.float32))
+    boxes = BoxRegression(np.zeros((4, SMALL.hog_length), np.float32), np.array(sides, np.float32))
     search = fixed(*SETS).model_copy(
         update={"probability": MEDIAN if probability is None else probability}
     )

@@ -1,3 +1,5 @@
+from fractions import Fraction
+
 import numpy as np
 import pytest
 from hypothesis import assume, given
@@ -6,7 +8,7 @@ from hypothesis import strategies as st
 from seed import SEED
 from vdet.boxes import Int32Array
 from vdet.config.svm import WindowSettings
-from vdet.detect.svm.windows import Windows, lay_grid
+from vdet.detect.svm.windows import WindowGrid, Windows, lay_grid
 
 LARGE, SMALL = SEED.svm.search.windows
 ROWS = 2000  # of a frame that is higher than all bands here
@@ -16,19 +18,13 @@ def band(size: int, overlap: float, top: int, bottom: int) -> WindowSettings:
     return WindowSettings(size=size, overlap=overlap, top=top, bottom=bottom)
 
 
-def stepped(size: int, step: int, top: int, bottom: int) -> WindowSettings:
-    return WindowSettings(size=size, step=step, top=top, bottom=bottom)
-
-
-def boxes_of(
-    settings: WindowSettings, width: int, height: int = ROWS, cells: int = 8
-) -> Int32Array:
-    return lay_grid(settings, width, height, cells).boxes
+def boxes_of(settings: WindowSettings, width: int, height: int = ROWS) -> Int32Array:
+    return lay_grid(settings, width, height).boxes
 
 
 def test_the_seed_sets_have_423_and_408_windows_on_a_720p_frame() -> None:
-    assert len(lay_grid(LARGE, 1280, 720, 8)) == len(boxes_of(LARGE, 1280, 720)) == 423
-    assert len(lay_grid(SMALL, 1280, 720, 8)) == len(boxes_of(SMALL, 1280, 720)) == 408
+    assert len(lay_grid(LARGE, 1280, 720)) == len(boxes_of(LARGE, 1280, 720)) == 423
+    assert len(lay_grid(SMALL, 1280, 720)) == len(boxes_of(SMALL, 1280, 720)) == 408
 
 
 def test_windows_are_laid_row_by_row_from_the_top_left() -> None:
@@ -78,56 +74,27 @@ def test_any_frame_that_can_hold_a_window_has_one_at_its_left(
     assert boxes[0].tolist() == [0, 0, size, size]
 
 
-def test_a_step_is_counted_in_cells_of_the_patch() -> None:
-    # 8 cells across 64 pixels: a step of 2 is 16 pixels
-    boxes = boxes_of(stepped(64, 2, 8, 104), 100)
-    assert boxes[:, :2].tolist() == [[x, y] for y in (8, 24, 40) for x in (0, 16, 32)]
-    assert boxes_of(stepped(64, 2, 8, 104), 100, cells=16)[1].tolist() == [8, 8, 64, 64]
-
-
-def test_windows_of_a_fractional_step_lie_at_whole_pixels_and_do_not_drift() -> None:
-    x = boxes_of(stepped(100, 1, 0, 100), 200)[:, 0]  # 12.5 pixels
-    assert x.tolist() == [0, 12, 25, 38, 50, 62, 75, 88, 100]
-
-
-@given(
-    st.integers(8, 200),
-    st.integers(1, 8),
-    st.sampled_from([4, 8, 16]),
-    st.integers(0, 300),
-    st.integers(0, 400),
-)
-def test_windows_with_a_step_fill_the_band_as_far_as_they_fit(
-    size: int, step: int, cells: int, top: int, spare: int
-) -> None:
-    settings = stepped(size, step, top, top + size + spare)
-    width = size + spare
-    grid = lay_grid(settings, width, ROWS, cells)
-    x, y, w, h = grid.boxes.T
-    assert (x[0], y[0]) == (0, top)
-    assert (x + w).max() <= width
-    assert (y + h).max() <= settings.bottom
-    assert grid.columns == grid.rows
-    assert grid.columns * grid.step + size > width
-
-
 def test_the_share_is_one_over_the_number_of_windows_that_cover_a_pixel() -> None:
-    for settings in (band(64, 0.75, 0, 320), stepped(64, 2, 0, 320)):
-        grid = lay_grid(settings, 320, 320, 8)
-        covered = np.zeros((320, 320))
-        for x, y, w, h in grid.boxes.tolist():
-            covered[y : y + h, x : x + w] += 1
-        assert covered[160, 160] == 16
-        assert grid.share == 1 / 16
+    grid = lay_grid(band(64, 0.75, 0, 320), 320, 320)
+    covered = np.zeros((320, 320))
+    for x, y, w, h in grid.boxes.tolist():
+        covered[y : y + h, x : x + w] += 1
+    assert covered[160, 160] == 16
+    assert grid.share == 1 / 16
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 50])
 def test_the_grids_of_every_nth_window_together_are_the_whole_grid(n: int) -> None:
-    grid = lay_grid(stepped(100, 1, 40, 300), 555, 720, 8)  # of a fractional step
+    grid = WindowGrid(100, Fraction(25, 2), Fraction(0), Fraction(40), columns=37, rows=13)
     parts = [grid.every_nth(n, column, row) for column in range(n) for row in range(n)]
     together = np.concatenate([part.boxes for part in parts])
     assert len(together) == sum(len(part) for part in parts) == len(grid)
     assert {tuple(box) for box in together.tolist()} == {tuple(b) for b in grid.boxes.tolist()}
+
+
+def test_windows_of_a_fractional_step_lie_at_whole_pixels_and_do_not_drift() -> None:
+    grid = WindowGrid(100, Fraction(25, 2), Fraction(0), Fraction(0), columns=9, rows=1)
+    assert grid.boxes[:, 0].tolist() == [0, 12, 25, 38, 50, 62, 75, 88, 100]
 
 
 def test_hits_are_the_windows_of_at_least_the_probability_in_order() -> None:

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from vdet.config.train import AugmentationSettings
-from vdet.learn.svm.augmentation import PatchSample, augment, cut_off, mirrored, zoom_in
+from vdet.learn.svm.augmentation import PatchSample, augment, cut_off, mirrored
 
 NOISE = np.random.default_rng(0).integers(0, 256, (64, 64, 3), dtype=np.uint8)
 OFF = AugmentationSettings(mirror=False, cut=0, parts=0)
@@ -86,17 +86,3 @@ def test_the_same_seed_gives_the_same_samples_with_other_kinds_on_or_off() -> No
     other = augmented(OFF.model_copy(update={"parts": 1}), seed=4)[0]
     np.testing.assert_array_equal(part.image, same.image)
     assert part.image.shape != other.image.shape or (part.image != other.image).any()
-
-
-def test_zoomed_in_a_box_moves_and_grows_with_its_vehicle() -> None:
-    image = np.zeros((64, 64, 3), np.uint8)
-    image[20:40, 24:44] = 255
-    box = (np.array([24, 20, 44, 40]) / 64 - 0.5).astype(np.float32)
-    for seed in range(20):
-        (sample,) = zoom_in(PatchSample(image, True, box), (seed,))
-        side = len(sample.image)
-        assert 38 <= side <= 64
-        rows, columns = (np.flatnonzero(sample.image[:, :, 0].any(axis=axis)) for axis in (1, 0))
-        edges = np.array([columns[0], rows[0], columns[-1] + 1, rows[-1] + 1])
-        inside = (edges > 0) & (edges < side)
-        np.testing.assert_allclose(sample.sides[inside], (edges / side - 0.5)[inside], atol=1e-5)

@@ -18,16 +18,10 @@ def scene(count: int = 400) -> tuple[Float32Array, Float32Array]:
     return hogs, TRUE.sides(hogs)
 
 
-def fit(
-    hogs: Float32Array,
-    sides: Float32Array,
-    penalty: float,
-    weights: Float32Array | None = None,
-) -> BoxRegression:
-    ones = np.ones(len(hogs), np.float32)
+def fit(hogs: Float32Array, sides: Float32Array, penalty: float) -> BoxRegression:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("vdet.learn.svm.box_regression.PENALTY", penalty)
-        return fit_sides(hogs.copy(), sides, ones if weights is None else weights)
+        return fit_sides(hogs.copy(), sides)
 
 
 def test_a_linear_map_is_found() -> None:
@@ -54,14 +48,6 @@ def test_the_penalty_is_per_patch_so_that_a_set_given_twice_gives_the_same(count
     once = fit(hogs, sides, penalty=0.5)
     twice = fit(np.tile(hogs, (2, 1)), np.tile(sides, (2, 1)), penalty=0.5)
     np.testing.assert_allclose(once.weights, twice.weights, atol=1e-4)
-
-
-def test_a_row_of_weight_two_counts_as_two() -> None:
-    hogs, sides = scene(60)
-    sides += np.random.default_rng(3).normal(size=sides.shape).astype(np.float32)
-    weighted = fit(hogs, sides, 1e-6, np.repeat(np.array([2, 1], np.float32), [20, 40]))
-    repeated = fit(np.concatenate([hogs, hogs[:20]]), np.concatenate([sides, sides[:20]]), 1e-6)
-    np.testing.assert_allclose(weighted.weights, repeated.weights, atol=2e-2)
 
 
 def test_a_feature_that_hardly_varies_gets_a_small_weight() -> None:

@@ -14,7 +14,7 @@ from sklearn.svm import LinearSVC
 
 from vdet.boxes import BoolArray, Float32Array
 from vdet.config.schema import Settings, SvmSettings, TrainSettings
-from vdet.config.svm import FeatureSettings, HistogramSettings, HogSettings
+from vdet.config.svm import FeatureSettings
 from vdet.config.train import SvmTrainingSettings
 from vdet.detect.svm.model import LinearModel
 from vdet.errors import DataError
@@ -22,7 +22,7 @@ from vdet.learn.svm.dataset import PatchFile
 from vdet.learn.svm.extraction import LabelledVectors, RowNumbers
 from vdet.learn.svm.fitting import fit as fit_rows
 
-COLOUR = FeatureSettings(hog=HogSettings(channels=()), histogram=HistogramSettings(bins=8))
+FEATURES = FeatureSettings()
 
 
 def clouds(count: int = 300) -> tuple[Float32Array, npt.NDArray[np.bool_]]:
@@ -55,7 +55,7 @@ def fit(
         origins = np.arange(len(vectors))
     rows = labelled(vectors.copy(), vehicle, origins)
     return fit_rows(
-        rows, Settings(detector=SvmSettings(features=COLOUR), train=TrainSettings(svm=training))
+        rows, Settings(detector=SvmSettings(features=FEATURES), train=TrainSettings(svm=training))
     )
 
 
@@ -75,7 +75,7 @@ def test_the_folded_model_gives_the_probabilities_of_scikit_learn(ensemble: bool
     members = 3 if ensemble else 1
     assert model.weights.shape == (members, 24)
     assert model.biases.shape == model.slopes.shape == model.offsets.shape == (members,)
-    assert model.features == COLOUR
+    assert model.features == FEATURES
     kinds = {a.dtype for a in (model.weights, model.biases, model.slopes, model.offsets)}
     assert kinds == {np.dtype(np.float32)}
 
@@ -139,8 +139,6 @@ def test_a_fit_has_the_training_part_in_memory_once(monkeypatch: pytest.MonkeyPa
     vectors = rng.normal(size=(7500, 768)).astype(np.float32)
     vehicle = (vectors[:, 0] > 0)[origins]
     rows = labelled(vectors, vehicle, origins)
-    features = FeatureSettings(hog=HogSettings(channels=()), histogram=HistogramSettings(bins=256))
-    training = SvmTrainingSettings()
-    settings = Settings(detector=SvmSettings(features=features), train=TrainSettings(svm=training))
+    settings = Settings(detector=SvmSettings())
     peak = peak_memory(lambda: fit_rows(rows.of(np.ones(3000, bool)), settings))
     assert peak < 1.5 * vectors.nbytes

@@ -10,7 +10,7 @@ import pytest
 
 from pages.html import Elements
 from vdet.config.schema import Settings, SvmSettings, TrainSettings
-from vdet.config.svm import FeatureSettings, HistogramSettings, HogSettings
+from vdet.config.svm import FeatureSettings, HistogramSettings
 from vdet.config.train import SvmTrainingSettings
 from vdet.evaluate.output import RunName
 from vdet.learn.svm.dataset import PatchFile, find_patches
@@ -26,12 +26,10 @@ from vdet.learn.svm.patch_eval import (
 from vdet.learn.svm.training import train
 from vdet.media.images import write_image
 
-FEATURES = FeatureSettings(
-    patch=16, hog=HogSettings(channels=()), histogram=HistogramSettings(bins=8)
-)
+FEATURES = FeatureSettings(patch=16, histogram=HistogramSettings(bins=8))
 SETTINGS = Settings(
     detector=SvmSettings(features=FEATURES),
-    train=TrainSettings(svm=SvmTrainingSettings(C=1, max_broken=0.1)),
+    train=TrainSettings(svm=SvmTrainingSettings(C=1)),
 )
 
 
@@ -44,7 +42,12 @@ def bright_and_dark(tmp_path: Path) -> Path:
             folder = tmp_path / class_ / group
             folder.mkdir(parents=True)
             for number in range(12):
-                image = random.normal(level, 20, (16, 16, 3)).clip(0, 255).astype(np.uint8)
+                image = (
+                    random.normal(level, 20, (16, 16, 1))
+                    .repeat(3, axis=2)
+                    .clip(0, 255)
+                    .astype(np.uint8)
+                )
                 write_image(folder / f"{number}.png", image)
     return tmp_path
 
@@ -61,7 +64,6 @@ def scores_of(vehicle: list[bool], probabilities: list[float]) -> PatchScores:
 def test_a_new_model_is_tested_on_the_last_patches_of_each_folder(bright_and_dark: Path) -> None:
     light = np.full((16, 16, 3), 180, np.uint8)
     write_image(bright_and_dark / "non-vehicles" / "b" / "11.png", light, overwrite=True)
-    (bright_and_dark / "non-vehicles" / "a" / "3.png").write_bytes(b"broken")
     steps: list[tuple[str, int | None]] = []
 
     def start(what: str, total: int | None) -> Callable[[int], object]:
@@ -71,15 +73,14 @@ def test_a_new_model_is_tested_on_the_last_patches_of_each_folder(bright_and_dar
     files = find_patches([bright_and_dark])
     scores = evaluate_patches(files, SETTINGS, jobs=1, steps=start)
     (mistake,) = scores.mistakes
-    assert str(mistake.file).endswith("non-vehicles/b/11.png"), "beside a broken patch"
+    assert str(mistake.file).endswith("non-vehicles/b/11.png")
     assert (scores.test.patches, scores.test.accuracy.value) == (8, 7 / 8)
     assert scores.test.groups["non-vehicles/b"].value == 0.5
     assert "leak-free" in scores.meaning
-    assert steps == [("describing patches", 48), ("fitting the model", None),
-                     ("computing scores", None)]  # fmt: skip
+    assert steps == [("describing patches", 48), ("fitting the classifier", None)]
     page = Elements(patch_page(scores, RunName("svm", None, None, ())))
     assert len(page.all("img")) == 1
-    for words in ("11.png", "ROC curve", "non-vehicles/b"):
+    for words in ("11.png", "ROC AUC", "non-vehicles/b"):
         assert words in page.text
 
 
@@ -102,7 +103,7 @@ def test_patches_of_one_class_have_no_ranking() -> None:
     scores = scores_of([False, False], [0.2, 0.1])
     assert (scores.test.accuracy.value, scores.recall.value) == (1, None)
     assert scores.roc_auc is scores.log_loss is None
-    assert "<svg" in patch_page(scores, RunName("svm", None, None, ()))
+    assert "None." in patch_page(scores, RunName("svm", None, None, ()))
 
 
 def test_the_worst_mistakes_come_first() -> None:

@@ -1,10 +1,7 @@
 import json
-import logging
 import os
 import shutil
-import signal
 from dataclasses import asdict, replace
-from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -19,15 +16,13 @@ from vdet.boxes import Image
 from vdet.config.schema import Settings, SvmSettings, TrainSettings
 from vdet.config.svm import FeatureSettings, HistogramSettings, HogSettings
 from vdet.config.train import AugmentationSettings, SvmTrainingSettings
-from vdet.detect.svm.features import FeatureExtractor, Layout
+from vdet.detect.svm.features import FeatureExtractor
 from vdet.detect.svm.model import load_model, save_model
 from vdet.errors import DataError
-from vdet.learn.svm.augmentation import Augmenter, augment
 from vdet.learn.svm.dataset import PatchFile, find_patches
-from vdet.learn.svm.extraction import MAX_NAMED, LabelledVectors, extract, hold_out
+from vdet.learn.svm.extraction import LabelledVectors, extract, hold_out
 from vdet.learn.svm.training import train
 from vdet.media.images import read_image, write_image
-from vdet.workers import LocalProcesses, ThisProcess, Workers
 
 SIZE = 16
 GROUPS = {
@@ -41,7 +36,7 @@ SETTINGS = Settings(
         features=FeatureSettings(
             patch=SIZE,
             halved=(),
-            hog=HogSettings(cell=4, channels=(0,)),
+            hog=HogSettings(cell=4),
             histogram=HistogramSettings(bins=8),
         )
     ),
@@ -97,36 +92,16 @@ def files(data: Path) -> list[PatchFile]:
     return find_patches([data])
 
 
-def with_broken(files: list[PatchFile], folder: Path, count: int) -> list[PatchFile]:
-    """Add patches that are no pictures, in the middle of the list."""
-    (folder / "vehicles").mkdir()
-    broken = [PatchFile(folder, f"vehicles/{i}.png", "vehicles/far", True) for i in range(count)]
-    for file in broken:
-        (folder / file.name).write_text("no picture")
-    return [*files[:9], *broken, *files[9:]]
-
-
 def but(**changes: object) -> Settings:
     """Return the settings with some of `training` replaced."""
     training = SETTINGS.train.svm.model_copy(update=changes)
     return SETTINGS.model_copy(update={"train": TrainSettings(svm=training)})
 
 
-SERIAL = ThisProcess()
-AUGMENTER = partial(augment, settings=SETTINGS.train.svm.augmentation)
-
-
 def describe(
-    files: list[PatchFile],
-    *,
-    features: FeatureSettings = SETTINGS.svm.features,
-    augmenter: Augmenter | None = None,
-    workers: Workers = SERIAL,
-    max_broken: float = 0,
-    seed: int = 0,
+    files: list[PatchFile], settings: Settings = SETTINGS, *, augmented: bool = False, jobs: int = 1
 ) -> LabelledVectors:
-    training = SvmTrainingSettings(max_broken=max_broken, seed=seed)
-    return extract(files, features, training, workers=workers, augmenter=augmenter)
+    return extract(files, settings.svm.features, settings.train.svm, augmented=augmented, jobs=jobs)
 
 
 def test_patches_are_described_in_order_with_their_class_and_group(files: list[PatchFile]) -> None:
@@ -137,31 +112,22 @@ def test_patches_are_described_in_order_with_their_class_and_group(files: list[P
     last = cv2.imread(str(files[-1].source / files[-1].name))
     assert last is not None
     extractor = FeatureExtractor(SETTINGS.svm.features)
-    assert data.vectors.shape == (57, extractor.layout.length)
+    assert data.vectors.shape == (57, SETTINGS.svm.features.length)
     expected = extractor.describe(np.asarray(last, np.uint8))
     np.testing.assert_array_equal(data.vectors[-1], expected)
 
 
-def test_several_processes_give_the_same_as_one(
-    files: list[PatchFile], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("vdet.learn.svm.extraction.CHUNK", 10)
-    one, two = (
-        describe(files, augmenter=AUGMENTER, workers=workers)
-        for workers in (ThisProcess(), LocalProcesses(2))
-    )
+def test_several_threads_give_the_same_as_one(files: list[PatchFile]) -> None:
+    one, three = (describe(files, augmented=True, jobs=jobs) for jobs in (1, 3))
     for name in ("vectors", "vehicle", "sides", "origins"):
-        np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
-    np.testing.assert_array_equal(one.groups, two.groups)
-    assert one.digest == two.digest
+        np.testing.assert_array_equal(getattr(one, name), getattr(three, name))
+    np.testing.assert_array_equal(one.groups, three.groups)
+    assert one.digest == three.digest
 
 
-def test_augmented_samples_follow_and_have_the_row_of_their_patch(
-    files: list[PatchFile], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("vdet.learn.svm.extraction.CHUNK", 10)
-    mirror = partial(augment, settings=AugmentationSettings(mirror=True, cut=0, parts=0))
-    rows = describe(files, augmenter=mirror)
+def test_augmented_samples_follow_and_have_the_row_of_their_patch(files: list[PatchFile]) -> None:
+    mirror = but(augmentation=AugmentationSettings(mirror=True, cut=0, parts=0))
+    rows = describe(files, mirror, augmented=True)
     assert len(rows.files) == 57
     assert rows.origins.tolist() == [patch for patch in range(57) for _ in range(2)]
     assert rows.vehicle.tolist() == [file.vehicle for file in files for _ in range(2)]
@@ -183,17 +149,6 @@ def test_only_the_kept_patches_and_the_samples_made_of_them_are_used() -> None:
     assert kept.vehicle.tolist() == [False, True, True, True, False, True, False]
     assert kept.origins.tolist() == [0, 1, 2, 0, 0, 1, 2]
     assert list(kept.files) == [files[1], files[2], files[4]]
-
-
-def test_a_process_that_is_killed_is_an_error(
-    files: list[PatchFile], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def be_killed(*_: object, **__: object) -> None:
-        os.kill(os.getpid(), signal.SIGKILL)
-
-    monkeypatch.setattr("vdet.learn.svm.extraction._describe", be_killed)
-    with pytest.raises(DataError, match="a process was killed"):
-        describe(files, workers=LocalProcesses(2))
 
 
 def test_different_data_sets_have_different_digests(files: list[PatchFile]) -> None:
@@ -218,30 +173,15 @@ def test_a_file_name_that_is_no_text_is_part_of_the_digest(tmp_path: Path) -> No
     assert len(digests) == 2
 
 
-def test_broken_patches_are_skipped_and_counted_and_the_first_ones_named(
-    files: list[PatchFile], tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
-    count = MAX_NAMED + 3
-    mixed = with_broken(files, tmp_path, count)
-    with caplog.at_level(logging.WARNING, "vdet"):
-        data = describe(mixed, max_broken=0.5)
-    assert data.groups.tolist() == [file.group for file in files]
-    np.testing.assert_array_equal(data.vectors, describe(files).vectors)
-    assert [record.message for record in caplog.records] == [
-        *(f"{tmp_path}: vehicles/{i}.png: is no readable picture; skipped" for i in range(10)),
-        "… and 3 more",
-    ]
-
-
-def test_more_broken_patches_than_are_tolerated_are_an_error(
+def test_broken_patches_are_an_error_that_names_the_first(
     files: list[PatchFile], tmp_path: Path
 ) -> None:
-    mixed = with_broken(files, tmp_path, 3)
-    message = r"vehicles/0\.png: 3 of 60 patches are broken \(train\.svm\.max"
-    with pytest.raises(DataError, match=message):
-        train(mixed, but(max_broken=0.04), jobs=1)
-    _, report = train(mixed, but(max_broken=0.05), jobs=1)
-    assert report.broken == 3
+    (tmp_path / "vehicles").mkdir()
+    broken = [PatchFile(tmp_path, f"vehicles/{i}.png", "vehicles/far", True) for i in range(3)]
+    for file in broken:
+        (tmp_path / file.name).write_text("no picture")
+    with pytest.raises(DataError, match=r"vehicles/0\.png: 3 of 60 patches are broken$"):
+        train([*files[:9], *broken, *files[9:]], SETTINGS, jobs=1)
 
 
 TAILS = np.array(["a"] * 10 + ["b"] * 5 + ["c"] * 3 + ["d"])
@@ -341,7 +281,7 @@ def test_with_boxes_a_model_finds_the_sides_of_vehicles(
     last = [file for file in files if file.is_boxed][-1]
     assert last.sides is not None
     described = FeatureExtractor(SETTINGS.svm.features).describe(read_image(mined / last.name))
-    hogs = described[: Layout.of(SETTINGS.svm.features).hog_length]
+    hogs = described[: SETTINGS.svm.features.hog_length]
     found = model.box_regression.sides(hogs[np.newaxis])[0]
     np.testing.assert_allclose(found[[1, 3]], np.array(last.sides, float)[[1, 3]], atol=0.1)
     np.testing.assert_allclose(found[[0, 2]], [-0.5, 0.5], atol=0.05)
@@ -352,22 +292,3 @@ def test_with_boxes_a_model_finds_the_sides_of_vehicles(
     assert report.groups["boxes/near"] == 40
     assert report.vehicles == 32, "patches of boxes/ belong to neither class"
     assert model.provenance["boxes_sha256"] != model.provenance["data_sha256"]
-
-
-def test_vehicles_from_sets_without_boxes_are_assumed_to_fill_their_patch(
-    data: Path, mined: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The boxes of the mined vehicles are small; the other set makes the boxes larger."""
-    monkeypatch.setattr("vdet.learn.svm.box_regression.PENALTY", 100)
-    small = tmp_path / "small"
-    shutil.copytree(mined, small)
-    table = small / "boxes.csv"
-    table.write_text(table.read_text().replace(",-0.5,,0.5,", ",-0.2,-0.1,0.2,0.1"))
-    files = [file for file in find_patches([small, data]) if not file.is_boxed]
-    model, _ = train(files, SETTINGS, jobs=1)
-    assert model.box_regression is not None
-    vehicles = [file for file in files if file.vehicle]
-    hogs = describe(vehicles).vectors[:, : Layout.of(SETTINGS.svm.features).hog_length]
-    left, top, right, bottom = model.box_regression.sides(hogs).mean(axis=0).tolist()
-    assert max(left, -right) < -0.25
-    assert max(top, -bottom) < -0.15

@@ -12,7 +12,7 @@ TEST = Classification(
 )
 GROUPS = {"vehicles/far": 60, "boxes/mined": 7}
 METRICS = TrainingMetrics(
-    60, 40, 9, 0, GROUPS, 4800, "tail", 80, 90, train_accuracy=1.0, test=TEST, box_error=0.0431
+    60, 40, 9, GROUPS, 4800, "tail", 80, 90, train_accuracy=1.0, test=TEST, box_error=0.0431
 )
 
 
@@ -40,7 +40,6 @@ def test_the_text_has_the_split_with_accuracies_confusion_and_groups() -> None:
     assert text[0] == (
         "patches: 60 vehicles, 40 non-vehicles, 9 with the box of their vehicle; 4800 features each"
     )
-    assert "(3 broken ones skipped)" in lines(replace(METRICS, broken=3))[0]
     accuracy = (
         "train accuracy 1.0000 (80 patches + 90 augmented), "
         "test accuracy 0.9000 [0.700, 0.970] (20 patches)"

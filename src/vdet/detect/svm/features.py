@@ -4,7 +4,6 @@ Source: Dalal & Triggs, "Histograms of Oriented Gradients for Human Detection", 
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -18,34 +17,6 @@ Channels = tuple[Image, Image, Image]
 """The channels of a colour space, uint8 `(H, W)` each; of those in `halved`, `(H / 2, W / 2)`."""
 
 
-@dataclass(frozen=True, slots=True)
-class Layout:
-    """Where the parts of a feature vector lie; `hog` has one part for each described channel."""
-
-    hog: tuple[slice, ...]
-    histogram: slice
-
-    @staticmethod
-    def of(settings: FeatureSettings) -> "Layout":
-        """Return the layout of the vectors that these settings give."""
-        hog = settings.hog
-        blocks = settings.patch // hog.cell - hog.block + 1
-        length = blocks**2 * hog.block**2 * hog.orientations
-        parts = [slice(i * length, (i + 1) * length) for i in range(len(hog.channels))]
-        start = length * len(parts)
-        return Layout(tuple(parts), slice(start, start + 3 * (settings.histogram.bins or 0)))
-
-    @property
-    def hog_length(self) -> int:
-        """Number of HOG features, which come first; 4,704 for the seed's settings."""
-        return int(self.histogram.start)
-
-    @property
-    def length(self) -> int:
-        """Number of all features; 4,800 for the seed's settings."""
-        return int(self.histogram.stop)
-
-
 class FeatureExtractor:
     """Computes the feature vectors of patches; it has no state, so threads may share it.
 
@@ -56,7 +27,6 @@ class FeatureExtractor:
 
     def __init__(self, settings: FeatureSettings) -> None:
         self.settings = settings
-        self.layout = Layout.of(settings)
         self._descriptors = patch_descriptors(settings)
 
     def describe(self, patch: Image) -> Float32Array:
@@ -69,21 +39,21 @@ class FeatureExtractor:
 
         Returns
         -------
-        float32 `(layout.length,)`: HOG 0 to 1, histogram in pixels.
+        float32 `(settings.length,)`: HOG 0 to 1, histogram in pixels.
         """
         return self.describe_channels(split(patch, self.settings))
 
     def describe_channels(self, channels: Channels) -> Float32Array:
         """Compute the features of one patch from its channels."""
-        parts = [np.ravel(hog.compute(channels[i])) for i, hog in self._descriptors.items()]
-        if bins := self.settings.histogram.bins:
-            parts += [histogram(channel, bins) for channel in channels]
-        return np.concatenate(parts, dtype=np.float32)
+        pairs = zip(self._descriptors, channels, strict=True)
+        hogs = [np.ravel(hog.compute(channel)) for hog, channel in pairs]
+        histograms = [histogram(channel, self.settings.histogram.bins) for channel in channels]
+        return np.concatenate([*hogs, *histograms], dtype=np.float32)
 
     def describe_all(self, patches: Iterable[Image]) -> Float32Array:
-        """Compute the features of patches one by one; float32 `(n, layout.length)`."""
+        """Compute the features of patches one by one; float32 `(n, settings.length)`."""
         vectors = [self.describe(patch) for patch in patches]
-        return np.stack(vectors) if vectors else np.empty((0, self.layout.length), np.float32)
+        return np.reshape(vectors, (-1, self.settings.length)).astype(np.float32, copy=False)
 
 
 def split(image: Image, settings: FeatureSettings) -> Channels:
@@ -111,10 +81,10 @@ def hog_descriptor(
     return cv2.HOGDescriptor((width, height), block, cell, cell, settings.hog.orientations)
 
 
-def patch_descriptors(settings: FeatureSettings) -> dict[int, cv2.HOGDescriptor]:
-    """Return the descriptors of a patch, by channel, in the order of the features."""
-    sides = settings.patch, settings.patch
-    return {number: hog_descriptor(settings, sides, number) for number in settings.hog.channels}
+def patch_descriptors(settings: FeatureSettings) -> list[cv2.HOGDescriptor]:
+    """Return the descriptor of each channel of a patch."""
+    window = settings.patch, settings.patch
+    return [hog_descriptor(settings, window, number) for number in range(3)]
 
 
 def histogram(channel: Image, bins: int) -> npt.NDArray[np.intp]:

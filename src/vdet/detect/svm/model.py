@@ -19,7 +19,6 @@ import numpy.typing as npt
 from vdet.archives import open_archive, read_member
 from vdet.boxes import Float32Array
 from vdet.config.svm import FeatureSettings
-from vdet.detect.svm.features import Layout
 from vdet.errors import ModelError
 from vdet.files import read_whole, staged
 
@@ -139,10 +138,11 @@ def _read(archive: zipfile.ZipFile) -> LinearModel:
         raise ValueError("not the header of a model")
     if header["version"] != FORMAT_VERSION:
         raise ModelError(f"is of version {header['version']!r:.20}, not {FORMAT_VERSION}")
-    # The shipped models name the size of small pictures, which are features no more. That of the
-    # original does not say which channels are halved: none is.
+    # The shipped models name the size of small pictures, which are features no more, and the
+    # channels that have HOG. That of the original does not say which channels are halved: none is.
     known = {"halved": ()} | header["features"]
     known.pop("spatial", None)
+    known["hog"].pop("channels", None)
     boxes = [name for name in _BOX_ARRAYS if f"{name}.npy" in archive.namelist()]
     features, provenance = FeatureSettings.model_validate(known), header["provenance"]
     arrays = {name: _read_array(archive, name) for name in _ARRAYS}
@@ -164,14 +164,13 @@ def _read_array(archive: zipfile.ZipFile, name: str) -> npt.NDArray[Any]:
 
 def _check_arrays(model: LinearModel) -> None:
     members = len(model.biases) if model.biases.ndim == 1 else 0
-    layout = Layout.of(model.features)
-    expected = (members, layout.length)
+    expected = (members, model.features.length)
     if not 1 <= members <= MAX_MEMBERS or model.weights.shape != expected:
         raise ModelError(f"has weights of shape {model.weights.shape} instead of {expected}")
     for name in _ARRAYS:
         _check_array(getattr(model, name), expected if name == "weights" else (members,), name)
     if model.box_regression is not None:
-        _check_array(model.box_regression.weights, (4, layout.hog_length), _BOX_ARRAYS[0])
+        _check_array(model.box_regression.weights, (4, model.features.hog_length), _BOX_ARRAYS[0])
         _check_array(model.box_regression.biases, (4,), _BOX_ARRAYS[1])
 
 

@@ -28,8 +28,8 @@ _MIN_SIDE = 0.2  # of the smallest vehicle that a window can show, sides of the 
 class GridSearch(Protocol):
     """An engine for the windows of one grid."""
 
-    def search(self, frame: FramePyramid) -> GridResult:
-        """Return the probability of each window."""
+    def search(self, frame: FramePyramid, probability: float) -> GridResult:
+        """Search a frame; windows of at least this probability are hits."""
 
 
 Engine = Callable[[LinearModel, WindowGrid], GridSearch]
@@ -86,23 +86,15 @@ class FrameSearch:
         self._top = top // _ALIGNMENT * _ALIGNMENT
         self._margin = -(-max(-left, right - width, 0) // _ALIGNMENT) * _ALIGNMENT
         self._probability = settings.search.probability
-        self._regression = model.box_regression
         self._features = model.features
 
     def search(self, picture: Picture) -> Windows:
         """Search a frame; return the windows of all sets, in the order of `grids`."""
         frame = FramePyramid(picture, self._features, self._top, self._bottom, self._margin)
-        results = [each.search(frame) for each in self._searches]
-        vehicles = self._boxes.astype(np.float32)
-        if self._regression is not None:
-            first = 0
-            for result in results:
-                (hits,) = np.nonzero(result.probabilities >= self._probability)
-                if len(hits):
-                    sides = self._regression.sides(result.hogs(hits))
-                    vehicles[first + hits] = _vehicle_boxes(vehicles[first + hits], sides)
-                first += len(result.probabilities)
+        results = [each.search(frame, self._probability) for each in self._searches]
         probabilities = np.concatenate([result.probabilities for result in results])
+        sides = np.concatenate([result.sides for result in results])
+        vehicles = _vehicle_boxes(self._boxes.astype(np.float32), sides)
         return Windows(self._boxes, probabilities, self._shares, vehicles)
 
 

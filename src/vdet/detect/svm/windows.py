@@ -8,7 +8,6 @@ sets of all sizes.
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -21,6 +20,9 @@ from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
 from vdet.config.svm import FeatureSettings, PerspectiveSettings, WindowSettings
 
 IndexArray = npt.NDArray[np.intp]
+
+WINDOW_SIDES = np.array([-0.5, -0.5, 0.5, 0.5], np.float32)
+"""The sides of a vehicle that fills its window."""
 
 _MAX_ASPECT = 16 / 9
 """Of a wider frame, which shows more to the sides, the height times this counts as the width."""
@@ -65,13 +67,13 @@ class Windows:
 class GridResult:
     """What the search of a grid gives, window by window in the order of `WindowGrid.boxes`.
 
-    `probabilities` is float32 `(n,)`. `hogs` takes indices of windows, `(m,)`, and returns their
-    HOG features as `FeatureExtractor` gives them, float32 `(m, h)`; few windows need them, so they
-    are computed when asked for.
+    `probabilities` is float32 `(n,)`. `sides` is float32 `(n, 4)`: left, top, right and bottom of
+    the vehicle, from the centre of the window in its sides; of windows that are no hits, and by a
+    model without box regression, `WINDOW_SIDES`.
     """
 
     probabilities: Float32Array
-    hogs: Callable[[IndexArray], Float32Array]
+    sides: Float32Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,6 +110,21 @@ class WindowGrid:
         along = max(1.0, float(self.size / self.step))
         return 1 / (min(self.columns, along) * min(self.rows, along))
 
+    def strip(self, patch: int) -> tuple[slice, slice, int, int]:
+        """Return the strip of the grid: its rows and columns in the frame, its width and height.
+
+        It begins at the first window and ends with the last. Width and height are pixels at the
+        scale where a window has `patch` pixels.
+        """
+
+        def extent(first: Fraction, count: int) -> tuple[slice, int]:
+            start, span = round(first), (count - 1) * self.step + self.size
+            return slice(start, start + round(span)), round(span * patch / self.size)
+
+        rows, height = extent(self.top, self.rows)
+        columns, width = extent(self.left, self.columns)
+        return rows, columns, width, height
+
     def every_nth(self, n: int, column: int, row: int) -> "WindowGrid":
         """Return the grid of every n-th window, from this column and row on."""
         left, top = self.left + column * self.step, self.top + row * self.step
@@ -124,18 +141,17 @@ def lay_grids(
     out.
     """
     search = scale_lengths(settings.search, height / REFERENCE_HEIGHT)
-    cells = features.patch // features.hog.cell
-    grids = [lay_grid(each, width, height, cells) for each in search.windows]
+    grids = [lay_grid(each, width, height) for each in search.windows]
     grids += lay_perspective(search.perspective, features, width, height, horizon=horizon)
     return [grid for grid in grids if len(grid)]
 
 
-def lay_grid(settings: WindowSettings, width: int, height: int, cells: int) -> WindowGrid:
+def lay_grid(settings: WindowSettings, width: int, height: int) -> WindowGrid:
     """Lay the windows of a set over its band of rows and the width of the frame.
 
-    With `overlap`, each product is truncated to a whole number: step = int(size·(1 - overlap)),
-    buffer = int(size·overlap), count = int((span - buffer) / step) across and down, or fewer where
-    fewer fit. With `step`, a number of cells, there are as many windows as fit.
+    Each product is truncated to a whole number: step = int(size·(1 - overlap)), buffer =
+    int(size·overlap), count = int((span - buffer) / step) across and down, or fewer where fewer
+    fit.
 
     Parameters
     ----------
@@ -143,32 +159,20 @@ def lay_grid(settings: WindowSettings, width: int, height: int, cells: int) -> W
         Lengths already scaled to the frame (`scale_lengths`).
     width, height
         Pixels; the band ends where the frame does.
-    cells
-        Number of cells across a patch, in which `step` is counted.
 
     Returns
     -------
     The grid; without windows where the band or the frame is smaller than a window.
     """
-    size = settings.size
-    bottom = max(settings.bottom, settings.top + size)  # scaling may have rounded a row away
-    spans = width, min(bottom, height) - settings.top
-    if size <= 0 or min(spans) < size:
-        return WindowGrid(max(1, size), Fraction(1), Fraction(0), Fraction(settings.top), 0, 0)
-    step, buffer = _step_and_buffer(settings, cells)
-    columns, rows = (
-        min(int((span - buffer) / step), int((span - size) / step) + 1) for span in spans
-    )
-    return WindowGrid(size, step, Fraction(0), Fraction(settings.top), columns, rows)
-
-
-def _step_and_buffer(settings: WindowSettings, cells: int) -> tuple[Fraction, Fraction]:
-    if settings.step is not None:
-        step = Fraction(settings.step * settings.size, cells)
-        return step, settings.size - step
-    assert settings.overlap is not None  # the settings have one of the two
-    step = Fraction(max(1, int(settings.size * (1 - settings.overlap))))
-    return step, Fraction(int(settings.size * settings.overlap))
+    size, top = settings.size, settings.top
+    bottom = max(settings.bottom, top + size)  # scaling may have rounded a row away
+    spans = width, min(bottom, height) - top
+    step = max(1, int(size * (1 - settings.overlap)))
+    buffer = int(size * settings.overlap)
+    columns, rows = (min((span - buffer) // step, (span - size) // step + 1) for span in spans)
+    if not 0 < size <= min(spans):
+        columns = rows = 0
+    return WindowGrid(size, Fraction(step), Fraction(0), Fraction(top), columns, rows)
 
 
 def lay_perspective(
@@ -199,7 +203,7 @@ def lay_perspective(
         size = unit * max(1, round(side / unit))
         first = horizon * height + (sets.highest - 1) * size
         top = max(0, round(first / (1 << halvings)) << halvings)
-        step = Fraction(sets.step * size, cells)
+        step = Fraction(size, cells)
         beyond = int(Fraction(sets.beyond) * size / step)
         columns = (width + 2 * beyond * step - size) // step + 1
         wanted = round((sets.lowest - sets.highest) * size / step) + 1

@@ -4,7 +4,7 @@ A mirrored road is a road too, the sides of the frame cut vehicles off, and a pa
 not be taken for a vehicle.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import cv2
@@ -13,11 +13,8 @@ import numpy as np
 from vdet.boxes import Float32Array, Image
 from vdet.config.train import AugmentationSettings
 
-UNKNOWN_SIDES: tuple[float, ...] = (np.nan,) * 4
-
 _CUT_SHARES = (0.15, 0.5)  # of the patch's width
 _PART_SHARES = (0.4, 0.6)  # of its width and height
-_ZOOM_SHARES = (0.6, 1.0)  # of its width and height
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,10 +28,6 @@ class PatchSample:
     image: Image
     vehicle: bool
     sides: Float32Array
-
-
-Augmenter = Callable[[PatchSample, tuple[int, ...]], Iterator[PatchSample]]
-"""Makes further samples of a sample and a seed."""
 
 
 def augment(
@@ -55,8 +48,7 @@ def augment(
             share, left = cuts.uniform(*_CUT_SHARES), cuts.random() < 0.5
             yield cut_off(each, share, left=left)
         if each.vehicle and parts.random() < settings.parts:
-            unknown = np.array(UNKNOWN_SIDES, np.float32)
-            yield replace(_crop(each, _PART_SHARES, parts), vehicle=False, sides=unknown)
+            yield part_of(each, parts)
 
 
 def mirrored(sample: PatchSample) -> PatchSample:
@@ -76,32 +68,22 @@ def cut_off(sample: PatchSample, share: float, *, left: bool) -> PatchSample:
     left
         True for the frame's left side, False for its right side.
     """
+    if left:
+        return mirrored(cut_off(mirrored(sample), share, left=False))
     width = sample.image.shape[1]
-    lost = round(share * width)
-    kept = sample.image[:, lost:] if left else sample.image[:, : width - lost]
-    before, after = (lost, 0) if left else (0, lost)
-    image = cv2.copyMakeBorder(kept, 0, 0, before, after, cv2.BORDER_REPLICATE)
-    edge = lost / width - 0.5 if left else 0.5 - lost / width
+    kept = width - round(share * width)
+    image = np.take(sample.image, np.arange(width).clip(0, kept - 1), axis=1)
     sides = sample.sides.copy()
     across = sides[::2]
-    across[across < edge if left else across > edge] = np.nan
-    return replace(sample, image=np.asarray(image, np.uint8), sides=sides)
+    across[across > kept / width - 0.5] = np.nan
+    return replace(sample, image=image, sides=sides)
 
 
-def zoom_in(sample: PatchSample, seed: tuple[int, ...]) -> Iterator[PatchSample]:
-    """Yield one crop of most of a sample, in which its box is displaced and larger."""
-    yield _crop(sample, _ZOOM_SHARES, np.random.default_rng(seed))
-
-
-def _crop(
-    sample: PatchSample, shares: tuple[float, float], rng: np.random.Generator
-) -> PatchSample:
-    """Return a random crop with a share of width and height between the two `shares`."""
+def part_of(sample: PatchSample, rng: np.random.Generator) -> PatchSample:
+    """Return a random crop, which is no vehicle and has no sides."""
     whole = np.array(sample.image.shape[1::-1])
-    size = np.maximum(1, np.rint(rng.uniform(*shares) * whole)).astype(int)
-    corner = rng.integers(0, whole - size + 1)
-    (x, y), (right, bottom) = corner, corner + size
-    shift = (corner + size / 2) / whole - 0.5
-    sides = (sample.sides - np.tile(shift, 2)) * np.tile(whole / size, 2)
+    size = np.maximum(1, np.rint(rng.uniform(*_PART_SHARES) * whole)).astype(int)
+    x, y = corner = rng.integers(0, whole - size + 1)
+    right, bottom = corner + size
     image = np.ascontiguousarray(sample.image[y:bottom, x:right])
-    return PatchSample(image, sample.vehicle, sides.astype(np.float32))
+    return PatchSample(image, vehicle=False, sides=np.full(4, np.nan, np.float32))

@@ -1,11 +1,8 @@
-"""Patch files and the samples made of them → feature vectors, in parallel."""
+"""Patch files and the samples made of them → feature vectors."""
 
 import hashlib
-import logging
-from collections.abc import Callable, Sequence
-from contextlib import closing
-from dataclasses import dataclass, replace
-from functools import partial
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -16,16 +13,10 @@ from vdet.config.svm import FeatureSettings
 from vdet.config.train import SvmTrainingSettings
 from vdet.detect.svm.features import FeatureExtractor, to_patch
 from vdet.errors import DataError
-from vdet.learn.svm.augmentation import UNKNOWN_SIDES, Augmenter, PatchSample
-from vdet.learn.svm.dataset import PatchFile, read_patches
-from vdet.workers import WorkerKilledError, Workers
-
-log = logging.getLogger("vdet")
-
-CHUNK = 128
-"""Patches that a process describes at a time."""
-MAX_NAMED = 10
-"""At most this many broken patches are named in warnings."""
+from vdet.learn.svm.augmentation import PatchSample, augment
+from vdet.learn.svm.dataset import Patch, PatchFile, read_patches
+from vdet.run.threads import map_ordered
+from vdet.workers import core_count
 
 TEST_SHARE = 0.2
 """Share of the patches that is held out for the test."""
@@ -51,7 +42,7 @@ class LabelledVectors:
     files
         The file of each patch.
     digest
-        SHA-256 over the names, checksums and boxes of all patch files, also the broken ones.
+        SHA-256 over the names, checksums and boxes of all patch files.
     """
 
     vectors: Float32Array
@@ -90,8 +81,8 @@ def extract(
     features: FeatureSettings,
     training: SvmTrainingSettings,
     *,
-    workers: Workers,
-    augmenter: Augmenter | None = None,
+    augmented: bool = True,
+    jobs: int | None = None,
     progress: Callable[[int], object] = lambda _: None,
 ) -> LabelledVectors:
     """Describe all patches; the result has the order of `files`.
@@ -99,93 +90,64 @@ def extract(
     Parameters
     ----------
     training
-        Has the tolerated share of unreadable patches, which are named in warnings and skipped, and
-        the seed of the augmenter.
-    workers
-        They describe the patches, `CHUNK` at a time.
-    augmenter
-        Makes samples of each patch, which are described too. They depend on the patch and the seed,
-        not on the other patches.
+        Has the seed and the settings of the augmentation. What is made of a patch depends on them
+        and on the patch, not on the other patches.
+    augmented
+        Describe the samples made of each patch too.
+    jobs
+        Number of threads; None: one for each core.
     progress
         Called with the number of patches done since the last call.
 
     Raises
     ------
     DataError
-        Too many patches are unreadable, or a worker process was killed.
-    ClusterError
-        The cluster of `workers` cannot be used.
+        A patch is unreadable.
     """
-    describe = partial(_describe, features=features, augmenter=augmenter, seed=training.seed)
-    parts = [files[i : i + CHUNK] for i in range(0, len(files), CHUNK)] or [[]]
-    chunks: dict[int, tuple[LabelledVectors, list[int]]] = {}
-    try:
-        with closing(workers.map(describe, parts)) as results:
-            for number, chunk in results:
-                chunks[number] = chunk
-                progress(len(parts[number]))
-    except WorkerKilledError as error:
-        raise DataError("a process was killed; with fewer --jobs it needs less memory") from error
-    checksums = [each for number in range(len(parts)) for each in chunks[number][1]]
-    data = _joined([chunks[number][0] for number in range(len(parts))])
-    _check_broken(files, set(data.files), training.max_broken)
-    return replace(data, digest=_digest(files, checksums))
+    extractor = FeatureExtractor(features)
+    digest = hashlib.sha256()
+    broken: list[PatchFile] = []
 
+    def samples() -> Iterator[list[PatchSample]]:
+        for patch in read_patches(files):
+            digest.update(_digest_line(patch))
+            if patch.image is None:
+                broken.append(patch.file)
+                continue
+            sides = np.array(patch.file.sides or (np.nan,) * 4, np.float32)
+            whole = PatchSample(patch.image, patch.file.vehicle, sides)
+            seed = training.seed, patch.checksum
+            more = augment(whole, seed, training.augmentation) if augmented else ()
+            yield [whole, *more]
 
-def _describe(
-    files: Sequence[PatchFile], features: FeatureSettings, augmenter: Augmenter | None, seed: int
-) -> tuple[LabelledVectors, list[int]]:
-    """Return the vectors of the files that are not broken, and the checksums of all files."""
-    patches = list(read_patches(files))
-    samples: list[PatchSample] = []
-    origins: list[int] = []
-    good: list[PatchFile] = []
-    for patch in patches:
-        if patch.image is not None:
-            sides = np.array(patch.file.sides or UNKNOWN_SIDES, np.float32)
-            sample = PatchSample(patch.image, patch.file.vehicle, sides)
-            more = augmenter(sample, (seed, patch.checksum)) if augmenter else ()
-            samples += (sample, *more)
-            origins += [len(good)] * (len(samples) - len(origins))
-            good.append(patch.file)
-    images = (to_patch(sample.image, features.patch) for sample in samples)
-    vectors = FeatureExtractor(features).describe_all(images)
-    vehicle = np.array([sample.vehicle for sample in samples], bool)
-    of_boxes = np.array([sample.sides for sample in samples], np.float32).reshape(-1, 4)
-    data = LabelledVectors(vectors, vehicle, of_boxes, np.array(origins, np.intp), good)
-    return data, [patch.checksum for patch in patches]
+    def describe(same: Sequence[PatchSample]) -> Float32Array:
+        return extractor.describe_all(to_patch(each.image, features.patch) for each in same)
 
-
-def _joined(chunks: Sequence[LabelledVectors]) -> LabelledVectors:
-    firsts = np.cumsum([0, *(len(chunk.files) for chunk in chunks)])
+    vectors = [describe([])]
+    labels: list[tuple[bool, Float32Array, int]] = []
+    with map_ordered(describe, samples(), jobs or core_count()) as results:
+        for number, (same, described) in enumerate(results):
+            vectors.append(described)
+            labels += [(each.vehicle, each.sides, number) for each in same]
+            progress(1)
+    if broken:
+        raise DataError(f"{broken[0]}: {len(broken)} of {len(files)} patches are broken")
+    vehicle, sides, origins = zip(*labels, strict=True) if labels else ((), (), ())
     return LabelledVectors(
-        np.concatenate([chunk.vectors for chunk in chunks]),
-        np.concatenate([chunk.vehicle for chunk in chunks]),
-        np.concatenate([chunk.sides for chunk in chunks]),
-        np.concatenate([each.origins + first for each, first in zip(chunks, firsts, strict=False)]),
-        [file for chunk in chunks for file in chunk.files],
+        np.concatenate(vectors),
+        np.array(vehicle, bool),
+        np.reshape(sides, (-1, 4)).astype(np.float32),
+        np.array(origins, np.intp),
+        files,
+        digest.hexdigest(),
     )
 
 
-def _check_broken(files: Sequence[PatchFile], good: set[PatchFile], max_broken: float) -> None:
-    broken = [file for file in files if file not in good]
-    for file in broken[:MAX_NAMED]:
-        log.warning("%s: is no readable picture; skipped", file)
-    if len(broken) > MAX_NAMED:
-        log.warning("… and %d more", len(broken) - MAX_NAMED)
-    if len(broken) > max_broken * len(files):
-        raise DataError(
-            f"{broken[0]}: {len(broken)} of {len(files)} patches are broken (train.svm.max_broken)"
-        )
-
-
-def _digest(files: Sequence[PatchFile], checksums: Sequence[int]) -> str:
-    digest = hashlib.sha256()
-    for file, checksum in zip(files, checksums, strict=True):
-        sides = f" {file.sides}" if file.sides else ""
-        line = f"{file.group}/{file.name.rpartition('/')[2]} {checksum:08x}{sides}\n"
-        digest.update(line.encode("utf-8", "surrogateescape"))  # a file name may be no valid text
-    return digest.hexdigest()
+def _digest_line(patch: Patch) -> bytes:
+    file = patch.file
+    sides = f" {file.sides}" if file.sides else ""
+    line = f"{file.group}/{file.name.rpartition('/')[2]} {patch.checksum:08x}{sides}\n"
+    return line.encode("utf-8", "surrogateescape")  # a file name may be no valid text
 
 
 def hold_out(groups: npt.NDArray[np.str_], name: SplitName, seed: int) -> BoolArray:

@@ -101,8 +101,6 @@ class TrainingMetrics:
     ----------
     boxed
         Number of patches with a known box, including those of neither class.
-    broken
-        Number of unreadable patches.
     groups
         Number of patches of each group.
     train_augmented
@@ -115,7 +113,6 @@ class TrainingMetrics:
     vehicles: int
     non_vehicles: int
     boxed: int
-    broken: int
     groups: dict[str, int]
     features: int
     split: str
@@ -127,9 +124,8 @@ class TrainingMetrics:
 
     def lines(self) -> Iterator[str]:
         """Yield the metrics as lines of text."""
-        broken = f" ({self.broken} broken ones skipped)" if self.broken else ""
         yield (
-            f"patches: {self.vehicles} vehicles, {self.non_vehicles} non-vehicles{broken}, "
+            f"patches: {self.vehicles} vehicles, {self.non_vehicles} non-vehicles, "
             f"{self.boxed} with the box of their vehicle; {self.features} features each"
         )
         yield from (f"  {group:<28}{count:6d} patches" for group, count in self.groups.items())

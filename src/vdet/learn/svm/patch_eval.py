@@ -6,7 +6,6 @@ a split that leaks nothing, because patches in a row are near-duplicates.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,25 +13,20 @@ import numpy as np
 from vdet.boxes import BoolArray, Float64Array
 from vdet.config.schema import Settings
 from vdet.detect.svm.model import LinearModel
-from vdet.errors import DataError
 from vdet.evaluate.output import RunName, share, table
 from vdet.evaluate.tiles import Tile
-from vdet.learn.svm.augmentation import augment
 from vdet.learn.svm.dataset import PatchFile, read_patches
-from vdet.learn.svm.extraction import extract, hold_out
-from vdet.learn.svm.fitting import fit
+from vdet.learn.svm.extraction import extract
 from vdet.learn.svm.metrics import CONFUSION_HEADINGS, Classification, Rate
-from vdet.pages.charts import FILL, Axis, Plot, curve, number_axis
+from vdet.learn.svm.training import fit_part
 from vdet.pages.render import render
 from vdet.progress import Steps, no_steps
-from vdet.workers import make_workers
 
 THRESHOLD = 0.5
 """A patch with at least this probability is classified as a vehicle."""
 MOST_MISTAKES = 24
 """Most mistakes of either kind that are shown."""
 
-_LEAST_RATE = 1e-3  # of false alarms, in the ROC curve
 _SPLIT = "tail split: leak-free, a new model is tested on the last patches of each folder"
 _READY = "if the model was trained on some of these patches, the scores are too good"
 
@@ -55,8 +49,6 @@ class PatchScores:
         Whether the model was trained on the tested patches.
     roc_auc, log_loss
         None if all tested patches are of one class.
-    roc
-        Shares of false alarms and of found vehicles at each threshold, float64 `(n,)` each.
     mistakes
         The worst missed vehicles and the worst false alarms, the worst first.
     """
@@ -67,7 +59,6 @@ class PatchScores:
     recall: Rate
     roc_auc: float | None
     log_loss: float | None
-    roc: tuple[Float64Array, Float64Array]
     mistakes: tuple[WrongPatch, ...]
 
 
@@ -84,37 +75,29 @@ def evaluate_patches(
     Parameters
     ----------
     jobs
-        Number of processes that describe patches; None for one per core.
+        Number of threads that describe patches; None: one for each core.
     steps
         Called at the start of each step, with the number of patches to describe or None.
 
     Raises
     ------
     DataError
-        Too many patches are unreadable, or there are too few to train on.
+        Patches are unreadable, or there are too few to train on.
     """
-    training = settings.train.svm
     files = [file for file in files if not file.is_boxed]
-    data = extract(
-        files,
-        model.features if model else settings.svm.features,
-        training,
-        workers=make_workers(jobs),
-        augmenter=None if model else partial(augment, settings=training.augmentation),
-        progress=steps("describing patches", len(files)),
-    )
     if model:
-        tested, meaning = np.full(len(data.files), True), _READY
+        progress = steps("describing patches", len(files))
+        training = settings.train.svm
+        data = extract(
+            files, model.features, training, augmented=False, jobs=jobs, progress=progress
+        )
+        tested, meaning = np.full(len(files), True), _READY
     else:
-        steps("fitting the model", None)
-        tested = hold_out(data.groups, "tail", training.seed)
-        if not tested.any():
-            raise DataError("nothing can be held out; give more patches")
-        model, meaning = fit(data.of(~tested), settings), _SPLIT
-    steps("computing scores", None)
+        data, tested, model = fit_part(files, settings, "tail", jobs=jobs, steps=steps)
+        meaning = _SPLIT
     rows = np.flatnonzero(tested)
     probabilities = model.probabilities(data.vectors[data.patches[rows]]).astype(np.float64)
-    return score_patches([data.files[row] for row in rows.tolist()], probabilities, meaning)
+    return score_patches([files[row] for row in rows.tolist()], probabilities, meaning)
 
 
 def score_patches(
@@ -126,7 +109,6 @@ def score_patches(
     vehicle = np.array([file.vehicle for file in files])
     positive = probabilities >= THRESHOLD
     both = 0 < np.count_nonzero(vehicle) < len(vehicle)
-    roc = metrics.roc_curve(vehicle, probabilities)[:2] if both else (np.empty(0), np.empty(0))
     return PatchScores(
         meaning=meaning,
         test=Classification.of(vehicle, positive, np.array([file.group for file in files])),
@@ -134,7 +116,6 @@ def score_patches(
         recall=Rate.of(positive[vehicle]),
         roc_auc=float(metrics.roc_auc_score(vehicle, probabilities)) if both else None,
         log_loss=float(metrics.log_loss(vehicle, probabilities)) if both else None,
-        roc=roc,
         mistakes=tuple(
             WrongPatch(files[row], float(probabilities[row]))
             for row in _worst(vehicle, probabilities)
@@ -173,11 +154,9 @@ def metric_rows(scores: PatchScores) -> list[list[str]]:
 
 
 def values(scores: PatchScores) -> dict[str, Any]:
-    """Return the scores as values for JSON, without the points of the curve."""
+    """Return the scores as values for JSON."""
     mistakes = [asdict(each) | {"file": str(each.file)} for each in scores.mistakes]
-    found = asdict(scores) | {"mistakes": mistakes}
-    del found["roc"]
-    return found
+    return asdict(scores) | {"mistakes": mistakes}
 
 
 def patch_page(scores: PatchScores, run: RunName) -> str:
@@ -188,19 +167,9 @@ def patch_page(scores: PatchScores, run: RunName) -> str:
         scores=scores,
         metrics=metric_rows(scores),
         confusion_headings=CONFUSION_HEADINGS,
-        roc=_roc_plot(scores),
         missed=_tiles(scores, vehicle=True),
         alarms=_tiles(scores, vehicle=False),
     )
-
-
-def _roc_plot(scores: PatchScores) -> Plot:
-    alarms, found = scores.roc
-    ticks = [(-3, "0.001"), (-2, "0.01"), (-1, "0.1"), (0, "1")]
-    x = Axis(np.log10(_LEAST_RATE), 0, ticks, "false alarms / non-vehicles")
-    roc = [curve(np.log10(np.maximum(alarms, _LEAST_RATE)), found, FILL)] if len(found) else []
-    title = "ROC curve: found vehicles / vehicles"
-    return Plot(title, x, number_axis(0, 1), lines=roc)
 
 
 def _tiles(scores: PatchScores, *, vehicle: bool) -> list[Tile]:

@@ -3,7 +3,6 @@
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, replace
-from functools import partial
 
 import numpy as np
 
@@ -11,15 +10,13 @@ from vdet.boxes import BoolArray
 from vdet.config.schema import Settings
 from vdet.detect.svm.model import LinearModel
 from vdet.errors import DataError
-from vdet.learn.svm.augmentation import augment
-from vdet.learn.svm.box_regression import extract_box_patches, fit_split_boxes
+from vdet.learn.svm.box_regression import fit_boxes
 from vdet.learn.svm.dataset import PatchFile
-from vdet.learn.svm.extraction import LabelledVectors, extract, hold_out
+from vdet.learn.svm.extraction import LabelledVectors, SplitName, extract, hold_out
 from vdet.learn.svm.fitting import fit
 from vdet.learn.svm.metrics import Classification, TrainingMetrics
 from vdet.progress import Steps, no_steps
 from vdet.version import __version__
-from vdet.workers import make_workers
 
 
 def train(
@@ -27,7 +24,6 @@ def train(
     settings: Settings,
     *,
     jobs: int | None = None,
-    scheduler: str | None = None,
     steps: Steps = no_steps,
 ) -> tuple[LinearModel, TrainingMetrics]:
     """Describe the patches, fit a model on a part of them, and test it on the others.
@@ -37,9 +33,7 @@ def train(
     files
         If some have known sides, the model learns to find the sides of vehicles.
     jobs
-        Number of processes; None: one for each core.
-    scheduler
-        Address of a Dask scheduler whose workers describe the patches instead.
+        Number of threads that describe patches; None: one for each core.
     steps
         Called at the start of each step, with the number of patches to describe or None.
 
@@ -51,44 +45,29 @@ def train(
     Raises
     ------
     DataError
-        Too many patches are unreadable, too few are left to learn from, or a process was killed.
-    ClusterError
-        The cluster of `scheduler` cannot be used.
+        Patches are unreadable, or there are too few to learn from.
     """
-    training = settings.train.svm
-    workers = make_workers(jobs, scheduler)
+    training, features = settings.train.svm, settings.svm.features
     boxed = [file for file in files if file.is_boxed]
     of_classes = [file for file in files if not file.is_boxed]
-    data = extract(
-        of_classes,
-        settings.svm.features,
-        training,
-        workers=workers,
-        augmenter=partial(augment, settings=training.augmentation),
-        progress=steps("describing patches", len(of_classes)),
+    data, held, model = fit_part(of_classes, settings, training.split, jobs=jobs, steps=steps)
+    progress = steps("describing patches with boxes", len(boxed))
+    without_parts = training.augmentation.model_copy(update={"parts": 0.0})  # they have no sides
+    of_sides = training.model_copy(update={"augmentation": without_parts})
+    of_boxed = extract(boxed, features, of_sides, jobs=jobs, progress=progress)
+    steps("fitting the sides of boxes", None)
+    regression, box_error = fit_boxes(
+        (data, of_boxed),
+        lambda each: hold_out(each.groups, training.split, training.seed),
+        features,
     )
-    boxes = extract_box_patches(of_classes, boxed, settings, workers=workers, steps=steps)
-
-    def held_of(some: LabelledVectors) -> BoolArray:
-        return hold_out(some.groups, training.split, training.seed)
-
-    held = held_of(data)
-    if not held.any():
-        raise DataError("no folder has two patches, of which one could be held out; give more")
-    steps("fitting the classifier", None)
-    model = fit(data.of(~held), settings)
-    regression, box_error = None, None
-    if boxes is not None:
-        steps("fitting the sides of boxes", None)
-        regression, box_error = fit_split_boxes(data, boxes, held_of, settings)
     predicted = model.probabilities(data.vectors[data.patches]) >= 0.5
     metrics = TrainingMetrics(
         vehicles=int(np.count_nonzero(data.labels)),
         non_vehicles=int(np.count_nonzero(~data.labels)),
         boxed=sum(file.sides is not None for file in files),
-        broken=len(files) - len(data.files) - (len(boxes.boxed.files) if boxes else len(boxed)),
         groups=dict(Counter(file.group for file in (*of_classes, *boxed))),
-        features=data.vectors.shape[1],
+        features=features.length,
         split=training.split,
         train_patches=int(np.count_nonzero(~held)),
         train_augmented=int(np.count_nonzero(~held[data.origins]) - np.count_nonzero(~held)),
@@ -99,9 +78,32 @@ def train(
     provenance = {
         "program": f"vdet {__version__}",
         "data_sha256": data.digest,
+        "boxes_sha256": of_boxed.digest,
         "training": training.model_dump(mode="json"),
         "report": asdict(metrics),
     }
-    if boxes and boxed:
-        provenance["boxes_sha256"] = boxes.boxed.digest
     return replace(model, provenance=provenance, box_regression=regression), metrics
+
+
+def fit_part(
+    files: Sequence[PatchFile],
+    settings: Settings,
+    split: SplitName,
+    *,
+    jobs: int | None,
+    steps: Steps,
+) -> tuple[LabelledVectors, BoolArray, LinearModel]:
+    """Describe patches of both classes and fit a model to those that `split` does not hold out.
+
+    Returns
+    -------
+    The patches, which of them are held out, bool `(patches,)`, and the model.
+    """
+    training = settings.train.svm
+    progress = steps("describing patches", len(files))
+    data = extract(files, settings.svm.features, training, jobs=jobs, progress=progress)
+    held = hold_out(data.groups, split, training.seed)
+    if not held.any():
+        raise DataError("no folder has two patches, of which one could be held out; give more")
+    steps("fitting the classifier", None)
+    return data, held, fit(data.of(~held), settings)
