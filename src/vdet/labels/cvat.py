@@ -105,11 +105,16 @@ def read_cvat(path: Path, data: bytes) -> SavedTracks:
                 tasks.append(_frames(opened[-1]))
 
     read_xml(path, _content(path, data), "annotations", take)
-    if len(tasks) > 1:
-        raise TruthError(f"{path}: has several tasks; export each as 'CVAT for video 1.1'")
-    covered, size = next(iter(tasks), None), next(iter(sizes), None)
+    covered, size = _only(path, tasks), next(iter(sizes), None)
     labels = chain.from_iterable(map(partial(_boxes, path, covered), tracks))
     return SavedTracks(tuple(limited(path, labels)), size=size, covered=covered)
+
+
+def _only(path: Path, tasks: Sequence[range | None]) -> range | None:
+    """Return the frames of the only task; None if they are not known."""
+    if len(tasks) > 1:
+        raise TruthError(f"{path}: has several tasks; export each as 'CVAT for video 1.1'")
+    return next(iter(tasks), None)
 
 
 def _content(path: Path, data: bytes) -> bytes:
