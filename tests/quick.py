@@ -8,7 +8,7 @@ and a region less heat than usual.
 QUICK = (
     "detector.kind=svm",
     "detector.search.probability=0.5",
-    "detector.search.windows=[{size: 80, step: 1, top: 380, bottom: 520}]",
+    "detector.search.windows=[{size: 80, overlap: 0.875, top: 380, bottom: 520}]",
     "detector.search.perspective.sizes=[]",
     "detector.stride=1",
     "detector.heat={frames: 4, threshold: 0.1, regions: outline}",

@@ -24,10 +24,10 @@ detector:
     windows:
     - {size: 160, overlap: 0.5, top: 380, bottom: 600}
     - size: 240
-      step: 2
+      overlap: 0.75
       top: 300
       bottom: 700
-    perspective: {sizes: [0.25, 0.5], horizon: 0.45, lowest: 1.1, beyond: 0.7, step: 2}
+    perspective: {sizes: [0.25, 0.5], horizon: 0.45, lowest: 1.1, beyond: 0.7}
   heat: {frames: 3, weight: "coverage", shrink: 4, blur: 15, threshold: 5e-1}
   score: {middle: 0.3, slope: 2}
 tracker:
