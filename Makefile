@@ -13,7 +13,8 @@ WEIGHTS := {"traffic_cams":3, "overpass":2.2, "bdd100k_dashcam":2.5, "vietnam_st
 PATCHES = $(DATA)/vehicles.zip $(DATA)/non-vehicles.zip
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint types tests nettest bench net unseen soak folds data model picture clean
+.PHONY: help demo test lint types tests nettest dist bench net unseen soak folds data model picture \
+	commands clean
 
 help:  ## print this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-8s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -36,6 +37,14 @@ tests: $(TOOLS)  ## run all tests
 nettest: $(TOOLS)  ## install torch, and run the tests of training networks
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check torch --constraint constraints.txt
 	$(BIN)/pytest tests/learn/net
+
+dist: $(TOOLS)  ## build the wheel, install it into an empty environment, and try it there
+	rm -rf dist build/try
+	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist .
+	$(PYTHON) -m venv build/try
+	build/try/bin/python -m pip install --quiet --disable-pip-version-check dist/*.whl \
+		--constraint constraints.txt
+	cd build/try && bin/vdet doctor && bin/vdet demo demo
 
 bench: $(TOOLS)  ## measure speed and memory, as ratios of one run
 	$(BIN)/python -m benchmarks
@@ -77,6 +86,9 @@ unseen: $(TOOLS)  ## measure on cameras left out of trainings, also the networks
 
 picture: $(TOOLS)  ## draw the pictures of the README
 	$(BIN)/python -m docs.pictures
+
+commands: $(READY)  ## write docs/commands.md, the help of every command
+	$(BIN)/python -m docs.commands
 
 # The versions in constraints.txt are the ones that the tests were last run with.
 $(READY): pyproject.toml constraints.txt

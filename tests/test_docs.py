@@ -9,6 +9,7 @@ from typing import Any
 import click
 import pytest
 
+from docs.commands import PAGE, commands_page
 from vdet.cli.main import cli
 from vdet.cli.options import SettingsChoice
 
@@ -110,3 +111,7 @@ def test_packages_that_the_program_tells_to_install_are_those_of_the_project() -
     assert hints
     assert {package for hint in hints for package in hint.split()} <= known
     assert "vdet[" not in "".join(map(text_of, [*PAGES, *(ROOT / "src").rglob("*.py")]))
+
+
+def test_the_page_of_commands_is_their_help() -> None:
+    assert PAGE.read_text(encoding="utf-8") == commands_page(), "run make commands"
