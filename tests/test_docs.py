@@ -8,8 +8,8 @@ from typing import Any
 
 import click
 import pytest
-
 from docs.commands import PAGE, commands_page
+
 from vdet.cli.main import cli
 from vdet.cli.options import SettingsChoice
 
