@@ -37,6 +37,7 @@ _BUILT_IN: dict[str, dict[str, str]] = {
         "json": "vdet.run.sinks.data:JSON",
         "vehicles": "vdet.run.sinks.data:VEHICLES",
         "crops": "vdet.run.sinks.folders:CROPS",
+        "clips": "vdet.run.sinks.clips:CLIPS",
         "page": "vdet.run.sinks.folders:PAGE",
         "counts": "vdet.run.sinks.data:COUNTS",
         "flows": "vdet.run.sinks.data:FLOWS",

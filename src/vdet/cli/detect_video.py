@@ -72,7 +72,7 @@ _batch_options = options.bundle(
     "vdet detect-video in.mp4 --no-video -c gate.yaml --flows flows.csv --interval 15min",
     "vdet detect-video clips/ -d found --tracks .jsonl --skip-existing",
 )
-@click.argument("clips", nargs=-1, required=True, type=options.PATH, metavar="IN [OUT] | CLIP...")
+@click.argument("videos", nargs=-1, required=True, type=options.PATH, metavar="IN [OUT] | CLIP...")
 @options.option("--no-video", "Write no video, only other outputs.")
 @options.output_option(
     "--tracks FILE",
@@ -92,6 +92,15 @@ _batch_options = options.bundle(
     "--page DIR",
     "Write page.html, a page about the vehicles, into DIR. With -d, give an ending such as .page.",
 )
+@options.output_option(
+    "--clips DIR",
+    "Cut a short video for each time in which a vehicle is shown, or with lines or zones one that "
+    "is counted, into DIR. With -d, an ending such as .clips.",
+)
+@options.short_form(
+    "--margin SECONDS", "clips.margin", "Begin before and end after the vehicle.", float
+)
+@options.short_form("--exact", "clips.exact", "Encode clips, exact to the frame.")
 @counting_options(" With -d, give only the ending.")
 @options.sink_option
 @options.start_option
@@ -117,7 +126,7 @@ _batch_options = options.bundle(
 @options.settings_options("output.crf=18", options.model_option)
 @options.overwrite_option
 def detect_video(
-    clips: tuple[Path, ...],
+    videos: tuple[Path, ...],
     no_video: bool,
     start: Fraction | None,
     end: Fraction | None,
@@ -144,7 +153,7 @@ def detect_video(
         raise click.UsageError("--stages and --at go together")
     source = Path()
     if batch.folder is None:
-        source, video = _in_and_out(clips, no_video=no_video)
+        source, video = _in_and_out(videos, no_video=no_video)
         wanted = [*video, *wanted]
     if no_video and not wanted:
         raise click.UsageError("nothing would be written; give an output, such as --tracks")
@@ -160,7 +169,7 @@ def detect_video(
     if batch.folder is None:
         _process_one(replace(run, outputs=options.as_outputs(wanted)))
         return 0
-    return _process_batch(clips, run, _read_suffixes(wanted, no_video=no_video), batch)
+    return _process_batch(videos, run, _read_suffixes(wanted, no_video=no_video), batch)
 
 
 def _in_and_out(clips: tuple[Path, ...], *, no_video: bool) -> tuple[Path, list[options.Wanted]]:

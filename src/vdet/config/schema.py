@@ -112,6 +112,15 @@ class OutputSettings(Section):
     """Quality: 0 is the best, 51 the worst."""
 
 
+class ClipSettings(Section):
+    """The clips that `--clips` cuts out of a video."""
+
+    margin: float = Field(2.0, ge=0, le=3600)
+    """Seconds before and after a vehicle. Clips that touch are joined."""
+    exact: bool = False
+    """true: encode clips again, exact to the frame. false: copy from key frame to key frame."""
+
+
 class DrawSettings(Section):
     """What is drawn on videos and pictures."""
 
@@ -152,6 +161,7 @@ class Settings(Section):
     labels: LabelSettings = LabelSettings()
     input: InputSettings = InputSettings()
     output: OutputSettings = OutputSettings()
+    clips: ClipSettings = ClipSettings()
     draw: DrawSettings = DrawSettings()
 
     def with_paths(self, change: Callable[[str], str]) -> "Settings":

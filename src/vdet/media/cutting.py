@@ -1,0 +1,115 @@
+"""Cut parts out of a video: whole key-frame intervals are copied, without encoding them again."""
+
+from collections.abc import Iterable, Iterator
+from fractions import Fraction
+from pathlib import Path
+
+import av
+from av.packet import Packet
+from av.stream import Stream
+
+from vdet.config.schema import InputSettings, OutputSettings
+from vdet.errors import OutputError
+from vdet.media.clock import ClockUnwrapper
+from vdet.media.demux import is_pipe, open_input, packets, picture_stream
+from vdet.media.images import is_picture_name
+from vdet.media.reader import VideoReader
+from vdet.media.writer import VIDEO_SUFFIXES, VideoWriter
+
+_SOUND_LAG = 1  # seconds of pictures after the end in which sound of the part is still read
+
+
+def can_copy(source: Path) -> bool:
+    """Return whether parts of a video can be copied: one can seek in it, and its clock is one."""
+    if is_pipe(source) or not source.is_file() or is_picture_name(source):
+        return False
+    with open_input(source) as container:
+        return not ClockUnwrapper(container, picture_stream(container, source)).may_restart
+
+
+def copied_suffix(source: Path) -> str:
+    """Return the suffix of copied parts: that of the source, or .mkv, which holds any codec."""
+    suffix = source.suffix.lower()
+    return suffix if suffix in VIDEO_SUFFIXES else ".mkv"
+
+
+def copy_part(source: Path, start: Fraction, end: Fraction, target: Path) -> None:
+    """Copy the key-frame intervals in which a part of a video lies, with its sound.
+
+    Parameters
+    ----------
+    start, end
+        Times of frames as `Frame.time` has them, seconds. The copy begins at the last key frame at
+        or before `start`, and ends before the first one at or after `end`.
+
+    Raises
+    ------
+    VideoError
+        The source cannot be read.
+    OutputError
+        The container of `target` cannot hold a stream of the source.
+    """
+    with open_input(source) as container, av.open(str(target.absolute()), "w") as written:
+        pictures = picture_stream(container, source)
+        streams: list[Stream] = [pictures, *container.streams.audio]
+        try:
+            targets = {one.index: written.add_stream_from_template(one) for one in streams}
+            container.seek(int(start * av.time_base))
+            found = packets(container, streams, on_error=lambda: None)
+            for packet in _moved_to_zero(found, pictures.index, end):
+                packet.stream = targets[packet.stream_index]
+                written.mux(packet)
+        except (ValueError, av.FFmpegError) as error:
+            raise OutputError(f"{target.name}: cannot be copied from {source}: {error}") from error
+
+
+def _moved_to_zero(
+    found: "Iterable[Packet[Stream]]", pictures: int, end: Fraction
+) -> "Iterator[Packet[Stream]]":
+    """Yield the packets from the first key frame to the first one at or after `end`.
+
+    `pictures` is the index of the stream with key frames. The first one is moved to second 0.
+    """
+    begin: Fraction | None = None
+    stop: Fraction | None = None
+    for packet in found:
+        if packet.pts is None or packet.dts is None:
+            continue
+        time, is_picture = packet.pts * packet.time_base, packet.stream_index == pictures
+        if is_picture and packet.is_keyframe:
+            begin = time if begin is None else begin
+            stop = time if stop is None and time >= end else stop
+        if is_picture and stop is not None and time > stop + _SOUND_LAG:
+            return
+        is_over = stop is not None and (is_picture or time >= stop)
+        if begin is None or time < begin or is_over:
+            continue
+        shift = round(begin / packet.time_base)
+        packet.pts, packet.dts = packet.pts - shift, packet.dts - shift
+        yield packet
+
+
+def encode_part(
+    source: Path,
+    start: Fraction,
+    end: Fraction,
+    target: Path,
+    *,
+    reading: InputSettings,
+    writing: OutputSettings,
+) -> None:
+    """Encode a part of a video, exact to the frame, with its sound.
+
+    Parameters
+    ----------
+    start, end
+        Seconds from the first frame; frames with start ≤ time < end are written.
+
+    Errors as of `VideoReader` and `VideoWriter`.
+    """
+    with (
+        VideoReader(source, start=start, end=end, settings=reading) as reader,
+        VideoWriter(target, reader.info, writing, whole_sound=False) as writer,
+    ):
+        for frame in reader:
+            writer.write(frame)
