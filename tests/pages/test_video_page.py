@@ -1,10 +1,11 @@
-"""The page of a video, and the page over many."""
+"""The page of a video."""
 
 import re
 import shutil
 import subprocess
 from collections.abc import Sequence
 from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -16,9 +17,11 @@ from pages.html import Elements
 from run.red_runs import video_info
 from traffic.passing import HEIGHT, WIDTH, frame, passing, summarize, track
 from vdet.boxes import Box
+from vdet.pages.batch import VehicleRow
 from vdet.pages.render import jpeg_uri, link_to
-from vdet.pages.video import Player, VideoPage, write_index
+from vdet.pages.video import Player, VideoPage
 from vdet.track.track import FrameTracks
+from vdet.traffic.clock import Clock
 from vdet.traffic.counts import Counts, Event
 from vdet.traffic.records import VehicleRecord
 from vdet.traffic.speeds import Speeds
@@ -183,32 +186,31 @@ class TestVideoPage:
         html.encode("utf-8")
 
 
-def test_the_facts_have_the_counts() -> None:
-    counts = counted(*[("</script><b>", "in", 1)] * 8)
-    facts = replace(page(), counts=counts).facts
+def test_the_facts_have_the_counts_and_a_row_for_each_vehicle() -> None:
+    counts = counted(("north", "in", 1, 1), ("south", "in", 2, 1), *[("</script><b>", "in", 1)] * 8)
+    clock = Clock(datetime(2026, 5, 1, 7, tzinfo=UTC), "as given")
+    known = {1: "../a.crops/vehicle-0001.jpg"}
+    facts = replace(page(), counts=counts, clock=clock, pictures=known).facts
     assert (facts.frames, facts.vehicles, facts.most) == (52, 2, 1)
-    assert facts.counts == {"</script><b>: in": 8}
-
-
-class TestIndex:
-    def index(self, folder: Path, *names: str) -> Elements:
-        """Write the page over these videos."""
-        pages = [(name, Path(f"{name}.page", "page.html"), page().facts) for name in names]
-        write_index(pages, folder / "index.html")
-        return Elements((folder / "index.html").read_text(encoding="utf-8"))
-
-    def test_it_links_each_page_and_adds_up(self, tmp_path: Path) -> None:
-        made = self.index(tmp_path, "a", "day/b")
-        links = {link["href"] for link in made.all("a")}
-        assert links == {"a.page/page.html", "day/b.page/page.html"}
-        for words in ("4vehicles", "2 videos", "0:04", "104frames"):
-            assert words in made.text
-        assert all(
-            each.startswith("data:image/jpeg;") or each in links for each in made.addresses()
-        )
-
-    def test_of_no_video_it_says_so(self, tmp_path: Path) -> None:
-        assert "No video could be searched." in self.index(tmp_path).text
+    assert facts.counts == {"north: in": 1, "south: in": 1, "</script><b>: in": 8}
+    assert facts.rows == (
+        VehicleRow(
+            class_name=None,
+            first=0.0,
+            moment="0.000",
+            seconds=2.0,
+            clock="2026-05-01T07:00:00+00:00",
+            way="north → south",
+            picture="../a.crops/vehicle-0001.jpg",
+        ),
+        VehicleRow(
+            class_name="truck",
+            first=2.0,
+            moment="2.000",
+            seconds=0.1,
+            clock="2026-05-01T07:00:02+00:00",
+        ),
+    )
 
 
 @pytest.mark.skipif(not shutil.which("chromium"), reason="needs Chromium")

@@ -1,21 +1,19 @@
-"""The page of a video: when vehicles were there, where, what they looked like; and an index."""
+"""The page of a video: when vehicles were there, where, and what they looked like."""
 
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
-
-from pydantic import BaseModel, ConfigDict, Field
+from dataclasses import dataclass, field
 
 from vdet.boxes import Image
 from vdet.errors import named
-from vdet.files import write_text
 from vdet.media import VideoInfo
 from vdet.pages import charts
+from vdet.pages.batch import NO_STILL, VehicleRow, VideoFacts
 from vdet.pages.charts import Axis, Plot, Span, Timeline, clock
-from vdet.pages.render import jpeg_uri, link_to, render
+from vdet.pages.render import jpeg_uri, render
 from vdet.pages.traffic import counts_by_interval, traffic_part
+from vdet.traffic.clock import Clock
 from vdet.traffic.counts import Counts
 from vdet.traffic.paths import draw_paths
 from vdet.traffic.records import VehicleRecord
@@ -24,24 +22,6 @@ from vdet.traffic.speeds import KMH
 _MOST_VEHICLES = 300  # that are shown one by one
 _SPEED_STEP = 5  # km/h, of the classes of speeds
 _SMALL = 200  # columns of the still in the pages over many videos
-_NO_PICTURE = "data:image/jpeg;base64,"
-
-
-class VideoFacts(BaseModel):
-    """A video in numbers: pages over many videos are made from it.
-
-    `seconds` is how much of the video was searched, `most` how many vehicles were shown at once.
-    `counts` are by name; `still` is a small picture as a data URI.
-    """
-
-    model_config = ConfigDict(frozen=True)
-
-    seconds: float = Field(ge=0)
-    frames: int = Field(ge=0)
-    vehicles: int = Field(ge=0)
-    most: int = Field(ge=0)
-    still: str = Field(pattern=r"^data:image/jpeg;base64,[A-Za-z0-9+/=]*$")
-    counts: dict[str, int] = {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,8 +69,11 @@ class VideoPage:
         That of the counts over time, seconds.
     gaps
         Times without frames, from the frame before to the one after, seconds.
-    zero
-        Second of the day at time 0; None where it is not known.
+    clock
+        When the video begins; None where it is not known.
+    pictures
+        By id, the address of the picture of a vehicle as seen from the page, where the run writes
+        one.
     """
 
     video: VideoInfo
@@ -105,7 +88,8 @@ class VideoPage:
     counts: Counts | None = None
     interval: int = 60
     gaps: Sequence[tuple[float, float]] = ()
-    zero: float | None = None
+    clock: Clock | None = None
+    pictures: Mapping[int, str] = field(default_factory=dict)
 
     @property
     def facts(self) -> VideoFacts:
@@ -115,8 +99,23 @@ class VideoPage:
             frames=self.frames,
             vehicles=len(self.records),
             most=self.most,
-            still=_NO_PICTURE if self.poster is None else jpeg_uri(self.poster, _SMALL),
+            still=NO_STILL if self.poster is None else jpeg_uri(self.poster, _SMALL),
             counts=self._totals,
+            rows=tuple(self._row(record) for record in self.records),
+        )
+
+    def _row(self, record: VehicleRecord) -> VehicleRow:
+        events = self.counts.events if self.counts else ()
+        names = [event.name for event in events if event.id == record.id]
+        return VehicleRow(
+            class_name=record.class_name,
+            first=round(record.first, 3),
+            moment=self.player.moment(record.first) if self.player else "0",
+            seconds=round(record.seconds, 1),
+            clock=self.clock and self.clock.at(record.first).isoformat(timespec="seconds"),
+            speed=round(KMH * record.speeds.quantile(0.5), 1) if record.speeds else None,
+            way=" → ".join(dict.fromkeys(names)),
+            picture=self.pictures.get(record.id, ""),
         )
 
     def html(self) -> str:
@@ -187,7 +186,7 @@ class VideoPage:
         counted = counts_by_interval(self.counts, step) if self.counts else {}
         series = {"First seen": {"vehicles": came}, "At lines and zones": counted}
         ends = step * (self.start // step), step * math.ceil(self.end / step)
-        x = charts.time_axis(*ends, self.zero)
+        x = charts.time_axis(*ends, self.clock and self.clock.second_of_day)
         return [charts.interval_plot(some, x, step, name) for name, some in series.items() if some]
 
     @property
@@ -208,7 +207,7 @@ class VideoPage:
 
     @property
     def _times(self) -> Axis:
-        return charts.time_axis(self.start, self.end, self.zero)
+        return charts.time_axis(self.start, self.end, self.clock and self.clock.second_of_day)
 
 
 def _spans(record: VehicleRecord, row: int) -> list[Span]:
@@ -221,12 +220,3 @@ def _spans(record: VehicleRecord, row: int) -> list[Span]:
         Span(row, *span, title, fill, ink, f"#{record.id}" if span is longest else "", span[0])
         for span in record.followed
     ]
-
-
-def write_index(videos: Sequence[tuple[str, Path, VideoFacts]], target: Path) -> None:
-    """Write the page over many videos: each has a name, a page as seen from it, and facts."""
-    counts: Counter[str] = Counter()
-    for _, _, facts in videos:
-        counts.update(facts.counts)
-    linked = [(name, link_to(page, Path()), facts) for name, page, facts in videos]
-    write_text(target, render("index.html", videos=linked, counts=counts))

@@ -44,9 +44,7 @@ def results() -> list[FrameResult]:
 
 def cut(source: Path, folder: Path, *, exact: bool = False) -> dict[str, list[int]]:
     """Return the numbers of the frames of each clip, by its name."""
-    settings = SETTINGS.model_copy(
-        update={"clips": ClipSettings(margin=0.2, exact=exact)}
-    )
+    settings = SETTINGS.model_copy(update={"clips": ClipSettings(margin=0.2, exact=exact)})
     with VideoReader(source) as reader:
         video = replace(reader.info)
     write(Output("clips", folder), results(), settings=settings, video=video)

@@ -11,8 +11,9 @@ from vdet.files import write_text
 from vdet.lanes.drawing import stage_pictures
 from vdet.media import Picture
 from vdet.media.images import encode_image, is_picture_name
+from vdet.pages.batch import VideoFacts, write_index
 from vdet.pages.render import PAGE_NAME, jpeg_uri, link_to
-from vdet.pages.video import Player, VideoFacts, VideoPage, write_index
+from vdet.pages.video import Player, VideoPage
 from vdet.regions import lay_regions
 from vdet.run.result import FrameResult
 from vdet.run.sinks.drawn import PICTURE_LABEL, label_text
@@ -89,9 +90,13 @@ class CropSink(BaseSink):
         for crop in crops:
             if crop.id in self._written:
                 self._written[crop.id].unlink()
-            name = f"vehicle-{crop.id:04d}-at-{crop.time:.3f}s.jpg"
+            name = _crop_name(crop.id, crop.time)
             self._written[crop.id] = path = self._folder / name
             path.write_bytes(encode_image(crop.image, path))
+
+
+def _crop_name(number: int, time: float) -> str:
+    return f"vehicle-{number:04d}-at-{time:.3f}s.jpg"
 
 
 CROPS = SinkKind(CropSink, what="pictures of vehicles", marker="vehicle-*-at-*s.*", takes="videos")
@@ -153,8 +158,20 @@ class PageSink(BaseSink):
             counts=traffic.counts() if traffic else None,
             interval=settings.traffic.seconds or 60,
             gaps=self._gaps,
-            zero=clock.second_of_day if clock else None,
+            clock=clock,
+            pictures=self._pictures(),
         )
+
+    def _pictures(self) -> dict[int, str]:
+        """Return the addresses of the pictures of `crops`, where this run writes them."""
+        folder = next((each.path for each in self.context.outputs if each.sink == "crops"), None)
+        if folder is None:
+            return {}
+        times = {number: time for number, (time, _) in self._thumbnails.items()}
+        return {
+            number: link_to(folder / _crop_name(number, time), self.path)
+            for number, time in times.items()
+        }
 
     def _player(self) -> Player | None:
         """Return the video that this run writes; else the source, if it is a video file."""
