@@ -186,7 +186,7 @@ class VideoPage:
         counted = counts_by_interval(self.counts, step) if self.counts else {}
         series = {"First seen": {"vehicles": came}, "At lines and zones": counted}
         ends = step * (self.start // step), step * math.ceil(self.end / step)
-        x = charts.time_axis(*ends, self.clock and self.clock.second_of_day)
+        x = charts.time_axis(*ends, self._zero)
         return [charts.interval_plot(some, x, step, name) for name, some in series.items() if some]
 
     @property
@@ -206,8 +206,13 @@ class VideoPage:
         return drawn
 
     @property
+    def _zero(self) -> float | None:
+        """The second of the day at time 0, if it is known."""
+        return self.clock.second_of_day if self.clock else None
+
+    @property
     def _times(self) -> Axis:
-        return charts.time_axis(self.start, self.end, self.clock and self.clock.second_of_day)
+        return charts.time_axis(self.start, self.end, self._zero)
 
 
 def _spans(record: VehicleRecord, row: int) -> list[Span]:
