@@ -7,7 +7,7 @@ from vdet.labels.label import Corners, Label
 from vdet.labels.roles import RIDER
 
 _MACHINES = ("motorcycle", "bicycle")
-_LEAST_COVERED = 0.1  # fraction of a rider's box that the box of what is ridden covers
+_MIN_COVERED = 0.1  # fraction of a rider's box that the box of what is ridden covers
 
 
 def merge_riders(labels: Sequence[Label]) -> list[Label]:
@@ -16,18 +16,15 @@ def merge_riders(labels: Sequence[Label]) -> list[Label]:
     A rider belongs to the one that covers most of the rider's box. One without remains.
     """
     machines = [row for row, label in enumerate(labels) if our_name(label.name or "") in _MACHINES]
-    merged = list(labels)
-    gone = set()
+    merged = dict(enumerate(labels))
     for row, rider in enumerate(labels):
-        if letters(rider.name or "") != RIDER:
-            continue
-        covered = [(_covered(rider.box, labels[each].box), each) for each in machines]
-        most, machine = max(covered, default=(0.0, -1))
-        if most >= _LEAST_COVERED:
-            around = _around(merged[machine].box, rider.box)
-            merged[machine] = merged[machine]._replace(box=around)
-            gone.add(row)
-    return [label for row, label in enumerate(merged) if row not in gone]
+        if machines and letters(rider.name or "") == RIDER:
+            covered, machine = max((_covered(rider.box, labels[n].box), n) for n in machines)
+            if covered >= _MIN_COVERED:
+                around = _around(merged[machine].box, rider.box)
+                merged[machine] = merged[machine]._replace(box=around)
+                del merged[row]
+    return list(merged.values())
 
 
 def _covered(box: Corners, other: Corners) -> float:
