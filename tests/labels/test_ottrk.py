@@ -70,8 +70,9 @@ def test_what_is_no_such_file_is_refused(tmp_path: Path) -> None:
     for data, message in (
         (b"{}", f"{other}Invalid data stream"),
         (written(OTTRK, FRAMES)[:-9], f"{other}Compressed file ended"),
-        (packed({"data": {"detections": []}}), f"{other}metadata: Field required"),
-        (packed(old), f"{other}metadata.video.recorded_start_date: Input should be a valid number"),
+        (packed({"data": {"detections": []}}), f"{other}'metadata'"),
+        (packed([]), f"{other}list indices must be integers"),
+        (packed(old), f"{other}recorded_start_date: Input should be a valid number"),
         (packed(narrow), r"data\.detections\.1: width: Input should be a valid number"),
     ):
         with pytest.raises(TruthError, match=message):

@@ -8,6 +8,7 @@ import io
 import json
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime, timedelta
+from itertools import count
 from pathlib import Path, PurePath
 from typing import Any, BinaryIO
 
@@ -83,19 +84,6 @@ class _Video(BaseModel):
     begin: float = Field(alias="recorded_start_date", ge=0, le=1e11)
 
 
-class _Metadata(BaseModel):
-    video: _Video
-
-
-class _Data(BaseModel):
-    detections: list[dict[str, Any]]
-
-
-class _Document(BaseModel):
-    metadata: _Metadata
-    data: _Data
-
-
 _BEFORE_STATE = ("frame", "occurrence", "track-id", "x", "y", "w", "h", "confidence")
 
 
@@ -107,19 +95,20 @@ def read_ottrk(path: Path, data: bytes) -> SavedTracks:
     TruthError
         The file is damaged, of another form or version, or expands to more than `MAX_BYTES`.
     """
-    what = f"is not OTVision's tracks with detections of version {_DETECTIONS}, or is damaged"
+    moments: Times = {}
     try:
         text = bz2.BZ2File(io.BytesIO(data)).read(parsing.MAX_BYTES + 1)
         if len(text) > parsing.MAX_BYTES:
             raise ValueError(f"it is larger than {parsing.MAX_BYTES:,} bytes")
-        document = _Document.model_validate(parsing.read_json(path, text))
+        document = parsing.read_json(path, text)
+        video = _Video.model_validate(document["metadata"]["video"])
+        rows = map(_row, count(), document["data"]["detections"])
+        labels = limited(path, parsing.row_labels(path, rows, moments, first_frame=1))
     except TruthError:
         raise
-    except (EOFError, OSError, ValueError) as error:
+    except (EOFError, OSError, LookupError, TypeError, AttributeError, ValueError) as error:
+        what = f"is not OTVision's tracks with detections of version {_DETECTIONS}, or is damaged"
         raise TruthError(f"{path}: {what}: {first_mistake(error)}") from error
-    video, moments = document.metadata.video, Times()
-    rows = (_row(number, box) for number, box in enumerate(document.data.detections))
-    labels = limited(path, parsing.row_labels(path, rows, moments, first_frame=1))
     times = {frame: (place, moment - video.begin) for frame, (place, moment) in moments.items()}
     size = (video.width, video.height) if video.width and video.height else None
     begin = datetime.fromtimestamp(video.begin, UTC)
