@@ -68,7 +68,20 @@ def test_a_crowd_is_an_ignore_region() -> None:
         assert [row.ignored for row in saved.labels] == [bool(crowd), False, False]
 
 
-def test_a_document_that_would_take_too_much_memory_is_refused_before_it_is_parsed() -> None:
-    data = b'{"images": [' + b"[]," * 10_000_000
-    with pytest.raises(TruthError, match=r"a\.json: would take more than 1 GB of memory; cut it"):
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (b'{"images": [' + b"[]," * 6_000_000, "would take more than 1 GB of memory; cut it"),
+        (b'{"a\\"":0, ' * 3_000_000, "would take more than 1 GB of memory; cut it"),
+        (
+            b"{" + b",".join(b'"%d" : 0' % n for n in range(10_001)) + b"}",
+            "objects have more than 10,000 different keys",
+        ),
+    ],
+    ids=["lists", "quotes", "keys"],
+)
+def test_what_would_take_too_much_memory_is_refused_before_it_is_parsed(
+    data: bytes, message: str
+) -> None:
+    with pytest.raises(TruthError, match=rf"a\.json: {message}"):
         read_coco(Path("a.json"), data)

@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any, BinaryIO
 
-from pydantic import AfterValidator, Field, TypeAdapter, ValidationError
+from pydantic import AfterValidator, FailFast, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
 from vdet.errors import TruthError, printable
@@ -127,9 +127,9 @@ class _Info:
 
 @_entry
 class _Document:
-    images: list[_Image]
-    annotations: list[_Annotation]
-    categories: list[_Category]
+    images: Annotated[list[_Image], FailFast()]
+    annotations: Annotated[list[_Annotation], FailFast()]
+    categories: Annotated[list[_Category], FailFast()]
     info: _Info | None = None
 
 

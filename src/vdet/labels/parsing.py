@@ -4,6 +4,7 @@ import codecs
 import io
 import json
 import math
+import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import islice
 from pathlib import Path, PurePosixPath
@@ -31,6 +32,12 @@ MAX_LINES = 10_000_000
 
 _MAX_MEMORY = 700_000_000
 """Bytes that the values of a JSON document may take, estimated, beside its text."""
+
+_JSON_SIZES = {b"{": 240, b"[": 64, b",": 64, b'\\"': 250}
+"""Bytes that an object, a list, or a value in one take; a quote in a key hides it from `_KEY`."""
+
+_KEY = re.compile(rb'"([^"]*)"\s*:')
+_MAX_KEYS = 10_000
 
 _LATEST = 1e11
 """Largest time in seconds, three thousand years of wall-clock time."""
@@ -241,11 +248,16 @@ def read_json(path: Path, data: bytes) -> Any:
     Raises
     ------
     TruthError
-        It is not JSON, or its values would take more than `_MAX_MEMORY`.
+        It is not JSON, its values would take more than `_MAX_MEMORY`, or objects have more than
+        `_MAX_KEYS` different keys.
     """
-    memory = 240 * data.count(b"{") + 64 * data.count(b"[") + 48 * data.count(b",")
-    if memory > _MAX_MEMORY:
+    if sum(data.count(part) * size for part, size in _JSON_SIZES.items()) > _MAX_MEMORY:
         raise TruthError(f"{path}: would take more than 1 GB of memory; cut it into parts")
+    keys: set[bytes] = set()
+    for found in _KEY.finditer(data):
+        keys.add(found[1])
+        if len(keys) > _MAX_KEYS:
+            raise TruthError(f"{path}: objects have more than {_MAX_KEYS:,} different keys")
     try:
         return json.loads(data.decode("utf-8-sig"))
     except (ValueError, RecursionError) as error:
