@@ -74,8 +74,8 @@ def test_a_crowd_is_an_ignore_region() -> None:
         (b'{"images": [' + b"[]," * 6_000_000, "would take more than 1 GB of memory; cut it"),
         (b'{"a\\"":0, ' * 3_000_000, "would take more than 1 GB of memory; cut it"),
         (
-            b"{" + b",".join(b'"%d" : 0' % n for n in range(10_001)) + b"}",
-            "objects have more than 10,000 different keys",
+            b"{" + b",".join(b'"%d" : 0' % n for n in range(1001)) + b"}",
+            "has more than 1,000 different names of values",
         ),
     ],
     ids=["lists", "quotes", "keys"],

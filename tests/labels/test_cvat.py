@@ -42,6 +42,11 @@ class TestReading:
     def test_frames_count_from_0_and_boxes_are_corners(self) -> None:
         assert rows(track(BOX)) == (row("track 3", 1, 3, 10, 20, 30.5, 40, name="car"),)
 
+    def test_a_declared_encoding_does_not_matter(self) -> None:
+        for name in ("latin-1", "utf-7", "hex"):
+            text = track(BOX, "Überlandbus").replace('"utf-8"', f'"{name}"')
+            assert rows(text)[0].name == "Überlandbus"
+
     def test_an_occluded_box_is_lost(self) -> None:
         (row,) = rows(track(BOX.replace('occluded="0"', 'occluded="1"')))
         assert row.state == "lost"
@@ -126,9 +131,10 @@ class TestWriting:
     ("text", "message"),
     [
         (document("<meta>"), "6: broken XML: mismatched tag"),
+        (document("").replace('"utf-8"', '"utf-16"') + "\0", " is not text (UTF-8)"),
         (track(BOX).replace('id="3"', ""), "track : <track> without its 'id'"),
         (track(BOX).replace("label", "x"), "track 3: <track> without its 'label'"),
-        (document('<image id="0" name="a.png"/>'), "image: CVAT for images"),
+        (document('<image id="0" name="a.png"/>'), " CVAT for images"),
         ("<svg/>", " <svg> where the format has <annotations>"),
         (
             track('<polygon frame="0" points="1,2;3,4"/>'),
@@ -137,17 +143,17 @@ class TestWriting:
         (track(BOX.replace(' xtl="10"', "")), "track 3: <box> without its 'xtl'"),
         (track(BOX.replace("10", "NaN")), "track 3: 'NaN' is not a number"),
         (track(BOX.replace("/>", ' rotation="30"/>')), "track 3: the box is rotated"),
-        (task(0, 9, BOX, "step=x").decode(), "task: the frame filter 'step=x' is unknown"),
+        (task(0, 9, BOX, "step=x").decode(), "meta: the frame filter 'step=x' is unknown"),
         (
             task(1, 9, BOX, "step=2").decode(),
             "track 3: no frame 0 is in the task; it has every 2. frame from 1 to 9",
         ),
         (
             document("<meta><job/></meta>"),
-            "job: has several tasks; export each as 'CVAT for video 1.1'",
+            "meta: has several tasks; export each as 'CVAT for video 1.1'",
         ),
-        (document("").replace("640", "wide"), "task: 'wide' is not a number"),
-        (document("").replace("640", "6" * 2000), "task: '66666"),
+        (document("").replace("640", "wide"), "meta: 'wide' is not a number"),
+        (document("").replace("640", "6" * 2000), "meta: '66666"),
     ],
 )
 def test_other_xml_than_cvat_video_is_refused_with_its_line(text: str, message: str) -> None:

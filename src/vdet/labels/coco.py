@@ -18,6 +18,7 @@ from pydantic import AfterValidator, FailFast, Field, TypeAdapter, ValidationErr
 from pydantic.dataclasses import dataclass
 
 from vdet.errors import TruthError, printable
+from vdet.labels.documents import read_json
 from vdet.labels.formats import Format, SourceVideo, last_classes
 from vdet.labels.label import NO_ID, Label, Size, from_size, line_error
 from vdet.labels.parsing import (
@@ -27,7 +28,6 @@ from vdet.labels.parsing import (
     checked_times,
     first_mistake,
     read_bytes,
-    read_json,
 )
 from vdet.labels.pictures import LabelledPicture, is_file
 from vdet.labels.video import SavedTracks

@@ -15,11 +15,11 @@ from xml.etree import ElementTree as ET
 from xml.sax.saxutils import escape, quoteattr
 
 from vdet.errors import TruthError, escaped
+from vdet.labels.documents import attribute, read_xml, size_of, text_of
 from vdet.labels.formats import Format, SourceVideo, last_classes
 from vdet.labels.label import Corners, Label, limited, line_error
 from vdet.labels.parsing import archive_members, parse_corners, parse_number, parse_whole
 from vdet.labels.video import SavedTracks
-from vdet.labels.xml_elements import attribute, read_elements, size_of, text_of
 from vdet.track.track import FrameTracks, State, Track
 
 _MEMBER = "annotations.xml"  # in the zip file that CVAT exports
@@ -86,23 +86,21 @@ def read_cvat(path: Path, data: bytes) -> SavedTracks:
         The XML is broken, declares a document type, is beyond a limit or of another format, a box
         lies in a frame that the task leaves out, or it is not known which frames that are.
     """
-    tracks: dict[ET.Element, list[_Key]] = {}
-    tasks: list[ET.Element] = []
-    size = covered = None
-    for parent, element in read_elements(path, _content(path, data), "annotations", depth=2):
-        try:
-            if parent.tag == "track":
-                tracks.setdefault(parent, []).append(_key(parent, element))
-            elif parent.tag == "meta":
-                tasks += [*element.iter("task"), *element.iter("job")]
-                size = size or size_of(next(element.iter("original_size"), None))
-                covered = _frames(tasks)
-            elif element.tag == "image":
-                raise ValueError("CVAT for images; export the task as 'CVAT for video 1.1'")
-        except ValueError as error:
-            place = f"track {parent.get('id', ''):.40}" if parent.tag == "track" else element.tag
-            raise line_error(path, place, str(error)) from error
-    labels = (label for keys in tracks.values() for label in _boxes(path, covered, keys))
+    root = read_xml(path, _content(path, data), "annotations")
+    if root.find("image") is not None:
+        raise TruthError(f"{path}: CVAT for images; export the task as 'CVAT for video 1.1'")
+    place, labels = "meta", list[Label]()
+    try:
+        size = size_of(root.find("meta//original_size"))
+        covered = _frames([*root.iterfind("meta//task"), *root.iterfind("meta//job")])
+        for track in root.iterfind("track"):
+            place = f"track {track.get('id', ''):.40}"
+            keys = sorted((_key(track, box) for box in track), key=lambda key: key.label.frame)
+            labels += limited(path, _boxes(covered, keys))
+    except TruthError:
+        raise
+    except ValueError as error:
+        raise line_error(path, place, str(error)) from error
     return SavedTracks(limited(path, labels), covered, size=size)
 
 
@@ -143,9 +141,8 @@ def _key(track: ET.Element, box: ET.Element) -> _Key:
     return _Key(label, attribute(box, "outside") == "1")
 
 
-def _boxes(path: Path, covered: range | None, keys: list[_Key]) -> Iterator[Label]:
+def _boxes(covered: range | None, keys: Sequence[_Key]) -> Iterator[Label]:
     """Yield the boxes of a track in all frames that are covered; None: in all up to its last."""
-    keys.sort(key=lambda key: key.label.frame)
     step = covered.step if covered else 1
     for number, (label, outside) in enumerate(keys):
         if outside:
@@ -154,7 +151,7 @@ def _boxes(path: Path, covered: range | None, keys: list[_Key]) -> Iterator[Labe
         if covered is not None and index not in covered:
             every = f"every {step}. frame" if step > 1 else "the frames"
             what = f"it has {every} from {covered.start} to {covered.stop - 1}"
-            raise line_error(path, label.place, f"no frame {index} is in the task; {what}")
+            raise ValueError(f"no frame {index} is in the task; {what}")
         yield label
         after = keys[number + 1].label if number + 1 < len(keys) else None
         end = after.frame - 1 if after else covered.stop if covered else index + 1

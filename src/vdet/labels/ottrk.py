@@ -16,6 +16,7 @@ from pydantic import BaseModel, Field
 
 from vdet.errors import TruthError
 from vdet.labels import parsing
+from vdet.labels.documents import read_json
 from vdet.labels.formats import Format, SourceVideo, last_classes
 from vdet.labels.label import limited
 from vdet.labels.parsing import Index, Row, Times, checked_times, first_mistake
@@ -100,7 +101,7 @@ def read_ottrk(path: Path, data: bytes) -> SavedTracks:
         text = bz2.BZ2File(io.BytesIO(data)).read(parsing.MAX_BYTES + 1)
         if len(text) > parsing.MAX_BYTES:
             raise ValueError(f"it is larger than {parsing.MAX_BYTES:,} bytes")
-        document = parsing.read_json(path, text)
+        document = read_json(path, text)
         video = _Video.model_validate(document["metadata"]["video"])
         rows = map(_row, count(), document["data"]["detections"])
         labels = limited(path, parsing.row_labels(path, rows, moments, first_frame=1))

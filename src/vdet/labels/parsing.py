@@ -2,9 +2,7 @@
 
 import codecs
 import io
-import json
 import math
-import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import islice
 from pathlib import Path, PurePosixPath
@@ -25,19 +23,10 @@ MAX_BYTES = 300_000_000
 """Largest size of a file of boxes, unpacked."""
 
 MAX_PART = 1_000_000
-"""Largest size of a line or an XML tag, in bytes."""
+"""Largest size of a line, in bytes."""
 
 MAX_LINES = 10_000_000
 """Largest number of lines in a file of boxes."""
-
-_MAX_MEMORY = 700_000_000
-"""Bytes that the values of a JSON document may take, estimated, beside its text."""
-
-_JSON_SIZES = {b"{": 240, b"[": 64, b",": 64, b'\\"': 250}
-"""Bytes that an object, a list, or a value in one take; a quote in a key hides it from `_KEY`."""
-
-_KEY = re.compile(rb'"([^"]*)"\s*:')
-_MAX_KEYS = 10_000
 
 _LATEST = 1e11
 """Largest time in seconds, three thousand years of wall-clock time."""
@@ -240,28 +229,6 @@ def archive_members(
             return {name: read_member(archive, name, most=MAX_BYTES) for name in names}
     except ArchiveError as error:
         raise TruthError(f"{path}: {error}") from error
-
-
-def read_json(path: Path, data: bytes) -> Any:
-    """Return the values of a JSON document, and refuse what would take too much memory.
-
-    Raises
-    ------
-    TruthError
-        It is not JSON, its values would take more than `_MAX_MEMORY`, or objects have more than
-        `_MAX_KEYS` different keys.
-    """
-    if sum(data.count(part) * size for part, size in _JSON_SIZES.items()) > _MAX_MEMORY:
-        raise TruthError(f"{path}: would take more than 1 GB of memory; cut it into parts")
-    keys: set[bytes] = set()
-    for found in _KEY.finditer(data):
-        keys.add(found[1])
-        if len(keys) > _MAX_KEYS:
-            raise TruthError(f"{path}: objects have more than {_MAX_KEYS:,} different keys")
-    try:
-        return json.loads(data.decode("utf-8-sig"))
-    except (ValueError, RecursionError) as error:
-        raise TruthError(f"{path}: is not JSON: {error}") from error
 
 
 def first_mistake(error: Exception) -> str:

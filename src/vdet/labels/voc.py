@@ -7,10 +7,10 @@ of its development kit.
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
+from vdet.labels.documents import read_xml, size_of, text_of
 from vdet.labels.label import Label, Size, line_error
 from vdet.labels.parsing import parse_corners, read_bytes
 from vdet.labels.pictures import PictureFormat
-from vdet.labels.xml_elements import read_elements, size_of, text_of
 
 _SIDES = ("xmin", "ymin", "xmax", "ymax")
 
@@ -26,16 +26,15 @@ def read_voc(file: Path, _picture: Path) -> tuple[tuple[Label, ...], Size | None
     TruthError
         The file is broken XML, declares a document type, or is of another form.
     """
-    labels, size = [], None
-    for _, element in read_elements(file, read_bytes(file), "annotation", depth=1):
-        place = f"object {len(labels) + 1}"
-        try:
-            if element.tag == "object":
-                labels.append(_label(place, element))
-            elif element.tag == "size":
-                size = size_of(element)
-        except ValueError as error:
-            raise line_error(file, place, str(error)) from error
+    root = read_xml(file, read_bytes(file), "annotation")
+    place, labels = "size", list[Label]()
+    try:
+        size = size_of(root.find("size"))
+        for number, element in enumerate(root.iterfind("object"), start=1):
+            place = f"object {number}"
+            labels.append(_label(place, element))
+    except ValueError as error:
+        raise line_error(file, place, str(error)) from error
     return tuple(labels), size
 
 
