@@ -42,6 +42,11 @@ class TestReading:
     def test_frames_count_from_0_and_boxes_are_corners(self) -> None:
         assert rows(track(BOX)) == (row("track 3", 1, 3, 10, 20, 30.5, 40, name="car"),)
 
+    def test_too_many_boxes_between_key_frames_are_refused(self) -> None:
+        end = BOX.replace('frame="0"', 'frame="9000000"')
+        with pytest.raises(TruthError, match=r"track 3: has more than 1,000,000 boxes; cut it"):
+            rows(track(BOX + end))
+
     def test_a_declared_encoding_does_not_matter(self) -> None:
         for name in ("latin-1", "utf-7", "hex"):
             text = track(BOX, "Überlandbus").replace('"utf-8"', f'"{name}"')

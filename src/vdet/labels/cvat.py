@@ -23,6 +23,7 @@ from vdet.labels.video import SavedTracks
 from vdet.track.track import FrameTracks, State, Track
 
 _MEMBER = "annotations.xml"  # in the zip file that CVAT exports
+_MAX_LABELS = 1_000_000  # with those between key frames, which a small file may have many of
 _SIDES = ("xtl", "ytl", "xbr", "ybr")
 
 
@@ -89,19 +90,23 @@ def read_cvat(path: Path, data: bytes) -> SavedTracks:
     root = read_xml(path, _content(path, data), "annotations")
     if root.find("image") is not None:
         raise TruthError(f"{path}: CVAT for images; export the task as 'CVAT for video 1.1'")
-    place, labels = "meta", list[Label]()
     try:
         size = size_of(root.find("meta//original_size"))
         covered = _frames([*root.iterfind("meta//task"), *root.iterfind("meta//job")])
-        for track in root.iterfind("track"):
-            place = f"track {track.get('id', ''):.40}"
-            keys = sorted((_key(track, box) for box in track), key=lambda key: key.label.frame)
-            labels += limited(path, _boxes(covered, keys))
-    except TruthError:
-        raise
     except ValueError as error:
-        raise line_error(path, place, str(error)) from error
-    return SavedTracks(limited(path, labels), covered, size=size)
+        raise line_error(path, "meta", str(error)) from error
+    labels = limited(path, _labels(path, root, covered), _MAX_LABELS)
+    return SavedTracks(labels, covered, size=size)
+
+
+def _labels(path: Path, root: ET.Element, covered: range | None) -> Iterator[Label]:
+    """Yield the boxes of all tracks. Raises `TruthError`."""
+    for track in root.iterfind("track"):
+        try:
+            keys = sorted((_key(track, box) for box in track), key=lambda key: key.label.frame)
+            yield from _boxes(covered, keys)
+        except ValueError as error:
+            raise line_error(path, f"track {track.get('id', ''):.40}", str(error)) from error
 
 
 def _content(path: Path, data: bytes) -> bytes:

@@ -70,11 +70,15 @@ def line_error(path: Path | str, place: int | str, what: str) -> TruthError:
     return TruthError(f"{path}:{place}: {what}")
 
 
-def limited(path: Path, labels: Iterable[Label]) -> tuple[Label, ...]:
-    """Return the labels of a file. Raises `TruthError` if there are more than `MAX_LABELS`."""
-    found = tuple(islice(labels, MAX_LABELS + 1))
-    if len(found) > MAX_LABELS:
-        what = f"has more than {MAX_LABELS:,} boxes; cut it into parts"
+def limited(path: Path, labels: Iterable[Label], most: int | None = None) -> tuple[Label, ...]:
+    """Return the labels of a file. Raises `TruthError` if there are more than `most`.
+
+    None stands for `MAX_LABELS`.
+    """
+    most = MAX_LABELS if most is None else most
+    found = tuple(islice(labels, most + 1))
+    if len(found) > most:
+        what = f"has more than {most:,} boxes; cut it into parts"
         raise line_error(path, found[-1].place, what)
     return found
 

@@ -117,7 +117,7 @@ def checked_pictures(
     counts = Counter[str](), Counter[str]()
     boxes = repeated = absurd = 0
     for picture in pictures:
-        labels = tuple({(label.name, label.box): label for label in picture.labels}.values())
+        labels = tuple({label[1:]: label for label in picture.labels}.values())
         boxes += len(labels)
         repeated += len(picture.labels) - len(labels)
         absurd += sum(_is_absurd(label.box, picture.size) for label in labels)
