@@ -148,6 +148,7 @@ class TestWriting:
         (track(BOX.replace(' xtl="10"', "")), "track 3: <box> without its 'xtl'"),
         (track(BOX.replace("10", "NaN")), "track 3: 'NaN' is not a number"),
         (track(BOX.replace("/>", ' rotation="30"/>')), "track 3: the box is rotated"),
+        (task(0, 9_000_000, BOX).decode(), "meta: has more than 1,000,000 frames; cut the video"),
         (task(0, 9, BOX, "step=x").decode(), "meta: the frame filter 'step=x' is unknown"),
         (
             task(1, 9, BOX, "step=2").decode(),

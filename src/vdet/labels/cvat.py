@@ -131,6 +131,8 @@ def _frames(tasks: Sequence[ET.Element]) -> range | None:
     if step is None:
         raise ValueError(f"the frame filter {rule!r:.40} is unknown; only step=NUMBER is known")
     first, last = (parse_whole(text_of(tasks[0], name)) for name in names)
+    if last - first > _MAX_LABELS:
+        raise ValueError(f"has more than {_MAX_LABELS:,} frames; cut the video into parts")
     return range(first, last + 1, int(step[1] or 1))
 
 
