@@ -19,8 +19,6 @@ from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any, BinaryIO
 
-import numpy as np
-
 from vdet.archives import store
 from vdet.config.document import MAX_BYTES, parse_document
 from vdet.errors import ConfigError, ImageError, TruthError, escaped, printable
@@ -110,7 +108,7 @@ def read_yolo(path: Path, data: bytes) -> SavedTracks:
             f"{path}:{printable(name)}", members[name], parse, form=form, counts=counts
         )
     )
-    return SavedTracks(limited(path, labels), [frame for frame, _ in frames], size=size)
+    return SavedTracks(limited(path, labels), sorted({n for n, _ in frames}), size=size)
 
 
 def _described(data: bytes, where: str) -> tuple[Mapping[str, Any], list[str]]:
@@ -160,14 +158,18 @@ def _label(place: int, columns: Sequence[str], names: Sequence[str], size: Size)
     number = parse_whole(columns[0])
     if not 0 <= number < len(names):
         raise ValueError(f"class {number} has no name; {_DATA} has {len(names)} names")
-    ratios = np.array([parse_number(column) for column in columns[1:]]).reshape(-1, 2)
-    points = (ratios * size).clip(0, size)
-    if (abs(points - ratios * size) > 1).any():
-        raise ValueError("a number is not between 0 and 1; YOLO has fractions of the picture")
+    xs, ys = ([_pixels(text, side) for text in columns[1 + n :: 2]] for n, side in enumerate(size))
     if count == _COLUMNS:  # middle and size
-        middle, half = points[0], points[1] / 2
-        points = np.array([middle - half, middle + half])
-    return Label(place, (*points.min(0).tolist(), *points.max(0).tolist()), names[number])
+        xs, ys = ([middle - side / 2, middle + side / 2] for middle, side in (xs, ys))
+    return Label(place, (min(xs), min(ys), max(xs), max(ys)), names[number])
+
+
+def _pixels(text: str, side: int) -> float:
+    """Return a fraction of a side of the frame in pixels. Raises ValueError."""
+    pixels = parse_number(text) * side
+    if not -1 <= pixels <= side + 1:
+        raise ValueError("a number is not between 0 and 1; YOLO has fractions of the picture")
+    return min(max(pixels, 0.0), float(side))
 
 
 def _track_label(place: int, columns: Sequence[str], names: Sequence[str], size: Size) -> Label:
