@@ -192,8 +192,8 @@ def row_labels(
     TruthError
         A value is not what its column needs.
     """
-    rows = iter(rows)
-    while block := list(islice(rows, _BLOCK)):
+    left = iter(rows)
+    while block := list(islice(left, _BLOCK)):
         places, cells = zip(*block, strict=True)
         try:
             values = _ROWS.validate_python(cells)
@@ -203,10 +203,10 @@ def row_labels(
             raise line_error(path, places[int(number)], what) from error
         for place, row in zip(places, values, strict=True):
             frame, time, id_, x, y, width, height, score, state, name, *known = row
-            times[frame - first_frame] = place, time
-            box, score = from_size(x, y, width, height), 1.0 if score is None else score
-            number = frame - first_frame + 1
-            yield Label(place, box, name, number, id_, score, False, state or "seen", *known)
+            index, score = frame - first_frame, 1.0 if score is None else score
+            times[index] = place, time
+            box, state = from_size(x, y, width, height), state or "seen"
+            yield Label(place, box, name, index + 1, id_, score, False, state, *known)
 
 
 def archive_members(
