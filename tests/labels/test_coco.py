@@ -72,13 +72,14 @@ def test_a_crowd_is_an_ignore_region() -> None:
     ("data", "message"),
     [
         (b'{"images": [' + b"[]," * 6_000_000, "would take more than 1 GB of memory; cut it"),
+        ('{"a": "🚌'.encode() + b"a" * 180_000_000, "would take more than 1 GB of memory; cut it"),
         (b'{"a\\"":0, ' * 3_000_000, "would take more than 1 GB of memory; cut it"),
         (
             b"{" + b",".join(b'"%d" : 0' % n for n in range(1001)) + b"}",
             "has more than 1,000 different names of values",
         ),
     ],
-    ids=["lists", "quotes", "keys"],
+    ids=["lists", "wide", "quotes", "keys"],
 )
 def test_what_would_take_too_much_memory_is_refused_before_it_is_parsed(
     data: bytes, message: str

@@ -70,7 +70,8 @@ def _check_memory(
     path: Path, data: bytes, sizes: Mapping[bytes, int], name: re.Pattern[bytes]
 ) -> None:
     """Refuse a document whose values would take too much memory, before it is parsed."""
-    if sum(data.count(part) * size for part, size in sizes.items()) > MAX_MEMORY:
+    text = 0 if data.isascii() else 4 * len(data)  # one wide character makes all of them wide
+    if text + sum(data.count(part) * size for part, size in sizes.items()) > MAX_MEMORY:
         raise TruthError(f"{path}: would take more than 1 GB of memory; cut it into parts")
     names: set[bytes] = set()
     for found in name.finditer(data):
