@@ -198,15 +198,15 @@ def row_labels(
         try:
             values = _ROWS.validate_python(cells)
         except ValidationError as error:
-            number, column = error.errors()[0]["loc"][:2]
+            at, column = error.errors()[0]["loc"][:2]
             what = f"{tuple(KINDS)[int(column)]}: {error.errors()[0]['msg']}"
-            raise line_error(path, places[int(number)], what) from error
+            raise line_error(path, places[int(at)], what) from error
         for place, row in zip(places, values, strict=True):
             frame, time, id_, x, y, width, height, score, state, name, *known = row
             index, score = frame - first_frame, 1.0 if score is None else score
             times[index] = place, time
-            box, state = from_size(x, y, width, height), state or "seen"
-            yield Label(place, box, name, index + 1, id_, score, False, state, *known)
+            box, number = from_size(x, y, width, height), index + 1
+            yield Label(place, box, name, number, id_, score, False, state or "seen", *known)
 
 
 def archive_members(

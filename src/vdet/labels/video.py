@@ -78,10 +78,10 @@ class SavedTracks:
 
 
 def _track(label: Label) -> Track:
-    _, box, name, _, number, score, _, state, *known = label
+    _, box, name, _, number, score, _, state, foot, metres, lane = label
     whole, score = Box.sized(*Box(*box).xywh), min(max(score, 0.0), 1.0)
     named = None if name is None else our_name(name) or name
-    return Track(number, whole, score, state, named, *known)
+    return Track(number, whole, score, state, named, foot, metres, lane)
 
 
 def spread_frames(known: Iterable[int] | None, every: int, first: int, last: int) -> set[int]:
