@@ -207,7 +207,13 @@ class TestSupervision:
     @pytest.mark.usefixtures("stub")
     def test_what_supervision_got_can_be_taken_back(self) -> None:
         made: Any = FOUND.to_supervision()
-        assert list(Boxes.from_supervision(made)) == list(FOUND)
+        made.data |= {"centroid": np.array(SIDES)[:, :2], "words": np.array(["a", "b", "c"])}
+        back = Boxes.from_supervision(made)
+        assert list(back) == list(FOUND)
+        assert {name: each.tolist() for name, each in back.data.items()} == {
+            **{name: each.tolist() for name, each in FOUND.data.items()},
+            "centroid": [sides[:2] for sides in SIDES],
+        }
         bare: Any = SimpleNamespace(
             xyxy=np.array(SIDES, np.float32),
             confidence=None,

@@ -2,7 +2,8 @@
 
 import stat
 import zipfile
-from pathlib import Path, PurePosixPath, PureWindowsPath
+from collections.abc import Mapping
+from pathlib import Path, PurePath, PurePosixPath, PureWindowsPath
 from typing import IO
 
 from vdet.errors import printable
@@ -36,8 +37,13 @@ def store(archive: zipfile.ZipFile, name: str, data: str | bytes) -> None:
     archive.writestr(info, data)
 
 
+def is_hidden(name: PurePath) -> bool:
+    """Return whether a name in a set is hidden, or is one that macOS adds to its zip files."""
+    return any(part.startswith((".", "__MACOSX")) for part in name.parts)
+
+
 def list_members(file: Path | IO[bytes]) -> list[str]:
-    """Return the names of the files in a zip file.
+    """Return the names of the files in a zip file that are not hidden.
 
     Raises
     ------
@@ -47,15 +53,15 @@ def list_members(file: Path | IO[bytes]) -> list[str]:
     """
     with open_archive(file) as archive:
         members = [member for member in archive.infolist() if not member.is_dir()]
-    names: set[str] = set()
+    names: dict[str, None] = {}
     for member in members:
         if mistake := _mistake(member, names):
             raise ArchiveError(f"its member {printable(member.filename)} {mistake}")
-        names.add(member.filename)
-    return [member.filename for member in members]
+        names[member.filename] = None
+    return [name for name in names if not is_hidden(PurePosixPath(name))]
 
 
-def _mistake(member: zipfile.ZipInfo, earlier: set[str]) -> str | None:
+def _mistake(member: zipfile.ZipInfo, earlier: Mapping[str, None]) -> str | None:
     posix, windows = PurePosixPath(member.filename), PureWindowsPath(member.filename)
     if posix.is_absolute() or windows.drive or windows.root:
         return "has an absolute name; make the archive again, with names relative to its top folder"

@@ -257,16 +257,18 @@ class Boxes:
     def from_supervision(cls, detections: "supervision.Detections") -> "Boxes":
         """Return boxes with copies of the columns of a `supervision.Detections`.
 
-        The classes are those of the column `class_name`. Without confidences, scores are 1. Errors
-        as of `Boxes`.
+        The classes are those of the column `class_name`; other columns of numbers are `data`.
+        Without confidences, scores are 1. Errors as of `Boxes`.
         """
         scores, names, classes = detections.confidence, [], None
+        columns = {name: np.asarray(column) for name, column in detections.data.items()}
+        data = {name: column for name, column in columns.items() if column.dtype.kind in "biuf"}
         if "class_name" in detections.data:
             known, classes = np.unique(detections.data["class_name"], return_inverse=True)
             names = known.tolist()
         scores = np.ones(len(detections.xyxy)) if scores is None else scores
         ids = detections.tracker_id
-        return cls(detections.xyxy, scores, classes=classes, names=names, ids=ids)
+        return cls(detections.xyxy, scores, classes=classes, names=names, ids=ids, data=data)
 
 
 def _column(

@@ -15,7 +15,6 @@ TRACKERS = "vdet.trackers"
 STEPS = "vdet.steps"
 SINKS = "vdet.sinks"
 FORMATS = "vdet.formats"
-PICTURE_FORMATS = "vdet.picture_formats"
 COMMANDS = "vdet.commands"
 
 _BUILT_IN: dict[str, dict[str, str]] = {
@@ -52,11 +51,6 @@ _BUILT_IN: dict[str, dict[str, str]] = {
         "yolo": "vdet.labels.yolo:YOLO",
         "ottrk": "vdet.labels.ottrk:OTTRK",
     },
-    PICTURE_FORMATS: {
-        "kitti": "vdet.labels.kitti:KITTI_PICTURES",
-        "yolo": "vdet.labels.yolo:YOLO_PICTURES",
-        "voc": "vdet.labels.voc:VOC_PICTURES",
-    },
 }
 """The names of vdet itself: where each is defined."""
 
@@ -90,5 +84,5 @@ def load_plugin(group: str, name: str) -> Any:
                 f"{name}: {point.value} fails to load ({type(error).__name__}: {error}); repair it"
             ) from error
     known = ", ".join(plugin_names(group)) or "none"
-    noun = group.removeprefix("vdet.").removesuffix("s").replace("_", " ")
+    noun = group.removeprefix("vdet.").removesuffix("s")
     raise ConfigError(f"{printable(name)}: is no {noun}; known are {known}")

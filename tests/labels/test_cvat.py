@@ -7,6 +7,7 @@ import pytest
 
 from labels.saving import VIDEO, car, frame, read_back, row, written
 from vdet.errors import TruthError
+from vdet.labels import cvat
 from vdet.labels.cvat import CVAT, read_cvat
 from vdet.labels.formats import SourceVideo
 from vdet.labels.label import Label
@@ -40,7 +41,20 @@ def rows(text: str) -> tuple[Label, ...]:
 
 class TestReading:
     def test_frames_count_from_0_and_boxes_are_corners(self) -> None:
-        assert rows(track(BOX)) == (row(5, 1, 3, 10, 20, 30.5, 40, name="car"),)
+        assert rows(track(BOX)) == (row("track 3", 1, 3, 10, 20, 30.5, 40, name="car"),)
+
+    def test_too_many_boxes_between_key_frames_are_refused(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(cvat, "_MAX_LABELS", 1000)
+        end = BOX.replace('frame="0"', 'frame="9000000"')
+        with pytest.raises(TruthError, match=r"track 3: has more than 1,000 boxes; cut it"):
+            rows(track(BOX + end))
+
+    def test_a_declared_encoding_does_not_matter(self) -> None:
+        for name in ("latin-1", "utf-7", "hex"):
+            text = track(BOX, "Überlandbus").replace('"utf-8"', f'"{name}"')
+            assert rows(text)[0].name == "Überlandbus"
 
     def test_an_occluded_box_is_lost(self) -> None:
         (row,) = rows(track(BOX.replace('occluded="0"', 'occluded="1"')))
@@ -95,9 +109,9 @@ class TestWriting:
         (track,) = self.tracks([frame(0, car()), frame(1, car())], part)
         assert self.frames_of(track, outside="1") == [2]
 
-    def test_the_label_is_the_class_with_most_score(self) -> None:
-        cars, trucks = [car(score=0.3)] * 2, [car(score=0.9, class_name="truck")]
-        (track,) = self.tracks([frame(k, each) for k, each in enumerate([*cars, *trucks])])
+    def test_the_label_is_the_last_class(self) -> None:
+        frames = [frame(0, car(score=0.9)), frame(1, car(score=0.3, class_name="truck"))]
+        (track,) = self.tracks(frames)
         assert track.attrib["label"] == "truck"
 
     def test_the_task_is_described_as_cvat_exports_it(self) -> None:
@@ -126,25 +140,30 @@ class TestWriting:
     ("text", "message"),
     [
         (document("<meta>"), "6: broken XML: mismatched tag"),
-        (document('<track label="car"/>'), "5: <track> without its 'id'"),
-        (document('<track id="3"/>'), "5: <track> without its 'label'"),
-        (document('<image id="0" name="a.png"/>'), "5: CVAT for images"),
-        ("<svg/>", "1: <svg> where the format has <annotations>"),
-        (track('<polygon frame="0" points="1,2;3,4"/>'), "5: <polygon> in a track; only boxes"),
-        (track(BOX.replace(' xtl="10"', "")), "5: <box> without its 'xtl'"),
-        (track(BOX.replace("10", "NaN")), "5: 'NaN' is not a number"),
-        (track(BOX.replace("/>", ' rotation="30"/>')), "5: the box is rotated"),
-        (task(0, 9, BOX, "step=x").decode(), "4: the frame filter 'step=x' is unknown"),
+        (document("").replace('"utf-8"', '"utf-16"') + "\0", " is not text (UTF-8)"),
+        (track(BOX).replace('id="3"', ""), "track : <track> without its 'id'"),
+        (track(BOX).replace("label", "x"), "track 3: <track> without its 'label'"),
+        (document('<image id="0" name="a.png"/>'), " CVAT for images"),
+        ("<svg/>", " <svg> where the format has <annotations>"),
+        (
+            track('<polygon frame="0" points="1,2;3,4"/>'),
+            "track 3: <polygon> in a track; only boxes",
+        ),
+        (track(BOX.replace(' xtl="10"', "")), "track 3: <box> without its 'xtl'"),
+        (track(BOX.replace("10", "NaN")), "track 3: 'NaN' is not a number"),
+        (track(BOX.replace("/>", ' rotation="30"/>')), "track 3: the box is rotated"),
+        (task(0, 9_000_000, BOX).decode(), "meta: has more than 1,000,000 frames; cut the video"),
+        (task(0, 9, BOX, "step=x").decode(), "meta: the frame filter 'step=x' is unknown"),
         (
             task(1, 9, BOX, "step=2").decode(),
-            "5: the box is in frame 0, which the task does not have; it has every 2. frame from 1",
+            "track 3: no frame 0 is in the task; it has every 2. frame from 1 to 9",
         ),
         (
             document("<meta><job/></meta>"),
-            " has several tasks; export each as 'CVAT for video 1.1'",
+            "meta: has several tasks; export each as 'CVAT for video 1.1'",
         ),
-        (document("").replace("640", "wide"), "4: 'wide' is not a number"),
-        (document("").replace("640", "6" * 2000), "4: '66666"),
+        (document("").replace("640", "wide"), "meta: 'wide' is not a number"),
+        (document("").replace("640", "6" * 2000), "meta: '66666"),
     ],
 )
 def test_other_xml_than_cvat_video_is_refused_with_its_line(text: str, message: str) -> None:

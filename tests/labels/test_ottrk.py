@@ -12,6 +12,7 @@ import pytest
 from labels.saving import VIDEO, car, frame, read_back, written
 from vdet.boxes import Box
 from vdet.errors import TruthError
+from vdet.labels import parsing
 from vdet.labels.formats import TrackWriter
 from vdet.labels.ottrk import OTTRK, read_ottrk
 from vdet.track.track import FrameTracks
@@ -61,25 +62,26 @@ def test_the_clock_is_kept(tmp_path: Path) -> None:
     assert saved.times == pytest.approx({0: 0, 1: 0.04, 2: 0.08})
 
 
-def test_boxes_of_the_first_version_have_their_middle_and_times_as_text(tmp_path: Path) -> None:
-    value = document(FRAMES)
-    value["metadata"]["otdet_version"] = "1.0"
-    value["metadata"]["video"]["recorded_start_date"] = "2020-01-01 00:00:00.000000"
-    for number, row in enumerate(value["data"]["detections"]):
-        row["occurrence"] = f"2020-01-01 00:00:00.{40_000 * number:06}"
-    saved = read_back(OTTRK, tmp_path, packed(value))
-    assert saved.labels[0].box == (-15, 0, 15, 40)
-    assert saved.times == pytest.approx({0: 0, 1: 0.04, 2: 0.08})
-
-
 def test_what_is_no_such_file_is_refused(tmp_path: Path) -> None:
-    value = document(FRAMES)
-    del value["data"]["detections"][1]["w"]
+    narrow, old = document(FRAMES), document(FRAMES)
+    del narrow["data"]["detections"][1]["w"]
+    old["metadata"]["video"]["recorded_start_date"] = "2020-01-01 00:00:00.000000"
+    other = r"is not OTVision's tracks with detections of version 1\.2, or is damaged: "
     for data, message in (
-        (b"{}", "Invalid data stream"),
-        (written(OTTRK, FRAMES)[:-9], "is cut off"),
-        (packed({"data": {}}), "metadata: Field required"),
-        (packed(value), r"data\.detections\.1: w: Field required"),
+        (b"{}", f"{other}Invalid data stream"),
+        (written(OTTRK, FRAMES)[:-9], f"{other}Compressed file ended"),
+        (packed({"data": {"detections": []}}), f"{other}'metadata'"),
+        (packed([]), f"{other}list indices must be integers"),
+        (packed(old), f"{other}recorded_start_date: Input should be a valid number"),
+        (packed(narrow), r"data\.detections\.1: width: Input should be a valid number"),
     ):
-        with pytest.raises(TruthError, match=rf"is not OTVision's tracks: {message}"):
+        with pytest.raises(TruthError, match=message):
             read_back(OTTRK, tmp_path, data)
+
+
+def test_what_expands_to_more_than_the_limit_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(parsing, "MAX_BYTES", 1000)
+    with pytest.raises(TruthError, match="damaged: it is larger than 1,000 bytes"):
+        read_back(OTTRK, tmp_path, bz2.compress(b" " * 1001))

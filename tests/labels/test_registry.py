@@ -1,3 +1,4 @@
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -39,7 +40,31 @@ def test_the_content_tells_the_format_where_the_name_leaves_it_open(
     assert (row.frame, row.id) == (3, 5)
 
 
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("gt.txt", "1;1;10;20;30;40", "columns must be separated by commas or spaces, not by ';'"),
+        ("a.csv", "frame;time;id", "columns must be separated by commas or spaces, not by ';'"),
+        ("a.txt", "1,1,1,1,9,9,0.9,0,1", "with nine columns, column 7 must be a flag, 0 or 1, but"),
+    ],
+)
+def test_what_other_tools_write_is_refused_in_words_that_fit(
+    tmp_path: Path, name: str, content: str, message: str
+) -> None:
+    (tmp_path / name).write_text(content)
+    with pytest.raises(TruthError, match=message):
+        read_tracks(tmp_path / name)
+
+
+def test_a_zip_file_of_another_format_says_what_to_do(tmp_path: Path) -> None:
+    path = tmp_path / "mot.zip"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("gt/gt.txt", "1,1,1,1,9,9,1,1,1")
+    with pytest.raises(TruthError, match=r"holds neither .* \(YOLO\); unpack it, and use the file"):
+        read_tracks(path)
+
+
 def test_an_empty_file_of_another_name_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.json").touch()
-    with pytest.raises(TruthError, match=r"a\.json: is empty; give tracks or truth, as in \.txt"):
+    with pytest.raises(TruthError, match=r"a\.json: is empty; tracks and truth are files as \.txt"):
         read_tracks(tmp_path / "a.json")

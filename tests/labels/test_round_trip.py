@@ -28,6 +28,7 @@ WHOLE = {CSV, JSON_LINES}
 """Formats that keep all that is known of a track."""
 TIMED = WHOLE | {COCO, OTTRK}
 LISTING = {JSON_LINES, COCO, YOLO}
+"""Formats that keep the frames without a box; CVAT has all up to the last one."""
 SCORED = {MOT, CSV, JSON_LINES, COCO, KITTI, OTTRK}
 SIZED = {COCO, CVAT, YOLO, OTTRK}
 MARKING = WHOLE | {COCO, CVAT}
@@ -107,10 +108,11 @@ def test_what_is_written_is_read_again(
         return  # a file without a record is no such file
     saved = read_back(form, tmp_path_factory.getbasetemp(), written(form, frames))
     found = {each.index: each.tracks for each in saved}
-    assert found == {
+    between = range(frames[-1].index if frames else 1) if form is CVAT else ()
+    assert found == dict.fromkeys(between, ()) | {
         each.index: tuple(kept(form, track) for track in each.tracks)
         for each in frames
-        if each.tracks or form in LISTING
+        if each.tracks or form in LISTING or form is CVAT
     }
     for each in saved:
         seconds = each.index / 25 if form in TIMED else math.nan
@@ -143,4 +145,4 @@ def test_a_box_may_reach_out_of_the_frame(tmp_path: Path, form: Format) -> None:
     box = Box.sized(-5, 700, 30, 60)
     saved = read_back(form, tmp_path, written(form, [frame(2, car(1, box))]))
     inside = box.clipped(1280, 720)
-    assert next(iter(saved)).tracks[0].box == (inside if form is YOLO else box)
+    assert list(saved)[-1].tracks[0].box == (inside if form is YOLO else box)

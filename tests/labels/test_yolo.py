@@ -46,7 +46,7 @@ class TestWriting:
         data = written(YOLO, [frame(0, car(1, class_name="bus"), car(2))])
         assert member(data, "data.yaml") == (
             "path: .\ntrain: train.txt\nval: train.txt\n"
-            'names:\n  0: "bus"\n  1: "car"\nwidth: 1280\nheight: 720\n'
+            'names: ["bus", "car"]\nwidth: 1280\nheight: 720\n'
         )
         assert member(data, "train.txt") == "images/train/frame_000000.png\n"
 
@@ -58,7 +58,7 @@ class TestWriting:
 class TestReading:
     def test_the_frame_is_the_number_at_the_end_of_the_name(self) -> None:
         saved = read_yolo(FILE, archive(labels__road_7="1 0.5 0.5 0.1 0.2 4", labels__road_3=""))
-        assert saved.listed == (3, 7)
+        assert saved.known == [3, 7]
         (row,) = saved.labels
         assert (row.frame, row.id, row.name) == (8, 4, "truck")
         assert row.box == pytest.approx((90, 40, 110, 60))
@@ -67,18 +67,31 @@ class TestReading:
         (row,) = read_yolo(FILE, archive(labels__f0="1 0.5 0.5 0.1 0.2 0.75 4")).labels
         assert (row.score, row.id) == (0.75, 4)
 
+    def test_hidden_members_are_passed_over(self) -> None:
+        hidden = ("labels/._f0", "__MACOSX/labels/f3", ".trash/labels/f7")
+        data = archive_of({"data.yaml": DATA, "labels/f0": ""} | dict.fromkeys(hidden, "\0"))
+        assert read_yolo(FILE, data).known == [0]
+
+    def test_names_from_1_are_warned_of(self, caplog: pytest.LogCaptureFixture) -> None:
+        assert read_yolo(FILE, archive(labels__f1="", labels__f2="")).known == [1, 2]
+        assert caplog.messages == [
+            "a.zip: frames are numbered from 0, and the first file is of frame 1"
+        ]
+
 
 @pytest.mark.parametrize(
     ("data", "message"),
     [
         (b"PK nothing", ": is neither a folder nor a readable zip file"),
-        (archive_of({"labels/f0": ""}), ": needs data.yaml with the names of the classes"),
+        (
+            archive_of({"labels/f0": ""}),
+            ": holds neither annotations.xml (CVAT) nor data.yaml (YOLO); unpack",
+        ),
         (described("names: [car]"), ":data.yaml: needs the size of the frames"),
         (described(DATA.replace("200", "0")), ":data.yaml: needs the size of the frames"),
         (described(DATA.replace("[car, truck]", "car")), ":data.yaml: names must be"),
         (described("a: &a [b]\nc: [*a, *a]"), ":data.yaml:2:5: is not YAML: aliases"),
-        (archive(labels__road=""), ": labels/road.txt has no number of a frame at its end"),
-        (archive(labels__a1="", labels__b01=""), ": labels/a1.txt and labels/b01.txt are of one"),
+        (archive(labels__road=""), ": labels/road.txt must end with the number of a frame"),
         (
             archive(labels__f0="\n0 0.5 0.5 0.1 0.1"),
             ":labels/f0.txt:2: YOLO with tracks has 6 or 7",

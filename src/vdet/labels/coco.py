@@ -7,7 +7,6 @@ Source: Lin et al., "Microsoft COCO: Common Objects in Context", 2014; cocodatas
 format"; Dave et al., "TAO: A Large-Scale Benchmark for Tracking Any Object", 2020.
 """
 
-import io
 import json
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
@@ -15,16 +14,22 @@ from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any, BinaryIO
 
-from pydantic import AfterValidator, Field, TypeAdapter
+from pydantic import AfterValidator, FailFast, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
 from vdet.errors import TruthError, printable
-from vdet.files import record_input
-from vdet.labels.formats import UNKNOWN, Format, SourceVideo, best_classes
-from vdet.labels.json_stream import JsonLists
-from vdet.labels.label import Label, from_size, limited, line_error
-from vdet.labels.parsing import LIMIT, Index, Number, Times, checked_times
-from vdet.labels.pictures import MAX_BOXES, MAX_PICTURES, LabelledPicture
+from vdet.labels.documents import read_json
+from vdet.labels.formats import Format, SourceVideo, last_classes
+from vdet.labels.label import NO_ID, Label, Size, from_size, line_error
+from vdet.labels.parsing import (
+    Index,
+    Number,
+    Times,
+    checked_times,
+    first_mistake,
+    read_bytes,
+)
+from vdet.labels.pictures import LabelledPicture, is_file
 from vdet.labels.video import SavedTracks
 from vdet.track.track import FrameTracks, State
 
@@ -32,7 +37,6 @@ _VIDEO = 1
 """Id of the only video."""
 
 _ANNOTATIONS = "annotations"  # the folder of label files in the COCO set itself
-_MAX_NAME = 255  # bytes, as in most file systems
 
 
 def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) -> None:
@@ -42,6 +46,7 @@ def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) ->
     `attributes.occluded` says that the vehicle is lost.
     """
     size = {"width": video.width, "height": video.height}
+    classes = last_classes(frames)
     categories: dict[str, int] = defaultdict(lambda: len(categories) + 1)  # the id of each name
     lists: dict[str, list[str]] = {  # entries as text, which is smaller than dictionaries
         "videos": [json.dumps({"id": _VIDEO, "name": video.name, **size})],
@@ -56,7 +61,7 @@ def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) ->
             annotation = {
                 "id": len(lists["annotations"]) + 1,
                 "image_id": number,
-                "category_id": categories[track.class_name or UNKNOWN],
+                "category_id": categories[classes[track.id]],
                 "track_id": track.id,
                 "bbox": [x, y, width, height],
                 "area": width * height,
@@ -65,7 +70,7 @@ def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) ->
                 "attributes": {"occluded": track.state == "lost"},
             }
             lists["annotations"].append(json.dumps(annotation))
-    for id_, name in best_classes(frames).items():
+    for id_, name in classes.items():
         entry = {"id": id_, "video_id": _VIDEO, "category_id": categories[name]}
         lists["tracks"].append(json.dumps(entry))
     lists["categories"] = [json.dumps({"id": n, "name": name}) for name, n in categories.items()]
@@ -73,17 +78,10 @@ def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) ->
     file.write(("{\n" + ",\n".join(parts) + "\n}\n").encode())
 
 
-_Id = Annotated[int, Field(ge=-LIMIT, le=LIMIT)]
-_Side = Annotated[int, Field(ge=1, le=LIMIT)]
-
-
 def _inside(name: str) -> str:
-    """Refuse the name of a picture that leads out of the set or cannot be a file name."""
-    inside = PurePosixPath(name)
-    if inside.is_absolute() or ".." in inside.parts:
+    """Refuse the name of a picture that leads out of the set."""
+    if PurePosixPath(name).is_absolute() or ".." in PurePosixPath(name).parts:
         raise ValueError(f"{printable(name)} leads out of the set")
-    if not name.isprintable() or any(len(part.encode()) > _MAX_NAME for part in inside.parts):
-        raise ValueError(f"{printable(name):.100} is not the name of a file")
     return name
 
 
@@ -93,7 +91,7 @@ _entry = partial(dataclass, frozen=True, slots=True, kw_only=True)
 @_entry
 class _Category:
     id: int
-    name: str = Field(max_length=1000)
+    name: str
 
 
 @_entry
@@ -101,93 +99,64 @@ class _Annotation:
     image_id: int
     category_id: int
     bbox: tuple[Number, Number, Number, Number]
-    iscrowd: int = Field(0, ge=0, le=1, strict=False)
-
-
-@_entry
-class _TrackAnnotation(_Annotation):
-    track_id: _Id
+    iscrowd: bool = False
+    track_id: Index | None = None
     score: Number = 1.0
-    attributes: dict[str, Any] = Field({})
+    attributes: dict[str, Any] | None = None
 
 
 @_entry
 class _Image:
     id: int
-    width: _Side | None = None
-    height: _Side | None = None
+    width: Index | None = None
+    height: Index | None = None
+    file_name: Annotated[str, AfterValidator(_inside)] = ""
+    frame_index: Index | None = None
+    time: float | None = None
+    labels: list[Label] = Field(default_factory=list, init=False)
 
     @property
-    def size(self) -> tuple[int, int] | None:
+    def size(self) -> Size | None:
         return (self.width, self.height) if self.width and self.height else None
 
 
 @_entry
-class _Picture(_Image):
-    file_name: Annotated[str, Field(min_length=1, max_length=1000), AfterValidator(_inside)]
-
-
-@_entry
-class _Frame(_Image):
-    frame_index: Index
-    video_id: _Id = _VIDEO
-    time: float | None = None
-
-
-@_entry
 class _Info:
-    unlabelled_classes: tuple[str, ...] = ()
+    unlabelled_classes: tuple[str, ...] = ()  # of our own: they may be there without a label
 
 
+@_entry
 class _Document:
-    """The needed content of a COCO file.
+    images: Annotated[list[_Image], FailFast()]
+    annotations: Annotated[list[_Annotation], FailFast()]
+    categories: Annotated[list[_Category], FailFast()]
+    info: _Info | None = None
 
-    `entries` are the images and the categories by their id; `annotations` are by the id of their
-    image, each with its number in the file. `unlabelled` are the classes that the file does not
-    label although they may be there: `unlabelled_classes` of its `info`, a key of our own.
-    """
 
-    def __init__(self, path: Path, file: BinaryIO, form: str, image: type, entry: type) -> None:
-        self.path = path
-        self.entries: dict[str, dict[int, Any]] = {"images": {}, "categories": {}}
-        self.annotations: dict[int, list[tuple[int, Any]]] = defaultdict(list)
-        self.unlabelled: tuple[str, ...] = ()
-        kinds = {"images": image, "annotations": entry, "categories": _Category, "info": _Info}
-        lists = JsonLists(file.read, {name: TypeAdapter[Any](kind) for name, kind in kinds.items()})
-        try:
-            for name, number, value in lists:
-                self._add(name, number, value)
-            if missing := kinds.keys() - lists.found - {"info"}:
-                raise ValueError(f"the list {min(missing)} is missing")
-        except ValueError as error:
-            raise TruthError(f"{path}: is not {form}: {error}") from error
+_DOCUMENT = TypeAdapter(_Document)
 
-    def _add(self, name: str, number: int, value: Any) -> None:
-        if number == (MAX_PICTURES if name == "images" else MAX_BOXES):
-            raise ValueError(f"there are more than {number:,} {name}; cut the file into parts")
-        if name == "info":
-            self.unlabelled = value.unlabelled_classes
-        elif name == "annotations":
-            self.annotations[value.image_id].append((number, value))
-        elif self.entries[name].setdefault(value.id, value) is not value:
-            raise ValueError(f"{name}.{number}: the id {value.id} is there already")
 
-    def labels(self) -> Iterator[tuple[Any, list[tuple[Any, Label]]]]:
-        """Yield each image with its annotations, each also as a label. Raises `TruthError`."""
-        images, categories = self.entries["images"], self.entries["categories"]
-        for image_id in self.annotations.keys() - images.keys():
-            number, _ = self.annotations[image_id][0]
-            raise line_error(self.path, f"annotations.{number}", f"no image has the id {image_id}")
-        for image in images.values():
-            found = []
-            for number, each in self.annotations.pop(image.id, ()):
-                place, category = f"annotations.{number}", categories.get(each.category_id)
-                if category is None:
-                    what = f"no category has the id {each.category_id}"
-                    raise line_error(self.path, place, what)
-                box, ignored = from_size(*each.bbox), bool(each.iscrowd)
-                found.append((each, Label(place, box, category.name, ignored=ignored)))
-            yield image, found
+def _read(path: Path, data: bytes) -> _Document:
+    """Return a document whose images have their labels. Raises `TruthError`."""
+    try:
+        document = _DOCUMENT.validate_python(read_json(path, data))
+    except ValidationError as error:
+        raise TruthError(f"{path}: is not COCO: {first_mistake(error)}") from error
+    images = {image.id: image for image in document.images}
+    names = {category.id: category.name for category in document.categories}
+    if len(images) < len(document.images) or len(names) < len(document.categories):
+        raise TruthError(f"{path}: is not COCO: an id of images or categories occurs twice")
+    for number, each in enumerate(document.annotations):
+        place = f"annotations.{number}"
+        if each.image_id not in images or each.category_id not in names:
+            what = f"image {each.image_id} or category {each.category_id} not found"
+            raise line_error(path, place, what)
+        image, box = images[each.image_id], from_size(*each.bbox)
+        state: State = "lost" if (each.attributes or {}).get("occluded") else "seen"
+        id_, frame = NO_ID if each.track_id is None else each.track_id, image.frame_index or 0
+        known = frame + 1, id_, each.score, each.iscrowd, state
+        image.labels.append(Label(place, box, names[each.category_id], *known))
+    return document
 
 
 def read_coco(path: Path, data: bytes) -> SavedTracks:
@@ -196,31 +165,24 @@ def read_coco(path: Path, data: bytes) -> SavedTracks:
     Raises
     ------
     TruthError
-        The file is not of this form, has several videos, an id of images or categories or a frame
-        appears twice, a time is wrong, or an annotation names an image or a category that is not
-        there.
+        The file is not of this form or too large, an id of images or categories or a frame occurs
+        twice, a time is wrong, or an annotation names an image or a category that is not there.
     """
-    form = "COCO with tracks"
-    document = _Document(path, io.BytesIO(data), form, _Frame, _TrackAnnotation)
-    images: list[_Frame] = list(document.entries["images"].values())
-    if len({image.video_id for image in images}) > 1:
-        raise TruthError(f"{path}: has images of several videos; give a file for each")
-    frames = {each.frame_index: (f"images.{number}", each) for number, each in enumerate(images)}
-    if len(frames) < len(images):
-        raise TruthError(f"{path}: a frame_index of images appears twice")
-
-    def labels() -> Iterator[Label]:
-        for image, annotations in document.labels():
-            for each, label in annotations:
-                frame, id_, score = image.frame_index + 1, each.track_id, each.score
-                state: State = "lost" if each.attributes.get("occluded") else "seen"
-                yield label._replace(frame=frame, id=id_, score=score, state=state)
-
+    images = _read(path, data).images
+    labels = tuple(label for image in images for label in image.labels)
+    frames = [image.frame_index for image in images if image.frame_index is not None]
+    if len(frames) < len(images) or any(label.id == NO_ID for label in labels):
+        what = "needs the frame_index of each image and the track_id of each annotation"
+        raise TruthError(f"{path}: {what}; CVAT has them in 'CVAT for video 1.1'")
+    if len(set(frames)) < len(images):
+        raise TruthError(f"{path}: a frame_index occurs twice; several videos need a file for each")
     times: Times = {
-        n: (place, each.time) for n, (place, each) in frames.items() if each.time is not None
+        frame: (f"images.{number}", image.time)
+        for number, (frame, image) in enumerate(zip(frames, images, strict=True))
+        if image.time is not None
     }
-    listed, size = tuple(sorted(frames)), images[0].size if images else None
-    return SavedTracks(tuple(limited(path, labels())), listed, checked_times(path, times), size)
+    size = images[0].size if images else None
+    return SavedTracks(labels, tuple(sorted(frames)), checked_times(path, times), size)
 
 
 COCO = Format("COCO", ".coco.json", read_coco, whole=_write)
@@ -236,34 +198,25 @@ def read_coco_pictures(path: Path) -> Iterator[LabelledPicture]:
     ------
     TruthError
         The file is not of this form, an annotation names a picture or a category that is not
-        there, an id appears twice, there are more than `MAX_PICTURES` or `MAX_BOXES`, or a picture
-        lies outside.
+        there, an id occurs twice, or a picture lies outside.
     """
-    try:
-        with path.open("rb") as file:
-            record_input(file.fileno())
-            document = _Document(path, file, "COCO", _Picture, _Annotation)
-    except OSError as error:
-        raise TruthError(f"{path}: cannot be read: {error.strerror}") from error
-    folder = _picture_folder(
-        path, [image.file_name for image in document.entries["images"].values()]
-    )
-    for image, annotations in document.labels():
-        labels, picture = tuple(label for _, label in annotations), folder / image.file_name
-        yield LabelledPicture(picture, path, labels, image.size, document.unlabelled)
+    document, folder = _read(path, read_bytes(path)), None
+    unlabelled = document.info.unlabelled_classes if document.info else ()
+    for image in document.images:
+        folder = folder or _picture_folder(path, image.file_name)
+        picture, labels = folder / image.file_name, tuple(image.labels)
+        yield LabelledPicture(picture, path, labels, image.size, unlabelled)
 
 
-def _picture_folder(path: Path, names: Sequence[str]) -> Path:
+def _picture_folder(path: Path, name: str) -> Path:
     """Return the folder that the names of pictures are relative to: the one with the first."""
-    near = path.parent
-    if not names or (near / names[0]).is_file():
-        return near
+    near, shown = path.parent, printable(name)
     above = near.parent if near.name == _ANNOTATIONS else near
-    levels = (above,), sorted(above.glob("*/")), sorted(above.glob("*/*/"))
-    holding = ([each for each in level if (each / names[0]).is_file()] for level in levels)
-    found = next(filter(None, holding), [])
-    if len(found) != 1:
-        which = " and ".join(str(folder) for folder in found[:2])
-        what = f"lies in {which}" if found else "is missing: it should lie beside it or below"
-        raise TruthError(f"{path}: its first picture, {names[0]}, {what}")
-    return found[0]
+    for level in ([near], [above], sorted(above.glob("*/")), sorted(above.glob("*/*/"))):
+        found = [folder for folder in level if is_file(folder / name)]
+        if len(found) > 1:
+            where = " and ".join(str(folder) for folder in found[:2])
+            raise TruthError(f"{path}: its first picture, {shown}, lies in {where}; keep one")
+        if found:
+            return found[0]
+    raise TruthError(f"{path}: its first picture, {shown}, is missing beside it and below")

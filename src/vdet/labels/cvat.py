@@ -9,53 +9,50 @@ Source: the CVAT manual, "XML annotation format", section "Interpolation".
 import re
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
-from functools import partial
-from itertools import chain
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
+from xml.etree import ElementTree as ET
 from xml.sax.saxutils import escape, quoteattr
 
 from vdet.errors import TruthError, escaped
-from vdet.labels.formats import Format, SourceVideo, best_classes
+from vdet.labels.documents import attribute, read_xml, size_of, text_of
+from vdet.labels.formats import Format, SourceVideo, last_classes
 from vdet.labels.label import Corners, Label, limited, line_error
-from vdet.labels.parsing import archive_members, parse_number, parse_whole
+from vdet.labels.parsing import archive_members, parse_corners, parse_number, parse_whole
 from vdet.labels.video import SavedTracks
-from vdet.labels.xml_reader import Element, read_xml
 from vdet.track.track import FrameTracks, State, Track
 
 _MEMBER = "annotations.xml"  # in the zip file that CVAT exports
+_MAX_LABELS = 1_000_000  # with those between key frames, which a small file may have many of
+_SIDES = ("xtl", "ytl", "xbr", "ybr")
 
 
 def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) -> None:
     """Write a track for each vehicle; the box of a lost one is `occluded`."""
-    for line in _lines(video, frames):
-        file.write(f"{line}\n".encode())
-
-
-def _lines(video: SourceVideo, frames: Sequence[FrameTracks]) -> Iterator[str]:
     count = max(frames[-1].index + 1 if frames else 0, video.frames or 0)
     boxes: dict[int, list[tuple[int, Track]]] = defaultdict(list)
     for frame in frames:
         for track in frame.tracks:
             boxes[track.id].append((frame.index, track))
-    labels = {id_: escaped(name) for id_, name in best_classes(frames).items()}
-    names = sorted(f"<label><name>{escape(each)}</name></label>" for each in set(labels.values()))
-    yield '<?xml version="1.0" encoding="utf-8"?>'
-    yield "<annotations>"
-    yield "  <version>1.1</version>"
-    yield "  <meta><task>"
-    yield f"    <name>{escape(escaped(video.name))}</name>"
-    yield f"    <size>{count}</size><mode>interpolation</mode>"
-    yield f"    <start_frame>0</start_frame><stop_frame>{max(0, count - 1)}</stop_frame>"
-    yield f"    <labels>{''.join(names)}</labels>"
-    size = f"<width>{video.width}</width><height>{video.height}</height>"
-    yield f"    <original_size>{size}</original_size>"
-    yield "  </task></meta>"
+    labels = {id_: escaped(name) for id_, name in last_classes(frames).items()}
+    names = sorted(f"<label><name>{escape(name)}</name></label>" for name in set(labels.values()))
+    head = f"""<?xml version="1.0" encoding="utf-8"?>
+<annotations>
+  <version>1.1</version>
+  <meta><task>
+    <name>{escape(escaped(video.name))}</name>
+    <size>{count}</size><mode>interpolation</mode>
+    <start_frame>0</start_frame><stop_frame>{max(0, count - 1)}</stop_frame>
+    <labels>{"".join(names)}</labels>
+    <original_size><width>{video.width}</width><height>{video.height}</height></original_size>
+  </task></meta>
+"""
+    file.write(head.encode())
     for id_, label in labels.items():
-        yield f'  <track id="{id_}" label={quoteattr(label)} source="auto">'
-        yield from _box_lines(boxes[id_], count)
-        yield "  </track>"
-    yield "</annotations>"
+        file.write(f'  <track id="{id_}" label={quoteattr(label)} source="auto">\n'.encode())
+        file.writelines(line.encode() for line in _box_lines(boxes[id_], count))
+        file.write(b"  </track>\n")
+    file.write(b"</annotations>\n")
 
 
 def _box_lines(boxes: Sequence[tuple[int, Track]], count: int) -> Iterator[str]:
@@ -65,9 +62,16 @@ def _box_lines(boxes: Sequence[tuple[int, Track]], count: int) -> Iterator[str]:
         x1, y1, x2, y2 = track.box.pixels
         corners = f'xtl="{x1:.2f}" ytl="{y1:.2f}" xbr="{x2:.2f}" ybr="{y2:.2f}"'
         text = f'occluded="{int(track.state == "lost")}" keyframe="1" {corners} z_order="0"'
-        yield f'    <box frame="{frame}" outside="0" {text}></box>'
+        yield f'    <box frame="{frame}" outside="0" {text}></box>\n'
         if after != frame + 1 and frame + 1 < count:
-            yield f'    <box frame="{frame + 1}" outside="1" {text}></box>'
+            yield f'    <box frame="{frame + 1}" outside="1" {text}></box>\n'
+
+
+class _Key(NamedTuple):
+    """A box that stands in the file; one that is `outside` ends the one before."""
+
+    label: Label
+    outside: bool
 
 
 def read_cvat(path: Path, data: bytes) -> SavedTracks:
@@ -83,38 +87,26 @@ def read_cvat(path: Path, data: bytes) -> SavedTracks:
         The XML is broken, declares a document type, is beyond a limit or of another format, a box
         lies in a frame that the task leaves out, or it is not known which frames that are.
     """
-    tracks: list[list[_Key]] = [[]]  # the last one has not ended
-    sizes: list[tuple[int, int] | None] = []
-    tasks: list[range | None] = []
-
-    def take(opened: list[Element]) -> None:
-        match [each.name for each in opened]:
-            case ["annotations", "track", "box"]:
-                tracks[-1].append(_key(*opened[1:]))
-            case ["annotations", "track"]:
-                opened[-1].attribute("id")
-                opened[-1].attribute("label")
-                tracks.append([])
-            case ["annotations", "track", name]:
-                raise ValueError(f"<{name:.40}> in a track; only boxes can be scored")
-            case ["annotations", "image"]:
-                raise ValueError("CVAT for images; export the task as 'CVAT for video 1.1'")
-            case ["annotations", "meta", *_, "original_size"]:
-                sizes.append(opened[-1].size)
-            case ["annotations", "meta", *_, "task" | "job"]:
-                tasks.append(_frames(opened[-1]))
-
-    read_xml(path, _content(path, data), "annotations", take)
-    covered, size = _only(path, tasks), next(iter(sizes), None)
-    labels = chain.from_iterable(map(partial(_boxes, path, covered), tracks))
-    return SavedTracks(tuple(limited(path, labels)), size=size, covered=covered)
+    root = read_xml(path, _content(path, data), "annotations")
+    if root.find("image") is not None:
+        raise TruthError(f"{path}: CVAT for images; export the task as 'CVAT for video 1.1'")
+    try:
+        size = size_of(root.find("meta//original_size"))
+        covered = _frames([*root.iterfind("meta//task"), *root.iterfind("meta//job")])
+    except ValueError as error:
+        raise line_error(path, "meta", str(error)) from error
+    labels = limited(path, _labels(path, root, covered), _MAX_LABELS)
+    return SavedTracks(labels, covered, size=size)
 
 
-def _only(path: Path, tasks: Sequence[range | None]) -> range | None:
-    """Return the frames of the only task; None if they are not known."""
-    if len(tasks) > 1:
-        raise TruthError(f"{path}: has several tasks; export each as 'CVAT for video 1.1'")
-    return next(iter(tasks), None)
+def _labels(path: Path, root: ET.Element, covered: range | None) -> Iterator[Label]:
+    """Yield the boxes of all tracks. Raises `TruthError`."""
+    for track in root.iterfind("track"):
+        try:
+            keys = sorted((_key(track, box) for box in track), key=lambda key: key.label.frame)
+            yield from _boxes(covered, keys)
+        except ValueError as error:
+            raise line_error(path, f"track {track.get('id', ''):.40}", str(error)) from error
 
 
 def _content(path: Path, data: bytes) -> bytes:
@@ -127,65 +119,57 @@ def _content(path: Path, data: bytes) -> bytes:
     return members[_MEMBER]
 
 
-def _frames(task: Element) -> range | None:
-    """Return the frames of a task, counted from 0; None if it does not name them."""
-    if not {"start_frame", "stop_frame"} <= task.values.keys():
+def _frames(tasks: Sequence[ET.Element]) -> range | None:
+    """Return the frames of the only task, counted from 0; None if it does not name them."""
+    if len(tasks) > 1:
+        raise ValueError("has several tasks; export each as 'CVAT for video 1.1'")
+    names = ("start_frame", "stop_frame")
+    if not tasks or any(tasks[0].find(name) is None for name in names):
         return None
-    rule = task.values.get("frame_filter", [""])[0].strip()
+    rule = tasks[0].findtext("frame_filter", "").strip()
     step = re.fullmatch(r"(?:step=0*([1-9][0-9]{0,6}))?", rule)
     if step is None:
         raise ValueError(f"the frame filter {rule!r:.40} is unknown; only step=NUMBER is known")
-    first, last = (parse_whole(task.value(name)) for name in ("start_frame", "stop_frame"))
+    first, last = (parse_whole(text_of(tasks[0], name)) for name in names)
+    if last - first > _MAX_LABELS:
+        raise ValueError(f"has more than {_MAX_LABELS:,} frames; cut the video into parts")
     return range(first, last + 1, int(step[1] or 1))
 
 
-class _Key(NamedTuple):
-    """A box that stands in the file; one that is `outside` ends the one before."""
-
-    label: Label
-    outside: bool
-
-
-def _key(track: Element, box: Element) -> _Key:
-    if parse_number(box.attributes.get("rotation", "0")):
+def _key(track: ET.Element, box: ET.Element) -> _Key:
+    if box.tag != "box":
+        raise ValueError(f"<{box.tag:.40}> in a track; only boxes can be scored")
+    if parse_number(box.get("rotation", "0")):
         raise ValueError("the box is rotated; only upright boxes can be scored")
-    frame, id_ = parse_whole(box.attribute("frame")), parse_whole(track.attribute("id"))
-    left, top, right, bottom = (
-        parse_number(box.attribute(side)) for side in ("xtl", "ytl", "xbr", "ybr")
-    )
-    state: State = "lost" if parse_whole(box.attributes.get("occluded", "0")) == 1 else "seen"
-    corners, name = (left, top, right, bottom), track.attribute("label")
-    label = Label(box.line, corners, name, frame + 1, id_, state=state)
-    return _Key(label, bool(parse_whole(box.attribute("outside"))))
+    name, id_ = attribute(track, "label"), parse_whole(attribute(track, "id"))
+    frame, sides = parse_whole(attribute(box, "frame")), [attribute(box, each) for each in _SIDES]
+    state: State = "lost" if box.get("occluded") == "1" else "seen"
+    label = Label(f"track {id_}", parse_corners(sides), name, frame + 1, id_, state=state)
+    return _Key(label, attribute(box, "outside") == "1")
 
 
-def _boxes(path: Path, covered: range | None, keys: list[_Key]) -> Iterator[Label]:
+def _boxes(covered: range | None, keys: Sequence[_Key]) -> Iterator[Label]:
     """Yield the boxes of a track in all frames that are covered; None: in all up to its last."""
-    keys.sort(key=lambda key: key.label.frame)
     step = covered.step if covered else 1
     for number, (label, outside) in enumerate(keys):
-        index = label.frame - 1
-        if covered is not None and index not in covered and not outside:
-            what = f"the box is in frame {index}, which the task does not have"
-            raise line_error(path, label.place, f"{what}; it has {_shown(covered)}")
         if outside:
             continue
+        index = label.frame - 1
+        if covered is not None and index not in covered:
+            every = f"every {step}. frame" if step > 1 else "the frames"
+            what = f"it has {every} from {covered.start} to {covered.stop - 1}"
+            raise ValueError(f"no frame {index} is in the task; {what}")
         yield label
         after = keys[number + 1].label if number + 1 < len(keys) else None
         end = after.frame - 1 if after else covered.stop if covered else index + 1
         for frame in range(index + step, end, step):
-            share = (frame - index) / (end - index) if after else 0.0
-            yield label._replace(frame=frame + 1, box=_between(label, after or label, share))
+            ratio = (frame - index) / (end - index) if after else 0.0
+            yield label._replace(frame=frame + 1, box=_between(label, after or label, ratio))
 
 
-def _between(label: Label, after: Label, share: float) -> Corners:
-    x1, y1, x2, y2 = (a + share * (b - a) for a, b in zip(label.box, after.box, strict=True))
+def _between(label: Label, after: Label, ratio: float) -> Corners:
+    x1, y1, x2, y2 = (a + ratio * (b - a) for a, b in zip(label.box, after.box, strict=True))
     return x1, y1, x2, y2
-
-
-def _shown(covered: range) -> str:
-    every = f"every {covered.step}. frame" if covered.step > 1 else "the frames"
-    return f"{every} from {covered.start} to {covered.stop - 1}"
 
 
 CVAT = Format("CVAT for video 1.1", ".xml", read_cvat, whole=_write)

@@ -1,22 +1,18 @@
-"""The types of label formats, and the choice of the format of a file.
+"""What a format of tracks is, and the choice of the format of a file.
 
-Formats of tracks are registered in the group `vdet.formats`, those of labelled pictures in
-`vdet.picture_formats`: see `vdet.plugins`.
+Formats are registered in the group `vdet.formats`: see `vdet.plugins`.
 """
 
-from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from typing import BinaryIO
 
-from vdet.detect.classes import ClassScores
 from vdet.errors import TruthError
 from vdet.labels.parsing import numbered_lines
-from vdet.labels.pictures import LabelledPicture
 from vdet.labels.video import SavedTracks
-from vdet.plugins import FORMATS, PICTURE_FORMATS, load_plugin, plugin_names
+from vdet.plugins import FORMATS, load_plugin, plugin_names
 from vdet.track.track import FrameTracks
 
 UNKNOWN = "vehicle"
@@ -104,46 +100,15 @@ class TrackWriter:
             self._form.whole(self._file, self._video, self._kept)
 
 
-@dataclass(frozen=True, slots=True)
-class PictureFormat:
-    """A form of labelled pictures: a folder with pictures, and a folder with a file for each.
-
-    Attributes
-    ----------
-    name
-        For messages.
-    folders
-        The names of both folders.
-    read
-        Function that takes the folder of the set and returns the pictures with all their labels.
-        It raises `TruthError` with the place of the first mistake.
-    """
-
-    name: str
-    folders: tuple[str, str]
-    read: Callable[[Path], Iterable[LabelledPicture]]
-
-    def is_in(self, folder: Path) -> bool:
-        """Return whether a folder holds such a set."""
-        return all((folder / name).is_dir() for name in self.folders)
-
-
-def best_classes(frames: Iterable[FrameTracks]) -> dict[int, str]:
-    """Return the class of each track, by ascending id: that with most score, or `UNKNOWN`."""
-    classes: dict[int, ClassScores] = defaultdict(ClassScores)
-    for track in (track for frame in frames for track in frame.tracks):
-        classes[track.id].add(track.class_name or UNKNOWN, track.score)
-    return {id_: scores.best or UNKNOWN for id_, scores in sorted(classes.items())}
+def last_classes(frames: Iterable[FrameTracks]) -> dict[int, str]:
+    """Return the class that each track has in its last frame, or `UNKNOWN`, by ascending id."""
+    classes = {t.id: t.class_name or UNKNOWN for frame in frames for t in frame.tracks}
+    return dict(sorted(classes.items()))
 
 
 def track_formats() -> list[Format]:
     """Return all formats of tracks, those of vdet first. Raises `ConfigError` as `load_plugin`."""
     return [load_plugin(FORMATS, name) for name in plugin_names(FORMATS)]
-
-
-def picture_formats() -> list[PictureFormat]:
-    """Return all forms of labelled pictures that lie in folders."""
-    return [load_plugin(PICTURE_FORMATS, name) for name in plugin_names(PICTURE_FORMATS)]
 
 
 def track_suffixes() -> list[str]:
@@ -168,7 +133,8 @@ def recognise(path: Path, data: bytes) -> Format:
     Raises
     ------
     TruthError
-        The file is empty, and its name has the ending of no format.
+        The file is empty, and its name has the ending of no format; or its columns have semicolons
+        between them.
     """
     by_name = format_for(path)
     if by_name and by_name.suffix not in _UNCLEAR:
@@ -177,7 +143,7 @@ def recognise(path: Path, data: bytes) -> Format:
     form: Format | None = load_plugin(FORMATS, content) if content else by_name
     if form is None:
         suffixes = ", ".join(track_suffixes())
-        raise TruthError(f"{path}: is empty; give tracks or truth, as in {suffixes}")
+        raise TruthError(f"{path}: is empty; tracks and truth are files as {suffixes}")
     return form
 
 
@@ -186,13 +152,10 @@ def _content(path: Path, data: bytes) -> str | None:
     if data.startswith(b"PK"):
         return "cvat" if b"annotations.xml" in data else "yolo"
     _, first = next(numbered_lines(path, data), (0, ""))
-    match first[:1]:
-        case "":
-            return None
-        case "<":
-            return "cvat"
-        case "{":
-            return "coco"
-        case start if "," in first:
-            return "mot" if start in "0123456789+-." else "csv"
+    if first[:1] in ("", "<", "{"):
+        return {"": None, "<": "cvat", "{": "coco"}[first[:1]]
+    if "," in first:
+        return "mot" if first[0] in "0123456789+-." else "csv"
+    if ";" in first:
+        raise TruthError(f"{path}: columns must be separated by commas or spaces, not by ';'")
     return "kitti"

@@ -5,17 +5,15 @@ its development kits for tracking and for objects.
 """
 
 from collections.abc import Iterator, Sequence
-from functools import partial
 from pathlib import Path
 
-from vdet.labels.formats import Format, PictureFormat
+from vdet.labels.formats import Format
 from vdet.labels.label import Label, limited
-from vdet.labels.parsing import label_lines, parse_number, parse_whole, read_bytes
-from vdet.labels.pictures import LabelledPicture, labelled_pairs
+from vdet.labels.parsing import label_lines, parse_corners, parse_number, parse_whole, read_bytes
+from vdet.labels.pictures import PictureFormat
 from vdet.labels.video import SavedTracks
 from vdet.track.track import FrameTracks
 
-_OBJECT_COLUMNS = 15
 _TRACK_COLUMNS = 17  # frame and id, then those of an object
 _TYPES = {None: "Car", "car": "Car", "vehicle": "Car", "truck": "Truck", "bus": "Truck"}
 """KITTI's names of our classes. It has no bus; all other classes are Misc."""
@@ -44,34 +42,26 @@ def read_kitti(path: Path, data: bytes) -> SavedTracks:
     """
     counts = _TRACK_COLUMNS, _TRACK_COLUMNS + 1
     labels = label_lines(path, data, _track_label, form="KITTI tracking", counts=counts)
-    return SavedTracks(tuple(limited(path, labels)))
+    return SavedTracks(limited(path, labels))
 
 
-def _track_label(place: int | str, columns: Sequence[str]) -> Label:
-    frame, id_ = (parse_whole(column) for column in columns[:2])
+def _track_label(place: int, columns: Sequence[str]) -> Label:
+    frame, id_ = map(parse_whole, columns[:2])
     score = parse_number(columns[_TRACK_COLUMNS]) if len(columns) > _TRACK_COLUMNS else 1.0
-    return _object_label(place, columns[2:], frame + 1, id_, score)
+    return _object_label(place, columns[2:])._replace(frame=frame + 1, id=id_, score=score)
 
 
-def _object_label(
-    place: int | str, columns: Sequence[str], frame: int = 1, id_: int = -1, score: float = 1.0
-) -> Label:
-    left, top, right, bottom = (parse_number(column) for column in columns[4:8])
-    return Label(place, (left, top, right, bottom), columns[0], frame, id_, score)
+def _object_label(place: int, columns: Sequence[str]) -> Label:
+    return Label(place, parse_corners(columns[4:8]), columns[0])
 
 
-def read_kitti_pictures(folder: Path) -> Iterator[LabelledPicture]:
-    """Yield every picture of `image_2` that has a file in `label_2`, with 15 columns a line.
-
-    Raises
-    ------
-    TruthError
-        A file has no picture, a line another number of columns, or a column is not a number.
-    """
-    parse = partial(label_lines, parse=_object_label, form="KITTI", counts=[_OBJECT_COLUMNS])
-    for file, picture in labelled_pairs(folder / "label_2", ".txt", folder / "image_2"):
-        yield LabelledPicture(picture, file, tuple(parse(file, read_bytes(file))))
+def read_kitti_objects(file: Path, _: Path) -> tuple[tuple[Label, ...], None]:
+    """Read the labels of a picture, with 15 columns a line. Raises `TruthError` as `read_kitti`."""
+    data = read_bytes(file)
+    return tuple(label_lines(file, data, _object_label, form="KITTI", counts=[15])), None
 
 
 KITTI = Format("KITTI tracking", ".kitti.txt", read_kitti, _lines)
-KITTI_PICTURES = PictureFormat("KITTI", ("image_2", "label_2"), read_kitti_pictures)
+KITTI_PICTURES = PictureFormat(
+    "KITTI", ("image_2", "label_2"), ".txt", lambda _: read_kitti_objects
+)

@@ -1,6 +1,7 @@
 """A labelled box from a file, and the checks that apply to every format."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
+from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
@@ -20,6 +21,9 @@ _MAX_NAME = 100  # characters
 
 Corners = tuple[float, float, float, float]
 """x1, y1, x2, y2 in pixels from 0; the far sides are exclusive."""
+
+Size = tuple[int, int]
+"""Width and height in pixels."""
 
 
 class Label(NamedTuple):
@@ -66,13 +70,17 @@ def line_error(path: Path | str, place: int | str, what: str) -> TruthError:
     return TruthError(f"{path}:{place}: {what}")
 
 
-def limited(path: Path, labels: Iterable[Label]) -> Iterator[Label]:
-    """Yield the labels of a file. Raises `TruthError` if there are more than `MAX_LABELS`."""
-    for count, label in enumerate(labels):
-        if count == MAX_LABELS:
-            what = f"has more than {MAX_LABELS:,} boxes; cut it into parts"
-            raise line_error(path, label.place, what)
-        yield label
+def limited(path: Path, labels: Iterable[Label], most: int | None = None) -> tuple[Label, ...]:
+    """Return the labels of a file. Raises `TruthError` if there are more than `most`.
+
+    None stands for `MAX_LABELS`.
+    """
+    most = MAX_LABELS if most is None else most
+    found = tuple(islice(labels, most + 1))
+    if len(found) > most:
+        what = f"has more than {most:,} boxes; cut it into parts"
+        raise line_error(path, found[-1].place, what)
+    return found
 
 
 def checked_labels(path: Path, labels: Iterable[Label]) -> tuple[Label, ...]:
@@ -84,24 +92,21 @@ def checked_labels(path: Path, labels: Iterable[Label]) -> tuple[Label, ...]:
         A frame before the first, a negative id of a vehicle, an id twice in a frame, a box without
         area, or a name of more than 100 characters.
     """
-    checked: list[Label] = []
-    places: dict[tuple[int, int], int | str] = {}
-    for label in labels:
+    checked = tuple(labels)
+    keys: set[tuple[int, int]] = set()
+    for label in checked:
         mistake = mistake_in_box(label)
         key = label.frame, label.id
         if label.frame < 1:
             mistake = "the frame comes before the video's first"
         elif label.id < (NO_ID if label.ignored else 0):
             mistake = f"id {label.id} is negative; number the vehicles from 0 or 1"
-        elif key in places and label.id != NO_ID:
-            place = places[key]
-            named = f"line {place}" if isinstance(place, int) else place
-            mistake = f"id {label.id} is in the same frame already ({named})"
+        elif key in keys and label.id != NO_ID:
+            mistake = f"id {label.id} occurs twice in the same frame"
         if mistake is not None:
             raise line_error(path, label.place, mistake)
-        places[key] = label.place
-        checked.append(label)
-    return tuple(checked)
+        keys.add(key)
+    return checked
 
 
 def mistake_in_box(label: Label) -> str | None:
@@ -110,5 +115,5 @@ def mistake_in_box(label: Label) -> str | None:
     if width <= 0 or height <= 0 or width * height <= 0:
         return f"the box has no area: {width:g} wide, {height:g} high"
     if len(label.name or "") > _MAX_NAME:
-        return f"the label has more than {_MAX_NAME} characters; give a shorter one"
+        return f"the label must have at most {_MAX_NAME} characters"
     return None

@@ -39,16 +39,16 @@ def read_mot(path: Path, data: bytes) -> SavedTracks:
     """
     counts = _TRUTH_COLUMNS, _RESULT_COLUMNS
     labels = label_lines(path, data, _label, form="MOTChallenge", counts=counts, separator=",")
-    return SavedTracks(tuple(limited(path, labels)))
+    return SavedTracks(limited(path, labels))
 
 
-def _label(place: int | str, columns: Sequence[str]) -> Label:
-    seventh, *_ = [parse_number(column) for column in columns[6:]]
-    left, top, width, height = (parse_number(column) for column in columns[2:6])
+def _label(place: int, columns: Sequence[str]) -> Label:
+    frame, id_ = map(parse_whole, columns[:2])
+    left, top, width, height, seventh, *_ = map(parse_number, columns[2:])
     is_truth = len(columns) == _TRUTH_COLUMNS
     if is_truth and seventh not in {0, 1}:
-        raise ValueError(f"the flag (column 7) is {seventh:g}; it must be 0 or 1")
-    frame, id_ = (parse_whole(column) for column in columns[:2])
+        what = f"with nine columns, column 7 must be a flag, 0 or 1, but is {seventh:g}"
+        raise ValueError(f"{what}; a file of results needs ten columns")
     box, score = from_size(left - 1, top - 1, width, height), 1.0 if is_truth else seventh
     return Label(place, box, None, frame, id_, score, ignored=is_truth and seventh == 0)
 

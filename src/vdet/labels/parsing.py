@@ -1,18 +1,20 @@
-"""The limits of all files of boxes, and strict readers of their texts and numbers."""
+"""The limits of all files of boxes, and readers of their texts, numbers and rows."""
 
 import codecs
 import io
-import re
-from collections.abc import Callable, Iterator, Sequence
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import islice
 from pathlib import Path, PurePosixPath
-from typing import Annotated, TextIO
+from typing import Annotated, Any
 
-from pydantic import Field, ValidationError
+from pydantic import Field, TypeAdapter, ValidationError
 
 from vdet.archives import ArchiveError, list_members, open_archive, read_member
 from vdet.errors import TruthError
 from vdet.files import read_whole
-from vdet.labels.label import Label, line_error
+from vdet.labels.label import Corners, Label, from_size, line_error
+from vdet.track.track import State
 
 LIMIT = 10_000_000
 """Largest frame number, id or pixel coordinate. Larger numbers are damage, and would overflow."""
@@ -21,8 +23,7 @@ MAX_BYTES = 300_000_000
 """Largest size of a file of boxes, unpacked."""
 
 MAX_PART = 1_000_000
-"""Bytes that a line, an XML tag, or an object of a JSON list of tracks may always have; no text has
-twice as many."""
+"""Largest size of a line, in bytes."""
 
 MAX_LINES = 10_000_000
 """Largest number of lines in a file of boxes."""
@@ -37,73 +38,51 @@ Index = Annotated[int, Field(ge=0, le=LIMIT)]
 Times = dict[int, tuple[int | str, float]]
 """The place in the file and the time, seconds, of each frame, counted from 0."""
 
-_NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
-
 
 def read_bytes(path: Path) -> bytes:
     """Return the content of a file. Raises `TruthError` if it is larger than `MAX_BYTES`."""
     return read_whole(path, most=MAX_BYTES, what="file of boxes", error=TruthError)
 
 
-def check_parts(path: Path, data: bytes, what: str, ends: Sequence[bytes]) -> None:
-    """Refuse UTF-8 with a part of more than twice `MAX_PART` bytes before one of its `ends`.
+def numbered_lines(path: Path | str, data: bytes) -> Iterator[tuple[int, str]]:
+    """Yield every line that is not blank, stripped, with its number from 1.
 
     Raises
     ------
     TruthError
-        There is such a part, or the content is not text.
+        The content is not UTF-8, has more than `MAX_LINES`, or a line is longer than `MAX_PART`.
     """
-    decode = codecs.getincrementaldecoder("utf-8")().decode
-    for start in range(0, len(data), MAX_PART):
-        part = data[start : start + MAX_PART]
-        try:
-            decode(part, start + MAX_PART >= len(data))
-        except UnicodeDecodeError:
-            part = b"\0"
-        if b"\0" in part:
-            raise TruthError(f"{path}: is not text (UTF-8); give a file of boxes")
-        if len(part) == MAX_PART and not any(end in part for end in ends):
-            line = data.count(b"\n", 0, start) + 1
-            raise line_error(path, line, f"{what} is longer than {MAX_PART:,} bytes")
-
-
-def text_file(path: Path, data: bytes, newline: str | None = None) -> TextIO:
-    """Return the content of a file as a file of text, whose memory is that of `data`.
-
-    Raises
-    ------
-    TruthError
-        It is not UTF-8, has more than `MAX_LINES`, or one that is too long.
-    """
-    check_parts(path, data, "the line", (b"\n", b"\r"))
-    if max(data.count(b"\n"), data.count(b"\r")) > MAX_LINES:
-        raise TruthError(f"{path}: has more than {MAX_LINES:,} lines; cut it into parts")
-    return io.TextIOWrapper(io.BytesIO(data), "utf-8-sig", newline=newline)
-
-
-def numbered_lines(path: Path, data: bytes) -> Iterator[tuple[int, str]]:
-    """Yield every line that is not blank, stripped, with its number from 1; errors as above."""
-    for number, line in enumerate(text_file(path, data), start=1):
-        if stripped := line.strip():
-            yield number, stripped
+    file = io.BytesIO(data)
+    file.seek(len(codecs.BOM_UTF8) if data.startswith(codecs.BOM_UTF8) else 0)
+    try:
+        for number, line in enumerate(file, start=1):
+            if len(line) > MAX_PART:
+                raise line_error(path, number, f"the line is longer than {MAX_PART:,} bytes")
+            if number > MAX_LINES:
+                raise TruthError(f"{path}: has more than {MAX_LINES:,} lines; cut it into parts")
+            if stripped := line.decode().strip():
+                yield number, stripped
+    except UnicodeDecodeError as error:
+        raise TruthError(f"{path}: is not text (UTF-8)") from error
 
 
 def label_lines(
-    path: Path,
+    path: Path | str,
     data: bytes,
-    parse: Callable[[int | str, list[str]], Label],
+    parse: Callable[[int, list[str]], Label],
     *,
     form: str,
     counts: Sequence[int] | None,
     separator: str | None = None,
-    member: str = "",
 ) -> Iterator[Label]:
     """Yield the label of every line that is not blank.
 
     Parameters
     ----------
+    path
+        The file, for messages.
     parse
-        Function that takes the place of a line and its columns, and returns the label. Its
+        Function that takes the number of a line and its columns, and returns the label. Its
         ValueError becomes the message.
     form
         Name of the format, for messages.
@@ -111,8 +90,6 @@ def label_lines(
         How many columns a line may have; all lines have as many as the first. None: `parse` checks.
     separator
         Text between columns; None for spaces.
-    member
-        Name of the file in the archive `path`; empty if the content is that of `path`.
 
     Raises
     ------
@@ -121,49 +98,42 @@ def label_lines(
     """
     for line, content in numbered_lines(path, data):
         columns = content.split(separator)
-        place: int | str = f"{member}:{line}" if member else line
-        if counts is not None and len(columns) not in counts:
-            wanted = " or ".join(map(str, counts))
-            between = "commas" if separator else "spaces"
-            what = f"{form} has {wanted} columns between {between}; this line has {len(columns)}"
-            raise line_error(path, place, what)
-        counts = counts and (len(columns),)
         try:
-            label = parse(place, columns)
+            if counts is not None and len(columns) not in counts:
+                wanted, between = " or ".join(map(str, counts)), "commas" if separator else "spaces"
+                raise ValueError(
+                    f"{form} has {wanted} columns between {between}; this line has {len(columns)}"
+                )
+            label = parse(line, columns)
         except ValueError as error:
-            raise line_error(path, place, str(error)) from error
+            raise line_error(path, line, str(error)) from error
+        counts = counts and (len(columns),)
         yield label
 
 
 def parse_number(text: str) -> float:
-    """Return the decimal number in `text`.
-
-    Raises
-    ------
-    ValueError
-        The text is not a decimal number (words, NaN, infinity), or the number is beyond `LIMIT`.
-    """
-    stripped = text.strip()
-    if not _NUMBER.fullmatch(stripped):
-        raise ValueError(f"{stripped!r:.40} is not a number")
-    value = float(stripped)
-    if abs(value) > LIMIT:
-        raise ValueError(f"{stripped!r:.40} is beyond {LIMIT}")
+    """Return the number in `text`. Raises ValueError if it is none, or its size exceeds `LIMIT`."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not abs(value) <= LIMIT:
+        raise ValueError(f"{text.strip()!r:.40} is not a number of at most {LIMIT}")
     return value
 
 
 def parse_whole(text: str) -> int:
-    """Return the whole number in `text`; `3` and `3.0` are both 3.
-
-    Raises
-    ------
-    ValueError
-        The text is not a whole number, or the number is beyond `LIMIT`.
-    """
+    """Return the whole number in `text`; `3` and `3.0` are both 3. Raises ValueError."""
     value = parse_number(text)
     if not value.is_integer():
         raise ValueError(f"{text.strip()!r:.40} is not a whole number")
     return int(value)
+
+
+def parse_corners(texts: Sequence[str]) -> Corners:
+    """Return left, top, right and bottom from their texts. Raises ValueError."""
+    left, top, right, bottom = map(parse_number, texts)
+    return left, top, right, bottom
 
 
 def checked_times(path: Path, times: Times) -> dict[int, float]:
@@ -183,6 +153,60 @@ def checked_times(path: Path, times: Times) -> dict[int, float]:
             raise line_error(path, place, what)
         latest = time
     return {frame: time for frame, (_, time) in times.items()}
+
+
+KINDS = {
+    "frame": Index,
+    "time": float,
+    "id": Index,
+    **dict.fromkeys(("x", "y", "width", "height"), Number),
+    "score": Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] | None,
+    "state": State | None,
+    "class": str | None,
+    "foot": tuple[Number, Number] | None,
+    "distance": Number | None,
+    "lane": Annotated[int, Field(ge=-LIMIT, le=LIMIT)] | None,
+}
+"""What is known of a box, in pixels; the frame and the time, seconds, come first."""
+_Row: Any = tuple[(*KINDS.values(),)]  # type: ignore[misc]
+_ROWS: TypeAdapter[list[Any]] = TypeAdapter(list[_Row])
+_BLOCK = 300
+"""Rows that are checked at once; they fit into the cache."""
+
+Row = tuple[int | str, Sequence[Any]]
+"""The place of a box in its file, and its values in the order of `KINDS`."""
+
+
+def row_labels(
+    path: Path, rows: Iterable[Row], times: Times, first_frame: int = 0
+) -> Iterator[Label]:
+    """Yield the label of each row, and put the time of its frame into `times`.
+
+    Parameters
+    ----------
+    first_frame
+        The number of the first frame of a video in the file.
+
+    Raises
+    ------
+    TruthError
+        A value is not what its column needs.
+    """
+    left = iter(rows)
+    while block := list(islice(left, _BLOCK)):
+        places, cells = zip(*block, strict=True)
+        try:
+            values = _ROWS.validate_python(cells)
+        except ValidationError as error:
+            at, column = error.errors()[0]["loc"][:2]
+            what = f"{tuple(KINDS)[int(column)]}: {error.errors()[0]['msg']}"
+            raise line_error(path, places[int(at)], what) from error
+        for place, row in zip(places, values, strict=True):
+            frame, time, id_, x, y, width, height, score, state, name, *known = row
+            index, score = frame - first_frame, 1.0 if score is None else score
+            times[index] = place, time
+            box, number = from_size(x, y, width, height), index + 1
+            yield Label(place, box, name, number, id_, score, False, state or "seen", *known)
 
 
 def archive_members(
@@ -207,7 +231,7 @@ def archive_members(
         raise TruthError(f"{path}: {error}") from error
 
 
-def first_mistake(error: ValueError) -> str:
+def first_mistake(error: Exception) -> str:
     """Return one line that describes the first mistake in a document, and its place."""
     if not isinstance(error, ValidationError):
         return str(error)

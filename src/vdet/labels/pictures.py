@@ -1,15 +1,19 @@
 """Labelled pictures: the values, and the checks that apply to every form."""
 
+import logging
+import math
+import os
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from vdet.archives import is_hidden
 from vdet.boxes import BoolArray, Float64Array, Image
-from vdet.errors import ImageError, TruthError, printable
-from vdet.labels.label import MAX_IN_FRAME, Label, line_error, mistake_in_box
+from vdet.errors import ImageError, TruthError, counted, printable
+from vdet.labels.label import MAX_IN_FRAME, Corners, Label, Size, line_error, mistake_in_box
 from vdet.labels.riders import merge_riders
 from vdet.labels.roles import DEFAULT_ROLES, Roles
 from vdet.media.images import is_picture_name, read_image
@@ -19,6 +23,11 @@ MAX_PICTURES = 200_000
 
 MAX_BOXES = 2_000_000
 """Largest number of boxes in one set."""
+
+_SLACK = 0.1
+"""How far beyond a side of the picture boxes may reach, as a fraction of it."""
+
+log = logging.getLogger("vdet")
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +50,7 @@ class LabelledPicture:
     path: Path
     file: Path
     labels: tuple[Label, ...] = ()
-    size: tuple[int, int] | None = None
+    size: Size | None = None
     unlabelled: tuple[str, ...] = ()
 
     @property
@@ -70,9 +79,8 @@ class LabelledPicture:
         image = read_image(self.path)
         height, width = image.shape[:2]
         if self.size not in (None, (width, height)):
-            raise ImageError(
-                f"{self.path}: is {width}×{height}, its labels for {self.size[0]}×{self.size[1]}"
-            )
+            wanted = f"{self.size[0]}×{self.size[1]}"
+            raise ImageError(f"{self.path}: is {width}×{height}, its labels for {wanted}")
         return image
 
 
@@ -96,40 +104,58 @@ def checked_pictures(
 ) -> LabelledPictures:
     """Check the labels of a set, and leave out the labels that are not vehicles.
 
+    A label that occurs twice in a picture counts once, and a warning says so.
+
     Raises
     ------
     TruthError
-        There is no picture, a picture is missing or appears twice, a box has no area, or there are
-        more than `MAX_PICTURES`, `MAX_BOXES` in all or `MAX_IN_FRAME` in one picture.
+        There is no picture, a picture is missing or appears twice, a box has no area, most boxes
+        cannot be pixels of their pictures, or there are more than `MAX_PICTURES`, `MAX_BOXES` in
+        all or `MAX_IN_FRAME` in one picture.
     """
     checked: dict[Path, LabelledPicture] = {}
     counts = Counter[str](), Counter[str]()
-    boxes = 0
+    boxes = repeated = absurd = 0
     for picture in pictures:
-        boxes += len(picture.labels)
+        labels = tuple({label[1:]: label for label in picture.labels}.values())
+        boxes += len(labels)
+        repeated += len(picture.labels) - len(labels)
+        absurd += sum(_is_absurd(label.box, picture.size) for label in labels)
         if len(checked) == MAX_PICTURES or boxes > MAX_BOXES:
-            raise TruthError(
-                f"{name}: has more than {MAX_PICTURES:,} pictures or {MAX_BOXES:,} boxes; cut it"
-            )
+            most = f"{MAX_PICTURES:,} pictures or {MAX_BOXES:,} boxes"
+            raise TruthError(f"{name}: has more than {most}; cut it into parts")
         if picture.path in checked:
             raise TruthError(f"{name}: has the picture {printable(picture.path.name)} twice")
         checked[picture.path] = replace(
             picture,
-            labels=tuple(_with_roles(picture, roles, *counts)),
+            labels=tuple(_with_roles(replace(picture, labels=labels), roles, *counts)),
             unlabelled=tuple(filter(None, map(roles.class_of, picture.unlabelled))),
         )
     if not checked:
         raise TruthError(f"{name}: has no labelled picture")
-    others, ignored = (tuple(each.most_common()) for each in counts)
+    if absurd > boxes / 2:
+        what = f"{absurd} of {counted(boxes, 'box')} lie outside their pictures or within a pixel"
+        raise TruthError(f"{name}: {what}; the numbers must be pixels, as the format has them")
+    if repeated:
+        twice = counted(repeated, "label")
+        log.warning("%s: has %s twice in the same picture; each counts once", name, twice)
+    others, ignored = (tuple(count.most_common()) for count in counts)
     return LabelledPictures(name, tuple(checked.values()), others, ignored)
+
+
+def _is_absurd(box: Corners, size: Size | None) -> bool:
+    """Return whether a box cannot be pixels: it has fractions, or two corners for its size."""
+    pairs = zip(box[:2], box[2:], size or (math.inf, math.inf), strict=True)
+    reaches_out = any(a < -_SLACK * side or b > side + _SLACK * side for a, b, side in pairs)
+    return reaches_out or max(box[2:]) <= 1
 
 
 def _with_roles(
     picture: LabelledPicture, roles: Roles, others: Counter[str], ignored: Counter[str]
 ) -> Iterator[Label]:
     """Yield the vehicles and ignore regions of a picture, and count the labels of the others."""
-    if not picture.path.is_file():
-        raise TruthError(f"{picture.path}: is missing; its labels are there")
+    if not is_file(picture.path):
+        raise TruthError(f"{printable(str(picture.path))}: not found, but {picture.file} labels it")
     count = 0
     for label in merge_riders(picture.labels):
         name = label.name or ""
@@ -148,27 +174,68 @@ def _with_roles(
         yield label._replace(name=roles.class_of(name) or "vehicle", ignored=is_ignored)
 
 
-def pictures_below(folder: Path) -> list[Path]:
-    """Return the pictures in a folder and in those below it, in order, without hidden files."""
-    return sorted(filter(is_picture_name, folder.rglob("*")))
+def is_file(path: Path) -> bool:
+    """Return whether there is such a file; not where the name is too long for one."""
+    return os.path.isfile(path)  # noqa: PTH113  # the method of `Path` raises
 
 
-def labelled_pairs(labels: Path, suffix: str, pictures: Path) -> Iterator[tuple[Path, Path]]:
-    """Yield each label file in a folder with the picture of its name.
+Parse = Callable[[Path, Path], tuple[tuple[Label, ...], Size | None]]
+"""Reads a file of labels, of a picture: all its labels, and the size of the picture if known."""
 
-    Raises
-    ------
-    TruthError
-        A label file has no picture, or two.
+
+@dataclass(frozen=True, slots=True)
+class PictureFormat:
+    """A form of labelled pictures: a folder with pictures, and a folder with a file for each.
+
+    Attributes
+    ----------
+    name
+        For messages.
+    folders
+        The names of both folders.
+    suffix
+        Ending of the files of labels.
+    parser
+        Function that takes the folder of the set, and returns what reads a file of labels. Both
+        raise `TruthError` with the place of the first mistake.
+    is_whole
+        Whether a picture without a file of labels shows no vehicle; else it is not of the set.
     """
-    by_name: dict[str, list[Path]] = {}
-    for picture in pictures_below(pictures):
-        by_name.setdefault(picture.stem, []).append(picture)
-    for file in sorted(labels.glob(f"*{suffix}")):
-        if file.name.startswith("."):
-            continue
-        found = by_name.get(file.stem, [])
-        if len(found) != 1:
-            what = "are two pictures" if found else "is no picture"
-            raise TruthError(f"{file}: there {what} {printable(file.stem)} in {pictures}")
-        yield file, found[0]
+
+    name: str
+    folders: tuple[str, str]
+    suffix: str
+    parser: Callable[[Path], Parse]
+    is_whole: bool = False
+
+    def is_in(self, folder: Path) -> bool:
+        """Return whether a folder holds such a set."""
+        return all((folder / name).is_dir() for name in self.folders)
+
+    def read(self, folder: Path) -> Iterator[LabelledPicture]:
+        """Yield the pictures of a set, without hidden files.
+
+        Raises
+        ------
+        TruthError
+            A file of labels has no picture of its name, or a mistake.
+        """
+        pictures, labels = (folder / name for name in self.folders)
+        parse = self.parser(folder)
+        names = (file.relative_to(labels) for file in labels.rglob(f"*{self.suffix}"))
+        files = {name.with_suffix(""): labels / name for name in names if not _is_other(name)}
+        used = set()
+        for picture in sorted(filter(is_picture_name, pictures.rglob("*"))):
+            name = picture.relative_to(pictures).with_suffix("")
+            if name in files:
+                yield LabelledPicture(picture, files[name], *parse(files[name], picture))
+                used.add(name)
+            elif self.is_whole:
+                yield LabelledPicture(picture, picture)
+        if unused := files.keys() - used:
+            raise TruthError(f"{files[min(unused)]}: has no picture of its name below {pictures}")
+
+
+def _is_other(name: Path) -> bool:
+    """Return whether a file is not one of labels, but of the system or of a label tool."""
+    return is_hidden(name) or name.name == "classes.txt"

@@ -2,19 +2,25 @@
 
 import gc
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
+from vdet.archives import is_hidden
 from vdet.errors import TruthError
 from vdet.labels.coco import read_coco_pictures
-from vdet.labels.formats import picture_formats, recognise, track_formats
+from vdet.labels.formats import recognise, track_formats
+from vdet.labels.kitti import KITTI_PICTURES
 from vdet.labels.label import Label, checked_labels, line_error
 from vdet.labels.mot import MOT
 from vdet.labels.parsing import read_bytes
 from vdet.labels.pictures import LabelledPicture, LabelledPictures, checked_pictures
 from vdet.labels.roles import DEFAULT_ROLES, Roles, is_region
 from vdet.labels.video import LabelledVideo, SavedTracks
+from vdet.labels.voc import VOC_PICTURES
+from vdet.labels.yolo import YOLO_PICTURES
+
+_FORMS = (KITTI_PICTURES, YOLO_PICTURES, VOC_PICTURES)
+"""The forms of labelled pictures, but for COCO."""
 
 
 def read_tracks(path: Path, rate: float | None = None) -> SavedTracks:
@@ -31,27 +37,15 @@ def read_tracks(path: Path, rate: float | None = None) -> SavedTracks:
         The file cannot be read, or has a mistake; the message names its place.
     """
     data = read_bytes(path)
-    with _without_collection():
-        saved = recognise(path, data).read(path, data)
-        regions = {name for name in {each.name for each in saved.labels} if is_region(name)}
-        vehicles = (each for each in saved.labels if not (each.ignored or each.name in regions))
-        saved = replace(saved, labels=checked_labels(path, vehicles))
-    return saved if rate is None else saved.at_rate(rate)
-
-
-@contextmanager
-def _without_collection() -> Iterator[None]:
-    """Look for no cycles in memory: a million labels have none, and it takes a fourth of the time.
-
-    This holds for all threads.
-    """
-    was_on = gc.isenabled()
-    gc.disable()
+    gc.disable()  # a million labels have no cycles, and to look for some takes a fourth of the time
     try:
-        yield
+        saved = recognise(path, data).read(path, data)
+        regions = {name for name in {label.name for label in saved.labels} if is_region(name)}
+        vehicles = (label for label in saved.labels if not (label.ignored or label.name in regions))
+        saved = replace(saved, labels=checked_labels(path, vehicles))
     finally:
-        if was_on:
-            gc.enable()
+        gc.enable()
+    return saved if rate is None else saved.at_rate(rate)
 
 
 def read_predictions(path: Path) -> LabelledVideo:
@@ -66,7 +60,8 @@ def read_predictions(path: Path) -> LabelledVideo:
         As `read_tracks`.
     """
     saved = read_tracks(path)
-    return LabelledVideo.of(saved.labels, frame_count=saved.frame_count, rate=saved.rate)
+    count = saved.known[-1] + 1 if saved.known else None
+    return LabelledVideo.of(saved.labels, frame_count=count, rate=saved.rate)
 
 
 def read_truth(path: Path, roles: Roles = DEFAULT_ROLES) -> LabelledVideo:
@@ -94,7 +89,7 @@ def read_true_labels(path: Path, roles: Roles) -> SavedTracks:
     data = read_bytes(path)
     if not data.strip():
         names = ", ".join(each.name for each in track_formats())
-        raise TruthError(f"{path}: is empty; give {names}")
+        raise TruthError(f"{path}: is empty; truth is a file of {names}")
     form = recognise(path, data)
     saved = form.read(path, data)
     labels: Iterable[Label] = saved.labels
@@ -134,26 +129,26 @@ def read_labelled_pictures(path: Path, roles: Roles = DEFAULT_ROLES) -> Labelled
 
 def holds_labelled_pictures(path: Path) -> bool:
     """Return whether a path looks like labelled pictures, not like a folder of patches."""
+    return any(form.is_in(path) for form in _FORMS) or bool(_coco_files(path))
+
+
+def _coco_files(path: Path) -> list[Path]:
     if not path.is_dir():
-        return path.suffix.lower() == ".json"
-    return any(form.is_in(path) for form in picture_formats()) or bool(_coco_files(path))
-
-
-def _coco_files(folder: Path) -> list[Path]:
-    return sorted([*folder.glob("*.json"), *folder.glob("annotations/*.json")])
+        return [path] if path.suffix.lower() == ".json" else []
+    files = sorted([*path.glob("*.json"), *path.glob("annotations/*.json")])
+    return [file for file in files if not is_hidden(file.relative_to(path))]
 
 
 def _pictures(path: Path) -> Iterable[LabelledPicture]:
-    forms = picture_formats()
-    for form in forms:
+    for form in _FORMS:
         if form.is_in(path):
             return form.read(path)
-    files = [path] if path.suffix.lower() == ".json" and not path.is_dir() else _coco_files(path)
+    files = _coco_files(path)
     if len(files) == 1:
         return read_coco_pictures(files[0])
     if files:
         names = ", ".join(str(file.relative_to(path)) for file in files[:5])
-        raise TruthError(f"{path}: holds several .json files ({names}); give the one with labels")
-    wanted = ", ".join(f"{' and '.join(form.folders)} ({form.name})" for form in forms)
-    what = "is no set of labelled pictures: a folder with one .json file (COCO)"
+        raise TruthError(f"{path}: holds several .json files ({names}); pass the one with labels")
+    wanted = ", ".join(f"{' and '.join(form.folders)} ({form.name})" for form in _FORMS)
+    what = "labelled pictures not found: a folder with one .json file (COCO)"
     raise TruthError(f"{path}: {what}, {wanted}")

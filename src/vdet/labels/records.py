@@ -6,81 +6,44 @@ JSON lines have a record for each frame, even one without a box. CSV has a row f
 import csv
 import io
 import json
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from itertools import islice
+from collections.abc import Iterator
 from operator import itemgetter
 from pathlib import Path
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated, Any
 
-from pydantic import FailFast, Field, TypeAdapter, ValidationError
+from pydantic import FailFast, TypeAdapter, ValidationError
 from typing_extensions import TypedDict
 
 from vdet.errors import TruthError
 from vdet.labels.formats import Format
-from vdet.labels.label import MAX_LABELS, Label, from_size, limited, line_error
+from vdet.labels.label import limited, line_error
 from vdet.labels.parsing import (
-    LIMIT,
+    KINDS,
     Index,
-    Number,
+    Row,
     Times,
     checked_times,
     first_mistake,
     numbered_lines,
-    text_file,
+    row_labels,
 )
 from vdet.labels.video import SavedTracks
-from vdet.track.track import FrameTracks, State, Track
+from vdet.track.track import FrameTracks, Track
 
 _NEEDED = ("frame", "time", "id", "x", "y", "width", "height")
-_OPTIONAL = ("score", "state", "class", "foot_x", "foot_y", "distance", "lane")
-_COLUMNS = _NEEDED + _OPTIONAL
-_BLOCK = 300
-"""Rows of a table that are checked at once; they fit into the cache."""
-_MAX_COLUMNS = 1000
-_MAX_ROW = 100
-"""Lines of a row of a table, whose cells may contain line ends."""
+_COLUMNS = (*_NEEDED, "score", "state", "class", "foot_x", "foot_y", "distance", "lane")
+_FOOT = slice(10, 12)  # columns
 
-
-# Dictionaries are read twice as fast as models, and an hour of video has a million boxes.
-_Known = TypedDict(
-    "_Known",
-    {
-        "score": Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)],
-        "state": State,
-        "class": str | None,
-        "foot": tuple[Number, Number] | None,
-        "distance": Number | None,
-        "lane": Annotated[int, Field(ge=-LIMIT, le=LIMIT)] | None,
-    },
-    total=False,
-)
-
-
-class _Track(_Known):
-    id: Index
-    x: Number
-    y: Number
-    width: Number
-    height: Number
+_OF_TRACK = tuple(KINDS)[2:]
 
 
 class _Record(TypedDict):
     frame: Index
     time: float
-    tracks: Annotated[list[_Track], FailFast()]
+    tracks: Annotated[list[dict[str, Any]], FailFast()]
 
 
-_KINDS = get_type_hints(_Track, include_extras=True) | {
-    "frame": Index,
-    "time": float,
-    "foot_x": Number,
-    "foot_y": Number,
-}
 _RECORD = TypeAdapter(_Record)
-_Row: Any = tuple[  # type: ignore[misc]
-    (*(_KINDS[each] for each in _NEEDED), *(_KINDS[each] | None for each in _OPTIONAL))
-]
-_ROWS: TypeAdapter[list[Any]] = TypeAdapter(list[_Row])
 
 
 def _json_lines(frame: FrameTracks) -> Iterator[str]:
@@ -111,13 +74,9 @@ def _csv_lines(frame: FrameTracks) -> Iterator[str]:
         place, score = track.box.xywh, f"{track.score:.4f}"
         cells = (frame.index, f"{frame.time:.6f}", track.id, *place, score, track.state)
         others = (track.class_name, *known["foot"], known["distance"], known["lane"])
-        yield _csv_line((*cells, *others))
-
-
-def _csv_line(cells: Iterable[object]) -> str:
-    file = io.StringIO()
-    csv.writer(file, lineterminator="\n").writerow(cells)
-    return file.getvalue()
+        row = io.StringIO()
+        csv.writer(row, lineterminator="\n").writerow((*cells, *others))
+        yield row.getvalue()
 
 
 def read_json_lines(path: Path, data: bytes) -> SavedTracks:
@@ -129,32 +88,10 @@ def read_json_lines(path: Path, data: bytes) -> SavedTracks:
         The file is empty, a line is not such a record, frames do not ascend, or a time is wrong.
     """
     times: Times = {}
-    labels = tuple(limited(path, _json_labels(path, data, times)))
+    labels = limited(path, row_labels(path, _json_rows(path, data, times), times))
     if not times:
         raise TruthError(f"{path}: is empty; it should have a record for every frame")
-    return SavedTracks(labels, listed=tuple(times), times=checked_times(path, times))
-
-
-def _json_labels(path: Path, data: bytes, times: Times) -> Iterator[Label]:
-    """Yield the boxes of every record, and put the time of every frame into `times`."""
-    last = -1
-    for line, content in numbered_lines(path, data):
-        if len(times) == MAX_LABELS:
-            raise line_error(path, line, f"has more than {MAX_LABELS:,} frames; cut it into parts")
-        try:
-            record = _RECORD.validate_json(content, strict=True)
-        except ValidationError as error:
-            raise line_error(path, line, first_mistake(error)) from error
-        if record["frame"] <= last:
-            raise line_error(path, line, f"frame {record['frame']} comes after frame {last}")
-        last = record["frame"]
-        times[last] = line, record["time"]
-        for each in record["tracks"]:
-            box = from_size(each["x"], each["y"], each["width"], each["height"])
-            score, state = each.get("score", 1.0), each.get("state", "seen")
-            known = each.get("class") or None, last + 1, each["id"], score, False, state
-            place = each.get("foot"), each.get("distance"), each.get("lane")
-            yield Label(line, box, *known, *place)
+    return SavedTracks(labels, known=tuple(times), times=checked_times(path, times))
 
 
 def read_csv(path: Path, data: bytes) -> SavedTracks:
@@ -169,70 +106,53 @@ def read_csv(path: Path, data: bytes) -> SavedTracks:
         its column needs, or a time is wrong.
     """
     times: Times = {}
-    labels = tuple(limited(path, _csv_labels(path, data, times)))
+    labels = limited(path, row_labels(path, _csv_rows(path, data), times))
     return SavedTracks(labels, times=checked_times(path, times))
 
 
-def _csv_labels(path: Path, data: bytes, times: Times) -> Iterator[Label]:
-    """Yield the label of every row, and put the time of its frame into `times`."""
-    rows = _rows(path, data)
-    while block := list(islice(rows, _BLOCK)):
-        lines, cells = zip(*block, strict=True)
+def _json_rows(path: Path, data: bytes, times: Times) -> Iterator[Row]:
+    """Yield the boxes of every record, and put the time of its frame into `times`."""
+    last = -1
+    for line, content in numbered_lines(path, data):
         try:
-            values = _ROWS.validate_python(cells)
+            record = _RECORD.validate_json(content)
         except ValidationError as error:
-            number, column = error.errors()[0]["loc"][:2]
-            what = f"{_COLUMNS[int(column)]}: {error.errors()[0]['msg']}"
-            raise line_error(path, lines[int(number)], what) from error
-        for line, row in zip(lines, values, strict=True):
-            frame, time, id_, x, y, width, height, score, state, name, *foot, metres, lane = row
-            times[frame] = line, time
-            box, score = from_size(x, y, width, height), 1.0 if score is None else score
-            place = None if None in foot else tuple(foot)
-            yield Label(
-                line, box, name, frame + 1, id_, score, False, state or "seen", place, metres, lane
-            )
+            raise line_error(path, line, first_mistake(error)) from error
+        if record["frame"] <= last:
+            raise line_error(path, line, f"frame {record['frame']} comes after frame {last}")
+        last, time = record["frame"], record["time"]
+        times[last] = line, time
+        for track in record["tracks"]:
+            yield line, (last, time, *map(track.get, _OF_TRACK))
 
 
-def _rows(path: Path, data: bytes) -> Iterator[tuple[int, list[str | None]]]:
-    """Yield the line of each row and its cells in the order of `_COLUMNS`; None is an empty one."""
-    numbered = enumerate(text_file(path, data, ""))
-    before = 0  # the line before the row that is read
-
-    def lines() -> Iterator[str]:
-        for number, line in numbered:
-            if number - before > _MAX_ROW:
-                raise ValueError(f"the row has more than {_MAX_ROW} lines; a quote may be missing")
-            yield line
-
-    table = csv.reader(lines(), strict=True, skipinitialspace=True)
-    try:
-        names = next(table, [])
-        pick = _picker(names)
-        for cells in table:
-            before = table.line_num
-            if not cells:
-                continue
-            if len(cells) != len(names):
-                raise ValueError(f"this line has not the {len(names)} columns of the header")
-            cells.append("")
-            yield before, [cell or None for cell in pick(cells)]
-    except (ValueError, csv.Error) as error:
-        raise line_error(path, max(1, table.line_num), str(error)) from error
-
-
-def _picker(names: Sequence[str]) -> Callable[[list[str]], tuple[str, ...]]:
-    """Return a function that orders the cells of a row as `_COLUMNS`.
-
-    `names` is the header; a column that it does not name is the last cell of the row.
-    """
-    if len(names) > _MAX_COLUMNS:
-        raise ValueError(f"the header has more than {_MAX_COLUMNS:,} columns")
+def _csv_rows(path: Path, data: bytes) -> Iterator[Row]:
+    """Yield the rows of a table; an empty cell is None, and so is one of a missing column."""
+    lines = numbered_lines(path, data)
+    names = _cells(path, *next(lines, (1, "")))
     if any(names.count(name) != 1 for name in _NEEDED):
         needed = ", ".join(_NEEDED)
-        raise ValueError(f"the header must name each of these columns once: {needed}")
-    return itemgetter(*(names.index(each) if each in names else -1 for each in _COLUMNS))
+        raise line_error(path, 1, f"the header must name each of these columns once: {needed}")
+    pick = itemgetter(*(names.index(name) if name in names else -1 for name in _COLUMNS))
+    for line, content in lines:
+        cells = _cells(path, line, content)
+        if len(cells) != len(names):
+            what = f"has {len(cells)} cells, but the header has {len(names)}"
+            raise line_error(path, line, f"this line {what}")
+        cells.append("")
+        row: list[Any] = [cell or None for cell in pick(cells)]
+        row[_FOOT] = [None if None in row[_FOOT] else row[_FOOT]]
+        yield line, row
+
+
+def _cells(path: Path, line: int, content: str) -> list[str]:
+    if '"' not in content and ", " not in content:
+        return content.split(",")
+    try:
+        return next(csv.reader([content], strict=True, skipinitialspace=True), [])
+    except csv.Error as error:
+        raise line_error(path, line, str(error)) from error
 
 
 JSON_LINES = Format("JSON lines", ".jsonl", read_json_lines, _json_lines)
-CSV = Format("CSV", ".csv", read_csv, _csv_lines, _csv_line(_COLUMNS))
+CSV = Format("CSV", ".csv", read_csv, _csv_lines, ",".join(_COLUMNS) + "\n")

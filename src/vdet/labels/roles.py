@@ -12,7 +12,7 @@ RIDER = "rider"
 
 _IGNORED = ("tram", "train", "misc", "trailer", "caravan", RIDER)
 _REGIONS = ("ignore", "ignored", "ignore region", "ignored region", "ignored regions", "dont care")
-_REGION_LETTERS = {letters(word) for word in _REGIONS}
+_REGION_LETTERS = tuple(dict.fromkeys(map(letters, _REGIONS)))
 _ANY_KIND = ("car", "truck", "bus")  # what "vehicle" among the classes of a detector includes
 
 

@@ -25,11 +25,9 @@ class SavedTracks:
     ----------
     labels
         The boxes, exactly as in the file.
-    listed
-        The frames that the file lists, also those without a box, counted from 0, ascending; empty
-        where it lists only boxes.
-    covered
-        The frames that the file is about, where it has a rule for them; the others are not known.
+    known
+        The frames that the file is about, also those without a box, counted from 0, ascending;
+        None: all up to its last box.
     times
         Seconds of each frame with a time in the file; empty if the format has no times.
     size
@@ -39,34 +37,21 @@ class SavedTracks:
     """
 
     labels: tuple[Label, ...]
-    listed: tuple[int, ...] = ()
+    known: Sequence[int] | None = None
     times: Mapping[int, float] = field(default_factory=dict)
     size: tuple[int, int] | None = None
     begin: datetime | None = None
-    covered: range | None = None
-
-    @property
-    def known(self) -> Sequence[int] | None:
-        """The frames that the file is about, from 0; None: all up to its last box."""
-        return self.covered if self.covered is not None else self.listed or None
-
-    @property
-    def frame_count(self) -> int | None:
-        """Number of frames of the video up to the last one listed; None if none is."""
-        return self.listed[-1] + 1 if self.listed else None
 
     @property
     def rate(self) -> float | None:
         """Frames per second from the first time to the last; None if that is not known."""
-        if not self.times:
-            return None
-        first, last = min(self.times), max(self.times)
-        seconds = self.times[last] - self.times[first]
+        first, last = min(self.times, default=0), max(self.times, default=0)
+        seconds = self.times[last] - self.times[first] if self.times else 0.0
         return (last - first) / seconds if seconds > 0 else None
 
     @property
     def has_times(self) -> bool:
-        """Whether every frame has a time; if not, give a rate to `at_rate`."""
+        """Whether every frame has a time; if not, pass a rate to `at_rate`."""
         return all(index in self.times for index in self._indices())
 
     def at_rate(self, rate: float) -> "SavedTracks":
@@ -75,7 +60,7 @@ class SavedTracks:
         return replace(self, times=times | dict(self.times))
 
     def __iter__(self) -> Iterator[FrameTracks]:
-        """Yield the frames with a box and the listed frames, in order.
+        """Yield the frames with a box and the known frames, in order.
 
         Boxes are rounded to whole pixels, and scores lie between 0 and 1. A class is one of
         `OUR_NAMES` if the label means one, else the label. An unknown time is NaN: see `has_times`.
@@ -89,18 +74,14 @@ class SavedTracks:
             yield FrameTracks(index, time, tuple(map(_track, labels)))
 
     def _indices(self) -> list[int]:
-        return sorted({label.frame - 1 for label in self.labels}.union(self.listed))
+        return sorted({label.frame - 1 for label in self.labels}.union(self.known or ()))
 
 
 def _track(label: Label) -> Track:
-    _, box, name, _, number, score, _, state, foot, distance, lane = label
-    left, top, right, bottom = box
-    x1, y1 = math.floor(left + 0.5), math.floor(top + 0.5)
-    x2, y2 = math.floor(right + 0.5), math.floor(bottom + 0.5)
-    whole = Box(x1, y1, max(x2, x1 + 1), max(y2, y1 + 1))
+    _, box, name, _, number, score, _, state, foot, metres, lane = label
+    whole, score = Box.sized(*Box(*box).xywh), min(max(score, 0.0), 1.0)
     named = None if name is None else our_name(name) or name
-    score = score if 0 <= score <= 1 else float(score > 1)
-    return Track(number, whole, score, state, named, foot, distance, lane)
+    return Track(number, whole, score, state, named, foot, metres, lane)
 
 
 def spread_frames(known: Iterable[int] | None, every: int, first: int, last: int) -> set[int]:
