@@ -29,7 +29,7 @@ def truth(tmp_path: Path) -> Path:
 def test_prints_a_table(run: Run, found: Path, truth: Path) -> None:
     result = run("eval", "tracks", found, truth, "--until", "10")
     assert (result.code, result.err) == (0, "")
-    assert result.out.splitlines()[3].split()[4:9] == ["1.000", "0", "2", "0.800", "0.889"]
+    assert result.out.splitlines()[3].split()[5:10] == ["1.000", "0", "2", "0.800", "0.889"]
     assert "vehicle 1 missed" in result.out
 
 
@@ -59,7 +59,7 @@ def test_numbers_and_page_appear_together_also_on_a_full_disk(
     before = set(tmp_path.iterdir())
 
     def fill(descriptor: int) -> None:
-        if Path(os.readlink(f"/proc/self/fd/{descriptor}")).name == "page.html":
+        if Path(f"/proc/self/fd/{descriptor}").readlink().name == "page.html":
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         sync(descriptor)
 
