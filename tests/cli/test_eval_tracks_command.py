@@ -30,7 +30,7 @@ def test_prints_a_table(run: Run, found: Path, truth: Path) -> None:
     result = run("eval", "tracks", found, truth, "--until", "10")
     assert (result.code, result.err) == (0, "")
     assert result.out.splitlines()[3].split()[5:10] == ["1.000", "0", "2", "0.800", "0.889"]
-    assert "vehicle 1 missed" in result.out
+    assert "missed vehicle 1" in result.out
 
 
 def test_json_has_plain_keys(run: Run, found: Path, truth: Path) -> None:
@@ -47,7 +47,7 @@ def test_writes_a_page(run: Run, found: Path, truth: Path, tmp_path: Path) -> No
     result = run("eval", "tracks", found, truth, "--page", tmp_path / "page")
     assert result.code == 0, result.err
     html = (tmp_path / "page" / "page.html").read_text()
-    for words in ("largest mistakes in", "vehicle 1 missed", "frames 1–10 compared"):
+    for words in ("largest mistakes in", "missed vehicle 1", "frames 1–10 compared"):
         assert words in html
     assert f"compared with {truth} by vdet {vdet.__version__}" in html
 

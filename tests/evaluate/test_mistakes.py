@@ -16,17 +16,17 @@ def found_mistakes(found: LabelledVideo, truth: LabelledVideo) -> tuple[Mistake,
 def test_frames_in_a_row_are_one_mistake_and_the_longest_comes_first() -> None:
     found = video(drive(1, range(3, 6)), drive(1, range(7, 11)), drive(2, range(2, 5), x=300))
     alarm, late, gap = found_mistakes(found, video(drive(7, TEN)))
-    assert alarm == Mistake("false alarm", 2, 2, 3, 4, 3, (300.0, 0.0, 400.0, 100.0), 0)
-    assert late == Mistake("missed", 7, 1, 1, 2, 2, BOX, 0)
-    assert gap == Mistake("missed", 7, 6, 6, 6, 1, BOX, 0)
-    assert [each.name for each in (alarm, late)] == ["false alarm, track 2", "vehicle 7 missed"]
+    assert alarm == Mistake("false alarm, track", 2, 2, 3, 4, 3, (300.0, 0.0, 400.0, 100.0), 0)
+    assert late == Mistake("missed vehicle", 7, 1, 1, 2, 2, BOX, 0)
+    assert gap == Mistake("missed vehicle", 7, 6, 6, 6, 1, BOX, 0)
+    assert [each.name for each in (alarm, late)] == ["false alarm, track 2", "missed vehicle 7"]
     assert [each.span for each in (late, gap)] == ["1–2", "6"]
 
 
 def test_a_box_that_fits_badly_is_lost_on_both_sides_with_its_overlap() -> None:
     # 100 wide against 250 wide over it: IoU 0.4
     alarm, missed = found_mistakes(video(drive(1, TEN, width=250)), video(drive(7, TEN)))
-    assert (alarm.what, missed.what) == ("false alarm", "missed")
+    assert (alarm.what, missed.what) == ("false alarm, track", "missed vehicle")
     assert alarm.overlap == missed.overlap == pytest.approx(0.4)
 
 

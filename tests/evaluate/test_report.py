@@ -39,7 +39,7 @@ class TestVideo:
         assert any(line.startswith("largest mistakes in clip 1") for line in lines)
         assert not any(line.startswith("largest mistakes in clip 0") for line in lines)
         assert [each["named"] for each in report.values["classes"]] == [{"bus": 2}]
-        assert "vehicle 1 missed" in Elements(report.page()).text
+        assert "missed vehicle 1" in Elements(report.page()).text
 
     def test_a_sweep_has_a_row_for_each_setting_and_names_the_best(self) -> None:
         runs = [self.run(("a=1", "b=2"), range(1, 6)), self.run(("a=2", "b=2"), TEN)]
@@ -78,11 +78,11 @@ class TestMistakesInVideo:
         tiles = mistake_tiles(clip_path, compare(found, truth))
         images = {tile.title: tile.image for tile in tiles}
         assert set(images) == {
-            "vehicle 7 missed, frame 5",
+            "missed vehicle 7, frame 5",
             "false alarm, track 1, frame 5",
             "false alarm, track 2, frame 3",
         }
-        missed = images["vehicle 7 missed, frame 5"]
+        missed = images["missed vehicle 7, frame 5"]
         for color in (TRUE, FOUND):
             assert np.any((missed == color).all(axis=2))
 

@@ -117,6 +117,6 @@ def test_only_frames_that_the_truth_is_about_are_compared(tmp_path: Path, name: 
     comparison = compare(found, truth)
     assert [frame.number for frame in comparison.frames] == [1, 6, 11]
     (missed,) = mistakes(comparison)
-    assert (missed.what, missed.first, missed.last, missed.boxes) == ("missed", 6, 6, 1)
+    assert (missed.what, missed.first, missed.last, missed.boxes) == ("missed vehicle", 6, 6, 1)
     assert truth.known is not None
     assert spread_frames(truth.known.tolist(), 4, 1, 11) == {1, 6, 11}

@@ -8,8 +8,9 @@ import pytest
 from pages.html import Elements
 from vdet.errors import counted
 from vdet.evaluate.mistakes import Tile
+from vdet.evaluate.report import Report
 from vdet.files import write_text
-from vdet.pages.render import link_to, render
+from vdet.pages.render import link_to
 
 NASTY = '"><script>alert("&")</script>'
 
@@ -17,14 +18,8 @@ NASTY = '"><script>alert("&")</script>'
 @pytest.fixture(scope="module")
 def html() -> str:
     tile = Tile(np.zeros((4, 6, 3), np.uint8), NASTY, NASTY)
-    return render(
-        "eval.html",
-        subtitle=NASTY,
-        figures=[(NASTY, NASTY)],
-        notes=[NASTY],
-        tables=[([NASTY], [[NASTY]])],
-        sheets=[(NASTY, [tile])],
-    )
+    table = [NASTY, NASTY], [[NASTY, NASTY]]
+    return Report([NASTY], [table, table], [NASTY], {}, [(NASTY, [tile])]).page()
 
 
 def test_text_is_escaped_everywhere(html: str) -> None:

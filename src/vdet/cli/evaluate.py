@@ -124,8 +124,7 @@ def tracks(
 @options.until_option
 @options.option(
     "--sweep KEY=VALUE,VALUE",
-    "Compare values of one setting, for example tracker.needed=0.1,0.3. Repeated, all "
-    "combinations are compared.",
+    "Compare values of a setting, for example tracker.needed=0.1,0.3. Can be repeated.",
     name="sweeps",
     multiple=True,
 )

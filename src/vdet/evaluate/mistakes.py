@@ -35,7 +35,7 @@ class Mistake:
     Attributes
     ----------
     what
-        `missed` or `false alarm`.
+        `missed vehicle` or `false alarm, track`.
     id
         Of the vehicle in the truth, or of the track.
     first, middle, last
@@ -61,8 +61,7 @@ class Mistake:
     @property
     def name(self) -> str:
         """What the mistake is, as text."""
-        missed = self.what == "missed"
-        return f"vehicle {self.id} missed" if missed else f"false alarm, track {self.id}"
+        return f"{self.what} {self.id}"
 
     @property
     def span(self) -> str:
@@ -82,8 +81,8 @@ def mistakes(comparison: Comparison) -> tuple[Mistake, ...]:
             comparison.track_ids[frame.tracks],
         )
         for what, ids, boxes, iou, paired in (
-            ("missed", vehicles, frame.vehicle_boxes, frame.iou, frame.rows),
-            ("false alarm", tracks, frame.track_boxes, frame.iou.T, frame.columns),
+            ("missed vehicle", vehicles, frame.vehicle_boxes, frame.iou, frame.rows),
+            ("false alarm, track", tracks, frame.track_boxes, frame.iou.T, frame.columns),
         ):
             for row in np.setdiff1d(np.arange(len(ids)), paired).tolist():
                 overlap = float(iou[row].max(initial=0))

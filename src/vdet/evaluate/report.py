@@ -66,15 +66,8 @@ class Report:
 
         Raises `ImageError` or `VideoError` if what it shows can no longer be read.
         """
-        headings, rows = self.tables[0]
-        return render(
-            "eval.html",
-            subtitle="; ".join(self.head),
-            figures=list(zip(headings, rows[-1], strict=True))[1:],
-            tables=[each for each in self.tables if each[1]],
-            notes=self.notes,
-            sheets=[(name, list(tiles)) for name, tiles in self.sheets],
-        )
+        sheets = [(name, list(tiles)) for name, tiles in self.sheets]
+        return render("eval.html", report=self, sheets=sheets)
 
 
 def images_report(result: ImagesResult, name: RunName) -> Report:

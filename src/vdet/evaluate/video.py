@@ -82,9 +82,9 @@ class RunResult:
     @cached_property
     def total(self) -> ClipResult:
         """All videos, taken as one."""
-        if len(self.clips) == 1:
-            return self.clips[0]
-        return ClipResult("total", pool([clip.comparison for clip in self.clips]))
+        first, *more = self.clips
+        parts = [clip.comparison for clip in self.clips]
+        return ClipResult("total", pool(parts)) if more else first
 
 
 def _roles(settings: Settings | None) -> Roles:
