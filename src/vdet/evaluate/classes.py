@@ -48,11 +48,11 @@ def class_results(comparison: Comparison) -> tuple[ClassResult, ...]:
     return tuple(_result(name, pairs) for name in ordered)
 
 
-_Pairs = Counter[tuple[str | None, str | None]]
-"""Classes of vehicles with those of their tracks. None: missed, or a false alarm."""
+_Pair = tuple[str | None, str | None]
+"""The classes of a vehicle and of its track. None: missed, or a false alarm."""
 
 
-def _pairs(comparison: Comparison) -> Iterator[tuple[str | None, str | None]]:
+def _pairs(comparison: Comparison) -> Iterator[_Pair]:
     together = Counter[tuple[int, int]]()
     for frame in comparison.frames:
         together.update(zip(frame.found.tolist(), frame.found_by.tolist(), strict=True))
@@ -65,7 +65,7 @@ def _pairs(comparison: Comparison) -> Iterator[tuple[str | None, str | None]]:
         yield None, comparison.track_names[track]
 
 
-def _result(name: str, pairs: _Pairs) -> ClassResult:
+def _result(name: str, pairs: Counter[_Pair]) -> ClassResult:
     named = Counter({found: count for (true, found), count in pairs.items() if true == name})
     vehicles, right = named.total(), named[name]
     shown = sum(pairs[true, found] for true, found in pairs if found == name and true != UNKNOWN)

@@ -31,6 +31,8 @@ from vdet.regions import Regions, lay_regions
 from vdet.run.loop import build, named_errors, peek
 from vdet.run.result import FrameResult
 
+_DEFAULT = Settings()
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Clip:
@@ -87,12 +89,8 @@ class RunResult:
         return ClipResult("total", pool(parts)) if more else first
 
 
-def _roles(settings: Settings | None) -> Roles:
-    return Roles.from_settings(settings or Settings())
-
-
 def open_clip(
-    video: Path, truth_path: Path, until: int | None = None, settings: Settings | None = None
+    video: Path, truth_path: Path, until: int | None = None, settings: Settings = _DEFAULT
 ) -> Clip:
     """Read the truth of a video.
 
@@ -108,12 +106,12 @@ def open_clip(
     TruthError
         The truth cannot be used.
     """
-    truth = read_truth(truth_path, _roles(settings))
+    truth = read_truth(truth_path, Roles.from_settings(settings))
     return Clip(video, truth_path, truth.until(until) if until else truth)
 
 
 def score_files(
-    prediction: Path, truth_path: Path, until: int | None = None, settings: Settings | None = None
+    prediction: Path, truth_path: Path, until: int | None = None, settings: Settings = _DEFAULT
 ) -> ClipResult:
     """Score a file of tracks against a file of truth; arguments as of `open_clip`.
 
@@ -126,7 +124,7 @@ def score_files(
     """
     found, truth = (
         read_predictions(prediction),
-        read_truth(truth_path, _roles(settings)),
+        read_truth(truth_path, Roles.from_settings(settings)),
     )
     last = until or truth.last_frame
     return ClipResult(str(prediction), compare(found.until(last), truth.until(last)), last)
@@ -168,16 +166,14 @@ def evaluate_clip(
     """
     rows: list[list[Label]] = [[] for _ in variants]
     source, last, frames = variants[0].settings.input, clip.truth.last_frame, 0
-    with (
-        VideoReader(clip.video, frames=last or None, settings=source) as reader,
-        named_errors(clip.video, VideoError),
-    ):
+    with VideoReader(clip.video, frames=last or None, settings=source) as reader:
         advance, info = progress(reader.expected), reader.info
-        for results in follow_together(variants, reader, info):
-            for labels, result in zip(rows, results, strict=True):
-                labels.extend(_labels(result))
-            frames += 1
-            advance(1)
+        with named_errors(clip.video, VideoError):
+            for results in follow_together(variants, reader, info):
+                for labels, result in zip(rows, results, strict=True):
+                    labels.extend(_labels(result))
+                frames += 1
+                advance(1)
     clip.truth.check_end(clip.truth_path, frames)
     truth = clip.truth.until(frames)
     scored = []
