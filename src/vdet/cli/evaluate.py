@@ -60,11 +60,8 @@ def images(
 @command("vdet eval patches vehicles.zip non-vehicles.zip --page page")
 @_data
 @options.settings_options("train.svm.C=1e-4", options.model_option)
-@options.jobs_option("Describe patches in N threads.")
 @results_options
-def patches(
-    data: tuple[Path, ...], choice: options.SettingsChoice, jobs: int | None, results: Results
-) -> None:
+def patches(data: tuple[Path, ...], choice: options.SettingsChoice, results: Results) -> None:
     """Measure the classifier on labelled patches.
 
     Each DATA is a folder or a zip file, as vdet train takes it. With --model, this model is tested
@@ -82,7 +79,7 @@ def patches(
     results.check()
     files = find_patches(data)
     with progress_steps("") as steps:
-        result = patch_eval.evaluate_patches(files, settings, model, jobs=jobs, steps=steps)
+        result = patch_eval.evaluate_patches(files, settings, model, steps=steps)
     name = RunName("svm", path, choice.name, choice.assignments)
     text, values = [name.line, *patch_eval.lines(result)], patch_eval.values(result)
     results.print(text, name.values | values, lambda: patch_eval.patch_page(result, name))
@@ -109,11 +106,10 @@ def tracks(
     from vdet.evaluate.report import tracks_report
     from vdet.evaluate.video import score_files
 
-    settings = choice.read()
     results.check()
     with progress_steps("") as steps:
         steps("comparing", None)
-        result = score_files(prediction, truth, until, settings)
+        result = score_files(prediction, truth, until, choice.read())
     report = tracks_report(result, truth)
     results.print(report.lines(), report.values, report.page)
 
@@ -153,10 +149,8 @@ def video(
     from vdet.regions import check_masks
 
     check_masks(base.regions)
-    variants = []
-    for extra in grid(sweeps):
-        settings = choice.read(*extra)
-        variants.append(Variant(settings, load_detector(settings.detector), extra))
+    swept = [(choice.read(*extra), extra) for extra in grid(sweeps)]
+    variants = [Variant(one, load_detector(one.detector), extra) for one, extra in swept]
     results.check()
     clips = [open_clip(*pair, until, base) for pair in zip(videos, truths, strict=True)]
     with progress_steps(" frames") as steps:

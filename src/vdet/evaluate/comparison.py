@@ -233,10 +233,9 @@ def _check_size(prediction: LabelledVideo, truth: LabelledVideo) -> None:
         or max(found.max(), true.max()) > MAX_IN_FRAME
         or max(tracks * vehicles, int(np.sum(found * true))) > MAX_PAIRS
     ):
-        raise TruthError(
-            f"{tracks:,} tracks with {len(prediction):,} boxes and {vehicles:,} vehicles with "
-            f"{len(truth):,} are too many to compare; cut the video into parts"
-        )
+        found_ones = f"{tracks:,} tracks with {len(prediction):,} boxes"
+        what = f"{found_ones} and {vehicles:,} vehicles with {len(truth):,}"
+        raise TruthError(f"{what} are too many to compare; cut the video into parts")
 
 
 def _apply_regions(

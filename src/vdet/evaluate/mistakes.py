@@ -99,8 +99,7 @@ def _mistake(what: str, id_: int, frames: Sequence[_Seen]) -> Mistake:
     (first, *_), (last, *_) = frames[0], frames[-1]
     middle, box, _ = frames[(len(frames) - 1) // 2]
     overlap = sum(each[2] for each in frames) / len(frames)
-    corners = tuple(box.tolist())
-    return Mistake(what, id_, first, middle, last, len(frames), corners, overlap)
+    return Mistake(what, id_, first, middle, last, len(frames), tuple(box.tolist()), overlap)
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,14 +138,14 @@ def mistake_tiles(video: Path, comparison: Comparison) -> Iterator[Tile]:
         part = Box.sized(x - width / 2, y - width / 3, width, width / 1.5)
         drawn = _with_boxes(image, frames[mistake.middle])
         tile = part.clipped(image.shape[1], image.shape[0]).cut(drawn)
-        title = f"{mistake.name}, frame {mistake.middle}"
-        yield Tile(tile, title, f"{mistake.span}: best IoU {mistake.overlap:.2f}")
+        caption = f"{mistake.span}: best IoU {mistake.overlap:.2f}"
+        yield Tile(tile, f"{mistake.name}, frame {mistake.middle}", caption)
 
 
 def _middle_frames(video: Path, chosen: Sequence[Mistake]) -> list[tuple[Mistake, Image]]:
     wanted = {mistake.middle for mistake in chosen}
     tolerant = InputSettings(max_damaged=1)  # it was accepted when it was scored
-    with VideoReader(video, frames=max(wanted, default=0), settings=tolerant) as reader:
+    with VideoReader(video, frames=max(wanted, default=1), settings=tolerant) as reader:
         images = {frame.index + 1: frame.image for frame in reader if frame.index + 1 in wanted}
     return [(each, images[each.middle]) for each in chosen if each.middle in images]
 

@@ -29,7 +29,7 @@ class RunName:
     @property
     def values(self) -> dict[str, Any]:
         """The same facts as values for JSON."""
-        model = str(self.model) if self.model else None
+        model = self.model and str(self.model)
         return {"program": f"vdet {__version__}", **asdict(self), "model": model}
 
 

@@ -7,11 +7,10 @@ from typing import Any
 
 from vdet.errors import printable
 from vdet.evaluate.classes import ClassResult, class_results
-from vdet.evaluate.images import ImagesResult
+from vdet.evaluate.images import ImagesResult, MeasuredSet
 from vdet.evaluate.mistakes import Tile, mistake_tiles, mistakes, worst_tiles
 from vdet.evaluate.output import RunName, figure, share, table
 from vdet.evaluate.video import ClipResult, RunResult
-from vdet.labels.pictures import LabelledPictures
 from vdet.pages.render import render
 from vdet.version import __version__
 
@@ -87,7 +86,7 @@ def images_report(result: ImagesResult, name: RunName) -> Report:
     return Report(
         [name.line, what],
         [_score_table("source", _OF_PICTURES, rows), _class_table(classes)],
-        [_others(source.labelled) for source in result.sources if source.labelled.others],
+        [_others(source) for source in result.sources if source.labelled.others],
         {**name.values, **asdict(counting), **values},
         [(source.labelled.name, worst_tiles(source)) for source in result.sources],
     )
@@ -114,10 +113,10 @@ def tracks_report(result: ClipResult, truth: Path) -> Report:
 
 def _run_report(run: RunResult, what: str, values: Mapping[str, Any]) -> Report:
     """Show a row of scores for each video and one for the total of several, and the mistakes."""
-    rows = [*run.clips, run.total] if len(run.clips) > 1 else run.clips
-    of_clips = [(clip.name, clip.scores) for clip in rows]
+    clips = dict.fromkeys((*run.clips, run.total))  # of one video, its own result is the total
+    rows = [(clip.name, clip.scores) for clip in clips]
     tables = [
-        _score_table("video", _OF_BOXES + _OF_VIDEO, of_clips),
+        _score_table("video", _OF_BOXES + _OF_VIDEO, rows),
         _class_table(class_results(run.total.comparison)),
         *map(_mistake_table, run.clips),
     ]
@@ -166,7 +165,7 @@ def _mistake_table(clip: ClipResult) -> Table:
     ]
 
 
-def _others(labelled: LabelledPictures) -> str:
+def _others(source: MeasuredSet) -> str:
     """Return the labels that are not vehicles, as a line."""
-    named = ", ".join(f"{printable(name)} ({count})" for name, count in labelled.others)
-    return f"not vehicles in {labelled.name}: {named}"
+    named = ", ".join(f"{printable(name)} ({count})" for name, count in source.labelled.others)
+    return f"not vehicles in {source.labelled.name}: {named}"

@@ -84,9 +84,8 @@ class RunResult:
     @cached_property
     def total(self) -> ClipResult:
         """All videos, taken as one."""
-        first, *more = self.clips
         parts = [clip.comparison for clip in self.clips]
-        return ClipResult("total", pool(parts)) if more else first
+        return ClipResult("total", pool(parts)) if len(parts) > 1 else self.clips[0]
 
 
 def open_clip(
@@ -138,10 +137,8 @@ def evaluate_clips(
     Arguments and errors as of `evaluate_clip`, which is called for each clip.
     """
     results = [evaluate_clip(clip, variants, progress) for clip in clips]
-    return [
-        RunResult(of_clips, variant.assignments)
-        for variant, of_clips in zip(variants, zip(*results, strict=True), strict=True)
-    ]
+    by_variant = zip(variants, zip(*results, strict=True), strict=True)
+    return [RunResult(of_clips, variant.assignments) for variant, of_clips in by_variant]
 
 
 def evaluate_clip(
