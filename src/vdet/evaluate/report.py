@@ -65,8 +65,7 @@ class Report:
 
         Raises `ImageError` or `VideoError` if what it shows can no longer be read.
         """
-        sheets = [(name, list(tiles)) for name, tiles in self.sheets]
-        return render("eval.html", report=self, sheets=sheets)
+        return render("eval.html", report=self, sheets=[(n, list(t)) for n, t in self.sheets])
 
 
 def images_report(result: ImagesResult, name: RunName) -> Report:
