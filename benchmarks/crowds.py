@@ -14,8 +14,7 @@ from benchmarks.drawn_traffic import as_planes, follow, shown_labels, true_label
 from vdet.config.schema import Settings
 from vdet.detect.factory import load_detector
 from vdet.detect.protocol import DetectorModel
-from vdet.evaluate.scores import Scores
-from vdet.evaluate.video import score_video
+from vdet.evaluate.scores import Scores, score
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.random_scenes import (
     LANE_WIDTH,
@@ -89,7 +88,7 @@ def scores_of(scene: Scene, model: DetectorModel, settings: Settings) -> Scores:
     """Find and follow the vehicles of a scene, and compare them with its truth."""
     results = follow(model, settings, scene, map(as_planes, frames(scene)))
     truth = true_labels(scene, range(scene.frames))
-    return score_video(f"crowd {scene.seed}", shown_labels(results), truth).scores
+    return score(shown_labels(results), truth)
 
 
 def main() -> None:

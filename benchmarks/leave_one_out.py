@@ -26,8 +26,8 @@ from vdet.config.schema import NetworkSettings, Settings
 from vdet.config.train import NetworkScoreSettings
 from vdet.detect.factory import load_detector, trained_on
 from vdet.evaluate.images import Counting, ImagesResult, MeasuredSet, evaluate_images
-from vdet.evaluate.output import figure, share, table
-from vdet.evaluate.report import result_lines
+from vdet.evaluate.output import RunName, figure, share, table
+from vdet.evaluate.report import video_report
 from vdet.evaluate.video import Variant, evaluate_clips, open_clip
 from vdet.labels.reading import read_labelled_pictures
 from vdet.learn.net.run import NetworkJob, read_sources, train_to_file
@@ -210,9 +210,9 @@ class SetScores:
     name: str
     vehicles: int
     f1: float
-    best_f1: float | None
-    best_score: float | None
-    ap50: float | None
+    best_f1: float
+    best_score: float
+    ap50: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -256,12 +256,12 @@ def summarize(by_kind: ByKind) -> Summary:
     """Return the scores at one score for all groups, and fit the calibration to all detections."""
     results = [result for each in by_kind.values() for result in each]
     sources = [source for result in results for source in result.sources]
-    scores = np.unique(np.concatenate([each.ranked.f1_curve()[0] for each in sources]))
+    scores = np.unique(np.concatenate([each.ranked.scores for each in sources]))
     common = scores[np.argmax(_mean_f1(results, scores))]
     slope, offset = fit_calibration(*ranked_logits(sources))
     means = {}
     for kind, each in by_kind.items():
-        bests = [result.mean.best_f1 for result in each if result.mean.best_f1 is not None]
+        bests = [result.mean.best_f1 for result in each]
         means[kind] = float(_mean_f1(each, common)), float(np.mean(bests))
     return Summary(
         sets=tuple(
@@ -287,8 +287,8 @@ def summarize(by_kind: ByKind) -> Summary:
 def video_lines(clip: tuple[Path, Path], network: Path, settings: Settings) -> list[str]:
     """Return how well a network finds and follows the vehicles of a video."""
     model = load_detector(NetworkSettings(model=str(network)))
-    variant = Variant(settings, model, ())
-    return result_lines(evaluate_clips([open_clip(*clip)], [variant]))
+    runs = evaluate_clips([open_clip(*clip)], [Variant(settings, model)])
+    return video_report(runs, RunName("net", network, None)).lines()
 
 
 def _mean_f1(results: Sequence[ImagesResult], scores: Float64Array) -> Float64Array:

@@ -179,6 +179,5 @@ def test_vehicles_are_found_once_and_tightly(
     assert scores["idf1"] >= 0.95
     assert scores["id_switches"] == 0
     assert scores["false_tracks"] <= 1
-    delays = [each["found"] - each["appears"] for each in scores["first_detections"]]
-    assert len(delays) == 2
-    assert max(delays) <= delay
+    assert len(scores["delays"]) == 2
+    assert max(scores["delays"]) <= delay

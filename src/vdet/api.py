@@ -289,21 +289,17 @@ def count_tracks(
     return count_frames(tracks, settings, size)
 
 
-def evaluate_tracks(
-    tracks: PathName, truth: PathName, *, until: int | None = None, rate: float | None = None
-) -> Scores:
+def evaluate_tracks(tracks: PathName, truth: PathName, *, until: int | None = None) -> Scores:
     """Compare a file of tracks with the truth.
 
     Parameters
     ----------
     until
         Number of the last frame to use, from 1; None: the last that the truth covers.
-    rate
-        Frames per second of the video, where the files do not say it.
 
     Raises `TruthError` if a file cannot be used.
     """
-    return score_files(Path(tracks), Path(truth), until=until, rate=rate).total
+    return score_files(Path(tracks), Path(truth), until).scores
 
 
 def _run(source: PathName | Run, **part: Any) -> Run:

@@ -120,7 +120,7 @@ def run_demo(
     find(ROAD, _BY_MODEL, load_settings(assignments=[model_file]))
     truth, scores = read_truth(folder / TRUTH), []
     for name, outputs in (("network", _BY_NETWORK), (f"linear model {MODEL}", _BY_MODEL)):
-        found = score(read_predictions(folder / outputs["tracks"]), truth, rate=float(scene.rate))
+        found = score(read_predictions(folder / outputs["tracks"]), truth)
         ratios = (found.precision, found.recall, found.f1, found.idf1)
         scores.append([name, *(f"{ratio:.2f}" for ratio in ratios), str(found.id_switches)])
     compared = table(("", "precision", "recall", "F1", "IDF1", "id switches"), scores)

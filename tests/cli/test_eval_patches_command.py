@@ -6,7 +6,7 @@ from pathlib import Path
 from conftest import Run
 
 QUICK = (
-    *("--set", "train.svm.C=0.001", "--jobs", "1"),
+    *("--set", "train.svm.C=0.001"),
     *("--set", "train.svm.augmentation={mirror: false, cut: 0, parts: 0}"),
 )
 
@@ -28,7 +28,7 @@ def test_trains_a_model_and_tests_it(run: Run, patches_path: Path, tmp_path: Pat
 def test_measures_a_ready_model_on_everything(
     run: Run, patches_path: Path, model_path: Path
 ) -> None:
-    options = ("--model", model_path, "--json", "-", "--jobs", "1")
+    options = ("--model", model_path, "--json", "-")
     result = run("eval", "patches", patches_path, *options)
     assert result.code == 0, result.err
     found = json.loads(result.out)

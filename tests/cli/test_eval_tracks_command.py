@@ -1,6 +1,8 @@
 """`vdet eval tracks`."""
 
+import errno
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -25,10 +27,10 @@ def truth(tmp_path: Path) -> Path:
 
 
 def test_prints_a_table(run: Run, found: Path, truth: Path) -> None:
-    result = run("eval", "tracks", found, truth, "--until", "10", "--rate", "25")
+    result = run("eval", "tracks", found, truth, "--until", "10")
     assert (result.code, result.err) == (0, "")
-    assert "8 found, 2 missed, 0 false alarms" in result.out
-    assert "vehicle 1 missed" in result.out
+    assert result.out.splitlines()[3].split()[5:10] == ["1.000", "0", "2", "0.800", "0.889"]
+    assert "missed vehicle 1" in result.out
 
 
 def test_json_has_plain_keys(run: Run, found: Path, truth: Path) -> None:
@@ -45,9 +47,30 @@ def test_writes_a_page(run: Run, found: Path, truth: Path, tmp_path: Path) -> No
     result = run("eval", "tracks", found, truth, "--page", tmp_path / "page")
     assert result.code == 0, result.err
     html = (tmp_path / "page" / "page.html").read_text()
-    for words in ("Vehicle by vehicle", "Largest mistakes", "vehicle 1 missed", "<svg"):
+    for words in ("largest mistakes in", "missed vehicle 1", "frames 1–10 compared"):
         assert words in html
     assert f"compared with {truth} by vdet {vdet.__version__}" in html
+
+
+def test_numbers_and_page_appear_together_also_on_a_full_disk(
+    run: Run, found: Path, truth: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sync = os.fsync
+    before = set(tmp_path.iterdir())
+
+    def fill(descriptor: int) -> None:
+        if Path(f"/proc/self/fd/{descriptor}").readlink().name == "page.html":
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        sync(descriptor)
+
+    monkeypatch.setattr(os, "fsync", fill)
+    outputs = ("--json", tmp_path / "e.json", "--page", tmp_path / "page")
+    result = run("eval", "tracks", found, truth, *outputs)
+    assert result.code == 1
+    assert "page.html: cannot be written: No space left on device" in result.err
+    assert set(tmp_path.iterdir()) == before
+    monkeypatch.undo()
+    assert run("eval", "tracks", found, truth, *outputs).code == 0
 
 
 def test_bad_truth_is_an_error_of_one_line(run: Run, found: Path, tmp_path: Path) -> None:

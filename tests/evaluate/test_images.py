@@ -54,7 +54,6 @@ def test_results_do_not_depend_on_threads(red_set: LabelledPictures, model: SvmM
     images = [result.sources[0].images for result in (alone, together)]
     for one, other, image in zip(*images, red_set.pictures, strict=True):
         assert one.picture is image is other.picture
-        assert one.width == WIDTH
         for frame, same in zip(one.every.frames, other.every.frames, strict=True):
             assert np.array_equal(frame.track_boxes, same.track_boxes)
             assert np.array_equal(frame.scores, same.scores)

@@ -9,17 +9,12 @@ from labels.saving import checked_video, row
 from labels.writers import Boxed, Labelled, write_coco
 from pages.html import Elements
 from vdet.boxes import Boxes
+from vdet.evaluate.comparison import compare
 from vdet.evaluate.images import Counting, ImagesResult, MeasuredImage, score_source
+from vdet.evaluate.mistakes import FOUND, TRUE, mistake_tiles, worst_tiles
 from vdet.evaluate.output import RunName
-from vdet.evaluate.report import (
-    images_report,
-    mistake_tiles,
-    tracks_report,
-    video_report,
-    worst_tiles,
-)
-from vdet.evaluate.tiles import FOUND, TRUE
-from vdet.evaluate.video import RunResult, best, score_files, score_video
+from vdet.evaluate.report import images_report, tracks_report, video_report
+from vdet.evaluate.video import ClipResult, RunResult, score_files
 from vdet.labels.label import Label, from_size
 from vdet.labels.reading import read_labelled_pictures
 
@@ -29,50 +24,48 @@ NAME = RunName("svm", None, None, ("b=1",))
 class TestVideo:
     def run(self, assignments: tuple[str, ...], *found: range) -> RunResult:
         """Return a run over as many clips; in each the vehicle is found in these of ten frames."""
-        clips = [
-            score_video(f"clip {number}", video(drive(1, frames)), video(drive(1, TEN)))
-            for number, frames in enumerate(found)
-        ]
-        return RunResult.of(assignments, clips)
+        truth = video([label._replace(name="car") for label in drive(1, TEN)])
+        tracks = [[each._replace(name="bus") for each in drive(1, frames)] for frames in found]
+        comparisons = [compare(video(track), truth) for track in tracks]
+        clips = [ClipResult(f"clip {n}", each, 10) for n, each in enumerate(comparisons)]
+        return RunResult(clips, assignments)
 
-    def test_several_clips_have_a_row_each_and_a_total(self) -> None:
-        lines = video_report([self.run((), TEN, range(1, 6))], NAME).lines
-        assert [line.split("  ")[0] for line in lines[2:5]] == ["clip 0", "clip 1", "total"]
-        assert any(line.startswith("largest of 1 mistake in clip 1") for line in lines)
+    def test_several_clips_have_a_row_each_and_a_total_and_classes_a_table(self) -> None:
+        report = video_report([self.run((), TEN, range(1, 6))], NAME)
+        lines = report.lines()
+        assert [line.split("  ")[0] for line in lines[3:6]] == ["clip 0", "clip 1", "total"]
+        assert lines[7].split("  ")[0] == "class"
+        assert lines[8].split() == ["car", "2", "2", "0", "0.000", "0.000", "0.000", "bus", "2"]
+        assert any(line.startswith("largest mistakes in clip 1") for line in lines)
+        assert not any(line.startswith("largest mistakes in clip 0") for line in lines)
+        assert [each["named"] for each in report.values["classes"]] == [{"bus": 2}]
+        assert "missed vehicle 1" in Elements(report.page()).text
 
     def test_a_sweep_has_a_row_for_each_setting_and_names_the_best(self) -> None:
         runs = [self.run(("a=1", "b=2"), range(1, 6)), self.run(("a=2", "b=2"), TEN)]
-        assert best(runs) is runs[1]
-        assert video_report(runs, NAME).lines[-1] == "best F1: a=2 b=2 (1.000)"
+        report = video_report(runs, NAME)
+        assert [line.split("  ")[0] for line in report.lines()[3:5]] == ["a=1 b=2", "a=2 b=2"]
+        assert report.lines()[-1] == "best F1: a=2 b=2 (1.000)"
+        settings = [each["settings"] for each in report.values["sweep"]]
+        assert settings == [("a=1", "b=2"), ("a=2", "b=2")]
+        assert "a=1 b=2" in report.page()
 
-    def test_values_of_one_run_and_of_a_sweep(self) -> None:
-        one = video_report([self.run((), TEN)], NAME).values
-        assert (one["detector"], one["set"]) == ("svm", ["b=1"])
-        assert one["total"]["f1"] == one["videos"][0]["f1"] == 1
-        two = video_report([self.run(("a=1",), TEN), self.run(("a=[x=1]",), TEN)], NAME).values
-        assert [each["settings"] for each in two["sweep"]] == [{"a": "1"}, {"a": "[x=1]"}]
+    def test_values_of_one_run(self) -> None:
+        values = video_report([self.run((), TEN)], NAME).values
+        assert (values["detector"], values["assignments"]) == ("svm", ("b=1",))
+        assert values["total"]["f1"] == values["videos"][0]["f1"] == 1
 
-    def test_only_frames_that_the_truth_covers_are_compared_and_the_others_are_reported(
-        self, tmp_path: Path
-    ) -> None:
+    def test_only_frames_that_the_truth_covers_are_compared(self, tmp_path: Path) -> None:
         found, truth = tmp_path / "found.txt", tmp_path / "gt.txt"
         found.write_text("".join(f"{n},1,1,1,100,100,1,-1,-1,-1\n" for n in range(1, 21)))
         truth.write_text("".join(f"{n},1,1,1,100,100,1,3,1\n" for n in TEN))
         covered = score_files(found, truth)
-        assert (covered.total.false_positives, covered.clips[0].left_out) == (0, 10)
-        line = f"{found}: frames 1–10 compared; left out: 10 boxes found in later ones"
+        assert covered.scores.false_positives == 0
+        line = f"{found}: frames 1–10 compared"
         report = tracks_report(covered, truth)
-        assert line in report.lines
+        assert line in report.lines()
         assert line in report.page()
-        longer = score_files(found, truth, until=15)
-        assert (longer.total.false_positives, longer.clips[0].left_out) == (5, 5)
-
-    def test_a_timeline_names_vehicles_tracks_and_false_alarms(self) -> None:
-        found = video(drive(4, range(1, 5)), drive(9, range(6, 11)), drive(5, TEN, x=200))
-        clip = score_video("clip", found, video(drive(7, TEN)))
-        text = Elements(video_report([RunResult.of((), [clip])], NAME).page()).text
-        for name in ("vehicle 7", "#4", "#9", "missed: 5–5", "false alarms", "alarm, track 5"):
-            assert name in text
+        assert score_files(found, truth, until=15).scores.false_positives == 5
 
 
 class TestMistakesInVideo:
@@ -82,21 +75,20 @@ class TestMistakesInVideo:
     def test_one_is_shown_by_its_middle_frame_with_boxes(self, clip_path: Path) -> None:
         found = checked_video([*self.low(1, TEN, x=20), *self.low(2, range(2, 5), x=250)])
         truth = checked_video(self.low(7, TEN))
-        tiles = mistake_tiles(score_video("clip", found, truth, video=clip_path))
+        tiles = mistake_tiles(clip_path, compare(found, truth))
         images = {tile.title: tile.image for tile in tiles}
         assert set(images) == {
-            "vehicle 7 missed, frame 5",
+            "missed vehicle 7, frame 5",
             "false alarm, track 1, frame 5",
             "false alarm, track 2, frame 3",
         }
-        missed = images["vehicle 7 missed, frame 5"]
-        assert missed.shape[1] == 330
+        missed = images["missed vehicle 7, frame 5"]
         for color in (TRUE, FOUND):
             assert np.any((missed == color).all(axis=2))
 
     def test_the_picture_of_one_at_the_edge_lies_inside_the_frame(self, clip_path: Path) -> None:
         truth = checked_video(self.low(7, TEN, x=290))
-        (picture,) = mistake_tiles(score_video("clip", video(), truth, video=clip_path))
+        (picture,) = mistake_tiles(clip_path, compare(video(), truth))
         assert picture.image[:, -8:].any(axis=2).mean() > 0.9, "no black border"
 
 
@@ -116,13 +108,13 @@ class TestPictures:
 
     def test_the_page_names_detector_source_and_labels_left_out(self, tmp_path: Path) -> None:
         result = self.result(tmp_path / "a_$x_{$ set", self.CAR.box)
-        html = images_report(result, RunName("net", Path("x/my.onnx"), "net", ())).page()
+        html = images_report(result, RunName("net", Path("x/my.onnx"), "net")).page()
         assert "detector net, model my.onnx, settings net; boxes from score 0.50" in html
         assert "not vehicles in" in html
         assert "cow (1)" in html
 
     def test_a_page_where_nothing_is_found_can_be_made(self, tmp_path: Path) -> None:
-        assert "<svg" in images_report(self.result(tmp_path), NAME).page()
+        assert "1 missed" in images_report(self.result(tmp_path), NAME).page()
 
     def test_those_with_mistakes_are_shown_with_their_boxes(self, tmp_path: Path) -> None:
         first, second = worst_tiles(self.result(tmp_path, (70, 10, 20, 30)).sources[0])

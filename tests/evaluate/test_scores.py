@@ -22,6 +22,22 @@ def test_two_empty_videos_have_scores_too() -> None:
     assert (scores.vehicles, scores.tracks, scores.f1, scores.hota) == (0, 0, 0, 0)
 
 
+def test_the_delay_is_from_the_first_true_frame_to_the_first_match() -> None:
+    places = (8, 5, 0.0), (9, 7, 300.0), (10, 5, 600.0)  # id, first frame, place
+    truth = video(*(drive(id_, range(start, 20), x) for id_, start, x in places))
+    found = video(drive(1, range(12, 20)), drive(2, range(7, 20), x=300), drive(3, TEN, x=900))
+    scores = score(found, truth)
+    assert (scores.delays, scores.mean_delay) == ((7, 0, None), 3.5)
+
+
+@pytest.mark.parametrize(("on_vehicle", "false"), [(4, 1), (5, 0), (6, 0)])
+def test_a_track_is_false_when_more_than_half_of_it_matches_nothing(
+    on_vehicle: int, false: int
+) -> None:
+    track = drive(1, range(1, 1 + on_vehicle)) + drive(1, range(1 + on_vehicle, 11), x=300)
+    assert score(video(track), video(drive(8, range(1, 11)))).false_tracks == false
+
+
 PLACES = st.integers(0, 12).map(lambda step: step * 20.0)
 SCENES = st.dictionaries(st.tuples(st.integers(1, 6), st.integers(1, 4)), PLACES, max_size=20).map(
     lambda boxes: video(*(drive(i, range(f, f + 1), x) for (f, i), x in boxes.items()))

@@ -150,7 +150,6 @@ def test_only_the_frames_that_the_truth_covers_are_read(
     clip = open_clip(clip_path, truth_path)
     (result,) = evaluate_clip(clip, [variant()], lambda _: steps.append)
     assert result.until == len(steps) == FRAMES
-    assert result.comparison.seconds == FRAMES / 25
 
 
 def test_vehicles_outside_the_regions_do_not_count(

@@ -53,6 +53,13 @@ def test_classes_that_the_detector_does_not_look_for_are_ignored(
     assert all(roles.role_of(name) == "vehicle" for name in classes)
 
 
+def test_a_class_that_the_detector_finds_is_never_left_out() -> None:
+    changes = ['detector.classes=["car", "bicycle"]', "labels.roles.cyclist=other"]
+    roles = Roles.from_settings(load_settings((), [*changes, "labels.roles.person=other"]))
+    found = {word: roles.role_of(word) for word in ("car", "bicycle", "person")}
+    assert found == {"car": "vehicle", "bicycle": "ignored", "person": "other"}
+
+
 def test_a_detector_of_vehicles_looks_for_cars_trucks_and_buses() -> None:
     settings = load_settings((), ['detector.classes=["vehicle"]'])
     roles = Roles.from_settings(settings)

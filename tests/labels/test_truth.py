@@ -6,7 +6,7 @@ import pytest
 from labels.saving import car, checked_video, frame, row, written
 from vdet.errors import TruthError
 from vdet.evaluate.comparison import compare
-from vdet.evaluate.timelines import stretches
+from vdet.evaluate.mistakes import mistakes
 from vdet.labels import mot
 from vdet.labels.formats import Format, track_formats
 from vdet.labels.reading import read_truth
@@ -117,7 +117,7 @@ def test_only_frames_that_the_truth_is_about_are_compared(tmp_path: Path, name: 
     found = checked_video([row(0, n, 1, 1, 1, 8, 8) for n in range(1, 12) if n != 6])
     comparison = compare(found, truth)
     assert [frame.number for frame in comparison.frames] == [1, 6, 11]
-    kinds = [(each.kind, each.first, each.last, each.boxes) for each in stretches(comparison)]
-    assert kinds == [("found", 1, 1, 1), ("missed", 6, 6, 1), ("found", 11, 11, 1)]
+    (missed,) = mistakes(comparison)
+    assert (missed.what, missed.first, missed.last, missed.boxes) == ("missed vehicle", 6, 6, 1)
     assert truth.known is not None
     assert spread_frames(truth.known.tolist(), 4, 1, 11) == {1, 6, 11}

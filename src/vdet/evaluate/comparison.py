@@ -31,6 +31,9 @@ MAX_PAIRS = 25_000_000
 UNMATCHED = -1
 """Partner of a vehicle that no track has found."""
 
+UNKNOWN = "vehicle"
+"""Class of a vehicle or a track whose kind is not known."""
+
 _IGNORED_SHARE = 0.5
 _KEEP_BONUS = 1000.0  # larger than any sum of overlaps
 
@@ -87,8 +90,8 @@ class Comparison:
         The frames of several pooled videos stand one after the other.
     vehicle_ids, track_ids
         int64: the id in its file of every vehicle and track that has a box in `frames`.
-    seconds
-        Length of the video, None if it is not known.
+    vehicle_names, track_names
+        The class of each of these, "vehicle" where it is not known.
     step
         Frames from one that the truth is about to the next; the smallest such number.
     """
@@ -96,7 +99,8 @@ class Comparison:
     frames: tuple[ComparedFrame, ...]
     vehicle_ids: Int64Array
     track_ids: Int64Array
-    seconds: float | None
+    vehicle_names: tuple[str, ...]
+    track_names: tuple[str, ...]
     step: int = 1
 
     def vehicle_lengths(self) -> Int64Array:
@@ -107,10 +111,16 @@ class Comparison:
         """Return the number of boxes of every track, int64."""
         return counts((frame.tracks for frame in self.frames), len(self.track_ids))
 
+    def false_tracks(self) -> Int64Array:
+        """Return the tracks with more than half of their boxes unmatched, int64.
 
-def compare(
-    prediction: LabelledVideo, truth: LabelledVideo, *, rate: float | None = None
-) -> Comparison:
+        Boxes dropped for an ignore region do not count: a track without other boxes is not false.
+        """
+        right = counts((frame.found_by for frame in self.frames), len(self.track_ids))
+        return np.flatnonzero(2 * right < self.track_lengths())
+
+
+def compare(prediction: LabelledVideo, truth: LabelledVideo) -> Comparison:
     """Compare predictions with the truth of the same video: apply ignore regions and pair boxes.
 
     Boxes are paired at IoU 0.5 and above. A pair of the previous frame stays together if it still
@@ -119,14 +129,8 @@ def compare(
     Source: Bernardin and Stiefelhagen, "Evaluating Multiple Object Tracking Performance: The CLEAR
     MOT Metrics", 2008.
 
-    Predictions in frames that the truth is not about are left out. The video is taken to end with
-    the last frame that either of them knows. If the truth covers only a part of the video, cut the
-    predictions with `until` first; otherwise all later ones are false alarms.
-
-    Parameters
-    ----------
-    rate
-        Frames per second; None takes that of the predictions or the truth.
+    Predictions in frames that the truth is not about are left out. If the truth covers only a part
+    of the video, cut the predictions with `until` first; otherwise all later ones are false alarms.
 
     Raises
     ------
@@ -157,16 +161,15 @@ def compare(
             if iou.size:
                 partners[:] = UNMATCHED
                 partners[frame.found] = frame.found_by
-    rate = rate or prediction.rate or truth.rate
-    seconds = max(prediction.last_frame, truth.last_frame) / rate if rate else None
-    return Comparison(tuple(frames), vehicle_ids, track_ids, seconds, step)
+    names = tuple(truth.classes.get(id_, UNKNOWN) for id_ in vehicle_ids.tolist())
+    found_names = tuple(prediction.classes.get(id_, UNKNOWN) for id_ in track_ids.tolist())
+    return Comparison(tuple(frames), vehicle_ids, track_ids, names, found_names, step)
 
 
 def pool(comparisons: Sequence[Comparison]) -> Comparison:
     """Join the comparisons of several videos; the scores of the result are their total.
 
-    The same id in two videos means two vehicles or tracks. The length is known only if that of
-    every video is.
+    The same id in two videos means two vehicles or tracks.
     """
     frames: list[ComparedFrame] = []
     vehicles = tracks = 0
@@ -177,11 +180,13 @@ def pool(comparisons: Sequence[Comparison]) -> Comparison:
         ]
         vehicles += len(one.vehicle_ids)
         tracks += len(one.track_ids)
-    seconds = [one.seconds for one in comparisons if one.seconds is not None]
-    vehicle_ids = joined(one.vehicle_ids for one in comparisons)
-    track_ids = joined(one.track_ids for one in comparisons)
-    total = sum(seconds) if len(seconds) == len(comparisons) else None
-    return Comparison(tuple(frames), vehicle_ids, track_ids, total)
+    ids = (
+        joined(one.vehicle_ids for one in comparisons),
+        joined(one.track_ids for one in comparisons),
+    )
+    vehicle_names = tuple(name for one in comparisons for name in one.vehicle_names)
+    track_names = tuple(name for one in comparisons for name in one.track_names)
+    return Comparison(tuple(frames), *ids, vehicle_names, track_names)
 
 
 def assign(weights: npt.NDArray[Any]) -> tuple[Int64Array, Int64Array]:
@@ -220,18 +225,17 @@ def joined(arrays: Iterable[Int64Array]) -> Int64Array:
 
 def _check_size(prediction: LabelledVideo, truth: LabelledVideo) -> None:
     """Refuse a comparison that would take hours and gigabytes."""
-    tracks, vehicles = (len(np.unique(each.ids)) for each in (prediction, truth))
+    tracks, vehicles = (len(np.unique(video.ids)) for video in (prediction, truth))
     last = max(prediction.last_frame, truth.last_frame)
-    found, true = (np.bincount(each.frames, minlength=last + 1) for each in (prediction, truth))
+    found, true = (np.bincount(video.frames, minlength=last + 1) for video in (prediction, truth))
     if (
         max(tracks, vehicles) > MAX_IDS
         or max(found.max(), true.max()) > MAX_IN_FRAME
         or max(tracks * vehicles, int(np.sum(found * true))) > MAX_PAIRS
     ):
-        raise TruthError(
-            f"{tracks:,} tracks with {len(prediction):,} boxes and {vehicles:,} vehicles with "
-            f"{len(truth):,} are too many to compare; cut the video into parts"
-        )
+        found_ones = f"{tracks:,} tracks with {len(prediction):,} boxes"
+        what = f"{found_ones} and {vehicles:,} vehicles with {len(truth):,}"
+        raise TruthError(f"{what} are too many to compare; cut the video into parts")
 
 
 def _apply_regions(

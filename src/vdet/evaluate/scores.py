@@ -1,20 +1,24 @@
-"""All metrics of a video under plain names."""
+"""How well vehicles are found, at one score and at every score; and all metrics of a video."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
+from statistics import fmean
 
 import numpy as np
 
-from vdet.evaluate.average_precision import rank_predictions
-from vdet.evaluate.comparison import Comparison, compare, counts
-from vdet.evaluate.timelines import FirstDetection, first_detections, frames_too_long
-from vdet.evaluate.tracking_metrics import fragmentations, hota, id_switches, identity_matches
+from vdet.boxes import BoolArray, Float64Array
+from vdet.evaluate import tracking_metrics as tracking
+from vdet.evaluate.comparison import ComparedFrame, Comparison, compare, counts
 from vdet.labels.video import LabelledVideo
+
+IOU_THRESHOLDS = np.linspace(0.5, 0.95, 10)
+
+_RECALLS = np.linspace(0, 1, 101)
 
 _MOSTLY_TRACKED = 0.8
 _MOSTLY_LOST = 0.2
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class DetectionScores:
     """Counts of boxes over all frames and their ratios, 0 to 1; 0 if there is nothing to divide by.
 
@@ -31,7 +35,7 @@ class DetectionScores:
     mean_iou: float
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Scores(DetectionScores):
     """All metrics of a video.
 
@@ -58,20 +62,12 @@ class Scores(DetectionScores):
         HOTA and its two factors, detection accuracy and association accuracy, 0 to 1.
     vehicles, vehicle_boxes, tracks, track_boxes
         What was counted, without ignore regions and the predictions dropped for them.
-    first_detections
-        One for every vehicle.
+    delays
+        For every vehicle the frames from its appearance to its first match; None: it has none.
     mean_delay
-        Mean frames until the first detection, over the vehicles that were found; None if none was.
-    mean_excess
-        Mean frames for which a vehicle is shown after its last true box, over those that were
-        found; None if none was.
-    never_found
-        Vehicles without any match.
+        Mean over the vehicles that were found; None if none was.
     false_tracks
-        Number of tracks with more than half of their boxes unmatched. Boxes dropped for an ignore
-        region do not count, so a track without other boxes is not false.
-    false_tracks_per_minute
-        None if the length of the video is not known.
+        Number of tracks with more than half of their boxes unmatched.
     """
 
     ap50: float
@@ -93,91 +89,130 @@ class Scores(DetectionScores):
     vehicle_boxes: int
     tracks: int
     track_boxes: int
-    first_detections: tuple[FirstDetection, ...]
+    delays: tuple[int | None, ...]
     mean_delay: float | None
-    mean_excess: float | None
-    never_found: int
     false_tracks: int
-    false_tracks_per_minute: float | None
 
 
-def score(prediction: LabelledVideo, truth: LabelledVideo, *, rate: float | None = None) -> Scores:
-    """Score the predictions for a video against its truth.
-
-    Parameters
-    ----------
-    rate
-        Frames per second; None takes that of the predictions or the truth.
-    """
-    return score_comparison(compare(prediction, truth, rate=rate))
+def score(prediction: LabelledVideo, truth: LabelledVideo) -> Scores:
+    """Score the predictions for a video against its truth."""
+    return score_comparison(compare(prediction, truth))
 
 
-def score_detections(comparison: Comparison) -> DetectionScores:
-    """Score a comparison without regard to ids and scores."""
+def score_boxes(comparison: Comparison) -> tuple[int, int, int, float, float, float, float]:
+    """Score a comparison without regard to ids and scores: the fields of `DetectionScores`."""
     frames = comparison.frames
     vehicles = sum(len(frame.vehicles) for frame in frames)
     tracks = sum(len(frame.tracks) for frame in frames)
     matches = sum(len(frame.rows) for frame in frames)
     overlap = sum(float(frame.iou[frame.rows, frame.columns].sum()) for frame in frames)
-    return DetectionScores(
-        matches=matches,
-        false_positives=tracks - matches,
-        misses=vehicles - matches,
-        precision=ratio(matches, tracks),
-        recall=ratio(matches, vehicles),
-        f1=ratio(2 * matches, tracks + vehicles),
-        mean_iou=ratio(overlap, matches),
-    )
+    precision, recall = ratio(matches, tracks), ratio(matches, vehicles)
+    ratios = precision, recall, ratio(2 * matches, tracks + vehicles), ratio(overlap, matches)
+    return matches, tracks - matches, vehicles - matches, *ratios
 
 
 def score_comparison(comparison: Comparison) -> Scores:
     """Score a comparison: one video, or several that `pool` has joined."""
-    frames = comparison.frames
-    detection = score_detections(comparison)
-    of_vehicles, of_tracks = comparison.vehicle_lengths(), comparison.track_lengths()
-    vehicle_boxes, track_boxes = int(of_vehicles.sum()), int(of_tracks.sum())
-    found = counts((frame.found for frame in frames), len(of_vehicles)) / of_vehicles
+    matches, alarms, *_, overlap = detection = score_boxes(comparison)
+    lengths, shown = comparison.vehicle_lengths(), int(comparison.track_lengths().sum())
+    boxes, vehicles = int(lengths.sum()), len(lengths)
+    found = counts((frame.found for frame in comparison.frames), vehicles) / lengths
     tracked, lost = int(np.sum(found > _MOSTLY_TRACKED)), int(np.sum(found < _MOSTLY_LOST))
-    right = counts((frame.found_by for frame in frames), len(of_tracks))
-    false_tracks = int(np.sum(2 * right < of_tracks))
-    first = first_detections(comparison)
-    delays = [each.delay for each in first if each.delay is not None]
-    excess = frames_too_long(comparison)
-    switches, agreeing = id_switches(comparison), identity_matches(comparison)
-    ap50, ap50_95 = rank_predictions(comparison).average_precisions()
-    total, deta, assa = hota(comparison)
+    delays = tracking.delays(comparison)
+    known = [delay for delay in delays if delay is not None]
+    switches, agreeing = tracking.id_switches(comparison), tracking.identity_matches(comparison)
     return Scores(
-        **asdict(detection),
-        ap50=ap50,
-        ap50_95=ap50_95,
-        mota=ratio(detection.matches - detection.false_positives - switches, vehicle_boxes),
-        motp=detection.mean_iou,
-        id_switches=switches,
-        fragmentations=fragmentations(comparison),
-        mostly_tracked=tracked,
-        partly_tracked=len(found) - tracked - lost,
-        mostly_lost=lost,
-        idf1=ratio(2 * agreeing, vehicle_boxes + track_boxes),
-        idp=ratio(agreeing, track_boxes),
-        idr=ratio(agreeing, vehicle_boxes),
-        hota=total,
-        deta=deta,
-        assa=assa,
-        vehicles=len(of_vehicles),
-        vehicle_boxes=vehicle_boxes,
-        tracks=len(of_tracks),
-        track_boxes=track_boxes,
-        first_detections=first,
-        mean_delay=sum(delays) / len(delays) if delays else None,
-        mean_excess=sum(excess) / len(excess) if excess else None,
-        never_found=len(first) - len(delays),
-        false_tracks=false_tracks,
-        false_tracks_per_minute=(
-            60 * false_tracks / comparison.seconds if comparison.seconds else None
-        ),
+        *detection,
+        *rank_predictions(comparison).average_precisions(),
+        ratio(matches - alarms - switches, boxes),
+        overlap,
+        switches,
+        tracking.fragmentations(comparison),
+        *(tracked, vehicles - tracked - lost, lost),
+        *(ratio(2 * agreeing, boxes + shown), ratio(agreeing, shown), ratio(agreeing, boxes)),
+        *tracking.hota(comparison),
+        *(vehicles, boxes, len(comparison.track_ids), shown),
+        delays,
+        fmean(known) if known else None,
+        len(comparison.false_tracks()),
     )
 
 
 def ratio(part: float, whole: float) -> float:
     """Return `part / whole`; 0 if `whole` is 0, as in TrackEval."""
     return float(part / whole) if whole else 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RankedPredictions:
+    """All predictions by descending score, and which of them are right.
+
+    Each finds the vehicle of its frame that it overlaps most among those that no prediction before
+    it has found. Those of equal score are taken in the order of the frames, so that without scores
+    they describe a single operating point.
+    Source: the COCO detection evaluation (pycocotools).
+
+    Attributes
+    ----------
+    scores
+        float64 `(n,)`, descending.
+    right
+        bool `(10, n)`: whether each finds a vehicle, at each of `IOU_THRESHOLDS`.
+    vehicles
+        Number of true boxes.
+    """
+
+    scores: Float64Array
+    right: BoolArray
+    vehicles: int
+
+    def average_precisions(self) -> tuple[float, float]:
+        """Return the average precision at IoU 0.5, and its mean over `IOU_THRESHOLDS`, 0 to 1.
+
+        It is the mean of the precision at the 101 recalls 0, 0.01 … 1; 0 if there are no vehicles.
+        """
+        if not self.vehicles or not len(self.scores):
+            return 0.0, 0.0
+        precisions = [_average_precision(row, self.vehicles) for row in self.right]
+        return precisions[0], float(np.mean(precisions))
+
+    def f1_at(self, scores: Float64Array) -> Float64Array:
+        """Return F1 where predictions with at least each of these scores count, float64 `(k,)`."""
+        counted = np.searchsorted(-self.scores, -scores, side="right")
+        right = np.concatenate([[0], np.cumsum(self.right[0])])[counted]
+        return np.asarray(2 * right / np.maximum(1, counted + self.vehicles))
+
+
+def rank_predictions(comparison: Comparison) -> RankedPredictions:
+    """Sort the predictions by descending score, and mark those that are right."""
+    none = np.zeros((len(IOU_THRESHOLDS), 0), np.bool_)
+    frames = comparison.frames
+    scores = np.concatenate([np.empty(0), *(np.sort(-frame.scores) for frame in frames)])
+    right = np.concatenate([none, *map(_right_predictions, frames)], axis=1)
+    order = np.argsort(scores, kind="stable")
+    vehicles = sum(len(frame.vehicles) for frame in frames)
+    return RankedPredictions(-scores[order], right[:, order], vehicles)
+
+
+def _right_predictions(frame: ComparedFrame) -> BoolArray:
+    """Return whether each prediction finds a vehicle, `(10, m)`: by threshold and score."""
+    order = np.argsort(-frame.scores, kind="stable")
+    right = np.zeros((len(IOU_THRESHOLDS), len(order)), np.bool_)
+    overlaps = frame.iou[:, order]
+    for row, threshold in zip(right, IOU_THRESHOLDS, strict=True):
+        free = overlaps.copy()
+        for column in np.flatnonzero(overlaps.max(axis=0, initial=0) >= threshold).tolist():
+            best = len(free) - 1 - int(np.argmax(free[::-1, column]))  # the last of equals: COCO
+            if free[best, column] >= threshold:
+                row[column] = True
+                free[best] = -1
+    return right
+
+
+def _average_precision(right: BoolArray, vehicles: int) -> float:
+    found = np.cumsum(right)
+    recall = found / vehicles
+    precision = found / np.arange(1, len(right) + 1)
+    highest_from_here = np.maximum.accumulate(precision[::-1])[::-1]
+    reached = np.searchsorted(recall, _RECALLS, side="left")
+    return float(np.append(highest_from_here, 0)[reached].mean())

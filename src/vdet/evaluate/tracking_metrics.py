@@ -1,4 +1,4 @@
-"""How well vehicles are followed: id switches, fragmentations, identity and HOTA.
+"""How well vehicles are followed: delays, id switches, identity and HOTA.
 
 Sources, with details as in TrackEval:
 CLEAR-MOT: Bernardin and Stiefelhagen, "Evaluating Multiple Object Tracking Performance: The CLEAR
@@ -14,6 +14,19 @@ from vdet.evaluate.comparison import MATCH_IOU, UNMATCHED, Comparison, assign, a
 
 ALPHAS = np.arange(0.05, 0.99, 0.05)
 """The overlap thresholds of HOTA, 0.05 … 0.95; the metrics are the mean over them."""
+
+
+def delays(comparison: Comparison) -> tuple[int | None, ...]:
+    """Return the frames from the first that has a vehicle to its first match, by vehicle.
+
+    None: the vehicle is never found.
+    """
+    appears: dict[int, int] = {}
+    found: dict[int, int] = {}
+    for frame in reversed(comparison.frames):  # so the first frame is the one that stays
+        appears |= dict.fromkeys(frame.vehicles.tolist(), frame.number)
+        found |= dict.fromkeys(frame.found.tolist(), frame.number)
+    return tuple(found[one] - appears[one] if one in found else None for one in sorted(appears))
 
 
 def id_switches(comparison: Comparison) -> int:

@@ -8,6 +8,7 @@ import itertools
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -19,10 +20,9 @@ from vdet.detect.protocol import DetectorModel
 from vdet.errors import VideoError
 from vdet.evaluate.comparison import Comparison, compare, pool
 from vdet.evaluate.scores import Scores, score_comparison
-from vdet.evaluate.timelines import Stretch, mistakes, stretches
 from vdet.labels.label import Label
 from vdet.labels.reading import read_predictions, read_truth
-from vdet.labels.roles import DEFAULT_ROLES, Roles
+from vdet.labels.roles import Roles
 from vdet.labels.video import LabelledVideo
 from vdet.media import Frame, Picture, VideoInfo
 from vdet.media.reader import VideoReader
@@ -31,15 +31,16 @@ from vdet.regions import Regions, lay_regions
 from vdet.run.loop import build, named_errors, peek
 from vdet.run.result import FrameResult
 
+_DEFAULT = Settings()
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Clip:
-    """A video and the truth of its frames up to number `until`; None: of all frames."""
+    """A video and the truth of its first frames; of all, if the truth has no last frame."""
 
     video: Path
     truth_path: Path
     truth: LabelledVideo
-    until: int | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,50 +55,41 @@ class Variant:
     assignments: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class ClipResult:
-    """The scores of one video under one of the settings.
+    """One video under one of the settings, or several videos taken as one.
 
     `name` is shown in tables; `video` is the file, None if a file of tracks is scored. The frames
-    up to `until`, counted from 1, are compared. `left_out` is the number of boxes in later frames.
+    up to `until`, counted from 1, are compared.
     """
 
     name: str
-    video: Path | None
     comparison: Comparison
-    scores: Scores
-    stretches: tuple[Stretch, ...]
-    until: int
-    left_out: int = 0
+    until: int = 0
+    video: Path | None = None
 
-    @property
-    def mistakes(self) -> tuple[Stretch, ...]:
-        """The missed vehicles and the false alarms, the longest first."""
-        return mistakes(self.stretches)
+    @cached_property
+    def scores(self) -> Scores:
+        """All metrics."""
+        return score_comparison(self.comparison)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class RunResult:
-    """The scores of all videos under one of the settings, and their total.
+    """All videos under one of the settings; `assignments` are those of the `Variant`."""
 
-    `assignments` are those of the `Variant`.
-    """
+    clips: Sequence[ClipResult]
+    assignments: tuple[str, ...] = ()
 
-    assignments: tuple[str, ...]
-    clips: tuple[ClipResult, ...]
-    total: Scores
-
-    @staticmethod
-    def of(assignments: tuple[str, ...], clips: Sequence[ClipResult]) -> "RunResult":
-        """Return the result with the total of all clips, taken as one video."""
-        if len(clips) == 1:
-            return RunResult(assignments, tuple(clips), clips[0].scores)
-        total = score_comparison(pool([clip.comparison for clip in clips]))
-        return RunResult(assignments, tuple(clips), total)
+    @cached_property
+    def total(self) -> ClipResult:
+        """All videos, taken as one."""
+        parts = [clip.comparison for clip in self.clips]
+        return ClipResult("total", pool(parts)) if len(parts) > 1 else self.clips[0]
 
 
 def open_clip(
-    video: Path, truth_path: Path, until: int | None = None, roles: Roles = DEFAULT_ROLES
+    video: Path, truth_path: Path, until: int | None = None, settings: Settings = _DEFAULT
 ) -> Clip:
     """Read the truth of a video.
 
@@ -105,18 +97,36 @@ def open_clip(
     ----------
     until
         Number of the last frame to use, from 1; None: the last that the truth covers.
-    roles
-        What the labels of the truth mean.
+    settings
+        With the classes that are looked for, and the roles of labels.
 
     Raises
     ------
     TruthError
         The truth cannot be used.
     """
-    truth = read_truth(truth_path, roles)
-    if until is not None:
-        truth = truth.until(until)
-    return Clip(video, truth_path, truth, until or truth.last_frame or None)
+    truth = read_truth(truth_path, Roles.from_settings(settings))
+    return Clip(video, truth_path, truth.until(until) if until else truth)
+
+
+def score_files(
+    prediction: Path, truth_path: Path, until: int | None = None, settings: Settings = _DEFAULT
+) -> ClipResult:
+    """Score a file of tracks against a file of truth; arguments as of `open_clip`.
+
+    Tracks in later frames are left out.
+
+    Raises
+    ------
+    TruthError
+        A file cannot be used.
+    """
+    found, truth = (
+        read_predictions(prediction),
+        read_truth(truth_path, Roles.from_settings(settings)),
+    )
+    last = until or truth.last_frame
+    return ClipResult(str(prediction), compare(found.until(last), truth.until(last)), last)
 
 
 def evaluate_clips(
@@ -127,64 +137,13 @@ def evaluate_clips(
     Arguments and errors as of `evaluate_clip`, which is called for each clip.
     """
     results = [evaluate_clip(clip, variants, progress) for clip in clips]
-    return [
-        RunResult.of(variant.assignments, of_clips)
-        for variant, of_clips in zip(variants, zip(*results, strict=True), strict=True)
-    ]
+    by_variant = zip(variants, zip(*results, strict=True), strict=True)
+    return [RunResult(of_clips, variant.assignments) for variant, of_clips in by_variant]
 
 
-def score_video(
-    name: str,
-    prediction: LabelledVideo,
-    truth: LabelledVideo,
-    *,
-    video: Path | None = None,
-    rate: float | None = None,
-) -> ClipResult:
-    """Score the predictions for a video and list their mistakes; arguments as in `compare`."""
-    comparison = compare(prediction, truth, rate=rate)
-    until = max(prediction.last_frame, truth.last_frame)
-    scores = score_comparison(comparison)
-    return ClipResult(name, video, comparison, scores, stretches(comparison), until)
-
-
-def score_files(
-    prediction: Path,
-    truth: Path,
-    roles: Roles = DEFAULT_ROLES,
-    *,
-    until: int | None = None,
-    rate: float | None = None,
-) -> RunResult:
-    """Score a file of tracks against a file of truth.
-
-    Parameters
-    ----------
-    roles
-        What the labels of the truth mean.
-    until
-        Number of the last frame to use, from 1; None: the last that the truth covers.
-    rate
-        As `compare` takes it.
-
-    Raises
-    ------
-    TruthError
-        A file cannot be used.
-    """
-    found, true = read_predictions(prediction), read_truth(truth, roles)
-    last = until or true.last_frame
-    compared = found.until(last)
-    result = score_video(str(prediction), compared, true.until(last), rate=rate)
-    return RunResult.of((), [replace(result, left_out=len(found) - len(compared))])
-
-
-def best(runs: Sequence[RunResult]) -> RunResult:
-    """Return the run with the highest F1, the first of equal ones."""
-    return max(runs, key=lambda run: run.total.f1)
-
-
-def evaluate_clip(clip: Clip, variants: Sequence[Variant], progress: Progress) -> list[ClipResult]:
+def evaluate_clip(
+    clip: Clip, variants: Sequence[Variant], progress: Progress = no_progress
+) -> list[ClipResult]:
     """Find the vehicles of a clip under each of the settings, in one pass, and score them.
 
     Vehicles of the truth that stand outside the regions are ignored.
@@ -203,30 +162,37 @@ def evaluate_clip(clip: Clip, variants: Sequence[Variant], progress: Progress) -
         The truth covers frames beyond the end of the video.
     """
     rows: list[list[Label]] = [[] for _ in variants]
-    frames = 0
-    source = variants[0].settings.input
-    with VideoReader(clip.video, frames=clip.until, settings=source) as reader:
-        advance = progress(reader.expected)
+    source, last, frames = variants[0].settings.input, clip.truth.last_frame, 0
+    with VideoReader(clip.video, frames=last or None, settings=source) as reader:
+        advance, info = progress(reader.expected), reader.info
         with named_errors(clip.video, VideoError):
-            for results in follow_together(variants, reader, reader.info):
-                for row, result in zip(rows, results, strict=True):
-                    number = result.frame.index + 1
-                    row += [
-                        Label(0, track.box.pixels, frame=number, id=track.id, score=track.score)
-                        for track in result.tracks
-                    ]
-                frames = results[0].frame.index + 1
+            for results in follow_together(variants, reader, info):
+                for labels, result in zip(rows, results, strict=True):
+                    labels.extend(_labels(result))
+                frames += 1
                 advance(1)
-        info = reader.info
     clip.truth.check_end(clip.truth_path, frames)
     truth = clip.truth.until(frames)
     scored = []
     for variant, labels in zip(variants, rows, strict=True):
-        found = LabelledVideo.of(labels, frame_count=frames, rate=float(info.rate))
         regions = lay_regions(variant.settings.regions, info.width, info.height)
-        counted = _in_regions(truth, regions)
-        scored.append(score_video(str(clip.video), found, counted, video=clip.video))
+        comparison = compare(LabelledVideo.of(labels), _in_regions(truth, regions))
+        scored.append(ClipResult(str(clip.video), comparison, frames, video=clip.video))
     return scored
+
+
+def _labels(result: FrameResult) -> Iterator[Label]:
+    for track in result.tracks:
+        box, number = track.box.pixels, result.frame.index + 1
+        yield Label(0, box, track.class_name, number, track.id, track.score)
+
+
+def _in_regions(truth: LabelledVideo, regions: Regions | None) -> LabelledVideo:
+    """Return the truth of a video, in which vehicles outside the regions are ignored."""
+    if regions is None:
+        return truth
+    outside = [not regions.contains(Box(*sides).foot) for sides in truth.boxes.tolist()]
+    return replace(truth, ignored=truth.ignored | np.array(outside, np.bool_))
 
 
 def follow_together(
@@ -243,13 +209,14 @@ def follow_together(
         (each.settings.detector.search_key, each.settings.regions, own.rate)
         for each, own in zip(variants, pipelines, strict=True)
     ]
-    searches: dict[int, _Search] = {}  # by the first of the variants that share it
+    searches = [
+        _shared(own.detector.search, keys.count(key))
+        for own, key in zip(pipelines, keys, strict=True)
+    ]
     runs = []
     for own, key, copy in zip(pipelines, keys, itertools.tee(read, len(keys)), strict=True):
-        first = keys.index(key)
-        if first not in searches:
-            searches[first] = _shared(own.detector.search, keys.count(key))
-        detector = _Sharing(searches[first], own.detector.detect)
+        search = searches[keys.index(key)]  # that of the first variant that searches alike
+        detector = _Sharing(search, own.detector.detect)
         runs.append(replace(own, detector=detector).follow(copy, video.path))
     yield from zip(*runs, strict=True)
 
@@ -283,11 +250,3 @@ def _shared(search: _Search, users: int) -> _Search:
             return candidates
 
     return locked
-
-
-def _in_regions(truth: LabelledVideo, regions: Regions | None) -> LabelledVideo:
-    """Return the truth of a video, in which vehicles outside the regions are ignored."""
-    if regions is None:
-        return truth
-    outside = [not regions.contains(Box(*sides).foot) for sides in truth.boxes.tolist()]
-    return replace(truth, ignored=truth.ignored | np.array(outside, np.bool_))

@@ -99,14 +99,16 @@ def read_true_labels(path: Path, roles: Roles) -> SavedTracks:
 
 
 def _with_roles(path: Path, labels: Iterable[Label], roles: Roles) -> Iterator[Label]:
-    """Yield vehicles and ignore regions."""
+    """Yield vehicles and ignore regions; the name of each is the class that its label means."""
     for label in labels:
         role = "vehicle" if label.name is None else roles.role_of(label.name)
         if role is None:
             what = f"label {label.name!r:.40} is unknown; give it a role in labels.roles, or use "
             raise line_error(path, label.place, f"{what}one of: {roles.known}")
         if role != "other":
-            yield label._replace(score=1.0, ignored=label.ignored or role == "ignored")
+            name = label.name and (roles.class_of(label.name) or "vehicle")
+            ignored = label.ignored or role == "ignored"
+            yield label._replace(name=name, score=1.0, ignored=ignored)
 
 
 def read_labelled_pictures(path: Path, roles: Roles = DEFAULT_ROLES) -> LabelledPictures:

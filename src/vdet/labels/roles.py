@@ -40,11 +40,14 @@ class Roles:
     def of(cls, roles: Mapping[str, Role], classes: Sequence[str]) -> Self:
         """Return the roles of words; a class without a role is a vehicle if it is in `classes`.
 
-        Other known classes are ignored.
+        Other known classes are ignored. A class of `classes` whose role is "other" is ignored too:
+        the detector finds it, so it is not a part of the background.
         """
         words: dict[str, Role] = dict.fromkeys((*OUR_NAMES, *map(_key, _IGNORED)), "ignored")
         words.update(dict.fromkeys(map(_key, classes), "vehicle"))
-        words.update({_key(word): role for word, role in roles.items()})
+        for word, role in roles.items():
+            is_found = words.get(_key(word)) == "vehicle"
+            words[_key(word)] = "ignored" if is_found and role == "other" else role
         words.update(dict.fromkeys(_REGION_LETTERS, "ignored"))
         return cls(words, {_key(name): name for name in classes})
 

@@ -121,6 +121,8 @@ class LabelledVideo:
     known
         int64: numbers of the frames that the labels are about, ascending; of the others nothing is
         known. None: all frames.
+    classes
+        The class of each vehicle by its id, the last one that it has; without those not known.
     """
 
     frames: Int64Array
@@ -131,6 +133,7 @@ class LabelledVideo:
     frame_count: int | None = None
     rate: float | None = None
     known: Int64Array | None = None
+    classes: Mapping[int, str] = field(default_factory=dict)
 
     @staticmethod
     def of(
@@ -154,6 +157,11 @@ class LabelledVideo:
             frame_count=frame_count,
             rate=rate,
             known=None if known is None else np.array(known, np.int64) + 1,
+            classes={
+                label.id: our_name(label.name) or label.name
+                for label in ordered
+                if label.name and not label.ignored
+            },
         )
 
     def __len__(self) -> int:

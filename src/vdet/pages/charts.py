@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vdet.boxes import Float64Array
 from vdet.draw.boxes import color_of, text_color
 from vdet.draw.paint import Color
 
@@ -22,7 +21,6 @@ FILL, BAD, SOFT = "var(--fill)", "var(--bad)", "var(--soft)"
 _COLORS = ("#0f9d8a", "#d97706", "#6366f1", "#db2777", "#65a30d", "#0284c7", "#b45309", "#9333ea")
 _TICKS = 5  # most parts of an axis
 _TIMES = (1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400, 21600, 43200)
-_MOST_POINTS = 400  # of a curve
 _STEPS = 160  # of a number over time
 _NOTHING = 1e-9  # length of an axis whose ends are equal
 
@@ -58,23 +56,13 @@ class Bar:
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
-    """A line through points `(x, y)`."""
-
-    points: Sequence[tuple[float, float]]
-    color: str = FILL
-    dashed: bool = False
-
-
-@dataclass(frozen=True, slots=True)
 class Plot:
-    """Bars and lines on two axes."""
+    """Bars on two axes."""
 
     title: str
     x: Axis
     y: Axis
     bars: Sequence[Bar] = ()
-    lines: Sequence[Line] = ()
     legend: Sequence[tuple[str, str]] = ()
 
 
@@ -173,12 +161,6 @@ def number_axis(
     if fixed:
         return Axis(low, high, [each for each in ticks if low <= each[0] <= high], title)
     return Axis(ticks[0][0], ticks[-1][0], ticks, title)
-
-
-def curve(xs: Float64Array, ys: Float64Array, color: str) -> Line:
-    """Return a line through at most `_MOST_POINTS` of the points, float64 `(n,)` each."""
-    rows = np.unique(np.linspace(0, len(xs) - 1, min(len(xs), _MOST_POINTS)).astype(int))
-    return Line(list(zip(xs[rows].tolist(), ys[rows].tolist(), strict=True)), color)
 
 
 def level_plot(

@@ -79,7 +79,7 @@ def _facets(body: Body, color: Color) -> tuple[Float64Array, Int64Array, list[Co
     Of two facets that overlap, one is hidden.
     """
     facets = _underside(body) + _lower_body(body, color) + _wheels(body, color)
-    facets += _rear(body, color) + _front(body, color) + _cabin(body, color)
+    facets += _ends(body, color) + _cabin(body, color)
     ends = np.cumsum([len(corners) for corners, _ in facets])[:-1]
     return np.concatenate([corners for corners, _ in facets]), ends, [color for _, color in facets]
 
@@ -123,35 +123,27 @@ def _wheels(body: Body, color: Color) -> list[_Facet]:
     return parts
 
 
-def _rear(body: Body, color: Color) -> list[_Facet]:
-    """Paint bumper, boot, plate and lights onto the rear."""
+def _ends(body: Body, color: Color) -> list[_Facet]:
+    """Paint bumper, boot or grille, plate and lights onto rear and front."""
     half, belt = body.width / 2, min(body.belt, _HIGHEST_LIGHT)
-    bumper = _SILL + 0.32
+    rear, front, z = _SILL + 0.32, _SILL + 0.2, body.length + 0.01
     light = mixed(_LIGHT, shaded(color, 0.5), 0.2)
-    return [
-        (_upright(-half + 0.05, half - 0.05, _SILL, _SILL + 0.1, -0.01), shaded(color, 0.4)),
-        (_upright(-half, half, bumper, bumper + 0.03, -0.01), shaded(color, 0.5)),
-        (_upright(-half + 0.1, half - 0.1, belt - 0.05, belt, -0.01), shaded(color, 1.12)),
-        (_upright(-0.27, 0.27, bumper + 0.05, bumper + 0.17, -0.02), _PLATE),
-        (_upright(-half + 0.02, -half + 0.36, belt - 0.24, belt - 0.06, -0.02), light),
-        (_upright(half - 0.36, half - 0.02, belt - 0.24, belt - 0.06, -0.02), light),
+    panels = [
+        (-half + 0.05, half - 0.05, _SILL, _SILL + 0.1, -0.01, shaded(color, 0.4)),
+        (-half, half, rear, rear + 0.03, -0.01, shaded(color, 0.5)),
+        (-half + 0.1, half - 0.1, belt - 0.05, belt, -0.01, shaded(color, 1.12)),
+        (-0.27, 0.27, rear + 0.05, rear + 0.17, -0.02, _PLATE),
+        (-half + 0.02, -half + 0.36, belt - 0.24, belt - 0.06, -0.02, light),
+        (half - 0.36, half - 0.02, belt - 0.24, belt - 0.06, -0.02, light),
+        (half - 0.05, -half + 0.05, _SILL, _SILL + 0.12, z, shaded(color, 0.4)),
+        (half - 0.5, -half + 0.5, front, belt - 0.12, z, shaded(_GLASS, 0.6)),
+        (0.26, -0.26, front, front + 0.12, z + 0.01, _PLATE),
+        (half - 0.04, half - 0.44, belt - 0.28, belt - 0.1, z, _HEADLIGHT),
+        (-half + 0.44, -half + 0.04, belt - 0.28, belt - 0.1, z, _HEADLIGHT),
     ]
-
-
-def _front(body: Body, color: Color) -> list[_Facet]:
-    """Paint bumper, grille, plate and lights onto the front, and a windscreen if it is tall."""
-    half, belt, z = body.width / 2, min(body.belt, _HIGHEST_LIGHT), body.length + 0.01
-    bumper = _SILL + 0.2
-    parts = [
-        (_upright(half - 0.05, -half + 0.05, _SILL, _SILL + 0.12, z), shaded(color, 0.4)),
-        (_upright(half - 0.5, -half + 0.5, bumper, belt - 0.12, z), shaded(_GLASS, 0.6)),
-        (_upright(0.26, -0.26, bumper, bumper + 0.12, z + 0.01), _PLATE),
-        (_upright(half - 0.04, half - 0.44, belt - 0.28, belt - 0.1, z), _HEADLIGHT),
-        (_upright(-half + 0.44, -half + 0.04, belt - 0.28, belt - 0.1, z), _HEADLIGHT),
-    ]
-    if body.belt > _HIGHEST_LIGHT:
-        parts.append((_upright(half - 0.15, -half + 0.15, 1.5, 2.5, z), _GLASS))
-    return parts
+    if body.belt > _HIGHEST_LIGHT:  # a windscreen
+        panels.append((half - 0.15, -half + 0.15, 1.5, 2.5, z, _GLASS))
+    return [(_upright(*sides), painted) for *sides, painted in panels]
 
 
 def _cabin(body: Body, color: Color) -> list[_Facet]:

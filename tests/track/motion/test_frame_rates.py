@@ -132,5 +132,5 @@ def test_many_weak_false_detections_do_not_become_tracks(rate: int) -> None:
     assert scores.false_tracks == 0
     assert scores.id_switches == 0
     assert scores.f1 > 0.93
-    shown_after = [(first.delay or 0) / rate for first in scores.first_detections]
+    shown_after = [(delay or 0) / rate for delay in scores.delays]
     assert max(shown_after) <= max(0.4, 3 / rate)

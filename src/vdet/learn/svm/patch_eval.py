@@ -13,8 +13,8 @@ import numpy as np
 from vdet.boxes import BoolArray, Float64Array
 from vdet.config.schema import Settings
 from vdet.detect.svm.model import LinearModel
+from vdet.evaluate.mistakes import Tile
 from vdet.evaluate.output import RunName, share, table
-from vdet.evaluate.tiles import Tile
 from vdet.learn.svm.dataset import PatchFile, read_patches
 from vdet.learn.svm.extraction import extract
 from vdet.learn.svm.metrics import CONFUSION_HEADINGS, Classification, Rate
@@ -163,7 +163,7 @@ def patch_page(scores: PatchScores, run: RunName) -> str:
     """Return the page as HTML."""
     return render(
         "eval_patches.html",
-        subtitle="; ".join(run.lines()),
+        subtitle=run.line,
         scores=scores,
         metrics=metric_rows(scores),
         confusion_headings=CONFUSION_HEADINGS,
