@@ -20,7 +20,7 @@ from pydantic.dataclasses import dataclass
 
 from vdet.errors import TruthError, printable
 from vdet.files import record_input
-from vdet.labels.formats import UNKNOWN, Format, SourceVideo, best_classes
+from vdet.labels.formats import Format, SourceVideo, last_classes
 from vdet.labels.json_stream import JsonLists
 from vdet.labels.label import Label, from_size, limited, line_error
 from vdet.labels.parsing import LIMIT, Index, Number, Times, checked_times
@@ -42,6 +42,7 @@ def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) ->
     `attributes.occluded` says that the vehicle is lost.
     """
     size = {"width": video.width, "height": video.height}
+    classes = last_classes(frames)
     categories: dict[str, int] = defaultdict(lambda: len(categories) + 1)  # the id of each name
     lists: dict[str, list[str]] = {  # entries as text, which is smaller than dictionaries
         "videos": [json.dumps({"id": _VIDEO, "name": video.name, **size})],
@@ -56,7 +57,7 @@ def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) ->
             annotation = {
                 "id": len(lists["annotations"]) + 1,
                 "image_id": number,
-                "category_id": categories[track.class_name or UNKNOWN],
+                "category_id": categories[classes[track.id]],
                 "track_id": track.id,
                 "bbox": [x, y, width, height],
                 "area": width * height,
@@ -65,7 +66,7 @@ def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) ->
                 "attributes": {"occluded": track.state == "lost"},
             }
             lists["annotations"].append(json.dumps(annotation))
-    for id_, name in best_classes(frames).items():
+    for id_, name in classes.items():
         entry = {"id": id_, "video_id": _VIDEO, "category_id": categories[name]}
         lists["tracks"].append(json.dumps(entry))
     lists["categories"] = [json.dumps({"id": n, "name": name}) for name, n in categories.items()]

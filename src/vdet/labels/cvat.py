@@ -16,7 +16,7 @@ from typing import BinaryIO, NamedTuple
 from xml.sax.saxutils import escape, quoteattr
 
 from vdet.errors import TruthError, escaped
-from vdet.labels.formats import Format, SourceVideo, best_classes
+from vdet.labels.formats import Format, SourceVideo, last_classes
 from vdet.labels.label import Corners, Label, limited, line_error
 from vdet.labels.parsing import archive_members, parse_number, parse_whole
 from vdet.labels.video import SavedTracks
@@ -38,7 +38,7 @@ def _lines(video: SourceVideo, frames: Sequence[FrameTracks]) -> Iterator[str]:
     for frame in frames:
         for track in frame.tracks:
             boxes[track.id].append((frame.index, track))
-    labels = {id_: escaped(name) for id_, name in best_classes(frames).items()}
+    labels = {id_: escaped(name) for id_, name in last_classes(frames).items()}
     names = sorted(f"<label><name>{escape(each)}</name></label>" for each in set(labels.values()))
     yield '<?xml version="1.0" encoding="utf-8"?>'
     yield "<annotations>"

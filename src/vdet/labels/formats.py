@@ -4,23 +4,19 @@ Formats of tracks are registered in the group `vdet.formats`, those of labelled 
 `vdet.picture_formats`: see `vdet.plugins`.
 """
 
-from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from typing import BinaryIO
 
-from vdet.detect.classes import ClassScores
+from vdet.detect.classes import UNKNOWN
 from vdet.errors import TruthError
 from vdet.labels.parsing import numbered_lines
 from vdet.labels.pictures import LabelledPicture
 from vdet.labels.video import SavedTracks
 from vdet.plugins import FORMATS, PICTURE_FORMATS, load_plugin, plugin_names
 from vdet.track.track import FrameTracks
-
-UNKNOWN = "vehicle"
-"""Name of a vehicle without a class, for formats that need a name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,12 +124,10 @@ class PictureFormat:
         return all((folder / name).is_dir() for name in self.folders)
 
 
-def best_classes(frames: Iterable[FrameTracks]) -> dict[int, str]:
-    """Return the class of each track, by ascending id: that with most score, or `UNKNOWN`."""
-    classes: dict[int, ClassScores] = defaultdict(ClassScores)
-    for track in (track for frame in frames for track in frame.tracks):
-        classes[track.id].add(track.class_name or UNKNOWN, track.score)
-    return {id_: scores.best or UNKNOWN for id_, scores in sorted(classes.items())}
+def last_classes(frames: Iterable[FrameTracks]) -> dict[int, str]:
+    """Return the class that each track has in its last frame, or `UNKNOWN`, by ascending id."""
+    classes = {t.id: t.class_name or UNKNOWN for frame in frames for t in frame.tracks}
+    return dict(sorted(classes.items()))
 
 
 def track_formats() -> list[Format]:

@@ -15,7 +15,7 @@ from typing import Annotated, Any, BinaryIO
 from pydantic import BaseModel, BeforeValidator, Field, TypeAdapter
 
 from vdet.errors import TruthError
-from vdet.labels.formats import UNKNOWN, Format, SourceVideo, best_classes
+from vdet.labels.formats import Format, SourceVideo, last_classes
 from vdet.labels.json_stream import JsonLists
 from vdet.labels.label import Corners, Label, from_size, limited
 from vdet.labels.parsing import MAX_BYTES, Index, Number, Times, checked_times
@@ -36,6 +36,7 @@ _CENTRED = ("0.", "1.0")
 def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) -> None:
     """Write all boxes; a video without a clock begins in 1970."""
     zero = video.begin.timestamp() if video.begin else 0.0
+    classes = last_classes(frames)
     last = {track.id: frame.index for frame in frames for track in frame.tracks}
     begun: set[int] = set()
     rows = []
@@ -44,19 +45,20 @@ def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) ->
         for track in frame.tracks:
             ends = track.id not in begun, last[track.id] == frame.index
             begun.add(track.id)
-            known = track.class_name or UNKNOWN, round(track.score, 4), *track.box.xywh
+            known = classes[track.id], round(track.score, 4), *track.box.xywh
             place = frame.index + 1, moment, video.name, track.state != "seen"
             rows.append(dict(zip(_COLUMNS, (*known, *place, *ends, track.id), strict=True)))
-    metadata = _metadata(video, frames, zero)
+    metadata = _metadata(video, frames, zero, sorted(set(classes.values())))
     text = json.dumps({"metadata": metadata, "data": {"detections": rows}}, allow_nan=False)
     file.write(bz2.compress(text.encode()))
 
 
-def _metadata(video: SourceVideo, frames: Sequence[FrameTracks], zero: float) -> dict[str, Any]:
+def _metadata(
+    video: SourceVideo, frames: Sequence[FrameTracks], zero: float, classes: Sequence[str]
+) -> dict[str, Any]:
     first, last = (frames[0], frames[-1]) if frames else (FrameTracks(0, 0.0, ()),) * 2
     seconds, steps = last.time - first.time, last.index - first.index
     program, name = {"otvision_version": f"vdet {__version__}"}, PurePath(video.name)
-    classes = dict(enumerate(sorted(set(best_classes(frames).values()))))
     return {
         "otdet_version": _DETECTIONS,
         "video": {
@@ -67,7 +69,7 @@ def _metadata(video: SourceVideo, frames: Sequence[FrameTracks], zero: float) ->
             "recorded_start_date": f"{zero:.6f}",
             "length": str(timedelta(seconds=round(seconds))),
         },
-        "detection": {**program, "model": {"name": "vdet", "classes": classes}},
+        "detection": {**program, "model": {"name": "vdet", "classes": dict(enumerate(classes))}},
         "ottrk_version": _TRACKS,
         "tracking": {
             **program,

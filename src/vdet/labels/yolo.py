@@ -20,9 +20,10 @@ from typing import Any, BinaryIO
 
 from vdet.archives import store
 from vdet.config.document import MAX_BYTES, parse_document
+from vdet.detect.classes import UNKNOWN
 from vdet.errors import ConfigError, ImageError, TruthError, escaped, printable
 from vdet.labels import parsing
-from vdet.labels.formats import UNKNOWN, Format, PictureFormat, SourceVideo
+from vdet.labels.formats import Format, PictureFormat, SourceVideo
 from vdet.labels.label import Label, limited
 from vdet.labels.parsing import archive_members, label_lines, parse_number, parse_whole, read_bytes
 from vdet.labels.pictures import LabelledPicture, pictures_below

@@ -1,0 +1,65 @@
+"""The class of a track: one vote over all that was seen of a vehicle.
+
+Only trackers vote. A row of a track has its class so far; what is made at the end of a video, such
+as counts, records and pages, uses the class of the track's last row.
+"""
+
+from collections import Counter
+from collections.abc import Mapping
+
+from vdet.boxes import Float64Array
+from vdet.detect.classes import UNKNOWN
+
+_MAJORITY = 0.5
+"""Fraction of all votes that a class needs; a vehicle without such a class is `UNKNOWN`."""
+
+_CLOSE = 0.02
+"""Fraction of the frame's area from which on a box shows all that a detector can tell apart."""
+
+_CUT_OFF = 0.1
+"""What a search that sees only a part of the vehicle counts."""
+
+_BORDER = 0.005
+"""A box that ends this near to the side of the frame is cut off, as a fraction of the frame."""
+
+
+class ClassVotes:
+    """The votes of the searches that found a vehicle, by class."""
+
+    def __init__(self) -> None:
+        self._sums: Counter[str] = Counter()
+
+    @property
+    def winner(self) -> str | None:
+        """The class with the majority, or else `UNKNOWN`; None where no detection had a class."""
+        if not self._sums:
+            return None
+        name, most = self._sums.most_common(1)[0]
+        return name if most >= _MAJORITY * self._sums.total() else UNKNOWN
+
+    def add(self, classes: Mapping[str, float], weight: float) -> None:
+        """Add what a search says: how likely each class is, and the weight of the search."""
+        for name, likely in classes.items():
+            self._sums[name] += weight * likely
+
+    def join(self, other: "ClassVotes") -> None:
+        """Add the votes of another track of the same vehicle."""
+        self._sums.update(other._sums)
+
+
+def vote_weight(box: Float64Array, score: float, size: tuple[int, int]) -> float:
+    """Return how much a detection tells of the class: by its area, its score, and if it is whole.
+
+    Parameters
+    ----------
+    box
+        x1, y1, x2, y2 in pixels, inside the frame.
+    score
+        0 to 1.
+    size
+        Width and height of the frame, pixels.
+    """
+    x1, y1, x2, y2 = (box / (*size, *size)).tolist()
+    area = min((x2 - x1) * (y2 - y1), _CLOSE)
+    is_whole = min(x1, y1) > _BORDER and max(x2, y2) < 1 - _BORDER
+    return score * area * (1 if is_whole else _CUT_OFF)
