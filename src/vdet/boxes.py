@@ -78,13 +78,8 @@ class Box:
     @property
     def pixels(self) -> tuple[int, int, int, int]:
         """x1, y1, x2, y2 as whole pixels, halves up."""
-        floor = math.floor
-        return (
-            floor(self.x1 + 0.5),
-            floor(self.y1 + 0.5),
-            floor(self.x2 + 0.5),
-            floor(self.y2 + 0.5),
-        )
+        up, down = math.floor(self.y1 + 0.5), math.floor(self.y2 + 0.5)
+        return math.floor(self.x1 + 0.5), up, math.floor(self.x2 + 0.5), down
 
     @property
     def xywh(self) -> tuple[int, int, int, int]:
@@ -293,14 +288,12 @@ class Boxes:
         """
         import pandas as pd
 
-        columns = dict(zip(("x1", "y1", "x2", "y2"), self.sides.T, strict=True))
-        known = {"score": self.scores, "class_name": self.class_names, "id": self.ids}
-        more = {
-            name if column.ndim == 1 else f"{name}_{number}": values
-            for name, column in self.data.items()
-            for number, values in enumerate(np.atleast_2d(column.T))
-        }
-        return pd.DataFrame(columns | known | more)
+        columns: dict[str, Any] = dict(zip(("x1", "y1", "x2", "y2"), self.sides.T, strict=True))
+        columns |= {"score": self.scores, "class_name": self.class_names, "id": self.ids}
+        for name, data in self.data.items():
+            parts = {f"{name}_{number}": part for number, part in enumerate(data.T)}
+            columns |= {name: data} if data.ndim == 1 else parts
+        return pd.DataFrame(columns)
 
 
 def _column(
@@ -352,16 +345,9 @@ def iou(a: Float64Array, b: Float64Array) -> Float64Array:
 
 
 def coverage(boxes: Float64Array, others: Float64Array) -> Float64Array:
-    """Return the share, 0 to 1, of every box's own area that lies in each of the others.
+    """Return the fraction of every box's own area that lies in each of the others, `(n, m)`.
 
-    Parameters
-    ----------
-    boxes, others
-        x1, y1, x2, y2 of shapes `(n, 4)` and `(m, 4)`, each of `boxes` with an area.
-
-    Returns
-    -------
-    float64 of shape `(n, m)`.
+    `boxes` and `others` are x1, y1, x2, y2 of shapes `(n, 4)` and `(m, 4)`; those have an area.
     """
     return _intersection(boxes[:, np.newaxis], others) / area(boxes)[:, np.newaxis]
 

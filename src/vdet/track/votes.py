@@ -4,7 +4,7 @@ Only trackers vote. A row of a track has its class so far; what is made at the e
 as counts, records and pages, uses the class of the track's last row.
 """
 
-from collections import Counter
+from collections import defaultdict
 from collections.abc import Mapping
 
 from vdet.boxes import Float64Array
@@ -27,15 +27,15 @@ class ClassVotes:
     """The votes of the searches that found a vehicle, by class."""
 
     def __init__(self) -> None:
-        self._sums: Counter[str] = Counter()
+        self._sums: defaultdict[str, float] = defaultdict(float)
 
     @property
     def winner(self) -> str | None:
         """The class with the majority, or else `UNKNOWN`; None where no detection had a class."""
         if not self._sums:
             return None
-        name, most = self._sums.most_common(1)[0]
-        return name if most >= _MAJORITY * self._sums.total() else UNKNOWN
+        name = max(self._sums, key=self._sums.__getitem__)
+        return name if self._sums[name] >= _MAJORITY * sum(self._sums.values()) else UNKNOWN
 
     def add(self, classes: Mapping[str, float], weight: float) -> None:
         """Add what a search says: how likely each class is, and the weight of the search."""
@@ -44,7 +44,7 @@ class ClassVotes:
 
     def join(self, other: "ClassVotes") -> None:
         """Add the votes of another track of the same vehicle."""
-        self._sums.update(other._sums)
+        self.add(other._sums, 1.0)
 
 
 def vote_weight(box: Float64Array, score: float, size: tuple[int, int]) -> float:
@@ -59,7 +59,7 @@ def vote_weight(box: Float64Array, score: float, size: tuple[int, int]) -> float
     size
         Width and height of the frame, pixels.
     """
-    x1, y1, x2, y2 = (box / (*size, *size)).tolist()
+    x1, y1, x2, y2 = map(float, box / (*size, *size))
     area = min((x2 - x1) * (y2 - y1), _CLOSE)
     is_whole = min(x1, y1) > _BORDER and max(x2, y2) < 1 - _BORDER
     return score * area * (1 if is_whole else _CUT_OFF)
