@@ -86,8 +86,8 @@ class Session:
         options, outputs = self._new_options(), Future[list[Array]]()
         options.log_severity_level = _SILENT
         # One long operation cannot be stopped: its thread is left behind.
-        work = threading.Thread(target=self._run, args=(inputs, options, outputs), daemon=True)
-        work.start()
+        call = inputs, options, outputs
+        threading.Thread(target=self._run, args=call, name="vdet-network", daemon=True).start()
         for _ in range(MAX_SECONDS):  # seconds in which this process was stopped do not count
             with suppress(TimeoutError):
                 return outputs.result(1)
