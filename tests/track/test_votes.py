@@ -101,12 +101,14 @@ def test_a_box_cut_off_by_the_frame_hardly_counts() -> None:
 @pytest.mark.parametrize(
     ("likely", "name"),
     [
-        ([{"car": 0.52, "truck": 0.48}, {"truck": 0.9, "car": 0.1}, {"car": 0.52, "truck": 0.48}],
+        ([{"car": 0.6, "truck": 0.4}, {"truck": 0.9, "car": 0.1}, {"car": 0.6, "truck": 0.4}],
          "truck"),
-        ([{"car": 0.4, "truck": 0.35, "bus": 0.25}], "vehicle"),
-        ([{"car": 0.6, "truck": 0.4}], "car"),
+        ([{"car": 0.5, "truck": 0.35, "bus": 0.15}], "truck"),
+        ([{"car": 0.5, "truck": 0.25, "bus": 0.25}], "vehicle"),
+        ([{"car": 0.65, "truck": 0.35}], "car"),
+        ([{"truck": 0.45, "bus": 0.55}], "bus"),
     ],
-    ids=["the sure search decides", "no majority", "majority"],
+    ids=["the sure search decides", "trucks look like cars", "not clear", "car", "no car"],
 )  # fmt: skip
 def test_searches_vote_with_the_likelihood_of_each_class(
     likely: list[dict[str, float]], name: str
