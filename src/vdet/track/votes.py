@@ -12,8 +12,8 @@ from vdet.detect.classes import UNKNOWN
 
 _USUAL, _USUAL_NEEDS = "car", 0.6
 """The class that detectors take for small or unclear vehicles of every kind, and the fraction of
-all votes that it needs. A network that has not seen these pictures gives cars 0.93 of the votes, but
-also trucks and buses a third to a half.
+all votes that it needs. On pictures that it has not seen, the shipped network is sure of cars to
+0.93, but takes trucks and buses for cars to a third or a half.
 """
 
 _OTHERS_NEED = 0.3
