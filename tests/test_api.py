@@ -124,8 +124,8 @@ def test_a_notebook_shows_a_result_as_its_frame_with_the_vehicles() -> None:
         cv2.imdecode(np.frombuffer(each._repr_png_(), np.uint8), cv2.IMREAD_COLOR)
         for each in (result, shown)
     )
-    assert (plain == frame.image).all()
-    assert (drawn != plain).any(axis=2)[120, 96:160].all()
+    assert np.array_equal(plain, frame.image)
+    assert np.any(drawn != plain, axis=2)[120, 96:160].all()
 
 
 def test_tracks_are_handed_to_pandas_and_supervision(monkeypatch: pytest.MonkeyPatch) -> None:
