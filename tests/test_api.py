@@ -7,10 +7,11 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import asdict, replace
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import cv2
@@ -62,6 +63,10 @@ def test_every_public_name_is_there_and_documented() -> None:
         assert getattr(vdet, name).__doc__, f"vdet.{name} has no docstring"
 
 
+def test_dir_lists_the_public_names() -> None:
+    assert {*vdet.api.__all__, "__version__"} <= set(dir(vdet))
+
+
 def test_a_name_that_is_not_there_is_an_attribute_error() -> None:
     with pytest.raises(AttributeError, match="no attribute 'Dedector'"):
         _ = vdet.Dedector
@@ -91,8 +96,54 @@ def test_importing_vdet_has_no_side_effect() -> None:
     ],
 )
 def test_what_is_no_bgr_image_is_refused(image: Any) -> None:
-    with pytest.raises(ValueError, match="give BGR uint8"):
+    with pytest.raises(ValueError, match=r"^image: must be .* BGR uint8 \(H, W, 3\), not \w+ \("):
         vdet.Detector().detect(image)
+
+
+def test_a_detector_takes_an_array_or_the_path_of_a_picture(tmp_path: Path) -> None:
+    (frame,) = drive(1)
+    write_image(tmp_path / "red.png", frame.image)
+    detector = vdet.Detector(detector=red_boxes)
+    expected = list(detector.detect(frame.image))
+    assert expected
+    assert list(detector.detect(tmp_path / "red.png")) == expected
+    assert list(detector.detect(str(tmp_path / "red.png"))) == expected
+    with pytest.raises(vdet.VdetError, match=r"none\.png"):
+        detector.detect(tmp_path / "none.png")
+    wrong: Any = [frame.image]
+    with pytest.raises(TypeError, match=r"^image: must be a path or an array.*, not a list$"):
+        detector.detect(wrong)
+
+
+def test_a_notebook_shows_a_result_as_its_frame_with_the_vehicles() -> None:
+    (frame,) = drive(1)
+    box = vdet.Box(96, 120, 160, 168)
+    result = vdet.FrameResult(Path("a.mp4"), frame, vdet.Boxes([], []), (), searched=False)
+    shown = replace(result, tracks=(vdet.Track(1, box, 0.9, "seen", "car"),))
+    plain, drawn = (
+        cv2.imdecode(np.frombuffer(each._repr_png_(), np.uint8), cv2.IMREAD_COLOR)
+        for each in (result, shown)
+    )
+    assert np.array_equal(plain, frame.image)
+    assert np.any(drawn != plain, axis=2)[120, 96:160].all()
+
+
+def test_tracks_are_handed_to_pandas_and_supervision(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, kind in (("pandas", "DataFrame"), ("supervision", "Detections")):
+        module = ModuleType(name)
+        vars(module)[kind] = lambda *rows, **columns: (*rows, columns)
+        monkeypatch.setitem(sys.modules, name, module)
+    car = vdet.Track(4, vdet.Box(1, 2, 3, 5), 0.9, "seen", "car", (2.0, 5.0), 12.5, -1)
+    bus = vdet.Track(5, vdet.Box(0, 0, 9, 9), 0.8, "lost", "bus")
+    frame = vdet.FrameTracks(7, 0.28, (car, bus))
+    (first, _), columns = frame.to_pandas()
+    expected = {"frame": 7, "time": 0.28, "x1": 1, "y1": 2, "x2": 3, "y2": 5} | asdict(car)
+    assert columns == {"columns": [name for name in expected if name != "box"]}
+    assert first == expected
+    (made,) = frame.to_supervision()
+    assert made["xyxy"].tolist() == [[1, 2, 3, 5], [0, 0, 9, 9]]
+    assert (made["tracker_id"].tolist(), made["confidence"].tolist()) == ([4, 5], [0.9, 0.8])
+    assert made["data"]["class_name"].tolist() == ["car", "bus"]
 
 
 def test_a_picture_too_small_is_an_image_error() -> None:

@@ -162,6 +162,7 @@ class TestBoxes:
             ({"sides": [*SIDES[:2], [5, 5, 5, 9]]}, "sides: .* no area; give x1 < x2 and y1 < y2"),
             ({"scores": [0, 1, 1.01]}, "scores: a score is not in 0 to 1"),
             ({"classes": [0, 1, 2]}, "classes: an index that `names` does not have"),
+            ({"data": {"class_scores": [[1]] * 3}}, "class_scores: must have a column for each"),
         ],
     )
     def test_what_cannot_be_is_refused(self, changes: dict[str, Any], message: str) -> None:
@@ -204,6 +205,13 @@ class TestSupervision:
         plain: Any = Boxes(SIDES, SCORES).to_supervision()
         assert (plain.class_id, plain.tracker_id, plain.data) == (None, None, {})
 
+    @staticmethod
+    def assert_equal(one: Boxes, other: Boxes) -> None:
+        assert (list(one), one.names) == (list(other), other.names)
+        assert {name: column.tolist() for name, column in one.data.items()} == {
+            name: column.tolist() for name, column in other.data.items()
+        }
+
     @pytest.mark.usefixtures("stub")
     def test_what_supervision_got_can_be_taken_back(self) -> None:
         made: Any = FOUND.to_supervision()
@@ -219,8 +227,10 @@ class TestSupervision:
             confidence=None,
             class_id=None,
             tracker_id=None,
-            data={},
+            data={"class_name": np.array(["car", "bus", "car"])},
+            metadata={},
         )
+        assert Boxes.from_supervision(bare).class_names == ["car", "bus", "car"]
         assert [each.score for each in Boxes.from_supervision(bare)] == [1, 1, 1]
 
     @pytest.mark.parametrize("found", [FOUND, FOUND[:0], Boxes(SIDES, SCORES)])
@@ -230,4 +240,15 @@ class TestSupervision:
             supervision = pytest.importorskip("supervision")
             made = found.to_supervision()
         assert isinstance(made, supervision.Detections)
-        assert list(Boxes.from_supervision(made)) == list(found)
+        self.assert_equal(Boxes.from_supervision(made), found)
+
+
+def test_pandas_gets_a_column_for_each_field(monkeypatch: pytest.MonkeyPatch) -> None:
+    module = ModuleType("pandas")
+    vars(module)["DataFrame"] = dict
+    monkeypatch.setitem(sys.modules, "pandas", module)
+    table = FOUND.to_pandas()
+    assert list(table)[:7] == ["x1", "y1", "x2", "y2", "score", "class_name", "id"]
+    assert np.column_stack([table[name] for name in ("x1", "y1", "x2", "y2")]).tolist() == SIDES
+    assert table["class_name"] == ["lorry", "car", "lorry"]
+    assert {name.rstrip("_01") for name in list(table)[7:]} == set(FOUND.data)

@@ -11,6 +11,10 @@ if TYPE_CHECKING:
 from vdet.version import __version__ as __version__  # noqa: E402
 
 
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__getattr__("__all__")})  # type: ignore[misc]
+
+
 def __getattr__(name: str) -> object:
     if name == "__all__" or not name.startswith("__"):
         from importlib import import_module

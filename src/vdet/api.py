@@ -24,6 +24,8 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from vdet.boxes import Box, Boxes, Image
 from vdet.config.loading import find_config, kind_of_model
 from vdet.config.loading import load_settings as load_layers
@@ -35,6 +37,7 @@ from vdet.evaluate.scores import Scores
 from vdet.evaluate.video import score_files
 from vdet.files import record_input, recorded_inputs
 from vdet.media import Frame, Picture
+from vdet.media.images import read_image
 from vdet.progress import no_progress, reporting
 from vdet.regions import check_masks
 from vdet.run.pictures import PictureJob, PictureSearch, run_picture
@@ -98,16 +101,24 @@ class Detector:
         self._settings, self._model, _ = _resolved(settings, detector, None)
         self.for_video = self._model.for_video
 
-    def detect(self, image: Image) -> Boxes:
-        """Find the vehicles in a picture, BGR uint8 `(H, W, 3)`.
+    def detect(self, image: Image | PathName) -> Boxes:
+        """Find the vehicles in a picture: the path of a file, or an array, BGR uint8 `(H, W, 3)`.
 
         Each picture is searched for itself; `follow` uses what consecutive frames have in common.
 
-        Raises `ImageError` if it is too small to be searched, `ValueError` if it is no such array.
+        Raises `ImageError` if it cannot be read or is too small to be searched, `TypeError` or
+        `ValueError` if it is neither a path nor such an array.
         """
+        source = Path("image")
+        if isinstance(image, str | PathLike):
+            source = Path(image)
+            image = read_image(source)
+        wanted = "must be a path or an array, BGR uint8 (H, W, 3)"
+        if not isinstance(image, np.ndarray):
+            raise TypeError(f"image: {wanted}, not a {type(image).__name__}")
         if image.dtype != "uint8" or image.ndim != 3 or image.shape[2] != 3:
-            raise ValueError(f"image: {image.dtype} {image.shape}; give BGR uint8 (H, W, 3)")
-        return PictureSearch(self._model, self._settings).detect(Path("image"), image).detections
+            raise ValueError(f"image: {wanted}, not {image.dtype} {image.shape}")
+        return PictureSearch(self._model, self._settings).detect(source, image).detections
 
 
 class Tracker:

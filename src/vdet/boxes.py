@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 if TYPE_CHECKING:
+    import pandas as pd
     import supervision
 
 Float32Array = npt.NDArray[np.float32]
@@ -77,13 +78,8 @@ class Box:
     @property
     def pixels(self) -> tuple[int, int, int, int]:
         """x1, y1, x2, y2 as whole pixels, halves up."""
-        floor = math.floor
-        return (
-            floor(self.x1 + 0.5),
-            floor(self.y1 + 0.5),
-            floor(self.x2 + 0.5),
-            floor(self.y2 + 0.5),
-        )
+        up, down = math.floor(self.y1 + 0.5), math.floor(self.y2 + 0.5)
+        return math.floor(self.x1 + 0.5), up, math.floor(self.x2 + 0.5), down
 
     @property
     def xywh(self) -> tuple[int, int, int, int]:
@@ -156,8 +152,9 @@ class Boxes:
     ids
         int64 `(n,)`: which vehicle each is; None where that is not known.
     data
-        Further columns of `n` rows by name, float64. A `centroid` `(n, 2)`, x and y, and a
-        `strength` `(n,)` are used by the rules tracker.
+        Further columns of `n` rows by name, float64. Trackers use `class_scores`
+        `(n, len(names))`, how likely each box is of each class; the rules tracker also uses
+        `centroid` `(n, 2)`, x and y, and `strength` `(n,)`.
     trace
         What the detector needs for its stage pictures; not used by others.
 
@@ -203,6 +200,8 @@ class Boxes:
             raise ValueError("scores: a score is not in 0 to 1")
         if self.classes is not None and not np.isin(self.classes, range(len(names))).all():
             raise ValueError("classes: an index that `names` does not have")
+        if self.data.get("class_scores", np.empty((0, len(names)))).shape[1:] != (len(names),):
+            raise ValueError("class_scores: must have a column for each of `names`")
 
     def __len__(self) -> int:
         return len(self.sides)
@@ -240,6 +239,14 @@ class Boxes:
             return [None] * len(self)
         return [self.names[number] for number in self.classes.tolist()]
 
+    @property
+    def likely_classes(self) -> list[dict[str, float]]:
+        """For each box how likely each class is, 0 to 1; nothing where classes are not known."""
+        if "class_scores" in self.data:
+            rows = self.data["class_scores"].tolist()
+            return [dict(zip(self.names, row, strict=True)) for row in rows]
+        return [{} if name is None else {name: 1.0} for name in self.class_names]
+
     def to_supervision(self) -> "supervision.Detections":
         """Return a `supervision.Detections` with copies; needs the package supervision."""
         import supervision
@@ -251,24 +258,42 @@ class Boxes:
             class_id=None if self.classes is None else self.classes.astype(int),
             tracker_id=None if self.ids is None else self.ids.copy(),
             data=names | {name: column.copy() for name, column in self.data.items()},
+            metadata={"class_names": self.names},
         )
 
     @classmethod
     def from_supervision(cls, detections: "supervision.Detections") -> "Boxes":
         """Return boxes with copies of the columns of a `supervision.Detections`.
 
-        The classes are those of the column `class_name`; other columns of numbers are `data`.
-        Without confidences, scores are 1. Errors as of `Boxes`.
+        The classes are those of the column `class_name`, the other columns of numbers become
+        `data`. Without confidences, scores are 1. Errors as of `Boxes`.
         """
-        scores, names, classes = detections.confidence, [], None
-        columns = {name: np.asarray(column) for name, column in detections.data.items()}
-        data = {name: column for name, column in columns.items() if column.dtype.kind in "biuf"}
-        if "class_name" in detections.data:
-            known, classes = np.unique(detections.data["class_name"], return_inverse=True)
-            names = known.tolist()
-        scores = np.ones(len(detections.xyxy)) if scores is None else scores
-        ids = detections.tracker_id
-        return cls(detections.xyxy, scores, classes=classes, names=names, ids=ids, data=data)
+        data = {name: np.asarray(column) for name, column in detections.data.items()}
+        labels, scores = data.pop("class_name", None), detections.confidence
+        names = list(detections.metadata.get("class_names", ()))
+        names += sorted({*([] if labels is None else labels.tolist())} - {*names})
+        return cls(
+            detections.xyxy,
+            np.ones(len(detections.xyxy)) if scores is None else scores,
+            classes=None if labels is None else [names.index(label) for label in labels],
+            names=names,
+            ids=detections.tracker_id,
+            data={name: column for name, column in data.items() if column.dtype.kind in "biuf"},
+        )
+
+    def to_pandas(self) -> "pd.DataFrame":
+        """Return a table with a row for each box; needs the package pandas.
+
+        Its columns are x1, y1, x2, y2, score, class_name, id, and those of `data`.
+        """
+        import pandas as pd
+
+        columns: dict[str, Any] = dict(zip(("x1", "y1", "x2", "y2"), self.sides.T, strict=True))
+        columns |= {"score": self.scores, "class_name": self.class_names, "id": self.ids}
+        for name, data in self.data.items():
+            parts = {f"{name}_{number}": part for number, part in enumerate(data.T)}
+            columns |= {name: data} if data.ndim == 1 else parts
+        return pd.DataFrame(columns)
 
 
 def _column(
@@ -320,16 +345,9 @@ def iou(a: Float64Array, b: Float64Array) -> Float64Array:
 
 
 def coverage(boxes: Float64Array, others: Float64Array) -> Float64Array:
-    """Return the share, 0 to 1, of every box's own area that lies in each of the others.
+    """Return the fraction of every box's own area that lies in each of the others, `(n, m)`.
 
-    Parameters
-    ----------
-    boxes, others
-        x1, y1, x2, y2 of shapes `(n, 4)` and `(m, 4)`, each of `boxes` with an area.
-
-    Returns
-    -------
-    float64 of shape `(n, m)`.
+    `boxes` and `others` are x1, y1, x2, y2 of shapes `(n, 4)` and `(m, 4)`; those have an area.
     """
     return _intersection(boxes[:, np.newaxis], others) / area(boxes)[:, np.newaxis]
 

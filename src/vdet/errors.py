@@ -85,8 +85,30 @@ def in_one_line(error: Exception) -> str:
         return f"{error.filename or 'reading or writing'}: {error.strerror or error}"
     if isinstance(error, MemoryError) or _NO_ROOM in str(error):
         return "there is too little memory; end other programs, or raise the limit (ulimit -v)"
+    if fault := opencv_fault():
+        return fault
     text = " ".join(f"{type(error).__name__}: {error}".split())
     return f"internal error, please report it ({text}); VDET_DEBUG=1 shows more"
+
+
+def opencv_fault() -> str | None:
+    """Return what is wrong if another package has replaced or removed the OpenCV that vdet needs.
+
+    Both packages of OpenCV write into one folder: the later one wins, and removing it breaks both.
+    """
+    try:
+        import cv2
+    except ImportError:
+        version = "missing"
+    else:
+        if hasattr(cv2, "HOGDescriptor"):
+            return None
+        version = getattr(cv2, "__version__", "damaged")
+    return (
+        f"OpenCV is {version}: opencv-python has replaced opencv-python-headless; run "
+        '"pip uninstall -y opencv-python opencv-python-headless" and then '
+        "\"pip install 'opencv-python-headless<5'\""
+    )
 
 
 def escaped(text: str) -> str:

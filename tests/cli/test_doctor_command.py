@@ -43,3 +43,21 @@ def test_what_does_not_work_is_named_with_what_to_do(
     assert "broken  codec h264: " in result.out
     assert "broken  settings default: net.onnx: is damaged; install vdet again\n" in result.out
     assert result.out.endswith("vdet does not work here: see what is broken\n")
+
+
+def test_another_opencv_over_ours_is_named_with_the_cure(
+    run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: Any) -> NoReturn:
+        raise AttributeError("module 'cv2' has no attribute 'HOGDescriptor'")
+
+    monkeypatch.delattr("cv2.HOGDescriptor")
+    monkeypatch.setattr("cv2.__version__", "5.0.0")
+    cure = (
+        "OpenCV is 5.0.0: opencv-python has replaced opencv-python-headless; run "
+        '"pip uninstall -y opencv-python opencv-python-headless" and then '
+        "\"pip install 'opencv-python-headless<5'\"\n"
+    )
+    assert f"broken  cv2: {cure}" in run("doctor").out
+    monkeypatch.setattr("vdet.config.rendering.render", fail)
+    assert run("config").err == f"vdet: {cure}"

@@ -39,14 +39,11 @@ def test_scores_are_those_of_all_frames_and_the_largest_box_is_kept() -> None:
     assert found.largest == boxes[1]
 
 
-def test_the_class_is_a_vote_weighted_by_score() -> None:
-    def seen(*classes: tuple[str | None, float]) -> VehicleRecord:
-        tracks = [track(1, PLACE, class_name=name, score=score) for name, score in classes]
-        return record(*(frame(n, each) for n, each in enumerate(tracks)))
-
-    assert seen((None, 0.9)).class_name is None
-    assert seen(("car", 0.3), ("car", 0.3), ("truck", 0.9)).class_name == "truck"
-    assert seen(("car", 0.9), ("truck", 0.9), ("car", 0.9), (None, 1.0)).class_name == "car"
+def test_the_class_is_that_of_the_last_frame() -> None:
+    names = (None, "car", "car", "truck")
+    tracks = [track(1, PLACE, class_name=name) for name in names]
+    found = [record(*(frame(n, each) for n, each in enumerate(tracks[:n]))) for n in range(1, 5)]
+    assert tuple(each.class_name for each in found) == names
 
 
 class TestTime:

@@ -6,7 +6,7 @@ from functools import partial
 
 from vdet.cli.command import command
 from vdet.cli.results import Results, facts_options
-from vdet.errors import in_one_line
+from vdet.errors import in_one_line, opencv_fault
 from vdet.version import __version__
 
 Finding = tuple[str, str, str]
@@ -25,7 +25,7 @@ def doctor(results: Results) -> int:
     from vdet.config.loading import shipped_configs
     from vdet.workers import core_count
 
-    found = [("vdet", "ok", f"{__version__}, on {core_count()} cores"), *_packages()]
+    found = [("vdet", "ok", f"{__version__}, on {core_count()} cores"), *_packages(), _opencv()]
     checks = {f"settings {name}": partial(_check_config, name) for name in shipped_configs()}
     found += [_checked(*each) for each in ({"codec h264": _check_codec} | checks).items()]
     works = all(status != "broken" for _, status, _ in found)
@@ -50,6 +50,15 @@ def _packages() -> Iterator[Finding]:
             yield name, "ok", version(package)
         except PackageNotFoundError:
             yield name, "absent" if extra else "broken", f"pip install {package}"
+
+
+def _opencv() -> Finding:
+    """Check the OpenCV that is imported: another package may have written over it."""
+    if fault := opencv_fault():
+        return "cv2", "broken", fault
+    import cv2
+
+    return "cv2", "ok", cv2.__version__
 
 
 def _checked(name: str, check: Callable[[], str]) -> Finding:

@@ -69,7 +69,6 @@ def _network(path: Path) -> Facts:
     return {
         "kind": "network",
         "form": found.name,
-        "reasons": list(found.reasons),
         "input_for_1280x720": f"{found.form.width}x{found.form.height}",
         "classes": [name for name in found.names if our_name(name)],
         "other_classes": [name for name in found.names if not our_name(name)],

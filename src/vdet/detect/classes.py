@@ -5,6 +5,9 @@ from functools import lru_cache
 OUR_NAMES = ("car", "truck", "bus", "motorcycle", "bicycle", "person", "vehicle")
 """The classes in all outputs; `vehicle` is a vehicle of unknown class."""
 
+UNKNOWN = "vehicle"
+"""Name of a vehicle whose class is not known, also for formats that need a name."""
+
 WORDS = {
     "car": ("car", "van", "suv", "taxi", "pickup", "pickup truck"),
     "truck": ("truck", "lorry"),
@@ -30,17 +33,3 @@ _NAMES = {letters(word): name for name, words in WORDS.items() for word in words
 def our_name(label: str) -> str | None:
     """Return which of `OUR_NAMES` a label means; None where it means none of them."""
     return _NAMES.get(letters(label))
-
-
-class ClassScores(dict[str, float]):
-    """For each class, the sum of the scores of a vehicle's detections."""
-
-    def add(self, name: str | None, score: float) -> None:
-        """Add the class and score of one detection; a class of None is ignored."""
-        if name is not None:
-            self[name] = self.get(name, 0.0) + score
-
-    @property
-    def best(self) -> str | None:
-        """The class with the highest sum, the earliest among equals; None without any class."""
-        return max(self, key=self.__getitem__, default=None)

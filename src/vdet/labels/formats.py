@@ -9,14 +9,12 @@ from datetime import datetime
 from pathlib import Path
 from typing import BinaryIO
 
+from vdet.detect.classes import UNKNOWN
 from vdet.errors import TruthError
 from vdet.labels.parsing import numbered_lines
 from vdet.labels.video import SavedTracks
 from vdet.plugins import FORMATS, load_plugin, plugin_names
 from vdet.track.track import FrameTracks
-
-UNKNOWN = "vehicle"
-"""Name of a vehicle without a class, for formats that need a name."""
 
 
 @dataclass(frozen=True, slots=True)

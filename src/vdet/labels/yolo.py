@@ -21,8 +21,9 @@ from typing import Any, BinaryIO
 
 from vdet.archives import store
 from vdet.config.document import MAX_BYTES, parse_document
+from vdet.detect.classes import UNKNOWN
 from vdet.errors import ConfigError, ImageError, TruthError, escaped, printable
-from vdet.labels.formats import UNKNOWN, Format, SourceVideo
+from vdet.labels.formats import Format, SourceVideo
 from vdet.labels.label import Label, Size, limited
 from vdet.labels.parsing import (
     LIMIT,

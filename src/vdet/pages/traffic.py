@@ -8,6 +8,7 @@ from statistics import median
 import numpy as np
 
 from vdet.boxes import Image
+from vdet.detect.classes import UNKNOWN
 from vdet.draw.boxes import color_of
 from vdet.pages.charts import Series, hex_color
 from vdet.traffic.counts import Counts, Event, vehicle_trips
@@ -45,13 +46,11 @@ def traffic_part(
         way = first.name, others[-1].name if others else _UNKNOWN
         flows.setdefault(way, []).append((first, others[-1] if others else first))
     ordered = sorted(flows.items(), key=lambda flow: -len(flow[1]))
-    classes = sorted(
-        {first.class_name or "unknown" for each in flows.values() for first, _ in each}
-    )
+    classes = sorted({first.class_name or UNKNOWN for each in flows.values() for first, _ in each})
     several = classes if len(classes) > 1 else []
     rows, arrows = [], []
     for number, (way, trips) in enumerate(ordered):
-        found = Counter(first.class_name or "unknown" for first, _ in trips)
+        found = Counter(first.class_name or UNKNOWN for first, _ in trips)
         speeds = [speed for trip in trips if (speed := _mean_speed(known, *trip)) is not None]
         shown = f"{median(speeds):.0f}" if speeds else _UNKNOWN
         rows.append((*way, *(str(found[name]) for name in several), str(len(trips)), shown))

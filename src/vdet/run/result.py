@@ -4,7 +4,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import cv2
+
 from vdet.boxes import Boxes
+from vdet.draw.boxes import color_of, draw_box
 from vdet.media import Frame
 from vdet.track.track import FrameTracks, Track
 
@@ -43,3 +46,11 @@ class FrameResult:
         """The tracks with the number and the time of the frame, and its lane if there is one."""
         facts = {"lane": self.road.record()} if self.road else {}
         return FrameTracks(self.frame.index, float(self.frame.time), self.tracks, facts)
+
+    def _repr_png_(self) -> bytes:
+        """Return the frame with its vehicles, which notebooks show."""
+        image = self.frame.image.copy()
+        for track in self.tracks:
+            label = f"#{track.id} {track.class_name or ''}".rstrip()
+            draw_box(image, track.box, color_of(track.id), label, dashed=track.state == "lost")
+        return cv2.imencode(".png", image)[1].tobytes()

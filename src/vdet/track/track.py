@@ -1,11 +1,15 @@
 """The protocol of all trackers, and the vehicles that they show in a frame."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any, Literal, Protocol, runtime_checkable
+from dataclasses import asdict, astuple, dataclass, field, fields
+from typing import TYPE_CHECKING, Any, Literal, Protocol, runtime_checkable
 
 from vdet.boxes import Box, Boxes
 from vdet.media import Picture
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import supervision
 
 State = Literal["seen", "between", "lost"]
 """How a vehicle is known in a frame: see `Track`."""
@@ -84,6 +88,35 @@ class FrameTracks:
     time: float
     tracks: tuple[Track, ...]
     facts: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def boxes(self) -> Boxes:
+        """The vehicles as boxes with ids; without classes where one of them has none."""
+        names = sorted({track.class_name for track in self.tracks if track.class_name})
+        every = [track.class_name for track in self.tracks]
+        return Boxes(
+            [astuple(track.box) for track in self.tracks],
+            [track.score for track in self.tracks],
+            classes=None if None in every else [names.index(str(name)) for name in every],
+            names=names,
+            ids=[track.id for track in self.tracks],
+        )
+
+    def to_supervision(self) -> "supervision.Detections":
+        """Return a `supervision.Detections` with ids; needs the package supervision."""
+        return self.boxes.to_supervision()
+
+    def to_pandas(self) -> "pd.DataFrame":
+        """Return a table with a row for each vehicle; needs the package pandas.
+
+        Its columns are frame, time, x1, y1, x2, y2, and the other fields of `Track`.
+        """
+        import pandas as pd
+
+        when = {"frame": self.index, "time": self.time}
+        rows = [when | asdict(track.box) | asdict(track) for track in self.tracks]
+        names = [*when, *("x1", "y1", "x2", "y2"), *(each.name for each in fields(Track))]
+        return pd.DataFrame(rows, columns=[name for name in names if name != "box"])
 
 
 class VideoTracker(Protocol):

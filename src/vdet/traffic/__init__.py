@@ -15,7 +15,8 @@ The counts of a video follow from its tracks alone (`FrameTracks`), live or from
    height or more from where the vehicle crossed before.
 6. Vehicles that are seen for less than `counts.confirmed` do not count. Once a vehicle is
    confirmed, its earlier events count too.
-7. The class of a vehicle is that with the highest sum of scores over all its frames.
+7. The class of a vehicle is that of the last frame of its track; of several tracks, of the one
+   that shows it largest.
 8. A vehicle that is first seen within a second after another was last seen, and near the place
    where that one was or would be, is taken for the same vehicle: its tracks have one number. A
    vehicle that moves out at the edge of the frame has no such successor. A track that was not

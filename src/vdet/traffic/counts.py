@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from itertools import accumulate, pairwise
 from typing import TypeVar
 
-from vdet.labels.formats import UNKNOWN
+from vdet.detect.classes import UNKNOWN
 from vdet.traffic.borders import APPEAR, ENTER, EXIT, VANISH
 from vdet.traffic.clock import Clock
 from vdet.traffic.intervals import Intervals, Moment, Span

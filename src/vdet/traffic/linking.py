@@ -7,11 +7,11 @@ import math
 from array import array
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from operator import itemgetter
 
 import numpy as np
 
 from vdet.boxes import Box, Float64Array
-from vdet.detect.classes import ClassScores
 from vdet.track.track import FrameTracks, Track
 
 GAP = 1.0
@@ -59,7 +59,7 @@ class VehiclePath:
     vehicle
         Its number.
     class_name
-        That with the highest sum of scores over all its frames; None if it has none.
+        The last class of its track; of several tracks, of the one that shows it largest.
     tracks
         From when it had which track: times and ids.
     seen
@@ -131,7 +131,7 @@ class TrackLinker:
                 if vehicle.is_another():
                     paths.append(self._split(track.id))
                 vehicle.back = None
-            self._vehicles[track.id].classes.add(track.class_name, track.score)
+            self._vehicles[track.id].name(track)
         return paths
 
     def start_video(self) -> None:
@@ -189,6 +189,8 @@ class _Vehicle:
         Those of `VehiclePath`.
     rows
         All that was seen of it, one frame after the other: see `_table`.
+    classes
+        By track its largest height, pixels, and its class so far.
     back
         Number of the first row after it was out of sight, until it is judged.
     """
@@ -198,7 +200,7 @@ class _Vehicle:
     shown: float
     tracks: list[tuple[float, int]] = field(default_factory=list)
     rows: "array[float]" = field(default_factory=lambda: array("d"))
-    classes: ClassScores = field(default_factory=ClassScores)
+    classes: dict[int, tuple[int, str | None]] = field(default_factory=dict)
     back: int | None = None
 
     def see(self, track: Track, time: float, frame: int) -> None:
@@ -211,6 +213,11 @@ class _Vehicle:
             stay = _table(self.rows[-_STAY * _COLUMNS :])
             if np.ptp(stay[:, 1:3], axis=0).max() <= _STANDS * stay[-1, 3]:
                 del self.rows[(1 - _STAY) * _COLUMNS : -_COLUMNS]
+
+    def name(self, track: Track) -> None:
+        """Take in the class so far of its track."""
+        largest, _ = self.classes.get(track.id, (0, None))
+        self.classes[track.id] = max(largest, track.box.xywh[3]), track.class_name
 
     def is_judged(self) -> bool:
         """Return whether it is clear whether one that was out of sight is another one."""
@@ -246,7 +253,8 @@ class _Vehicle:
         if now - last[0] > GAP and math.dist(last[1:3], rows[0, 1:3]) > last[3]:
             rows = np.concatenate([rows, self.onward(*np.add(last[0], _ONWARD))[1:]])
         columns = rows[:, 0], rows[:, 1:3], *rows[:, 3:].T
-        return VehiclePath(self.number, self.classes.best, tuple(self.tracks), seen, *columns)
+        _, name = max(reversed(self.classes.values()), key=itemgetter(0))
+        return VehiclePath(self.number, name, tuple(self.tracks), seen, *columns)
 
 
 def _table(rows: "array[float]") -> Float64Array:

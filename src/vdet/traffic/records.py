@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any, get_args
 
 from vdet.boxes import Box
-from vdet.detect.classes import ClassScores
 from vdet.polygons import Point
 from vdet.track.track import FrameTracks, State, Track
 from vdet.traffic.clock import Clock
@@ -52,8 +51,8 @@ class VehicleRecord:
         Number of frames that show it in each state of `Track`.
     best_score, sum_of_scores
         Over these frames; a score is 0 to 1.
-    classes
-        Sum of the scores over these frames, by class.
+    class_name
+        That of its last frame: see `vdet.track.votes`.
     path
         Where it stood (`Track.foot`): the first point, a point after each step, and the last point.
         Frames in which it was lost do not count, unless it was in all.
@@ -72,15 +71,10 @@ class VehicleRecord:
     states: Counter[State] = field(default_factory=Counter)
     best_score: float = 0.0
     sum_of_scores: float = 0.0
-    classes: ClassScores = field(default_factory=ClassScores)
+    class_name: str | None = None
     path: list[Point] = field(default_factory=list)
     followed: list[tuple[float, float]] = field(default_factory=list)
     speeds: Speeds | None = None
-
-    @property
-    def class_name(self) -> str | None:
-        """The class with the highest sum of scores; None if the detector has no classes."""
-        return self.classes.best
 
     @property
     def mean_score(self) -> float:
@@ -102,7 +96,7 @@ class VehicleRecord:
         self.last = time
         self.sum_of_scores += track.score
         self.best_score = max(self.best_score, track.score)
-        self.classes.add(track.class_name, track.score)
+        self.class_name = track.class_name
         self.largest = max(self.largest, track.box, key=lambda box: box.area)
         only_lost = self.states.total() == self.states["lost"]
         if track.state != "lost" and only_lost:

@@ -67,12 +67,11 @@ def ultralytics(size: tuple[int, int], box: RedBox, classes: int) -> Form:
     return Form(table, 4 + box.class_id, 7)
 
 
-def ultralytics_v5(size: tuple[int, int], box: RedBox, classes: int) -> Form:
-    """v5: `(3 n, 5 + classes)`, three boxes a cell; objectness is the redness, class score 1."""
-    table = np.zeros((3 * len(cells(*size)), 5 + classes), np.float32)
-    table[11, :4] = box.x, box.y, box.width, box.height
-    table[11, 5 + box.class_id] = 1
-    return Form(table, 11, 4)
+def rt_detr_rows(size: tuple[int, int], box: RedBox, classes: int) -> Form:
+    """RT-DETR of Ultralytics: `(300, 4 + classes)`, middle and size as fractions of the input."""
+    table = np.zeros((300, 4 + classes), np.float32)
+    table[11, :4] = np.array([box.x, box.y, box.width, box.height]) / [*size, *size]
+    return Form(table, 11, 4 + box.class_id)
 
 
 def yolox(size: tuple[int, int], box: RedBox, classes: int, *, raw: bool) -> Form:
@@ -106,6 +105,7 @@ def write_network(
     *,
     metadata: Mapping[str, str] | None = None,
     dynamic: bool = False,
+    batch: int = 1,
 ) -> Path:
     """Write a network with one input of `size` whose score is the red of `pixel` of the input."""
     width, height = size
@@ -118,7 +118,7 @@ def write_network(
         helper.make_node("Mul", ["red", "hot"], ["score"]),
         helper.make_node("Add", ["table", "score"], ["output0"]),
     ]
-    inputs = [helper.make_tensor_value_info("images", TensorProto.FLOAT, [1, 3, *sides])]
+    inputs = [helper.make_tensor_value_info("images", TensorProto.FLOAT, [batch, 3, *sides])]
     outputs = [helper.make_tensor_value_info("output0", TensorProto.FLOAT, None)]
     return write_graph(path, nodes, inputs, outputs, constants, metadata)
 
@@ -197,6 +197,28 @@ def write_endless(path: Path) -> Path:
     return write_graph(
         path, [loop, add], inputs, [value("output0", TensorProto.FLOAT, None)], constants
     )
+
+
+def write_slow(path: Path) -> Path:
+    """Write a network of one operation that takes long, which onnxruntime cannot stop."""
+    weights = _constant(np.ones((3, 3, 127, 127), np.float32), "weights")
+    value, sides = helper.make_tensor_value_info, [1, 3, 700, 700]
+    nodes = [helper.make_node("Conv", ["images", "weights"], ["output0"])]
+    inputs = [value("images", TensorProto.FLOAT, sides)]
+    outputs = [value("output0", TensorProto.FLOAT, None)]
+    return write_graph(path, nodes, inputs, outputs, [weights])
+
+
+def write_with_weights_elsewhere(path: Path, location: str) -> Path:
+    """Write a network whose weights lie in another file."""
+    weights = TensorProto(name="weights", dims=[4], data_type=TensorProto.FLOAT)
+    weights.data_location = TensorProto.EXTERNAL
+    weights.external_data.add(key="location", value=location)
+    value = helper.make_tensor_value_info
+    nodes = [helper.make_node("Add", ["images", "weights"], ["output0"])]
+    inputs = [value("images", TensorProto.FLOAT, [1, 3, 64, 4])]
+    outputs = [value("output0", TensorProto.FLOAT, None)]
+    return write_graph(path, nodes, inputs, outputs, [weights])
 
 
 def write_graph(

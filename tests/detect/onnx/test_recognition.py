@@ -1,6 +1,7 @@
 """Networks of the usual tools: recognised without a setting, and their boxes are right."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +12,8 @@ from detect.onnx.graphs import (
     Form,
     RedBox,
     final,
+    rt_detr_rows,
     ultralytics,
-    ultralytics_v5,
     write_network,
     write_rt_detr,
     yolox,
@@ -64,12 +65,10 @@ def class_names(found: Boxes) -> list[str]:
     [
         (ultralytics(SIZE, BOX, 80), ULTRALYTICS, "Ultralytics v8 or later"),
         (ultralytics(SIZE, BOX, 80), None, "Ultralytics v8 or later"),
-        (ultralytics_v5(SIZE, BOX, 80), ULTRALYTICS, "Ultralytics v5"),
-        (ultralytics_v5(SIZE, BOX, 80), None, "Ultralytics v5"),
         (final(BOX), FINAL, "boxes after suppression"),
         (final(BOX, rows=100), None, "boxes after suppression"),
     ],
-    ids=["v8", "v8 bare", "v5", "v5 bare", "end to end", "end to end bare"],
+    ids=["v8", "v8 bare", "end to end", "end to end bare"],
 )
 def test_a_centred_letterbox_in_rgb(
     form: Form, metadata: Mapping[str, str] | None, name: str, tmp_path: Path
@@ -123,6 +122,53 @@ def test_rt_detr_stretches_the_frame(tmp_path: Path) -> None:
     assert found.sides == pytest.approx(np.array([[112, 112, 144, 144]]), abs=0.01)
     assert found.scores == pytest.approx([1.0], abs=0.01)
     assert recognize(Session(path)).name == "RT-DETR"
+
+
+@pytest.mark.parametrize("classes", [2, 80])
+def test_rt_detr_of_ultralytics_has_rows_of_fractions(classes: int, tmp_path: Path) -> None:
+    box = RedBox(x=64, y=32, width=16, height=8, class_id=1)
+    names = ["car", "bus"] if classes == 2 else COCO
+    metadata = {**ULTRALYTICS, "names": str(dict(enumerate(names)))}
+    metadata["description"] = "Ultralytics RT-DETR-l model"
+    form = rt_detr_rows(SIZE, box, classes)
+    path = write_network(tmp_path / "net.onnx", form, SIZE, (64, 32), metadata=metadata)
+    found = detect(path, frame_with_red(128, 128), classes=names)
+    assert found.sides == pytest.approx(np.array([[112, 112, 144, 144]]), abs=0.01)
+    assert class_names(found) == [names[1]]
+    assert recognize(Session(path)).name == "RT-DETR of Ultralytics"
+
+
+@pytest.mark.parametrize("make", [final, partial(ultralytics, SIZE, classes=80)])
+def test_boxes_as_fractions_of_the_input_are_refused(
+    make: Callable[..., Form], tmp_path: Path
+) -> None:
+    form = make(box=RedBox(x=0.5, y=0.5, width=0.25, height=0.25, class_id=2))
+    path = write_network(tmp_path / "net.onnx", form, SIZE, (64, 32), metadata=None)
+    with pytest.raises(ModelError, match=r"its boxes are fractions of the input, not pixels"):
+        detect(path, frame_with_red(128, 128))
+
+
+def test_a_batch_of_several_pictures_is_refused(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = write_network(tmp_path / "net.onnx", final(BOX), SIZE, (64, 32), batch=4)
+    with pytest.raises(ModelError, match=r"its input is \[4, 3, 64, 128\], not \[1, 3, height"):
+        recognize(Session(path))
+    assert capfd.readouterr().err == ""
+
+
+def test_how_likely_each_class_is_goes_to_the_tracker(tmp_path: Path) -> None:
+    names = ["car", "van", "truck", "person"]
+    form = ultralytics(SIZE, RedBox(64, 32, 16, 8, 2), 4)
+    form.table[4:, 7] = 0.4, 0.2, 0.0, 0.4
+    path = write_network(tmp_path / "net.onnx", form, SIZE, (64, 32))
+    found = detect(path, frame_with_red(128, 128), names=names, classes=["truck", "car"])
+    assert class_names(found) == ["truck"]
+    assert found.data["class_scores"] == pytest.approx(np.array([[0.5, 0.3]]), abs=0.01)
+    bare = detect(
+        write_network(tmp_path / "rows.onnx", final(BOX), SIZE, (64, 32)), frame_with_red(128, 128)
+    )
+    assert not bare.data  # only the best class is known
 
 
 def test_only_the_classes_that_are_asked_for_count(tmp_path: Path) -> None:

@@ -114,3 +114,13 @@ def test_what_comes_out_from_behind_another_vehicle_does_not_run_ahead_of_its_bo
     seen = [sized(400 - 5 * n, 300 - 0.6 * n, 30 * 1.08**n, 22 * 1.06**n) for n in range(16)]
     state = after(seen[:-1])
     assert state.box == pytest.approx(seen[-1], abs=0.12 * (state.box[2] - state.box[0]))
+
+
+@pytest.mark.parametrize("seconds", [-0.3, 0.3])
+def test_what_comes_nearer_moves_slower_in_the_past_and_faster_in_the_future(
+    seconds: float,
+) -> None:
+    state = still()
+    state.mean[0, 1], state.mean[2:, 1] = 100, 0.2  # pixels a second; growth a second
+    near = 1 / (1 - 0.2 * seconds)
+    assert state.moved(seconds)[0] == pytest.approx([120 + 100 * seconds * near, 100 * near**2])

@@ -12,10 +12,8 @@ SIZE = (1000, 500)
 FRAME = 0.04
 
 
-def observation(
-    x: float = 400, width: float = 100, score: float = 1.0, class_name: str | None = None
-) -> Observation:
-    return Observation(np.array([x, 200, x + width, 200 + width / 2]), score, class_name)
+def observation(x: float = 400, width: float = 100, score: float = 1.0) -> Observation:
+    return Observation(np.array([x, 200, x + width, 200 + width / 2]), score)
 
 
 def seen(
@@ -56,7 +54,7 @@ def test_a_carried_vehicle_keeps_its_velocity_and_a_lost_one_comes_to_rest() -> 
     assert abs(missed(vehicle, 60).state.mean[0, 1]) < 0.1 * velocity
 
 
-# Score and class
+# Score
 
 
 @pytest.mark.parametrize("rate", [5, 10, 25, 50])
@@ -65,12 +63,3 @@ def test_older_detections_count_less_at_the_same_pace_at_any_frame_rate(rate: in
     for _ in range(rate):
         vehicle.see(observation(score=0.5), Look(0, 1 / rate, SIZE))
     assert vehicle.scores.value == pytest.approx(0.5 + 0.5 * np.exp(-1 / SCORE_TIME), abs=1e-3)
-
-
-def test_the_class_is_the_one_with_the_highest_sum_of_scores() -> None:
-    vehicle = Vehicle(observation(score=0.9, class_name="bus"), Look(0, FRAME, SIZE), SETTINGS)
-    assert vehicle.classes.best == "bus"
-    for _ in range(2):
-        vehicle.see(observation(score=0.6, class_name="car"), Look(0, FRAME, SIZE))
-    assert vehicle.classes.best == "car"
-    assert seen(3).classes.best is None

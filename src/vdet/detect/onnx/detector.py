@@ -75,7 +75,9 @@ class NetworkDetector:
         is_known = (raw.classes >= 0) & (raw.classes < len(self.numbers))
         numbers = self.numbers[np.where(is_known, raw.classes, -1)]
         keep = (numbers >= 0) & (boxes[:, 2:] - boxes[:, :2] >= 1).all(axis=1)  # not with a NaN
-        found = RawBoxes(boxes[keep].astype(np.float32), raw.scores[keep], numbers[keep])
+        wanted = self.numbers[:-1, np.newaxis] == np.arange(len(self.settings.classes))
+        likely = None if raw.class_scores is None else raw.class_scores[keep] @ wanted
+        found = RawBoxes(boxes[keep].astype(np.float32), raw.scores[keep], numbers[keep], likely)
         return found, network.form, self.settings.still_score if index is None else 0.0
 
     def detect(self, candidates: Candidates) -> Boxes:
@@ -83,8 +85,14 @@ class NetworkDetector:
         raw, form, least = candidates
         rows = suppress(raw.boxes, raw.scores, self.settings.overlap)
         rows = rows[raw.scores[rows] >= least]
-        classes, names, trace = raw.classes[rows], self.settings.classes, (raw, form)
-        return Boxes(raw.boxes[rows], raw.scores[rows], classes=classes, names=names, trace=trace)
+        return Boxes(
+            raw.boxes[rows],
+            raw.scores[rows],
+            classes=raw.classes[rows],
+            names=self.settings.classes,
+            data={} if raw.class_scores is None else {"class_scores": raw.class_scores[rows]},
+            trace=(raw, form),
+        )
 
     def stage_pictures(self, image: Image, detections: Boxes) -> dict[str, Image]:
         """Return the network's input as a picture, and the boxes before suppression."""

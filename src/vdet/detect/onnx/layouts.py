@@ -22,12 +22,15 @@ class RawBoxes:
     """Boxes before suppression.
 
     `boxes` float32 `(n, 4)`: x1, y1, x2, y2, pixels of the input or of the frame; `scores` float32
-    `(n,)`, 0 to 1; `classes` int32 `(n,)`: indices in the names of the network or of the settings.
+    `(n,)`, 0 to 1; `classes` int32 `(n,)`: indices in the names of the network or of the settings;
+    `class_scores` float32 `(n, len(names))`: how likely each is, None where the network only says
+    which class is the best.
     """
 
     boxes: Float32Array
     scores: Float32Array
     classes: Int32Array
+    class_scores: Float32Array | None = None
 
 
 OutputLayout = Callable[[Sequence[Array], float], RawBoxes]
@@ -50,7 +53,8 @@ def our_cells(
     lengths = np.logaddexp(0, table[rows, 1:5] + 1) * strides[rows, np.newaxis]
     middle = centers[rows]
     boxes = np.concatenate([middle - lengths[:, :2], middle + lengths[:, 2:]], axis=1)
-    return _raw(boxes, 1 / (1 + np.exp(-logits[rows])), table[rows, 5:].argmax(axis=1))
+    classes = np.exp(table[rows, 5:] - table[rows, 5:].max(axis=1, keepdims=True))
+    return _raw(boxes, 1 / (1 + np.exp(-logits[rows])), classes.argmax(axis=1), classes)
 
 
 def center_columns(outputs: Sequence[Array], least: float) -> RawBoxes:
@@ -59,10 +63,19 @@ def center_columns(outputs: Sequence[Array], least: float) -> RawBoxes:
     return _of_best_classes(table[:, :2], table[:, 2:4], table[:, 4:], least)
 
 
-def center_rows(outputs: Sequence[Array], least: float, *, grid: Cells | None = None) -> RawBoxes:
-    """Read Ultralytics v5 and YOLOX: rows of middle, size, objectness and class scores.
+def center_fractions(outputs: Sequence[Array], least: float, *, size: tuple[int, int]) -> RawBoxes:
+    """Read RT-DETR of Ultralytics: rows of middle and size, as fractions, and class scores.
 
-    `grid` are the cells of the input where middles and sizes are relative to those, as in YOLOX.
+    `size` is width and height of the input, pixels.
+    """
+    table = outputs[0][0]
+    return _of_best_classes(table[:, :2] * size, table[:, 2:4] * size, table[:, 4:], least)
+
+
+def center_rows(outputs: Sequence[Array], least: float, *, grid: Cells | None = None) -> RawBoxes:
+    """Read YOLOX: rows of middle, size, objectness and class scores.
+
+    `grid` are the cells of the input where middles and sizes are relative to those.
     """
     table = outputs[0][0]
     middle, size = table[:, :2], table[:, 2:4]
@@ -104,12 +117,20 @@ def _of_best_classes(middle: Array, size: Array, scores: Array, least: float) ->
     rows = np.flatnonzero(best >= least)
     half = size[rows] / 2
     boxes = np.concatenate([middle[rows] - half, middle[rows] + half], axis=1)
-    return _raw(boxes, best[rows], classes[rows])
+    return _raw(boxes, best[rows], classes[rows], scores[rows])
 
 
-def _raw(boxes: Array, scores: Array, classes: Array) -> RawBoxes:
-    """Return the boxes. Raises `ValueError` where the shapes do not fit each other."""
+def _raw(
+    boxes: Array, scores: Array, classes: Array, class_scores: Array | None = None
+) -> RawBoxes:
+    """Return the boxes; each row of `class_scores`, at least 0, becomes one whose sum is 1.
+
+    Raises `ValueError` where the shapes do not fit each other.
+    """
     count = len(scores)
     clipped = np.clip(scores.astype(np.float32).reshape(count), 0, 1)
     numbers = classes.astype(np.int32).reshape(count)
-    return RawBoxes(boxes.astype(np.float32).reshape(count, 4), clipped, numbers)
+    if class_scores is not None:
+        class_scores = np.nan_to_num(class_scores.astype(np.float32).clip(1e-9, 1))
+        class_scores /= class_scores.sum(axis=1, keepdims=True)
+    return RawBoxes(boxes.astype(np.float32).reshape(count, 4), clipped, numbers, class_scores)

@@ -56,14 +56,18 @@ class InputForm:
             values = np.multiply(values, self.factor, dtype=np.float32).astype(self.dtype)
         return np.ascontiguousarray(values[np.newaxis]), place
 
+    @property
+    def grey(self) -> Image:
+        """A grey picture of the size of the input."""
+        return np.full((self.height, self.width, 3), GREY, np.uint8)
+
     def scaled(self, picture: Picture) -> tuple[Image, "Placement"]:
         """Return the input as a picture, BGR uint8, and where the frame lies in it."""
         place = self._place(picture.width, picture.height)
         scaled = _scaled_picture(picture, *place.size)
         if place.size == (self.width, self.height):
             return scaled, place
-        canvas = np.full((self.height, self.width, 3), GREY, np.uint8)
-        (width, height), left, top = place.size, place.left, place.top
+        canvas, (width, height), left, top, _ = self.grey, *place
         canvas[top : top + height, left : left + width] = scaled
         return canvas, place
 

@@ -15,7 +15,7 @@ from vdet.config.section import Section
 from vdet.config.train import NetworkScoreSettings
 from vdet.detect.onnx import layouts
 from vdet.detect.onnx.layouts import OutputLayout, RawBoxes, cell_centers
-from vdet.detect.onnx.preparation import GREY, InputForm, size_of_area
+from vdet.detect.onnx.preparation import InputForm, size_of_area
 from vdet.detect.onnx.session import TYPES, Array, Session
 from vdet.errors import ModelError
 from vdet.media import Picture
@@ -23,6 +23,7 @@ from vdet.media import Picture
 _MAX_SIDE = 16_384
 _MAX_PIXELS = 16_000_000
 _MOST_FINAL_ROWS = 1000
+_NORMALISED = 2.0  # pixels of the input: no box of an ordinary network ends nearer to the corner
 _DEFAULT_SIDE = 640  # of the usual exports with an input of any size
 _SIZES = "orig_target_sizes"
 _STILL_PIXELS = 1.44
@@ -57,8 +58,6 @@ class Recognized:
         The network.
     name
         Name of the form, for messages.
-    reasons
-        How the form was recognised, in words.
     names
         Names of the classes, in the network's order.
     form
@@ -71,7 +70,6 @@ class Recognized:
 
     session: Session
     name: str
-    reasons: tuple[str, ...]
     names: tuple[str, ...]
     form: InputForm
     layout: OutputLayout
@@ -99,31 +97,16 @@ class Recognized:
             The network does not run, or its outputs are not what its form says.
         """
         values, place = self.form.prepare(picture)
-        outputs = self._outputs(values)
+        outputs = _outputs(self.session, self.form, values)
         try:
             with np.errstate(all="ignore"):  # numbers of any size
                 raw = self.layout(outputs, least)
-                return replace(raw, boxes=place.to_frame(raw.boxes))
+                found = replace(raw, boxes=place.to_frame(raw.boxes))
         except (ValueError, TypeError, IndexError) as error:
             raise _unknown(self.session, f"it gives {_shapes(outputs)}") from error
-
-    def outputs_for_grey(self) -> list[Array]:
-        """Return the outputs for a grey picture. Raises `ModelError` where it does not run."""
-        return self._outputs(self.form.prepare(self.grey)[0])
-
-    @property
-    def grey(self) -> Picture:
-        """A grey picture of the size of the input."""
-        return Picture(np.full((self.form.height, self.form.width, 3), GREY, np.uint8))
-
-    def _outputs(self, values: Array) -> list[Array]:
-        size = [[self.form.width, self.form.height]]
-        return self.session.run(
-            {
-                slot.name: np.array(size, TYPES[slot.type]) if slot.name == _SIZES else values
-                for slot in self.session.inputs
-            }
-        )
+        if raw.boxes.max(initial=-math.inf) < _NORMALISED and len(raw.boxes):
+            raise _unknown(self.session, "its boxes are fractions of the input, not pixels")
+        return found
 
 
 def recognize(session: Session, names: Sequence[str] = ()) -> Recognized:
@@ -165,73 +148,63 @@ def _ours(session: Session, header: Header, size: tuple[int, int]) -> Recognized
     """Return a network of ours with an input of one size, width and height in pixels."""
     form = InputForm(*size, rows_first=True, dtype=np.uint8)
     layout = partial(layouts.our_cells, cells=cell_centers(*size), score=header.calibration)
-    reasons = ("it has a header of vdet",)
-    return Recognized(session, "vdet", reasons, header.classes, form, layout, header)
+    return Recognized(session, "vdet", header.classes, form, layout, header)
 
 
 def _rt_detr(session: Session, names: Sequence[str]) -> Recognized:
     places = {name: place for place, name in enumerate(session.output_names)}
     if not {"labels", "boxes", "scores"} <= set(places):
         raise _unknown(session, f"it has an input {_SIZES}, but outputs {', '.join(places)}")
-    order = places["labels"], places["boxes"], places["scores"]
-    layout = partial(layouts.named_columns, order=order)
-    reasons = (f"it has an input {_SIZES}", "its outputs are labels, boxes and scores")
+    layout = partial(
+        layouts.named_columns, order=(places["labels"], places["boxes"], places["scores"])
+    )
     form = replace(_form(session, None), fit="stretch")
-    found = Recognized(session, "RT-DETR", reasons, tuple(names) or COCO, form, layout)
-    found.find(found.grey, 0)  # raises where the shapes are others
+    found = Recognized(session, "RT-DETR", tuple(names) or COCO, form, layout)
+    found.find(Picture(form.grey), 0)  # raises where the shapes are others
     return found
 
 
 def _by_shape(session: Session, names: Sequence[str]) -> Recognized:
     metadata = _ultralytics_metadata(session)
     form = _form(session, metadata.size)
-    names = tuple(names) or metadata.names
-    found = Recognized(session, "", (), names, form, layouts.final_rows)
-    outputs = found.outputs_for_grey()
-    shape = outputs[0].shape
-    size = f"{form.width}×{form.height}"
-    cells = len(cell_centers(form.width, form.height)[1])
-    rule = _rule(shape[1:], cells, metadata) if len(shape) == 3 and shape[0] == 1 else None
-    if rule is None:
+    outputs = _outputs(session, form, form.prepare(Picture(form.grey))[0])
+    found = _rule(outputs[0], form, metadata)
+    if found is None:
+        size = f"{form.width}×{form.height}"
         raise _unknown(session, f"for an input of {size} it gives {_shapes(outputs)}")
-    name, reason, classes, layout = rule
-    seen = ("its metadata has the keys of Ultralytics",) if metadata.names else ()
-    reasons = (*seen, f"its output is {shape}: {reason}")
-    names = _names(session, names, classes)
-    found = replace(found, name=name, reasons=reasons, names=names, layout=layout)
-    return _as_yolox(found) if name == "YOLOX" else found
+    name, classes, layout = found
+    if name == "YOLOX":
+        form = replace(form, fit="corner", is_rgb=False, factor=1.0)
+    if "RT-DETR" in name:
+        form = replace(form, fit="stretch")
+    known = _names(session, tuple(names) or metadata.names, classes)
+    return Recognized(session, name, known, form, layout)
 
 
-_Rule = tuple[str, str, int | None, OutputLayout]
-"""A form of output: its name, the reason for it, its number of classes (None: any), its layout."""
+_Rule = tuple[str, int | None, OutputLayout]
+"""A form of output: its name, its number of classes (None: any), its layout."""
 
 
-def _rule(shape: Sequence[int], cells: int, metadata: "_Metadata") -> _Rule | None:
-    """Return the form of an output of this many rows and columns, if it is known."""
-    rows, columns = shape
-    known = len(metadata.names)
-    final = "boxes after suppression", "rows of box, score and class", None, layouts.final_rows
+def _rule(output: Array, form: InputForm, metadata: "_Metadata") -> _Rule | None:
+    """Return the form of the first output for a grey picture, if it is known."""
+    if len(output.shape) != 3 or len(output) != 1:
+        return None
+    _, rows, columns = output.shape
+    size, known = (form.width, form.height), len(metadata.names)
+    grid = cell_centers(*size)
+    cells = len(grid[1])
+    final = "boxes after suppression", None, layouts.final_rows
+    if metadata.is_rt_detr and columns == 4 + known and not metadata.is_final:
+        return "RT-DETR of Ultralytics", known, partial(layouts.center_fractions, size=size)
     if columns == 6 and metadata.is_final:
         return final
     if columns == cells and known in (0, rows - 4):
-        reason = "columns of box and class scores"
-        return "Ultralytics v8 or later", reason, rows - 4, layouts.center_columns
-    if rows == 3 * cells and known in (0, columns - 5):
-        return "Ultralytics v5", "three boxes a cell", columns - 5, layouts.center_rows
+        return "Ultralytics v8 or later", rows - 4, layouts.center_columns
     if rows == cells and columns >= 6 and not known:  # an exact number: before any number of rows
-        return "YOLOX", "one box a cell, and no metadata", columns - 5, layouts.center_rows
+        is_decoded = output[..., :2].max() >= form.width / 2  # boxes spread over the input
+        layout = partial(layouts.center_rows, grid=None if is_decoded else grid)
+        return "YOLOX", columns - 5, layout
     return final if columns == 6 and rows <= _MOST_FINAL_ROWS else None
-
-
-def _as_yolox(found: Recognized) -> Recognized:
-    """Return YOLOX with its own form of input, and decoded where the export left that out."""
-    found = replace(found, form=replace(found.form, fit="corner", is_rgb=False, factor=1.0))
-    boxes = found.find(found.grey, -math.inf).boxes
-    if boxes.max(initial=0) >= found.form.width / 2:  # they spread over the input
-        return found
-    grid = cell_centers(found.form.width, found.form.height)
-    reasons = (*found.reasons, "its boxes are relative to cells")
-    return replace(found, layout=partial(layouts.center_rows, grid=grid), reasons=reasons)
 
 
 def _names(session: Session, names: tuple[str, ...], count: int | None) -> tuple[str, ...]:
@@ -252,6 +225,7 @@ class _Metadata(NamedTuple):
     names: tuple[str, ...] = ()
     size: tuple[int, int] | None = None
     is_final: bool = False
+    is_rt_detr: bool = False
 
 
 def _ultralytics_metadata(session: Session) -> _Metadata:
@@ -270,14 +244,16 @@ def _ultralytics_metadata(session: Session) -> _Metadata:
     if task != "detect":
         raise _unknown(session, f"its task is {task:.40}, not detect")
     is_final = has_nms or metadata.get("end2end") == "True"
-    return _Metadata(known, size, is_final)
+    model = metadata.get("description", "") + metadata.get("head", "")
+    is_rt_detr = "rtdetr" in model.lower().replace("-", "")
+    return _Metadata(known, size, is_final, is_rt_detr)
 
 
 def _form(session: Session, size: tuple[int, int] | None) -> InputForm:
     """Return the usual input, of fixed size, or of the `size` in the metadata, or of 640×640."""
     slot = next(each for each in session.inputs if each.name != _SIZES)
     shape = [side if isinstance(side, int) and side > 0 else None for side in slot.shape]
-    if len(shape) != 4 or shape[1] not in (3, None):
+    if len(shape) != 4 or shape[0] not in (1, None) or shape[1] not in (3, None):
         seen = str(slot.shape).replace("None", "any")
         raise _unknown(session, f"its input is {seen:.100}, not [1, 3, height, width]")
     usual = size or (_DEFAULT_SIDE, _DEFAULT_SIDE)
@@ -286,6 +262,17 @@ def _form(session: Session, size: tuple[int, int] | None) -> InputForm:
         limits = f"{_MAX_PIXELS:,} pixels, or a side of more than {_MAX_SIDE:,}"
         raise _unknown(session, f"its input has no pixels, more than {limits}")
     return InputForm(width, height, "center", is_rgb=True, factor=1 / 255, dtype=TYPES[slot.type])
+
+
+def _outputs(session: Session, form: InputForm, values: Array) -> list[Array]:
+    """Return the outputs for a prepared input. Raises `ModelError` where it does not run."""
+    size = [[form.width, form.height]]
+    return session.run(
+        {
+            slot.name: np.array(size, TYPES[slot.type]) if slot.name == _SIZES else values
+            for slot in session.inputs
+        }
+    )
 
 
 def _shapes(outputs: Sequence[Array]) -> str:

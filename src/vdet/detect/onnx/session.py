@@ -2,8 +2,8 @@
 
 import os
 import threading
-import weakref
 from collections.abc import Mapping
+from concurrent.futures import Future
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -49,7 +49,8 @@ class Session:
     Raises
     ------
     ModelError
-        The file cannot be read, or is not an ONNX file that onnxruntime can run.
+        The file cannot be read, is not an ONNX file that onnxruntime can run, or has its weights in
+        other files.
     """
 
     def __init__(self, path: Path) -> None:
@@ -79,23 +80,29 @@ class Session:
                 raise ModelError(f"{path}: its input {each.name:.40} is a {each.type}, no picture")
         if any(len(value) > _MAX_METADATA for value in self.metadata.values()):
             raise ModelError(f"{path}: has metadata of more than {_MAX_METADATA:,} characters")
-        self._running: set[Any] = set()
-        closed = threading.Event()
-        weakref.finalize(self, closed.set)
-        threading.Thread(target=_watch, args=(self._running, closed), daemon=True).start()
 
     def run(self, inputs: Mapping[str, Array]) -> list[Array]:
         """Return all outputs. Raises `ModelError` if it fails, or takes too much time or memory."""
-        options = self._new_options()
+        options, outputs = self._new_options(), Future[list[Array]]()
         options.log_severity_level = _SILENT
-        self._running.add(options)
+        # One long operation cannot be stopped: its thread is left behind.
+        call = inputs, options, outputs
+        threading.Thread(target=self._run, args=call, name="vdet-network", daemon=True).start()
+        for _ in range(MAX_SECONDS):  # seconds in which this process was stopped do not count
+            with suppress(TimeoutError):
+                return outputs.result(1)
+        options.terminate = True
+        raise self._failed(f"it took more than {MAX_SECONDS} s")
+
+    def _run(self, inputs: Mapping[str, Array], options: Any, outputs: Future[list[Array]]) -> None:
         try:
-            return [np.asarray(each) for each in self._session.run(None, dict(inputs), options)]
+            found = self._session.run(None, dict(inputs), options)
+            outputs.set_result([np.asarray(each) for each in found])
         except Exception as error:  # onnxruntime raises kinds of its own
-            reason = f"it took more than {MAX_SECONDS} s" if options.terminate else _in_words(error)
-            raise ModelError(f"{self.path}: does not run on a picture: {reason}") from error
-        finally:
-            self._running.discard(options)
+            outputs.set_exception(self._failed(_in_words(error)))
+
+    def _failed(self, reason: str) -> ModelError:
+        return ModelError(f"{self.path}: does not run on a picture: {reason}")
 
 
 def _limited_options() -> Any:
@@ -107,6 +114,9 @@ def _limited_options() -> Any:
     options.enable_mem_pattern = False  # it reserves more than is used
     options.log_severity_level = _SILENT
     options.add_session_config_entry("session.use_env_allocators", "1")
+    # Weights in other files would be read from this folder; none can be in it.
+    folder = "session.model_external_initializers_file_folder_path"
+    options.add_session_config_entry(folder, os.devnull)
     cpu = onnxruntime.OrtMemoryInfo(
         "Cpu", onnxruntime.OrtAllocatorType.ORT_ARENA_ALLOCATOR, 0, onnxruntime.OrtMemType.DEFAULT
     )
@@ -116,20 +126,10 @@ def _limited_options() -> Any:
     return options
 
 
-def _watch(running: set[Any], closed: threading.Event) -> None:
-    """Stop what runs for too long.
-
-    Seconds are counted here, so that a process that was itself stopped for a while ends nothing.
-    """
-    seconds: dict[Any, int] = {}
-    while not closed.wait(1):
-        seconds = {each: seconds.get(each, -1) + 1 for each in list(running)}
-        for options, count in seconds.items():
-            options.terminate = count >= MAX_SECONDS
-
-
 def _in_words(error: Exception) -> str:
     message = str(error)
+    if "External data" in message:
+        return "its weights are in other files; export it as one file"
     if "memory" in message:
         return "it takes too much memory"
     return message.partition("\n")[0][:200]

@@ -89,7 +89,7 @@ class MotionState:
         What moves evenly on the road comes near as its size grows, and ever faster in the picture:
         with a distance of Z, size and place change by 1 / Z and velocity by 1 / Z².
         """
-        most = min(_MOST_NEARER, _MOST_NEARER_RATE * seconds)
+        most = min(_MOST_NEARER, _MOST_NEARER_RATE * abs(seconds))
         nearer = float(np.clip(np.mean(self.mean[2:, 1]) * seconds, -most, most))
         growth = 1 / (1 - nearer)
         mean = self.mean @ np.array([[1.0, 0.0], [seconds, 1.0]])

@@ -132,12 +132,10 @@ class MotionTracker:
 
     def _observations(self, detections: Boxes, picture: Picture | None) -> list[Observation]:
         boxes = visible(detections.sides, self._size)
-        each = zip(boxes, detections, appearances(picture, boxes), _are_large(boxes), strict=True)
-        return [
-            Observation(box, detection.score, detection.class_name, appearance)
-            for box, detection, appearance, is_large in each
-            if is_large
-        ]
+        columns = detections.scores.tolist(), detections.likely_classes
+        rows = zip(boxes, *columns, appearances(picture, boxes), strict=True)
+        large = _are_large(boxes)
+        return [Observation(*row) for row, is_large in zip(rows, large, strict=True) if is_large]
 
     def _visible(self, means: Sequence[Float64Array]) -> Float64Array:
         """Return the part in the frame of each centre and size, `(n, 4)`; see `Place`."""
@@ -192,7 +190,7 @@ class MotionTracker:
             Box(*box.tolist()),
             score,
             place.state,
-            class_name=vehicle.classes.best,
+            class_name=vehicle.votes.winner,
             whole_foot=Box(*whole_box(place.mean).tolist()).foot,
         )
 

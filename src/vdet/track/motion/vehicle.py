@@ -6,15 +6,16 @@ It is measured in seconds of detections with score 1, so that it does not depend
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from vdet.boxes import Float64Array
 from vdet.config.schema import MotionTrackerSettings
-from vdet.detect.classes import ClassScores
 from vdet.track.motion.history import SCORE_TIME, History, Moment
 from vdet.track.motion.state import MotionState
+from vdet.track.votes import ClassVotes, vote_weight
 
 LONGEST_LOOK = 0.1
 """Seconds for which one frame counts as evidence at most: a single frame must not be enough."""
@@ -52,13 +53,13 @@ class Look:
 class Observation:
     """A detection inside the frame.
 
-    `box` is x1, y1, x2, y2 in pixels, float64 `(4,)`; `appearance` is `(2, 3)`, see
-    `appearances`.
+    `box` is x1, y1, x2, y2 in pixels, float64 `(4,)`; `classes` says how likely each class is;
+    `appearance` is `(2, 3)`, see `appearances`.
     """
 
     box: Float64Array
     score: float
-    class_name: str | None = None
+    classes: Mapping[str, float] = field(default_factory=dict)
     appearance: Float64Array = field(default_factory=lambda: np.full((2, 3), np.nan))
 
     @property
@@ -112,8 +113,8 @@ class Vehicle:
         Mean score of the latest detections, 0 to 1; a frame without one counts as 0.
     detection_scores
         The same, without the frames that have no detection.
-    classes
-        The classes of its detections.
+    votes
+        Its class, by what all detections say.
     history
         Where it was in the latest frames.
     begin
@@ -134,8 +135,8 @@ class Vehicle:
         self.confirmed = False
         self.id: int | None = None
         self.scores, self.detection_scores = RecentMean(), RecentMean()
-        self.classes = ClassScores()
-        self._add(first, look.seconds)
+        self.votes = ClassVotes()
+        self._add(first, look)
 
     @property
     def is_present(self) -> bool:
@@ -169,7 +170,7 @@ class Vehicle:
         self.unseen = self.hidden = 0.0
         kept = math.exp(-look.seconds / _APPEARANCE_TIME)
         self.appearance = kept * self.appearance + (1 - kept) * observation.appearance
-        self._add(observation, look.seconds)
+        self._add(observation, look)
 
     def miss(self, look: Look) -> None:
         """Note a frame without a detection of it."""
@@ -186,10 +187,11 @@ class Vehicle:
         self.unseen = max(self.unseen, self._settings.carried)
 
     def take_over(self, other: "Vehicle") -> None:
-        """Go on with the id and the history of another track of the same vehicle."""
+        """Go on with the id, the history and the votes of another track of the same vehicle."""
         self.id = self.id if other.id is None else other.id
         self.begin = min(self.begin, other.begin)
         self.history.join(other.history)
+        self.votes.join(other.votes)
 
     def merge(self, other: "Vehicle") -> None:
         """Take over the history of another track that follows the same vehicle now.
@@ -201,10 +203,11 @@ class Vehicle:
         self.id = min(ids)[1] if ids else None
         self.since = min(self.since, other.since)
 
-    def _add(self, observation: Observation, seconds: float) -> None:
-        self._weigh(observation.score, seconds)
-        self.detection_scores.add(observation.score, seconds)
-        self.classes.add(observation.class_name, observation.score)
+    def _add(self, observation: Observation, look: Look) -> None:
+        self._weigh(observation.score, look.seconds)
+        self.detection_scores.add(observation.score, look.seconds)
+        weight = vote_weight(observation.box, observation.score, look.size)
+        self.votes.add(observation.classes, weight * min(look.seconds, LONGEST_LOOK))
 
     def _weigh(self, score: float, seconds: float) -> None:
         gained = (score - self._settings.leak) * min(seconds, LONGEST_LOOK)

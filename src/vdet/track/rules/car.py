@@ -1,14 +1,16 @@
 """One car of the original system: where it was detected lately, and for how long."""
 
 from collections import deque
-from dataclasses import dataclass, replace
-from statistics import fmean, multimode
+from collections.abc import Mapping
+from dataclasses import astuple, dataclass, field, replace
+from statistics import fmean
 
 import cv2
 import numpy as np
 
 from vdet.boxes import Box, Image
 from vdet.config.tracker import RulesTrackerSettings
+from vdet.track.votes import ClassVotes, vote_weight
 
 Point = tuple[float, float]
 
@@ -21,7 +23,7 @@ class Region:
     centroid: Point
     peak: float
     score: float = 1.0
-    class_name: str | None = None
+    classes: Mapping[str, float] = field(default_factory=dict)
 
     def moved(self, x: float, y: float) -> "Region":
         """Return it with the top left corner of its box at another place."""
@@ -55,6 +57,8 @@ class Car:
         Average rectangle, rounded to whole pixels.
     centroid
         Average centroid, `(x, y)`.
+    votes
+        Its class, by what all regions say.
     """
 
     box: Box
@@ -65,17 +69,13 @@ class Car:
         self.id = number
         self.needed = settings.detections_needed
         self.in_a_row = self.count = self.matches = self.misses = 0
+        self.votes = ClassVotes()
         self._seen: deque[Region] = deque(maxlen=settings.history)
 
     @property
     def score(self) -> float:
         """Average score, 0 to 1."""
         return fmean(region.score for region in self._seen)
-
-    @property
-    def class_name(self) -> str | None:
-        """The most frequent class of the detections, the earliest one among equals."""
-        return multimode(region.class_name for region in self._seen)[0]
 
     @property
     def is_shown(self) -> bool:
@@ -102,6 +102,10 @@ class Car:
     def see(self, region: Region, image: Image, *, by_match: bool = False) -> None:
         """Add a detection in the frame `image`; the region lies in it."""
         self._image = region.box.cut(image).copy()
+        if not by_match:
+            size = image.shape[1], image.shape[0]
+            weight = vote_weight(np.array(astuple(region.box)), region.score, size)
+            self.votes.add(region.classes, weight)
         self._seen.append(region)
         sides = zip(*(each.box.xywh for each in self._seen), strict=True)
         self.box = Box.sized(*(round(fmean(values)) for values in sides))

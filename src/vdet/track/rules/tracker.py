@@ -20,7 +20,7 @@ from vdet.config.tracker import RulesTrackerSettings
 from vdet.media import Picture
 from vdet.track.rules.association import Association
 from vdet.track.rules.car import Car, Region
-from vdet.track.track import Track
+from vdet.track.track import State, Track
 
 
 class RulesTracker:
@@ -81,7 +81,8 @@ class RulesTracker:
     def _track(self, car: Car) -> Track:
         """Return what is shown of a car; it gets its id when it is first shown."""
         car.id = next(self._ids) if car.id is None else car.id
-        return Track(car.id, car.box, car.score, "lost" if car.matches else "seen", car.class_name)
+        state: State = "lost" if car.matches else "seen"
+        return Track(car.id, car.box, car.score, state, car.votes.winner)
 
 
 def large_enough(
@@ -96,6 +97,6 @@ def large_enough(
     centers = (detections.sides[:, :2] + detections.sides[:, 2:]) / 2
     centroids = map(tuple, detections.data.get("centroid", centers).tolist())
     strengths = detections.data.get("strength", detections.scores).tolist()
-    scores, names = detections.scores.tolist(), detections.class_names
-    regions = map(Region, boxes, centroids, strengths, scores, names)
+    scores, classes = detections.scores.tolist(), detections.likely_classes
+    regions = map(Region, boxes, centroids, strengths, scores, classes)
     return [r for r in regions if r.box.width >= least and r.box.height >= least]

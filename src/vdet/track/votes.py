@@ -1,0 +1,74 @@
+"""The class of a track: one vote over all that was seen of a vehicle.
+
+Only trackers vote. A row of a track has its class so far; what is made at the end of a video, such
+as counts, records and pages, uses the class of the track's last row.
+"""
+
+from collections import defaultdict
+from collections.abc import Mapping
+
+from vdet.boxes import Float64Array
+from vdet.detect.classes import UNKNOWN
+
+_USUAL, _USUAL_NEEDS = "car", 0.6
+"""The class that detectors take for small or unclear vehicles of every kind, and the fraction of
+all votes that it needs. On pictures that it has not seen, the shipped network is sure of cars to
+0.93, but takes trucks and buses for cars to a third or a half.
+"""
+
+_OTHERS_NEED = 0.3
+"""Fraction of all votes that another class needs; a vehicle without such a class is `UNKNOWN`."""
+
+_CLOSE = 0.05
+"""Fraction of the frame's area from which on a box shows all that a detector can tell apart."""
+
+_CUT_OFF = 0.1
+"""What a search that sees only a part of the vehicle counts: a cut-off truck looks like a car."""
+
+_BORDER = 0.005
+"""A box that ends this near to the side of the frame is cut off, as a fraction of the frame."""
+
+
+class ClassVotes:
+    """The votes of the searches that found a vehicle, by class."""
+
+    def __init__(self) -> None:
+        self._sums: defaultdict[str, float] = defaultdict(float)
+
+    @property
+    def winner(self) -> str | None:
+        """The class with most votes, or `UNKNOWN`; None where no detection had a class."""
+        if not self._sums:
+            return None
+        total, others = sum(self._sums.values()), dict(self._sums)
+        if others.pop(_USUAL, 0.0) >= _USUAL_NEEDS * total or not others:
+            return _USUAL
+        name = max(others, key=others.__getitem__)
+        return name if others[name] >= _OTHERS_NEED * total else UNKNOWN
+
+    def add(self, classes: Mapping[str, float], weight: float) -> None:
+        """Add what a search says: how likely each class is, and the weight of the search."""
+        for name, likely in classes.items():
+            self._sums[name] += weight * likely
+
+    def join(self, other: "ClassVotes") -> None:
+        """Add the votes of another track of the same vehicle."""
+        self.add(other._sums, 1.0)
+
+
+def vote_weight(box: Float64Array, score: float, size: tuple[int, int]) -> float:
+    """Return how much a detection tells of the class: by its area, its score, and if it is whole.
+
+    Parameters
+    ----------
+    box
+        x1, y1, x2, y2 in pixels, inside the frame.
+    score
+        0 to 1.
+    size
+        Width and height of the frame, pixels.
+    """
+    x1, y1, x2, y2 = map(float, box / (*size, *size))
+    area = min((x2 - x1) * (y2 - y1), _CLOSE)
+    is_whole = min(x1, y1) > _BORDER and max(x2, y2) < 1 - _BORDER
+    return score * area * (1 if is_whole else _CUT_OFF)
