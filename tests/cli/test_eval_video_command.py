@@ -94,7 +94,7 @@ def test_what_cannot_be_is_said_before_any_work(
     assert words in result.err
 
 
-@pytest.mark.parametrize("sweep", [TWO_SHIPPED, "detector.features.color_space=YCrCb,HSV"])
+@pytest.mark.parametrize("sweep", [TWO_SHIPPED, "detector.features.patch=32,48"])
 def test_a_model_that_is_given_must_fit_all_settings(
     run: Run, clip_path: Path, truth_path: Path, model_path: Path, sweep: str
 ) -> None:

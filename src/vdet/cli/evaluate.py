@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Sequence
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import click
 from vdet.cli import options
 from vdet.cli.command import command
 from vdet.cli.messages import progress_steps
-from vdet.cli.results import Results, results_options
+from vdet.cli.results import Results, facts_options, results_options
 from vdet.errors import ConfigError
 
 
@@ -68,8 +69,12 @@ def images(
     results.print(*images_report(result, run))
 
 
+_ON_LAST = "leak-free: a new model is tested on the last patches of each folder"
+_ON_ALL = "if the model was trained on some of these patches, the scores are too good"
+
+
 @command(
-    "vdet eval patches vehicles.zip non-vehicles.zip --page page",
+    "vdet eval patches vehicles.zip non-vehicles.zip --json scores.json",
     "vdet eval patches patches/ --model model.npz",
 )
 @click.argument("data", nargs=-1, required=True, type=options.INPUT, metavar="DATA...")
@@ -81,7 +86,7 @@ def images(
 )
 @options.settings_options("train.svm.C=1e-4")
 @options.jobs_option("Describe patches in N threads.")
-@results_options
+@facts_options
 def patches(
     data: tuple[Path, ...],
     choice: options.SettingsChoice,
@@ -96,19 +101,20 @@ def patches(
     from vdet.detect.svm.kind import requested_features, trained_on
     from vdet.detect.svm.model import load_model
     from vdet.evaluate.output import RunName
-    from vdet.learn.svm import patch_eval
     from vdet.learn.svm.dataset import find_patches
+    from vdet.learn.svm.training import evaluate_patches
 
     model_path = Path(settings.svm.model) if settings.svm.model else None
     model = load_model(model_path, requested_features(settings.svm)) if model_path else None
     results.check()
     files = find_patches(data)
     with progress_steps("") as steps:
-        result = patch_eval.evaluate_patches(files, settings, model, jobs=jobs, steps=steps)
+        result = evaluate_patches(files, settings, model, jobs=jobs, steps=steps)
     sources = trained_on(model_path) if model_path else ()
     name = RunName("svm", model_path, choice.name, choice.assignments, sources)
-    text, values = [*name.lines(), *patch_eval.lines(result)], patch_eval.values(result)
-    results.print(text, name.values() | values, lambda: patch_eval.patch_page(result, name))
+    meaning = _ON_ALL if model else _ON_LAST
+    values = name.values() | {"meaning": meaning, "test": asdict(result)}
+    results.print([*name.lines(), meaning, "", *result.lines()], values)
 
 
 @command("vdet eval tracks out.txt gt.txt --page page")
