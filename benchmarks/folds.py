@@ -27,10 +27,9 @@ from vdet.evaluate.scores import score
 from vdet.labels.label import Label
 from vdet.labels.reading import read_truth
 from vdet.labels.video import LabelledVideo
-from vdet.learn.svm.box_regression import fit_boxes
 from vdet.learn.svm.dataset import PatchFile, find_patches
 from vdet.learn.svm.extraction import LabelledVectors, extract
-from vdet.learn.svm.fitting import fit
+from vdet.learn.svm.fitting import fit, fit_boxes
 from vdet.media import Frame, Picture
 from vdet.media.reader import VideoReader
 from vdet.run.loop import Pipeline, SearchRate, peek
@@ -41,7 +40,7 @@ BLOCKS = 5
 LEAST = 0.2  # probability of the windows that are kept for the sweeps
 SETTINGS = (
     f"detector.search.probability={LEAST}",
-    "train.svm.augmentation.mirror=false",  # half the memory, a third of the time
+    "train.svm.augmentation=false",  # half the memory, a third of the time
 )
 SWEEPS = {
     "detector.search.probability": (0.2, 0.3, 0.4, 0.5),
@@ -100,9 +99,9 @@ class Searched:
     detector: SvmDetector
     windows: dict[int, Windows]
 
-    def search(self, picture: Picture, index: int | None) -> Candidates:
+    def search(self, picture: Picture, index: int | None) -> Candidates:  # noqa: ARG002
         assert index is not None
-        return Candidates(self.windows[index], picture, is_still=False)
+        return Candidates(self.windows[index], is_still=False)
 
     def detect(self, candidates: Candidates) -> Boxes:
         return self.detector.detect(candidates)
@@ -139,14 +138,16 @@ def _models(sources: Sequence[Path], last: int, settings: Settings) -> list[Line
     files = [file for file in patches if not file.is_boxed]
     boxed = [file for file in patches if file.is_boxed]
     features = settings.svm.features
-    data, boxes = (extract(each, features, settings.train.svm) for each in (files, boxed))
+    data, boxes = (extract(some, features, augmented=False) for some in (files, boxed))
 
     def without(block: int) -> LinearModel:
         def held_out(some: LabelledVectors) -> BoolArray:
             return np.equal(_block_of(_frames_of(some.files), last), block)
 
         model = fit(data.of(~held_out(data)), settings)
-        return replace(model, box_regression=fit_boxes((data, boxes), held_out, features)[0])
+        held = [held_out(some) for some in (data, boxes)]
+        regression, _ = fit_boxes((data, boxes), held, features.hog_length)
+        return replace(model, box_regression=regression)
 
     at_once = joblib.Parallel(n_jobs=2, prefer="threads", verbose=5)
     return list(at_once(joblib.delayed(without)(block) for block in range(BLOCKS)))

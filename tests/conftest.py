@@ -16,7 +16,7 @@ from hypothesis import settings
 from drawn_patches import write_patches
 from vdet.cli import main
 from vdet.config.schema import Settings, SvmSettings, TrainSettings
-from vdet.config.train import AugmentationSettings, SvmTrainingSettings
+from vdet.config.train import SvmTrainingSettings
 from vdet.detect.svm.model import save_model
 from vdet.learn.svm.dataset import find_patches
 from vdet.learn.svm.training import train
@@ -69,7 +69,7 @@ def patches_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def model_path(patches_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A model with the default features, trained on generated patches and nothing made of them."""
     path = tmp_path_factory.mktemp("model") / "model.npz"
-    plain = SvmTrainingSettings(augmentation=AugmentationSettings(mirror=False, cut=0, parts=0))
+    plain = SvmTrainingSettings(augmentation=False)
     settings = Settings(detector=SvmSettings(), train=TrainSettings(svm=plain))
     model, _ = train(find_patches([patches_path]), settings, jobs=1)
     save_model(model, path)

@@ -30,7 +30,7 @@ WIDTH, HEIGHT = 320, 240
 SCALE = REFERENCE_HEIGHT / HEIGHT
 CAR = Box.sized(96, 120, 64, 48)
 BINS = 8
-COLOUR = FeatureSettings(color_space="RGB", histogram=HistogramSettings(bins=BINS))
+COLOUR = FeatureSettings(halved=(), histogram=HistogramSettings(bins=BINS))
 BAND = WindowSettings(size=32, overlap=0.75, top=96, bottom=192)
 SETTINGS = Settings(
     detector=SvmSettings(
@@ -43,9 +43,7 @@ SETTINGS = Settings(
             ),
             perspective=PerspectiveSettings(sizes=()),
         ),
-        heat=HeatSettings(
-            frames=2, weight="none", shrink=1, blur=15, threshold=1.4, regions="outline"
-        ),
+        heat=HeatSettings(frames=2, blur=15, threshold=1.4, regions="outline"),
         score=ScoreSettings(middle=1.4),
         stills=StillSettings(strength=0, width=30 / WIDTH, height=30 / HEIGHT),
     ),
@@ -57,9 +55,9 @@ SETTINGS = Settings(
 def by_perspective(horizon: float | None, *sizes: float) -> Settings:
     """Give the default's way, for cars as large as `CAR`; without box regression votes agree less.
 
-    Rows are right for a horizon of 0.35; at None it is looked for.
+    Rows are right for a horizon of 0.5; at None it is looked for.
     """
-    perspective = PerspectiveSettings(sizes=sizes, horizon=horizon, highest=0.9, lowest=2.1)
+    perspective = PerspectiveSettings(sizes=sizes, horizon=horizon)
     return Settings(
         detector=SvmSettings(
             stride=1,
@@ -72,15 +70,15 @@ def by_perspective(horizon: float | None, *sizes: float) -> Settings:
     )
 
 
-PERSPECTIVE = by_perspective(0.35, 0.15, 0.2)
-THREE_SETS = by_perspective(0.35, 0.15, 0.2, 0.25)
+PERSPECTIVE = by_perspective(0.5, 0.15, 0.2)
+THREE_SETS = by_perspective(0.5, 0.15, 0.2, 0.25)
 """With window sets of 48, 64 and 80 pixels; all of them find `CAR`."""
 
 
 def red_finder() -> LinearModel:
     """Give a model that is sure of a window where 44 % of the pixels are bright red."""
     weights = np.zeros((1, COLOUR.length), np.float32)
-    weights[0, COLOUR.hog_length + BINS - 1] = 1 / COLOUR.patch**2
+    weights[0, COLOUR.hog_length + 2 * BINS - 1] = 1 / COLOUR.patch**2
     return LinearModel(
         COLOUR,
         weights,

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from vdet.detect.svm.model import save_model
 from vdet.errors import OutputError
 from vdet.evaluate.output import table
 from vdet.evaluate.scores import score
-from vdet.files import make_folder, write_whole
+from vdet.files import make_folder, staged, write_json, write_whole
 from vdet.labels.reading import read_predictions, read_truth
 from vdet.learn.svm.choosing import Most
 from vdet.learn.svm.dataset import find_patches
@@ -53,7 +54,7 @@ traffic:
 """
 _BY_NETWORK = {"video": "found.mp4", "tracks": "found.csv"}
 _ON_POLE = {"video": "counted.mp4", "tracks": "pole.csv", "flows": "flows.csv", "page": "page"}
-_MOST = Most(per_vehicle=2, false_alarms=6, parts=3)  # drawn vehicles are alike: few suffice
+_MOST = Most(per_vehicle=2, false_alarms=6, parts=3, probability=0)  # drawn ones are alike
 _BY_MODEL = {"tracks": "model.csv", "stages": "stages"}
 
 
@@ -104,7 +105,7 @@ def run_demo(
     counting = load_settings([folder / GATE])
     find(POLE, _ON_POLE, counting)
     announce(f"3/4 drawing {ROADS} more roads, and training a linear model on patches of them …")
-    linear = load_settings(assignments=["train.mine.probability=0"], detector="svm")
+    linear = load_settings(detector="svm")
     make_folder(folder / "training")
     roads = [folder / "training" / f"road{number}.mp4" for number in range(1, ROADS + 1)]
     sources = [VideoSource(road, road.with_suffix(".txt"), every=2) for road in roads]
@@ -113,8 +114,9 @@ def run_demo(
     model = load_svm(linear.svm, None)  # only the places of its windows matter
     mine(sources, folder / PATCHES, linear, model, most=_MOST, overwrite=overwrite, steps=steps)
     learnt, metrics = train(find_patches([folder / PATCHES]), linear, steps=steps)
-    save_model(learnt, folder / MODEL, overwrite=overwrite)
-    metrics.write(folder / METRICS, overwrite=overwrite)
+    with staged(folder / MODEL, overwrite=overwrite) as temporary:
+        save_model(learnt, temporary)
+    write_json(asdict(metrics), str(folder / METRICS), overwrite=overwrite)
     announce("4/4 finding the vehicles with the linear model …")
     model_file = f"detector.model={json.dumps(str(folder / MODEL))}"
     find(ROAD, _BY_MODEL, load_settings(assignments=[model_file]))

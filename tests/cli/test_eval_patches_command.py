@@ -5,24 +5,18 @@ from pathlib import Path
 
 from conftest import Run
 
-QUICK = (
-    *("--set", "train.svm.C=0.001"),
-    *("--set", "train.svm.augmentation={mirror: false, cut: 0, parts: 0}"),
-)
+QUICK = ("--set", "train.svm.C=0.001", "--set", "train.svm.augmentation=false")
 
 
 def test_trains_a_model_and_tests_it(run: Run, patches_path: Path, tmp_path: Path) -> None:
-    target, folder = tmp_path / "p.json", tmp_path / "page"
-    result = run("eval", "patches", patches_path, "--json", target, "--page", folder, *QUICK)
+    target = tmp_path / "p.json"
+    result = run("eval", "patches", patches_path, "--json", target, *QUICK)
     assert result.code == 0, result.err
-    for words in ("patches tested", "leak-free", "log loss", "["):
+    for words in ("patches tested: 65", "leak-free", "precision", "predicted non-vehicle"):
         assert words in result.out
     found = json.loads(target.read_text())
     assert found["test"]["patches"] == 65
-    assert found["test"]["accuracy"]["value"] > 0.9
-    html = (folder / "page.html").read_text()
-    for words in ("By class and by group", "Worst mistakes"):
-        assert words in html
+    assert found["test"]["accuracy"] > 0.9
 
 
 def test_measures_a_ready_model_on_everything(
@@ -34,4 +28,4 @@ def test_measures_a_ready_model_on_everything(
     found = json.loads(result.out)
     assert found["test"]["patches"] == 320
     assert "if the model was trained on some of these patches" in found["meaning"]
-    assert "ROC AUC" in result.err, "the table makes room on standard output"
+    assert "recall" in result.err, "the table makes room on standard output"

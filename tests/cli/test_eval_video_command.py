@@ -90,7 +90,7 @@ def test_what_cannot_be_is_said_before_any_work(
 def test_a_model_that_is_given_must_fit_all_settings(
     run: Run, clip_path: Path, truth_path: Path, model_path: Path
 ) -> None:
-    sweep = ("--sweep", "detector.features.color_space=YCrCb,HSV")
+    sweep = ("--sweep", "detector.features.patch=32,48")
     options = ("--truth", truth_path, "--model", model_path, *sweep)
     result = run("eval", "video", clip_path, *options)
     assert (result.code, result.out) == (1, "")

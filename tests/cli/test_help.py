@@ -137,7 +137,7 @@ def test_one_option_means_the_same_in_every_command() -> None:
     [
         (["config", "-c"], "se", {"seed", "se"}),  # the second stands for files
         (["detect-video", "--set"], "tracker.need", {"tracker.needed="}),
-        (["train", "--set"], "train.svm.augmentation.m", {"train.svm.augmentation.mirror="}),
+        (["train", "--set"], "train.svm.a", {"train.svm.augmentation="}),
         (["eval", "video", "--model"], "mod", {"mod"}),
     ],
 )

@@ -41,9 +41,7 @@ def truth_path(scene: Scene, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def options(model_path: Path) -> tuple[str | Path, ...]:
-    # Of a model this small, whatever it finds likely is worth a look.
-    lenient = ("--set", "train.mine.probability=0.05")
-    return ("--model", model_path, *WINDOWS, *lenient)
+    return ("--model", model_path, *WINDOWS)
 
 
 def test_mines_patches_that_train_learns_from(
@@ -90,19 +88,20 @@ def test_a_patch_is_its_window_and_its_box_is_that_of_the_truth(
         frames = [frame.image for frame in reader]
     truth = read_truth(truth_path)
     seen = set()
-    for patch in read_patches(find_patches([target])):
-        match = NAME.fullmatch(patch.file.name.rpartition("/")[2])
+    files = find_patches([target])
+    for file, image in zip(files, read_patches(files), strict=True):
+        match = NAME.fullmatch(file.name.rpartition("/")[2])
         assert match
         number, x, y, side = map(int, match.groups())
         seen.add(number)
         crop = frames[number - 1][y : y + side, x : x + side]
         expected = cv2.resize(crop, (64, 64), interpolation=cv2.INTER_LINEAR)
-        np.testing.assert_array_equal(patch.image, expected)
-        if patch.file.sides is not None:
+        np.testing.assert_array_equal(image, expected)
+        if file.sides is not None:
             here = truth.frame(number)
             corners = here.boxes[~here.ignored]
             middle = np.array([x, y, x, y]) + side / 2
-            told = np.array(patch.file.sides, float) * side + middle
+            told = np.array(file.sides, float) * side + middle
             misses = np.nanmax(abs(corners - told), axis=1)
             assert misses.min() < 0.05
     assert seen == {1, 5, 9}
@@ -155,7 +154,6 @@ def _patches(path: Path) -> dict[str, bytes]:
         (("-o", "mined.npz"), 1, "mined.npz: patches are written as .zip; name it so"),
         (("--truth", "none.txt"), 1, "none.txt: cannot be read"),
         (("--truth", "a.txt", "--truth", "b.txt"), 2, "(videos: 1, truths: 2)"),
-        (("--set", "train.mine.probability=-1"), 1, "train.mine.probability"),
         (("--set", BELOW), 1, "road.mp4: no search window fits into 320×180 pixels"),
     ],
 )

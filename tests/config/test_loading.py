@@ -82,26 +82,19 @@ def test_all_errors_are_given_at_once(path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "column", "message"),
     [
-        ("heat: {x: 3}", 19, "heat.x: is no setting; known here: frames, weight, shrink, "),
+        ("heat: {x: 3}", 19, "heat.x: is no setting; known here: frames, blur, threshold, "),
         ("features: {hog: {cel: 3}}", 29, "features.hog.cel: is no setting; did you mean cell?"),
         ("heat: 3", 12, "heat: should be a section, key: value (got 3)"),
         ("heat: {frames: 2001-01-01}", 19, "heat.frames: should be a valid integer (got datetime"),
         ("heat: {threshold: 1e999}", 19, "heat.threshold: should be a finite number (got inf)"),
-        ("features: {color_space: BGR}", 23, "features.color_space: should be 'YCrCb', 'HSV', "),
         ("features: {patch: 62}", 12, "features: patch must be a multiple of hog.cell (4)"),
-        (
-            "search: {windows: [], perspective: {sizes: []}}",
-            12,
-            "search: windows or perspective.sizes must be given",
-        ),
         ("search: {windows: [5]}", 31, "search.windows[0]: should be a section, key: value"),
         (
             "search: {windows: [{size: 64, overlap: 0.8, top: 0, bottom: 63}]}",
             31,
             "search.windows[0]: bottom must be at least top + size",
         ),
-        ("heat: {shrink: 3}", 19, "heat.shrink: should be 1, 2, 4 or 8 (got 3)"),
-        ("heat: {weight: some}", 19, "heat.weight: should be 'none' or 'coverage' (got 'some')"),
+        ("heat: {regions: some}", 19, "heat.regions: should be 'outline' or 'votes' (got 'some')"),
     ],
 )
 def test_a_mistake_in_the_detector_is_explained_in_one_line(

@@ -74,7 +74,6 @@ detectors = st.builds(
     SvmSettings,
     features=st.builds(
         FeatureSettings,
-        color_space=st.sampled_from(["YCrCb", "RGB", "LUV"]),
         hog=st.builds(HogSettings, orientations=st.integers(2, 32)),
         histogram=st.builds(HistogramSettings, bins=st.sampled_from([8, 256])),
     ),
@@ -85,8 +84,7 @@ detectors = st.builds(
     ),
     heat=st.builds(
         HeatSettings,
-        weight=st.sampled_from(["none", "coverage"]),
-        shrink=st.sampled_from([1, 2, 4, 8]),
+        regions=st.sampled_from(["outline", "votes"]),
         threshold=finite.map(abs),
     ),
 )
@@ -100,8 +98,7 @@ some_settings = st.builds(
         svm=st.builds(
             SvmTrainingSettings,
             C=st.floats(0, 1e6, exclude_min=True),
-            split=st.sampled_from(["random", "tail"]),
-            seed=st.integers(0, 2**32 - 1),
+            augmentation=st.booleans(),
         ),
     ),
 )

@@ -21,7 +21,7 @@ from vdet.detect.svm.model import load_model
 from vdet.errors import ConfigError, ModelError
 from vdet.media import Picture
 
-OTHER = FeatureSettings(color_space="HSV")
+OTHER = FeatureSettings(patch=48)
 
 
 class TestLinearModel:

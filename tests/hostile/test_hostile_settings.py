@@ -27,8 +27,8 @@ detector:
       overlap: 0.75
       top: 300
       bottom: 700
-    perspective: {sizes: [0.25, 0.5], horizon: 0.45, lowest: 1.1, beyond: 0.7}
-  heat: {frames: 3, weight: "coverage", shrink: 4, blur: 15, threshold: 5e-1}
+    perspective: {sizes: [0.25, 0.5], horizon: 0.45}
+  heat: {frames: 3, regions: "votes", blur: 15, threshold: 5e-1}
   score: {middle: 0.3, slope: 2}
 tracker:
   kind: rules
@@ -131,8 +131,8 @@ HOSTILE = {
     "huge version": ("%YAML " + "1" * 5000 + ".1\n---\nheat: {}", "is not YAML"),
     "no such character": (r'heat: "\UFFFFFFFF"', "is not YAML"),
     "half a character": (
-        r'detector: {heat: {weight: "\ud800"}}',
-        r"detector\.heat\.weight: .*got '\\ud800'",
+        r'detector: {heat: {regions: "\ud800"}}',
+        r"detector\.heat\.regions: .*got '\\ud800'",
     ),
     "half a character as kind": (
         r'detector: {kind: "\ud800"}',

@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Sequence
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import click
 from vdet.cli import options
 from vdet.cli.command import command
 from vdet.cli.messages import progress_steps
-from vdet.cli.results import Results, results_options
+from vdet.cli.results import Results, facts_options, results_options
 from vdet.errors import ConfigError
 
 _data = click.argument("data", nargs=-1, required=True, type=options.INPUT, metavar="DATA...")
@@ -57,10 +58,14 @@ def images(
     results.print(report.lines(), report.values, report.page)
 
 
-@command("vdet eval patches vehicles.zip non-vehicles.zip --page page")
+_ON_LAST = "leak-free: a new model is tested on the last patches of each folder"
+_ON_ALL = "if the model was trained on some of these patches, the scores are too good"
+
+
+@command("vdet eval patches vehicles.zip non-vehicles.zip --json scores.json")
 @_data
 @options.settings_options("train.svm.C=1e-4", options.model_option)
-@results_options
+@facts_options
 def patches(data: tuple[Path, ...], choice: options.SettingsChoice, results: Results) -> None:
     """Measure the classifier on labelled patches.
 
@@ -71,18 +76,19 @@ def patches(data: tuple[Path, ...], choice: options.SettingsChoice, results: Res
     from vdet.detect.svm.kind import requested_features
     from vdet.detect.svm.model import load_model
     from vdet.evaluate.output import RunName
-    from vdet.learn.svm import patch_eval
     from vdet.learn.svm.dataset import find_patches
+    from vdet.learn.svm.training import evaluate_patches
 
     path = Path(settings.svm.model) if settings.svm.model else None
     model = load_model(path, requested_features(settings.svm)) if path else None
     results.check()
     files = find_patches(data)
     with progress_steps("") as steps:
-        result = patch_eval.evaluate_patches(files, settings, model, steps=steps)
+        result = evaluate_patches(files, settings, model, steps=steps)
     name = RunName("svm", path, choice.name, choice.assignments)
-    text, values = [name.line, *patch_eval.lines(result)], patch_eval.values(result)
-    results.print(text, name.values | values, lambda: patch_eval.patch_page(result, name))
+    meaning = _ON_ALL if model else _ON_LAST
+    values = name.values | {"meaning": meaning, "test": asdict(result)}
+    results.print([name.line, meaning, "", *result.lines()], values)
 
 
 @command("vdet eval tracks out.txt gt.txt --page page")

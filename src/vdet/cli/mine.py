@@ -27,7 +27,7 @@ from vdet.files import check_output
     default=1,
 )
 @options.until_option
-@options.settings_options("train.mine.probability=0.3", options.model_option)
+@options.settings_options("labels.roles.tram=vehicle", options.model_option)
 @options.overwrite_option
 def mine(
     sources: tuple[Path, ...],

@@ -8,8 +8,6 @@ from pydantic import Field, model_validator
 from vdet.config.detector import DetectorSettings, Foot, Searches
 from vdet.config.section import FRAME_LENGTH, Pixels, Section, Share
 
-ColorSpace = Literal["YCrCb", "HSV", "LUV", "HLS", "YUV", "RGB"]
-
 
 class HogSettings(Section):
     """Histograms of oriented gradients (Dalal & Triggs 2005), as cv2.HOGDescriptor gives them."""
@@ -34,11 +32,9 @@ class FeatureSettings(Section):
 
     patch: int = Field(32, ge=16, le=256)
     """Side of a patch, in pixels."""
-    color_space: ColorSpace = "YCrCb"
-    """Colour space: YCrCb, HSV, LUV, HLS, YUV or RGB."""
     halved: Annotated[tuple[Literal[0, 1, 2], ...], Field(max_length=3)] = (1, 2)
-    """Channels that are described at half their size, with HOG cells of half the side. Video has
-    chroma at half size.
+    """Channels of YCrCb that are described at half their size, with HOG cells of half the side.
+    Video has chroma at half size.
     """
     hog: HogSettings = HogSettings()
     histogram: HistogramSettings = HistogramSettings()
@@ -89,8 +85,6 @@ class WindowSettings(Section):
     def _fits_its_band(self) -> "WindowSettings":
         if self.bottom - self.top < self.size:
             raise ValueError("bottom must be at least top + size")
-        if int(self.size * (1 - self.overlap)) < 1:
-            raise ValueError("overlap leaves a step of less than a pixel")
         return self
 
 
@@ -103,27 +97,10 @@ class PerspectiveSettings(Section):
     """Side of the windows of each set, as a share of the frame's width. In frames wider than 16:9,
     as a share of 16/9 of the height.
     """
-    zoom: float = Field(1.0, ge=0.1, le=10)
-    """Factor of all sizes. Above 1 for a longer lens."""
     horizon: float | None = Field(None, ge=-1, le=1)
     """Row of the horizon, as a share of the frame's height. null: where the lines of the road meet
     in the first frames.
     """
-    highest: float = Field(0.6, ge=0, le=10)
-    """Distance from the horizon down to the bottom of a set's highest windows, in sides of a
-    window.
-    """
-    lowest: float = Field(1.1, ge=0, le=10)
-    """Distance from the horizon down to the bottom of a set's lowest windows, in sides of a window.
-    """
-    beyond: Share = 0.7
-    """Share of a window that may lie beyond the left or right of the frame."""
-
-    @model_validator(mode="after")
-    def _is_in_order(self) -> "PerspectiveSettings":
-        if self.lowest < self.highest:
-            raise ValueError("lowest must be at least highest")
-        return self
 
 
 class SearchSettings(Section):
@@ -135,34 +112,23 @@ class SearchSettings(Section):
     """Window sets over fixed rows."""
     perspective: PerspectiveSettings = PerspectiveSettings()
 
-    @model_validator(mode="after")
-    def _has_windows(self) -> "SearchSettings":
-        if not (self.windows or self.perspective.sizes):
-            raise ValueError("windows or perspective.sizes must be given")
-        return self
-
 
 class HeatSettings(Section):
     """How the hits of consecutive frames are summed into a heatmap, and become detections."""
 
     frames: int = Field(2, ge=1, le=100)
     """Number of searched frames whose hits are summed."""
-    weight: Literal["none", "coverage"] = "coverage"
-    """none: a hit adds its probability. coverage: a hit adds its probability divided by the number
-    of windows of its set that cover a pixel, so the threshold does not depend on their overlap.
-    """
-    shrink: Literal[1, 2, 4, 8] = 4
-    """Pixels across and down that one value of the heatmap covers."""
     blur: Annotated[int, Field(ge=1, le=100_000), FRAME_LENGTH] = 15
     """Side of the Gaussian kernel that blurs the heat, in pixels."""
     threshold: float = Field(0.075, ge=0)
     """Heat above which a pixel is hot."""
     regions: Literal["outline", "votes"] = "votes"
-    """outline: each connected hot area is a detection, with its bounding box. votes: the boxes of
-    the hits in an area decide how many vehicles it shows, and where.
+    """outline: a hit adds its probability to the heat; each connected hot area is a detection, with
+    its bounding box. votes: a hit adds less the more windows of its set cover a pixel; the boxes of
+    the hits in a hot area decide how many vehicles it shows, and where.
     """
     votes: float = Field(0.12, ge=0)
-    """Least weight of hits that agree on a vehicle, with votes."""
+    """Minimum weight of hits that agree on a vehicle, with votes."""
 
 
 class ScoreSettings(Section):

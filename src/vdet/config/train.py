@@ -1,25 +1,10 @@
 """The section `train`: how models are trained."""
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import Field
 
 from vdet.config.section import Section, Share
-
-
-class AugmentationSettings(Section):
-    """Further samples that are made from the training patches."""
-
-    mirror: bool = True
-    """Add the mirror image of each patch. The samples below are made from both."""
-    cut: Share = 0.15
-    """Share of patches that are added again, cut off by 15 to 50 % at the left or right, as by the
-    side of the frame.
-    """
-    parts: Share = 0.05
-    """Share of vehicle patches from which a crop, 40 to 60 % of the width and height, is added as a
-    non-vehicle.
-    """
 
 
 class SvmTrainingSettings(Section):
@@ -27,24 +12,10 @@ class SvmTrainingSettings(Section):
 
     C: float = Field(3e-5, gt=0, le=1e6)
     """Penalty of errors. Smaller values give a smoother model."""
-    split: Literal["random", "tail"] = "random"
-    """Patches that are held out for the test. random: any (near-duplicates leak). tail: the last of
-    each folder, in numeric order of file names.
+    augmentation: bool = True
+    """Learn from further samples: the mirror image of each patch, and of some patches a copy that
+    the side of a frame cuts off, and a part as an example of what is not a vehicle.
     """
-    seed: int = Field(0, ge=0, le=2**32 - 1)
-    """Seed of the split, the folds and the augmentation."""
-    ensemble: bool = False
-    """true: keep an SVM for each fold of the calibration and average their probabilities. false:
-    fit one SVM to everything.
-    """
-    augmentation: AugmentationSettings = AugmentationSettings()
-
-
-class MiningSettings(Section):
-    """What `vdet mine` takes from each frame of labelled video."""
-
-    probability: Share = 0.2
-    """Least probability of a false alarm: a window that shows no vehicle."""
 
 
 class NetworkScoreSettings(Section):
@@ -86,8 +57,7 @@ class NetworkTrainingSettings(Section):
 
 
 class TrainSettings(Section):
-    """Training of models: `vdet train`, `vdet mine` and `vdet train-net`."""
+    """Training of models: `vdet train` and `vdet train-net`."""
 
     svm: SvmTrainingSettings = SvmTrainingSettings()
-    mine: MiningSettings = MiningSettings()
     net: NetworkTrainingSettings = NetworkTrainingSettings()

@@ -1,5 +1,3 @@
-from typing import get_args
-
 import cv2
 import numpy as np
 import pytest
@@ -7,7 +5,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from seed import SEED
-from vdet.config.svm import ColorSpace, FeatureSettings
+from vdet.config.svm import FeatureSettings
 from vdet.detect.svm.features import (
     FeatureExtractor,
     cut_window,
@@ -50,13 +48,6 @@ def test_the_histogram_part_is_what_numpy_gives_for_each_channel_of_ycrcb() -> N
 def test_a_histogram_counts_every_value_once(bins: int) -> None:
     channel = np.repeat(np.arange(256, dtype=np.uint8), 2).reshape(16, 32)
     assert histogram(channel, bins).tolist() == [2 * 256 // bins] * bins
-
-
-@pytest.mark.parametrize("space", get_args(ColorSpace))
-def test_every_colour_space_is_that_of_opencv(space: ColorSpace) -> None:
-    settings = seed_but(color_space=space)
-    converted = cv2.cvtColor(PATCH, getattr(cv2, f"COLOR_BGR2{space}"))
-    np.testing.assert_array_equal(split(PATCH, settings), converted.transpose(2, 0, 1))
 
 
 def test_a_halved_channel_is_described_at_half_its_size() -> None:

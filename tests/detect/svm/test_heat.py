@@ -5,9 +5,9 @@ import cv2
 import numpy as np
 import pytest
 
-from vdet.boxes import Box, Float32Array
+from vdet.boxes import Box
 from vdet.config.svm import HeatSettings, WindowSettings
-from vdet.detect.svm.heat import Heat, HeatHistory, find_regions
+from vdet.detect.svm.heat import Heat, find_regions, sum_heat
 from vdet.detect.svm.windows import Windows, lay_grid
 
 
@@ -18,19 +18,11 @@ def found(*windows: tuple[int, int, int, int, float], share: float = 1) -> Windo
     return Windows(boxes, probabilities, shares, boxes.astype(np.float32))
 
 
-def heat_map(
-    frames: int = 2,
-    blur: int = 1,
-    weight: Literal["none", "coverage"] = "none",
-    shrink: Literal[1, 2, 4, 8] = 1,
-) -> HeatHistory:
-    """Make the map of a frame of 100 × 60 pixels."""
-    settings = HeatSettings(frames=frames, blur=blur, weight=weight, shrink=shrink)
-    return HeatHistory(100, 60, settings)
-
-
-def values_of(heat: HeatHistory, windows: Windows) -> Float32Array:
-    return heat.update(windows).values
+def heat_of(
+    *frames: Windows, blur: int = 1, regions: Literal["outline", "votes"] = "outline"
+) -> Heat:
+    """Return the heat of frames of 100 × 60 pixels."""
+    return sum_heat(frames, (100, 60), HeatSettings(blur=blur, regions=regions))
 
 
 def drawn(*boxes: tuple[int, int, int, int, float], shrink: int = 1) -> Heat:
@@ -42,7 +34,7 @@ def drawn(*boxes: tuple[int, int, int, int, float], shrink: int = 1) -> Heat:
 
 
 def test_heat_is_the_sum_of_the_probabilities_of_the_windows_over_a_pixel() -> None:
-    heat = values_of(heat_map(), found((10, 10, 20, 20, 0.5), (20, 20, 20, 20, 0.75)))
+    heat = heat_of(found((10, 10, 20, 20, 0.5), (20, 20, 20, 20, 0.75))).values
     assert heat.shape == (60, 100)
     assert heat.dtype == np.float32
     assert heat[10, 10] == 0.5
@@ -52,26 +44,16 @@ def test_heat_is_the_sum_of_the_probabilities_of_the_windows_over_a_pixel() -> N
     assert heat.sum() == 400 * 0.5 + 400 * 0.75
 
 
-def test_heat_is_summed_over_the_last_frames_and_the_oldest_is_forgotten() -> None:
-    heat = heat_map(frames=3)
-    peaks = [heat.update(found((0, 0, 5, 5, p))).peak for p in (0.5, 0.25, 1, 0.125)]
-    assert peaks == [0.5, 0.75, 1.75, 1.375]
+def test_heat_is_summed_over_the_frames() -> None:
+    assert heat_of(*(found((0, 0, 5, 5, p)) for p in (0.25, 1, 0.125))).peak == 1.375
 
 
 def test_blur_spreads_heat_and_conserves_it() -> None:
     window = found((40, 20, 20, 20, 1))
-    sharp, blurred = values_of(heat_map(), window), values_of(heat_map(blur=15), window)
+    sharp, blurred = heat_of(window).values, heat_of(window, blur=15).values
     assert blurred.sum() == pytest.approx(sharp.sum(), rel=1e-5)
     assert 0 < blurred[30, 35] < 1
     np.testing.assert_allclose(blurred, cv2.GaussianBlur(sharp, (15, 15), 0), atol=1e-6)
-
-
-def test_the_sum_is_blurred_and_not_the_frames_that_are_kept() -> None:
-    heat = heat_map(frames=2, blur=9)
-    heat.update(found((40, 20, 20, 20, 1)))
-    twice = values_of(heat, found((40, 20, 20, 20, 1)))
-    once = values_of(heat_map(blur=9), found((40, 20, 20, 20, 1)))
-    np.testing.assert_allclose(twice, 2 * once, atol=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -87,67 +69,60 @@ def test_the_sum_is_blurred_and_not_the_frames_that_are_kept() -> None:
 def test_a_hit_partly_outside_the_frame_heats_the_inside(
     window: tuple[int, int, int, int], pixels: int
 ) -> None:
-    assert values_of(heat_map(), found((*window, 1))).sum() == pixels
+    assert heat_of(found((*window, 1))).values.sum() == pixels
 
 
-def test_by_coverage_a_hit_adds_its_probability_times_its_share() -> None:
-    quarters = found((10, 10, 20, 20, 0.5), (20, 20, 20, 20, 1), share=0.25)
-    values = values_of(heat_map(weight="coverage"), quarters)
-    assert values[10, 10] == 0.125
-    assert values[25, 25] == 0.375
-    assert values[39, 39] == 0.25
+def test_with_votes_a_hit_adds_its_probability_times_its_share() -> None:
+    quarters = found((8, 8, 20, 20, 0.5), (20, 20, 20, 20, 1), share=0.25)
+    values = heat_of(quarters, regions="votes").values
+    assert (values[2, 2], values[6, 6], values[9, 9]) == (0.125, 0.375, 0.25)
 
 
 @pytest.mark.parametrize("overlap", [0, 0.5, 0.75])
-def test_by_coverage_heat_does_not_depend_on_overlap(overlap: float) -> None:
+def test_with_votes_heat_does_not_depend_on_overlap(overlap: float) -> None:
     settings = WindowSettings(size=20, overlap=overlap, top=0, bottom=60)
     grid = lay_grid(settings, 100, 60)
     shares = np.full(len(grid), grid.share, np.float32)
     ones, boxes = np.ones(len(grid), np.float32), grid.boxes
     windows = Windows(boxes, ones, shares, boxes.astype(np.float32))
-    assert values_of(heat_map(weight="coverage"), windows)[30, 50] == pytest.approx(1)
+    assert heat_of(windows, regions="votes").values[7, 12] == pytest.approx(1)
 
 
 def test_a_hit_heats_its_vehicle_and_not_its_window() -> None:
     window = found((10, 10, 20, 20, 0.5))
     shown = replace(window, vehicles=np.array([[14, 12, 30, 10]], np.float32))
-    expected = values_of(heat_map(), found((14, 12, 30, 10, 0.5)))
-    np.testing.assert_array_equal(values_of(heat_map(), shown), expected)
+    expected = heat_of(found((14, 12, 30, 10, 0.5)))
+    np.testing.assert_array_equal(heat_of(shown).values, expected.values)
 
 
 @pytest.mark.parametrize(("x", "first"), [(9.4, 9), (9.6, 10), (-0.4, 0)])
 def test_the_sides_of_a_vehicle_are_rounded_to_pixels(x: float, first: int) -> None:
     window = found((10, 10, 20, 20, 1))
     shown = replace(window, vehicles=np.array([[x, 5, 20, 10]], np.float32))
-    (columns,) = np.nonzero(values_of(heat_map(), shown)[7])
+    (columns,) = np.nonzero(heat_of(shown).values[7])
     assert columns.tolist() == list(range(first, first + 20))
 
 
-@pytest.mark.parametrize("shrink", [2, 4, 8])
-class TestShrunk:
-    def test_a_value_stands_for_n_by_n_pixels(self, shrink: Literal[2, 4, 8]) -> None:
-        heat = heat_map(shrink=shrink).update(found((16, 8, 32, 24, 0.5)))
-        assert heat.shrink == shrink
-        expected = np.zeros((60, 100), np.float32)
-        expected[8:32, 16:48] = 0.5
-        np.testing.assert_array_equal(heat.values, expected[::shrink, ::shrink])
+def test_with_votes_a_value_stands_for_4_by_4_pixels() -> None:
+    window = found((16, 8, 32, 24, 0.5))
+    heat = heat_of(window, regions="votes")
+    assert heat.shrink == 4
+    expected = np.zeros((15, 25), np.float32)
+    expected[2:8, 4:12] = 0.5
+    np.testing.assert_array_equal(heat.values, expected)
+    blurred = heat_of(window, blur=24, regions="votes").values  # 24 / 4, made odd
+    np.testing.assert_allclose(blurred, cv2.GaussianBlur(expected, (7, 7), 0), atol=1e-6)
 
-    def test_blur_is_as_wide_in_pixels_of_the_frame(self, shrink: Literal[2, 4, 8]) -> None:
-        window = found((32, 16, 16, 16, 1))
-        sharp = values_of(heat_map(shrink=shrink), window)
-        blurred = values_of(heat_map(shrink=shrink, blur=24), window)
-        side = {2: 13, 4: 7, 8: 3}[shrink]  # 24 / n, made odd
-        np.testing.assert_allclose(blurred, cv2.GaussianBlur(sharp, (side, side), 0), atol=1e-6)
-        assert (blurred != sharp).any()
 
-    def test_regions_are_in_pixels_of_the_frame(self, shrink: int) -> None:
-        (region,) = find_regions(drawn((5, 3, 4, 2, 2), shrink=shrink), 1)
-        assert region.box == Box.sized(5 * shrink, 3 * shrink, 4 * shrink, 2 * shrink)
-        # the middles of the outermost values' pixels are at equal distance from it
-        left, right = (5 + 0.5) * shrink - 0.5, (8 + 0.5) * shrink - 0.5
-        top, bottom = (3 + 0.5) * shrink - 0.5, (4 + 0.5) * shrink - 0.5
-        assert region.centroid == pytest.approx(((left + right) / 2, (top + bottom) / 2))
-        assert region.strength == 2
+@pytest.mark.parametrize("shrink", [1, 4])
+def test_regions_are_in_pixels_of_the_frame(shrink: int) -> None:
+    (region,) = find_regions(drawn((5, 3, 4, 2, 2), shrink=shrink), 1)
+    assert region.box == Box.sized(5 * shrink, 3 * shrink, 4 * shrink, 2 * shrink)
+    # the middles of the outermost values' pixels are at equal distance from it
+    left, right = (5 + 0.5) * shrink - 0.5, (8 + 0.5) * shrink - 0.5
+    top, bottom = (3 + 0.5) * shrink - 0.5, (4 + 0.5) * shrink - 0.5
+    assert region.centroid == pytest.approx(((left + right) / 2, (top + bottom) / 2))
+    assert region.strength == 2
 
 
 def test_a_rectangle_gives_its_box_its_middle_and_its_peak() -> None:

@@ -137,18 +137,12 @@ def test_a_saved_model_is_loaded_bit_for_bit(path: Path, members: int) -> None:
         assert getattr(loaded, name).dtype == np.float32
 
 
-def test_the_features_of_a_model_come_with_it(path: Path) -> None:
-    features = FeatureSettings(color_space="HLS")
-    save_model(model_of(1, features), path)
-    assert load_model(path).features == features
-    assert load_model(path, features).features == features
-
-
 def test_a_model_that_does_not_say_which_channels_are_halved_has_none(path: Path) -> None:
     features = SMALL.model_copy(update={"halved": ()})
     header = header_of(features)
     del header["features"]["halved"]
-    header["features"]["spatial"] = {"size": 0}  # as older versions wrote it
+    header["features"]["color_space"] = "YCrCb"  # as older versions wrote it
+    header["features"]["spatial"] = {"size": 0}
     header["features"]["hog"]["channels"] = [0, 1, 2]
     write_npz(path, header)
     assert load_model(path).features == features
@@ -178,7 +172,7 @@ def test_the_regression_of_boxes_is_kept_bit_for_bit(path: Path) -> None:
         (
             "box_weights",
             np.zeros((4, 95), np.float32),
-            "box_weights are damaged; train it",
+            r"box_weights are damaged, or not of shape \(4, 96\); train it",
         ),
         ("box_weights", np.zeros((4, 120), np.float32), "box_weights are damaged"),
         ("box_weights", np.zeros((3, 96), np.float32), "box_weights are damaged"),
@@ -205,14 +199,12 @@ def test_a_regression_with_one_of_its_two_arrays_is_damaged(path: Path, missing:
         load_model(write_npz(path, header_of(), **arrays))
 
 
-def test_a_model_asked_for_other_features_says_which_differ(path: Path) -> None:
+def test_a_model_asked_for_other_features_says_which_it_has(path: Path) -> None:
     save_model(model_of(1), path)
-    asked = SMALL.model_copy(update={"color_space": "HSV", "patch": 32})
-    with pytest.raises(ModelError, match="trained with other features") as error:
+    asked = SMALL.model_copy(update={"patch": 32})
+    message = r'trained with other features: detector\.features=\{"patch":16,'
+    with pytest.raises(ModelError, match=message):
         load_model(path, asked)
-    assert "detector.features.color_space: YCrCb, asked for HSV" in str(error.value)
-    assert "detector.features.patch: 16, asked for 32" in str(error.value)
-    assert "features.hog" not in str(error.value)
 
 
 def test_a_missing_model_is_named(path: Path) -> None:
@@ -255,6 +247,10 @@ def test_a_model_cut_off_anywhere_is_damaged(path: Path) -> None:
         (header_of(features={"patch": 63}), "is not a vdet model, or is damaged"),
         (header_of(features={"patch": math.nan}), "is not a vdet model, or is damaged"),
         (header_of(features={"colour": "red"}), "is not a vdet model, or is damaged"),
+        (
+            header_of(features=SMALL.model_dump(mode="json") | {"color_space": "HSV"}),
+            "has another colour space than YCrCb",
+        ),
         (header_of(provenance=[]), "is not a vdet model, or is damaged"),
         (header_of(provenance="me"), "is not a vdet model, or is damaged"),
         (header_of(provenance=None), "is not a vdet model, or is damaged"),
@@ -278,13 +274,13 @@ def test_a_model_without_one_of_its_parts_is_damaged(path: Path, missing: str) -
 @pytest.mark.parametrize(
     ("name", "array", "message"),
     [
-        ("weights", np.zeros((2, 119), np.float32), r"shape \(2, 119\) instead of \(2, 120\)"),
-        ("weights", np.zeros((3, 120), np.float32), r"shape \(3, 120\) instead of \(2, 120\)"),
-        ("weights", np.zeros(120, np.float32), "instead of"),
-        ("weights", np.zeros((2, 120, 1), np.float32), "instead of"),
+        ("weights", np.zeros((2, 119), np.float32), r"or not of shape \(2, 120\)"),
+        ("weights", np.zeros((3, 120), np.float32), r"or not of shape \(2, 120\)"),
+        ("weights", np.zeros(120, np.float32), "weights are damaged"),
+        ("weights", np.zeros((2, 120, 1), np.float32), "weights are damaged"),
         ("weights", np.zeros((2, 120)), "weights are damaged"),
         ("weights", np.full((2, 120), np.nan, np.float32), "weights are damaged"),
-        ("biases", np.zeros((2, 1), np.float32), "instead of"),
+        ("biases", np.zeros((2, 1), np.float32), "biases are damaged"),
         ("biases", np.array([0, np.inf], np.float32), "biases are damaged"),
         ("biases", np.zeros(2, "S4"), "biases are damaged"),
         ("biases", np.zeros(2, [("a", "f4")]), "biases are damaged"),
@@ -302,11 +298,10 @@ def test_an_array_that_does_not_fit_is_refused(
         load_model(write_npz(path, header_of(), **{name: array}))
 
 
-@pytest.mark.parametrize("members", [0, 21])
-def test_no_members_and_too_many_are_refused(path: Path, members: int) -> None:
-    arrays = {name: np.zeros(members, np.float32) for name in ("biases", "slopes", "offsets")}
-    weights = np.zeros((members, 120), np.float32)
-    with pytest.raises(ModelError, match="train it again"):
+def test_a_model_without_members_is_refused(path: Path) -> None:
+    arrays = {name: np.zeros(0, np.float32) for name in ("biases", "slopes", "offsets")}
+    weights = np.zeros((0, 120), np.float32)
+    with pytest.raises(ModelError, match="has no SVM; train it again"):
         load_model(write_npz(path, header_of(), weights=weights, **arrays))
 
 
@@ -356,5 +351,5 @@ def test_no_memory_is_allocated_for_a_shape_that_the_file_does_not_hold(path: Pa
 )
 def test_a_shape_that_the_file_does_not_hold_is_refused(path: Path, shape: str) -> None:
     data = npy_header("<f4", shape) + bytes(192)
-    with pytest.raises(ModelError, match=r"damaged|has weights of shape"):
+    with pytest.raises(ModelError, match="damaged"):
         load_model(write_members(path, members_of(model_of(2), weights=data)))

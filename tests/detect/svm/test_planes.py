@@ -3,17 +3,13 @@
 from dataclasses import astuple, dataclass
 
 import numpy as np
-import pytest
 
 from codings import in_any_coding
 from detect.svm.engine_comparison import fitted, log_odds, road
-from red_cars import CAR, HEIGHT, SETTINGS, THREE_SETS, WIDTH, red_finder
-from red_cars import road as plain_road
 from vdet.boxes import Float32Array, Float64Array, Image, iou_matrix
-from vdet.config.schema import Settings, SvmSettings
+from vdet.config.schema import SvmSettings
 from vdet.config.svm import FeatureSettings
 from vdet.detect.factory import load_detector
-from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.search import FrameSearch
 from vdet.media import Picture, Planes
 from vdet.media.coding import Coding
@@ -71,23 +67,3 @@ def vehicles_in(picture: Picture) -> Vehicles:
     boxes = found.sides
     nearest = iou_matrix(boxes, TRUE_BOXES).argmax(axis=0)
     return Vehicles(boxes[nearest], found.scores[nearest])
-
-
-@in_any_coding
-@pytest.mark.parametrize("settings", [SETTINGS, THREE_SETS], ids=["rows", "perspective"])
-def test_a_model_of_another_colour_space_finds_exactly_the_same(
-    settings: Settings, coding: Coding
-) -> None:
-    image = plain_road(CAR)
-    model = SvmModel(red_finder(), settings.svm)
-
-    def found_in(picture: Picture) -> tuple[Float64Array, Float64Array]:
-        detector = model.for_video(WIDTH, HEIGHT, [image])
-        for index in range(settings.svm.heat.frames + 1):
-            found = detector.detect(detector.search(picture, index))
-        return found.sides, found.data["strength"]
-
-    ours, expected = (found_in(picture) for picture in both_forms(image, coding))
-    assert len(expected[0]) == 1
-    for one, other in zip(ours, expected, strict=True):
-        np.testing.assert_array_equal(one, other)

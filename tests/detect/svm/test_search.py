@@ -59,9 +59,7 @@ def fixed(*sets: WindowSettings) -> SearchSettings:
 
 PERSPECTIVE = SvmSettings(
     features=SMALL,
-    search=SearchSettings(
-        perspective=PerspectiveSettings(sizes=(0.1, 0.15, 0.2, 0.3), beyond=0.34)
-    ),
+    search=SearchSettings(perspective=PerspectiveSettings(sizes=(0.1, 0.15, 0.2, 0.3))),
 )
 
 
@@ -119,7 +117,7 @@ class TestLayingGrids:
         self, settings: SvmSettings, width: int, height: int
     ) -> None:
         x, y, w, h = laid(width, height, settings).T
-        beyond = settings.search.perspective.beyond if settings.search.perspective.sizes else 0
+        beyond = 0.7 if settings.search.perspective.sizes else 0
         assert (x >= -beyond * w).all()
         assert (y >= 0).all()
         assert (x + w <= width + beyond * w).all()
@@ -157,15 +155,14 @@ class TestSearching:
 
     def test_what_lies_beyond_the_sides_repeats_the_outermost_columns(self) -> None:
         wide = np.pad(FRAME, ((0, 0), (24, 24), (0, 0)), mode="edge")
-        perspective = PERSPECTIVE.search.perspective.model_copy(update={"zoom": 160 / 208})
-        settings = PERSPECTIVE.model_copy(
-            update={"search": SearchSettings(perspective=perspective)}
-        )
+        sizes = tuple(size * 160 / 208 for size in PERSPECTIVE.search.perspective.sizes)
+        search = SearchSettings(perspective=PerspectiveSettings(sizes=sizes))
+        settings = PERSPECTIVE.model_copy(update={"search": search})
         found = search_all(FrameSearch(model_of(SMALL), settings, 208, 120, horizon=0.3), wide)
         moved = (found.boxes - [24, 0, 0, 0]).tolist()
         expected = dict(zip(map(tuple, moved), found.probabilities.tolist(), strict=True))
         ours = search_all(by_perspective())
-        assert ours.boxes[:, 0].min() == -12
+        assert ours.boxes[:, 0].min() == -24
         for box, probability in zip(ours.boxes.tolist(), ours.probabilities.tolist(), strict=True):
             assert expected[tuple(box)] == pytest.approx(probability, abs=1e-5)
 

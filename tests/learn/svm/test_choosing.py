@@ -18,7 +18,7 @@ from vdet.learn.svm.choosing import (
 WIDTH = 1000
 CAR = Box.sized(400, 300, 100, 70)
 OTHER = Box.sized(700, 300, 100, 70)
-GENEROUS = Most(per_vehicle=1000, false_alarms=1000, parts=1000)
+GENEROUS = Most(per_vehicle=1000, false_alarms=1000, parts=1000, probability=0.2)
 
 
 Truth = tuple[npt.NDArray[np.float64], npt.NDArray[np.bool_]]
@@ -49,10 +49,9 @@ def chosen(
     labels: Truth,
     most: Most = GENEROUS,
     seed: int = 0,
-    probability: float = 0.2,
 ) -> list[ChosenWindow]:
     rng = np.random.default_rng(seed)
-    return list(choose_windows(found, *labels, WIDTH, rng, probability=probability, most=most))
+    return list(choose_windows(found, *labels, WIDTH, rng, most=most))
 
 
 def kinds(choices: list[ChosenWindow]) -> dict[Box, str]:
@@ -106,8 +105,8 @@ def many() -> Windows:
 
 
 def test_each_vehicle_and_the_frame_give_no_more_than_the_settings_allow() -> None:
-    most = Most(per_vehicle=4, false_alarms=7, parts=3)
-    choices = chosen(many(), truth(CAR, OTHER), most, probability=0)
+    most = Most(per_vehicle=4, false_alarms=7, parts=3, probability=0)
+    choices = chosen(many(), truth(CAR, OTHER), most)
     counted = [choice.kind for choice in choices]
     kinds_in_order: tuple[PatchKind, ...] = ("vehicle", "box", "false alarm", "part")
     assert [counted.count(kind) for kind in kinds_in_order] == [8, 8, 7, 3]
@@ -116,7 +115,7 @@ def test_each_vehicle_and_the_frame_give_no_more_than_the_settings_allow() -> No
 
 
 def test_the_same_seed_takes_the_same_windows_and_another_seed_others() -> None:
-    most = Most(per_vehicle=4, false_alarms=7)
+    most = Most(per_vehicle=4, false_alarms=7, probability=0)
     one, same, other = (chosen(many(), truth(CAR), most, seed) for seed in (0, 0, 1))
     assert one == same
     assert set(one) != set(other)

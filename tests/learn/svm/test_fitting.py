@@ -45,12 +45,10 @@ def fit(
     vectors: Float32Array,
     vehicle: BoolArray,
     origins: RowNumbers | None = None,
-    *,
-    ensemble: bool = True,
-    **changes: object,
+    penalty: float = 0.01,
 ) -> LinearModel:
     """Fit to copies of vectors; without origins, all rows are patches."""
-    training = SvmTrainingSettings(C=0.01, ensemble=ensemble).model_copy(update=changes)
+    training = SvmTrainingSettings(C=penalty)
     if origins is None:
         origins = np.arange(len(vectors))
     rows = labelled(vectors.copy(), vehicle, origins)
@@ -59,22 +57,20 @@ def fit(
     )
 
 
-@pytest.mark.parametrize("ensemble", [True, False])
-def test_the_folded_model_gives_the_probabilities_of_scikit_learn(ensemble: bool) -> None:
+def test_the_folded_model_gives_the_probabilities_of_scikit_learn() -> None:
     vectors, vehicle = clouds()
-    model = fit(vectors, vehicle, ensemble=ensemble)
+    model = fit(vectors, vehicle)
     svm = CalibratedClassifierCV(
         LinearSVC(C=0.01, random_state=0),
         cv=StratifiedKFold(3, shuffle=True, random_state=0),
-        ensemble=ensemble,
+        ensemble=False,
     )
     reference = make_pipeline(StandardScaler(), svm).fit(vectors, vehicle)
     expected = reference.predict_proba(vectors)[:, 1]
     assert expected.std() > 0.2
     np.testing.assert_allclose(model.probabilities(vectors), expected, atol=1e-4)
-    members = 3 if ensemble else 1
-    assert model.weights.shape == (members, 24)
-    assert model.biases.shape == model.slopes.shape == model.offsets.shape == (members,)
+    assert model.weights.shape == (1, 24)
+    assert model.biases.shape == model.slopes.shape == model.offsets.shape == (1,)
     assert model.features == FEATURES
     kinds = {a.dtype for a in (model.weights, model.biases, model.slopes, model.offsets)}
     assert kinds == {np.dtype(np.float32)}
@@ -84,7 +80,7 @@ def test_the_folded_model_gives_the_probabilities_of_scikit_learn(ensemble: bool
 def test_too_few_patches_of_a_class_for_the_folds_are_an_error(vehicles: int, others: int) -> None:
     vehicle = np.array([True] * vehicles + [False] * others, bool)
     vectors = np.ones((len(vehicle), 24), np.float32)
-    message = rf"a class has {min(vehicles, others)} training patches, and 3 are needed; give more"
+    message = rf"a class has {min(vehicles, others)} training patches, must be at least 3; add more"
     with pytest.raises(DataError, match=message):
         fit(vectors, vehicle)
 
@@ -95,7 +91,7 @@ def test_an_svm_that_has_not_converged_is_reported_by_a_warning(
 ) -> None:
     monkeypatch.setattr("vdet.learn.svm.fitting.MAX_ITERATIONS", most)
     with caplog.at_level(logging.WARNING, "vdet"):
-        fit(*clouds(), C=1e6 if most == 1 else 0.01)
+        fit(*clouds(), penalty=1e6 if most == 1 else 0.01)
     warning = "the SVM has not converged; lower train.svm.C"
     assert (warning in caplog.text) is (most == 1)
 
@@ -107,8 +103,8 @@ def test_a_patch_and_the_samples_made_of_it_are_in_the_same_fold() -> None:
     noise = rng.normal(size=(90, 24)).astype(np.float32)  # can only be learned by heart
     twice = np.concatenate([noise, noise])
     origins = np.tile(np.arange(90), 2)
-    honest = fit(twice, np.tile(vehicle, 2), origins, ensemble=False, C=10.0)
-    leaking = fit(twice, np.tile(vehicle, 2), ensemble=False, C=10.0)
+    honest = fit(twice, np.tile(vehicle, 2), origins, penalty=10.0)
+    leaking = fit(twice, np.tile(vehicle, 2), penalty=10.0)
     np.testing.assert_allclose(honest.weights, leaking.weights, atol=1e-3)
     assert abs(leaking.slopes[0]) > 2 * abs(honest.slopes[0])
 
@@ -119,7 +115,7 @@ def test_augmented_samples_do_not_count_in_the_calibration() -> None:
     rows = np.concatenate([vectors, vectors[~vehicle]])
     labels = np.concatenate([vehicle, np.zeros(np.count_nonzero(~vehicle), bool)])
     origins = np.concatenate([np.arange(400), np.flatnonzero(~vehicle)])
-    model = fit(rows, labels, origins, ensemble=False)
+    model = fit(rows, labels, origins)
     assert model.probabilities(vectors).mean() == pytest.approx(vehicle.mean(), abs=0.04)
 
 

@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 
 from vdet.boxes import Box, Image
-from vdet.config.loading import load_settings
-from vdet.config.schema import OutputSettings, SvmSettings
+from vdet.config.schema import OutputSettings, Settings, SvmSettings
 from vdet.detect.svm.kind import load_svm
 from vdet.errors import DataError, VideoError
-from vdet.learn.svm.choosing import MOST, Most
+from vdet.learn.svm.choosing import Most
 from vdet.learn.svm.dataset import find_patches, read_patches
 from vdet.learn.svm.mining import PictureSource, VideoSource, mine
 from vdet.media import Frame, Picture, VideoInfo
@@ -26,7 +25,8 @@ CAR = Box.sized(270, 190, 100, 70)
 TREE = Box.sized(60, 190, 96, 70)
 RED, GREEN = (0, 0, 255), (0, 160, 0)
 MODEL = load_svm(SvmSettings(), None)
-EVERY = load_settings(assignments=["train.mine.probability=0"])
+SETTINGS = Settings()
+EVERY = Most(probability=0)
 NAME = re.compile(r"(?:frame|picture)(\d{6})_x(-?\d+)_y(\d+)_s(\d{4})\.png")
 
 
@@ -73,7 +73,7 @@ def test_windows_on_the_truth_are_vehicles_and_others_false_alarms(
     video: VideoSource, tmp_path: Path
 ) -> None:
     archive = tmp_path / "mined.zip"
-    frames, counts = mine([video], archive, EVERY, MODEL)
+    frames, counts = mine([video], archive, SETTINGS, MODEL, most=EVERY)
     assert frames == 3
     for box in boxes_of(archive, "vehicles/mined_road"):
         assert box.iou(CAR) > 0.35
@@ -81,15 +81,15 @@ def test_windows_on_the_truth_are_vehicles_and_others_false_alarms(
         assert box.iou(CAR) < 0.5
     vehicles = [file for file in find_patches([archive]) if file.group == "vehicles/mined_road"]
     assert len(vehicles) == counts["vehicle"] > 0
-    for patch in read_patches(vehicles):
-        assert patch.image is not None
-        _, green, red = patch.image[32, 32].tolist()
+    for image in read_patches(vehicles):
+        assert image is not None
+        _, green, red = image[32, 32].tolist()
         assert red > green + 100, "the middle of a vehicle shows the car"
 
 
 def test_nothing_wanted_is_an_error(video: VideoSource, tmp_path: Path) -> None:
     with pytest.raises(DataError, match=r"road\.mp4: no window fits a vehicle or is a false alarm"):
-        mine([video], tmp_path / "mined.zip", EVERY, MODEL, most=Most(0, 0, 0))
+        mine([video], tmp_path / "mined.zip", SETTINGS, MODEL, most=Most(0, 0, 0))
     assert not (tmp_path / "mined.zip").exists()
 
 
@@ -102,7 +102,7 @@ def test_frames_too_small_for_any_window_are_an_error_with_the_name_of_the_video
         writer.write(Frame(0, Fraction(0), Picture(np.zeros((8, 8, 3), np.uint8))))
     truth.write_text("1,1,1,1,4,4,1,3,1\n")
     with pytest.raises(VideoError, match=r"tiny\.mp4: no search window fits into 8×8"):
-        mine([VideoSource(source, truth)], tmp_path / "mined.zip", EVERY, MODEL)
+        mine([VideoSource(source, truth)], tmp_path / "mined.zip", SETTINGS, MODEL, most=EVERY)
     assert not (tmp_path / "mined.zip").exists()
 
 
@@ -127,12 +127,12 @@ class TestPictures:
     ) -> None:
         sources = (PictureSource(folder), replace(video, last=1))
         output = tmp_path / "mined.zip"
-        assert mine(sources, output, EVERY, MODEL)[0] == 2
+        assert mine(sources, output, SETTINGS, MODEL, most=EVERY)[0] == 2
         vehicles = boxes_of(output, "vehicles/mined_city")
         assert vehicles == boxes_of(output, "vehicles/mined_road") != []
         alarms = boxes_of(output, "non-vehicles/mined_city")
-        assert len(alarms) == MOST.false_alarms
+        assert len(alarms) == EVERY.false_alarms
 
     def test_two_sources_of_one_name_are_refused(self, folder: Path, tmp_path: Path) -> None:
         with pytest.raises(DataError, match="2 sources are named city; rename them"):
-            mine([PictureSource(folder)] * 2, tmp_path / "mined.zip", EVERY, MODEL)
+            mine([PictureSource(folder)] * 2, tmp_path / "mined.zip", SETTINGS, MODEL, most=EVERY)

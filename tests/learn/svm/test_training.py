@@ -1,21 +1,17 @@
 import json
-import os
 import shutil
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Literal
 
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 import vdet
 from vdet.boxes import Image
 from vdet.config.schema import Settings, SvmSettings, TrainSettings
 from vdet.config.svm import FeatureSettings, HistogramSettings, HogSettings
-from vdet.config.train import AugmentationSettings, SvmTrainingSettings
+from vdet.config.train import SvmTrainingSettings
 from vdet.detect.svm.features import FeatureExtractor
 from vdet.detect.svm.model import load_model, save_model
 from vdet.errors import DataError
@@ -40,11 +36,7 @@ SETTINGS = Settings(
             histogram=HistogramSettings(bins=8),
         )
     ),
-    train=TrainSettings(
-        svm=SvmTrainingSettings(
-            C=0.1, augmentation=AugmentationSettings(mirror=True, cut=0.5, parts=0.5)
-        )
-    ),
+    train=TrainSettings(svm=SvmTrainingSettings(C=0.1)),
 )
 
 
@@ -92,16 +84,8 @@ def files(data: Path) -> list[PatchFile]:
     return find_patches([data])
 
 
-def but(**changes: object) -> Settings:
-    """Return the settings with some of `training` replaced."""
-    training = SETTINGS.train.svm.model_copy(update=changes)
-    return SETTINGS.model_copy(update={"train": TrainSettings(svm=training)})
-
-
-def describe(
-    files: list[PatchFile], settings: Settings = SETTINGS, *, augmented: bool = False, jobs: int = 1
-) -> LabelledVectors:
-    return extract(files, settings.svm.features, settings.train.svm, augmented=augmented, jobs=jobs)
+def describe(files: list[PatchFile], *, augmented: bool = False, jobs: int = 1) -> LabelledVectors:
+    return extract(files, SETTINGS.svm.features, augmented=augmented, jobs=jobs)
 
 
 def test_patches_are_described_in_order_with_their_class_and_group(files: list[PatchFile]) -> None:
@@ -122,12 +106,14 @@ def test_several_threads_give_the_same_as_one(files: list[PatchFile]) -> None:
     for name in ("vectors", "vehicle", "sides", "origins"):
         np.testing.assert_array_equal(getattr(one, name), getattr(three, name))
     np.testing.assert_array_equal(one.groups, three.groups)
-    assert one.digest == three.digest
 
 
-def test_augmented_samples_follow_and_have_the_row_of_their_patch(files: list[PatchFile]) -> None:
-    mirror = but(augmentation=AugmentationSettings(mirror=True, cut=0, parts=0))
-    rows = describe(files, mirror, augmented=True)
+def test_augmented_samples_follow_and_have_the_row_of_their_patch(
+    files: list[PatchFile], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("CUT", "PART"):
+        monkeypatch.setattr(f"vdet.learn.svm.augmentation.{name}", 0)
+    rows = describe(files, augmented=True)
     assert len(rows.files) == 57
     assert rows.origins.tolist() == [patch for patch in range(57) for _ in range(2)]
     assert rows.vehicle.tolist() == [file.vehicle for file in files for _ in range(2)]
@@ -151,28 +137,6 @@ def test_only_the_kept_patches_and_the_samples_made_of_them_are_used() -> None:
     assert list(kept.files) == [files[1], files[2], files[4]]
 
 
-def test_different_data_sets_have_different_digests(files: list[PatchFile]) -> None:
-    renamed = [replace(files[0], group="non-vehicles/x"), *files[1:]]
-    boxed = [replace(files[0], sides=(None, 0.0, None, 0.1)), *files[1:]]
-    sets = (files, files, files[1:], renamed, boxed)
-    whole, same, *others = (describe(some).digest for some in sets)
-    assert whole == same
-    assert len({whole, *others}) == 4
-    assert len(whole) == 64
-
-
-def test_a_file_name_that_is_no_text_is_part_of_the_digest(tmp_path: Path) -> None:
-    picture = texture(np.random.default_rng(0), vehicle=True)
-    digests = set()
-    for name in (b"\xff.png", b"\xfe.png"):
-        path = tmp_path / name.hex() / "vehicles" / os.fsdecode(name)
-        path.parent.mkdir(parents=True)
-        write_image(path, picture)
-        odd = PatchFile(path.parent, path.name, "vehicles", vehicle=True)
-        digests.add(describe([odd]).digest)
-    assert len(digests) == 2
-
-
 def test_broken_patches_are_an_error_that_names_the_first(
     files: list[PatchFile], tmp_path: Path
 ) -> None:
@@ -180,72 +144,42 @@ def test_broken_patches_are_an_error_that_names_the_first(
     broken = [PatchFile(tmp_path, f"vehicles/{i}.png", "vehicles/far", True) for i in range(3)]
     for file in broken:
         (tmp_path / file.name).write_text("no picture")
-    with pytest.raises(DataError, match=r"vehicles/0\.png: 3 of 60 patches are broken$"):
+    with pytest.raises(DataError, match=r"vehicles/0\.png: is not a readable picture$"):
         train([*files[:9], *broken, *files[9:]], SETTINGS, jobs=1)
 
 
 TAILS = np.array(["a"] * 10 + ["b"] * 5 + ["c"] * 3 + ["d"])
 
 
-@pytest.mark.parametrize("seed", [0, 1])
-def test_the_tail_split_holds_out_the_last_of_each_group(seed: int) -> None:
-    assert np.flatnonzero(hold_out(TAILS, "tail", seed)).tolist() == [8, 9, 14, 17]
-    scattered = hold_out(np.array(["a", "b"] * 5), "tail", seed)
+def test_the_last_of_each_group_are_held_out() -> None:
+    assert np.flatnonzero(hold_out(TAILS)).tolist() == [8, 9, 14, 17]
+    scattered = hold_out(np.array(["a", "b"] * 5))
     assert np.flatnonzero(scattered).tolist() == [8, 9]
 
 
-@given(st.integers(2, 500), st.integers(0, 10))
-def test_the_random_split_holds_out_a_fifth_but_never_nothing_or_all(count: int, seed: int) -> None:
-    held = hold_out(np.array(["a"] * count), "random", seed)
-    assert 1 <= held.sum() <= count - 1
-    assert abs(held.sum() - count / 5) <= 1
-
-
-@pytest.mark.parametrize("name", ["random", "tail"])
 def test_neither_test_patches_nor_samples_made_of_them_are_learned_from(
-    mined: Path, tmp_path: Path, name: Literal["random", "tail"]
+    mined: Path, tmp_path: Path
 ) -> None:
     """Other pictures in place of the held-out ones give the same model."""
-    settings = but(split=name)
     files = find_patches([mined])
     spoilt = tmp_path / "spoilt"
     shutil.copytree(mined, spoilt)
     for is_boxed in (False, True):
         some = [file for file in files if file.is_boxed is is_boxed]
         groups = np.array([file.group for file in some])
-        held = hold_out(groups, name, settings.train.svm.seed)
+        held = hold_out(groups)
         for row in np.flatnonzero(held):
             flat = np.full((SIZE, SIZE, 3), row, np.uint8)
             write_image(spoilt / some[row].name, flat, overwrite=True)
-    one, _ = train(files, settings, jobs=1)
-    other, report = train(find_patches([spoilt]), settings, jobs=1)
+    one, _ = train(files, SETTINGS, jobs=1)
+    other, report = train(find_patches([spoilt]), SETTINGS, jobs=1)
     np.testing.assert_array_equal(one.weights, other.weights)
     np.testing.assert_array_equal(one.slopes, other.slopes)
     assert one.box_regression is not None
     assert other.box_regression is not None
     np.testing.assert_array_equal(one.box_regression.weights, other.box_regression.weights)
-    assert report.train_augmented > report.train_patches
-
-
-@pytest.mark.parametrize("split", ["random", "tail"])
-def test_the_metrics_are_those_of_the_model(files: list[PatchFile], split: str) -> None:
-    model, report = train(files, but(split=split), jobs=1)
-    assert report.split == split
-    data = describe(files)
-    right = (model.probabilities(data.vectors) >= 0.5) == data.vehicle
-    tested = report.test.patches * (report.test.accuracy.value or 0)
-    assert right.sum() == pytest.approx(report.train_patches * report.train_accuracy + tested)
-
-
-def test_the_same_seed_gives_the_same_model_and_another_seed_another(
-    files: list[PatchFile],
-) -> None:
-    one, same, different = (
-        train(files, each, jobs=1)[0] for each in (SETTINGS, SETTINGS, but(seed=1))
-    )
-    for name in ("weights", "biases", "slopes", "offsets"):
-        np.testing.assert_array_equal(getattr(one, name), getattr(same, name))
-    assert (one.weights != different.weights).any()
+    learnt = sum(report.groups.values()) - report.groups["boxes/near"] - report.test.patches
+    assert report.samples > 2 * learnt
 
 
 def test_a_trained_model_has_its_provenance_and_can_be_saved(
@@ -258,7 +192,6 @@ def test_a_trained_model_has_its_provenance_and_can_be_saved(
     assert provenance["program"] == f"vdet {vdet.__version__}"
     assert provenance["training"] == SETTINGS.train.svm.model_dump(mode="json")
     assert provenance["report"] == json.loads(json.dumps(asdict(report)))
-    assert provenance["data_sha256"] == describe(files).digest
     np.testing.assert_array_equal(loaded.weights, model.weights)
 
 
@@ -267,16 +200,15 @@ def test_groups_of_one_patch_each_have_no_tail_to_test(
 ) -> None:
     lonely = [replace(file, group=f"{file.group}/{i}") for i, file in enumerate(files)]
     with pytest.raises(DataError, match="no folder has two patches"):
-        train(lonely, but(split="tail"), jobs=1)
+        train(lonely, SETTINGS, jobs=1)
 
 
 def test_with_boxes_a_model_finds_the_sides_of_vehicles(
     mined: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("vdet.learn.svm.box_regression.PENALTY", 1e-3)  # the patches are few
-    settings = but(split="tail")
+    monkeypatch.setattr("vdet.learn.svm.fitting.PENALTY", 1e-3)  # the patches are few
     files = find_patches([mined])
-    model, report = train(files, settings, jobs=1)
+    model, report = train(files, SETTINGS, jobs=1)
     assert model.box_regression is not None
     last = [file for file in files if file.is_boxed][-1]
     assert last.sides is not None
@@ -288,7 +220,5 @@ def test_with_boxes_a_model_finds_the_sides_of_vehicles(
     error = report.box_error
     assert error is not None
     assert error < 0.06
-    assert report.boxed == 60
-    assert report.groups["boxes/near"] == 40
-    assert report.vehicles == 32, "patches of boxes/ belong to neither class"
-    assert model.provenance["boxes_sha256"] != model.provenance["data_sha256"]
+    assert report.groups == GROUPS | {"boxes/near": 40}
+    assert "boxes/near" not in report.test.groups, "they belong to neither class"

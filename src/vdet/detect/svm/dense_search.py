@@ -1,17 +1,20 @@
-"""The dense engine: a strip of the frame is described once for all the windows in it.
+"""The dense search: a strip of the frame is described once for all the windows in it.
 
-Windows that are whole cells apart share their HOG blocks. A grid of which every second window is
-whole cells apart is searched as four such grids. The windows of any other grid share only resizing
-and gradients.
+A strip is what a grid covers, at the scale where a window is a patch. Windows that are whole cells
+apart share its HOG blocks (`Blocks`), which is fast: so are the sets that follow the perspective. A
+grid of which every second window is whole cells apart is searched as four such grids. The windows
+of any other grid share only the gradients of the strip (`Gradients`): so do those of 128 pixels of
+the original. All share sums over its pixels (`table_sums`).
 """
 
-from typing import Any
+from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
 from vdet.boxes import Float32Array
-from vdet.detect.svm import strips
-from vdet.detect.svm.features import Channels, patch_descriptors
+from vdet.config.svm import FeatureSettings
+from vdet.detect.svm.features import Channels, hog_descriptor, patch_descriptors
 from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.pyramid import FramePyramid
 from vdet.detect.svm.windows import WINDOW_SIDES, GridResult, IndexArray, WindowGrid
@@ -19,8 +22,23 @@ from vdet.detect.svm.windows import WINDOW_SIDES, GridResult, IndexArray, Window
 MAX_PHASES = 2
 """Most grids of shared blocks, across and down, that a grid is split into; with more of them,
 sharing only the gradients is faster."""
+
 BATCH = 8192
-"""Number of windows that are described before they are classified; it bounds the memory."""
+"""Number of windows whose vectors are in memory at once."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Part:
+    """`n` windows of a grid that lie at whole pixels of one strip, in each channel of a patch.
+
+    `numbers` `(n,)` counts them in the grid, `x` and `y` `(n,)` are their top-left pixels in the
+    strip, which `strip` cuts out of a frame.
+    """
+
+    numbers: IndexArray
+    strip: tuple[slice, slice, int, int]
+    x: IndexArray
+    y: IndexArray
 
 
 class DenseSearch:
@@ -29,106 +47,146 @@ class DenseSearch:
     def __init__(self, model: LinearModel, grid: WindowGrid) -> None:
         features = model.features
         pixels = grid.step * features.patch / grid.size  # from window to window, of the patch
+        self._hog: type[Blocks | Gradients] = Blocks
         n = (pixels / features.hog.cell).denominator
-        part: type[_Part] = _AlignedPart
         if n > MAX_PHASES:
-            part = _LocatedPart
+            self._hog = Gradients
             n = (pixels / max(map(features.shrink, range(3)))).denominator
-        self._model = model
-        self._numbers = np.arange(len(grid)).reshape(grid.rows, grid.columns)
+        self._model, self._count = model, len(grid)
+        self._weights, of_colours = np.split(model.weights, [features.hog_length], axis=1)
+        bins = features.histogram.bins
+        self._tables = np.repeat(of_colours.reshape(-1, 3, bins), 256 // bins, axis=2)
         self._parts = [
-            (self._numbers[row::n, column::n].ravel(), part(model, grid.every_nth(n, column, row)))
+            _part(grid, features.patch, n, column, row)
             for row in range(min(n, grid.rows))
             for column in range(min(n, grid.columns))
         ]
 
     def search(self, frame: FramePyramid, probability: float) -> GridResult:
         """Search a frame; windows of at least this probability are hits."""
-        probabilities = np.zeros(self._numbers.size, np.float32)
-        sides = np.tile(WINDOW_SIDES, (self._numbers.size, 1))
-        regression = self._model.box_regression
-        for numbers, part in self._parts:
+        model, features = self._model, self._model.features
+        probabilities = np.zeros(self._count, np.float32)
+        sides = np.tile(WINDOW_SIDES, (self._count, 1))
+        for part in self._parts:
             strip = frame.cut(*part.strip)
-            described = part.describe(strip)
-            found = self._model.to_probabilities(part.values(strip, described))
-            probabilities[numbers] = found
-            (hits,) = np.nonzero(found >= probability)
-            if regression is not None and len(hits):
-                sides[numbers[hits]] = regression.sides(part.hogs(described, hits))
+            hog = self._hog(strip, features)
+            values = table_sums(strip, self._tables, features, part.x, part.y)
+            values += hog.values(self._weights, part.x, part.y)
+            found = model.to_probabilities(values + model.biases)
+            probabilities[part.numbers] = found
+            hits = found >= probability
+            if model.box_regression is not None and hits.any():
+                vectors = hog.vectors(part.x[hits], part.y[hits])
+                sides[part.numbers[hits]] = model.box_regression.sides(vectors)
         return GridResult(probabilities, sides)
 
 
-class _Part:
-    """`n` windows that lie at whole pixels of one strip, in each channel of a patch."""
-
-    def __init__(self, model: LinearModel, grid: WindowGrid) -> None:
-        self._model, self._features = model, model.features
-        self._tables = strips.histogram_tables(model)
-        self.strip = grid.strip(self._features.patch)
-        row, column = np.divmod(np.arange(len(grid)), grid.columns)
-        pixels = int(grid.step * self._features.patch / grid.size)
-        self._x, self._y = column * pixels, row * pixels
-
-    def values(self, strip: Channels, described: Any) -> Float32Array:
-        """Return the decision values of the `m` members of the model, `(n, m)`."""
-        of_colours = strips.table_sums(strip, self._tables, self._features, self._x, self._y)
-        return (self._hog_values(described) + of_colours).T + self._model.biases
-
-    def describe(self, strip: Channels) -> Any:
-        """Return what all windows of the strip share."""
-        raise NotImplementedError
-
-    def hogs(self, described: Any, places: IndexArray) -> Float32Array:
-        """Return the HOG features of some of the windows, by their indices."""
-        raise NotImplementedError
-
-    def _hog_values(self, described: Any) -> Float32Array:
-        """Return the share of HOG in the decision values, `(m, n)`."""
-        raise NotImplementedError
+def _part(grid: WindowGrid, patch: int, n: int, column: int, row: int) -> _Part:
+    """Return every n-th window, from this column and row on."""
+    numbers = np.arange(len(grid)).reshape(grid.rows, grid.columns)[row::n, column::n]
+    pixels = int(n * grid.step * patch / grid.size)
+    y, x = np.indices(numbers.shape).reshape(2, -1) * pixels
+    return _Part(numbers.ravel(), grid.every_nth(n, column, row).strip(patch), x, y)
 
 
-class _AlignedPart(_Part):
-    """Windows that are whole cells apart. They share the HOG blocks of the strip."""
+class Blocks:
+    """The HOG of windows that are whole cells apart: each block of the strip is computed once.
 
-    def __init__(self, model: LinearModel, grid: WindowGrid) -> None:
-        super().__init__(model, grid)
-        self._weights = strips.block_weights(model)
-        cell = self._features.hog.cell
-        self._columns, self._rows = self._x // cell, self._y // cell
+    `x` and `y`, `(n,)`, are the top-left pixels of windows in the strip.
+    """
 
-    def describe(self, strip: Channels) -> Float32Array:
-        return strips.describe_blocks(strip, self._features)
+    def __init__(self, strip: Channels, features: FeatureSettings) -> None:
+        self._features = features
+        hog = features.hog
+        height, width = (side * features.shrink(0) for side in strip[0].shape)
+        columns, rows = (side // hog.cell - hog.block + 1 for side in (width, height))
+        # A descriptor whose window is the strip gives each block once, column by column.
+        vectors = [
+            hog_descriptor(features, (width, height), number).compute(channel)
+            for number, channel in enumerate(strip)
+        ]
+        blocks = [np.reshape(vector, (columns, rows, -1)) for vector in vectors]
+        self._blocks = np.concatenate(blocks, axis=-1, dtype=np.float32)
 
-    def hogs(self, described: Float32Array, places: IndexArray) -> Float32Array:
-        columns, rows = self._columns[places], self._rows[places]
-        return strips.window_blocks(described, columns, rows, self._features)
+    def vectors(self, x: IndexArray, y: IndexArray) -> Float32Array:
+        """Return the HOG of windows as `FeatureExtractor` orders it, float32 `(n, h)`."""
+        steps = np.arange(self._features.blocks)
+        columns = self._cells(x)[:, np.newaxis, np.newaxis] + steps[:, np.newaxis]
+        rows = self._cells(y)[:, np.newaxis, np.newaxis] + steps
+        by_block = self._blocks[columns, rows].reshape(len(x), len(steps) ** 2, 3, -1)
+        return by_block.swapaxes(1, 2).reshape(len(x), -1)
 
-    def _hog_values(self, described: Float32Array) -> Float32Array:
-        return strips.block_sums(described, self._weights, self._columns, self._rows)
+    def values(self, weights: Float32Array, x: IndexArray, y: IndexArray) -> Float32Array:
+        """Return the HOG of windows times weights, `(m, h)` → float32 `(n, m)`."""
+        # A matrix product weights every block as if it lay in each place (i, j) of a window.
+        columns, rows, length = self._blocks.shape
+        side, count = self._features.blocks, len(weights)
+        by_place = weights.reshape(count, 3, side**2, -1).swapaxes(1, 2).reshape(-1, length)
+        planes = by_place @ self._blocks.reshape(-1, length).T
+        planes = planes.reshape(count, side, side, columns * rows)
+        # Block (i, j) of the window that begins at block k is block k + i·rows + j.
+        last = columns * rows - side + 1
+        down = np.zeros((count, side, last), np.float32)
+        for j in range(side):
+            down += planes[:, :, j, j : j + last]
+        last -= (side - 1) * rows
+        sums = np.zeros((count, last), np.float32)
+        for i in range(side):
+            sums += down[:, i, i * rows : i * rows + last]
+        return sums[:, self._cells(x) * rows + self._cells(y)].T
+
+    def _cells(self, pixels: IndexArray) -> IndexArray:
+        return pixels // self._features.hog.cell
 
 
-class _LocatedPart(_Part):
-    """Other windows. They share the gradients of the strip (`HOGDescriptor.compute`)."""
+class Gradients:
+    """The HOG of windows at any pixels: gradients are shared (`HOGDescriptor.compute`)."""
 
-    def __init__(self, model: LinearModel, grid: WindowGrid) -> None:
-        super().__init__(model, grid)
-        self._descriptors = patch_descriptors(self._features)
-        self._weights = model.weights[:, : self._features.hog_length]
+    def __init__(self, strip: Channels, features: FeatureSettings) -> None:
+        self._strip, self._features = strip, features
+        self._descriptors = patch_descriptors(features)
 
-    def describe(self, strip: Channels) -> Channels:
-        return strip
-
-    def hogs(self, described: Channels, places: IndexArray) -> Float32Array:
+    def vectors(self, x: IndexArray, y: IndexArray) -> Float32Array:
+        """Return the HOG of windows as `FeatureExtractor` orders it, float32 `(n, h)`."""
         parts = []
-        for number, (hog, channel) in enumerate(zip(self._descriptors, described, strict=True)):
-            shrink = self._features.shrink(number)
-            x, y = self._x[places] // shrink, self._y[places] // shrink
-            vectors = hog.compute(channel, locations=list(zip(x.tolist(), y.tolist(), strict=True)))
-            parts.append(np.reshape(vectors, (len(places), -1)))
+        for number, (hog, channel) in enumerate(zip(self._descriptors, self._strip, strict=True)):
+            places = np.stack([x, y], axis=1) // self._features.shrink(number)
+            vectors = hog.compute(channel, locations=list(map(tuple, places.tolist())))
+            parts.append(np.reshape(vectors, (len(x), -1)))
         return np.concatenate(parts, axis=1, dtype=np.float32)
 
-    def _hog_values(self, described: Channels) -> Float32Array:
-        places = np.arange(len(self._x))
-        batches = (places[first : first + BATCH] for first in range(0, len(places), BATCH))
-        values = [self.hogs(described, batch) @ self._weights.T for batch in batches]
-        return np.concatenate(values).T
+    def values(self, weights: Float32Array, x: IndexArray, y: IndexArray) -> Float32Array:
+        """Return the HOG of windows times weights, `(m, h)` → float32 `(n, m)`."""
+        batches = (slice(first, first + BATCH) for first in range(0, len(x), BATCH))
+        return np.concatenate([self.vectors(x[some], y[some]) @ weights.T for some in batches])
+
+
+def table_sums(
+    strip: Channels,
+    tables: Float32Array,
+    features: FeatureSettings,
+    x: IndexArray,
+    y: IndexArray,
+) -> Float32Array:
+    """Sum what the pixels of windows add: their colour histograms times weights.
+
+    Parameters
+    ----------
+    tables
+        float32 `(m, 3, 256)`: what a pixel adds, by channel and value.
+    x, y
+        Top-left pixels of the windows in the strip, `(n,)`.
+
+    Returns
+    -------
+    float32 `(n, m)`.
+    """
+    sums = np.zeros((len(x), len(tables)), np.float32)
+    for number, channel in enumerate(strip):
+        shrink = features.shrink(number)
+        left, top, side = x // shrink, y // shrink, features.patch // shrink
+        for row, table in enumerate(tables[:, number]):
+            integral = np.asarray(cv2.integral(cv2.LUT(channel, table)))
+            lower = integral[top + side, left + side] - integral[top + side, left]
+            sums[:, row] += lower - integral[top, left + side] + integral[top, left]
+    return sums

@@ -10,10 +10,9 @@ import numpy as np
 from vdet.boxes import Boxes, Image, are_nested
 from vdet.config.schema import SvmSettings
 from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
-from vdet.detect.svm.heat import Heat, HeatHistory, HotRegion, find_regions
+from vdet.detect.svm.heat import Heat, HotRegion, find_regions, sum_heat
 from vdet.detect.svm.horizon import DEFAULT_HORIZON, find_horizon
 from vdet.detect.svm.model import LinearModel
-from vdet.detect.svm.road_check import RoadCheck
 from vdet.detect.svm.search import FrameSearch
 from vdet.detect.svm.stages import Trace, stage_pictures
 from vdet.detect.svm.votes import Votes, split_regions
@@ -31,25 +30,18 @@ class Candidates:
     """
 
     windows: Windows
-    picture: Picture
     is_still: bool
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SvmModel:
-    """A linear model with its settings: a `DetectorModel`.
-
-    `check` warns of a road that the model does not know; None for no warning.
-    """
+    """A linear model with its settings: a `DetectorModel`."""
 
     model: LinearModel
     settings: SvmSettings
-    check: RoadCheck | None = None
 
     def for_video(self, width: int, height: int, images: Sequence[Image]) -> "SvmDetector":
         """Return a detector for frames of one size; `images` show where the horizon is.
-
-        Still pictures share the check; each video has its own.
 
         Raises
         ------
@@ -59,12 +51,11 @@ class SvmModel:
             Too many windows fit into such a frame.
         """
         horizon = self._horizon(images)
-        check = self.check.restarted() if self.check and len(images) > 1 else self.check
         search = FrameSearch(self.model, self.settings, width, height, horizon=horizon)
-        return SvmDetector(search, self.settings, (width, height), check)
+        return SvmDetector(search, self.settings, (width, height))
 
     def _horizon(self, images: Sequence[Image]) -> float:
-        """Return the row of the horizon, share of the height, and report it."""
+        """Return the row of the horizon, as a fraction of the height, and report it."""
         perspective = self.settings.search.perspective
         if not perspective.sizes:
             return DEFAULT_HORIZON  # no window set depends on it
@@ -86,25 +77,16 @@ class SvmDetector:
     ----------
     size
         Width and height of the frames, pixels.
-    check
-        As of `SvmModel`.
     """
 
-    def __init__(
-        self,
-        search: FrameSearch,
-        settings: SvmSettings,
-        size: tuple[int, int],
-        check: RoadCheck | None = None,
-    ) -> None:
-        self._search, self._settings, self._size, self._check = search, settings, size, check
+    def __init__(self, search: FrameSearch, settings: SvmSettings, size: tuple[int, int]) -> None:
+        self._search, self._settings, self._size = search, settings, size
         self._heat = scale_lengths(settings.heat, size[1] / REFERENCE_HEIGHT)
-        self._history = HeatHistory(*size, self._heat)
         self._recent: deque[Windows] = deque(maxlen=self._heat.frames)
 
     def search(self, picture: Picture, index: int | None) -> Candidates:
         """Search the windows of a frame; several threads may call this at once."""
-        return Candidates(self._search.search(picture), picture, is_still=index is None)
+        return Candidates(self._search.search(picture), is_still=index is None)
 
     def detect(self, candidates: Candidates) -> Boxes:
         """Add the hits of the next frame to the heat, and return what is hot.
@@ -113,16 +95,10 @@ class SvmDetector:
         same as in video.
         """
         hits = candidates.windows.hits(self._settings.search.probability)
-        for _ in range(self._heat.frames if candidates.is_still else 1):
-            heat = self._history.update(hits)
-            self._recent.append(hits)
-        trace = Trace(hits, heat, self._search.grids)
-        detections = self._detections(self._regions(heat), trace)
-        if candidates.is_still:
-            detections = self._shown_in_still(detections)
-        if self._check and len(self._recent) == self._heat.frames:
-            self._check.compare(candidates.picture, detections)
-        return detections
+        self._recent.extend([hits] * (self._heat.frames if candidates.is_still else 1))
+        heat = sum_heat(self._recent, self._size, self._heat)
+        found = self._found(self._regions(heat), Trace(hits, heat, self._search.grids))
+        return self._shown_in_still(found) if candidates.is_still else found
 
     def stage_pictures(self, image: Image, detections: Boxes) -> dict[str, Image]:
         """Return pictures of the windows, the hits and the heat."""
@@ -136,19 +112,19 @@ class SvmDetector:
         inside = (replace(region, box=region.box.clipped(*self._size)) for region in regions)
         return [region for region in inside if region.box.area]
 
-    def _detections(self, regions: Sequence[HotRegion], trace: Trace) -> Boxes:
-        strengths = np.array([region.strength for region in regions], np.float64)
-        centroids = np.reshape([region.centroid for region in regions], (-1, 2))
+    def _found(self, regions: Sequence[HotRegion], trace: Trace) -> Boxes:
         sides = np.reshape([astuple(region.box) for region in regions], (-1, 4))
-        scores = [self._settings.score.of(strength) for strength in strengths.tolist()]
-        return Boxes(
-            sides, scores, data={"centroid": centroids, "strength": strengths}, trace=trace
-        )
+        scores = [self._settings.score.of(region.strength) for region in regions]
+        data = {
+            "centroid": np.reshape([region.centroid for region in regions], (-1, 2)),
+            "strength": np.array([region.strength for region in regions], np.float64),
+        }
+        return Boxes(sides, scores, data=data, trace=trace)
 
     def _shown_in_still(self, found: Boxes) -> Boxes:
         """Return the detections that are strong and large enough, without those inside another."""
         stills, strengths = self._settings.stills, found.data["strength"]
-        least = np.array([stills.width, stills.height]) * self._size
+        smallest = np.array([stills.width, stills.height]) * self._size
         sizes = found.sides[:, 2:] - found.sides[:, :2]
-        shown = found[(strengths >= stills.strength) & (sizes >= least).all(axis=1)]
+        shown = found[(strengths >= stills.strength) & (sizes >= smallest).all(axis=1)]
         return shown[~are_nested(shown.sides, shown.data["strength"])]

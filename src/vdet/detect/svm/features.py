@@ -14,7 +14,7 @@ from vdet.config.svm import FeatureSettings
 from vdet.media.images import split_channels
 
 Channels = tuple[Image, Image, Image]
-"""The channels of a colour space, uint8 `(H, W)` each; of those in `halved`, `(H / 2, W / 2)`."""
+"""Luma, red and blue (YCrCb), uint8 `(H, W)` each; those in `halved`, `(H / 2, W / 2)`."""
 
 
 class FeatureExtractor:
@@ -57,14 +57,13 @@ class FeatureExtractor:
 
 
 def split(image: Image, settings: FeatureSettings) -> Channels:
-    """Return the channels of the settings' colour space of an image, BGR uint8 `(H, W, 3)`."""
-    conversion = getattr(cv2, f"COLOR_BGR2{settings.color_space}")
-    channels = split_channels(np.asarray(cv2.cvtColor(image, conversion)))
-    first, second, third = (
+    """Return the channels of an image, BGR uint8 `(H, W, 3)`."""
+    converted = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2YCrCb))
+    luma, red, blue = (
         halve(channel) if number in settings.halved else channel
-        for number, channel in enumerate(channels)
+        for number, channel in enumerate(split_channels(converted))
     )
-    return first, second, third
+    return luma, red, blue
 
 
 def hog_descriptor(

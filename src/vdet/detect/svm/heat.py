@@ -4,14 +4,14 @@ A hit adds to the pixels of its vehicle (`Windows.vehicles`), which with box reg
 than the window. The original system summed heat in the same way.
 """
 
-from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
-from vdet.boxes import Box, Float32Array
+from vdet.boxes import Box, Float32Array, from_sizes
 from vdet.config.svm import HeatSettings
 from vdet.detect.svm.windows import Windows
 
@@ -48,48 +48,39 @@ class HotRegion:
     strength: float
 
 
-class HeatHistory:
-    """Sums the probabilities of hits over the last frames.
+_SHRINK = 4
+"""Pixels across and down that a value of the heat covers, with votes; 1 with outlines."""
+
+
+def sum_heat(recent: Sequence[Windows], size: tuple[int, int], settings: HeatSettings) -> Heat:
+    """Return the blurred sum of the hits of the last frames.
+
+    Each hit adds to the values that its vehicle covers: its probability or, with `regions: votes`,
+    its probability times its share.
 
     Parameters
     ----------
-    width, height
-        Size of the frames, pixels.
+    recent
+        The hits of each frame.
+    size
+        Width and height of the frames, pixels.
     settings
         Lengths already scaled to that size.
     """
-
-    def __init__(self, width: int, height: int, settings: HeatSettings) -> None:
-        self._shape = (-(-height // settings.shrink), -(-width // settings.shrink))
-        self._settings = settings
-        self._recent: deque[Float32Array] = deque(maxlen=settings.frames)
-
-    def update(self, hits: Windows) -> Heat:
-        """Add the hits of the next frame, drop the oldest frame, return the blurred sum.
-
-        A value is the sum over the hits of the last `frames` frames, this one included, that cover
-        it. Each adds its probability or, with `weight: coverage`, its probability times its share.
-        """
-        self._recent.append(self._values_of(hits))
-        total = np.zeros(self._shape, np.float32)
-        for values in self._recent:
-            total += values
-        side = self._settings.blur // self._settings.shrink | 1  # a Gaussian kernel has a middle
-        if side > 1:
-            cv2.GaussianBlur(total, (side, side), 0, dst=total)
-        return Heat(total, self._settings.shrink)
-
-    def _values_of(self, hits: Windows) -> Float32Array:
-        values = np.zeros(self._shape, np.float32)
-        heats = hits.probabilities
-        if self._settings.weight == "coverage":
-            heats = heats * hits.shares
-        sides = hits.vehicles.astype(np.float64)
-        sides[:, 2:] += sides[:, :2]
-        sides = np.maximum(0, np.floor(sides / self._settings.shrink + 0.5)).astype(np.int64)
+    by_votes = settings.regions == "votes"
+    shrink = _SHRINK if by_votes else 1
+    total = np.zeros([-(-side // shrink) for side in reversed(size)], np.float32)
+    for hits in recent:
+        values = np.zeros_like(total)
+        heats = hits.probabilities * hits.shares if by_votes else hits.probabilities
+        sides = np.maximum(0, np.floor(from_sizes(hits.vehicles) / shrink + 0.5)).astype(np.int64)
         for (left, top, right, bottom), heat in zip(sides.tolist(), heats.tolist(), strict=True):
             values[top:bottom, left:right] += heat
-        return values
+        total += values
+    side = settings.blur // shrink | 1  # a Gaussian kernel has a middle
+    if side > 1:
+        cv2.GaussianBlur(total, (side, side), 0, dst=total)
+    return Heat(total, shrink)
 
 
 def find_regions(heat: Heat, threshold: float) -> list[HotRegion]:

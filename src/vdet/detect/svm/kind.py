@@ -1,14 +1,12 @@
 """The linear model as the kind of detector `svm`: its model files, and how it is loaded."""
 
-from functools import cache, partial
 from pathlib import Path
 
-from vdet.config.schema import NetworkSettings, SvmSettings
+from vdet.config.schema import SvmSettings
 from vdet.config.svm import FeatureSettings
-from vdet.detect.factory import DetectorKind, load_detector
+from vdet.detect.factory import DetectorKind
 from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.model import load_model
-from vdet.detect.svm.road_check import RoadCheck
 from vdet.errors import ModelError
 
 _MODELS = Path(__file__).parents[2] / "models"
@@ -40,8 +38,7 @@ def load_svm(settings: SvmSettings, path: Path | None) -> SvmModel:
         The file cannot be used, or the model was trained with other features.
     """
     model = load_model(path or shipped_model(settings), requested_features(settings))
-    network = cache(partial(load_detector, NetworkSettings()))
-    return SvmModel(model, settings, check=RoadCheck(network) if path is None else None)
+    return SvmModel(model, settings)
 
 
 def requested_features(settings: SvmSettings) -> FeatureSettings | None:

@@ -1,8 +1,8 @@
 """The linear model: weights, probabilities, and the file that holds them.
 
-A model is one or several linear SVMs, its members. Each has a sigmoid that turns its decision value
-into a probability (Platt 1999); the model's probability is the mean over the members. Features are
-not scaled before: their scaling is part of the weights.
+A model is a linear SVM and a sigmoid that turns its decision value into a probability (Platt 1999).
+That of the original has three of them, its members; its probability is the mean over the members.
+Features are not scaled before: their scaling is part of the weights.
 """
 
 import io
@@ -20,15 +20,14 @@ from vdet.archives import open_archive, read_member
 from vdet.boxes import Float32Array
 from vdet.config.svm import FeatureSettings
 from vdet.errors import ModelError
-from vdet.files import read_whole, staged
+from vdet.files import read_whole
 
 FORMAT, FORMAT_VERSION = "vdet model", 2
-MAX_MEMBERS = 20
 MAX_VALUE = 1e9
 """Largest absolute value of any number in a model; with larger ones, sigmoids could overflow."""
 _MAX_BYTES = 64_000_000
-_ARRAYS = ("weights", "biases", "slopes", "offsets")
-_BOX_ARRAYS = ("box_weights", "box_biases")
+_NAMES = ("weights", "biases", "slopes", "offsets")
+_BOX_NAMES = ("box_weights", "box_biases")
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,21 +87,26 @@ class LinearModel:
         return np.asarray((1 / (1 + np.exp(exponent))).mean(axis=1), np.float32)
 
 
-def save_model(model: LinearModel, path: Path, *, overwrite: bool = False) -> None:
-    """Write a model as `.npz` without pickle: arrays and a JSON header. Raises `OutputError`."""
+def save_model(model: LinearModel, path: Path) -> None:
+    """Write a model as `.npz` without pickle: arrays and a JSON header."""
     header = {
         "format": FORMAT,
         "version": FORMAT_VERSION,
         "features": model.features.model_dump(mode="json"),
         "provenance": model.provenance,
     }
-    arrays = {name: getattr(model, name) for name in _ARRAYS}
+    text = np.frombuffer(json.dumps(header).encode(), np.uint8)
+    with path.open("wb") as file:
+        np.savez_compressed(file, header=text, **_arrays(model))
+
+
+def _arrays(model: LinearModel) -> dict[str, Float32Array]:
+    """Return the arrays of a model by their names in the file."""
+    arrays = {name: getattr(model, name) for name in _NAMES}
     if model.box_regression is not None:
         parts = model.box_regression.weights, model.box_regression.biases
-        arrays |= zip(_BOX_ARRAYS, parts, strict=True)
-    text = np.frombuffer(json.dumps(header).encode(), np.uint8)
-    with staged(path, overwrite=overwrite) as temporary, temporary.open("wb") as file:
-        np.savez_compressed(file, header=text, **arrays)
+        arrays |= zip(_BOX_NAMES, parts, strict=True)
+    return arrays
 
 
 def load_model(path: Path, features: FeatureSettings | None = None) -> LinearModel:
@@ -126,28 +130,34 @@ def load_model(path: Path, features: FeatureSettings | None = None) -> LinearMod
     except Exception as error:  # NumPy, json and pydantic raise a dozen kinds on damaged data
         raise ModelError(f"{path}: is not a vdet model, or is damaged; train one") from error
     if features is not None and features != model.features:
-        raise ModelError(
-            f"{path}: was trained with other features: {_difference(model.features, features)}"
-        )
+        trained = model.features.model_dump_json()
+        raise ModelError(f"{path}: was trained with other features: detector.features={trained}")
     return model
 
 
 def _read(archive: zipfile.ZipFile) -> LinearModel:
-    header = json.loads(_read_array(archive, "header").tobytes())
+    present = {name.removesuffix(".npy") for name in archive.namelist()}
+    names = [name for name in ("header", *_NAMES, *_BOX_NAMES) if name in present]
+    arrays = {name: _read_array(archive, name) for name in names}
+    header = json.loads(arrays["header"].tobytes())
     if header["format"] != FORMAT or not isinstance(header["provenance"], dict):
         raise ValueError("not the header of a model")
     if header["version"] != FORMAT_VERSION:
         raise ModelError(f"is of version {header['version']!r:.20}, not {FORMAT_VERSION}")
-    # The shipped models name the size of small pictures, which are features no more, and the
-    # channels that have HOG. That of the original does not say which channels are halved: none is.
+    # The shipped models name the colour space, the size of small pictures and the channels that
+    # have HOG, which are settings no more. That of the original does not say what is halved: none.
     known = {"halved": ()} | header["features"]
+    if known.pop("color_space", "YCrCb") != "YCrCb":
+        raise ModelError("has another colour space than YCrCb")
     known.pop("spatial", None)
     known["hog"].pop("channels", None)
-    boxes = [name for name in _BOX_ARRAYS if f"{name}.npy" in archive.namelist()]
-    features, provenance = FeatureSettings.model_validate(known), header["provenance"]
-    arrays = {name: _read_array(archive, name) for name in _ARRAYS}
-    regression = BoxRegression(*(_read_array(archive, name) for name in boxes)) if boxes else None
-    model = LinearModel(features, **arrays, provenance=provenance, box_regression=regression)
+    boxes = [arrays[name] for name in _BOX_NAMES if name in arrays]
+    model = LinearModel(
+        FeatureSettings.model_validate(known),
+        **{name: arrays[name] for name in _NAMES},
+        provenance=header["provenance"],
+        box_regression=BoxRegression(*boxes) if boxes else None,
+    )
     _check_arrays(model)
     return model
 
@@ -163,25 +173,15 @@ def _read_array(archive: zipfile.ZipFile, name: str) -> npt.NDArray[Any]:
 
 
 def _check_arrays(model: LinearModel) -> None:
-    members = len(model.biases) if model.biases.ndim == 1 else 0
-    expected = (members, model.features.length)
-    if not 1 <= members <= MAX_MEMBERS or model.weights.shape != expected:
-        raise ModelError(f"has weights of shape {model.weights.shape} instead of {expected}")
-    for name in _ARRAYS:
-        _check_array(getattr(model, name), expected if name == "weights" else (members,), name)
-    if model.box_regression is not None:
-        _check_array(model.box_regression.weights, (4, model.features.hog_length), _BOX_ARRAYS[0])
-        _check_array(model.box_regression.biases, (4,), _BOX_ARRAYS[1])
-
-
-def _check_array(array: Float32Array, shape: tuple[int, ...], name: str) -> None:
-    if array.dtype != np.float32 or array.shape != shape or not (abs(array) <= MAX_VALUE).all():
-        raise ModelError(f"its {name} are damaged")
-
-
-def _difference(trained: FeatureSettings, requested: FeatureSettings) -> str:
-    return ", ".join(
-        f"detector.features.{name}: {getattr(trained, name)}, asked for {getattr(requested, name)}"
-        for name in type(trained).model_fields
-        if getattr(trained, name) != getattr(requested, name)
-    )
+    members = model.biases.size
+    if not members:
+        raise ModelError("has no SVM")
+    shapes = {
+        "weights": (members, model.features.length),
+        "box_weights": (4, model.features.hog_length),
+        "box_biases": (4,),
+    }
+    for name, array in _arrays(model).items():
+        shape = shapes.get(name, (members,))
+        if array.dtype != np.float32 or array.shape != shape or not (abs(array) <= MAX_VALUE).all():
+            raise ModelError(f"its {name} are damaged, or not of shape {shape}")

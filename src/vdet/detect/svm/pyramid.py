@@ -6,24 +6,21 @@ import numpy as np
 from vdet.boxes import Image
 from vdet.config.svm import FeatureSettings
 from vdet.detect.svm.features import Channels, halve, resize, split
-from vdet.media import Picture, Planes
-
-_STREAM_SPACE = "YCrCb"  # the colour space whose channels planes have
+from vdet.media import Picture
 
 
 class FramePyramid:
     """The searched rows of one frame at full size and, made when needed, at half, quarter … size.
 
-    It gives the channels of the features' colour space. For YCrCb, it takes them from the planes of
-    a picture that has them; a value of chroma stands for 2 × 2 pixels. Otherwise it resizes BGR,
-    which is converted last, as in training.
+    It has luma, red and blue: the planes of a picture that has them, where a value of chroma stands
+    for 2 × 2 pixels. Otherwise it has BGR, which is converted last, as in training.
 
     Parameters
     ----------
     picture
         Upright, H × W pixels.
     features
-        Their colour space.
+        They say which channels are halved.
     top, bottom
         First row that is searched, even; first row below, None for the frame's end.
     margin
@@ -42,44 +39,31 @@ class FramePyramid:
         self._features = features
         self._origin = margin, -top
         rows = slice(top, picture.height if bottom is None else bottom)
-        planes = picture.planes
-        if planes and features.color_space == _STREAM_SPACE:
-            self._levels = _of_planes(planes, rows, margin)
-        else:
-            self._levels = (_Levels(_widened(picture.image[rows], margin)),)
+        self._levels = _levels(picture, rows, margin)
 
     def cut(self, rows: slice, columns: slice, width: int, height: int) -> Channels:
         """Return a part of the frame, resized to `width` × `height`.
 
-        `rows` and `columns` are pixels of the frame, columns may be negative. Of planes, each
-        channel equals `resize(channel[rows, columns], width, height)`; BGR is resized so, and then
-        converted. Halvings are shared by all cuts.
+        `rows` and `columns` are pixels of the frame, columns may be negative. Each channel, or BGR,
+        equals `resize(channel[rows, columns], width, height)`. Halvings are shared by all cuts.
         """
         across, down = self._origin
         sides = rows.start + down, rows.stop + down, columns.start + across, columns.stop + across
         if len(self._levels) == 1:
             return split(self._levels[0].cut(sides, width, height), self._features)
-        shrinks = map(self._features.shrink, range(len(self._levels)))
-        first, second, third = (
-            each.cut(sides, width // shrink, height // shrink)
-            for each, shrink in zip(self._levels, shrinks, strict=True)
+        shrinks = map(self._features.shrink, range(3))
+        luma, red, blue = (
+            levels.cut(sides, width // shrink, height // shrink)
+            for levels, shrink in zip(self._levels, shrinks, strict=True)
         )
-        return first, second, third
+        return luma, red, blue
 
 
 class _Levels:
-    """An image, or one channel, at full, half, quarter … size.
+    """A channel, or BGR, at full, half, quarter … size, made of what it is at `level`."""
 
-    Parameters
-    ----------
-    full
-        At full size; None if it is to be made of `half`.
-    half
-        At half size; None if it is to be made of `full`.
-    """
-
-    def __init__(self, full: Image | None, half: Image | None = None) -> None:
-        self._levels = {level: each for level, each in enumerate((full, half)) if each is not None}
+    def __init__(self, channel: Image, level: int = 0) -> None:
+        self._levels = {level: channel}
 
     def cut(self, sides: tuple[int, int, int, int], width: int, height: int) -> Image:
         """Return the part between top, bottom, left and right, resized to `width` × `height`."""
@@ -95,26 +79,26 @@ class _Levels:
         return resize(self._at(level)[top:bottom, left:right], width, height)
 
     def _at(self, level: int) -> Image:
-        """Return the image, halved `level` times."""
+        """Return the channel, halved `level` times."""
         if level not in self._levels:
             self._levels[level] = _halved(self._at(level - 1)) if level else _doubled(self._at(1))
         return self._levels[level]
 
 
-def _of_planes(planes: Planes, rows: slice, margin: int) -> tuple[_Levels, ...]:
+def _levels(picture: Picture, rows: slice, margin: int) -> list[_Levels]:
+    """Return luma, red and blue of the rows, or BGR."""
+    planes = picture.planes
+    if planes is None:
+        return [_Levels(_widened(picture.image[rows], margin))]
     blue_red = slice(rows.start // 2, -(-rows.stop // 2))
     luma, blue, red = planes.coding.to_common(
         (planes.luma[rows], planes.blue[blue_red], planes.red[blue_red])
     )
-    return (
-        _Levels(_widened(luma, margin)),
-        *(_Levels(None, _widened(each, margin // 2)) for each in (red, blue)),
-    )
+    chroma = [_Levels(_widened(each, margin // 2), level=1) for each in (red, blue)]
+    return [_Levels(_widened(luma, margin)), *chroma]
 
 
 def _widened(values: Image, margin: int) -> Image:
-    if not margin:
-        return values
     edge = cv2.BORDER_REPLICATE
     return np.asarray(cv2.copyMakeBorder(values, 0, 0, margin, margin, edge), np.uint8)
 

@@ -1,6 +1,5 @@
 """A picture of each stage of the detection."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -9,7 +8,7 @@ import numpy as np
 from vdet.boxes import Box, Image
 from vdet.detect.svm.heat import Heat
 from vdet.detect.svm.windows import WindowGrid, Windows
-from vdet.draw.boxes import GREEN, WHITE, color_of, draw_box, draw_label, label_tag
+from vdet.draw.boxes import GREEN, WHITE, color_of, draw_box, draw_label
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,47 +26,19 @@ class Trace:
 
 def stage_pictures(image: Image, trace: Trace) -> dict[str, Image]:
     """Return three pictures of a frame, BGR uint8 `(H, W, 3)`, by name: windows, hits, heat."""
-    return {
-        "windows": _draw_window_sets(image, trace.grids),
-        "hits": _draw_hits(image, trace.hits),
-        "heat": _draw_heat(image, trace.heat),
-    }
-
-
-def _draw_window_sets(image: Image, grids: Sequence[WindowGrid]) -> Image:
-    """Draw a row of lines for each row of windows, and one whole window with size and count."""
-    picture = (image * 0.6).astype(np.uint8)
-    for number, grid in enumerate(grids):
-        for x, y, width, height in grid.boxes.tolist():
-            picture[y, max(0, x) : x + width] = color_of(number)
-            if 0 <= x < picture.shape[1]:
-                picture[y : y + height, x] = color_of(number)
-    for number, grid in enumerate(grids):
-        across = number * grid.columns // len(grids)
-        example = Box.sized(*grid.boxes[across].tolist())
-        draw_box(picture, example, color_of(number), f"{grid.size} px: {len(grid)} windows")
-    return picture
-
-
-def _draw_hits(image: Image, hits: Windows) -> Image:
-    """Draw all hits, and the probability of each whose label covers no label of a likelier one."""
-    picture = image.copy()
-    for box in hits.boxes.tolist():
-        draw_box(picture, Box.sized(*box), GREEN)
-    tags: list[Box] = []
-    for i in np.argsort(-hits.probabilities, kind="stable").tolist():
-        box = Box.sized(*hits.boxes[i].tolist())
-        text, corner = f"{hits.probabilities[i]:.2f}", (box.x1, box.y2)
-        tag = label_tag(picture, text, corner)
-        if not any(tag.intersection(other).area for other in tags):
-            tags.append(draw_label(picture, text, corner, GREEN))
-    return picture
-
-
-def _draw_heat(image: Image, heat: Heat) -> Image:
-    picture = blend_heat(image, heat)
-    draw_label(picture, f"peak {heat.peak:.1f}", (0, 0), WHITE)
-    return picture
+    windows, hits = (image * 0.6).astype(np.uint8), image.copy()
+    for number, grid in enumerate(trace.grids):
+        boxes = [Box.sized(*box) for box in grid.boxes.tolist()]
+        extent = Box(boxes[0].x1, boxes[0].y1, boxes[-1].x2, boxes[-1].y2)
+        example = boxes[number * grid.columns // len(trace.grids)]
+        draw_box(windows, extent, color_of(number))
+        draw_box(windows, example, color_of(number), f"{grid.size} px: {len(grid)} windows")
+    for row in np.argsort(trace.hits.probabilities).tolist():  # the likeliest is on top
+        box = Box.sized(*trace.hits.boxes[row].tolist())
+        draw_box(hits, box, GREEN, f"{trace.hits.probabilities[row]:.2f}")
+    heat = blend_heat(image, trace.heat)
+    draw_label(heat, f"peak {trace.heat.peak:.1f}", (0, 0), WHITE)
+    return {"windows": windows, "hits": hits, "heat": heat}
 
 
 def blend_heat(image: Image, heat: Heat) -> Image:

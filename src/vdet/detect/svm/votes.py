@@ -9,7 +9,7 @@ vote again. This is greedy non-maximum suppression that averages boxes instead o
 Viola & Jones merge detections ("Robust Real-Time Face Detection", 2004, section 5.6).
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -62,7 +62,7 @@ class Votes:
         Boxes are cut off at the sides of the frame of `size` (width and height, pixels): windows
         can only guess how far a vehicle reaches beyond, so their guesses need not agree.
         """
-        boxes = from_sizes(np.concatenate([each.vehicles for each in hits]))
+        boxes = from_sizes(np.concatenate([some.vehicles for some in hits]))
         shares = np.concatenate([each.shares for each in hits], dtype=np.float64)
         probabilities = np.concatenate([each.probabilities for each in hits], dtype=np.float64)
         bounded = np.clip(probabilities, 1 - _MAX_PROBABILITY, _MAX_PROBABILITY)
@@ -86,15 +86,6 @@ class Votes:
         return Votes(self.boxes[indices], self.presence[indices], self.position[indices])
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _VotedBox:
-    """A box `(4,)` that votes agree on, and the sums of their weights, times their overlaps."""
-
-    box: Float64Array
-    position: float
-    presence: float
-
-
 def split_regions(regions: Sequence[HotRegion], votes: Votes, least: float) -> list[HotRegion]:
     """Return the vehicles that the votes in the regions agree on, strongest first in each region.
 
@@ -102,18 +93,15 @@ def split_regions(regions: Sequence[HotRegion], votes: Votes, least: float) -> l
     larger one is kept only if it is far stronger; the tracker, or `SvmDetector` in a still picture,
     shows one of the two. `least` is the least weight of the votes that agree on a vehicle.
     """
-    found = [
-        vehicle
-        for group in _overlapping([region.box for region in regions])
-        for vehicle in _vehicles(votes.within(group), least)
-    ]
-    boxes = np.reshape([each.box for each in found], (-1, 4))
-    position = np.array([each.position for each in found])
+    groups = _overlapping([region.box for region in regions])
+    found = [vehicle for group in groups for vehicle in _vehicles(votes.within(group), least)]
+    boxes = np.reshape([box for box, _, _ in found], (-1, 4))
+    position = np.array([weight for _, weight, _ in found])
     parts = coverage(boxes, boxes) > _INSIDE
     parts &= area(boxes) > area(boxes)[:, np.newaxis]
     parts &= _FAR_STRONGER * position > position[:, np.newaxis]
-    kept = [found[row] for row in np.flatnonzero(~parts.any(axis=1)).tolist()]
-    pairs = [(Box(*each.box.tolist()), each.presence) for each in kept]
+    kept = zip(boxes.tolist(), found, parts.any(axis=1), strict=True)
+    pairs = [(Box(*box), presence) for box, (_, _, presence), is_part in kept if not is_part]
     return [HotRegion(box.rounded, box.center, presence) for box, presence in pairs]
 
 
@@ -131,10 +119,10 @@ def _overlapping(boxes: Iterable[Box]) -> list[list[Box]]:
     return groups
 
 
-def _vehicles(votes: Votes, least: float) -> list[_VotedBox]:
+def _vehicles(votes: Votes, least: float) -> Iterator[tuple[Float64Array, float, float]]:
+    """Yield boxes `(4,)` that votes agree on, and their weights of position and presence."""
     overlaps = iou_matrix(votes.boxes, votes.boxes)
     presence, position = votes.presence.copy(), votes.position.copy()
-    found: list[_VotedBox] = []
     # Presence only falls: once no box has enough, none will be found any more.
     while position.any() and (overlaps @ presence).max() >= least:
         agreed = np.where(position > 0, overlaps @ position, 0)
@@ -142,14 +130,13 @@ def _vehicles(votes: Votes, least: float) -> list[_VotedBox]:
         box = _average(votes.boxes, position, overlaps[mode])
         around = iou_matrix(box[np.newaxis], votes.boxes)[0]
         box = _average(votes.boxes, position, around)
-        vehicle = _VotedBox(box, float(agreed[mode]), float(overlaps[mode] @ presence))
+        weight = float(overlaps[mode] @ presence)
         used = np.maximum(around, overlaps[mode]) > _AGREEMENT
         used[mode] = True
-        if vehicle.presence >= least:
-            found.append(vehicle)
+        if weight >= least:
+            yield box, float(agreed[mode]), weight
             used |= coverage(votes.boxes, box[np.newaxis])[:, 0] > _INSIDE
         presence[used] = position[used] = 0
-    return found
 
 
 def _average(boxes: Float64Array, weights: Float64Array, overlaps: Float64Array) -> Float64Array:

@@ -24,6 +24,13 @@ IndexArray = npt.NDArray[np.intp]
 WINDOW_SIDES = np.array([-0.5, -0.5, 0.5, 0.5], np.float32)
 """The sides of a vehicle that fills its window."""
 
+_HIGHEST, _LOWEST = 0.6, 1.1
+"""Distance from the horizon down to the bottoms of the highest and of the lowest windows of a set
+that follows the perspective, in sides of a window."""
+
+_BEYOND = 0.7
+"""Fraction of a window of such a set that may lie beyond the left or right of the frame."""
+
 _MAX_ASPECT = 16 / 9
 """Of a wider frame, which shows more to the sides, the height times this counts as the width."""
 
@@ -197,16 +204,16 @@ def lay_perspective(
     cells = features.patch // features.hog.cell
     grids: list[WindowGrid] = []
     for share in sets.sizes:
-        side = share * sets.zoom * min(width, _MAX_ASPECT * height)
+        side = share * min(width, _MAX_ASPECT * height)
         halvings = max(0, math.floor(math.log2(max(side, 1) / features.patch)))
         unit = cells << halvings
         size = unit * max(1, round(side / unit))
-        first = horizon * height + (sets.highest - 1) * size
+        first = horizon * height + (_HIGHEST - 1) * size
         top = max(0, round(first / (1 << halvings)) << halvings)
         step = Fraction(size, cells)
-        beyond = int(Fraction(sets.beyond) * size / step)
+        beyond = int(_BEYOND * cells)
         columns = (width + 2 * beyond * step - size) // step + 1
-        wanted = round((sets.lowest - sets.highest) * size / step) + 1
+        wanted = round((_LOWEST - _HIGHEST) * cells) + 1
         rows = min(wanted, (height - top - size) // step + 1)
         if size <= width and min(columns, rows) >= 1 and size not in {grid.size for grid in grids}:
             left = -beyond * step

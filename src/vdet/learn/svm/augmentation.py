@@ -11,10 +11,13 @@ import cv2
 import numpy as np
 
 from vdet.boxes import Float32Array, Image
-from vdet.config.train import AugmentationSettings
 
-_CUT_SHARES = (0.15, 0.5)  # of the patch's width
-_PART_SHARES = (0.4, 0.6)  # of its width and height
+CUT, PART = 0.15, 0.05
+"""Fractions of the patches, and of their mirror images, that are cut off; of which a part is taken.
+"""
+
+_CUT_WIDTHS = (0.15, 0.5)  # of the patch's width
+_PART_SIDES = (0.4, 0.6)  # of its width and height
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,25 +33,15 @@ class PatchSample:
     sides: Float32Array
 
 
-def augment(
-    sample: PatchSample, seed: tuple[int, ...], settings: AugmentationSettings
-) -> Iterator[PatchSample]:
-    """Yield the samples made of a patch, without the patch itself.
-
-    They depend on the settings and the seed alone. Switching one kind on does not change the
-    others.
-    """
-    cuts, parts = (np.random.default_rng((*seed, kind)) for kind in range(2))
-    whole = [sample]
-    if settings.mirror:
-        whole.append(mirrored(sample))
-        yield whole[1]
-    for each in whole:
-        if cuts.random() < settings.cut:
-            share, left = cuts.uniform(*_CUT_SHARES), cuts.random() < 0.5
-            yield cut_off(each, share, left=left)
-        if each.vehicle and parts.random() < settings.parts:
-            yield part_of(each, parts)
+def augment(sample: PatchSample, rng: np.random.Generator) -> Iterator[PatchSample]:
+    """Yield the samples made of a patch: its mirror image, and now and then a cut or a part."""
+    mirror = mirrored(sample)
+    yield mirror
+    for whole in (sample, mirror):
+        if rng.random() < CUT:
+            yield cut_off(whole, rng.uniform(*_CUT_WIDTHS), left=rng.random() < 0.5)
+        if whole.vehicle and rng.random() < PART:
+            yield part_of(whole, rng)
 
 
 def mirrored(sample: PatchSample) -> PatchSample:
@@ -58,20 +51,20 @@ def mirrored(sample: PatchSample) -> PatchSample:
     return PatchSample(np.asarray(cv2.flip(sample.image, 1), np.uint8), sample.vehicle, sides)
 
 
-def cut_off(sample: PatchSample, share: float, *, left: bool) -> PatchSample:
+def cut_off(sample: PatchSample, fraction: float, *, left: bool) -> PatchSample:
     """Return a sample cut off by the side of a frame; its outermost column is repeated beyond.
 
     Parameters
     ----------
-    share
-        The share of the width that is cut off.
+    fraction
+        How much of the width is cut off.
     left
         True for the frame's left side, False for its right side.
     """
     if left:
-        return mirrored(cut_off(mirrored(sample), share, left=False))
+        return mirrored(cut_off(mirrored(sample), fraction, left=False))
     width = sample.image.shape[1]
-    kept = width - round(share * width)
+    kept = width - round(fraction * width)
     image = np.take(sample.image, np.arange(width).clip(0, kept - 1), axis=1)
     sides = sample.sides.copy()
     across = sides[::2]
@@ -80,9 +73,9 @@ def cut_off(sample: PatchSample, share: float, *, left: bool) -> PatchSample:
 
 
 def part_of(sample: PatchSample, rng: np.random.Generator) -> PatchSample:
-    """Return a random crop, which is no vehicle and has no sides."""
+    """Return a random crop, which is not a vehicle and has no sides."""
     whole = np.array(sample.image.shape[1::-1])
-    size = np.maximum(1, np.rint(rng.uniform(*_PART_SHARES) * whole)).astype(int)
+    size = np.maximum(1, np.rint(rng.uniform(*_PART_SIDES) * whole)).astype(int)
     x, y = corner = rng.integers(0, whole - size + 1)
     right, bottom = corner + size
     image = np.ascontiguousarray(sample.image[y:bottom, x:right])

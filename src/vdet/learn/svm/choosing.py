@@ -7,7 +7,7 @@ of its other side is unknown.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, cast
 
 import numpy as np
 
@@ -27,12 +27,14 @@ class Most:
 
     For each vehicle, at most `per_vehicle` windows that fit it, and as many others that show it. In
     the whole frame, at most `false_alarms` windows where no vehicle is, and `parts` that show only
-    a part of one: with many parts, fewer vehicles are found as a whole.
+    a part of one: with many parts, fewer vehicles are found as a whole. False alarms and parts have
+    at least `probability`.
     """
 
     per_vehicle: int = 16
     false_alarms: int = 15
     parts: int = 10
+    probability: float = 0.2
 
 
 MOST = Most()
@@ -49,7 +51,7 @@ class ChosenWindow:
 
     kind: PatchKind
     box: Box
-    sides: Sides | None = None
+    sides: Sides | None
 
 
 def choose_windows(
@@ -59,7 +61,6 @@ def choose_windows(
     frame_width: int,
     rng: np.random.Generator,
     *,
-    probability: float,
     most: Most,
 ) -> Iterator[ChosenWindow]:
     """Choose from the windows of a frame, of each kind at most as many as `most` says.
@@ -73,12 +74,10 @@ def choose_windows(
         frame; bool `(n,)`: which are ignore regions.
     frame_width
         Width of the frame, pixels.
-    probability
-        Least probability of a false alarm or a part.
     """
     _, first = np.unique(windows.boxes, axis=0, return_index=True)
     boxes, vehicles = from_sizes(windows.boxes[first]), labelled[~ignored]
-    is_hit = windows.probabilities[first] >= probability
+    is_hit = windows.probabilities[first] >= most.probability
     comparisons = [compare_windows(boxes, vehicle, frame_width) for vehicle in vehicles]
     distances = [np.full(len(boxes), np.inf)]  # of no vehicle
     distances += [np.where(each.near, each.distances, np.inf) for each in comparisons]
@@ -91,7 +90,7 @@ def choose_windows(
         kind: PatchKind, flags: BoolArray, most: int, sides: Float64Array | None = None
     ) -> Iterator[ChosenWindow]:
         for row in sorted(rng.permutation(np.flatnonzero(flags))[:most].tolist()):
-            seen = None if sides is None else _sides(sides[row])
+            seen = None if sides is None else cast("Sides", tuple(sides[row].tolist()))
             yield ChosenWindow(kind, Box(*boxes[row].tolist()), seen)
 
     for number, each in enumerate(comparisons):
@@ -101,11 +100,6 @@ def choose_windows(
         yield from some("box", each.shows & own, most.per_vehicle, each.sides)
     yield from some("false alarm", is_alarm, most.false_alarms)
     yield from some("part", is_part, most.parts)
-
-
-def _sides(row: Float64Array) -> Sides:
-    left, top, right, bottom = (None if np.isnan(side) else float(side) for side in row)
-    return left, top, right, bottom
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -11,7 +11,6 @@ import io
 import math
 import re
 import zipfile
-import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -33,11 +32,14 @@ TABLE = "boxes.csv"
 COLUMNS = ("name", "left", "top", "right", "bottom")
 MAX_PATCH_BYTES = 16_000_000
 
-Sides = tuple[float | None, float | None, float | None, float | None]
+Sides = tuple[float, float, float, float]
 """Left, top, right and bottom of a vehicle, from the patch's centre, in widths and heights of it.
 
-Right and down are positive; None for a side that is not known, for instance outside the frame.
+Right and down are positive; NaN for a side that is not known, for instance outside the frame.
 """
+
+UNKNOWN: Sides = (math.nan, math.nan, math.nan, math.nan)
+"""No side is known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,15 +61,6 @@ class PatchFile:
 
     def __str__(self) -> str:
         return f"{self.source}: {printable(self.name)}"
-
-
-@dataclass(frozen=True, slots=True)
-class Patch:
-    """A patch as read: BGR uint8 image of any size, None if it is broken, and its checksum."""
-
-    file: PatchFile
-    image: Image | None
-    checksum: int
 
 
 def find_patches(sources: Sequence[Path]) -> list[PatchFile]:
@@ -128,28 +121,27 @@ def _numeric(name: str) -> list[tuple[int, str]]:
     return [(len(part) if part.isdecimal() else 0, part) for part in parts]
 
 
-def read_patches(files: Iterable[PatchFile]) -> Iterator[Patch]:
-    """Yield patches in the order given; a broken one has no image. Each zip file is opened once."""
-    files = list(files)
-    contents = _contents((file.source, file.name) for file in files)
-    for file, data in zip(files, contents, strict=True):
-        yield Patch(file, decode_image(data), zlib.crc32(data))
+def read_patches(files: Sequence[PatchFile]) -> Iterator[Image | None]:
+    """Yield the picture of each patch, BGR uint8 of any size; None for a broken one."""
+    return map(decode_image, _contents((file.source, file.name) for file in files))
 
 
 def _contents(places: Iterable[tuple[Path, str]]) -> Iterator[bytes]:
-    """Yield the content of files in folders or zip files; an empty one if it cannot be read."""
+    """Yield the content of files in folders or zip files; an empty one if it cannot be read.
+
+    Each zip file is opened once.
+    """
     with ExitStack() as stack:
         opened = cache(lambda source: stack.enter_context(open_archive(source)))
         for source, name in places:
             try:
                 if source.is_dir():
                     path = source / name
-                    data = read_whole(path, most=MAX_PATCH_BYTES, what="patch", error=DataError)
+                    yield read_whole(path, most=MAX_PATCH_BYTES, what="patch", error=DataError)
                 else:
-                    data = read_member(opened(source), name, most=MAX_PATCH_BYTES)
+                    yield read_member(opened(source), name, most=MAX_PATCH_BYTES)
             except (DataError, ArchiveError):
-                data = b""
-            yield data
+                yield b""
 
 
 def _read_table(source: Path) -> dict[str, Sides]:
@@ -165,9 +157,9 @@ def _read_table(source: Path) -> dict[str, Sides]:
 
 
 def _sides(values: Sequence[str]) -> Sides:
-    left, top, right, bottom = (float(value) if value else None for value in values)
-    if not all(side is None or math.isfinite(side) for side in (left, top, right, bottom)):
-        raise ValueError("a side is not a number")
+    left, top, right, bottom = (float(value or "nan") for value in values)
+    if any(map(math.isinf, (left, top, right, bottom))):
+        raise ValueError("a side is infinite")
     return left, top, right, bottom
 
 
@@ -190,7 +182,9 @@ def patch_archive(path: Path, *, overwrite: bool = False) -> Iterator[AddPatch]:
         def add(name: str, patch: Image, sides: Sides | None) -> None:
             store(file, name, cv2.imencode(".png", patch)[1].tobytes())
             if sides is not None:
-                rows.writerow([name, *("" if side is None else f"{side:.4f}" for side in sides)])
+                rows.writerow(
+                    [name, *("" if math.isnan(side) else f"{side:.4f}" for side in sides)]
+                )
 
         yield add
         store(file, TABLE, table.getvalue())

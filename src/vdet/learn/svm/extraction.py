@@ -1,28 +1,25 @@
 """Patch files and the samples made of them → feature vectors."""
 
-import hashlib
+import zlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from vdet.boxes import BoolArray, Float32Array
 from vdet.config.svm import FeatureSettings
-from vdet.config.train import SvmTrainingSettings
 from vdet.detect.svm.features import FeatureExtractor, to_patch
 from vdet.errors import DataError
 from vdet.learn.svm.augmentation import PatchSample, augment
-from vdet.learn.svm.dataset import Patch, PatchFile, read_patches
+from vdet.learn.svm.dataset import UNKNOWN, PatchFile, read_patches
 from vdet.run.threads import map_ordered
 from vdet.workers import core_count
 
-TEST_SHARE = 0.2
-"""Share of the patches that is held out for the test."""
+TEST_FRACTION = 0.2
+"""Fraction of the patches that is held out for the test."""
 
 RowNumbers = npt.NDArray[np.intp]
-SplitName = Literal["random", "tail"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,8 +38,6 @@ class LabelledVectors:
         intp `(n,)`: the number of the patch that a row shows or was made of.
     files
         The file of each patch.
-    digest
-        SHA-256 over the names, checksums and boxes of all patch files.
     """
 
     vectors: Float32Array
@@ -50,7 +45,6 @@ class LabelledVectors:
     sides: Float32Array
     origins: RowNumbers
     files: Sequence[PatchFile]
-    digest: str = ""
 
     @property
     def groups(self) -> npt.NDArray[np.str_]:
@@ -69,19 +63,19 @@ class LabelledVectors:
 
     def of(self, kept: BoolArray) -> "LabelledVectors":
         """Return a copy of the kept patches, bool `(patches,)`, with the samples made of them."""
-        used = np.flatnonzero(kept[self.origins])
-        new_rows = np.cumsum(kept) - 1
-        vectors, vehicle, sides = self.vectors[used], self.vehicle[used], self.sides[used]
-        files = [self.files[row] for row in np.flatnonzero(kept).tolist()]
-        return LabelledVectors(vectors, vehicle, sides, new_rows[self.origins[used]], files)
+        used = kept[self.origins]
+        files = [file for file, is_kept in zip(self.files, kept, strict=True) if is_kept]
+        origins = (np.cumsum(kept) - 1)[self.origins[used]]
+        return LabelledVectors(
+            self.vectors[used], self.vehicle[used], self.sides[used], origins, files
+        )
 
 
 def extract(
     files: Sequence[PatchFile],
     features: FeatureSettings,
-    training: SvmTrainingSettings,
     *,
-    augmented: bool = True,
+    augmented: bool,
     jobs: int | None = None,
     progress: Callable[[int], object] = lambda _: None,
 ) -> LabelledVectors:
@@ -89,11 +83,8 @@ def extract(
 
     Parameters
     ----------
-    training
-        Has the seed and the settings of the augmentation. What is made of a patch depends on them
-        and on the patch, not on the other patches.
     augmented
-        Describe the samples made of each patch too.
+        Describe the samples made of each patch too. They depend on the patch alone.
     jobs
         Number of threads; None: one for each core.
     progress
@@ -105,20 +96,14 @@ def extract(
         A patch is unreadable.
     """
     extractor = FeatureExtractor(features)
-    digest = hashlib.sha256()
-    broken: list[PatchFile] = []
 
     def samples() -> Iterator[list[PatchSample]]:
-        for patch in read_patches(files):
-            digest.update(_digest_line(patch))
-            if patch.image is None:
-                broken.append(patch.file)
-                continue
-            sides = np.array(patch.file.sides or (np.nan,) * 4, np.float32)
-            whole = PatchSample(patch.image, patch.file.vehicle, sides)
-            seed = training.seed, patch.checksum
-            more = augment(whole, seed, training.augmentation) if augmented else ()
-            yield [whole, *more]
+        for file, image in zip(files, read_patches(files), strict=True):
+            if image is None:
+                raise DataError(f"{file}: is not a readable picture")
+            whole = PatchSample(image, file.vehicle, np.array(file.sides or UNKNOWN, np.float32))
+            rng = np.random.default_rng(zlib.crc32(image.tobytes()))
+            yield [whole, *(augment(whole, rng) if augmented else ())]
 
     def describe(same: Sequence[PatchSample]) -> Float32Array:
         return extractor.describe_all(to_patch(each.image, features.patch) for each in same)
@@ -130,8 +115,6 @@ def extract(
             vectors.append(described)
             labels += [(each.vehicle, each.sides, number) for each in same]
             progress(1)
-    if broken:
-        raise DataError(f"{broken[0]}: {len(broken)} of {len(files)} patches are broken")
     vehicle, sides, origins = zip(*labels, strict=True) if labels else ((), (), ())
     return LabelledVectors(
         np.concatenate(vectors),
@@ -139,37 +122,27 @@ def extract(
         np.reshape(sides, (-1, 4)).astype(np.float32),
         np.array(origins, np.intp),
         files,
-        digest.hexdigest(),
     )
 
 
-def _digest_line(patch: Patch) -> bytes:
-    file = patch.file
-    sides = f" {file.sides}" if file.sides else ""
-    line = f"{file.group}/{file.name.rpartition('/')[2]} {patch.checksum:08x}{sides}\n"
-    return line.encode("utf-8", "surrogateescape")  # a file name may be no valid text
+def hold_out(groups: npt.NDArray[np.str_]) -> BoolArray:
+    """Choose the test patches: the last ones of each group, at least one and never all of it.
 
-
-def hold_out(groups: npt.NDArray[np.str_], name: SplitName, seed: int) -> BoolArray:
-    """Choose the test patches: `TEST_SHARE` of them, at least one and never all of a part.
+    Consecutive video frames, which are near-duplicates, are then on the same side, except where the
+    two parts meet.
 
     Parameters
     ----------
     groups
         Shape `(n,)`: the group of each patch, the patches of a group in numeric order.
-    name
-        `random`: any patches, as in the original system. `tail`: the last ones of each group, so
-        that consecutive video frames are on the same side, except where the two parts meet.
 
     Returns
     -------
     bool `(n,)`: True for the patches of the test.
     """
     held = np.zeros(len(groups), bool)
-    parts = [np.random.default_rng(seed).permutation(len(groups))[::-1]]
-    if name == "tail":
-        parts = [np.flatnonzero(groups == group) for group in np.unique(groups)]
-    for rows in parts:
-        count = min(max(1, round(len(rows) * TEST_SHARE)), len(rows) - 1)
+    for group in np.unique(groups):
+        rows = np.flatnonzero(groups == group)
+        count = min(max(1, round(len(rows) * TEST_FRACTION)), len(rows) - 1)
         held[rows[len(rows) - count :]] = True
     return held

@@ -1,4 +1,4 @@
-"""Scale, fit and calibrate: feature vectors → a `LinearModel`.
+"""Scale, fit and calibrate: feature vectors → a `LinearModel`; and fit the sides of vehicles.
 
 The classifier is that of scikit-learn's `LinearSVC`: squared hinge loss, L2 penalty on weights and
 bias. liblinear, which `LinearSVC` calls, copies float32 data to six times their size; L-BFGS needs
@@ -9,17 +9,17 @@ Optimization", 1989; of the calibration, Platt, "Probabilistic outputs for suppo
 """
 
 import logging
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.optimize import minimize  # type: ignore[import-untyped]
-from sklearn.linear_model import LogisticRegression
+from sklearn.linear_model import LogisticRegression, Ridge
 from sklearn.model_selection import StratifiedKFold
 from sklearn.preprocessing import StandardScaler
 
 from vdet.boxes import BoolArray, Float32Array, Float64Array
 from vdet.config.schema import Settings
-from vdet.detect.svm.model import LinearModel
+from vdet.detect.svm.model import BoxRegression, LinearModel
 from vdet.errors import DataError
 from vdet.learn.svm.extraction import LabelledVectors
 
@@ -29,13 +29,20 @@ FOLDS = 3
 """Folds of the cross-validation that calibrates."""
 MAX_ITERATIONS = 1000
 """Most iterations of the solver."""
+PENALTY = 1.0
+"""Ridge penalty of the weights of scaled features that find sides, for each row."""
+
+_SMALL_SPREAD = 0.05
+"""Added to the spread of each feature, as a fraction of the mean spread: limits the weights of
+features that hardly vary."""
+
 _BLOCK = 1024  # rows that are scaled at a time
 _CORRECTIONS = 20  # of L-BFGS
 _TOLERANCE = 1e-9  # of the loss, relative to that of zero weights
 
 
 def fit(rows: LabelledVectors, settings: Settings) -> LinearModel:
-    """Scale the features, fit one or several linear SVMs, and calibrate each by a sigmoid.
+    """Scale the features, fit a linear SVM, and calibrate it by a sigmoid.
 
     The sigmoid is fitted to the patches alone, each scored by an SVM that was fitted without it and
     without the samples made of it. The scaling becomes part of the weights.
@@ -50,37 +57,34 @@ def fit(rows: LabelledVectors, settings: Settings) -> LinearModel:
     DataError
         A class has fewer patches than there are calibration folds.
     """
-    training, labels = settings.train.svm, rows.labels
+    penalty, labels = settings.train.svm.C, rows.labels
     fewest = min(np.count_nonzero(labels), np.count_nonzero(~labels))
     if fewest < FOLDS:
-        raise DataError(f"a class has {fewest} training patches, and {FOLDS} are needed; give more")
+        raise DataError(
+            f"a class has {fewest} training patches, must be at least {FOLDS}; add more"
+        )
     scaler = StandardScaler(copy=False)
     for start in range(0, len(rows.vectors), _BLOCK):  # as a whole, it needs twice their memory
         scaler.partial_fit(rows.vectors[start : start + _BLOCK])
     vectors, patches = scaler.transform(rows.vectors), rows.patches
-    svms, sigmoids, scores = [], [], np.zeros(len(labels))
-    folds = StratifiedKFold(FOLDS, shuffle=True, random_state=training.seed)
-    for _, tested in folds.split(labels, labels):
-        svm = _fit_svm(vectors, rows.vehicle, ~np.isin(rows.origins, tested), training.C)
-        scores[tested] = vectors[patches[tested]] @ svm.x[:-1].astype(np.float32) + svm.x[-1]
-        svms.append(svm)
-        sigmoids.append(_fit_sigmoid(scores[tested], labels[tested]))
-    if not training.ensemble:
-        everything = np.ones(len(vectors), bool)
-        svms = [_fit_svm(vectors, rows.vehicle, everything, training.C)]
-        sigmoids = [_fit_sigmoid(scores, labels)]
-    if any(svm.status == 1 for svm in svms):  # the iterations are used up
-        log.warning("the SVM has not converged; lower train.svm.C")
+    scores = np.zeros(len(labels))
+    for _, tested in StratifiedKFold(FOLDS, shuffle=True, random_state=0).split(labels, labels):
+        part = _fit_svm(vectors, rows.vehicle, ~np.isin(rows.origins, tested), penalty)
+        scores[tested] = vectors[patches[tested]] @ part[:-1].astype(np.float32) + part[-1]
+    svm = _fit_svm(vectors, rows.vehicle, np.ones(len(vectors), bool), penalty)
     # w·(x - μ)/σ + b = (w/σ)·x + (b - (w/σ)·μ)
-    weights = np.array([svm.x[:-1] for svm in svms]) / scaler.scale_
-    biases = np.array([svm.x[-1] for svm in svms]) - weights @ scaler.mean_
-    slopes, offsets = np.array(sigmoids, np.float32).T
-    planes = weights.astype(np.float32), biases.astype(np.float32)
-    return LinearModel(settings.svm.features, *planes, slopes, offsets)
+    weights = svm[:-1] / scaler.scale_
+    bias = svm[-1] - weights @ scaler.mean_
+    slope, offset = _fit_sigmoid(scores, labels)
+    biases, slopes, offsets = np.array([[bias], [slope], [offset]], np.float32)
+    normal = weights[np.newaxis].astype(np.float32)
+    return LinearModel(settings.svm.features, normal, biases, slopes, offsets)
 
 
-def _fit_svm(vectors: Float32Array, vehicle: BoolArray, used: BoolArray, penalty: float) -> Any:
-    """Fit a linear SVM to the used rows; `x` of the result has the weights, and the bias last."""
+def _fit_svm(
+    vectors: Float32Array, vehicle: BoolArray, used: BoolArray, penalty: float
+) -> Float64Array:
+    """Fit a linear SVM to the used rows; return the weights, and the bias last."""
     # All vectors take part in the products: a copy of some would take their memory again.
     signs = np.where(vehicle, used, -1.0 * used).astype(np.float32)
     scale = 1 / (penalty * np.count_nonzero(used))  # the loss of zero weights becomes 1
@@ -97,7 +101,10 @@ def _fit_svm(vectors: Float32Array, vehicle: BoolArray, used: BoolArray, penalty
     limits = {"maxiter": MAX_ITERATIONS, "maxfun": 10 * MAX_ITERATIONS}
     options = {**limits, "maxcor": _CORRECTIONS, "ftol": _TOLERANCE, "gtol": 0}
     zeros = np.zeros(vectors.shape[1] + 1)
-    return minimize(loss, zeros, jac=True, method="L-BFGS-B", options=options)
+    found = minimize(loss, zeros, jac=True, method="L-BFGS-B", options=options)
+    if found.status == 1:  # the iterations are used up
+        log.warning("the SVM has not converged; lower train.svm.C")
+    return np.asarray(found.x)
 
 
 def _fit_sigmoid(scores: Float64Array, vehicle: BoolArray) -> tuple[float, float]:
@@ -111,3 +118,65 @@ def _fit_sigmoid(scores: Float64Array, vehicle: BoolArray) -> tuple[float, float
     weights = np.concatenate([targets, 1 - targets])
     found = LogisticRegression(C=np.inf, tol=1e-8).fit(values, signs, weights)
     return -found.coef_[0, 0], -found.intercept_[0]
+
+
+def fit_boxes(
+    sets: Sequence[LabelledVectors], held: Sequence[BoolArray], hog_length: int
+) -> tuple[BoxRegression | None, float | None]:
+    """Fit on the patches that are not held out and measure the error on the others.
+
+    Parameters
+    ----------
+    sets
+        Patches of which some have known sides.
+    held
+        Of each set, which patches are held out, bool `(patches,)`.
+    hog_length
+        Number of features of HOG, which come first.
+
+    Returns
+    -------
+    The regression, and the mean absolute error on the known sides of patches that are held out, as
+    a fraction of the patch's side. Either is None if it has no patches.
+    """
+    hogs, sides, tested_hogs, tested_sides = [], [], [], []
+    for data, out in zip(sets, held, strict=True):
+        known = np.isfinite(data.sides).any(axis=1)
+        learnt, tested = known & ~out[data.origins], data.patches[out]
+        tested = tested[known[tested]]
+        hogs.append(data.vectors[learnt, :hog_length])
+        sides.append(data.sides[learnt])
+        tested_hogs.append(data.vectors[tested, :hog_length])
+        tested_sides.append(data.sides[tested])
+    if not sum(map(len, sides)):
+        return None, None
+    regression = fit_sides(np.concatenate(hogs), np.concatenate(sides))
+    truth = np.concatenate(tested_sides)
+    errors = abs(regression.sides(np.concatenate(tested_hogs)) - truth)
+    return regression, round(float(np.nanmean(errors)), 4) if len(truth) else None
+
+
+def fit_sides(hogs: Float32Array, sides: Float32Array) -> BoxRegression:
+    """Fit the sides of vehicles' boxes to HOG vectors; a side that is never known is always 0.
+
+    Parameters
+    ----------
+    hogs
+        float32 `(n, h)`; they are overwritten, which saves memory.
+    sides
+        float32 `(n, 4)`: left, top, right, bottom from the window's centre, in widths and heights
+        of the window; NaN for unknown ones.
+    """
+    spread = hogs.std(axis=0)
+    spread += _SMALL_SPREAD * spread.mean() + np.finfo(np.float32).tiny
+    hogs /= spread
+    weights = np.zeros((4, hogs.shape[1]), np.float32)
+    biases = np.zeros(4, np.float32)
+    for side in range(4):
+        known = ~np.isnan(sides[:, side])
+        if known.any():
+            ridge = Ridge(PENALTY * np.count_nonzero(known), copy_X=False)
+            ridge.fit(hogs[known], sides[known, side])
+            weights[side] = ridge.coef_ / spread
+            biases[side] = ridge.intercept_
+    return BoxRegression(weights, biases)

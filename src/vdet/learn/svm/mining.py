@@ -8,7 +8,7 @@ Detection", 1998; for HOG and linear SVM, Dalal & Triggs, 2005, section 4.
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -47,8 +47,7 @@ _FOLDERS: dict[PatchKind, str] = {
 class LabelledFrame:
     """A frame or a picture with its windows.
 
-    The names of its patches begin with `name`. Which windows are chosen depends on `number` and on
-    the seed of the settings.
+    The names of its patches begin with `name`. Which windows are chosen depends on `number`.
     """
 
     name: str
@@ -97,21 +96,19 @@ class VideoSource:
             info, advance = reader.info, progress(last)
             images, frames = peek(reader)
             with named_errors(self.path, VideoError):
-                search = search_windows(model, info.width, info.height, images)
+                detector = model.for_video(info.width, info.height, images)
             for frame in frames:
                 number = frame.index + 1
                 labels = truth.frame(number)
-                if number in regular or self._cuts_off(number, labels, info.width):
+                vehicles = labels.boxes[~labels.ignored]
+                cuts_off = any(cut_sides(box, info.width).any() for box in vehicles)
+                if number in regular or (number >= self.first and cuts_off):
                     image, name = frame.image, f"frame{number:06}"
-                    yield LabelledFrame(name, frame.index, image, search(image), labels)
+                    windows = detector.search(Picture(image), None).windows
+                    yield LabelledFrame(name, frame.index, image, windows, labels)
                 advance(1)
         if number < last:
             truth.check_end(self.truth, number)
-
-    def _cuts_off(self, number: int, labels: LabelledVideo, width: int) -> bool:
-        """Return whether a frame that may be used cuts a vehicle off."""
-        vehicles = labels.boxes[~labels.ignored]
-        return number >= self.first and any(cut_sides(box, width).any() for box in vehicles)
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,7 +135,8 @@ class PictureSource:
             image = labelled.read()
             height, width = image.shape[:2]
             with named_errors(labelled.path, ImageError):
-                windows = search_windows(model, width, height, [image])(image)
+                detector = model.for_video(width, height, [image])
+            windows = detector.search(Picture(image), None).windows
             yield LabelledFrame(f"picture{number + 1:06}", number, image, windows, labelled)
             advance(1)
 
@@ -166,7 +164,7 @@ def mine(
     model
         The model whose false alarms are searched for.
     most
-        Most patches of each kind in a frame.
+        Most patches of each kind in a frame, and the minimum probability of false alarms.
     steps
         Called for each source with its name and its number of frames.
 
@@ -189,7 +187,6 @@ def mine(
     for name, count in Counter(names).items():
         if count > 1:
             raise DataError(f"{count} sources are named {name}; rename them, or mine one at a time")
-    choose = partial(choose_windows, probability=settings.train.mine.probability, most=most)
     searched = 0
     counts: Counter[PatchKind] = Counter()
     with patch_archive(output, overwrite=overwrite) as add:
@@ -197,30 +194,18 @@ def mine(
             progress = partial(steps, source.path.name)
             for frame in source.frames(model, settings, progress):
                 searched += 1
-                rng = np.random.default_rng((settings.train.svm.seed, frame.number))
+                rng = np.random.default_rng(frame.number)
                 labels, width = frame.labels, frame.image.shape[1]
-                for each in choose(frame.windows, labels.boxes, labels.ignored, width, rng):
-                    x, y, side, _ = each.box.xywh
+                for chosen in choose_windows(
+                    frame.windows, labels.boxes, labels.ignored, width, rng, most=most
+                ):
+                    x, y, side, _ = chosen.box.xywh
                     patch = to_patch(cut_window(frame.image, x, y, side, side), PATCH)
-                    folder = _FOLDERS[each.kind].format(stem)
+                    folder = _FOLDERS[chosen.kind].format(stem)
                     name = f"{folder}/{frame.name}_x{x:04}_y{y:04}_s{side:04}.png"
-                    add(name, patch, each.sides)
-                    counts[each.kind] += 1
+                    add(name, patch, chosen.sides)
+                    counts[chosen.kind] += 1
         if not counts:
             shown = ", ".join(str(source.path) for source in sources)
             raise DataError(f"{shown}: no window fits a vehicle or is a false alarm; try others")
     return searched, counts
-
-
-def search_windows(
-    model: SvmModel, width: int, height: int, images: Sequence[Image]
-) -> Callable[[Image], Windows]:
-    """Return a search of frames of this size, `images` are the first few, for their windows.
-
-    Raises
-    ------
-    ImageError
-        Such frames cannot be searched.
-    """
-    detector = model.for_video(width, height, images)
-    return lambda image: detector.search(Picture(image), None).windows
