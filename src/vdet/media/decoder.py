@@ -104,9 +104,8 @@ class Decoder:
     clock
         Says whether, and how often, the clock restarts.
     ticks
-        When each of numbered pictures is shown, in units of the time base.
-    is_rate_assumed
-        Whether nothing says how many numbered pictures there are in a second.
+        When each of numbered pictures is shown, in units of the time base; a range where their
+        names do not say.
     is_countable
         Whether frames can be counted without decoding them.
 
@@ -125,14 +124,12 @@ class Decoder:
         context.thread_count = 1  # with more, frames near damage differ from run to run
         self.clock = ClockUnwrapper(self.container, self.stream)
         self.damage = Damage(1 / demux.rate_of(self.stream) / demux.time_base_of(self.stream))
-        is_indexed = self.container.format.name != "avi" and not demux.is_pipe(path)
-        self.is_countable = is_indexed and context.name in _COUNTABLE
+        self._is_avi = self.container.format.name == "avi"
+        self.is_countable = context.name in _COUNTABLE and not (self._is_avi or demux.is_pipe(path))
         self._packets = self._read()
         self.ticks: Sequence[int] = ()
-        self.is_rate_assumed = False
         if sequence := find_sequence(path):
             _, self.ticks = sequence.timing(frame_rate)
-            self.is_rate_assumed = not (frame_rate or sequence.ticks)
             self._packets = self._read_pictures(sequence.files)
 
     def skip_to(self, time: int, first: int) -> bool:
@@ -186,6 +183,8 @@ class Decoder:
         found = demux.packets(self.container, self.clock.streams, self._fail)
         for packet in self.clock.unwrap(found):
             if packet.stream_index == self.stream.index:
+                if self._is_avi and self.stream.codec_context.has_b_frames:
+                    packet.pts = packet.dts = None  # AVI has no times of presentation
                 self.damage.corrupt_packets += packet.is_corrupt
                 self.damage.restarts = self.clock.restarts
                 yield packet

@@ -36,7 +36,6 @@ _12_BITS, _16_BITS = 4095, 65_535
 """The values of white."""
 _ALL_BITS = cv2.IMREAD_COLOR | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
 _JPEG_SCAN, _JPEG_END = b"\xff\xda", b"\xff\xd9"  # markers, ITU-T T.81, annex B
-_TURNED_BY_PILLOW = "TIFF"
 _ORIENTATION = 274  # EXIF tag
 
 log = logging.getLogger("vdet")
@@ -121,7 +120,7 @@ def read_header(path: Path) -> tuple[tuple[int, int], Orientation]:
     picture = _open(read_encoded(path), path)
     width, height = picture.size
     turn = _orientation(picture)
-    if turn.is_sideways and picture.format != _TURNED_BY_PILLOW:
+    if turn.is_sideways and picture.format != "TIFF":
         width, height = height, width
     return (width, height), turn
 
@@ -206,7 +205,8 @@ def _orientation(picture: ImageFile) -> Orientation:
 
 def _decode(data: bytes, path: Path) -> Image:
     picture = _open(data + _JPEG_END if _is_cut_off(data) else data, path)
-    turn = Orientation() if picture.format == _TURNED_BY_PILLOW else _orientation(picture)
+    # Pillow itself turns TIFF.
+    turn = Orientation() if picture.format == "TIFF" else _orientation(picture)
     with _refusing(path):
         return upright(_to_bgr(picture, data), turn)
 

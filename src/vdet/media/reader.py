@@ -135,7 +135,7 @@ class VideoReader:
 
     def _assumptions(self) -> Iterator[str]:
         """Yield what is read in another way than the file, or the user, may mean."""
-        if self._decoder.is_rate_assumed:
+        if isinstance(self._decoder.ticks, range) and self._settings.frame_rate is None:
             yield f"{ASSUMED_RATE:.0f} pictures a second are assumed; --set input.frame_rate=N"
         if self._decoder.container.streams.audio and not self.info.has_sound:
             yield "its sound is left out: a pipe can be read only once"
@@ -215,7 +215,7 @@ class VideoReader:
         shown = max(period, picture.duration * info.time_base)
         declared, self.length = self.length, time + shown - info.start
         if declared and declared - self.length > max(2 * period, declared * _TOLERANCE):
-            self._faults.append(f"ends early: {index + 1} of {info.frames} frames are readable")
+            self._faults.append(f"ends early: {index + 1} of {info.frames} frames could be read")
 
     def _report(self) -> None:
         """Refuse a video that is too damaged; warn of any other fault."""

@@ -118,7 +118,6 @@ _LARGEST_AT_ONCE = 1920 * 1088
 """Pixels of the largest frames of which several are encoded at once; that takes more memory."""
 _MARK = "made by vdet"
 _MP4 = (b"ftyp", b"styp", b"moov", b"moof", b"mdat", b"free", b"skip", b"wide")  # first boxes
-_COARSEST = 20_000  # ticks a second; FFmpeg writes no coarser ones into mp4
 _FINEST = 10_000_000  # ticks a second; more is not safe in mp4 players
 _MATRICES = {"bt601": 6, "bt709": 1}  # codes of ITU-T H.273
 
@@ -238,7 +237,7 @@ class VideoWriter:
 
     def _check_pause(self, seconds: Fraction) -> None:
         """Refuse more ticks from one frame to the next than mp4 can hold."""
-        ticks = seconds * max(self._time_base.denominator, _COARSEST)
+        ticks = seconds * max(self._time_base.denominator, 20_000)  # FFmpeg writes no coarser ones
         if ticks >= 2**31 and self._container.format.name != "matroska":
             raise OutputError(
                 f"{self._name}: cannot hold a pause of {int(seconds)} s; name it .mkv"
