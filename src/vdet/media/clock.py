@@ -66,7 +66,7 @@ class ClockUnwrapper:
         """Add the offset of its part to the times of a packet, and note where it ends."""
         stream = packet.stream_index
         number = self._part_at(stream, begin)
-        self.restarts += stream == self._pictures and number > self._part_of.get(stream, 0)
+        self.restarts += stream == self._pictures and number > self._part_of[stream]
         self._part_of[stream] = number
         duration = (packet.duration or 0) * packet.time_base or self._period
         end = begin + self._offsets[number] + duration
@@ -77,7 +77,8 @@ class ClockUnwrapper:
 
     def _part_at(self, stream: int, begin: Fraction) -> int:
         """Return the part in which a stream goes on at a time of its clock; it may be a new one."""
-        for number in range(self._part_of.get(stream, 0), len(self._offsets)):
+        newest = self._part_of.get(self._pictures, 0)
+        for number in range(self._part_of.setdefault(stream, newest), len(self._offsets)):
             if self._goes_on(stream, begin + self._offsets[number]):
                 return number
         self._offsets.append(max(self._ends.values()) - begin)

@@ -90,8 +90,7 @@ def find_sequence(path: Path) -> PictureSequence | None:
 
 def _by_the_clock(files: tuple[Path, ...]) -> PictureSequence | None:
     """Return the pictures if all their names are times, each another one."""
-    time_in = ClockSettings().time_in
-    times = {time: file for file in files if (time := time_in(file.name))}
+    times = {time: file for file in files if (time := ClockSettings().time_in(file.name))}
     if len(times) < len(files) or len({time.tzinfo for time in times}) > 1:
         return None
     ordered = sorted(times)
