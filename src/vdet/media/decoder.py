@@ -197,7 +197,7 @@ class Decoder:
             except ImageError:
                 self._fail()
             else:
-                packet.stream, packet.time_base = self.stream, self.stream.time_base
+                packet.stream, packet.time_base = self.stream, demux.time_base_of(self.stream)
                 packet.pts = packet.dts = tick
                 packet.is_keyframe = True
                 yield packet
