@@ -56,7 +56,7 @@ def test_a_video_is_described(run: Run, tmp_path: Path) -> None:
     ):
         assert line in result.out
     values = json.loads((tmp_path / "facts.json").read_text())
-    assert (values["width"], values["height"], values["frames"]) == (160, 96, 12)
+    assert (values["width"], values["height"], values["declared_frames"]) == (160, 96, 12)
     assert (values["rate"], values["seconds"]) == (25, 0.48)
     again = run("info", path, "--json", tmp_path / "facts.json")
     assert (again.code, again.err.count("\n")) == (1, 1)

@@ -1,14 +1,19 @@
-"""Which pictures a pattern names."""
+"""Which pictures a pattern or a folder names, and when each was taken."""
 
 import tempfile
+from fractions import Fraction
 from pathlib import Path
 
+import cv2
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from clips import draw_frame, read_number
+from vdet.config.schema import InputSettings
 from vdet.errors import VideoError
-from vdet.media.numbered import PictureSequence, find_sequence
+from vdet.media.numbered import find_sequence
+from vdet.media.reader import VideoReader
 
 
 def make(folder: Path, *names: str) -> None:
@@ -16,65 +21,66 @@ def make(folder: Path, *names: str) -> None:
         (folder / name).touch()
 
 
-def test_pictures_begin_at_the_first_number_that_exists(tmp_path: Path) -> None:
-    make(tmp_path, "a_0099.png", "a_0100.png", "a_0101.png", "a_0.png", "b_0001.png", "a_0050.jpg")
-    pattern = str(tmp_path / "a_%04d.png")
-    assert find_sequence(tmp_path / "a_%04d.png") == PictureSequence(pattern, 99)
+def names_of(path: Path) -> list[str]:
+    found = find_sequence(path)
+    assert found is not None
+    return [file.name for file in found.files]
 
 
-def test_numbers_may_have_more_digits_than_the_pattern(tmp_path: Path) -> None:
-    make(tmp_path, "98.png", "99.png", "100.png", "0101.png")
-    found = find_sequence(tmp_path / "%02d.png")
-    assert found == PictureSequence(str(tmp_path / "%02d.png"), 98)
+@pytest.mark.parametrize(
+    ("pattern", "names", "others"),
+    [
+        ("a_%04d.png", ["a_0099.png", "a_0100.png"], ["a_0.png", "b_0001.png", "a_0050.jpg"]),
+        ("%02d.png", ["98.png", "99.png", "100.png"], ["0101.png"]),
+        ("100%%_%d.png", ["100%_1.png"], ["100%%_7.png"]),
+        ("7_%d.png", ["7_0.png", "7_3.png", "7_6.png"], ["7_05.png"]),
+    ],
+)
+def test_a_pattern_names_its_pictures(
+    pattern: str, names: list[str], others: list[str], tmp_path: Path
+) -> None:
+    make(tmp_path, *reversed(names), *others)
+    assert names_of(tmp_path / pattern) == names
 
 
-def test_a_doubled_per_cent_sign_means_one(tmp_path: Path) -> None:
-    folder = tmp_path / "50%d"
-    folder.mkdir()
-    make(folder, "100%_1.png", "100%%_7.png")
-    found = find_sequence(folder / "100%%_%d.png")
-    assert found == PictureSequence(f"{tmp_path}/50%%d/100%%_%d.png", 1)
+@pytest.mark.parametrize(
+    ("names", "others"),
+    [
+        (["0000000007.png", "0000000008.png"], ["notes.txt"]),
+        (["9.jpg", "10.jpg"], [".11.jpg"]),
+        (["cam 2_img_099.png", "cam 2_img_100.png"], []),
+        (["100%_1_left.JPG"], []),
+        (["7_0006.png", "7_0009.png", "7_0012.png"], ["cover.png"]),
+    ],
+)
+def test_the_numbered_pictures_of_a_folder_are_found(
+    names: list[str], others: list[str], tmp_path: Path
+) -> None:
+    make(tmp_path, *reversed(names), *others)
+    assert names_of(tmp_path) == names
 
 
-class TestFolder:
-    @pytest.mark.parametrize(
-        ("names", "pattern"),
-        [
-            (["0000000007.png", "0000000008.png", "notes.txt"], "%010d.png"),
-            (["9.jpg", "10.jpg", ".11.jpg"], "%d.jpg"),
-            (["cam 2_img_099.png", "cam 2_img_100.png"], "cam 2_img_%03d.png"),
-            (["100%_1_left.JPG"], "100%%_%d_left.JPG"),
-        ],
-    )
-    def test_its_numbered_pictures_are_found(
-        self, names: list[str], pattern: str, tmp_path: Path
-    ) -> None:
-        make(tmp_path, *names)
-        found = find_sequence(tmp_path)
-        assert found is not None
-        assert found.pattern == f"{tmp_path}/{pattern}"
-
-    @pytest.mark.parametrize(
-        ("names", "words"),
-        [
-            (["a.png"], "has no numbered pictures; give a video"),
-            (["1.png", "3.png", "4.png"], "picture 2 is missing; put a copy of 1"),
-            (
-                ["a_01.png", "a_02.png", "b_01.png"],
-                "several kinds of names; give .*/a_%02d.png or .*/b_%02d.png",
-            ),
-        ],
-    )
-    def test_other_pictures_are_refused(self, names: list[str], words: str, tmp_path: Path) -> None:
-        make(tmp_path, *names)
-        with pytest.raises(VideoError, match=words):
-            find_sequence(tmp_path)
+SEVERAL = "several kinds of names; use a pattern, as in img_%04d.png"
 
 
-def test_the_error_names_the_pattern_that_fits(tmp_path: Path) -> None:
-    make(tmp_path, "img_0001.png", "img_0002.png")
-    with pytest.raises(VideoError, match=r"no picture of such a name; give .*/img_%04d\.png$"):
-        find_sequence(tmp_path / "img_%d.png")
+@pytest.mark.parametrize(
+    ("name", "names", "words"),
+    [
+        ("", ["a.png"], "no numbered pictures found; use a video, or -d DIR"),
+        ("", ["1.png", "3.png", "4.png"], "picture 2 is missing; put a copy of 1"),
+        ("", ["a_01.png", "a_02.png", "b_01.png"], SEVERAL),
+        ("", ["1_01.png", "2_01.png"], SEVERAL),
+        ("img_%02d.png", [], "no numbered pictures found"),
+        ("img_%02d.png", ["img_1.png"], "no numbered pictures found"),
+        ("img_%02d.png", ["img_06.png", "img_09.png", "img_15.png"], "picture 12 is missing"),
+    ],
+)
+def test_no_pictures_and_a_gap_are_refused(
+    name: str, names: list[str], words: str, tmp_path: Path
+) -> None:
+    make(tmp_path, *names)
+    with pytest.raises(VideoError, match=words):
+        find_sequence(tmp_path / name)
 
 
 @pytest.mark.parametrize(
@@ -82,33 +88,6 @@ def test_the_error_names_the_pattern_that_fits(tmp_path: Path) -> None:
 )
 def test_a_name_that_is_no_pattern_is_a_file(name: str, tmp_path: Path) -> None:
     assert find_sequence(tmp_path / name) is None
-
-
-@pytest.mark.parametrize(
-    ("names", "words"),
-    [
-        ((), "there is no such file, and no picture of such a name"),
-        (("img_1.png",), "no picture of such a name"),
-        (("img_01.png", "img_03.png", "img_04.png"), "picture 2 is missing; put a copy of 1"),
-        (
-            ("img_06.png", "img_09.png", "img_15.png"),
-            "picture 12 is missing; put a copy of 9",
-        ),
-        (("img_95.png", "img_98.png", "img_101.png"), "fill with zeros"),
-    ],
-)
-def test_no_pictures_and_a_gap_are_refused(
-    names: tuple[str, ...], words: str, tmp_path: Path
-) -> None:
-    make(tmp_path, *names)
-    with pytest.raises(VideoError, match=words):
-        find_sequence(tmp_path / "img_%02d.png")
-
-
-def test_numbers_may_rise_by_a_step(tmp_path: Path) -> None:
-    make(tmp_path, "7_0006.png", "7_0009.png", "7_0012.png")
-    pattern = str(tmp_path / "7_%04d.png")
-    assert find_sequence(tmp_path) == PictureSequence(pattern, 6, 3)
 
 
 @given(
@@ -121,6 +100,36 @@ def test_a_pattern_matches_the_names_that_printf_makes(
     before: str, digits: int | None, first: int, count: int
 ) -> None:
     name = f"{before}_%{'' if digits is None else f'0{digits}'}d.png"
+    names = [name % number for number in range(first, first + count)]
     with tempfile.TemporaryDirectory() as folder:
-        make(Path(folder), *(name % number for number in range(first, first + count)))
-        assert find_sequence(Path(folder) / name) == PictureSequence(f"{folder}/{name}", first)
+        make(Path(folder), *names)
+        assert names_of(Path(folder) / name) == names
+
+
+NAMES = ["cam_20260501_070040.png", "cam_20260501_070050.png", "cam_20260501_070120.png"]
+
+
+@pytest.mark.parametrize(
+    ("rate", "times"), [(None, [0, 10, 40]), (25.0, [0, Fraction(1, 25), Fraction(2, 25)])]
+)
+def test_names_that_are_times_say_when_each_picture_is_shown(
+    rate: float | None, times: list[Fraction], tmp_path: Path
+) -> None:
+    for number, name in enumerate(NAMES):
+        assert cv2.imwrite(str(tmp_path / name), draw_frame(number, 160, 96))
+    with VideoReader(tmp_path, settings=InputSettings(frame_rate=rate)) as reader:
+        frames = list(reader)
+        assert reader.info.frames == 3
+    assert [frame.time for frame in frames] == times
+    assert [read_number(frame.image) for frame in frames] == [0, 1, 2]
+    with VideoReader(tmp_path, start=Fraction(10), settings=InputSettings()) as reader:
+        assert [frame.index for frame in reader] == [1, 2]
+
+
+def test_numbers_beside_one_time_are_numbers(tmp_path: Path) -> None:
+    names = [f"20260501_070040_{number}.png" for number in (8, 9, 10)]
+    make(tmp_path, *names)
+    assert names_of(tmp_path) == names
+    found = find_sequence(tmp_path)
+    assert found is not None
+    assert found.ticks == ()

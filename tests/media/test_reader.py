@@ -116,23 +116,17 @@ def set_matrix(path: Path, a: float, b: float, c: float, d: float) -> Path:
     return path
 
 
-FLIP = np.array([[-1, 0], [0, 1]])
-
-
 @pytest.mark.parametrize("turns", range(4))
-@pytest.mark.parametrize("mirrored", [False, True])
-def test_all_eight_orientations_are_upright(turns: int, mirrored: bool, tmp_path: Path) -> None:
+def test_all_quarter_turns_are_upright(turns: int, tmp_path: Path) -> None:
     path = write_clip(tmp_path / "clip.mp4", count=1)
     with VideoReader(path) as reader:
         stored = next(iter(reader)).image
-    quarter = np.linalg.matrix_power(np.array([[0, -1], [1, 0]]), turns)
-    matrix = FLIP @ quarter if mirrored else quarter
+    matrix = np.linalg.matrix_power(np.array([[0, -1], [1, 0]]), turns)
     with VideoReader(set_matrix(path, *matrix.ravel() * 0.5)) as reader:
         image = next(iter(reader)).image
-        assert reader.info.orientation == Orientation(turns * 90, mirrored)
+        assert reader.info.orientation == Orientation(turns * 90)
         assert image.shape == (reader.info.height, reader.info.width, 3)
-    expected = np.rot90(stored[:, ::-1] if mirrored else stored, turns)
-    np.testing.assert_array_equal(image, expected)
+    np.testing.assert_array_equal(image, np.rot90(stored, turns))
 
 
 def test_other_video_streams_are_reported(tmp_path: Path, warnings: Warnings) -> None:
@@ -148,43 +142,43 @@ def test_other_video_streams_are_reported(tmp_path: Path, warnings: Warnings) ->
     assert warnings() == [f"{path}: has 2 video streams; only the first is used"]
 
 
-def write_hdr(path: Path, transfer: int, luma: int, *, bits: int = 10, matrix: int = 9) -> Path:
-    """Write a grey frame with a transfer of BT.2100 and primaries of BT.2020."""
+def write_hdr(path: Path, transfer: int, lumas: list[int]) -> Path:
+    """Write grey columns of 10 bits with a transfer of BT.2100 and primaries of BT.2020."""
     with av.open(str(path), "w") as container:
         stream = container.add_stream("ffv1", rate=25)
         assert isinstance(stream, av.VideoStream)
-        pixels = "yuv420p" if bits == 8 else "yuv420p10le"
-        stream.width, stream.height, stream.pix_fmt = 160, 96, pixels
+        stream.width, stream.height, stream.pix_fmt = 160, 96, "yuv420p10le"
         context = stream.codec_context
-        context.color_trc, context.color_primaries, context.colorspace = transfer, 9, matrix
+        context.color_trc, context.color_primaries, context.colorspace = transfer, 9, 9
         context.color_range = 1
-        planes = np.full((144, 160), 1 << bits - 1, np.uint8 if bits == 8 else np.uint16)
-        planes[:96] = luma
-        frame = av.VideoFrame.from_ndarray(planes, format=pixels)
+        planes = np.full((144, 160), 512, np.uint16)
+        planes[:96] = np.repeat(lumas, 160 // len(lumas))
+        frame = av.VideoFrame.from_ndarray(planes, format="yuv420p10le")
         container.mux(stream.encode(frame) + stream.encode(None))
     return path
 
 
-@pytest.mark.parametrize(("transfer", "name"), [(16, "PQ"), (18, "HLG")])
-@pytest.mark.parametrize("share", [0, 0.01, 0.18, 0.5])
-def test_hdr_is_read_as_standard_range_and_reported(
-    transfer: int, name: str, share: float, *, tmp_path: Path, warnings: Warnings
-) -> None:
-    """`share` of the light of reference white, 203 cd/m², is shown as so much light."""
-    if name == "PQ":
+def hdr_signal(transfer: int, share: float) -> float:
+    """Return the signal of a share of reference white, 203 cd/m² (BT.2100, BT.2408)."""
+    if transfer == 16:
         power = (203 * share / 10_000) ** 0.1593017578125
-        signal = ((0.8359375 + 18.8515625 * power) / (1 + 18.6875 * power)) ** 78.84375
-    else:
-        scene = (0.203 * share) ** (1 / 1.2)
-        curved = 0.17883277 * np.log(max(12 * scene - 0.28466892, 1e-9)) + 0.55991073
-        signal = np.sqrt(3 * scene) if scene <= 1 / 12 else curved
-    path = write_hdr(tmp_path / "hdr.mkv", transfer, round(64 + 876 * signal))
-    with VideoReader(path) as reader:
+        return float(((0.8359375 + 18.8515625 * power) / (1 + 18.6875 * power)) ** 78.84375)
+    scene = (0.203 * share) ** (1 / 1.2)
+    if scene <= 1 / 12:
+        return float(np.sqrt(3 * scene))
+    return float(0.17883277 * np.log(12 * scene - 0.28466892) + 0.55991073)
+
+
+@pytest.mark.parametrize("transfer", [16, 18])
+def test_hdr_is_read_as_standard_range(transfer: int, tmp_path: Path, warnings: Warnings) -> None:
+    shares = np.array([0, 0.01, 0.18, 0.5])
+    lumas = [round(64 + 876 * hdr_signal(transfer, share)) for share in shares]
+    with VideoReader(write_hdr(tmp_path / "hdr.mkv", transfer, lumas)) as reader:
         (frame,) = reader
         assert reader.info.color == ColorTags(1, 1, 1)
-    expected = 255 * share ** (1 / 2.4)
-    assert np.abs(frame.image - expected).max() < 5
-    assert warnings() == [f"{path}: is HDR ({name}) and is read as standard range (BT.709)"]
+    expected = 255 * shares ** (1 / 2.4)
+    assert np.abs(frame.image[:, 20::40] - expected[:, None]).max() < 5
+    assert warnings() == []
 
 
 def pictures_of(path: Path) -> list[av.VideoFrame]:
@@ -301,12 +295,6 @@ class TestFaults:
             assert reader.damaged == 0
         assert warnings() == []
 
-    def test_a_late_first_frame_is_no_early_end(self, tmp_path: Path, warnings: Warnings) -> None:
-        late: dict[str, Any] = {"codec": "wmv2", "begin": Fraction(10), "count": 30}
-        with VideoReader(write_clip(tmp_path / "late.wmv", **late)) as reader:
-            assert len(list(reader)) == reader.expected == 30
-        assert warnings() == []
-
     def test_an_mp4_may_begin_within_a_group_of_pictures(
         self, tmp_path: Path, warnings: Warnings
     ) -> None:
@@ -321,22 +309,9 @@ class TestFaults:
             assert reader.length == 2
         assert warnings() == []
 
-    @pytest.mark.parametrize("flags", ["", "+faststart"])
-    def test_videos_joined_byte_by_byte_are_reported(
-        self, flags: str, tmp_path: Path, warnings: Warnings
-    ) -> None:
-        path = write_clip(tmp_path / "joined.mp4", movflags=flags)
-        path.write_bytes(path.read_bytes() * 2)
-        with VideoReader(path) as reader:
-            assert len(list(reader)) == 12
-        (warning,) = warnings()
-        assert warning == (
-            f"{path}: is 2 videos joined to one file; only the first is sure to be read whole"
-        )
-
     def test_an_mp4_without_its_index_is_refused(self, tmp_path: Path) -> None:
         path = cut_off(write_clip(tmp_path / "cut.mp4", **GOPS), 0.3)
-        with pytest.raises(VideoError, match=r"cut\.mp4: is not a video, or was cut off"):
+        with pytest.raises(VideoError, match=r"cut\.mp4: .* is not a video, or was cut off"):
             VideoReader(path)
 
     @pytest.mark.parametrize("kind", DAMAGED)
@@ -350,9 +325,13 @@ class TestFaults:
         for one, other in zip(frames, again, strict=True):
             assert one.time == other.time
             np.testing.assert_array_equal(one.image, other.image)
-        assert 0 <= 60 - len(frames) <= damaged
-        assert damaged > 0
         (warning,) = set(warnings())
+        if kind == "webm":  # the rest of the file cannot be read
+            assert warning == f"{path}: ends early: {len(frames)} of 60 frames could be read"
+            return
+        unseen = 2 if kind == "ts" else 0  # packets that are missing whole
+        assert 0 <= 60 - len(frames) - unseen <= damaged
+        assert damaged > 0
         assert f"{path}: {damaged} of " in warning
 
 

@@ -66,21 +66,12 @@ def test_sound_is_copied_bit_for_bit(
     assert warnings() == []
 
 
-def test_every_sound_stream_is_copied_with_its_language(tmp_path: Path) -> None:
+def test_every_sound_stream_is_copied(tmp_path: Path) -> None:
     source = write_clip(tmp_path / "in.mkv", sounds=["aac", "libmp3lame"])
-    with av.open(str(source)) as original, av.open(str(tmp_path / "tagged.mkv"), "w") as tagged:
-        streams = {s.index: tagged.add_stream_from_template(s) for s in original.streams}
-        streams[2].metadata["language"] = "fra"
-        for packet in original.demux():
-            if packet.size:
-                packet.stream = streams[packet.stream.index]
-                tagged.mux(packet)
-    target = copy(tmp_path / "tagged.mkv", tmp_path / "out.mkv")
+    target = copy(source, tmp_path / "out.mkv")
     for track in (0, 1):
-        kept = [packet for packet in sound(tmp_path / "tagged.mkv", track) if packet[0] >= 0]
+        kept = [packet for packet in sound(source, track) if packet[0] >= 0]
         assert_same(sound(target, track), kept)
-    with av.open(str(target)) as container:
-        assert [stream.language for stream in container.streams.audio] == [None, "fra"]
 
 
 def test_a_part_has_the_sound_of_that_part(tmp_path: Path) -> None:

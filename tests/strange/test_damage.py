@@ -90,22 +90,6 @@ def test_damage_after_the_last_frame_read_does_not_count(tmp_path: Path, process
     assert shown.warnings == []
 
 
-def test_frames_in_a_hole_of_a_matroska_file_are_counted_by_the_times(
-    run: Run, tmp_path: Path
-) -> None:
-    clusters = {"cluster_time_limit": "400"}  # ten frames each
-    path = write_clip(tmp_path / "hole.mkv", count=COUNT, muxing=clusters, **KINDS["mkv"])
-    data = bytearray(path.read_bytes())
-    (first, _), (last, _) = packets_of(path)[22], packets_of(path)[26]
-    data[first:last] = bytes(last - first)
-    path.write_bytes(data)
-    unseen = COUNT - len(packets_of(path))
-    assert unseen >= 4
-    result = run("detect-video", path, tmp_path / "out.mp4")
-    assert result.code == 1
-    assert f"hole.mkv: {unseen} of 40 frames damaged or lost" in result.err
-
-
 def test_frames_that_were_never_recorded_are_not_lost(tmp_path: Path, process: Process) -> None:
     times = [Fraction(index, 25) for index in range(COUNT) if index not in {11, 22, 33, 34}]
     source = write_clip(tmp_path / "gaps.mp4", times=times)

@@ -8,10 +8,11 @@ from pathlib import Path
 import pytest
 from pydantic import ValidationError
 
-from vdet.config.camera import CameraSettings, ClockSettings
+from vdet.config.camera import CameraSettings, ClockSettings, moment
 from vdet.config.schema import InputSettings, Settings
 from vdet.errors import ConfigError
-from vdet.traffic.clock import find_clock
+from vdet.traffic.clock import Clock, find_clock
+from vdet.traffic.intervals import Intervals
 
 
 @pytest.fixture(autouse=True)
@@ -24,29 +25,23 @@ def time_zone(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     time.tzset()
 
 
-def begin(
-    name: str,
+def clock_of(
+    name: str | Path,
     given: str | None = None,
     created: str | None = None,
     start: float = 0.0,
-    pattern: str | None = None,
-) -> str:
-    camera = CameraSettings(clock=ClockSettings(pattern=pattern))
+    **clock: str | None,
+) -> Clock | None:
+    camera = CameraSettings(clock=ClockSettings(**clock))
     settings = Settings(input=InputSettings(begin=given), camera=camera)
-    return str(find_clock(Path("clips", name), settings, created, start))
+    return find_clock(Path("clips", name), settings, created, start)
 
 
 def test_a_time_that_is_given_is_taken() -> None:
     name, created = "a_20260501_070000.mp4", "2020-01-01T00:00:00Z"
-    assert begin(name, "2026-05-01 07:00-03:00", created) == "2026-05-01 07:00:00-03:00 (as given)"
-    assert begin(name, "2026-01-01 07:00") == "2026-01-01 07:00:00+01:00 (as given)"
-
-
-def test_the_creation_time_comes_before_the_name() -> None:
-    created = "2026-05-01T05:00:00.000000Z"
-    assert begin("a_20200101_000000.mp4", None, created) == (
-        "2026-05-01 07:00:00+02:00 (its creation time)"
-    )
+    given = clock_of(name, "2026-05-01 07:00-03:00", created)
+    assert str(given) == "2026-05-01 07:00:00-03:00 (as given)"
+    assert str(clock_of(name, "2026-01-01 07:00")) == "2026-01-01 07:00:00+01:00 (as given)"
 
 
 @pytest.mark.parametrize("created", [None, "", "1904-01-01T00:00:00Z", "yesterday"])
@@ -58,26 +53,105 @@ def test_the_creation_time_comes_before_the_name() -> None:
         "cam1-2026.05.01 07.00.00.ts",
         "REC2026-05-01T07-00-00.jsonl",
         "99999999_999999_20260501_070000.mp4",
+        "DJI_20260501070000_0001_D.MP4",
+        "2026_0501_070000_0001F.MP4",
+        "20260501T050000Z.mp4",
     ],
 )
-def test_without_a_clock_in_the_file_its_name_says_it(name: str, created: str | None) -> None:
-    assert begin(name, None, created) == "2026-05-01 07:00:00+02:00 (from its name)"
+def test_a_time_in_the_name_is_local_time_or_utc_after_a_z(name: str, created: str | None) -> None:
+    assert str(clock_of(name, None, created)) == "2026-05-01 07:00:00+02:00 (from its name)"
 
 
 @pytest.mark.parametrize("name", ["gate.mp4", "20261301_070000.mp4", "120260501_0700001.mp4"])
-def test_a_name_without_a_time_says_nothing(name: str) -> None:
-    assert find_clock(Path(name), Settings()) is None
+def test_without_a_time_in_the_name_the_creation_time_says_it(name: str) -> None:
+    assert clock_of(name) is None
+    found = clock_of(name, None, "2026-05-01T05:00:00.000000Z")
+    assert str(found) == "2026-05-01 07:00:00+02:00 (its creation time)"
+
+
+@pytest.mark.parametrize(
+    ("created", "is_said"),
+    [("2026-05-01T05:00:58Z", False), ("2026-05-01T07:00:00Z", True), ("2026-05-03T12:00Z", True)],
+)
+def test_a_name_and_metadata_that_disagree_are_both_said(
+    created: str, is_said: bool, caplog: pytest.LogCaptureFixture
+) -> None:
+    found = clock_of("20260501_070000.mp4", None, created)
+    assert str(found) == "2026-05-01 07:00:00+02:00 (from its name)"
+    other = moment(created).astimezone().isoformat(" ", "seconds")
+    said = f"begins 2026-05-01 07:00:00+02:00 by its name, {other} by its metadata"
+    expected = f"clips/20260501_070000.mp4: {said}; the name is used; --begin decides"
+    assert caplog.messages == [expected] * is_said
+    caplog.clear()
+    clock_of("20260501_070000.mp4", "2026-05-01 07:00", created)
+    assert caplog.messages == []
+
+
+def test_pictures_that_are_named_by_the_clock_say_when_they_begin(tmp_path: Path) -> None:
+    for name in ("20260501_070050.jpg", "20260501_070100.jpg"):
+        (tmp_path / name).touch()
+    assert str(clock_of(tmp_path)) == "2026-05-01 07:00:50+02:00 (from its name)"
 
 
 def test_a_pattern_says_how_the_time_is_written() -> None:
-    found = begin("x1 01.05.26 07h00m05.mp4", pattern="%d.%m.%y %Hh%Mm%S", created="2020-01-01")
-    assert found == "2026-05-01 07:00:05+02:00 (from its name)"
+    found = clock_of("x1 01.05.26 07h00m05.mp4", None, "2020-01-01", pattern="%d.%m.%y %Hh%Mm%S")
+    assert str(found) == "2026-05-01 07:00:05+02:00 (from its name)"
     with pytest.raises(ConfigError, match=r"b\.mp4: its name has no time like %Y_%H%M: camera\.cl"):
-        begin("b.mp4", pattern="%Y_%H%M")
+        clock_of("b.mp4", pattern="%Y_%H%M")
 
 
 def test_the_beginning_is_that_of_the_first_frame() -> None:
-    assert begin("a.ts", "2026-05-01 07:00+02:00", start=1.0).startswith("2026-05-01 06:59:59")
+    found = clock_of("a.ts", "2026-05-01 07:00+02:00", start=86_400.0)
+    assert found is not None
+    assert str(found) == "2026-05-01 07:00:00+02:00 (as given)"
+    assert found.at(86_410.0).isoformat() == "2026-05-01T07:00:10+02:00"
+
+
+BERLIN = {"zone": "Europe/Berlin"}
+
+
+class TestZone:
+    @pytest.mark.parametrize(
+        ("name", "zone", "text"),
+        [
+            ("20260501_070000.mp4", "Asia/Kolkata", "2026-05-01 07:00:00+05:30"),
+            ("20260501_070000Z.mp4", "Asia/Kolkata", "2026-05-01 12:30:00+05:30"),
+            ("20260329_023000.mp4", "Europe/Berlin", "2026-03-29 03:30:00+02:00"),  # there is none
+            ("20261025_023000.mp4", "Europe/Berlin", "2026-10-25 02:30:00+02:00"),  # the first
+        ],
+    )
+    def test_of_names_and_tables_is_a_setting(self, name: str, zone: str, text: str) -> None:
+        assert str(clock_of(name, zone=zone)) == f"{text} (from its name)"
+
+    def test_a_given_time_is_shown_in_the_zone_of_the_camera(self) -> None:
+        found = clock_of("a.mp4", "2026-05-01 07:00-03:00", **BERLIN)
+        assert str(found) == "2026-05-01 12:00:00+02:00 (as given)"
+
+    @pytest.mark.parametrize("clock", [{}, BERLIN])
+    def test_each_moment_has_the_offset_of_that_moment(self, clock: dict[str, str]) -> None:
+        if not clock:  # that of this computer
+            os.environ["TZ"] = "CET-1CEST,M3.5.0,M10.5.0/3"
+            time.tzset()
+        found = clock_of("20261025_015000.mp4", **clock)
+        assert found is not None
+        moments = [str(found.at(seconds)) for seconds in (0, 3600, 7200)]
+        assert moments == [
+            "2026-10-25 01:50:00+02:00",
+            "2026-10-25 02:50:00+02:00",
+            "2026-10-25 02:50:00+01:00",
+        ]
+        intervals = Intervals([(found, [(0.0, 7200.0)])], 3600)
+        starts = [str(intervals.moments(number)[0]) for number in intervals.numbers]
+        assert starts == [
+            "2026-10-25 01:00:00+02:00",
+            "2026-10-25 02:00:00+02:00",
+            "2026-10-25 02:00:00+01:00",
+        ]
+
+    @pytest.mark.parametrize("zone", ["Europe/Atlantis", "../etc/passwd", "", "Europe"])
+    def test_an_unknown_one_is_refused(self, zone: str) -> None:
+        with pytest.raises(ValidationError, match="unknown time zone"):
+            ClockSettings(zone=zone)
 
 
 @pytest.mark.parametrize("text", ["7 o'clock", "0001-01-01", "2026-05-01 25:00"])

@@ -33,7 +33,7 @@ def crossing(*shapes: LineSettings) -> Counts:
 
 
 def at(counted: Counts, begin: datetime = BEGINS) -> Counts:
-    return replace(counted, clock=Clock(begin, "as given"))
+    return replace(counted, clock=Clock(begin, "as given", begin.tzinfo))
 
 
 def named(video: Iterable[FrameTracks], name: str) -> list[FrameTracks]:
@@ -153,7 +153,8 @@ class TestIntervals:
     def test_a_video_without_a_box_beside_one_with_some(self) -> None:
         first, night = at(counts(frames(GOES_EAST), ZONE)), at(counts([], ZONE))
         rows = zone_table(
-            [first, replace(night, clock=Clock(BEGINS + timedelta(hours=3), ""))], 3600
+            [first, replace(night, clock=Clock(BEGINS + timedelta(hours=3), "", BEGINS.tzinfo))],
+            3600,
         )
         assert [(f"{row.start:%H:%M}", row.entered, row.mean) for row in rows] == [
             ("07:00", 1, pytest.approx(0.4, abs=0.01)), ("10:00", 0, 0),

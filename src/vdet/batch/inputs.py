@@ -121,7 +121,7 @@ def _pictures_in(folder: Path, base: Path) -> Iterator[InputVideo]:
         return
     assert sequence is not None
     place = Path(folder.absolute().name) if folder == base else folder.relative_to(base)
-    suffix = Path(sequence.pattern).suffix
+    suffix = sequence.files[0].suffix
     yield InputVideo(folder, place.with_name(f"{place.name}{suffix}"))
 
 

@@ -108,7 +108,7 @@ def _video(path: Path) -> Facts:
             "width": info.width,
             "height": info.height,
             **asdict(info.orientation),
-            "frames": info.frames,
+            "declared_frames": info.frames,
             "rate": float(info.rate),
             "start": float(info.start),
             "seconds": None if info.duration is None else float(info.duration),

@@ -1,8 +1,10 @@
 """The section `camera`: the frames that places are given for, the lens, the road and the clock."""
 
 import re
+from contextlib import suppress
 from datetime import datetime
 from typing import Annotated
+from zoneinfo import ZoneInfo
 
 from pydantic import Field, field_validator
 from pydantic_core.core_schema import ValidationInfo
@@ -88,8 +90,14 @@ class GroundPoint(Section):
     """Where it is on the road, x and y in metres from any point, at right angles."""
 
 
-CODES = {"%Y": r"\d{4}", **dict.fromkeys(("%m", "%d", "%H", "%M", "%S", "%y"), r"\d\d")}
+_CODES = {"%Y": r"\d{4}", **dict.fromkeys(("%m", "%d", "%H", "%M", "%S", "%y"), r"\d\d")}
 """The codes of a pattern of times, and the digits that each stands for."""
+_USUAL = re.compile(
+    r"(?<!\d)(\d{4})[-_.]?(\d\d)[-_.]?(\d\d)[-_T ]?(\d\d)[-_.:]?(\d\d)[-_.:]?(\d\d)"
+    r"(?!\d)(Z(?![a-zA-Z]))?",
+    re.ASCII,
+)
+"""A time in a name, such as 2026-05-01_07-00-00, 20260501T070000Z or 20260501070000."""
 
 
 def moment(text: str) -> datetime:
@@ -107,18 +115,51 @@ class ClockSettings(Section):
     """When the videos of the camera begin."""
 
     pattern: str | None = Field(None, max_length=200)
-    """Pattern of the time in the names of videos, as in %Y%m%d_%H%M%S. null: the creation time in
-    the video, else a time in its name.
+    """Pattern of the time in the names of videos, as in %Y%m%d_%H%M%S. null: a time in the name,
+    else the creation time in the video.
     """
+    zone: str | None = Field(None, max_length=100)
+    """Time zone of names and of tables, as in Europe/Berlin. null: that of this computer."""
 
     @field_validator("pattern")
     @classmethod
     def _has_known_codes(cls, pattern: str | None) -> str | None:
         if pattern is not None:
-            rest = re.sub("|".join(CODES), "", pattern)
+            rest = re.sub("|".join(_CODES), "", pattern)
             if "%" in rest or pattern == rest:
-                raise ValueError(f"a pattern has only {', '.join(CODES)} and other text")
+                raise ValueError(f"a pattern has only {', '.join(_CODES)} and other text")
         return pattern
+
+    @field_validator("zone")
+    @classmethod
+    def _is_known(cls, zone: str | None) -> str | None:
+        try:
+            return None if zone is None else ZoneInfo(zone).key
+        except (KeyError, ValueError, OSError):
+            raise ValueError(f"unknown time zone {zone!r}; use one such as Europe/Berlin") from None
+
+    @property
+    def time_zone(self) -> ZoneInfo | None:
+        """The time zone; None for that of this computer."""
+        return ZoneInfo(self.zone) if self.zone else None
+
+    def time_in(self, name: str) -> datetime | None:
+        """Return the time in the name of a file; None without one. It is in UTC after a ``Z``."""
+        texts = ["{}{}{}T{}{}{}{}".format(*groups) for groups in _USUAL.findall(name)]
+        if self.pattern:
+            parts = re.findall(r"%[a-zA-Z]|[^%]", self.pattern, re.DOTALL)
+            form = "".join(_CODES.get(part) or re.escape(part) for part in parts)
+            texts = re.findall(f"(?=({form}))", name, re.ASCII)
+        for text in texts:
+            with suppress(ValueError):
+                return moment(self._iso(text) if self.pattern else text)
+        return None
+
+    def _iso(self, text: str) -> str:
+        """Write a time of the pattern as ISO 8601 does. Raises `ValueError`."""
+        pattern = self.pattern or ""
+        zone = "Z" if "%SZ" in pattern else ""
+        return datetime.strptime(text, pattern).isoformat() + zone
 
 
 class CameraSettings(Section):

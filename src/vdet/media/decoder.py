@@ -1,32 +1,90 @@
 """Decode a picture stream from its first picture, or from a key frame, despite damage."""
 
-from collections import deque
-from collections.abc import Iterator
-from itertools import chain, pairwise
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import chain
 from pathlib import Path
 
 import av
 from av.packet import Packet
 from av.stream import Stream
 
+from vdet.errors import ImageError
+from vdet.media import demux
 from vdet.media.clock import ClockUnwrapper
-from vdet.media.damage import Damage
-from vdet.media.demux import (
-    MAX_PIXELS,
-    check_size,
-    is_pipe,
-    open_input,
-    packets,
-    period_of,
-    picture_stream,
-)
+from vdet.media.images import read_encoded
+from vdet.media.numbered import find_sequence
 
-_LARGEST_GROUP = 64_000_000  # bytes from one key frame to the next, which are held in memory
-_REORDERED = ("h264", "hevc")
-_ONE_PICTURE_PER_PACKET = frozenset((
-    "av1", "ffv1", "h264", "hevc", "libdav1d", "mjpeg", "mpeg1video", "mpeg2video", "mpeg4", "png",
-    "prores", "vp9",
-))  # fmt: skip
+_LONGEST_GROUP = 600  # packets from one key frame to the next, which are held in memory
+_COUNTABLE = ("av1", "h264", "hevc", "libdav1d", "mjpeg", "mpeg2video", "mpeg4", "png", "vp9")
+"""Codecs of which every packet makes one picture."""
+_MAX_LATE = 32  # periods; a picture later than that follows a clock that was set back
+_FLAGGED = 2  # last packets of a part, of which bytes seem to be missing where the next one begins
+
+
+@dataclass(slots=True)
+class Damage:
+    """Counts the errors, and the corrupt and missing pictures, of one stream.
+
+    Nothing is lost before there is evidence of damage: the first packets of a whole file may make
+    no picture. With evidence, as many pictures are lost as there are errors, or as there are
+    packets without a picture if these are more.
+
+    Attributes
+    ----------
+    period
+        Time from one picture to the next, in units of the stream's time base.
+    errors
+        Places in the file that cannot be read, and packets that cannot be decoded.
+    restarts
+        How often the clock restarts: the last packets before that are flagged, but not corrupt.
+    without_picture
+        Packets that made no picture; counted at the end of the stream.
+    """
+
+    period: Fraction
+    errors: int = 0
+    restarts: int = 0
+    packets: int = 0
+    pictures: int = 0
+    corrupt_packets: int = 0
+    without_picture: int = 0
+    _corrupt_pictures: int = 0
+    _last: int | None = None  # time of a picture
+
+    @property
+    def is_evident(self) -> bool:
+        """Whether there is evidence of damage."""
+        return self.errors + self._corrupt_pictures + self._flagged > 0
+
+    @property
+    def lost(self) -> int:
+        """Pictures that should be there and are not."""
+        return max(self.errors, self.without_picture * self.is_evident)
+
+    @property
+    def damaged(self) -> int:
+        """Pictures lost, and pictures decoded with errors."""
+        return max(self.lost + self._corrupt_pictures, self._flagged)
+
+    @property
+    def _flagged(self) -> int:
+        return max(0, self.corrupt_packets - _FLAGGED * self.restarts)
+
+    def receive(self, picture: av.VideoFrame) -> bool:
+        """Count a picture; return whether it is usable.
+
+        One that comes late, where there is damage, is not usable: it counts as lost.
+        """
+        if self.is_evident and None not in (picture.pts, self._last):
+            late = (self._last or 0) - (picture.pts or 0)
+            if 0 <= late <= _MAX_LATE * self.period:
+                return False
+        self._last = picture.pts
+        self.pictures += 1
+        self._corrupt_pictures += picture.is_corrupt
+        return True
 
 
 class Decoder:
@@ -35,7 +93,7 @@ class Decoder:
     Parameters
     ----------
     frame_rate
-        Of numbered pictures, per second; None: `ASSUMED_RATE`.
+        Of numbered pictures, per second; None: as their names say, else `ASSUMED_RATE`.
 
     Attributes
     ----------
@@ -45,35 +103,34 @@ class Decoder:
         What was damaged so far.
     clock
         Says whether, and how often, the clock restarts.
+    ticks
+        When each of numbered pictures is shown, in units of the time base; a range where their
+        names do not say.
+    is_countable
+        Whether frames can be counted without decoding them.
 
     Raises
     ------
     VideoError
-        The file cannot be read, has no moving pictures, or its frames are too large.
+        The file cannot be read, or has no moving pictures.
     """
 
     def __init__(self, path: Path, frame_rate: float | None) -> None:
         self.before = 0
-        self.container = open_input(path, frame_rate)
-        try:
-            self.stream = picture_stream(self.container, path)
-            context = self.stream.codec_context
-            check_size(path, context.width, context.height)
-        except BaseException:
-            self.container.close()
-            raise
-        context.options = {"max_pixels": str(MAX_PIXELS)}
+        self.container = demux.open_input(path, frame_rate)
+        self.stream = demux.picture_stream(self.container, path)
+        context = self.stream.codec_context
+        context.options = {"max_pixels": str(demux.MAX_PIXELS)}
         context.thread_count = 1  # with more, frames near damage differ from run to run
         self.clock = ClockUnwrapper(self.container, self.stream)
-        form = self.container.format.name
-        self._is_matroska = "matroska" in form
-        # AVI has no times of presentation: pictures take those of decoding, in their order.
-        self._takes_decoding_times = form == "avi" and context.name in _REORDERED
-        self._decoding_times: deque[int] = deque()
-        is_paired = context.name in _ONE_PICTURE_PER_PACKET
-        self.damage = Damage(period_of(self.stream), is_paired)
-        self.is_countable = is_paired and form != "avi" and not is_pipe(path)
+        self.damage = Damage(1 / demux.rate_of(self.stream) / demux.time_base_of(self.stream))
+        self._is_avi = self.container.format.name == "avi"
+        self.is_countable = context.name in _COUNTABLE and not (self._is_avi or demux.is_pipe(path))
         self._packets = self._read()
+        self.ticks: Sequence[int] = ()
+        if sequence := find_sequence(path):
+            _, self.ticks = sequence.timing(frame_rate)
+            self._packets = self._read_pictures(sequence.files)
 
     def skip_to(self, time: int, first: int) -> bool:
         """Begin at the last key frame that is not after a time, and count the frames before it.
@@ -89,63 +146,61 @@ class Decoder:
         are damaged, or key frames are very rare. The decoder is then of no more use.
         """
         group: list[Packet[Stream]] = []
-        key, held, times = first, 0, list[int]()
+        key, times = first, list[int]()
         for packet in self._packets:
-            is_sure = not (packet.is_corrupt or self.damage.is_evident or held > _LARGEST_GROUP)
-            if packet.pts is None or not is_sure:
+            is_damaged = packet.is_corrupt or self.damage.errors
+            if packet.pts is None or is_damaged or len(group) > _LONGEST_GROUP:
                 return False
             if packet.is_keyframe and packet.pts <= time:
-                key, held, group = packet.pts, 0, []
-            held += packet.size
+                key, group = packet.pts, []
             group.append(packet)
             if not packet.is_discard:  # else the file says that it is not shown
                 times.append(packet.pts)
             if packet.dts is not None and packet.dts > time:
                 break
-        self.before = sum(first <= each < key for each in times)
+        self.before = sum(first <= pts < key for pts in times)
         following = chain(group, self._packets)
         # What is shown before the key frame may need older pictures.
-        self._packets = (each for each in following if each.pts is None or each.pts >= key)
+        self._packets = (packet for packet in following if packet.pts is None or packet.pts >= key)
         return True
 
     def pictures(self) -> Iterator[av.VideoFrame]:
         """Yield the pictures that can be decoded."""
-        for packet, following in pairwise(chain(self._packets, (None, None))):
-            if packet and packet.is_corrupt and following is None:  # the file was cut off in it
-                self.damage.lost_at_end = 1
-                continue
-            for picture in self._decode(packet):
-                if self._decoding_times:
-                    picture.pts = self._decoding_times.popleft()
-                if self.damage.receive(picture):
-                    yield picture
-        self.damage.finish()
-
-    def close(self) -> None:
-        """Close the file."""
-        self.container.close()
+        for packet in chain(self._packets, (None,)):
+            if packet and not packet.is_discard:  # else the file says that it is not shown
+                self.damage.packets += 1
+            try:
+                decoded = self.stream.codec_context.decode(packet)
+            except av.FFmpegError:
+                self._fail()
+            else:
+                yield from filter(self.damage.receive, decoded)
+        if self.is_countable:
+            self.damage.without_picture = self.damage.packets - self.damage.pictures
 
     def _read(self) -> "Iterator[Packet[Stream]]":
-        """Yield the packets of the pictures.
-
-        In Matroska, damage shows only as a hole between the packets of all streams.
-        """
-        streams = self.container.streams if self._is_matroska else self.clock.streams
-        found = packets(self.container, streams, on_error=self.damage.fail)
+        """Yield the packets of the pictures."""
+        found = demux.packets(self.container, self.clock.streams, self._fail)
         for packet in self.clock.unwrap(found):
-            if self._is_matroska and packet.pos is not None:
-                self.damage.pass_bytes(packet.pos, packet.size)
             if packet.stream_index == self.stream.index:
+                if self._is_avi and self.stream.codec_context.has_b_frames:
+                    packet.pts = packet.dts = None  # AVI has no times of presentation
+                self.damage.corrupt_packets += packet.is_corrupt
+                self.damage.restarts = self.clock.restarts
                 yield packet
 
-    def _decode(self, packet: "Packet[Stream] | None") -> list[av.VideoFrame]:
-        """Return the pictures that the decoder has ready; for None, all that are left."""
-        if packet:
-            self.damage.send(packet)
-            if self._takes_decoding_times and packet.dts is not None:
-                self._decoding_times.append(packet.dts)
-        try:
-            return self.stream.codec_context.decode(packet)
-        except av.FFmpegError:
-            self.damage.fail()
-            return []
+    def _read_pictures(self, files: Iterable[Path]) -> "Iterator[Packet[Stream]]":
+        """Yield numbered pictures as packets."""
+        for file, tick in zip(files, self.ticks, strict=True):
+            try:
+                packet: Packet[Stream] = Packet(read_encoded(file))
+            except ImageError:
+                self._fail()
+            else:
+                packet.stream, packet.time_base = self.stream, demux.time_base_of(self.stream)
+                packet.pts = packet.dts = tick
+                packet.is_keyframe = True
+                yield packet
+
+    def _fail(self) -> None:
+        self.damage.errors += 1

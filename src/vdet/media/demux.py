@@ -13,44 +13,36 @@ from av.packet import Packet
 from av.stream import Discard, Disposition, Stream
 from av.video.stream import VideoStream
 
-from vdet.errors import ImageError, VideoError
+from vdet.errors import VideoError
 from vdet.files import record_input
-from vdet.media.coding import HDR_TRANSFERS, Coding
+from vdet.media.coding import Coding
 from vdet.media.frame import ColorTags, Tags, VideoInfo
-from vdet.media.images import PICTURE_SUFFIXES, Orientation, read_header
-from vdet.media.mp4 import check_index, first_bytes
-from vdet.media.numbered import ASSUMED_RATE, find_sequence
+from vdet.media.images import Orientation, read_header
+from vdet.media.numbered import find_sequence
 
 MAX_PIXELS = 8192 * 4608
 """Of a frame. 8K video, in both its widths, has fewer; a damaged header may claim far more."""
 
-MAX_SIDE = 16_384
-"""Pixels; H.264 cannot be written larger."""
-
-_ADDRESS = re.compile(r"[a-z][a-z0-9+.-]+:/", re.IGNORECASE)  # "rtsp://…" as a path
+_STREAM = re.compile(r"[a-z][a-z0-9+.-]+:/|-$", re.IGNORECASE)  # "rtsp://…" as a path, or "-"
 _MAX_FAILURES = 100  # in a row; a file with nothing but errors must end too
 
 # Formats that contain their pictures. Not among them are formats that name other files or addresses
 # to be opened (such as playlists), and text that would be drawn as a picture.
 _FORMATS = (
-    "apng", "asf", "av1", "avi", "cavsvideo", "dhav", "dirac", "dv", "flv", "gif", "gxf", "h261",
-    "h263", "h264", "hevc", "ivf", "kux", "live_flv", "m4v", "matroska", "mjpeg", "mjpeg_2000",
-    "mov", "mpeg", "mpegts", "mpegtsraw", "mpegvideo", "mpjpeg", "mxf", "nut", "obu", "ogg", "rm",
-    "vc1", "vvc", "wtv", "yuv4mpegpipe",
-)  # fmt: skip
+    "apng,asf,av1,avi,cavsvideo,dhav,dv,flv,gif,h263,h264,hevc,ivf,live_flv,m4v,matroska,mjpeg,"
+    "mov,mpeg,mpegts,mpegtsraw,mpegvideo,mpjpeg,mxf,nut,obu,ogg,rm,vc1,vvc,wtv,yuv4mpegpipe"
+)
+SAFELY = {"format_whitelist": _FORMATS, "max_pixels": str(MAX_PIXELS)}
+"""Options for opening any file: only these formats, and decoders that probe no larger frames."""
 
 
-def open_input(
-    path: Path, frame_rate: float | None = None, *, for_tags: bool = False
-) -> InputContainer:
-    """Open a video file, or numbered pictures (`img_%04d.png`, or a folder), for reading.
+def open_input(path: Path, frame_rate: float | None = None) -> InputContainer:
+    """Open a video file for reading, or the first of numbered pictures (`img_%04d.png`, a folder).
 
     Parameters
     ----------
     frame_rate
-        Of numbered pictures, per second; None: `ASSUMED_RATE`.
-    for_tags
-        Only the tags of the file are wanted: no frame is decoded to learn more of its streams.
+        Of numbered pictures, per second; None: as their names say, else `ASSUMED_RATE`.
 
     Raises
     ------
@@ -60,58 +52,32 @@ def open_input(
     """
     refuse_stream(path)
     # "a:b.mp4" would be taken for a protocol; an absolute name is not.
-    name, kind, options = str(path.absolute()), None, {"format_whitelist": ",".join(_FORMATS)}
+    name, options = str(path.absolute()), SAFELY
+    # FFmpeg may take raw Motion JPEG for a pipe of pictures, which is not read.
+    kind = "mjpeg" if path.suffix.lower() in (".mjpeg", ".mjpg") else None
     if sequence := find_sequence(path):
-        name, kind = sequence.pattern, "image2"
-        rate = Fraction(str(frame_rate or ASSUMED_RATE))
-        options = {
-            "framerate": f"{rate.numerator}/{rate.denominator}",
-            "start_number": str(sequence.first),
-            "start_number_range": "1",
-        }
-        if sequence.step > 1:
-            name, options["pattern_type"] = sequence.glob, "glob"
-    else:
-        if not os.path.exists(path):  # noqa: PTH110  # False, too, where it cannot be looked at
-            hint = ", or give numbered pictures as img_%04d.png" if "%" in path.name else ""
-            raise VideoError(f"{path}: there is no such file; check the name{hint}")
-        check_index(path)
-        if _is_raw_mjpeg(path):
-            kind = "mjpeg"  # FFmpeg may take it for a pipe of pictures, which is not read
+        name, kind = str(sequence.files[0].absolute()), "image2"
+        rate, _ = sequence.timing(frame_rate)
+        options = {"framerate": f"{rate.numerator}/{rate.denominator}", "pattern_type": "none"}
+    elif not os.path.exists(path):  # noqa: PTH110  # False, too, where it cannot be looked at
+        raise VideoError(f"{path}: there is no such file; check the name")
+    record_input(path)
     try:
-        options["max_pixels"] = str(MAX_PIXELS)  # the file is probed with decoders
-        if for_tags:
-            options["codec_whitelist"] = "none"
-        else:
-            record_input(path)
         return av.open(name, "r", kind, options, metadata_errors="replace")  # tags: any encoding
-    except (av.PermissionError, av.error.MemoryError) as error:
-        raise VideoError(f"{path}: cannot be opened: {error.strerror}") from error
     except av.FFmpegError as error:
-        raise VideoError(
-            f"{path}: is not a video, or was cut off ({error.strerror}); give a file that plays"
-        ) from error
+        fault = f"cannot be opened, is not a video, or was cut off ({error.strerror})"
+        raise VideoError(f"{path}: {fault}; use a file that plays") from error
 
 
 def refuse_stream(path: Path) -> None:
     """Refuse an address, or ``-``. Raises `VideoError`."""
-    if path.exists():
-        return
-    if _ADDRESS.match(str(path)):
+    if not path.exists() and _STREAM.match(str(path)):
         raise VideoError(f"{path}: streams are not read; record it into a file first")
-    if path == Path("-"):
-        raise VideoError("-: standard input is not read; give the name of a file")
 
 
 def is_pipe(path: Path) -> bool:
     """Return whether `path` can be read only once, as a FIFO."""
     return path.exists() and not path.is_file() and not path.is_dir()
-
-
-def _is_raw_mjpeg(path: Path) -> bool:
-    """Return whether a file begins with a JPEG picture, and is not named as a single one."""
-    is_jpeg = first_bytes(path).startswith(b"\xff\xd8\xff")
-    return is_jpeg and path.suffix.lower() not in PICTURE_SUFFIXES
 
 
 def packets(
@@ -140,9 +106,8 @@ def packets(
                 on_error()
 
 
-_DEFAULT_RATE = Fraction(25)
-_BT709 = ColorTags(1, 1, 1)
-_APPLE_LOCATION = "com.apple.quicktime.location.iso6709"
+HDR_TRANSFERS = (16, 18)
+"""PQ and HLG, in codes of ITU-T H.273."""
 _MAX_TERM = 1_000_000  # of a rate as a fraction; the encoder has 32-bit integers
 
 
@@ -167,33 +132,18 @@ def moving_streams(container: InputContainer) -> list[VideoStream]:
     return [stream for stream in container.streams.video if not stream.disposition & stills]
 
 
-def check_size(path: Path, width: int, height: int) -> None:
-    """Refuse frames that are too large, before memory is set aside. Raises `VideoError`."""
-    if max(width, height) > MAX_SIDE or width * height > MAX_PIXELS:
-        raise VideoError(
-            f"{path}: frames of {width}×{height} pixels are too large ({MAX_PIXELS // 10**6} "
-            f"million pixels and sides of {MAX_SIDE} at most); scale it down first"
-        )
-
-
-def _orientation(path: Path, first: av.VideoFrame) -> Orientation:
-    if sequence := find_sequence(path):
-        with suppress(ImageError):  # of a format that only FFmpeg reads
-            return read_header(Path(sequence.pattern % sequence.first))[1]
-    return Orientation.of_frame(first)
-
-
-def describe(
-    path: Path, container: InputContainer, stream: VideoStream, first: av.VideoFrame
-) -> VideoInfo:
+def describe(path: Path, stream: VideoStream, first: av.VideoFrame) -> VideoInfo:
     """Describe a video, of which the `first` picture has been decoded."""
-    time_base = _time_base(stream)
-    rate = _first_sensible(stream.average_rate, stream.guessed_rate)
+    container = stream.container
+    time_base = time_base_of(stream)
+    rate = rate_of(stream)
     start = (first.pts or 0) * time_base
     # The longest stream may be longer than the picture.
     longest = Fraction(container.duration, av.time_base) if container.duration else None
     duration = stated_duration(stream, start) or longest
-    turn = _orientation(path, first)
+    turn = Orientation.of_frame(first)
+    if sequence := find_sequence(path):
+        _, turn = read_header(sequence.files[0])
     is_hdr = first.color_trc in HDR_TRANSFERS
     colors = ColorTags(first.color_primaries, first.color_trc, first.colorspace)
     width, height, aspect = first.width, first.height, stream.sample_aspect_ratio or Fraction(1)
@@ -210,21 +160,18 @@ def describe(
         duration=duration,
         orientation=turn,
         pixel_aspect=aspect,
-        color=_BT709 if is_hdr else colors,
+        color=ColorTags(1, 1, 1) if is_hdr else colors,
         coding=(not is_hdr and turn == Orientation() and Coding.of(first)) or Coding(),
-        has_sound=bool(container.streams.audio),
-        tags=_tags(container, stream),
+        has_sound=bool(container.streams.audio) and not is_pipe(path),
+        tags=_tags(stream),
     )
 
 
-def _tags(container: InputContainer, stream: VideoStream) -> Tags:
+def _tags(stream: VideoStream) -> Tags:
     """Return metadata of the recording; their names differ between containers."""
-    found = {
-        name.lower(): value
-        for metadata in (stream.metadata, container.metadata)
-        for name, value in metadata.items()
-    }
-    location = found.get("location") or found.get(_APPLE_LOCATION)
+    metadata = stream.metadata | stream.container.metadata
+    found = {name.lower(): value for name, value in metadata.items()}
+    location = found.get("location") or found.get("com.apple.quicktime.location.iso6709")
     return Tags(found.get("creation_time"), location, found.get("title"))
 
 
@@ -232,38 +179,24 @@ def stated_duration(stream: VideoStream, start: Fraction) -> Fraction | None:
     """Return the time from the first frame to the end of the stream, as the file declares it.
 
     In seconds; None where it declares none. `start` is the time of the first frame. In MP4, frames
-    may be hidden before it. Matroska, in a tag, and ASF declare the time of the end.
+    may be hidden before it. Matroska declares the time of the end in a tag.
     """
-    form, unit = stream.container.format.name, _time_base(stream)
-    if stream.duration and form == "asf":
-        return stream.duration * unit - start
-    if stream.duration and form.startswith("mov"):
-        return ((stream.start_time or 0) + stream.duration) * unit - start
     if stream.duration:
-        return stream.duration * unit
-    try:
-        hours, minutes, seconds = stream.metadata["DURATION"].split(":")
-        end = Fraction(hours) * 3600 + Fraction(minutes) * 60 + Fraction(seconds)
-    except (KeyError, ValueError, ZeroDivisionError):
-        return None
-    return end - start if end > start else None
+        return ((stream.start_time or 0) + stream.duration) * time_base_of(stream) - start
+    with suppress(KeyError, ValueError, ZeroDivisionError):
+        hours, minutes, seconds = map(Fraction, stream.metadata["DURATION"].split(":"))
+        return hours * 3600 + minutes * 60 + seconds - start
+    return None
 
 
-def period_of(stream: VideoStream) -> Fraction:
-    """Return the usual time from one picture to the next, in units of the time base.
-
-    The average is longer where pictures are missing.
-    """
-    rate = _first_sensible(stream.guessed_rate, stream.average_rate)
-    return 1 / (rate * _time_base(stream))
-
-
-def _time_base(stream: VideoStream) -> Fraction:
-    return stream.time_base or Fraction(1, 90_000)
-
-
-def _first_sensible(*rates: Fraction | None) -> Fraction:
-    for rate in rates:
+def rate_of(stream: VideoStream) -> Fraction:
+    """Return the average rate in pictures per second; 25 where the file states none."""
+    for rate in (stream.average_rate, stream.guessed_rate):
         if rate and (near := rate.limit_denominator(_MAX_TERM)) > 0:
             return near
-    return _DEFAULT_RATE
+    return Fraction(25)
+
+
+def time_base_of(stream: VideoStream) -> Fraction:
+    """Return the unit of the times of a stream, in seconds."""
+    return stream.time_base or Fraction(1, 90_000)

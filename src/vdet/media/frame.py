@@ -4,17 +4,16 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
+import av
 import cv2
 import numpy as np
+from av.video.reformatter import ColorRange
 
 from vdet.boxes import Image
 from vdet.media.coding import Coding, Layers
 from vdet.media.images import Orientation, from_16_bits, split_channels
-
-if TYPE_CHECKING:
-    import av
 
 
 class Planes:
@@ -30,7 +29,7 @@ class Planes:
         Whether nothing else uses the picture, so that it may be changed and encoded.
     """
 
-    def __init__(self, picture: "av.VideoFrame", coding: Coding, *, is_own: bool = False) -> None:
+    def __init__(self, picture: av.VideoFrame, coding: Coding, *, is_own: bool = False) -> None:
         self.picture = picture
         self.coding = coding
         self.is_own = is_own
@@ -59,9 +58,6 @@ class Planes:
     @classmethod
     def blank(cls, width: int, height: int, coding: Coding) -> "Planes":
         """Return planes of their own, with any values; `width` × `height` pixels."""
-        import av
-        from av.video.reformatter import ColorRange
-
         picture = av.VideoFrame(width, height, "yuv420p")
         picture.colorspace = 1 if coding.matrix == "bt709" else 6  # ITU-T H.273
         picture.color_range = ColorRange.JPEG if coding.full_range else ColorRange.MPEG
@@ -101,7 +97,7 @@ class Planes:
         return self.luma, self.blue, self.red
 
 
-def _plane(picture: "av.VideoFrame", number: int) -> Image:
+def _plane(picture: av.VideoFrame, number: int) -> Image:
     plane = picture.planes[number]
     values = np.frombuffer(cast(bytes, plane), np.uint8)  # it is not typed as such
     rows = values[: plane.line_size * plane.height].reshape(plane.height, plane.line_size)
@@ -149,7 +145,7 @@ _16_BITS = ("gray16", "ya16", "rgb48", "rgba64")
 """Beginnings of the names of formats of 16-bit pictures, as in PNG and TIFF."""
 
 
-def bgr_of(picture: "av.VideoFrame") -> Image:
+def bgr_of(picture: av.VideoFrame) -> Image:
     """Return a decoded picture as BGR uint8 `(H, W, 3)`.
 
     Colour matrix and range are those of its tags; without tags, BT.601 and limited. For 16-bit

@@ -3,12 +3,12 @@
 import io
 import logging
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
 
+import av
 import cv2
 import numpy as np
 import numpy.typing as npt
@@ -18,9 +18,6 @@ from PIL.ImageFile import ImageFile
 from vdet.boxes import Image
 from vdet.errors import ImageError
 from vdet.files import read_whole, staged
-
-if TYPE_CHECKING:
-    import av
 
 MAX_PICTURE_PIXELS = 2**25
 """A picture of more pixels is not read: an 8K frame has fewer, a decompression bomb far more."""
@@ -39,7 +36,6 @@ _12_BITS, _16_BITS = 4095, 65_535
 """The values of white."""
 _ALL_BITS = cv2.IMREAD_COLOR | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
 _JPEG_SCAN, _JPEG_END = b"\xff\xda", b"\xff\xd9"  # markers, ITU-T T.81, annex B
-_TURNED_BY_PILLOW = "TIFF"
 _ORIENTATION = 274  # EXIF tag
 
 log = logging.getLogger("vdet")
@@ -69,28 +65,9 @@ class Orientation:
         return cls(rotation, mirrored=number in (2, 4, 5, 7))
 
     @classmethod
-    def of_frame(cls, picture: "av.VideoFrame") -> "Orientation":
-        """Return the orientation of a decoded frame, by its display matrix.
-
-        A matrix that is no quarter turn counts as the nearest one.
-        """
-        matrix = _display_matrix(picture)
-        mirrored = bool(np.linalg.det(matrix) < 0)
-        if mirrored:
-            matrix = matrix * [[-1], [1]]  # of x
-        degrees = math.degrees(math.atan2(-matrix[0, 1], matrix[0, 0]))
-        return cls(round(degrees / 90) * 90 % 360, mirrored)
-
-
-def _display_matrix(picture: "av.VideoFrame") -> npt.NDArray[np.float64]:
-    """Return the part of the display matrix for x and y, 2 × 2 (ISO/IEC 14496-12, 6.2.2)."""
-    try:
-        side_data = cast(Mapping[str, bytes], picture.side_data)  # it is not typed as such
-    except ValueError:  # some of it is of a kind that PyAV does not know
-        return np.eye(2)
-    if "DISPLAYMATRIX" not in side_data:
-        return np.eye(2)
-    return np.frombuffer(bytes(side_data["DISPLAYMATRIX"]), np.int32).reshape(3, 3)[:2, :2] / 65_536
+    def of_frame(cls, picture: av.VideoFrame) -> "Orientation":
+        """Return the nearest quarter turn of a decoded frame, by its display matrix."""
+        return cls(round(picture.rotation / 90) * 90 % 360)
 
 
 def upright(image: Image, orientation: Orientation) -> Image:
@@ -118,7 +95,7 @@ def read_image(path: Path) -> Image:
         larger than `MAX_BYTES`; the picture has more than `MAX_PICTURE_PIXELS`, or a side longer
         than `MAX_PICTURE_SIDE`.
     """
-    data = _read(path)
+    data = read_encoded(path)
     image = _decode(data, path)
     if _is_cut_off(data):
         log.warning("%s: was cut off, and is read as far as it goes", path)
@@ -140,12 +117,19 @@ def read_header(path: Path) -> tuple[tuple[int, int], Orientation]:
     ImageError
         As `read_image`.
     """
-    picture = _open(_read(path), path)
+    picture = _open(read_encoded(path), path)
     width, height = picture.size
     turn = _orientation(picture)
-    if turn.is_sideways and picture.format != _TURNED_BY_PILLOW:
+    if turn.is_sideways and picture.format != "TIFF":
         width, height = height, width
     return (width, height), turn
+
+
+def read_encoded(path: Path) -> bytes:
+    """Return the content of the file of a picture. Raises `ImageError`."""
+    if path.is_fifo():  # it may never end, or never begin
+        raise ImageError(f"{path}: can be read only once; write it into a file first")
+    return read_whole(path, most=MAX_BYTES, what="picture", error=ImageError)
 
 
 def decode_image(data: bytes) -> Image | None:
@@ -181,12 +165,6 @@ def from_16_bits(values: npt.NDArray[np.uint16]) -> Image:
     """
     white = _12_BITS if values.max(initial=0) <= _12_BITS else _16_BITS
     return np.asarray(cv2.convertScaleAbs(values, alpha=255 / white), np.uint8)
-
-
-def _read(path: Path) -> bytes:
-    if path.is_fifo():  # it may never end, or never begin
-        raise ImageError(f"{path}: can be read only once; write it into a file first")
-    return read_whole(path, most=MAX_BYTES, what="picture", error=ImageError)
 
 
 def _is_cut_off(data: bytes) -> bool:
@@ -227,7 +205,8 @@ def _orientation(picture: ImageFile) -> Orientation:
 
 def _decode(data: bytes, path: Path) -> Image:
     picture = _open(data + _JPEG_END if _is_cut_off(data) else data, path)
-    turn = Orientation() if picture.format == _TURNED_BY_PILLOW else _orientation(picture)
+    # Pillow itself turns TIFF.
+    turn = Orientation() if picture.format == "TIFF" else _orientation(picture)
     with _refusing(path):
         return upright(_to_bgr(picture, data), turn)
 
@@ -239,10 +218,8 @@ def _to_bgr(picture: ImageFile, data: bytes) -> Image:
     if has_16_bits:  # of which Pillow keeps 8
         values = cv2.imdecode(np.frombuffer(data, np.uint8), _ALL_BITS)
         return from_16_bits(np.asarray(values, np.uint16))
-    if picture.mode == "F":  # grey, white is 1
-        values = np.nan_to_num(np.asarray(picture)) * 255
-        grey = np.rint(values.clip(0, 255)).astype(np.uint8)
-        return np.asarray(cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR), np.uint8)
+    if picture.mode == "F":
+        raise ValueError("grey values in floating point")
     picture.info.pop("transparency", None)  # it is dropped; Pillow would warn of some kinds
     rgb = picture if picture.mode == "RGB" else picture.convert("RGB")
     return np.asarray(cv2.cvtColor(np.asarray(rgb), cv2.COLOR_RGB2BGR), np.uint8)

@@ -1,44 +1,49 @@
 """Numbered pictures as one video: a pattern like those of `printf`, or a folder.
 
-The pattern is `frames/img_%04d.png`, the folder `frames/`.
+The pattern is `frames/img_%04d.png`, the folder `frames/`. The names of the pictures may also be
+times of the clock, as in `20260501_070050.jpg`.
 """
 
+import math
 import re
-from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
 
-from vdet.errors import VideoError, printable
+from vdet.config.camera import ClockSettings
+from vdet.errors import VideoError
 from vdet.files import record_input
 from vdet.media.images import is_picture_name
 
 _PATTERN = re.compile(r"((?:[^%]|%%)*)%(?:0([1-9]\d*))?d((?:[^%]|%%)*)", re.ASCII)
-_NUMBERED = re.compile(r"(.*?)(\d+)(\D*\.\w+)", re.ASCII | re.DOTALL)  # by its last number
+_LAST_NUMBER = re.compile(r".*?(\d+)\D*\.\w+", re.ASCII | re.DOTALL)
 ASSUMED_RATE = 25.0
-"""Pictures per second, where the settings do not say."""
+"""Pictures per second, where neither the settings nor the names say."""
 
 
 @dataclass(frozen=True, slots=True)
 class PictureSequence:
-    """Pictures whose numbers rise by `step` without a gap, from `first` on.
+    """Pictures that are a video.
 
-    `pattern` is their absolute name, with ``%d`` or ``%04d`` for the number. Every other per cent
-    sign in it is doubled.
+    Attributes
+    ----------
+    files
+        The pictures, in order.
+    ticks, tick
+        When each picture was taken after the first one, if its name says so; the unit in seconds.
     """
 
-    pattern: str
-    first: int
-    step: int = 1
+    files: tuple[Path, ...]
+    ticks: tuple[int, ...] = ()
+    tick: int = 1
 
-    @property
-    def glob(self) -> str:
-        """The pattern of `glob` that the pictures have, whose numbers all have as many digits."""
-        match = _PATTERN.fullmatch(self.pattern)
-        assert match is not None
-        before, digits, after = match.groups()
-        number = "[0-9]" * len(str(self.first).zfill(int(digits or 0)))
-        return f"{_escaped(before)}{number}{_escaped(after)}"
+    def timing(self, frame_rate: float | None) -> tuple[Fraction, Sequence[int]]:
+        """Return the rate of the pictures, per second, and when each is shown, in such periods."""
+        if self.ticks and frame_rate is None:
+            return Fraction(1, self.tick), self.ticks
+        return Fraction(str(frame_rate or ASSUMED_RATE)), range(len(self.files))
 
 
 def find_sequence(path: Path) -> PictureSequence | None:
@@ -53,89 +58,50 @@ def find_sequence(path: Path) -> PictureSequence | None:
         The folder cannot be read, there is no such picture in it, or one is missing. The pictures
         of a folder are not one sequence.
     """
-    if path.is_dir():
-        folder, names = path, _names(path, path)
-        name = _only_pattern(path, names)
-    elif path.exists() or not _PATTERN.fullmatch(path.name):
+    pattern = None if path.exists() else _PATTERN.fullmatch(path.name)
+    if not (pattern or path.is_dir()):
         return None
-    else:
-        folder, name, names = path.parent, path.name, _names(path.parent, path)
-    numbers = _numbers(names, name)
-    if not numbers:
-        raise VideoError(
-            f"{path}: there is no such file, and no picture of such a name; "
-            f"{_known(folder, names) or f'{folder} has no numbered pictures at all'}"
-        )
-    step = min((following - number for number, following in pairwise(numbers)), default=1)
-    for number, following in pairwise(numbers):
-        if following != number + step:
+    folder, form = (path.parent, _form(*pattern.groups())) if pattern else (path, _LAST_NUMBER)
+    try:
+        matches = [(file, form.fullmatch(file.name)) for file in folder.iterdir()]
+    except OSError as error:
+        raise VideoError(f"{path}: {folder} cannot be read: {error.strerror}") from error
+    found = sorted(
+        (int(match[1]), file)
+        for file, match in matches
+        if match and (pattern or is_picture_name(file))
+    )
+    numbers, files = [number for number, _ in found], tuple(file for _, file in found)
+    if not files:
+        raise VideoError(f"{path}: no numbered pictures found; use a video, or -d DIR for a folder")
+    record_input(*files)
+    if by_the_clock := _by_the_clock(files):
+        return by_the_clock
+    steps = [following - number for number, following in pairwise(numbers)]
+    kinds = {re.sub(r"\d", "", file.name, flags=re.ASCII) for file in files}
+    if len(kinds) > 1 or 0 in steps:
+        raise VideoError(f"{path}: has several kinds of names; use a pattern, as in img_%04d.png")
+    step = min(steps, default=1)
+    for number, gap in zip(numbers, steps, strict=False):
+        if gap != step:
             raise VideoError(f"{path}: picture {number + step} is missing; put a copy of {number}")
-    if step > 1 and len({len(name % number) for number in (numbers[0], numbers[-1])}) > 1:
-        raise VideoError(f"{path}: numbers that rise by {step} need one length; fill with zeros")
-    record_input(*(folder / (name % number) for number in numbers))
-    return PictureSequence(f"{_doubled(str(folder.absolute()))}/{name}", numbers[0], step)
+    return PictureSequence(files)
 
 
-def _numbers(names: list[str], pattern: str) -> list[int]:
-    match = _PATTERN.fullmatch(pattern)
-    assert match is not None
-    before, digits, after = match.groups()
+def _by_the_clock(files: tuple[Path, ...]) -> PictureSequence | None:
+    """Return the pictures if all their names are times, each another one."""
+    times = {time: file for file in files if (time := ClockSettings().time_in(file.name))}
+    if len(times) < len(files) or len({time.tzinfo for time in times}) > 1:
+        return None
+    ordered = sorted(times)
+    seconds = [round((time - ordered[0]).total_seconds()) for time in ordered]
+    tick = math.gcd(*seconds) or 1
+    ticks = tuple(second // tick for second in seconds)
+    return PictureSequence(tuple(times[time] for time in ordered), ticks, tick)
+
+
+def _form(before: str, digits: str | None, after: str) -> re.Pattern[str]:
+    """Return what matches the names that a pattern makes."""
     before, after = (re.escape(part.replace("%%", "%")) for part in (before, after))
     number = r"0|[1-9]\d*" if digits is None else rf"\d{{{digits}}}|[1-9]\d{{{digits},}}"
-    form = re.compile(f"{before}({number}){after}", re.ASCII | re.DOTALL)
-    return sorted(int(match[1]) for match in map(form.fullmatch, names) if match)
-
-
-def _only_pattern(folder: Path, names: list[str]) -> str:
-    """Return the one pattern of the pictures in a folder. Raises `VideoError`."""
-    patterns = _patterns(names)
-    if not patterns:
-        raise VideoError(
-            f"{folder}: has no numbered pictures; give a video, or -d DIR for those in it"
-        )
-    if len(patterns) > 1:
-        raise VideoError(f"{folder}: has several kinds of names; {_known(folder, names)}")
-    return patterns[0]
-
-
-def _known(folder: Path, names: list[str]) -> str:
-    """Return advice that names patterns of existing pictures."""
-    some = [f"{folder / printable(pattern)}" for pattern in _patterns(names)[:2]]
-    return f"give {' or '.join(some)}" if some else ""
-
-
-def _patterns(names: list[str]) -> list[str]:
-    """Return the patterns of all numbered pictures, that of the most pictures first."""
-    groups: defaultdict[tuple[str, str], list[str]] = defaultdict(list)
-    for name in names:
-        match = _NUMBERED.fullmatch(name)
-        if match and is_picture_name(Path(name)):
-            before, number, after = match.groups()
-            groups[before, after].append(number)
-    ordered = sorted(groups.items(), key=lambda item: (-len(item[1]), item[0]))
-    return [
-        f"{_doubled(before)}{_conversion(digits)}{_doubled(after)}"
-        for (before, after), digits in ordered
-    ]
-
-
-def _conversion(numbers: list[str]) -> str:
-    """Return ``%d``, or ``%04d`` where numbers are filled with zeros to four digits."""
-    width = min(map(len, numbers))
-    return f"%0{width}d" if any(each[0] == "0" and len(each) > 1 for each in numbers) else "%d"
-
-
-def _escaped(text: str) -> str:
-    """Escape a part of a pattern for `glob`."""
-    return re.sub(r"([][*?{}~\\])", r"\\\1", text.replace("%%", "%"))
-
-
-def _doubled(text: str) -> str:
-    return text.replace("%", "%%")
-
-
-def _names(folder: Path, named: Path) -> list[str]:
-    try:
-        return [entry.name for entry in folder.iterdir()]
-    except OSError as error:
-        raise VideoError(f"{named}: {folder} cannot be read: {error.strerror}") from error
+    return re.compile(f"{before}({number}){after}", re.ASCII | re.DOTALL)

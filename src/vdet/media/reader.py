@@ -4,6 +4,7 @@ import itertools
 import logging
 import math
 from collections.abc import Generator, Iterator
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Self
@@ -11,21 +12,22 @@ from typing import Self
 import av
 import cv2
 import numpy as np
+from av.filter import Graph
+from av.video.stream import VideoStream
 
 from vdet.boxes import Image
 from vdet.config.schema import InputSettings
 from vdet.errors import VideoError
-from vdet.media.coding import HDR_TRANSFERS, Coding, StandardRange
+from vdet.media import demux
+from vdet.media.coding import Coding
 from vdet.media.decoder import Decoder
-from vdet.media.demux import MAX_PIXELS, check_size, describe, moving_streams, stated_duration
 from vdet.media.frame import Frame, Picture, Planes, VideoInfo, bgr_of
 from vdet.media.images import Orientation, upright
-from vdet.media.mp4 import joined_videos
-from vdet.media.numbered import ASSUMED_RATE, find_sequence
+from vdet.media.numbered import ASSUMED_RATE
 
 _log = logging.getLogger("vdet")
 _DEFAULTS = InputSettings()
-_MAX_TICKS = 2**62
+_MAX_SIDE = 16_384  # pixels; H.264 cannot be written larger
 _TOLERANCE = Fraction(1, 100)  # share of its duration, or frames, that a whole file may lack
 
 
@@ -79,32 +81,28 @@ class VideoReader:
         settings: InputSettings = _DEFAULTS,
     ) -> None:
         self._start, self._end, self._limit = start or Fraction(0), end, frames
-        self._tolerated = settings.max_damaged
+        self._settings = settings
         self._faults: list[str] = []
+        self._is_scaled = False
+        self._decoder = Decoder(path, settings.frame_rate)
+        self._pictures = self._decoder.pictures()
+        first = next(self._pictures, None)
+        if first is None or max(first.width, first.height) > _MAX_SIDE:
+            raise VideoError(
+                f"{path}: not one frame can be decoded; use a file that plays, with frames of "
+                f"at most {demux.MAX_PIXELS // 10**6} million pixels and sides of {_MAX_SIDE}"
+            )
+        stream = self._decoder.stream
+        self.info: VideoInfo = demux.describe(path, stream, first)
         self.length: Fraction | None = None
-        self._scaled: set[tuple[int, int]] = set()
-        self._frame_rate = settings.frame_rate
-        self._decoder = Decoder(path, self._frame_rate)
-        try:
-            self._pictures = self._decoder.pictures()
-            first = next(self._pictures, None)
-            if first is None:
-                raise VideoError(
-                    f"{path}: not one frame can be decoded; give a file that plays, of at most "
-                    f"{MAX_PIXELS // 10**6} million pixels a frame"
-                )
-            check_size(path, first.width, first.height)
-            container, stream = self._decoder.container, self._decoder.stream
-            self.info: VideoInfo = describe(path, container, stream, first)
-            if not self._decoder.clock.may_restart:
-                self.length = stated_duration(stream, self.info.start)
-            hdr = first.color_trc in HDR_TRANSFERS
-            self._standard_range = StandardRange(first.color_trc) if hdr else None
-            self._faults += self._assumptions(first)
-            self._frames = self._deliver(self._begin(first))
-        except BaseException:
-            self._decoder.close()
-            raise
+        if ticks := self._decoder.ticks:
+            self.length = (ticks[-1] + 1) * self.info.time_base
+            self.info = replace(self.info, frames=len(ticks), duration=self.length)
+        elif not self._decoder.clock.may_restart:
+            self.length = demux.stated_duration(stream, self.info.start)
+        self._to_standard = _standard_range(first.color_trc, stream)
+        self._faults += self._assumptions()
+        self._frames = self._deliver(self._begin(first))
 
     @property
     def damaged(self) -> int:
@@ -114,9 +112,8 @@ class VideoReader:
     @property
     def expected(self) -> int | None:
         """About how many frames there will be; None where the file does not say."""
-        if self.info.frames is None:
+        if (last := self.info.frames) is None:
             return None
-        last = self.info.frames
         if self._end is not None:
             last = min(last, math.ceil(self._end * self.info.rate))
         count = max(0, last - math.ceil(self._start * self.info.rate))
@@ -134,38 +131,31 @@ class VideoReader:
     def close(self) -> None:
         """Close the file; there are no more frames."""
         self._frames.close()
-        self._decoder.close()
+        self._decoder.container.close()
 
-    def _assumptions(self, first: av.VideoFrame) -> Iterator[str]:
+    def _assumptions(self) -> Iterator[str]:
         """Yield what is read in another way than the file, or the user, may mean."""
-        sequence = find_sequence(self.info.path)
-        if sequence and sequence.step > 1:
-            yield f"the numbers of its pictures rise by {sequence.step}"
-        if sequence and self._frame_rate is None:
+        if isinstance(self._decoder.ticks, range) and self._settings.frame_rate is None:
             yield f"{ASSUMED_RATE:.0f} pictures a second are assumed; --set input.frame_rate=N"
-        if self._standard_range:
-            name = HDR_TRANSFERS[first.color_trc]
-            yield f"is HDR ({name}) and is read as standard range (BT.709)"
-        streams = len(moving_streams(self._decoder.container))
+        if self._decoder.container.streams.audio and not self.info.has_sound:
+            yield "its sound is left out: a pipe can be read only once"
+        streams = len(demux.moving_streams(self._decoder.container))
         if streams > 1:
             yield f"has {streams} video streams; only the first is used"
-        videos = joined_videos(self.info.path)
-        if videos > 1:
-            yield f"is {videos} videos joined to one file; only the first is sure to be read whole"
 
     def _begin(self, first: av.VideoFrame) -> av.VideoFrame:
         """Return the picture at which decoding begins."""
-        time = min(math.floor((self.info.start + self._start) / self.info.time_base), _MAX_TICKS)
+        time = math.floor((self.info.start + self._start) / self.info.time_base)
         is_countable = self._decoder.is_countable and not first.interlaced_frame
         if not is_countable or first.pts is None or time <= first.pts:
             return first
-        decoder = Decoder(self.info.path, self._frame_rate)
+        decoder = Decoder(self.info.path, self._settings.frame_rate)
         pictures = decoder.pictures()
         picture = next(pictures, None) if decoder.skip_to(time, first.pts) else None
         if picture is None or decoder.damage.is_evident:
-            decoder.close()
+            decoder.container.close()
             return first
-        self._decoder.close()
+        self._decoder.container.close()
         self._decoder, self._pictures = decoder, pictures
         return picture
 
@@ -174,7 +164,7 @@ class VideoReader:
             yield from itertools.islice(self._selected(first), self._limit)
             self._report()
         finally:
-            self._decoder.close()
+            self._decoder.container.close()
 
     def _selected(self, first: av.VideoFrame) -> Iterator[Frame]:
         for index, time, picture in self._timed(first):
@@ -189,7 +179,7 @@ class VideoReader:
         info = self.info
         has_same_form = (
             info.orientation == Orientation()
-            and not self._standard_range
+            and not self._to_standard
             and Coding.of(picture) == info.coding
             and (picture.width, picture.height) == (info.width, info.height)
         )
@@ -198,67 +188,65 @@ class VideoReader:
     def _image(self, picture: av.VideoFrame) -> Image:
         info = self.info
         try:
+            if self._to_standard:
+                self._to_standard.vpush(picture)
+                picture = self._to_standard.vpull()
             image = bgr_of(picture)
         except (av.FFmpegError, ValueError) as error:
             pixels = picture.format.name
             raise VideoError(
                 f"{info.path}: its pixels ({pixels}) cannot be converted; convert it to H.264 first"
             ) from error
-        if self._standard_range:
-            image = self._standard_range.convert(image)
         image = upright(image, info.orientation)
-        height, width = image.shape[:2]
-        if (width, height) == (info.width, info.height):
-            return image
-        self._scaled.add((width, height))
         size = info.width, info.height
+        if image.shape[1::-1] == size:
+            return image
+        self._is_scaled = True
         return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
 
     def _timed(self, first: av.VideoFrame) -> Iterator[tuple[int, Fraction, av.VideoFrame]]:
-        period = 1 / self.info.rate
-        time = None
+        info, period, time = self.info, 1 / self.info.rate, None
         pictures = itertools.chain([first], self._pictures)
         for index, picture in enumerate(pictures, self._decoder.before):
-            stated = None if picture.pts is None else picture.pts * self.info.time_base
+            stated = None if picture.pts is None else picture.pts * info.time_base
             time = next_time(time, stated, period)
             yield index, time, picture
         assert time is not None
-        shown = max(period, picture.duration * self.info.time_base)
-        declared, self.length = self.length, time + shown - self.info.start
-        if declared and (lack := declared - self.length) > max(2 * period, declared * _TOLERANCE):
-            self._end_early(index + 1, lack)
-        if self._end is not None and self.length + period < self._end:
-            end = f"{float(self._end):.2f} s"
-            self._faults.append(f"ends at {float(self.length):.2f} s, before the end given, {end}")
-
-    def _end_early(self, frames: int, lack: Fraction) -> None:
-        """Note that `lack` seconds are missing at the end, after so many frames."""
-        decoder = self._decoder
-        if decoder.damage.goes_on(decoder.container.size):
-            decoder.damage.lost_at_end += round(lack * self.info.rate)
-        else:
-            self._faults.append(f"ends early: {frames} of {self.info.frames} frames could be read")
+        shown = max(period, picture.duration * info.time_base)
+        declared, self.length = self.length, time + shown - info.start
+        if declared and declared - self.length > max(2 * period, declared * _TOLERANCE):
+            self._faults.append(f"ends early: {index + 1} of {info.frames} frames could be read")
 
     def _report(self) -> None:
         """Refuse a video that is too damaged; warn of any other fault."""
-        damaged, total = self.damaged, self._decoder.damage.total
+        damaged, total = self.damaged, self._decoder.damage.pictures + self._decoder.damage.lost
         if damaged:
             self._faults.insert(0, f"{damaged} of {total} frames damaged or lost")
-        if damaged > math.ceil(self._tolerated * total):
+        if damaged > math.ceil(self._settings.max_damaged * total):
             raise VideoError(
                 f"{self.info.path}: {self._faults[0]}, more than input.max_damaged allows; raise it"
             )
-        restarts = self._decoder.clock.restarts
-        if restarts:
-            times = "once" if restarts == 1 else f"{restarts} times"
-            self._faults.append(f"its clock restarts {times}; the parts follow one another")
-        if self._scaled:
-            sizes = ", ".join(f"{width}×{height}" for width, height in sorted(self._scaled))
-            self._faults.append(
-                f"frames of {sizes} pixels scaled to {self.info.width}×{self.info.height}"
-            )
+        if restarts := self._decoder.clock.restarts:
+            self._faults.append(f"its clock restarts {restarts}×; the parts follow one another")
+        if self._is_scaled:
+            self._faults.append("frames of other sizes are scaled to that of the first")
         if self._faults:
             _log.warning("%s: %s", self.info.path, "; ".join(self._faults))
+
+
+def _standard_range(transfer: int, stream: VideoStream) -> Graph | None:
+    """Return the filter that makes standard range (BT.709) of HDR video; None for other video."""
+    if transfer not in demux.HDR_TRANSFERS:
+        return None
+    graph = Graph()
+    colors = "out_transfer=bt709:out_primaries=bt709:out_color_matrix=bt709"
+    graph.link_nodes(
+        graph.add_buffer(template=stream),
+        graph.add("scale", f"{colors}:intent=relative_colorimetric"),
+        graph.add("format", "bgr24"),
+        graph.add("buffersink"),
+    ).configure()
+    return graph
 
 
 def next_time(last: Fraction | None, stated: Fraction | None, period: Fraction) -> Fraction:

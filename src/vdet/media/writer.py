@@ -1,14 +1,12 @@
 """Write frames as H.264 into one container, and copy the sound of their source into it."""
 
 import contextlib
-import io
 import logging
 from collections.abc import Generator, Iterator
 from dataclasses import asdict
 from fractions import Fraction
-from itertools import islice
 from pathlib import Path
-from typing import Final, Self
+from typing import Self
 
 import av
 from av.audio.stream import AudioStream
@@ -21,14 +19,11 @@ from vdet.config.schema import OutputSettings
 from vdet.errors import OutputError, VideoError
 from vdet.media.clock import ClockUnwrapper
 from vdet.media.coding import Coding
-from vdet.media.demux import is_pipe, open_input, packets, picture_stream
+from vdet.media.demux import SAFELY, open_input, packets, picture_stream
 from vdet.media.frame import UNSPECIFIED, Frame, Picture, Planes, VideoInfo
-from vdet.media.mp4 import is_mp4
 from vdet.version import __version__
 
 _log = logging.getLogger("vdet")
-
-_MAX_TRIALS = 20  # packets of a stream; the first ones may be damaged
 
 
 class SoundCopy:
@@ -50,22 +45,21 @@ class SoundCopy:
         self._path = source
         self._target = target
         self._origin = origin
+        self._can_hide = target.format.name != "matroska"
         self._left_out = 0  # packets
         self._source = open_input(source)
-        try:
-            self._clock = ClockUnwrapper(self._source, picture_stream(self._source, source))
-            self._streams = self._add_streams()
-        except BaseException:
-            self._source.close()
-            raise
+        self._clock = ClockUnwrapper(self._source, picture_stream(self._source, source))
+        self._streams = self._add_streams()
         self._packets = self._moved()
         self._next = next(self._packets, None)
 
     def copy(self, until: Fraction | None) -> None:
         """Copy what begins before second `until` of the target; for None, all that is left."""
-        while self._next is not None and (until is None or _begin(self._next) < until):
+        while packet := self._next:
+            if until is not None and (packet.pts or 0) * packet.time_base >= until:
+                return
             try:
-                self._target.mux(self._next)
+                self._target.mux(packet)
             except av.InvalidDataError:  # found while it is repacked for another container
                 self._left_out += 1
             self._next = next(self._packets, None)
@@ -79,18 +73,16 @@ class SoundCopy:
         self._source.close()
 
     def _add_streams(self) -> dict[int, AudioStream]:
-        """Add streams to the target; return them by their index in the source."""
-        kind = self._target.format.name
-        streams = {}
+        """Add those streams to the target that it can hold, by their index in the source."""
+        streams, codecs = {}, self._target.supported_codecs
         for stream in self._source.streams.audio:
-            if _can_hold(kind, self._path, stream.index):
+            codec = stream.codec_context
+            if codec and codec.sample_rate and codec.name in codecs:
                 streams[stream.index] = self._target.add_stream_from_template(stream)
-                if stream.language:
-                    streams[stream.index].metadata["language"] = stream.language
             else:
-                codec = stream.codec_context.name if stream.codec_context else "unknown codec"
-                fault = f"its sound ({codec}) is empty, or cannot go into {kind}; left out"
-                _log.warning("%s: %s", self._path, fault)
+                name = codec.name if codec else "unknown codec"
+                fault = f"its sound ({name}) is empty, or cannot go into {self._target.format.name}"
+                _log.warning("%s: %s; left out", self._path, fault)
         return streams
 
     def _moved(self) -> "Generator[Packet[Stream], None, None]":
@@ -111,40 +103,13 @@ class SoundCopy:
             last[index] = dts
             shift = round(self._origin / packet.time_base)
             packet.pts, packet.dts = pts - shift, dts - shift
-            can_hide = self._target.format.name != "matroska"
-            heard_until = packet.pts + (packet.duration or 0) * can_hide
-            if heard_until >= 0:
+            if packet.pts + (packet.duration or 0) * self._can_hide >= 0:
                 packet.stream = self._streams[index]
                 yield packet
 
 
-def _begin(packet: "Packet[Stream]") -> Fraction:
-    return (packet.pts or 0) * packet.time_base
-
-
-def _can_hold(kind: str, path: Path, index: int) -> bool:
-    """Return whether a file of the format `kind` can hold a sound stream of `path`.
-
-    It is tried in memory: an unknown codec and damaged parameters show only when a file is written,
-    and there they would cost the picture too.
-    """
-    with open_input(path) as source:
-        found = packets(source, [source.streams[index]], on_error=lambda: None)
-        for packet in islice(found, _MAX_TRIALS):
-            try:
-                with av.open(io.BytesIO(), "w", kind) as trial:
-                    packet.stream = trial.add_stream_from_template(packet.stream)
-                    packet.pts = packet.dts = 0
-                    trial.mux(packet)
-            except (ValueError, av.FFmpegError):
-                continue
-            return True
-    return False
-
-
 VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv")
 
-_CODEC: Final = "libx264"
 _X264 = "b-adapt=0:scenecut=0:sync-lookahead=1"
 """Parameters of x264. It does not search the next frames for cuts, nor for the best kind of each:
 that takes a tenth of a run, and saves 1 % of the file. It keeps few frames in memory.
@@ -152,9 +117,8 @@ that takes a tenth of a run, and saves 1 % of the file. It keeps few frames in m
 _LARGEST_AT_ONCE = 1920 * 1088
 """Pixels of the largest frames of which several are encoded at once; that takes more memory."""
 _MARK = "made by vdet"
+_MP4 = (b"ftyp", b"styp", b"moov", b"moof", b"mdat", b"free", b"skip", b"wide")  # first boxes
 _FINEST = 10_000_000  # ticks a second; more is not safe in mp4 players
-_COARSEST = 20_000  # ticks a second; FFmpeg writes no coarser ones into mp4
-_MAX_STEP = 2**31  # ticks from one frame to the next in mp4
 _MATRICES = {"bt601": 6, "bt709": 1}  # codes of ITU-T H.273
 
 
@@ -167,10 +131,12 @@ def may_replace_video(path: Path) -> bool:
     if not path.is_file():
         return path.is_symlink()  # it leads nowhere
     try:
-        with open_input(path, for_tags=True) as container:
+        with av.open(str(path.absolute()), options=SAFELY, metadata_errors="replace") as container:
             tags = {key.lower(): value for key, value in container.metadata.items()}
-    except VideoError:
-        return not is_mp4(path)
+    except av.FFmpegError:
+        with contextlib.suppress(OSError), path.open("rb") as file:
+            return file.read(8)[4:] not in _MP4
+        return False
     return tags.get("comment", "").startswith(_MARK)
 
 
@@ -228,8 +194,7 @@ class VideoWriter:
     ) -> None:
         self._name = name or path
         if path.suffix.lower() not in VIDEO_SUFFIXES:
-            suffixes = ", ".join(VIDEO_SUFFIXES)
-            raise OutputError(f"{self._name}: videos are written as {suffixes}; name it so")
+            raise OutputError(f"{self._name}: videos must end in {', '.join(VIDEO_SUFFIXES)}")
         self._info = info
         self._whole_sound = whole_sound
         self._period = 1 / info.rate
@@ -243,9 +208,8 @@ class VideoWriter:
             self._container = av.open(
                 str(path.absolute()), mode="w", container_options={"movflags": "+faststart"}
             )
-        self._container.metadata["comment"] = f"{_MARK} {__version__}"
-        kept = {name: value for name, value in asdict(info.tags).items() if value}
-        self._container.metadata.update(kept)
+        tags = {name: value for name, value in asdict(info.tags).items() if value}
+        self._container.metadata.update(tags, comment=f"{_MARK} {__version__}")
         self._stream = self._add_picture(info, settings, threads)
 
     def write(self, frame: Frame) -> None:
@@ -256,10 +220,11 @@ class VideoWriter:
         with self._naming_the_file():
             if self._origin is None:
                 self._origin = frame.time
-                self._sound = self._open_sound(frame.time)
+                if self._info.has_sound:
+                    self._sound = SoundCopy(self._info.path, self._container, frame.time)
             since = frame.time - self._origin
             last, self._last = self._last, max(self._last + 1, round(since / self._time_base))
-            self._check_gap((self._last - last) * self._time_base)
+            self._check_pause((self._last - last) * self._time_base)
             picture = _to_encode(frame.picture, self._info.coding)
             picture.pts = self._last
             picture.time_base = self._time_base
@@ -270,11 +235,13 @@ class VideoWriter:
             if self._sound:
                 self._sound.copy(since)
 
-    def _check_gap(self, seconds: Fraction) -> None:
-        ticks = seconds * max(self._time_base.denominator, _COARSEST)
-        if ticks >= _MAX_STEP and self._container.format.name != "matroska":
-            gap = f"{float(seconds) / 3600:.0f} hours between two frames"
-            raise OutputError(f"{self._name}: cannot hold the {gap}; name it .mkv")
+    def _check_pause(self, seconds: Fraction) -> None:
+        """Refuse more ticks from one frame to the next than mp4 can hold."""
+        ticks = seconds * max(self._time_base.denominator, 20_000)  # FFmpeg writes no coarser ones
+        if ticks >= 2**31 and self._container.format.name != "matroska":
+            raise OutputError(
+                f"{self._name}: cannot hold a pause of {int(seconds)} s; name it .mkv"
+            )
 
     def __enter__(self) -> Self:
         return self
@@ -310,21 +277,11 @@ class VideoWriter:
             self._failure = OutputError(f"{self._name}: cannot be written: {error.strerror}")
             raise self._failure from error
 
-    def _open_sound(self, origin: Fraction) -> SoundCopy | None:
-        """Return a copy of the sound of the source, if it has any that can be read again."""
-        source = self._info.path
-        if not self._info.has_sound:
-            return None
-        if is_pipe(source):
-            _log.warning("%s: its sound is left out: a pipe can be read only once", source)
-            return None
-        return SoundCopy(source, self._container, origin)
-
     def _add_picture(
         self, info: VideoInfo, settings: OutputSettings, threads: int | None
     ) -> av.VideoStream:
         options = {"preset": settings.preset, "crf": str(settings.crf), "x264-params": _X264}
-        stream = self._container.add_stream(_CODEC, rate=info.rate, options=options)
+        stream = self._container.add_stream("libx264", rate=info.rate, options=options)
         context = stream.codec_context
         context.width = info.width + info.width % 2
         context.height = info.height + info.height % 2

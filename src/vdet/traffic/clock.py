@@ -1,21 +1,19 @@
 """The clock of a video: the moment at which it begins, and where that is known from."""
 
-import re
-from collections.abc import Callable, Iterable, Iterator
+import logging
 from contextlib import suppress
 from dataclasses import dataclass
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta, tzinfo
 from pathlib import Path
-from typing import Any
 
-from vdet.config.camera import CODES, moment
+from vdet.config.camera import moment
 from vdet.config.schema import Settings
 from vdet.errors import ConfigError
+from vdet.media.numbered import find_sequence
 
-_IN_NAMES = re.compile(
-    r"(?<!\d)(\d{4})[-_.]?(\d\d)[-_.]?(\d\d)[-_T ](\d\d)[-_.:]?(\d\d)[-_.:]?(\d\d)(?!\d)", re.ASCII
-)
-"""A time in the name of a file, such as 2026-05-01_07-00-00 or 20260501_070000."""
+_log = logging.getLogger("vdet")
+_SAME = timedelta(minutes=1)
+"""Largest difference of the times in the name and in the metadata of a video that are one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,35 +23,47 @@ class Clock:
     Attributes
     ----------
     zero
-        The moment of time 0 in the video, with its time zone.
+        The moment of time 0 in the video, in UTC.
     source
         Where it is known from, for messages.
+    zone
+        The time zone of the moments that `at` returns; None for that of this computer.
+    first
+        Time of the first frame in the video, seconds.
     """
 
     zero: datetime
     source: str
+    zone: tzinfo | None = None
+    first: float = 0.0
 
     def __str__(self) -> str:
-        return f"{self.zero.isoformat(' ', 'seconds')} ({self.source})"
+        return f"{_text(self.at(self.first))} ({self.source})"
 
     @property
     def second_of_day(self) -> float:
         """The second of the day at time 0 in the video."""
-        midnight = self.zero.replace(hour=0, minute=0, second=0, microsecond=0)
-        return (self.zero - midnight).total_seconds()
+        zero = self.at(0.0).replace(tzinfo=None)
+        return (zero - zero.replace(hour=0, minute=0, second=0, microsecond=0)).total_seconds()
 
     def at(self, seconds: float) -> datetime:
-        """Return the moment of a time in the video."""
-        return self.zero + timedelta(seconds=seconds)
+        """Return the moment of a time in the video, with the offset of its zone at that moment."""
+        return (self.zero + timedelta(seconds=seconds)).astimezone(self.zone)
 
 
 def find_clock(
-    path: Path, settings: Settings, created: str | None = None, start: float = 0.0
+    path: Path,
+    settings: Settings,
+    created: str | None = None,
+    start: float = 0.0,
+    zero: datetime | None = None,
 ) -> Clock | None:
     """Return the clock of a video; None if nothing says when it begins.
 
-    `input.begin` decides, then the pattern of `camera.clock`, then the creation time of the video,
-    then a time in its name. A time without a zone is in the time zone of this computer.
+    `input.begin` decides, then the pattern of `camera.clock`, then `zero`, then a time in its name
+    or in that of its first picture, then the creation time of the video. A time without a zone is
+    in that of the camera. If the name and the creation time differ by more than a minute, a warning
+    (logger "vdet") has both.
 
     Parameters
     ----------
@@ -63,42 +73,56 @@ def find_clock(
         The creation time in the metadata of the file.
     start
         Time of its first frame in the video, seconds.
+    zero
+        The moment of time 0, where the file itself says so.
 
     Raises
     ------
     ConfigError
         The name has no time as the pattern says.
     """
-    found = _begin(path, settings, created)
-    if found is None:
+    clock = settings.camera.clock
+    zone: tzinfo | None = clock.time_zone
+    if zero and not (settings.input.begin or clock.pattern):
+        return Clock(zero.astimezone(UTC), "from the file", zone, start)
+    if settings.input.begin:
+        begin, source = moment(settings.input.begin), "as given"
+        zone = zone or begin.tzinfo
+    elif found := _found(path, settings, created):
+        begin, source = found
+    else:
         return None
-    begin, source = found
-    return Clock(begin.astimezone(begin.tzinfo) - timedelta(seconds=start), source)
+    return Clock(_utc(begin, zone) - timedelta(seconds=start), source, zone, start)
 
 
-def _begin(path: Path, settings: Settings, created: str | None) -> tuple[datetime, str] | None:
-    if begin := settings.input.begin:
-        return moment(begin), "as given"
-    if pattern := settings.camera.clock.pattern:
-        codes = re.sub(r"%[a-zA-Z]|[^%]", lambda part: _code(part[0]), pattern, flags=re.DOTALL)
-        texts = re.findall(f"(?=({codes}))", path.name, re.ASCII)
-        found = next(_moments(lambda text: datetime.strptime(text, pattern), texts), None)
-        if found is None:
-            raise ConfigError(f"{path}: its name has no time like {pattern}: camera.clock.pattern")
-        return found, "from its name"
-    if created and (known := next(_moments(datetime.fromisoformat, [created]), None)):
-        return known.astimezone(), "its creation time"
-    named = map("".join, _IN_NAMES.findall(path.name))
-    in_name = next(_moments(lambda digits: datetime.strptime(digits, "%Y%m%d%H%M%S"), named), None)
-    return (in_name, "from its name") if in_name else None
+def _found(path: Path, settings: Settings, created: str | None) -> tuple[datetime, str] | None:
+    """Return when a video begins by its name and its metadata, and which of these says so."""
+    clock, zone = settings.camera.clock, settings.camera.clock.time_zone
+    sequence = find_sequence(path)
+    named, written = clock.time_in((sequence.files[0] if sequence else path).name), None
+    if clock.pattern and not named:
+        raise ConfigError(
+            f"{path}: its name has no time like {clock.pattern}: camera.clock.pattern"
+        )
+    with suppress(ValueError):
+        written = moment(created or "")
+    if not named:
+        return (written, "its creation time") if written else None
+    if written and not clock.pattern and abs(_utc(named, zone) - _utc(written, zone)) > _SAME:
+        by_name, by_metadata = (
+            _text(_utc(time, zone).astimezone(zone)) for time in (named, written)
+        )
+        _log.warning(
+            "%s: begins %s by its name, %s by its metadata; the name is used; --begin decides",
+            *(path, by_name, by_metadata),
+        )
+    return named, "from its name"
 
 
-def _code(part: str) -> str:
-    return CODES.get(part) or re.escape(part)
+def _utc(time: datetime, zone: tzinfo | None) -> datetime:
+    """Return a moment in UTC; without a zone of its own it is local time in `zone`."""
+    return (time if time.tzinfo or not zone else time.replace(tzinfo=zone)).astimezone(UTC)
 
 
-def _moments(parse: Callable[[Any], datetime], values: Iterable[Any]) -> Iterator[datetime]:
-    """Yield those values that are moments."""
-    for value in values:
-        with suppress(ValueError):
-            yield moment(parse(value).isoformat())
+def _text(time: datetime) -> str:
+    return time.isoformat(" ", "seconds")

@@ -65,10 +65,7 @@ def count_files(
         saved = read_tracks(path, rate)
         if not saved.has_times:
             raise TruthError(f"{path}: has no times; give the frames per second, as in --rate 25")
-        created, start = None, saved.times.get(0, 0.0)
-        if saved.begin:
-            created, start = saved.begin.isoformat(), 0.0
-        clock = find_clock(path, settings, created, start)
+        clock = find_clock(path, settings, None, saved.times.get(0, 0.0), saved.begin)
         place = _size(settings, size or saved.size)
         first = min(saved.times.values(), default=None)
         if group is None or not group.goes_on(place, clock, first):

@@ -1,7 +1,7 @@
 """The intervals of tables and of pages: parts of the time of one or several videos."""
 
 from collections.abc import Sequence
-from datetime import datetime, timedelta, timezone
+from datetime import datetime, timedelta, timezone, tzinfo
 from itertools import accumulate
 
 from vdet.errors import ConfigError
@@ -56,12 +56,14 @@ class Intervals:
     ) -> None:
         self._length = length
         self._origin: datetime | None = None
+        self._zone: tzinfo | None = None
         self._is_timed = True
         self._zeros = [0.0]
         clocks = [clock for clock, _ in videos if clock]
         if clocks and len(clocks) == len(videos):
-            offset = clocks[0].zero.utcoffset() or timedelta()
-            self._origin = datetime(1970, 1, 1, tzinfo=timezone(offset))
+            first = clocks[0].at(clocks[0].first)
+            self._origin = datetime(1970, 1, 1, tzinfo=timezone(first.utcoffset() or timedelta()))
+            self._zone = clocks[0].zone
             self._zeros = [(clock.zero - self._origin).total_seconds() for clock in clocks]
         elif len(videos) > 1:
             if length is not None:
@@ -123,5 +125,6 @@ class Intervals:
 
     def _moment(self, seconds: float) -> Moment:
         if self._origin:
-            return self._origin + timedelta(milliseconds=round(1000 * seconds))
+            found = self._origin + timedelta(milliseconds=round(1000 * seconds))
+            return found.astimezone(self._zone)
         return round(seconds, 3) if self._is_timed else None
