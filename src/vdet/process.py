@@ -1,6 +1,5 @@
 """The process of the program: its signals, its standard streams, the threads of its libraries."""
 
-import atexit
 import contextlib
 import io
 import os
@@ -12,8 +11,9 @@ from typing import Any, NoReturn
 
 from vdet.errors import INTERRUPTED, VdetError, in_one_line
 from vdet.system import CAN_WAKE, ENDING_SIGNALS
-from vdet.workers import CLEANUP_TIMEOUT, SINGLE_THREADED
+from vdet.workers import SINGLE_THREADED
 
+CLEANUP_TIMEOUT = 10.0  # seconds between a signal and a forced exit
 _SENT_AGAIN = 20
 _STDOUT, _STDERR = 1, 2
 
@@ -113,10 +113,7 @@ def _watch_for_signals() -> None:
 
 
 def _exit(code: object) -> NoReturn:
-    """Exit without unloading the libraries: it takes time, and could crash a thread that hangs."""
-    names = [thread.name for thread in threading.enumerate() if thread.daemon]
-    if not any(name.startswith("vdet-") for name in names):  # else one hangs in a read or write
-        atexit._run_exitfuncs()
+    """Exit without unloading the libraries: it takes time, and waits for a thread that hangs."""
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(code if isinstance(code, int) else int(code is not None))

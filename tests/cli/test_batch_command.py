@@ -41,7 +41,7 @@ def test_a_folder_with_a_bad_file_from_the_first_run_to_the_last(
     assert re.search(rf"{clips}/a\.mp4: 12 frames, \d tracks?, ", first.err)
     assert f"vdet: error: {clips}/bad.mp4: is not a video" in first.err
     assert first.err.count("bad.mp4") == 1, "an error is printed once"
-    assert first.err.splitlines()[-1] == f"{out}/manifest.jsonl: 2 files done, 1 failed"
+    assert first.err.splitlines()[-1] == f"{out}: 2 files done, 1 failed"
     made = ["a.csv", "a.mp4", "day2/b.csv", "day2/b.mp4", "manifest.jsonl"]
     assert names(out) == made
     assert (frames_of(out / "a.mp4"), frames_of(out / "day2" / "b.mp4")) == (12, 6)
@@ -54,19 +54,19 @@ def test_a_folder_with_a_bad_file_from_the_first_run_to_the_last(
 
     refused = run(*arguments)
     assert refused.code == 1
-    assert refused.err == f"vdet: {out}/a.mp4: is there already; give --overwrite to replace it\n"
+    assert refused.err == f"vdet: {out}/a.mp4: already exists; use --overwrite to replace it\n"
 
     before = (out / "a.mp4").stat().st_mtime_ns
     write_drive(clips / "bad.mp4", 3)
     again = run(*arguments, "--skip-existing")
     assert again.code == 0, again.err
-    assert "1 file done, 2 there already, 0 failed" in again.err
+    assert "1 file done, 2 skipped, 0 failed" in again.err
     assert (out / "a.mp4").stat().st_mtime_ns == before
     assert [Path(record["input"]).name for record in records_of(out)][-1] == "bad.mp4"
 
     nothing = run(*arguments, "--skip-existing")
     assert nothing.code == 0
-    assert nothing.err == f"{out}: 3 files there already\n"
+    assert nothing.err == f"{out}: 0 files done, 3 skipped, 0 failed\n"
     assert len(records_of(out)) == 4
 
 
@@ -109,7 +109,7 @@ def test_after_other_settings_or_another_model_videos_are_made_again(
     arguments = ("detect-video", clips, "-d", out, "--no-video", "--tracks", ".csv")
     assert run(*arguments).code == 0
     dry = (*arguments, "--skip-existing", "--dry-run")
-    assert run(*dry).out.count("there already") == 2
+    assert run(*dry).out.count("up to date") == 2
     (tmp_path / "steps").write_text("steps: {names: [theirs]}")
     other_step = ("-c", tmp_path / "steps")
     for change in (("--set", "tracker.needed=0.3"), ("-c", "svm"), ("--frames", "3"), other_step):

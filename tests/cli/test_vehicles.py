@@ -39,7 +39,7 @@ def test_one_video(run: Run, clips: Path, tmp_path: Path, red: tuple[str, ...]) 
     assert names(tmp_path / "page") == ["page.html"]
     again = run("detect-video", clips / "day" / "a.mp4", "--no-video", "--crops", "crops", *red)
     assert again.code == 1
-    assert "is there already; give --overwrite to replace it" in again.err
+    assert "already exists; use --overwrite to replace it" in again.err
 
 
 def test_many_videos_have_their_own_and_a_table_and_a_page_over_all(

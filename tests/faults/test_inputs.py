@@ -13,7 +13,7 @@ import pytest
 from faults.conftest import Start
 from red_cars import SETTINGS, red_model, red_settings
 from running import frames_of, names, until, write_drive
-from vdet.batch.task import Identity, process_file
+from vdet.batch.task import process_file
 from vdet.errors import VideoError
 from vdet.run.sinks.protocol import Output
 from vdet.run.video import Run, run_video
@@ -53,9 +53,7 @@ def test_a_file_that_is_removed_while_it_is_read_is_read_to_its_end(job: Run) ->
 
 def test_a_file_that_is_removed_before_its_turn_is_recorded(job: Run, tmp_path: Path) -> None:
     job.source.unlink()
-    record = process_file(
-        replace(job, settings=red_settings(tmp_path)), identity=Identity("digest")
-    )
+    record = process_file(replace(job, settings=red_settings(tmp_path)), folder=tmp_path / "out")
     assert record.error == f"{job.source}: there is no such file; check the name"
     assert record.frames is None
 

@@ -14,7 +14,7 @@ from conftest import Run
 from faults.conftest import Start
 from red_cars import SETTINGS, red_model, red_settings
 from running import names, until, write_drive
-from vdet.batch.task import Identity, process_file
+from vdet.batch.task import process_file
 from vdet.errors import VideoError
 from vdet.media import Frame
 from vdet.media.writer import VideoWriter
@@ -82,9 +82,7 @@ def test_a_writer_that_fails_at_the_100th_frame(
         write(writer, frame)
 
     monkeypatch.setattr(VideoWriter, "write", write_99)
-    record = process_file(
-        replace(job, settings=red_settings(tmp_path)), identity=Identity("digest")
-    )
+    record = process_file(replace(job, settings=red_settings(tmp_path)), folder=tmp_path / "out")
     assert record.error == f"{job.outputs[0].path}: cannot be written: Input/output error"
     assert written == list(range(99))
     assert names(tmp_path / "out") == []
@@ -118,9 +116,7 @@ def test_a_tracker_that_raises(
 
     monkeypatch.setattr(RulesTracker, "update", update)
     monkeypatch.setattr(MotionTracker, "observe", update)
-    record = process_file(
-        replace(job, settings=red_settings(tmp_path)), identity=Identity("digest")
-    )
+    record = process_file(replace(job, settings=red_settings(tmp_path)), folder=tmp_path / "out")
     assert record.error is not None
     assert "internal error, please report it (ZeroDivisionError: no scale)" in record.error
     result = run("detect-video", job.source, tmp_path / "out" / "single.mp4")

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 from vdet.config.schema import Settings
 from vdet.media import Frame, VideoInfo
 from vdet.plugins import STEPS, load_plugin
-from vdet.run.result import FrameResult
+from vdet.run.result import Facts, FrameResult
 from vdet.track.track import Track
 
 if TYPE_CHECKING:
@@ -36,6 +36,14 @@ class ParallelStep(Step, Protocol):
 
     def prepare(self, frame: Frame) -> None:
         """Do that part; several threads call this at once, each before `apply` for its frame."""
+
+
+@runtime_checkable
+class FindingStep(Step, Protocol):
+    """A step that finds out something about the whole video."""
+
+    def finish(self) -> Facts:
+        """Return it, after the last frame; sinks get it as `SinkContext.facts` when they finish."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +95,8 @@ class LaneStep:
         """Add the road, and where the vehicles are on it."""
         view = self._views.pop(result.frame.index)
         road = self._roads.update(view, (track.box for track in result.tracks))
-        return replace(result, road=road, tracks=with_positions(result.tracks, road, self._foot))
+        tracks = with_positions(result.tracks, road, self._foot)
+        return replace(result, tracks=tracks, facts={**result.facts, "lane": road})
 
 
 def with_positions(tracks: Sequence[Track], road: "Road", foot: float) -> tuple[Track, ...]:

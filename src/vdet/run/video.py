@@ -18,7 +18,7 @@ from vdet.files import OutputFiles, record_input, recorded_inputs
 from vdet.media.reader import VideoReader
 from vdet.progress import Progress, no_progress
 from vdet.run.loop import Pipeline, build, named_errors, peek
-from vdet.run.result import FrameResult
+from vdet.run.result import Facts, FrameResult
 from vdet.run.sinks.protocol import Output, SinkContext, check_sinks, open_sinks, sink_kind
 from vdet.run.steps import Step
 from vdet.run.threads import StalledError, prefetch
@@ -46,16 +46,14 @@ class Run:
     start, end
         Seconds from the first frame; frames with start ≤ time < end are processed.
     frames
-        Largest number of frames to process.
+        Maximum number of frames to process.
     at
         Time of the stage pictures, seconds from the first frame. If no output needs more, only the
         frames from 2 s before it are processed.
     overwrite
-        Replace outputs that are there already.
+        Replace outputs that already exist.
     threads
-        Number of threads that search; None for one per core.
-    codec_threads
-        Number of threads of the encoder; None for one per core.
+        Number of threads that search, and of those that encode; None for one per core.
     timeout
         Seconds in which the next frame must be read or written. After that the run fails, so that
         a disk or a network that hangs does not stop a batch. Reading gets the duration of the part
@@ -71,7 +69,6 @@ class Run:
     at: Fraction = Fraction(0)
     overwrite: bool = False
     threads: int | None = None
-    codec_threads: int | None = None
     timeout: float = IO_TIMEOUT
 
     def __post_init__(self) -> None:
@@ -86,6 +83,11 @@ class Run:
     def shows_at(self) -> bool:
         """Whether an output shows the frame at `at`."""
         return any(sink_kind(output.sink).one_frame for output in self.outputs)
+
+    @property
+    def only_at(self) -> bool:
+        """Whether all outputs show the frame at `at` alone."""
+        return self.shows_at and all(sink_kind(output.sink).one_frame for output in self.outputs)
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,8 +104,10 @@ class RunTotals:
         Wall time.
     clock
         When the video was recorded, if that is known.
+    facts
+        What the steps found out about the whole video.
     summaries
-        What sinks say of their outputs, by the path of the output.
+        What sinks say of their outputs, by the path of the output: see `BaseSink`.
     """
 
     width: int
@@ -112,7 +116,8 @@ class RunTotals:
     tracks: int
     seconds: float
     clock: Clock | None = None
-    summaries: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    facts: Facts = field(default_factory=dict)
+    summaries: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,10 +163,10 @@ def open_video(
             except FrameSizeError as error:
                 log.warning("%s: gets no boxes: %s", run.source, error)
                 pipeline = build(as_model(lambda _: NO_BOXES), settings, info, images)
-            traffic = LiveTraffic(settings, info.width, info.height)
             del images  # otherwise they stay in memory for the whole run
             threads = run.threads or core_count()
             with closing(pipeline.follow(frames, run.source, threads=threads)) as results:
+                traffic = LiveTraffic(settings, info.width, info.height)
                 yield OpenVideo(reader, pipeline, results, traffic)
     except StalledError as error:
         raise VideoError(
@@ -209,46 +214,57 @@ def run_video(
 
     No output is left after an error.
     """
+    with OutputFiles(overwrite=run.overwrite) as files:
+        return write_outputs(run, model, files, tracker=tracker, steps=steps, progress=progress)
+
+
+def write_outputs(
+    run: Run,
+    model: DetectorModel,
+    files: OutputFiles,
+    *,
+    tracker: VideoTracker | None = None,
+    steps: Sequence[Step] = (),
+    progress: Progress = no_progress,
+) -> RunTotals:
+    """Do as `run_video`, into `files`: the outputs are complete, but do not have their names yet.
+
+    The others are those of `run_video`.
+    """
     began = time.perf_counter()
     return_freed_memory()
-    only_at = run.shows_at and all(sink_kind(each.sink).one_frame for each in run.outputs)
-    if only_at and run.frames is None:
+    if run.only_at and run.frames is None:
         run = replace(run, start=max(run.at - LEAD, run.start or Fraction(0)))
     with (
-        OutputFiles(overwrite=run.overwrite) as files,
         open_video(run, model, tracker=tracker, steps=steps) as video,
         open_sinks(run.outputs, context := _context(run, files, video)) as sinks,
     ):
         info = video.reader.info
-        advance = progress(None if only_at else video.reader.expected)
-        frames, writing, last, ids = 0, 0.0, None, set[int]()
+        advance = progress(None if run.only_at else video.reader.expected)
+        frames, last, ids = 0, None, set[int]()
         for result in video.results:
             video.traffic.add(result.frame_tracks)
-            written = time.perf_counter()
             for sink in sinks:
                 sink.write(result)
-            writing += time.perf_counter() - written
             ids.update(track.id for track in result.tracks)
             frames += 1
             advance(1)
             if result.searched:
                 last = result.frame.time - info.start
-                if only_at and last >= run.at:
+                if run.only_at and last >= run.at:
                     break
         if last is None or (run.shows_at and last < run.at):
             when = "in the times given" if last is None else f"at {float(run.at):.2f} s or later"
             raise _no_frame(run, f"no frame is read {when}", video.reader.length)
+        context.facts.update(video.pipeline.facts())
         counts = video.traffic.counts()
         for warning in counts.warnings if counts else ():
             log.warning("%s: %s", run.source, warning)
-    seconds = time.perf_counter() - began
-    log.info(
-        "%s: finding the vehicles took %.1f s, drawing and writing them %.1f s",
-        *(run.source, seconds - writing, writing),
-    )
     pairs = zip(run.outputs, sinks, strict=True)
     summaries = {str(output.path): sink.summary for output, sink in pairs if sink.summary}
-    return RunTotals(info.width, info.height, frames, len(ids), seconds, context.clock, summaries)
+    seconds = time.perf_counter() - began
+    totals = info.width, info.height, frames, len(ids), seconds
+    return RunTotals(*totals, context.clock, context.facts, summaries)
 
 
 def _context(run: Run, files: OutputFiles, video: OpenVideo) -> SinkContext:
@@ -259,7 +275,7 @@ def _context(run: Run, files: OutputFiles, video: OpenVideo) -> SinkContext:
         info,
         is_part=run.is_part,
         at=run.at,
-        threads=run.codec_threads or core_count(),
+        threads=run.threads or core_count(),
         clock=find_clock(run.source, run.settings, info.tags.creation_time, float(info.start)),
         timeout=run.timeout,
         outputs=run.outputs,

@@ -213,6 +213,6 @@ def test_a_sink_refuses_results_that_it_cannot_take(
 class TestCheck:
     def test_a_folder_that_was_written_before_is_refused(self, tmp_path: Path) -> None:
         (tmp_path / "3-boxes.png").touch()
-        with pytest.raises(OutputError, match=r"3-boxes\.png: is there already"):
+        with pytest.raises(OutputError, match=r"3-boxes\.png: already exists"):
             check_sinks([Output("stages", tmp_path)], overwrite=False)
         check_sinks([Output("stages", tmp_path)], overwrite=True)

@@ -155,7 +155,7 @@ class VideoSink(BaseSink):
         counter = context.traffic.counter if context.traffic else None
         self._overlay = Overlay(context.settings, self.video, counter)
         writer = VideoWriter(
-            context.files.stage(self.path, may_replace_video),
+            context.files.stage(self.path),
             self.video,
             context.settings.output,
             name=self.path,

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from vdet.boxes import Image
 from vdet.config.rendering import render
@@ -16,7 +17,7 @@ from vdet.pages.video import Player, VideoFacts, VideoPage, write_index
 from vdet.regions import lay_regions
 from vdet.run.result import FrameResult
 from vdet.run.sinks.drawn import PICTURE_LABEL, label_text
-from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind, VideoPart
+from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.traffic.overview import BestCrops, Crop
 from vdet.traffic.records import VehicleRecords
 
@@ -117,7 +118,7 @@ class PageSink(BaseSink):
         """Write the page."""
         self._keep(self._crops.end())
         page = self._page()
-        self.summary = page.facts.model_dump()
+        self.summary = {"folder": self.path.name, **page.facts.model_dump()}
         write_text(self._file, page.html())
 
     def write(self, result: FrameResult) -> None:
@@ -166,9 +167,12 @@ class PageSink(BaseSink):
         return Player(path.name, link_to(path, self.path), bool(drawn), start)
 
 
-def _write_index(parts: Mapping[str, VideoPart], target: Path) -> None:
-    pages = [(name, part.place / PAGE_NAME, part.summary) for name, part in parts.items()]
-    write_index([(name, page, VideoFacts(**facts)) for name, page, facts in pages if facts], target)
+def _write_index(summaries: Mapping[str, dict[str, Any]], target: Path) -> None:
+    pages = [
+        (name, Path(name).parent / facts["folder"] / PAGE_NAME, VideoFacts(**facts))
+        for name, facts in summaries.items()
+    ]
+    write_index(pages, target)
 
 
 _INDEX = BatchTotal("index", _write_index, suffix=".html")
