@@ -256,10 +256,6 @@ def test_what_may_not_be_replaced_is_refused_before_any_work(tmp_path: Path) -> 
     for overwrite in (True, False):
         with pytest.raises(OutputError, match="is not a regular file, and is kept"):
             check_output(pipe, overwrite=overwrite)
-        with pytest.raises(
-            OutputError, match="was not written by vdet, and is kept; use another output"
-        ):
-            check_output(path, overwrite=overwrite, may_replace=lambda _: False)
 
 
 def test_a_folder_that_the_work_makes_may_be_missing(tmp_path: Path) -> None:

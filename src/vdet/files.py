@@ -14,7 +14,7 @@ import re
 import shutil
 import stat
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextvars import ContextVar
 from pathlib import Path
 from typing import Any, Self
@@ -27,16 +27,8 @@ _HOST = re.sub(r"[^a-z0-9]", "", platform.node().lower())[:16]
 _TEMPORARY = re.compile(rf"\.vdet-{_HOST}-[0-9a-f]{{16}}")
 _ASIDE = ".older"  # folder in a temporary one, for files that are replaced
 
-MayReplace = Callable[[Path], bool]
-"""Returns whether an existing file may be replaced, if the user asks for it."""
-
 _FileId = tuple[int, int]  # device and inode: the same for all names of a file
 _inputs: ContextVar[set[_FileId] | None] = ContextVar("inputs", default=None)
-
-
-def any_file(_: Path) -> bool:
-    """Allow every file to be replaced."""
-    return True
 
 
 @contextlib.contextmanager
@@ -78,27 +70,19 @@ def _id(file: Path | int) -> _FileId | None:
     return status.st_dev, status.st_ino
 
 
-def check_output(
-    path: Path,
-    *,
-    overwrite: bool,
-    makes_folder: bool = False,
-    may_replace: MayReplace = any_file,
-) -> None:
+def check_output(path: Path, *, overwrite: bool, makes_folder: bool = False) -> None:
     """Refuse an output that could not be written, before any work is done.
 
     Parameters
     ----------
     makes_folder
         The work makes the folder of the output if it is missing.
-    may_replace
-        Called if `path` exists.
 
     Raises
     ------
     OutputError
-        `path` is an input, is a folder, already exists (without `overwrite`) or may not be
-        replaced, or its folder cannot be written to.
+        `path` is an input, a folder, or already exists (without `overwrite`), or its folder cannot
+        be written to.
     """
     if os.path.isdir(path):  # noqa: PTH112  # a name that is too long fails later
         raise OutputError(f"{path}: is a folder; use the name of a file")
@@ -106,7 +90,7 @@ def check_output(
     if makes_folder:
         folder = next((parent for parent in path.parents if os.path.exists(parent)), folder)  # noqa: PTH110
     if os.path.lexists(path):
-        _check_replaceable(path, may_replace)
+        _check_replaceable(path)
         if not overwrite:
             raise OutputError(f"{path}: already exists; use --overwrite to replace it")
     if not folder.is_dir():
@@ -116,13 +100,11 @@ def check_output(
         raise OutputError(f"{path}: the folder {folder} cannot be written to")
 
 
-def _check_replaceable(path: Path, may_replace: MayReplace = any_file) -> None:
+def _check_replaceable(path: Path) -> None:
     if is_input(path):
         raise OutputError(f"{path}: is the input itself; use another output")
     if not (path.is_file() or path.is_symlink()):
         raise OutputError(f"{path}: is not a regular file, and is kept; use another output")
-    if not may_replace(path):
-        raise OutputError(f"{path}: was not written by vdet, and is kept; use another output")
 
 
 def make_folder(folder: Path) -> None:

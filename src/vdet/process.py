@@ -1,13 +1,11 @@
 """The process of the program: its signals, its standard streams, the threads of its libraries."""
 
-import contextlib
-import io
 import os
 import signal
 import sys
 import threading
 import time
-from typing import Any, NoReturn
+from typing import NoReturn
 
 from vdet.errors import INTERRUPTED, VdetError, in_one_line
 from vdet.system import CAN_WAKE, ENDING_SIGNALS
@@ -20,7 +18,7 @@ _STDOUT, _STDERR = 1, 2
 
 def run() -> NoReturn:
     """Run the program and exit: see `vdet.cli.main`. SIGTERM and SIGHUP act like Ctrl-C."""
-    prepare_streams()
+    open_streams()
     for name, value in SINGLE_THREADED.items():
         os.environ.setdefault(name, value)
     # A worker that is killed leaves semaphores, which loky removes; the user need not know of it.
@@ -44,35 +42,16 @@ def run() -> NoReturn:
         _exit(end.code)
 
 
-class LossyFile(io.FileIO):
-    """A file that drops what cannot be written: the disk is full, or its reader has ended."""
-
-    def write(self, data: Any) -> int:
-        """Write all bytes, or drop them, and return their number."""
-        rest = memoryview(data).cast("B")
-        with contextlib.suppress(OSError):
-            while rest:
-                rest = rest[super().write(rest) or len(rest) :]
-        return len(data)
-
-
-def prepare_streams() -> None:
-    """Let no message fail: where standard error cannot be written, messages are dropped.
-
-    Standard streams that are closed are opened, so that no output file takes their place.
-    """
+def open_streams() -> None:
+    """Open standard streams that are closed, so that no output file takes their place."""
     for number in range(3):
         try:
             os.fstat(number)
         except OSError:
-            os.open(os.devnull, os.O_RDONLY)  # takes the lowest number that is free
+            os.open(os.devnull, os.O_RDWR)  # takes the lowest number that is free
             os.set_inheritable(number, True)
-    if sys.stdout is None:
-        sys.stdout = open(_STDOUT, "w", encoding="utf-8", closefd=False)  # noqa: SIM115
-    encoding = sys.stderr.encoding if sys.stderr else "utf-8"
-    # Without a buffer below it, which would write a line twice if a signal comes as it is written.
-    file: Any = LossyFile(_STDERR, "w", closefd=False)
-    sys.stderr = io.TextIOWrapper(file, encoding, "backslashreplace", write_through=True)
+    sys.stdout = sys.stdout or open(_STDOUT, "w", encoding="utf-8", closefd=False)  # noqa: SIM115
+    sys.stderr = sys.stderr or open(_STDERR, "w", encoding="utf-8", closefd=False)  # noqa: SIM115
 
 
 def _signals() -> list[signal.Signals]:

@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 from vdet.errors import INTERRUPTED, ClusterError
-from vdet.version import __version__
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -207,8 +206,7 @@ class DaskCluster:
         Raises
         ------
         ClusterError
-            Dask is not installed, the scheduler does not answer, or ends; it has no worker, or one
-            with another version of vdet.
+            Dask is not installed, or the scheduler does not answer, has no worker, or ends.
         """
         try:
             from distributed import Client
@@ -227,18 +225,7 @@ class DaskCluster:
                     f"{self.address}: no Dask scheduler with a worker answers; start them with "
                     "`dask scheduler` and `dask worker`"
                 ) from error
-            versions = set(map(str, client.run(_version, on_error="return").values()))
-            if versions != {__version__}:
-                found = ", ".join(sorted(versions - {__version__}))
-                raise ClusterError(
-                    f"{self.address}: a worker has vdet {found}, here is vdet {__version__}; "
-                    "install one version everywhere"
-                )
             try:
                 yield client.get_executor(pure=False).submit
             except CancelledError as error:
                 raise ClusterError(f"{self.address}: the scheduler has ended; run again") from error
-
-
-def _version() -> str:
-    return __version__

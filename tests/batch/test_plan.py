@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import pytest
 
-from vdet.batch.manifest import Record, open_manifest
+from vdet.batch.manifest import Record, Written, open_manifest
 from vdet.batch.plan import OutputSuffix, Plan, make_plan
 from vdet.errors import BatchError, OutputError
 from vdet.files import recorded_inputs
@@ -77,12 +77,14 @@ def record(source: str, *paths: str) -> None:
 
 def note(source: str, *outputs: Output, made_by: str = "") -> None:
     """Add a record of outputs to the manifest."""
-    states = {str(each.path.absolute()): output_state(each) or (0, 0) for each in outputs}
     made = Record(
-        *(source, {}, "now", 0.0),
+        source,
+        "now",
         digest=made_by or digest(Run(Path(source))),
-        sizes={path: size for path, (size, _) in states.items()},
-        times={path: changed for path, (_, changed) in states.items()},
+        outputs=tuple(
+            Written(each.sink, str(each.path.absolute()), *(output_state(each) or (0, 0)))
+            for each in outputs
+        ),
     )
     with open_manifest(Path("out")) as add:
         add(made)

@@ -32,10 +32,11 @@ def test_the_record_says_what_was_done_and_folders_are_made(job: Run, tmp_path: 
     record = process_file(job, folder=tmp_path / "out")
     assert record.error is None
     assert record.input == str(job.source)
-    assert record.outputs == {
-        "video": str(tmp_path / "out" / "day" / "a.mp4"),
-        "tracks": str(tmp_path / "out" / "day" / "a.csv"),
-    }
+    paths = [tmp_path / "out" / "day" / name for name in ("a.mp4", "a.csv")]
+    assert [(each.sink, each.path) for each in record.outputs] == [
+        ("video", str(paths[0])),
+        ("tracks", str(paths[1])),
+    ]
     assert (record.width, record.height, record.frames, record.tracks) == (WIDTH, HEIGHT, 15, 1)
     assert record.warnings == ()
     assert record.seconds > 0
@@ -44,9 +45,8 @@ def test_the_record_says_what_was_done_and_folders_are_made(job: Run, tmp_path: 
     assert note.read_text() == record.line
     note.unlink()
     assert names(tmp_path / "out") == ["day/a.csv", "day/a.mp4"]
-    paths = [output.path for output in job.outputs]
-    assert record.sizes == {str(path): path.stat().st_size for path in paths}
-    assert record.times == {str(path): path.stat().st_mtime_ns for path in paths}
+    states = [(path.stat().st_size, path.stat().st_mtime_ns) for path in paths]
+    assert [each.state for each in record.outputs] == states
     assert record.digest == result_digest(job)
 
 
@@ -96,7 +96,7 @@ def test_an_error_is_recorded_without_numbers(job: Run, tmp_path: Path) -> None:
     assert record.error is not None
     assert record.error.startswith(f"{job.source}: is not a video")
     assert (record.width, record.height, record.frames, record.tracks) == (None,) * 4
-    assert (record.digest, record.sizes) == (None, {})
+    assert (record.digest, record.outputs) == (None, ())
 
 
 def test_the_digest_changes_with_the_time_zone(job: Run, monkeypatch: pytest.MonkeyPatch) -> None:

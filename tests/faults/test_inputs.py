@@ -14,7 +14,6 @@ from faults.conftest import Start
 from red_cars import SETTINGS, red_model, red_settings
 from running import frames_of, names, until, write_drive
 from vdet.batch.task import process_file
-from vdet.errors import VideoError
 from vdet.run.sinks.protocol import Output
 from vdet.run.video import Run, run_video
 
@@ -105,15 +104,6 @@ def pipe(clip: Path, tmp_path: Path) -> Iterator[Pipe]:
     pipe = Pipe(tmp_path / "in" / "pipe.ts", content[: len(content) * 2 // 3])
     yield pipe
     pipe.close()
-
-
-def test_an_input_that_stalls_is_given_up(pipe: Pipe, job: Run, tmp_path: Path) -> None:
-    stalling = replace(job, source=pipe.path, timeout=1)
-    with pytest.raises(VideoError, match=r"pipe\.ts: nothing was read or written for 1 s"):
-        run_video(replace(stalling, settings=SETTINGS), red_model())
-    assert names(tmp_path / "out") == []
-    pipe.close()
-    until(lambda: not any(thread.name.startswith("vdet-") for thread in threading.enumerate()))
 
 
 def test_ctrl_c_ends_the_wait_for_an_input_that_stalls(

@@ -9,14 +9,14 @@ import errno
 import hashlib
 import json
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, BinaryIO
 
 from vdet.errors import OutputError
-from vdet.files import output_errors, remove_stale, write_whole
+from vdet.files import output_errors, remove_stale
 from vdet.system import lock
 from vdet.version import __version__
 
@@ -26,93 +26,91 @@ _FLAGS = sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_BI
 
 
 @dataclass(frozen=True, slots=True)
+class Written:
+    """An output that was written.
+
+    Attributes
+    ----------
+    sink, path
+        The name of its sink; its absolute path.
+    bytes, changed
+        Its size, and the time of its last change (nanoseconds since 1970); of a folder the sum and
+        the latest of the files in it.
+    summary
+        What a file over all videos needs of it: see `BatchTotal`.
+    """
+
+    sink: str
+    path: str
+    bytes: int
+    changed: int
+    summary: Any = None
+
+    @property
+    def state(self) -> tuple[int, int]:
+        """Its size and time, as of `output_state`."""
+        return self.bytes, self.changed
+
+
+@dataclass(frozen=True, slots=True)
 class Record:
     """The result of one file.
 
     Attributes
     ----------
-    input, outputs
-        Absolute paths; that of each output is under the name of its sink, or all of them where the
-        sink writes several.
+    input
+        Its absolute path.
     started
         In UTC, as ISO 8601 writes it.
     seconds
         Wall time.
+    model, model_sha256
+        Name and SHA-256 of the model file; None for a detector without one.
     width, height
         Size of the upright picture, pixels.
     frames, tracks
         Number of frames read, and of tracks shown.
     begin
         When the video was recorded, and where that is known from, if it is.
-    error
-        None if all went well; else there are no outputs, and of the numbers only the seconds.
-    digest
-        SHA-256 of all that the outputs depend on: see `vdet.batch.task`. None without outputs.
-    sizes, times
-        Bytes of each output and the time of its last change (nanoseconds since 1970), by its path;
-        of a folder the sum and the latest of the files in it.
     facts
         What steps found out about the whole video, by their names.
-    summaries
-        What the sinks say of the outputs, by their paths: see `BatchTotal`.
+    outputs
+        Empty after an error.
+    digest
+        SHA-256 of all that the outputs depend on: see `vdet.batch.task`. None without outputs.
+    error
+        None if all went well; else there are no outputs, and of the numbers only the seconds.
     program
         The program with its version.
-    model, model_sha256
-        Name and SHA-256 of the model file; None for a detector without one.
     """
 
     input: str
-    outputs: Mapping[str, str | tuple[str, ...]]
     started: str
-    seconds: float
+    seconds: float = 0.0
+    model: str | None = None
+    model_sha256: str | None = None
     width: int | None = None
     height: int | None = None
     frames: int | None = None
     tracks: int | None = None
     begin: str | None = None
+    facts: Mapping[str, Any] = field(default_factory=dict)
+    outputs: tuple[Written, ...] = ()
+    digest: str | None = None
     warnings: tuple[str, ...] = ()
     error: str | None = None
-    digest: str | None = None
-    sizes: Mapping[str, int] = field(default_factory=dict)
-    times: Mapping[str, int] = field(default_factory=dict)
-    facts: Mapping[str, Any] = field(default_factory=dict)
-    summaries: Mapping[str, Any] = field(default_factory=dict)
     program: str = f"vdet {__version__}"
-    model: str | None = None
-    model_sha256: str | None = None
 
     @property
     def line(self) -> str:
         """The line of the manifest."""
         return json.dumps(asdict(self), allow_nan=False) + "\n"
 
-    def note(self, folder: Path) -> Path:
-        """Return where the note lies in the folder of a batch; it depends on the outputs alone."""
-        name = hashlib.sha256(json.dumps(self.outputs).encode()).hexdigest()
-        return folder / _NOTES / f"{name[:32]}.json"
 
-    def leave_note(self, folder: Path) -> None:
-        """Write the note. Raises `OutputError`."""
-        write_whole(self.note(folder), self.line, overwrite=True)
-
-
-class Written(NamedTuple):
-    """What a record says about an output."""
-
-    digest: str | None
-    state: tuple[int, int]
-    summary: Any
-
-
-def written_outputs(records: Iterable[Record]) -> dict[str, list[Written]]:
-    """Return what is written of each output, by its real path; the latest record comes last."""
-    found: dict[str, list[Written]] = {}
-    for each in records:
-        for name, size in each.sizes.items():
-            state = size, each.times[name]
-            written = Written(each.digest, state, each.summaries.get(name))
-            found.setdefault(os.path.realpath(name), []).append(written)
-    return found
+def note_path(folder: Path, path: Path) -> Path:
+    """Return the note in the folder of a batch about the run whose first output has a path."""
+    name = hashlib.sha256(os.fsencode(path.absolute())).hexdigest()
+    return folder / _NOTES / f"{name[:32]}.json"
 
 
 def read_records(*paths: Path) -> Iterator[Record]:
@@ -123,13 +121,13 @@ def read_records(*paths: Path) -> Iterator[Record]:
     OutputError
         A file cannot be read.
     """
-    known = {each.name for each in fields(Record)}
     for path in filter(os.path.lexists, paths):
         with output_errors(path), os.fdopen(os.open(path, os.O_RDONLY | _FLAGS), "rb") as file:
             for text in file:
-                with suppress(ValueError, TypeError, AttributeError):
+                with suppress(ValueError, TypeError, KeyError):
                     line = json.loads(text)
-                    yield Record(**{key: line[key] for key in known & line.keys()})
+                    outputs = tuple(Written(**each) for each in line["outputs"])
+                    yield Record(**{**line, "outputs": outputs})
 
 
 def read_batch(folder: Path) -> Iterator[Record]:
@@ -168,7 +166,8 @@ def open_manifest(folder: Path) -> Iterator[Callable[[Record], None]]:
                 if file.write(record.line.encode()) != len(record.line):
                     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
                 os.fsync(descriptor)
-                record.note(folder).unlink(missing_ok=True)
+            if record.outputs:
+                note_path(folder, Path(record.outputs[0].path)).unlink(missing_ok=True)
 
         with output_errors(path):
             _end_last_line(file)

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from vdet.batch.inputs import InputVideo, find_sources
-from vdet.batch.manifest import MANIFEST, read_batch, written_outputs
-from vdet.batch.task import is_done, replacing_ours
+from vdet.batch.manifest import MANIFEST, read_batch
+from vdet.batch.task import is_done, known_outputs, replacing_ours
 from vdet.detect.factory import load_detector
 from vdet.errors import BatchError, OutputError
 from vdet.files import check_output, is_input, record_input
@@ -32,25 +32,20 @@ class OutputSuffix:
 
 
 @dataclass(frozen=True, slots=True)
-class PlannedTotal:
-    """A file over all videos of a batch.
-
-    `outputs` are those that it is made from, by the name of their video.
-    """
-
-    made_by: BatchTotal
-    path: Path
-    outputs: Mapping[str, Path]
-
-
-@dataclass(frozen=True, slots=True)
 class Plan:
-    """The runs to do and those that are left out; all their outputs lie in `folder`."""
+    """The runs to do and those that are left out; all their outputs lie in `folder`.
+
+    Attributes
+    ----------
+    totals
+        The files over all videos: path, kind, and ending of the outputs that each is made from, by
+        their number in every run.
+    """
 
     folder: Path
     runs: tuple[Run, ...]
     skipped: tuple[Run, ...]
-    totals: tuple[PlannedTotal, ...] = ()
+    totals: Mapping[int, tuple[Path, BatchTotal, str]]
 
 
 def make_plan(
@@ -100,36 +95,28 @@ def make_plan(
         )
         for source in sources
     ]
-    totals = _totals(sources, folder, suffixes)
-    _refuse_shared(runs, totals, folder)
+    totals = {
+        number: (folder / f"{total.name}{total.suffix or ending}", total, ending)
+        for number, each in enumerate(suffixes)
+        for ending in (each.suffix or "",)
+        if (total := sink_kind(each.sink).total)
+    }
+    _refuse_shared(runs, [path for path, *_ in totals.values()], folder)
     manifest, skipped = folder / MANIFEST, []
     check_output(manifest, overwrite=True, makes_folder=True)
     if skip_existing:
-        written, every, runs = written_outputs(read_batch(folder)), runs, []
+        known, every, runs = known_outputs(read_batch(folder)), runs, []
         for run in every:
-            if is_done(run, written):
+            if is_done(run, known):
                 skipped.append(run)
             else:
-                runs.append(replacing_ours(run, written))
+                runs.append(replacing_ours(run, known))
     for run in runs:
         check_sinks(run.outputs, overwrite=run.overwrite, makes_folder=True)
-    for total in totals:
+    for path, *_ in totals.values():
         replaces = common.overwrite or (skip_existing and manifest.exists())
-        check_output(total.path, overwrite=replaces, makes_folder=True)
+        check_output(path, overwrite=replaces, makes_folder=True)
     return Plan(folder, tuple(runs), tuple(skipped), totals)
-
-
-def _totals(
-    sources: Sequence[InputVideo], folder: Path, suffixes: Sequence[OutputSuffix]
-) -> tuple[PlannedTotal, ...]:
-    places = {source.place.with_suffix("").as_posix(): folder / source.place for source in sources}
-    totals = []
-    for each in suffixes:
-        if total := sink_kind(each.sink).total:
-            path = folder / f"{total.name}{total.suffix or each.suffix or ''}"
-            outputs = {name: _path(place, each) for name, place in places.items()}
-            totals.append(PlannedTotal(total, path, outputs))
-    return tuple(totals)
 
 
 def _path(place: Path, output: OutputSuffix) -> Path:
@@ -151,11 +138,11 @@ def _refuse_nested(clips: Iterable[Path], sources: Iterable[InputVideo], folder:
             raise BatchError(f"{source.path}: lies in the output folder {folder}; use another")
 
 
-def _refuse_shared(runs: Iterable[Run], totals: Iterable[PlannedTotal], folder: Path) -> None:
+def _refuse_shared(runs: Iterable[Run], totals: Iterable[Path], folder: Path) -> None:
     """Refuse an output with the name of another output, of a total, the manifest or an input."""
     record_input(*(run.source for run in runs))
     owners = {folder / MANIFEST: "the manifest"}
-    makers = [(total.path, "the outputs of all videos") for total in totals]
+    makers = [(path, "the outputs of all videos") for path in totals]
     makers += [(output.path, str(run.source)) for run in runs for output in run.outputs]
     for path, maker in makers:
         if is_input(path):

@@ -6,9 +6,9 @@ from contextlib import closing
 from dataclasses import replace
 from functools import partial
 
-from vdet.batch.manifest import Record, open_manifest, read_batch, written_outputs
+from vdet.batch.manifest import Record, open_manifest, read_batch
 from vdet.batch.plan import Plan
-from vdet.batch.task import new_record, process_file
+from vdet.batch.task import known_outputs, new_record, process_file
 from vdet.files import OutputFiles, make_folder, output_errors, remove_stale
 from vdet.run.video import Run
 from vdet.workers import Workers, call_all
@@ -56,13 +56,15 @@ def _record_of_killed(run: Run) -> Record:
 
 
 def _write_totals(plan: Plan) -> None:
-    """Write the files over all videos, from what their records say of the outputs that exist."""
-    written = written_outputs(read_batch(plan.folder)) if plan.totals else {}
-    for total in plan.totals:
-        summaries = {
-            name: written[os.path.realpath(path)][-1].summary
-            for name, path in total.outputs.items()
-            if os.path.realpath(path) in written and os.path.exists(path)  # noqa: PTH110
-        }
-        with OutputFiles(overwrite=True) as files, output_errors(total.path):
-            total.made_by.write(summaries, files.stage(total.path))
+    """Write the files over all videos, from what records say of the outputs that exist."""
+    known = known_outputs(read_batch(plan.folder)) if plan.totals else {}
+    runs = sorted((*plan.runs, *plan.skipped), key=lambda run: run.outputs[0].path)
+    for number, (path, total, ending) in plan.totals.items():
+        summaries = {}
+        for output in (run.outputs[number] for run in runs):
+            written = known.get(os.path.realpath(output.path))
+            if written and os.path.exists(output.path):  # noqa: PTH110  # too long a name
+                name = output.path.relative_to(plan.folder).as_posix()
+                summaries[name.removesuffix(ending)] = written[-1][1].summary
+        with OutputFiles(overwrite=True) as files, output_errors(path):
+            total.write(summaries, files.stage(path))

@@ -23,10 +23,6 @@ _AHEAD = 8
 """Largest number of items that `map_ordered` takes ahead for each thread."""
 
 
-class StalledError(Exception):
-    """A read or a write did not end in time."""
-
-
 class _Thread(ThreadPoolExecutor):
     """A thread that makes calls in turn, each in the context (`contextvars`) of its caller.
 
@@ -44,22 +40,11 @@ class _Thread(ThreadPoolExecutor):
         self.shutdown(wait=not hangs)
 
 
-def _result(future: Future[R], timeout: float | None) -> R:
-    """Wait for a result; raise `StalledError` if it does not come within `timeout` seconds."""
-    try:
-        return future.result(timeout)
-    except TimeoutError:
-        if future.done():  # then it is an error of the call itself
-            raise
-        raise StalledError from None
-
-
 @contextmanager
-def prefetch(items: Iterable[T], *, timeout: float | None = None) -> Iterator[Iterator[T]]:
+def prefetch(items: Iterable[T]) -> Iterator[Iterator[T]]:
     """Take `items` in a thread, at most `DEPTH` ahead of the reader.
 
-    A generator is closed in that thread too. If the next item does not come within `timeout`
-    seconds, `StalledError` is raised.
+    A generator is closed in that thread too.
     """
     iterator = iter(items)
 
@@ -67,7 +52,7 @@ def prefetch(items: Iterable[T], *, timeout: float | None = None) -> Iterator[It
         ahead = deque(thread.call(next, iterator, _END) for _ in range(DEPTH))
 
         def taken() -> Iterator[T]:
-            while (item := _result(ahead.popleft(), timeout)) is not _END:
+            while (item := ahead.popleft().result()) is not _END:
                 ahead.append(thread.call(next, iterator, _END))
                 yield item
 
@@ -82,38 +67,29 @@ def prefetch(items: Iterable[T], *, timeout: float | None = None) -> Iterator[It
 
 @contextmanager
 def write_async(
-    take: Callable[[T], object],
-    *,
-    within: AbstractContextManager[object],
-    timeout: float | None = None,
-    extra: Callable[[], float] = lambda: 0.0,
+    take: Callable[[T], object], *, within: AbstractContextManager[object]
 ) -> Iterator[Callable[[T], None]]:
     """Give a function that passes items to `take` in a thread; at most `DEPTH` items wait.
 
     The thread enters and leaves the context manager `within`, with an error if the block ends with
-    one. An error in the thread is raised by a later call, or when the block ends. A call raises
-    `StalledError` if there is no room within `timeout` seconds. So does the end of the block if the
-    last items, or leaving `within`, get no further within `timeout` and the `extra` seconds.
+    one. An error in the thread is raised by a later call, or when the block ends.
     """
     with _Thread("vdet-write") as thread:
         waiting: deque[Future[Any]] = deque([thread.call(within.__enter__)])
 
-        def wait_for_room(room: int, limit: float | None) -> None:
-            while waiting and (len(waiting) >= room or waiting[0].done()):
-                _result(waiting.popleft(), limit)
-
         def put(item: T) -> None:
-            wait_for_room(DEPTH, timeout)
+            while waiting and (len(waiting) >= DEPTH or waiting[0].done()):
+                waiting.popleft().result()
             waiting.append(thread.call(take, item))
 
         try:
             yield put
-            limit = None if timeout is None else timeout + extra()
-            wait_for_room(0, limit)
+            for future in waiting:
+                future.result()
         except BaseException:
             thread.call(within.__exit__, *sys.exc_info())
             raise
-        _result(thread.call(within.__exit__, None, None, None), limit)
+        thread.call(within.__exit__, None, None, None).result()
 
 
 @contextmanager

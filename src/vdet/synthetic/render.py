@@ -15,9 +15,9 @@ import numpy.typing as npt
 
 from vdet.boxes import Float32Array, Float64Array, Image
 from vdet.config.schema import OutputSettings
-from vdet.files import check_output, staged
+from vdet.files import staged
 from vdet.media import Frame, Picture, VideoInfo
-from vdet.media.writer import VideoWriter, may_replace_video
+from vdet.media.writer import VideoWriter
 from vdet.synthetic.camera import NEAR, shaded
 from vdet.synthetic.scene import LINE_WIDTH, PERIOD, LaneLine, Scene
 from vdet.synthetic.vehicle import draw_vehicle
@@ -118,7 +118,6 @@ def write_clip(path: Path, scene: Scene, *, overwrite: bool = False) -> None:
     """
     camera, rate = scene.camera, scene.rate
     info = VideoInfo(path, camera.width, camera.height, rate, 1 / rate, frames=scene.frames)
-    check_output(path, overwrite=overwrite, may_replace=may_replace_video)
     with (
         staged(path, overwrite=overwrite) as temporary,
         VideoWriter(temporary, info, OutputSettings(crf=_CRF), name=path) as writer,

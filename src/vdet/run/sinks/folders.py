@@ -8,6 +8,7 @@ from typing import Any
 from vdet.boxes import Image
 from vdet.config.rendering import render
 from vdet.draw.boxes import WHITE, color_of, draw_box, draw_label, draw_regions
+from vdet.errors import OutputError
 from vdet.files import write_text
 from vdet.lanes.drawing import stage_pictures
 from vdet.media import Picture
@@ -34,6 +35,11 @@ class StagesSink(BaseSink):
         super().__init__(path, context)
         self._time = context.at + (context.video.start if context.video else 0)
         self._is_done = False
+
+    def finish(self) -> None:
+        """Refuse a time that no frame has. Raises `OutputError`."""
+        if not self._is_done:
+            raise OutputError(f"{self.path}: no frame at {float(self.context.at):.2f} s or later")
 
     def write(self, result: FrameResult) -> None:
         """Write the pictures if it is the frame."""

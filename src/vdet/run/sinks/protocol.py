@@ -11,7 +11,7 @@ from typing import Any, Literal, Protocol, Self
 from vdet.config.schema import Settings
 from vdet.detect.protocol import StagePictures
 from vdet.errors import OutputError
-from vdet.files import MayReplace, OutputFiles, any_file, check_output, output_errors
+from vdet.files import OutputFiles, check_output, output_errors
 from vdet.media import VideoInfo
 from vdet.plugins import SINKS, load_plugin
 from vdet.run.result import Fact, FrameResult
@@ -59,8 +59,6 @@ class SinkContext:
         Number of threads of an encoder; None lets it choose.
     clock
         When the video begins; None where it is not known.
-    timeout
-        Seconds after which a write that does not end is an error.
     outputs
         All outputs of the run, for a sink that refers to another.
     traffic
@@ -79,7 +77,6 @@ class SinkContext:
     at: Fraction = Fraction(0)
     threads: int | None = None
     clock: Clock | None = None
-    timeout: float | None = None
     outputs: tuple[Output, ...] = ()
     traffic: LiveTraffic | None = None
     facts: dict[str, Fact] = field(default_factory=dict)
@@ -158,9 +155,6 @@ class SinkKind:
         frames are read than it needs.
     takes
         "videos" or "pictures" if the sink can take results of these only.
-    may_replace
-        Says whether `--overwrite` may replace a file that is there. `OutputFiles.stage` takes it
-        too, for a file that appears during the run.
     total
         What a batch writes in addition, over all its videos.
     """
@@ -172,7 +166,6 @@ class SinkKind:
     writes_standard_output: bool = False
     one_frame: bool = False
     takes: Literal["videos", "pictures", "both"] = "both"
-    may_replace: MayReplace = any_file
     total: BatchTotal | None = None
 
     @property
@@ -220,7 +213,6 @@ def check_sinks(outputs: Sequence[Output], *, overwrite: bool, makes_folder: boo
             path,
             overwrite=overwrite,
             makes_folder=makes_folder or bool(kind.marker),
-            may_replace=kind.may_replace,
         )
 
 
@@ -237,8 +229,9 @@ def output_state(output: Output, place: Path | None = None) -> tuple[int, int] |
     return sum(s.st_size for s in states), max((s.st_mtime_ns for s in states), default=0)
 
 
-def open_sink(output: Output, context: SinkContext) -> "_NamedSink":
-    """Open the sink of an output. An `OSError` of the sink becomes an `OutputError` with its path.
+@contextmanager
+def open_sink(output: Output, context: SinkContext) -> Iterator[Sink]:
+    """Open the sink of an output. An `OSError` of its `with` block is that of the output.
 
     Raises
     ------
@@ -252,40 +245,33 @@ def open_sink(output: Output, context: SinkContext) -> "_NamedSink":
     source = "pictures" if context.video is None else "videos"
     if kind.takes not in ("both", source):
         raise OutputError(f"{output.path}: the sink {output.sink} is for {kind.takes}")
-    with output_errors(output.path):
-        return _NamedSink(kind.open(output.path, context), output.path)
+    with output_errors(output.path), kind.open(output.path, context) as sink:
+        yield sink
+
+
+class Sinks:
+    """The open sinks of several outputs, which get the same results."""
+
+    def __init__(self, sinks: Mapping[Path, Sink]) -> None:
+        self._sinks = sinks
+
+    def write(self, result: FrameResult) -> None:
+        """Give a result to all of them. Raises `OutputError`."""
+        for path, sink in self._sinks.items():
+            with output_errors(path):
+                sink.write(result)
+
+    @property
+    def summaries(self) -> dict[Path, Any]:
+        """The `summary` of each, by the path of its output."""
+        return {path: getattr(sink, "summary", None) for path, sink in self._sinks.items()}
 
 
 @contextmanager
-def open_sinks(outputs: Iterable[Output], context: SinkContext) -> Iterator[list["_NamedSink"]]:
+def open_sinks(outputs: Iterable[Output], context: SinkContext) -> Iterator[Sinks]:
     """Open the sinks of several outputs; errors as of `open_sink`."""
     with ExitStack() as stack:
-        yield [stack.enter_context(open_sink(output, context)) for output in outputs]
-
-
-class _NamedSink:
-    """A `Sink` whose `OSError` becomes an `OutputError` with the path of its output."""
-
-    def __init__(self, sink: Sink, path: Path) -> None:
-        self._sink = sink
-        self._path = path
-
-    def __enter__(self) -> Self:
-        with output_errors(self._path):
-            self._sink.__enter__()
-        return self
-
-    def __exit__(self, *raised: Any) -> None:
-        with output_errors(self._path):
-            self._sink.__exit__(*raised)
-
-    def write(self, result: FrameResult) -> None:
-        with output_errors(self._path):
-            self._sink.write(result)
-
-    @property
-    def summary(self) -> Any:
-        return getattr(self._sink, "summary", None)
+        yield Sinks({each.path: stack.enter_context(open_sink(each, context)) for each in outputs})
 
 
 def _kind_for(output: Output) -> SinkKind:
