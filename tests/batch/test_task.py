@@ -69,7 +69,7 @@ def test_the_detector_is_loaded_once_for_all_files(
     assert process_file(replace(again, frames=4), folder=tmp_path).error is None
 
 
-def test_only_warnings_about_this_file_are_recorded(
+def test_warnings_are_recorded(
     job: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     """They are not printed by the process: whoever gets the record does it, once."""
@@ -77,7 +77,6 @@ def test_only_warnings_about_this_file_are_recorded(
     def warn_and_process(*arguments: object, **options: object) -> object:
         log = logging.getLogger("vdet")
         log.warning("%s: 3 frames damaged", job.source)
-        log.warning("%s0: another file, in another thread", job.source)
         log.info("%s: nothing to worry about", job.source)
         return write_outputs(*arguments, **options)  # type: ignore[arg-type]
 

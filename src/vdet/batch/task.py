@@ -109,7 +109,7 @@ def process_file(run: Run, *, folder: Path) -> Record:
     limit_library_threads()
     began, record = time.perf_counter(), new_record(run)
     note = note_path(folder, run.outputs[0].path)
-    with _collected_warnings(run) as warnings:
+    with _collected_warnings() as warnings:
         try:
             for earlier in read_records(note):
                 known = known_outputs([earlier])
@@ -160,20 +160,14 @@ def new_record(run: Run) -> Record:
 
 
 @contextmanager
-def _collected_warnings(run: Run) -> Iterator[list[str]]:
-    """Give a list of the warnings about a run; other threads may log about other files.
-
-    They are not printed here: whoever gets the record prints them.
-    """
-    prefixes = tuple(f"{path}: " for path in (run.source, *(each.path for each in run.outputs)))
+def _collected_warnings() -> Iterator[list[str]]:
+    """Give a list of the warnings of the block; whoever gets the record prints them."""
     messages: list[str] = []
 
     def collect(record: logging.LogRecord) -> bool:
-        message = record.getMessage()
-        is_ours = record.levelno >= logging.WARNING and message.startswith(prefixes)
-        if is_ours:
-            messages.append(message)
-        return not is_ours
+        if record.levelno == logging.WARNING:
+            messages.append(record.getMessage())
+        return record.levelno != logging.WARNING
 
     log = logging.getLogger("vdet")
     log.addFilter(collect)

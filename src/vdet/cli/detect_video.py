@@ -183,10 +183,9 @@ def _in_and_out(clips: tuple[Path, ...], *, no_video: bool) -> tuple[Path, list[
 
 def _process_one(run: "Run") -> None:
     from vdet.detect.factory import load_detector
-    from vdet.run.video import check_run, run_video
+    from vdet.run.video import run_video
 
     model = load_detector(run.settings.detector)
-    check_run(run)
     with progress_steps(" frames") as steps:
         steps("opening", None)
         totals = run_video(run, model, progress=partial(steps, ""))

@@ -165,7 +165,7 @@ def labelled_pairs(labels: Path, suffix: str, pictures: Path) -> Iterator[tuple[
     for picture in pictures_below(pictures):
         by_name.setdefault(picture.stem, []).append(picture)
     for file in sorted(labels.glob(f"*{suffix}")):
-        if file.name.startswith("."):
+        if file.name.startswith(".") or not file.is_file():  # a FIFO may never end
             continue
         found = by_name.get(file.stem, [])
         if len(found) != 1:

@@ -197,7 +197,7 @@ def read_yolo_pictures(folder: Path) -> Iterator[LabelledPicture]:
         raise TruthError(f"{folder}: needs {_DATA} with the names of the classes, here or above")
     names = _class_names(_values(read_bytes(data), str(data)), str(data))
     images, labels = folder / "images", folder / "labels"
-    files = {file for file in labels.rglob("*.txt") if file.name != _NO_LABELS}
+    files = {file for file in labels.rglob("*.txt") if file.name != _NO_LABELS and file.is_file()}
     for picture in pictures_below(images):
         file = labels / picture.relative_to(images).with_suffix(".txt")
         if file in files:

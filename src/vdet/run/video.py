@@ -113,12 +113,6 @@ class OpenVideo:
     traffic: LiveTraffic
 
 
-def check_run(run: Run) -> None:
-    """Refuse a run whose outputs cannot be written, before any work. Raises `OutputError`."""
-    record_input(run.source)
-    check_sinks(run.outputs, overwrite=run.overwrite)
-
-
 @contextmanager
 def open_video(
     run: Run,
@@ -185,10 +179,12 @@ def run_video(
         The video cannot be read, too much of it is damaged, or the regions, the lines or the camera
         do not fit its frames.
     OutputError
-        An output cannot be written.
+        An output cannot be written; before any work, where that can be known.
 
     No output is left after an error.
     """
+    record_input(run.source)
+    check_sinks(run.outputs, overwrite=run.overwrite)
     with OutputFiles(overwrite=run.overwrite) as files:
         return write_outputs(run, model, files, tracker=tracker, steps=steps, progress=progress)
 

@@ -27,7 +27,7 @@ from vdet.run.sinks.protocol import (
     check_sinks,
     open_sink,
 )
-from vdet.run.video import Run, check_run
+from vdet.run.video import Run
 
 MOMENTS = ("open", "enter", "first", "middle", "end")
 
@@ -147,7 +147,6 @@ class TestFailure:
             run_red(job)
         assert list(tmp_path.iterdir()) == []
         self.set_failure(register, "never", RuntimeError())
-        check_run(job)
         run_red(job)
         names = {path.name for path in tmp_path.iterdir()}
         assert names == {"fragile.txt", "out.csv", "out.mp4", "stages", "page", "crops"}
