@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 class Fact(Protocol):
     """What a step finds out of a frame or of a whole video: a frozen value of a type of its own.
 
-    `str` of it is a line for people.
+    `str` of a fact about a whole video is a warning for people; empty, where there is none.
     """
 
     def record(self) -> Any:

@@ -224,7 +224,8 @@ def write_outputs(
             raise _no_frame(run, "there is no frame at these times", video.reader)
         context.facts.update(video.pipeline.facts())
         counts = video.traffic.counts()
-        for warning in counts.warnings if counts else ():
+        found = map(str, context.facts.values())
+        for warning in (*(counts.warnings if counts else ()), *filter(None, found)):
             log.warning("%s: %s", run.source, warning)
     seconds = time.perf_counter() - began
     totals = info.width, info.height, frames, len(ids), seconds

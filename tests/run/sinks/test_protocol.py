@@ -21,6 +21,7 @@ from vdet.media import Frame, Picture, VideoInfo
 from vdet.media.writer import VideoWriter
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import (
+    BaseSink,
     Output,
     SinkContext,
     SinkKind,
@@ -204,9 +205,57 @@ def test_a_sink_refuses_results_that_it_cannot_take(
     output = Output(sink, tmp_path / name)
     with OutputFiles() as files:
         context = SinkContext(files, SETTINGS, video_info() if is_video else None)
-        with pytest.raises(OutputError, match=f"{name}: the sink {sink} {words}"):
-            open_sink(output, context)
+        with (
+            pytest.raises(OutputError, match=f"{name}: the sink {sink} {words}"),
+            open_sink(output, context),
+        ):
+            pass
     assert list(tmp_path.iterdir()) == []
+
+
+@dataclass(frozen=True)
+class MostAtOnce:
+    """A fact about a whole video."""
+
+    vehicles: int
+
+    def __str__(self) -> str:
+        return f"shows {self.vehicles} vehicle at once"
+
+    def record(self) -> dict[str, int]:
+        return {"vehicles": self.vehicles}
+
+
+class CountsMost:
+    """A step that finds out the largest number of tracks in a frame."""
+
+    most = 0
+
+    def apply(self, result: FrameResult) -> FrameResult:
+        self.most = max(self.most, len(result.tracks))
+        return result
+
+    def finish(self) -> dict[str, MostAtOnce]:
+        return {"most": MostAtOnce(self.most)}
+
+
+def test_what_a_step_finds_out_of_a_video_reaches_its_sinks_totals_and_warnings(
+    red_clip: Path, tmp_path: Path, register: Register, caplog: pytest.LogCaptureFixture
+) -> None:
+    seen: list[object] = []
+
+    class Reads(BaseSink):
+        def write(self, _: FrameResult) -> None:
+            assert not self.context.facts
+
+        def finish(self) -> None:
+            seen.append(dict(self.context.facts))
+
+    register("reads", SinkKind(Reads))
+    totals = run_red(Run(red_clip, outputs(reads=tmp_path / "a")), steps=[CountsMost()])
+    assert totals.facts == {"most": MostAtOnce(1)}
+    assert seen == [totals.facts]
+    assert f"{red_clip}: shows 1 vehicle at once" in caplog.messages
 
 
 class TestCheck:
