@@ -70,6 +70,21 @@ def test_a_folder_with_a_bad_file_from_the_first_run_to_the_last(
     assert len(records_of(out)) == 4
 
 
+def test_a_warning_is_printed_once_and_not_with_quiet(
+    run: Run, clips: Path, tmp_path: Path
+) -> None:
+    data = (clips / "a.mp4").read_bytes()
+    (clips / "a.mp4").write_bytes(data + data)
+    options = ("--no-video", "--tracks", ".csv", "--jobs", "1")
+    loud = run("detect-video", clips, "-d", tmp_path / "loud", *options)
+    name = f"{clips}/a.mp4: "
+    assert loud.code == 0
+    assert f"vdet: warning: {name}" in loud.err
+    assert loud.err.count(name) == 2, "the warning, and the result"
+    quiet = run("-q", "detect-video", clips, "-d", tmp_path / "quiet", *options)
+    assert (quiet.code, quiet.err) == (0, "")
+
+
 def test_a_name_that_becomes_too_long_fails_alone(run: Run, clips: Path, tmp_path: Path) -> None:
     (clips / "day2" / "b.mp4").rename(clips / f"{'b' * 251}.mp4")
     arguments = ("detect-video", clips, "-d", tmp_path / "out", "--no-video", "--jobs", "1")
