@@ -12,7 +12,7 @@ RECORD = Record(
     "/in/a.mp4",
     "2026-01-02T03:04:05+00:00",
     *(1.5, "net.onnx", "12ab", 4, 3, 2, 1),
-    outputs=(Written("tracks", "/out/a.csv", 70, 123_456, [1]),),
+    outputs=(Written("tracks", "/out/a.csv", 70, 123_456, "digest", [1]),),
     program="vdet 1.2",
 )
 
@@ -45,10 +45,10 @@ def test_a_record_is_there_as_soon_as_it_is_added(tmp_path: Path) -> None:
                 "path": "/out/a.csv",
                 "bytes": 70,
                 "changed": 123_456,
+                "digest": "digest",
                 "summary": [1],
             }
         ],
-        "digest": None,
         "warnings": [],
         "error": None,
         "program": "vdet 1.2",

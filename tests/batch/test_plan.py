@@ -80,9 +80,11 @@ def note(source: str, *outputs: Output, made_by: str = "") -> None:
     made = Record(
         source,
         "now",
-        digest=made_by or digest(Run(Path(source))),
         outputs=tuple(
-            Written(each.sink, str(each.path.absolute()), *(output_state(each) or (0, 0)))
+            Written(
+                *(each.sink, str(each.path.absolute()), *(output_state(each) or (0, 0))),
+                digest=made_by or digest(Run(Path(source))),
+            )
             for each in outputs
         ),
     )

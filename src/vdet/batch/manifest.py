@@ -36,6 +36,8 @@ class Written:
     bytes, changed
         Its size, and the time of its last change (nanoseconds since 1970); of a folder the sum and
         the latest of the files in it.
+    digest
+        SHA-256 of all that it depends on: see `vdet.batch.task`.
     summary
         What a file over all videos needs of it: see `BatchTotal`.
     """
@@ -44,6 +46,7 @@ class Written:
     path: str
     bytes: int
     changed: int
+    digest: str
     summary: Any = None
 
     @property
@@ -76,8 +79,6 @@ class Record:
         What steps found out about the whole video, by their names.
     outputs
         Empty after an error.
-    digest
-        SHA-256 of all that the outputs depend on: see `vdet.batch.task`. None without outputs.
     error
         None if all went well; else there are no outputs, and of the numbers only the seconds.
     program
@@ -96,7 +97,6 @@ class Record:
     begin: str | None = None
     facts: Mapping[str, Any] = field(default_factory=dict)
     outputs: tuple[Written, ...] = ()
-    digest: str | None = None
     warnings: tuple[str, ...] = ()
     error: str | None = None
     program: str = f"vdet {__version__}"

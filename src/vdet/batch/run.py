@@ -65,6 +65,6 @@ def _write_totals(plan: Plan) -> None:
             written = known.get(os.path.realpath(output.path))
             if written and os.path.exists(output.path):  # noqa: PTH110  # too long a name
                 name = output.path.relative_to(plan.folder).as_posix()
-                summaries[name.removesuffix(ending)] = written[-1][1].summary
+                summaries[name.removesuffix(ending)] = written[-1].summary
         with OutputFiles(overwrite=True) as files, output_errors(path):
             total.write(summaries, files.stage(path))

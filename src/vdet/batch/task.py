@@ -22,8 +22,8 @@ from vdet.run.video import Run, write_outputs
 from vdet.version import __version__
 from vdet.workers import limit_library_threads
 
-Known = Mapping[str, Sequence[tuple[str | None, Written]]]
-"""What records say of outputs, by real paths: digest and output; the latest record comes last."""
+Known = Mapping[str, Sequence[Written]]
+"""What records say of outputs, by their real paths; the latest comes last."""
 
 
 def result_digest(run: Run) -> str:
@@ -66,20 +66,18 @@ def _kept_digest(path: str, _changed: int) -> str:
 
 def known_outputs(records: Iterable[Record]) -> Known:
     """Return what some records say of outputs."""
-    found: dict[str, list[tuple[str | None, Written]]] = {}
-    for record in records:
-        for each in record.outputs:
-            found.setdefault(os.path.realpath(each.path), []).append((record.digest, each))
+    found: dict[str, list[Written]] = {}
+    for written in (written for record in records for written in record.outputs):
+        found.setdefault(os.path.realpath(written.path), []).append(written)
     return found
 
 
 def is_done(run: Run, known: Known) -> bool:
     """Return whether the outputs of a run have their sizes, and were made as it would make them."""
-    expected = result_digest(run)
+    digest = result_digest(run)
     for output in run.outputs:
-        state = output_state(output)
-        digest, written = known.get(os.path.realpath(output.path), [(None, None)])[-1]
-        if not (state and written) or (digest, written.bytes) != (expected, state[0]):
+        state, written = output_state(output), known.get(os.path.realpath(output.path))
+        if not (state and written) or (written[-1].digest, written[-1].bytes) != (digest, state[0]):
             return False
     return True
 
@@ -94,7 +92,7 @@ def replacing_ours(run: Run, known: Known) -> Run:
     """
     for output in run.outputs:
         state, ours = output_state(output), known.get(os.path.realpath(output.path), ())
-        if state and state[0] and state not in {written.state for _, written in ours}:
+        if state and state[0] and state not in {written.state for written in ours}:
             raise BatchError(f"{output.path}: is not as vdet wrote it; remove it, or --overwrite")
     return replace(run, overwrite=any(os.path.lexists(output.path) for output in run.outputs))
 
@@ -139,10 +137,11 @@ def _written(run: Run, record: Record, files: OutputFiles) -> Record:
         begin=str(totals.clock) if totals.clock else None,
         facts={name: fact.record() for name, fact in totals.facts.items()},
         outputs=tuple(
-            Written(each.sink, str(each.path.absolute()), *state, totals.summaries[each.path])
+            Written(
+                each.sink, str(each.path.absolute()), *state, digest, totals.summaries[each.path]
+            )
             for each, state in zip(run.outputs, states, strict=True)
         ),
-        digest=digest,
     )
 
 

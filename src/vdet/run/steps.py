@@ -74,8 +74,18 @@ def make_steps(context: StepContext, others: Sequence[Step] = ()) -> list[Step]:
     ConfigError
         There is no step with a name in `settings.steps.names`.
     """
-    chosen = [load_plugin(STEPS, name) for name in context.settings.steps.names]
-    steps = [make(context) for make in (lane_step, region_step, *chosen)]
+    settings, width, height = context.settings, context.width, context.height
+    steps: list[Step | None] = []
+    if settings.lanes.enabled:
+        from vdet.lanes.road import RoadFinder
+
+        roads = RoadFinder(settings.camera.lens, settings.lanes, width, height)
+        steps.append(LaneStep(roads, settings.detector.foot))
+    if settings.regions:
+        from vdet.regions import Regions
+
+        steps.append(RegionStep(Regions(settings.regions, width, height)))
+    steps += [load_plugin(STEPS, name)(context) for name in settings.steps.names]
     return [step for step in (*steps, *others) if step is not None]
 
 
@@ -131,23 +141,3 @@ class RegionStep:
         detections = found[[n for n, each in enumerate(found) if contains(each.box.foot)]]
         tracks = tuple(track for track in result.tracks if contains(track.foot))
         return replace(result, detections=detections, tracks=tracks)
-
-
-def lane_step(context: StepContext) -> Step | None:
-    """Make a `LaneStep` if lanes are looked for."""
-    settings = context.settings
-    if not settings.lanes.enabled:
-        return None
-    from vdet.lanes.road import RoadFinder
-
-    roads = RoadFinder(settings.camera.lens, settings.lanes, context.width, context.height)
-    return LaneStep(roads, settings.detector.foot)
-
-
-def region_step(context: StepContext) -> Step | None:
-    """Make a `RegionStep` if there are regions."""
-    if not context.settings.regions:
-        return None
-    from vdet.regions import Regions
-
-    return RegionStep(Regions(context.settings.regions, context.width, context.height))
