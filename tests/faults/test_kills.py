@@ -70,14 +70,14 @@ KILLS_ITS_PROCESS = """
 import os, signal
 from vdet.batch import task
 
-process = task.run_video
+process = task.write_outputs
 
 def killing(job, *arguments, **options):
     if job.source.name == "kills.mp4":
         os.kill(os.getpid(), signal.SIGKILL)
     return process(job, *arguments, **options)
 
-task.run_video = killing
+task.write_outputs = killing
 """
 
 
