@@ -55,12 +55,14 @@ def _states(source: Path) -> list[tuple[Path, os.stat_result]]:
 def _digest_of(path: Path | str | None) -> str | None:
     """Return the SHA-256 of a file; None where there is none."""
     with suppress(OSError):
-        return _kept_digest(str(path), os.stat(path).st_mtime_ns) if path else None  # noqa: PTH116
+        if path:
+            state = Path(path).stat()
+            return _kept_digest(str(path), state.st_ino, state.st_mtime_ns, state.st_size)
     return None
 
 
 @lru_cache(maxsize=16)
-def _kept_digest(path: str, _changed: int) -> str:
+def _kept_digest(path: str, *_state: int) -> str:
     return hashlib.sha256(Path(path).read_bytes()).hexdigest()
 
 
