@@ -127,8 +127,9 @@ def open_video(
     """
     with named_errors(run.source, VideoError), prefetch(_reader_and_frames(run)) as read:
         reader: VideoReader = next(read)
-        if reader.length is not None and run.start is not None and run.start >= reader.length:
-            raise _no_frame(run, f"{float(run.start):.2f} s is beyond its end", reader)
+        latest = max(run.start or Fraction(0), run.at)
+        if reader.length is not None and latest >= reader.length:
+            raise _no_frame(run, f"{float(latest):.2f} s is beyond its end", reader)
         images, frames = peek(read)
         settings, info = run.settings, reader.info
         try:

@@ -87,7 +87,7 @@ def test_running_counts_are_drawn_if_asked_for(red_clip: Path, tmp_path: Path) -
 
 
 def test_without_lines_there_is_nothing_to_count_at(tmp_path: Path) -> None:
-    with pytest.raises(OutputError, match="nothing to count at; give lines or zones"):
+    with pytest.raises(OutputError, match="nothing to count at; add lines or zones"):
         write(Output("counts", tmp_path / "c.csv"), [result_of(Box.sized(1, 1, 9, 9))])
 
 

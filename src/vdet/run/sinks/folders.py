@@ -39,7 +39,9 @@ class StagesSink(BaseSink):
     def finish(self) -> None:
         """Refuse a time that no frame has. Raises `OutputError`."""
         if not self._is_done:
-            raise OutputError(f"{self.path}: no frame at {float(self.context.at):.2f} s or later")
+            source = self.context.video.path if self.context.video else self.path
+            at = float(self.context.at)
+            raise OutputError(f"{source}: no frame at {at:.2f} s or later; use an earlier --at")
 
     def write(self, result: FrameResult) -> None:
         """Write the pictures if it is the frame."""
