@@ -136,7 +136,7 @@ def test_a_full_standard_output_is_reported_in_one_line(
     def lose_output() -> None:
         os.chdir(tmp_path)
         os.close(1)
-        os.open("/dev/full", os.O_WRONLY)
+        os.set_inheritable(os.open("/dev/full", os.O_WRONLY), True)
 
     running.append(start(command, before=lose_output))
     result = running[0].finish()

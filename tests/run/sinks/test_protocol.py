@@ -180,7 +180,7 @@ def test_frames_too_small_to_be_searched_get_no_boxes_but_every_output(
         video=tmp_path / "out.mp4",
         tracks=tmp_path / "out.csv",
         stages=tmp_path / "stages",
-        collects=tmp_path,
+        collects=tmp_path / "collects",
     )
     totals = run_red(Run(source, wanted))
     assert (totals.frames, totals.tracks) == (5, 0)
