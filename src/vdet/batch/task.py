@@ -39,7 +39,9 @@ def result_digest(run: Run) -> str:
         *(f"vdet {__version__}", run.start, run.end, run.frames, time.timezone, time.tzname),
         *(_digest_of(file) for file in files),
         *((file.name, stat.st_size, stat.st_mtime_ns) for file, stat in _states(run.source)),
-        settings.with_paths(lambda _: "").model_dump_json(exclude={"train", "labels"}),
+        settings.with_paths(lambda _: "").model_dump_json(
+            exclude={"train": True, "labels": True, "detector": {"model"}}
+        ),
     )
     return hashlib.sha256("\0".join(map(repr, wanted)).encode()).hexdigest()
 
