@@ -188,7 +188,7 @@ def test_all_three_run_through_a_batch(package: Path, clip: Path, tmp_path: Path
         assert len((tmp_path / "out" / f"{name}.txt").read_text().splitlines()) == FRAMES
         assert frames_of(tmp_path / "out" / f"{name}.mp4") == FRAMES
     record = json.loads((tmp_path / "out" / "manifest.jsonl").read_text().splitlines()[0])
-    assert set(record["outputs"]) == {"video", "tally"}
+    assert {each["sink"] for each in record["outputs"]} == {"video", "tally"}
     assert (record["model"], record["error"]) == (None, None)
 
 

@@ -44,7 +44,7 @@ from vdet.run.pictures import PictureJob, PictureSearch, run_picture
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output, SinkContext, SinkKind, check_sinks
 from vdet.run.steps import Step, StepContext
-from vdet.run.video import Run, RunTotals, check_run, open_video, run_video
+from vdet.run.video import Run, RunTotals, open_video, run_video
 from vdet.track.factory import TrackerKind, make_tracker
 from vdet.track.track import FrameTracks, Track, VideoTracker
 from vdet.traffic.counting import count_files, count_frames
@@ -250,7 +250,6 @@ def detect_video(
         overwrite=overwrite or run.overwrite,
     )
     check_masks(chosen.regions)
-    check_run(run)
     reported = reporting(progress) if progress else no_progress
     return run_video(run, loaded, tracker=tracker, steps=steps, progress=reported)
 

@@ -14,7 +14,7 @@ import re
 import shutil
 import stat
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextvars import ContextVar
 from pathlib import Path
 from typing import Any, Self
@@ -27,16 +27,8 @@ _HOST = re.sub(r"[^a-z0-9]", "", platform.node().lower())[:16]
 _TEMPORARY = re.compile(rf"\.vdet-{_HOST}-[0-9a-f]{{16}}")
 _ASIDE = ".older"  # folder in a temporary one, for files that are replaced
 
-MayReplace = Callable[[Path], bool]
-"""Returns whether an existing file may be replaced, if the user asks for it."""
-
 _FileId = tuple[int, int]  # device and inode: the same for all names of a file
 _inputs: ContextVar[set[_FileId] | None] = ContextVar("inputs", default=None)
-
-
-def any_file(_: Path) -> bool:
-    """Allow every file to be replaced."""
-    return True
 
 
 @contextlib.contextmanager
@@ -78,51 +70,41 @@ def _id(file: Path | int) -> _FileId | None:
     return status.st_dev, status.st_ino
 
 
-def check_output(
-    path: Path,
-    *,
-    overwrite: bool,
-    makes_folder: bool = False,
-    may_replace: MayReplace = any_file,
-) -> None:
+def check_output(path: Path, *, overwrite: bool, makes_folder: bool = False) -> None:
     """Refuse an output that could not be written, before any work is done.
 
     Parameters
     ----------
     makes_folder
         The work makes the folder of the output if it is missing.
-    may_replace
-        Called if `path` is there.
 
     Raises
     ------
     OutputError
-        `path` is an input, is a folder, is there already (without `overwrite`) or may not be
-        replaced, or its folder cannot be written to.
+        `path` is an input, a folder, or already exists (without `overwrite`), or its folder cannot
+        be written to.
     """
-    if path.is_dir():
-        raise OutputError(f"{path}: is a folder; give the name of a file")
-    if os.path.lexists(path):
-        _check_replaceable(path, may_replace)
-        if not overwrite:
-            raise OutputError(f"{path}: is there already; give --overwrite to replace it")
+    if os.path.isdir(path):  # noqa: PTH112  # a name that is too long fails later
+        raise OutputError(f"{path}: is a folder; use the name of a file")
     folder = path.parent
     if makes_folder:
-        folder = next((parent for parent in path.parents if parent.exists()), folder)
+        folder = next((parent for parent in path.parents if os.path.exists(parent)), folder)  # noqa: PTH110
+    if os.path.lexists(path):
+        _check_replaceable(path)
+        if not overwrite:
+            raise OutputError(f"{path}: already exists; use --overwrite to replace it")
     if not folder.is_dir():
-        missing = "is no folder" if folder.exists() else "does not exist; make it first"
-        raise OutputError(f"{path}: the folder {folder} {missing}")
+        problem = "is not a folder" if folder.exists() else "does not exist; make it first"
+        raise OutputError(f"{path}: the folder {folder} {problem}")
     if not os.access(folder, os.W_OK):
         raise OutputError(f"{path}: the folder {folder} cannot be written to")
 
 
-def _check_replaceable(path: Path, may_replace: MayReplace) -> None:
+def _check_replaceable(path: Path) -> None:
     if is_input(path):
-        raise OutputError(f"{path}: is the input itself; give another output")
+        raise OutputError(f"{path}: is the input itself; use another output")
     if not (path.is_file() or path.is_symlink()):
-        raise OutputError(f"{path}: is no ordinary file, and is kept; give another output")
-    if not may_replace(path):
-        raise OutputError(f"{path}: vdet did not write it, so it is kept; give another output")
+        raise OutputError(f"{path}: is not a regular file, and is kept; use another output")
 
 
 def make_folder(folder: Path) -> None:
@@ -137,8 +119,9 @@ class OutputFiles:
     """The output files of one run, which appear together; a context manager.
 
     When the block ends without an error, all staged files are synced to the disk and then get their
-    names. When it ends with an error, or is interrupted, none appears, and every older file is as
-    it was. Folders are made where they are missing.
+    names, in the order in which their folders were staged. When it ends with an error, or is
+    interrupted, none appears, and every older file is as it was. Folders are made where they are
+    missing, and are removed again after an error.
 
     Parameters
     ----------
@@ -156,32 +139,23 @@ class OutputFiles:
     def __init__(self, *, overwrite: bool = False) -> None:
         self._overwrite = overwrite
         self._folders: dict[Path, Path] = {}  # temporary ones by where their files will go
-        self._may_replace: dict[Path, MayReplace] = {}
         self._names: dict[Path, re.Pattern[str]] = {}
-        self._new_folders: list[Path] = []
+        self._new_folders: list[Path] = []  # the outer ones first
         self._cleanup = contextlib.ExitStack()
 
-    def stage(self, path: Path, may_replace: MayReplace = any_file) -> Path:
-        """Return a new, empty file of the same name that will become `path`.
+    def stage(self, path: Path) -> Path:
+        """Return the file of the same name that will become `path`; it is empty at first.
 
         It lies in a temporary folder beside `path`. Temporary folders that killed runs left there
         are removed.
-
-        Parameters
-        ----------
-        may_replace
-            Called at the end if `path` is there and is to be overwritten.
         """
         with output_errors(path):
             temporary = self._temporary_folder(path.parent) / path.name
             temporary.touch()
-        self._may_replace[path] = may_replace
         return temporary
 
     def stage_folder(self, path: Path, names: re.Pattern[str] | None = None) -> Path:
         """Return a folder whose files will lie in the folder `path`.
-
-        If `path` is missing and the block ends with an error, it is not there afterwards.
 
         Parameters
         ----------
@@ -189,17 +163,20 @@ class OutputFiles:
             With `overwrite`, files of an earlier run are removed at the end: those in `path` with
             such names that this run did not write. None: all are kept.
         """
-        is_new = not path.exists()
-        with output_errors(path):
-            temporary = self._temporary_folder(path)
-        if is_new:
-            self._new_folders.append(path)
         if names:
             self._names[path] = names
-        return temporary
+        with output_errors(path):
+            return self._temporary_folder(path)
+
+    def place_of(self, path: Path) -> Path:
+        """Return where a file or folder lies that was staged, before it gets its name."""
+        folder = self._folders.get(path.parent, path.parent)
+        return self._folders.get(path, folder / path.name)
 
     def _temporary_folder(self, path: Path) -> Path:
         if path not in self._folders:
+            missing = [each for each in (path, *path.parents) if not each.exists()]
+            self._new_folders += reversed(missing)
             path.mkdir(parents=True, exist_ok=True)
             remove_stale(path)
             self._folders[path] = _make_temporary(path, self._cleanup)
@@ -215,7 +192,7 @@ class OutputFiles:
                     self._publish()
                     self._new_folders.clear()
         finally:
-            for folder in self._new_folders:
+            for folder in reversed(self._new_folders):
                 with contextlib.suppress(OSError):  # another run may have written into it
                     folder.rmdir()
 
@@ -235,33 +212,24 @@ class OutputFiles:
             for path, file in files.items():
                 with output_errors(path):
                     if self._overwrite and os.path.lexists(path):
-                        self._replace(path, file, undo)
-                    else:
-                        _add_name(path, file, undo)
+                        _check_replaceable(path)
+                        if not path.is_symlink():
+                            file.chmod(stat.S_IMODE(path.stat().st_mode))
+                        self._set_aside(path, undo)
+                    _add_name(path, file, undo)
             for folder, names in self._names.items() if self._overwrite else ():
                 for old in list(folder.iterdir()):
                     if names.fullmatch(old.name) and old not in files and not is_input(old):
                         with contextlib.suppress(OSError):
                             self._set_aside(old, undo)
-                            old.unlink(missing_ok=True)
             undo.pop_all()
 
-    def _replace(self, path: Path, file: Path, undo: contextlib.ExitStack) -> None:
-        _check_replaceable(path, self._may_replace.get(path, any_file))
-        if not path.is_symlink():
-            file.chmod(stat.S_IMODE(path.stat().st_mode))
-        self._set_aside(path, undo)
-        file.replace(path)
-
     def _set_aside(self, path: Path, undo: contextlib.ExitStack) -> None:
-        """Keep the file that is there in the temporary folder, under a second name if possible."""
+        """Move the file that is there into the temporary folder, which is removed at the end."""
         aside = self._folders[path.parent] / _ASIDE / path.name
         aside.parent.mkdir(exist_ok=True)
         undo.callback(_put_back, aside, path)
-        try:
-            os.link(path, aside, follow_symlinks=False)
-        except OSError:  # a file system without hard links
-            path.replace(aside)
+        path.replace(aside)
 
 
 def _put_back(aside: Path, path: Path) -> None:
@@ -270,7 +238,7 @@ def _put_back(aside: Path, path: Path) -> None:
 
 
 def _add_name(path: Path, file: Path, undo: contextlib.ExitStack) -> None:
-    """Give a file its final name, unless there is a file of this name; in one step of the system.
+    """Give a file its final name, unless another file has it; in one step where links are known.
 
     Raises `OutputError` if there is one.
     """
@@ -279,10 +247,8 @@ def _add_name(path: Path, file: Path, undo: contextlib.ExitStack) -> None:
         os.link(file, path)
     except OSError:
         if os.path.lexists(path):
-            raise OutputError(f"{path}: has appeared during the run; give another output") from None
-        path.touch(exist_ok=False)  # a file system without hard links: an empty file takes the name
-        undo.callback(_remove_if_same, path, path.stat())
-        file.replace(path)
+            raise OutputError(f"{path}: has appeared during the run; use another output") from None
+        file.replace(path)  # a file system without hard links
 
 
 def _remove_if_same(path: Path, status: os.stat_result) -> None:
@@ -297,8 +263,9 @@ def _make_temporary(parent: Path, cleanup: contextlib.ExitStack) -> Path:
         folder = parent / f".vdet-{_HOST}-{os.urandom(8).hex()}"
         # An interrupt may come as soon as the folder is there.
         cleanup.callback(shutil.rmtree, folder, ignore_errors=True)
-        folder.mkdir(0o700)  # what is private stays so while it is written
+        parent.mkdir(parents=True, exist_ok=True)  # a run that failed may have removed it
         with contextlib.suppress(FileNotFoundError, BlockingIOError):  # it was taken for stale
+            folder.mkdir(0o700)  # what is private stays so while it is written
             cleanup.enter_context(locked_folder(folder))
             folder.lstat()
             return folder
@@ -314,9 +281,7 @@ def remove_stale(folder: Path) -> None:
 
 
 @contextlib.contextmanager
-def staged(
-    path: Path, *, overwrite: bool = False, may_replace: MayReplace = any_file
-) -> Iterator[Path]:
+def staged(path: Path, *, overwrite: bool = False) -> Iterator[Path]:
     """Give a temporary file that becomes `path` when the block ends without an error.
 
     Raises
@@ -326,7 +291,7 @@ def staged(
         `OSError` that is not a `VdetError`.
     """
     with OutputFiles(overwrite=overwrite) as files:
-        temporary = files.stage(path, may_replace)
+        temporary = files.stage(path)
         with output_errors(path):
             yield temporary
 

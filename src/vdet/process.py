@@ -1,26 +1,24 @@
 """The process of the program: its signals, its standard streams, the threads of its libraries."""
 
-import atexit
-import contextlib
-import io
 import os
 import signal
 import sys
 import threading
 import time
-from typing import Any, NoReturn
+from typing import NoReturn
 
 from vdet.errors import INTERRUPTED, VdetError, in_one_line
 from vdet.system import CAN_WAKE, ENDING_SIGNALS
-from vdet.workers import CLEANUP_TIMEOUT, SINGLE_THREADED
+from vdet.workers import SINGLE_THREADED
 
+CLEANUP_TIMEOUT = 10.0  # seconds between a signal and a forced exit
 _SENT_AGAIN = 20
 _STDOUT, _STDERR = 1, 2
 
 
 def run() -> NoReturn:
     """Run the program and exit: see `vdet.cli.main`. SIGTERM and SIGHUP act like Ctrl-C."""
-    prepare_streams()
+    open_streams()
     for name, value in SINGLE_THREADED.items():
         os.environ.setdefault(name, value)
     # A worker that is killed leaves semaphores, which loky removes; the user need not know of it.
@@ -44,35 +42,16 @@ def run() -> NoReturn:
         _exit(end.code)
 
 
-class LossyFile(io.FileIO):
-    """A file that drops what cannot be written: the disk is full, or its reader has ended."""
-
-    def write(self, data: Any) -> int:
-        """Write all bytes, or drop them, and return their number."""
-        rest = memoryview(data).cast("B")
-        with contextlib.suppress(OSError):
-            while rest:
-                rest = rest[super().write(rest) or len(rest) :]
-        return len(data)
-
-
-def prepare_streams() -> None:
-    """Let no message fail: where standard error cannot be written, messages are dropped.
-
-    Standard streams that are closed are opened, so that no output file takes their place.
-    """
+def open_streams() -> None:
+    """Open standard streams that are closed, so that no output file takes their place."""
     for number in range(3):
         try:
             os.fstat(number)
         except OSError:
-            os.open(os.devnull, os.O_RDONLY)  # takes the lowest number that is free
+            os.open(os.devnull, os.O_RDWR)  # takes the lowest number that is free
             os.set_inheritable(number, True)
-    if sys.stdout is None:
-        sys.stdout = open(_STDOUT, "w", encoding="utf-8", closefd=False)  # noqa: SIM115
-    encoding = sys.stderr.encoding if sys.stderr else "utf-8"
-    # Without a buffer below it, which would write a line twice if a signal comes as it is written.
-    file: Any = LossyFile(_STDERR, "w", closefd=False)
-    sys.stderr = io.TextIOWrapper(file, encoding, "backslashreplace", write_through=True)
+    sys.stdout = sys.stdout or open(_STDOUT, "w", encoding="utf-8", closefd=False)  # noqa: SIM115
+    sys.stderr = sys.stderr or open(_STDERR, "w", encoding="utf-8", closefd=False)  # noqa: SIM115
 
 
 def _signals() -> list[signal.Signals]:
@@ -113,10 +92,7 @@ def _watch_for_signals() -> None:
 
 
 def _exit(code: object) -> NoReturn:
-    """Exit without unloading the libraries: it takes time, and could crash a thread that hangs."""
-    names = [thread.name for thread in threading.enumerate() if thread.daemon]
-    if not any(name.startswith("vdet-") for name in names):  # else one hangs in a read or write
-        atexit._run_exitfuncs()
+    """Exit without unloading the libraries: it takes time, and waits for a thread that hangs."""
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(code if isinstance(code, int) else int(code is not None))

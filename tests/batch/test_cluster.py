@@ -7,15 +7,15 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
 from conftest import Run
-from running import SOON, Gate, frames_of, names, start, until, with_modules, write_drive
+from running import Gate, frames_of, names, start, until, with_modules, write_drive
 from vdet.errors import ClusterError
-from vdet.workers import DaskCluster, WorkerKilledError
+from vdet.workers import DaskCluster, call_all
 
 distributed = pytest.importorskip("distributed")
 
@@ -93,34 +93,10 @@ def address(cluster: Cluster) -> str:
     return cluster.address
 
 
-def test_when_a_worker_is_killed_the_other_items_have_their_results(address: str) -> None:
-    """An item that waited at that worker may be lost too."""
+def test_only_an_item_that_always_kills_its_worker_has_no_result(address: str) -> None:
     items = ["10", "__import__('os')._exit(1)", *(str(number) for number in range(12, 20))]
-    results: dict[int, int] = {}
-    with pytest.raises(WorkerKilledError) as caught:
-        results.update(pair for pair in DaskCluster(address).map(eval, items))
-    lost = caught.value.lost
-    assert 1 in lost
-    assert len(lost) <= 2
-    assert results == {number: 10 + number for number in range(10) if number not in lost}
-
-
-def test_a_cluster_without_workers_is_given_up_and_a_repeated_item_knows_it(tmp_path: Path) -> None:
-    """A worker may end when its files have appeared, before its result has arrived."""
-    first = "__import__('vdet.workers').workers.is_repeated() or __import__('os')._exit(1)"
-    with scheduler(tmp_path, allowed_failures=1) as (cluster, _):
-        worker = dask("worker", "--nworkers", "1", folder=tmp_path)
-        try:
-            dask_cluster = DaskCluster(cluster.address, worker_timeout=SOON, lost_timeout=0.1)
-            slow = replace(dask_cluster, lost_timeout=SOON)
-            assert list(slow.map(eval, [first])) == [(0, True)]
-            results = dask_cluster.map(eval, ["1", "__import__('time').sleep(300)"])
-            assert next(results) == (0, 1)
-        finally:
-            worker.terminate()
-            worker.wait()
-        with pytest.raises(ClusterError, match="all workers have ended; start others"):
-            next(results)
+    results = dict(call_all(eval, items, DaskCluster(address)))
+    assert results == {item: None if "exit" in item else int(item) for item in items}
 
 
 def test_when_the_generator_is_closed_the_scheduler_forgets_the_items(
@@ -129,8 +105,8 @@ def test_when_the_generator_is_closed_the_scheduler_forgets_the_items(
     path = f"{str(tmp_path / 'go')!r}"
     wait = f"[None for _ in iter(lambda: __import__('os').path.exists({path}), True)]"
     with distributed.Client(address, set_as_default=False) as observer:
-        with closing(DaskCluster(address).map(eval, ["0", *[wait] * 20])) as results:
-            assert next(results) == (0, 0)
+        with closing(call_all(eval, ["0", *[wait] * 20], DaskCluster(address))) as results:
+            assert next(results) == ("0", 0)
             until(lambda: any(observer.processing().values()))
         until(lambda: not any(observer.processing().values()))
         (tmp_path / "go").touch()
@@ -175,22 +151,12 @@ def test_when_a_worker_is_killed_its_file_is_done_again(cluster: Cluster, tmp_pa
     assert frames_of(out / "long.mp4") == 150
 
 
-def test_workers_with_another_version_are_refused(
-    run: Run, address: str, clips: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("vdet.workers.__version__", "9.9")
-    result = run("detect-video", clips, "-d", tmp_path / "out", "--scheduler", address)
-    assert result.code == 1
-    assert "has vdet 0." in result.err
-    assert "here is vdet 9.9; install one version everywhere" in result.err
-
-
 def test_a_scheduler_that_has_no_worker_and_one_that_ends(tmp_path: Path) -> None:
     clip = write_drive(tmp_path / "clip.mp4", 150)
     out = tmp_path / "out"
     with scheduler(tmp_path) as (cluster, process):
-        with pytest.raises(ClusterError, match="has no worker"):
-            next(DaskCluster(cluster.address, worker_timeout=0.1).map(abs, [1]))
+        with pytest.raises(ClusterError, match="no Dask scheduler with a worker answers"):
+            next(call_all(abs, [1], DaskCluster(cluster.address, timeout=0.5)))
         worker = dask("worker", "--no-nanny", folder=tmp_path)
         try:
             until(lambda: registered(tmp_path) == 1)
@@ -212,11 +178,11 @@ def test_a_scheduler_that_has_no_worker_and_one_that_ends(tmp_path: Path) -> Non
     "address", ["tcp://127.0.0.1:9", "nonsense://x", "tcp://no.such.host.invalid:1"]
 )
 def test_no_scheduler_there(address: str) -> None:
-    with pytest.raises(ClusterError, match="no Dask scheduler answers there"):
-        next(DaskCluster(address, connect_timeout=0.5).map(abs, [1]))
+    with pytest.raises(ClusterError, match="no Dask scheduler with a worker answers"):
+        next(call_all(abs, [1], DaskCluster(address, timeout=0.5)))
 
 
 def test_without_dask_the_error_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(ClusterError, match="pip install dask distributed"):
-        next(DaskCluster("tcp://x:1").map(abs, [1]))
+        next(call_all(abs, [1], DaskCluster("tcp://x:1")))

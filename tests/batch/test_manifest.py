@@ -5,12 +5,15 @@ from pathlib import Path
 
 import pytest
 
-from vdet.batch.manifest import Record, open_manifest
+from vdet.batch.manifest import Record, Written, open_manifest
 from vdet.errors import OutputError
 
-OUTPUTS = {"video": "/out/a.mp4", "tracks": "/out/a.csv"}
 RECORD = Record(
-    "/in/a.mp4", OUTPUTS, "2026-01-02T03:04:05+00:00", 1.5, 4, 3, 2, 1, program="vdet 1.2"
+    "/in/a.mp4",
+    "2026-01-02T03:04:05+00:00",
+    *(1.5, "net.onnx", "12ab", 4, 3, 2, 1),
+    outputs=(Written("tracks", "/out/a.csv", 70, 123_456, "digest", [1]),),
+    program="vdet 1.2",
 )
 
 
@@ -19,38 +22,44 @@ def lines(path: Path) -> list[str]:
 
 
 def test_a_record_is_there_as_soon_as_it_is_added(tmp_path: Path) -> None:
-    path = tmp_path / "m.jsonl"
-    with open_manifest(path) as add:
+    path = tmp_path / "manifest.jsonl"
+    with open_manifest(tmp_path) as add:
         add(RECORD)
         (line,) = lines(path)
         add(RECORD)
     assert json.loads(line) == {
         "input": "/in/a.mp4",
-        "outputs": {"video": "/out/a.mp4", "tracks": "/out/a.csv"},
         "started": "2026-01-02T03:04:05+00:00",
         "seconds": 1.5,
+        "model": "net.onnx",
+        "model_sha256": "12ab",
         "width": 4,
         "height": 3,
         "frames": 2,
         "tracks": 1,
         "begin": None,
+        "facts": {},
+        "outputs": [
+            {
+                "sink": "tracks",
+                "path": "/out/a.csv",
+                "bytes": 70,
+                "changed": 123_456,
+                "digest": "digest",
+                "summary": [1],
+            }
+        ],
         "warnings": [],
         "error": None,
-        "digest": None,
-        "sizes": {},
-        "times": {},
-        "summaries": {},
         "program": "vdet 1.2",
-        "model": None,
-        "model_sha256": None,
     }
     assert len(lines(path)) == 2
 
 
 def test_a_line_that_was_cut_off_does_not_spoil_the_next(tmp_path: Path) -> None:
-    path = tmp_path / "m.jsonl"
+    path = tmp_path / "manifest.jsonl"
     path.write_text('{"input": "/in')
-    with open_manifest(path) as add:
+    with open_manifest(tmp_path) as add:
         add(RECORD)
     cut, whole = lines(path)
     assert cut == '{"input": "/in'
@@ -58,9 +67,9 @@ def test_a_line_that_was_cut_off_does_not_spoil_the_next(tmp_path: Path) -> None
 
 
 def test_names_of_any_kind_can_be_recorded(tmp_path: Path) -> None:
-    path = tmp_path / "m.jsonl"
-    odd = Record("/in/\udcff \n\U0001f697.mp4", {}, "now", 0.0, error="\udcff: bad")
-    with open_manifest(path) as add:
+    path = tmp_path / "manifest.jsonl"
+    odd = Record("/in/\udcff \n\U0001f697.mp4", "now", error="\udcff: bad")
+    with open_manifest(tmp_path) as add:
         add(odd)
     (line,) = lines(path)
     assert json.loads(line)["input"] == odd.input
@@ -71,23 +80,25 @@ def test_a_full_disk_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
         raise OSError(28, "No space left on device")
 
     def fill() -> None:
-        with open_manifest(tmp_path / "m.jsonl") as add:
+        with open_manifest(tmp_path) as add:
             monkeypatch.setattr("os.fsync", full)
             add(RECORD)
 
-    with pytest.raises(OutputError, match=r"m\.jsonl: cannot be written: No space left on device"):
+    with pytest.raises(
+        OutputError, match=r"manifest\.jsonl: cannot be written: No space left on device"
+    ):
         fill()
 
 
 def test_a_second_batch_into_the_folder_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "m.jsonl"
+    path = tmp_path / "manifest.jsonl"
 
     def open_again() -> None:
-        with open_manifest(path):
+        with open_manifest(tmp_path):
             pass
 
-    with open_manifest(path) as add:
-        with pytest.raises(OutputError, match=r"m\.jsonl: another batch writes here"):
+    with open_manifest(tmp_path) as add:
+        with pytest.raises(OutputError, match=r"manifest\.jsonl: another batch writes here"):
             open_again()
         add(RECORD)
     open_again()

@@ -8,9 +8,8 @@ from typing import ClassVar
 
 import pytest
 
-from vdet.batch.manifest import Record, open_manifest
+from vdet.batch.manifest import Record, Written, open_manifest
 from vdet.batch.plan import OutputSuffix, Plan, make_plan
-from vdet.batch.task import Identity, result_digest
 from vdet.errors import BatchError, OutputError
 from vdet.files import recorded_inputs
 from vdet.run.sinks import data
@@ -18,13 +17,18 @@ from vdet.run.sinks.protocol import BatchTotal, Output, output_state
 from vdet.run.video import Run
 
 COMMON = Run(Path(), frames=7)
-IDENTITY = Identity("settings")
 VIDEO: dict[str, str | None] = {"video": None}
 
 
 @pytest.fixture(autouse=True)
-def same_identity(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Identity, "of", lambda *_: IDENTITY)
+def simple_digest(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("vdet.batch.task.result_digest", digest)
+    monkeypatch.setattr("vdet.batch.plan.load_detector", lambda _: None)
+
+
+def digest(run: Run) -> str:
+    state = run.source.stat()
+    return f"{state.st_size} {state.st_mtime_ns}"
 
 
 @pytest.fixture
@@ -63,24 +67,28 @@ def outputs(runs: tuple[Run, ...]) -> list[list[str]]:
     return [[str(output.path) for output in job.outputs] for job in runs]
 
 
-def record(source: str, *paths: str, work: Identity = IDENTITY) -> None:
+def record(source: str, *paths: str) -> None:
     """Write outputs, and what the manifest says about them."""
     Path("out").mkdir(exist_ok=True)
     for path in paths:
         Path(path).write_bytes(b"result")
-    note(source, *(Output("video", Path(path)) for path in paths), work=work)
+    note(source, *(Output("video", Path(path)) for path in paths))
 
 
-def note(source: str, *outputs: Output, work: Identity = IDENTITY) -> None:
+def note(source: str, *outputs: Output, made_by: str = "") -> None:
     """Add a record of outputs to the manifest."""
-    states = {str(each.path.absolute()): output_state(each) or (0, 0) for each in outputs}
     made = Record(
-        *(source, {}, "now", 0.0),
-        digest=result_digest(work, Path(source)),
-        sizes={path: size for path, (size, _) in states.items()},
-        times={path: changed for path, (_, changed) in states.items()},
+        source,
+        "now",
+        outputs=tuple(
+            Written(
+                *(each.sink, str(each.path.absolute()), *(output_state(each) or (0, 0))),
+                digest=made_by or digest(Run(Path(source))),
+            )
+            for each in outputs
+        ),
     )
-    with open_manifest(Path("out/manifest.jsonl")) as add:
+    with open_manifest(Path("out")) as add:
         add(made)
 
 
@@ -97,7 +105,6 @@ class TestJobs:
             ["out/c.mp4"],
             ["out/day/a.mp4"],
         ]
-        assert made.manifest == Path("out/manifest.jsonl")
         assert not Path("out").exists()
 
     def test_a_sink_may_write_several_outputs_of_each_video(self) -> None:
@@ -116,6 +123,11 @@ class TestJobs:
             ("clips/day/a.mp4", False),
         ]
 
+    def test_no_run_is_compared_with_the_others(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        """A plan of 10,000 videos would take minutes."""
+        monkeypatch.setattr(Run, "__eq__", lambda *_: pytest.fail("compared"))
+        assert len(plan("clips", skip_existing=True).runs) == 4
+
     def test_what_was_written_in_parts_is_up_to_date_too(self) -> None:
         record("clips/a.mp4", "out/a.csv")
         record("clips/a.mp4", "out/a.mp4")
@@ -128,9 +140,7 @@ class TestJobs:
             lambda: Path("out/a.csv").unlink(),
             lambda: Path("clips/a.mp4").write_bytes(b"longer clip"),
             lambda: os.utime("clips/a.mp4", (0, 0)),
-            lambda: note(
-                "clips/a.mp4", Output("tracks", Path("out/a.csv")), work=Identity("other")
-            ),
+            lambda: note("clips/a.mp4", Output("tracks", Path("out/a.csv")), made_by="other"),
         ],
     )
     def test_what_is_empty_or_out_of_date_is_done_again(self, change: Callable[[], object]) -> None:
@@ -193,12 +203,12 @@ class TestRefused:
         with pytest.raises(BatchError, match=r"lies in the (input|output folder)"):
             plan("clips", folder=folder)
 
-    @pytest.mark.parametrize("clip", ["clips/*", "clips/*/*.mp4", "clips/**/*.mp4", "*/*/*.mp4"])
-    def test_an_output_folder_that_a_pattern_will_match(self, clip: str) -> None:
-        with pytest.raises(BatchError, match=r"^clips/found: lies in the input "):
-            plan(clip, folder="clips/found")
-        assert plan("clips/*.mp4", folder="clips/found").runs
-        assert plan("clips/day*/*.mp4", folder="clips/found").runs
+    def test_outputs_that_a_pattern_matches(self) -> None:
+        assert plan("clips/*/*.mp4", folder="clips/found").runs
+        Path("clips/found").mkdir()
+        Path("clips/found/a.mp4").touch()
+        with pytest.raises(BatchError, match=r"^clips/found/a.mp4: lies in the output folder"):
+            plan("clips/*/*.mp4", folder="clips/found")
 
     def test_an_output_that_is_an_input(self) -> None:
         Path("out").mkdir()
@@ -213,9 +223,9 @@ class TestRefused:
     def test_a_manifest_that_is_no_ordinary_file(self, make: Callable[[Path], object]) -> None:
         Path("out").mkdir()
         make(Path("out/manifest.jsonl"))
-        for skip_existing in (False, True):
-            with pytest.raises(OutputError, match=r"manifest\.jsonl: is not a regular file"):
-                plan("clips", skip_existing=skip_existing)
+        words = r"manifest\.jsonl: (is not a regular file|.*symbolic links)"
+        with pytest.raises(OutputError, match=words):
+            plan("clips", skip_existing=True)
         assert not Path("out/elsewhere").exists()
 
 
@@ -232,10 +242,10 @@ class TestTotals:
     def test_it_is_kept_like_other_outputs(self) -> None:
         Path("out").mkdir()
         Path("out/all.csv").write_text("precious")
-        with pytest.raises(OutputError, match=r"out/all.csv: is there already"):
+        with pytest.raises(OutputError, match=r"out/all.csv: already exists"):
             plan_outputs("clips/a.mp4", suffixes={"tracks": ".csv"})
         plan_outputs("clips/a.mp4", suffixes={"tracks": ".csv"}, overwrite=True)
-        with pytest.raises(OutputError, match=r"out/all.csv: is there already"):
+        with pytest.raises(OutputError, match=r"out/all.csv: already exists"):
             plan_outputs("clips/a.mp4", suffixes={"tracks": ".csv"}, skip_existing=True)
         Path("out/manifest.jsonl").touch()
         plan_outputs("clips/a.mp4", suffixes={"tracks": ".csv"}, skip_existing=True)
@@ -268,7 +278,7 @@ class TestFolders:
         Path("out/a.stages").mkdir(parents=True)
         assert self.plan().runs
         self.record()
-        with pytest.raises(OutputError, match=r"out/a\.stages/1-boxes\.png: is there already"):
+        with pytest.raises(OutputError, match=r"out/a\.stages/1-boxes\.png: already exists"):
             self.plan()
         assert self.plan(overwrite=True).runs
 

@@ -1,104 +1,146 @@
-"""Every item is done once, whatever happens to the processes; here the processes are simulated."""
+"""A batch: its records, the files over all videos, and what a kill between two steps leaves."""
 
-from collections.abc import Callable, Generator, Mapping, Sequence
-from dataclasses import dataclass, field
+import json
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import TypeVar
+from typing import Any
 
 import pytest
 
-from running import write_drive
-from vdet.batch.plan import OutputSuffix, Plan, PlannedTotal, make_plan
-from vdet.batch.run import each_once, run_batch, write_totals
-from vdet.batch.task import Identity
-from vdet.errors import OutputError
-from vdet.run.sinks.protocol import BatchTotal, VideoPart
+from red_cars import red_settings
+from running import names, write_drive
+from vdet.batch.plan import OutputSuffix, Plan, make_plan
+from vdet.batch.run import run_batch
+from vdet.batch.task import process_file
+from vdet.errors import BatchError, OutputError
+from vdet.run.sinks import data
+from vdet.run.sinks.protocol import BatchTotal
 from vdet.run.video import Run
-from vdet.workers import WorkerKilledError
+from vdet.workers import Submit
 
-T = TypeVar("T")
-R = TypeVar("R")
-
-
-@dataclass
-class FakeWorkers:
-    """Have `count` items in work at a time; a deadly item kills all that are in work with it."""
-
-    count: int
-    deadly: Sequence[object] = ()
-    kills_left: int = 1000
-    calls: list[list[object]] = field(default_factory=list)
-
-    def map(self, function: Callable[[T], R], items: Sequence[T]) -> Generator[tuple[int, R]]:
-        self.calls.append([])
-        in_work: list[tuple[int, R]] = []
-        for number, item in enumerate(items):
-            in_work.append((number, function(item)))
-            self.calls[-1].append(item)
-            if item in self.deadly and self.kills_left:
-                self.kills_left -= 1
-                raise WorkerKilledError(number for number, _ in in_work)
-            if len(in_work) == self.count:
-                yield in_work.pop(0)
-        yield from in_work
+OUTPUTS = [OutputSuffix("tracks", ".csv"), OutputSuffix("vehicles", ".cars.json")]
 
 
-def same(item: int) -> int:
-    return item
+MakePlan = Callable[..., Plan]
 
 
-@pytest.mark.parametrize("count", [1, 2, 4])
-def test_only_items_that_kill_their_process_have_no_result(count: int) -> None:
-    items = list(range(10))
-    results = dict(each_once(same, items, FakeWorkers(count, deadly=[3, 7]), same))
-    assert results == {item: None if item in (3, 7) else item for item in items}
+class InThread:
+    """One thread in place of processes."""
+
+    at_once = 1
+
+    @contextmanager
+    def open(self) -> Iterator[Submit]:
+        with ThreadPoolExecutor(1) as pool:
+            yield pool.submit
 
 
-def test_items_that_were_in_work_when_a_process_was_killed_are_repeated_one_by_one() -> None:
-    workers = FakeWorkers(2, deadly=[3], kills_left=1)
-    results = dict(each_once(same, range(6), workers, same))
-    assert results == {item: item for item in range(6)}
-    assert workers.calls == [[0, 1, 2, 3], [4, 5], [2], [3]]
-
-
-def test_what_is_repeated_may_differ_and_counts_for_its_item() -> None:
-    workers = FakeWorkers(2, deadly=[3], kills_left=1)
-    results = dict(each_once(same, range(4), workers, lambda item: item + 10))
-    assert results == {0: 0, 1: 1, 2: 12, 3: 13}
-
-
-def test_a_file_that_ended_when_its_process_was_killed_is_made_again(tmp_path: Path) -> None:
-    clip = write_drive(tmp_path / "clip.mp4", 3)
-    outputs = [OutputSuffix("tracks", ".csv")]
-    plan = make_plan([clip], tmp_path / "out", Run(Path()), outputs)
-    workers = FakeWorkers(1, deadly=plan.runs, kills_left=1)
-    ((job, record),) = run_batch(plan, workers=workers)
-    assert len(workers.calls) == 2
-    assert record.error is None
-    assert all(output.path.exists() for output in job.outputs)
-
-
-def join(parts: Mapping[str, VideoPart], target: Path) -> None:
-    lines = (f"{name}: {part.path.read_text()} in {part.place}\n" for name, part in parts.items())
-    target.write_text("".join(lines))
-
-
-def test_a_total_is_made_from_the_outputs_that_are_there(tmp_path: Path) -> None:
-    outputs = {name: tmp_path / f"{name}.txt" for name in ("a", "failed", "b")}
+@pytest.fixture
+def clips(tmp_path: Path) -> Path:
     for name in ("a", "b"):
-        outputs[name].write_text(f"of {name}")
-    total = PlannedTotal(BatchTotal("all", join), tmp_path / "all.txt", outputs)
-    (tmp_path / "all.txt").write_text("of an earlier run")
-    write_totals(Plan(tmp_path, Identity(""), (), (), (total,)))
-    assert (tmp_path / "all.txt").read_text() == "a: of a in a.txt\nb: of b in b.txt\n"
+        (tmp_path / "in" / name).mkdir(parents=True)
+        write_drive(tmp_path / "in" / name / "c.mp4", 15)
+    return tmp_path / "in"
 
 
-def test_a_total_that_cannot_be_made_leaves_nothing(tmp_path: Path) -> None:
-    def fail(_: Mapping[str, VideoPart], target: Path) -> None:
+@pytest.fixture
+def plan(clips: Path) -> MakePlan:
+    """A function that plans a batch of all clips into the folder `out`."""
+    common = Run(Path(), settings=red_settings(clips.parent), threads=1)
+    return partial(make_plan, [clips], clips.parent / "out", common, OUTPUTS)
+
+
+def run(planned: Plan) -> list[str | None]:
+    return [record.error for _, record in run_batch(planned, workers=InThread())]
+
+
+MADE = ["a/c.cars.json", "a/c.csv", "all.cars.json", "b/c.cars.json", "b/c.csv", "manifest.jsonl"]
+
+
+def test_a_total_has_what_is_known_of_all_videos_also_of_those_skipped(
+    clips: Path, plan: MakePlan
+) -> None:
+    out = clips.parent / "out"
+    assert run(plan()) == [None, None]
+    assert names(out) == MADE
+    total = json.loads((out / "all.cars.json").read_text())
+    assert total == [
+        {"video": f"{name}/c", **car}
+        for name in ("a", "b")
+        for car in json.loads((out / name / "c.cars.json").read_text())
+    ]
+    assert total
+    (out / "all.cars.json").unlink()
+    (out / "b" / "c.csv").unlink()
+    again = plan(skip_existing=True)
+    assert (len(again.runs), len(again.skipped)) == (1, 1)
+    assert run(again) == [None]
+    assert json.loads((out / "all.cars.json").read_text()) == total
+
+
+def test_what_was_made_before_the_program_was_killed_is_skipped(
+    clips: Path, plan: MakePlan
+) -> None:
+    """The worker has given the outputs their names, and there is no line of the manifest yet."""
+    out, first = clips.parent / "out", plan().runs[0]
+    assert process_file(first, folder=out).error is None
+    again = plan(skip_existing=True)
+    assert [each.source for each in again.skipped] == [first.source]
+    assert run(again) == [None]
+    assert names(out) == MADE
+    inputs = [
+        json.loads(line)["input"] for line in (out / "manifest.jsonl").read_text().splitlines()
+    ]
+    assert sorted(inputs) == [str(clips / name / "c.mp4") for name in ("a", "b")]
+
+
+def test_outputs_of_which_a_kill_left_some_are_made_again(clips: Path, plan: MakePlan) -> None:
+    out, first = clips.parent / "out", plan().runs[0]
+    process_file(first, folder=out)
+    first.outputs[1].path.unlink()
+    assert plan(skip_existing=True).runs[0].overwrite
+    assert process_file(first, folder=out).error is None
+    first.outputs[1].path.write_text("corrected by hand")
+    with pytest.raises(BatchError, match=r"c\.cars\.json: is not as vdet wrote it"):
+        plan(skip_existing=True)
+
+
+def test_a_file_whose_process_was_killed_is_made_once(clips: Path, plan: MakePlan) -> None:
+    out, first = clips.parent / "out", plan().runs[0]
+    record = process_file(first, folder=out)
+    assert process_file(first, folder=out).line == record.line
+
+
+@pytest.mark.parametrize("has_note", [True, False])
+def test_a_foreign_file_is_kept_also_when_a_process_was_killed(
+    clips: Path, plan: MakePlan, has_note: bool
+) -> None:
+    out, first = clips.parent / "out", plan().runs[0]
+    if has_note:
+        process_file(first, folder=out)
+    path = first.outputs[0].path
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text("theirs")
+    words = "is not as vdet wrote it" if has_note else "has appeared during the run"
+    assert f"{path}: {words}" in str(process_file(first, folder=out).error)
+    assert path.read_text() == "theirs"
+
+
+def test_a_total_that_cannot_be_made_leaves_nothing(
+    clips: Path, plan: MakePlan, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(_: object, target: Path) -> None:
         target.write_text("half")
         raise OSError(28, "No space left on device")
 
-    total = PlannedTotal(BatchTotal("all", fail), tmp_path / "all.txt", {})
-    with pytest.raises(OutputError, match=r"all.txt: .*No space left"):
-        write_totals(Plan(tmp_path, Identity(""), (), (), (total,)))
-    assert list(tmp_path.iterdir()) == []
+    def replaced(**changes: Any) -> None:
+        monkeypatch.setattr(data, "VEHICLES", replace(data.VEHICLES, **changes))
+
+    replaced(total=BatchTotal("all", fail))
+    with pytest.raises(OutputError, match=r"all.cars.json: .*No space left"):
+        run(plan())
+    assert names(clips.parent / "out") == [name for name in MADE if "all" not in name]

@@ -1,6 +1,8 @@
 """One file of a batch."""
 
 import logging
+import os
+import time
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -10,13 +12,11 @@ import pytest
 
 from red_cars import HEIGHT, WIDTH, red_settings
 from running import names, write_drive
-from vdet.batch.task import Identity, process_file, record_of_killed, result_digest
+from vdet.batch.task import process_file, result_digest
 from vdet.detect.factory import load_detector
 from vdet.detect.protocol import DetectorModel
 from vdet.run.sinks.protocol import Output
-from vdet.run.video import Run, run_video
-
-IDENTITY = Identity("digest", "red.npz", "a")
+from vdet.run.video import Run, write_outputs
 
 
 @pytest.fixture
@@ -29,26 +29,29 @@ def job(tmp_path: Path) -> Run:
 
 def test_the_record_says_what_was_done_and_folders_are_made(job: Run, tmp_path: Path) -> None:
     before = datetime.now(UTC).replace(microsecond=0)
-    record = process_file(job, identity=IDENTITY)
+    record = process_file(job, folder=tmp_path / "out")
     assert record.error is None
     assert record.input == str(job.source)
-    assert record.outputs == {
-        "video": str(tmp_path / "out" / "day" / "a.mp4"),
-        "tracks": str(tmp_path / "out" / "day" / "a.csv"),
-    }
+    paths = [tmp_path / "out" / "day" / name for name in ("a.mp4", "a.csv")]
+    assert [(each.sink, each.path) for each in record.outputs] == [
+        ("video", str(paths[0])),
+        ("tracks", str(paths[1])),
+    ]
     assert (record.width, record.height, record.frames, record.tracks) == (WIDTH, HEIGHT, 15, 1)
     assert record.warnings == ()
     assert record.seconds > 0
     assert before <= datetime.fromisoformat(record.started) <= datetime.now(UTC)
+    (note,) = (tmp_path / "out").glob(".vdet-notes/*")
+    assert note.read_text() == record.line
+    note.unlink()
     assert names(tmp_path / "out") == ["day/a.csv", "day/a.mp4"]
-    paths = [output.path for output in job.outputs]
-    assert record.sizes == {str(path): path.stat().st_size for path in paths}
-    assert record.times == {str(path): path.stat().st_mtime_ns for path in paths}
-    assert record.digest == result_digest(IDENTITY, job.source)
+    states = [(path.stat().st_size, path.stat().st_mtime_ns) for path in paths]
+    assert [each.state for each in record.outputs] == states
+    assert {each.digest for each in record.outputs} == {result_digest(job)}
 
 
 def test_the_detector_is_loaded_once_for_all_files(
-    job: Run, monkeypatch: pytest.MonkeyPatch
+    job: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     loaded: list[object] = []
 
@@ -57,38 +60,51 @@ def test_the_detector_is_loaded_once_for_all_files(
         return load_detector(*arguments)
 
     monkeypatch.setattr("vdet.batch.task.load_detector", load)
-    again = replace(job, overwrite=True)
-    for sha256 in ("a", "a", "b"):
-        assert process_file(again, identity=replace(IDENTITY, model_sha256=sha256)).error is None
-    assert loaded == [(job.settings.detector,)] * 2
+    again = replace(job, overwrite=True, outputs=job.outputs[1:])
+    for frames in (2, 3):
+        assert process_file(replace(again, frames=frames), folder=tmp_path).error is None
+    assert loaded == [(job.settings.detector,)]
+    (tmp_path / "red.npz").write_bytes((tmp_path / "red.npz").read_bytes())
+    os.utime(tmp_path / "red.npz", (0, 0))
+    assert process_file(replace(again, frames=4), folder=tmp_path).error is None
 
 
-def test_only_warnings_about_this_file_are_recorded(
-    job: Run, monkeypatch: pytest.MonkeyPatch
+def test_warnings_are_recorded(
+    job: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
+    """They are not printed by the process: whoever gets the record does it, once."""
+
     def warn_and_process(*arguments: object, **options: object) -> object:
         log = logging.getLogger("vdet")
         log.warning("%s: 3 frames damaged", job.source)
-        log.warning("%s0: another file, in another thread", job.source)
         log.info("%s: nothing to worry about", job.source)
-        return run_video(*arguments, **options)  # type: ignore[arg-type]
+        return write_outputs(*arguments, **options)  # type: ignore[arg-type]
 
-    monkeypatch.setattr("vdet.batch.task.run_video", warn_and_process)
+    monkeypatch.setattr("vdet.batch.task.write_outputs", warn_and_process)
     before = list(logging.getLogger("vdet").handlers)
-    assert process_file(job, identity=IDENTITY).warnings == (f"{job.source}: 3 frames damaged",)
+    assert process_file(job, folder=tmp_path / "out").warnings == (
+        f"{job.source}: 3 frames damaged",
+    )
     assert logging.getLogger("vdet").handlers == before
+    assert "frames damaged" not in capfd.readouterr().err
 
 
-def test_an_error_is_recorded_without_numbers(job: Run) -> None:
+def test_an_error_is_recorded_without_numbers(job: Run, tmp_path: Path) -> None:
     job.source.write_bytes(b"no video")
-    record = process_file(job, identity=IDENTITY)
+    record = process_file(job, folder=tmp_path / "out")
     assert record.error is not None
     assert record.error.startswith(f"{job.source}: is not a video")
     assert (record.width, record.height, record.frames, record.tracks) == (None,) * 4
-    assert (record.digest, record.sizes) == (None, {})
+    assert record.outputs == ()
 
 
-def test_a_file_whose_process_was_killed_has_a_record(job: Run) -> None:
-    record = record_of_killed(job, IDENTITY)
-    assert record.error is not None
-    assert record.error.startswith(f"{job.source}: its process was killed")
+def test_the_digest_changes_with_the_time_zone(job: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Clocks without a zone are those of this computer."""
+    digests = set()
+    for zone in ("UTC", "Europe/Berlin", "UTC"):
+        monkeypatch.setenv("TZ", zone)
+        time.tzset()
+        digests.add(result_digest(job))
+    assert len(digests) == 2
+    monkeypatch.undo()
+    time.tzset()

@@ -41,7 +41,7 @@ def test_a_folder_with_a_bad_file_from_the_first_run_to_the_last(
     assert re.search(rf"{clips}/a\.mp4: 12 frames, \d tracks?, ", first.err)
     assert f"vdet: error: {clips}/bad.mp4: is not a video" in first.err
     assert first.err.count("bad.mp4") == 1, "an error is printed once"
-    assert first.err.splitlines()[-1] == f"{out}/manifest.jsonl: 2 files done, 1 failed"
+    assert first.err.splitlines()[-1] == f"{out}: 2 files done, 1 failed"
     made = ["a.csv", "a.mp4", "day2/b.csv", "day2/b.mp4", "manifest.jsonl"]
     assert names(out) == made
     assert (frames_of(out / "a.mp4"), frames_of(out / "day2" / "b.mp4")) == (12, 6)
@@ -54,20 +54,35 @@ def test_a_folder_with_a_bad_file_from_the_first_run_to_the_last(
 
     refused = run(*arguments)
     assert refused.code == 1
-    assert refused.err == f"vdet: {out}/a.mp4: is there already; give --overwrite to replace it\n"
+    assert refused.err == f"vdet: {out}/a.mp4: already exists; use --overwrite to replace it\n"
 
     before = (out / "a.mp4").stat().st_mtime_ns
     write_drive(clips / "bad.mp4", 3)
     again = run(*arguments, "--skip-existing")
     assert again.code == 0, again.err
-    assert "1 file done, 2 there already, 0 failed" in again.err
+    assert "1 file done, 2 skipped, 0 failed" in again.err
     assert (out / "a.mp4").stat().st_mtime_ns == before
     assert [Path(record["input"]).name for record in records_of(out)][-1] == "bad.mp4"
 
     nothing = run(*arguments, "--skip-existing")
     assert nothing.code == 0
-    assert nothing.err == f"{out}: 3 files there already\n"
+    assert nothing.err == f"{out}: 0 files done, 3 skipped, 0 failed\n"
     assert len(records_of(out)) == 4
+
+
+def test_a_warning_is_printed_once_and_not_with_quiet(
+    run: Run, clips: Path, tmp_path: Path
+) -> None:
+    data = (clips / "a.mp4").read_bytes()
+    (clips / "a.mp4").write_bytes(data + data)
+    options = ("--no-video", "--tracks", ".csv", "--jobs", "1")
+    loud = run("detect-video", clips, "-d", tmp_path / "loud", *options)
+    name = f"{clips}/a.mp4: "
+    assert loud.code == 0
+    assert f"vdet: warning: {name}" in loud.err
+    assert loud.err.count(name) == 2, "the warning, and the result"
+    quiet = run("-q", "detect-video", clips, "-d", tmp_path / "quiet", *options)
+    assert (quiet.code, quiet.err) == (0, "")
 
 
 def test_a_name_that_becomes_too_long_fails_alone(run: Run, clips: Path, tmp_path: Path) -> None:
@@ -109,14 +124,14 @@ def test_after_other_settings_or_another_model_videos_are_made_again(
     arguments = ("detect-video", clips, "-d", out, "--no-video", "--tracks", ".csv")
     assert run(*arguments).code == 0
     dry = (*arguments, "--skip-existing", "--dry-run")
-    assert run(*dry).out.count("there already") == 2
+    assert run(*dry).out.count("up to date") == 2
     (tmp_path / "steps").write_text("steps: {names: [theirs]}")
     other_step = ("-c", tmp_path / "steps")
-    for change in (("--set", "tracker.needed=0.3"), ("-c", "svm"), ("--frames", "3"), other_step):
+    changes = (("--set", "tracker.needed=0.3"), ("--set", "output.crf=30"), ("-c", "svm"))
+    for change in (*changes, ("--frames", "3"), other_step):
         assert run(*dry, *change).out.count("→") == 2
     copy = shutil.copy(shipped, tmp_path / "copy.onnx")
-    no_effect = ("train.net.steps=9", "output.crf=30", "detector.still_score=0.7")
-    for same in (*(("--set", each) for each in no_effect), ("--model", copy)):
+    for same in (("--set", "train.net.steps=9"), ("--model", copy)):
         assert run(*dry, *same).out.count("→") == 0
 
 

@@ -98,7 +98,7 @@ def test_two_inputs_of_one_name(run: Run, picture: Path, tmp_path: Path) -> None
     twin.write_bytes(picture.read_bytes())
     result = run("detect-image", picture, twin, "-o", tmp_path / "out")
     assert result.code == 1
-    assert "is given for two outputs" in result.err
+    assert "is used for two outputs" in result.err
     assert not (tmp_path / "out").exists()
 
 

@@ -181,7 +181,7 @@ def test_never_writes_over_settings_that_it_reads(
     ("options", "words"),
     [
         (("--at", "50"), "50.00 s is beyond its end; it ends at "),
-        (("--at", "0.2", "--frames", "2"), "no frame is read at 0.20 s or later; it ends at "),
+        (("--at", "0.2", "--frames", "2"), "no frame at 0.20 s or later"),
         (("--at", "0", "--start", "50"), "50.00 s is beyond its end; it ends at "),
     ],
 )

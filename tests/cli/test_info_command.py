@@ -60,7 +60,7 @@ def test_a_video_is_described(run: Run, tmp_path: Path) -> None:
     assert (values["rate"], values["seconds"]) == (25, 0.48)
     again = run("info", path, "--json", tmp_path / "facts.json")
     assert (again.code, again.err.count("\n")) == (1, 1)
-    assert "is there already" in again.err
+    assert "already exists" in again.err
 
 
 def test_numbered_pictures_are_a_video_and_one_picture_is_not(run: Run, tmp_path: Path) -> None:

@@ -55,6 +55,20 @@ def test_saved_tracks_need_only_a_picture(run: Run, clip: Path, tracks: Path) ->
     assert (result.code, result.out) == (0, "paths.png: 320×240, 3 vehicles\n"), result.err
 
 
+@pytest.mark.parametrize(
+    ("part", "vehicles"),
+    [(("--start", "0.1", "--end", "0.9"), "1 vehicle"), (("--end", "1.9"), "2 vehicles")],
+)
+def test_saved_tracks_are_taken_from_the_part_that_is_named(
+    run: Run, clip: Path, part: tuple[str, ...], vehicles: str
+) -> None:
+    """Frames of .txt have the times of the clip, 25 a second; the second car comes after 1.2 s."""
+    rows = [f"{n},{1 + (n > 30)},{4 * n},80,40,30,1,-1,-1,-1" for n in range(1, 50)]
+    Path("t.txt").write_text("\n".join(rows) + "\n")
+    result = run("paths", clip, "--tracks-from", "t.txt", "-o", "paths.png", *part)
+    assert (result.code, result.out) == (0, f"paths.png: 320×240, {vehicles}\n"), result.err
+
+
 def test_lines_are_shown_without_a_run(run: Run, clip: Path) -> None:
     run("paths", clip, "--no-paths", "-o", "empty.png")
     result = run("paths", clip, "--no-paths", "-c", "lines.yaml", "-o", "preview.png")

@@ -18,16 +18,16 @@ def test_a_page_and_numbers_that_cannot_be_written_are_refused_before_any_work(
     assert not list(tmp_path.iterdir()), "a run that fails leaves no folder"
     results.print(["F1"], {"f1": 0.5}, lambda: "precious")
     for kept in (results, Results(str(target), overwrite=False), Results(None, False, folder)):
-        with pytest.raises(OutputError, match="is there already; give --overwrite"):
+        with pytest.raises(OutputError, match="already exists; use --overwrite"):
             kept.check()
     Results(str(target), page=folder, overwrite=True).check()
     with recorded_inputs():
         record_input(target)
         with pytest.raises(OutputError, match="is the input itself"):
             Results(str(target), overwrite=True).check()
-    with pytest.raises(OutputError, match=r"the folder .*page\.html is no folder"):
+    with pytest.raises(OutputError, match=r"the folder .*page\.html is not a folder"):
         Results(None, page=folder / "page.html", overwrite=True).check()
-    with pytest.raises(OutputError, match="is given for two outputs"):
+    with pytest.raises(OutputError, match="is used for two outputs"):
         Results(str(folder / "page.html"), page=folder, overwrite=True).check()
 
 

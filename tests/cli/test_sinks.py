@@ -73,9 +73,9 @@ class TestDetectVideo:
             ("tallies=a.csv", f"tallies: is no sink; {KNOWN}"),
             ("tracks=a.json", "a.json: tracks are written as .txt, .csv, .jsonl, "),
             ("tracks=none/a.csv", "none/a.csv: the folder none does not exist; make it first"),
-            ("tracks=old.csv", "old.csv: is there already; give --overwrite to replace it"),
+            ("tracks=old.csv", "old.csv: already exists; use --overwrite to replace it"),
             ("picture=a.png", "a.png: the sink picture is for pictures"),
-            ("tracks=t.txt", "t.txt: is given for two outputs; name another file for one"),
+            ("tracks=t.txt", "t.txt: is used for two outputs; rename one"),
         ],
     )
     def test_an_output_that_cannot_be_is_refused_before_any_work(

@@ -39,7 +39,7 @@ def test_one_video(run: Run, clips: Path, tmp_path: Path, red: tuple[str, ...]) 
     assert names(tmp_path / "page") == ["page.html"]
     again = run("detect-video", clips / "day" / "a.mp4", "--no-video", "--crops", "crops", *red)
     assert again.code == 1
-    assert "is there already; give --overwrite to replace it" in again.err
+    assert "already exists; use --overwrite to replace it" in again.err
 
 
 def test_many_videos_have_their_own_and_a_table_and_a_page_over_all(
@@ -70,11 +70,11 @@ def test_many_videos_have_their_own_and_a_table_and_a_page_over_all(
     before = {name: (tmp_path / "found" / name).stat().st_mtime_ns for name in found}
     Path("found/index.html").unlink()  # as if the batch had been interrupted before it
     skipped = run(*command, "--skip-existing")
-    assert "2 files there already" in skipped.err
+    assert "0 files done, 2 skipped" in skipped.err
     assert Path("found/index.html").exists()
     next(Path("found/day/a.crops").iterdir()).unlink()
     again = run(*command, "--skip-existing")
-    assert "1 file done, 1 there already, 0 failed" in again.err
+    assert "1 file done, 1 skipped, 0 failed" in again.err
     assert names(tmp_path / "found") == found
     same = [n for n in found if (tmp_path / "found" / n).stat().st_mtime_ns == before[n]]
     assert sorted(same) == sorted(name for name in found if name.startswith(NASTY))

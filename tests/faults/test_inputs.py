@@ -11,10 +11,12 @@ import av
 import pytest
 
 from faults.conftest import Start
-from red_cars import SETTINGS, red_model, red_settings
+from labels.writers import Boxed, Labelled, write_yolo
+from red_cars import CAR, HEIGHT, SETTINGS, WIDTH, red_model, red_settings
 from running import frames_of, names, until, write_drive
-from vdet.batch.task import Identity, process_file
-from vdet.errors import VideoError
+from vdet.batch.task import process_file
+from vdet.errors import VdetError
+from vdet.labels.reading import read_labelled_pictures
 from vdet.run.sinks.protocol import Output
 from vdet.run.video import Run, run_video
 
@@ -53,9 +55,7 @@ def test_a_file_that_is_removed_while_it_is_read_is_read_to_its_end(job: Run) ->
 
 def test_a_file_that_is_removed_before_its_turn_is_recorded(job: Run, tmp_path: Path) -> None:
     job.source.unlink()
-    record = process_file(
-        replace(job, settings=red_settings(tmp_path)), identity=Identity("digest")
-    )
+    record = process_file(replace(job, settings=red_settings(tmp_path)), folder=tmp_path / "out")
     assert record.error == f"{job.source}: there is no such file; check the name"
     assert record.frames is None
 
@@ -69,6 +69,19 @@ def test_a_file_that_shrinks_is_read_as_far_as_it_goes_with_a_warning(
     assert COUNT // 4 < totals.frames < COUNT * 3 // 4
     assert frames_of(job.outputs[0].path) == totals.frames
     assert f"ends early: {totals.frames} of {COUNT} frames could be read" in caplog.text
+
+
+def test_a_fifo_in_a_set_of_labelled_pictures_is_not_waited_for(tmp_path: Path) -> None:
+    boxes = (Boxed("car", (CAR.x1, CAR.y1, CAR.width, CAR.height)),)
+    write_yolo(tmp_path, {name: Labelled(WIDTH, HEIGHT, boxes) for name in "ab"})
+    (tmp_path / "labels" / "a.txt").unlink()
+    os.mkfifo(tmp_path / "labels" / "a.txt")
+    found = list(read_labelled_pictures(tmp_path).pictures)
+    assert [len(picture.labels) for picture in found] == [0, 1]
+    (tmp_path / "images" / "a.png").unlink()
+    os.mkfifo(tmp_path / "images" / "a.png")
+    with pytest.raises(VdetError, match=r"a\.png"):
+        list(read_labelled_pictures(tmp_path).pictures)
 
 
 class Pipe:
@@ -107,15 +120,6 @@ def pipe(clip: Path, tmp_path: Path) -> Iterator[Pipe]:
     pipe = Pipe(tmp_path / "in" / "pipe.ts", content[: len(content) * 2 // 3])
     yield pipe
     pipe.close()
-
-
-def test_an_input_that_stalls_is_given_up(pipe: Pipe, job: Run, tmp_path: Path) -> None:
-    stalling = replace(job, source=pipe.path, timeout=1)
-    with pytest.raises(VideoError, match=r"pipe\.ts: nothing was read or written for 1 s"):
-        run_video(replace(stalling, settings=SETTINGS), red_model())
-    assert names(tmp_path / "out") == []
-    pipe.close()
-    until(lambda: not any(thread.name.startswith("vdet-") for thread in threading.enumerate()))
 
 
 def test_ctrl_c_ends_the_wait_for_an_input_that_stalls(

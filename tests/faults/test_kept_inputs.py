@@ -10,7 +10,7 @@ from labels.writers import Boxed, Labelled, show, write_coco, write_yolo
 from red_cars import CAR, HEIGHT, WIDTH, road
 from running import write_drive
 
-KEPT = "is the input itself; give another output"
+KEPT = "is the input itself; use another output"
 
 
 @pytest.fixture

@@ -3,24 +3,20 @@
 import ctypes
 import json
 import os
-import threading
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from conftest import Run
 from faults.conftest import Start
-from red_cars import SETTINGS, red_model, red_settings
-from running import names, until, write_drive
-from vdet.batch.task import Identity, process_file
-from vdet.errors import VideoError
+from red_cars import red_settings
+from running import names, write_drive
+from vdet.batch.task import process_file
 from vdet.media import Frame
 from vdet.media.writer import VideoWriter
 from vdet.run import video
 from vdet.run.sinks.protocol import Output
-from vdet.run.video import run_video
 from vdet.track.motion.tracker import MotionTracker
 from vdet.track.rules.tracker import RulesTracker
 
@@ -82,32 +78,10 @@ def test_a_writer_that_fails_at_the_100th_frame(
         write(writer, frame)
 
     monkeypatch.setattr(VideoWriter, "write", write_99)
-    record = process_file(
-        replace(job, settings=red_settings(tmp_path)), identity=Identity("digest")
-    )
+    record = process_file(replace(job, settings=red_settings(tmp_path)), folder=tmp_path / "out")
     assert record.error == f"{job.outputs[0].path}: cannot be written: Input/output error"
     assert written == list(range(99))
     assert names(tmp_path / "out") == []
-
-
-def test_a_writer_that_hangs_at_its_end_is_given_up(
-    job: video.Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    released = threading.Event()
-    leave = VideoWriter.__exit__
-
-    def hang(writer: VideoWriter, *raised: Any) -> None:
-        released.wait()
-        leave(writer, *raised)
-
-    monkeypatch.setattr(VideoWriter, "__exit__", hang)
-    (tmp_path / "out").mkdir()
-    few = replace(job, frames=3, timeout=1)
-    with pytest.raises(VideoError, match="nothing was read or written for 1 s"):
-        run_video(replace(few, settings=SETTINGS), red_model())
-    assert names(tmp_path / "out") == []
-    released.set()
-    until(lambda: not any(thread.name.startswith("vdet-") for thread in threading.enumerate()))
 
 
 def test_a_tracker_that_raises(
@@ -118,9 +92,7 @@ def test_a_tracker_that_raises(
 
     monkeypatch.setattr(RulesTracker, "update", update)
     monkeypatch.setattr(MotionTracker, "observe", update)
-    record = process_file(
-        replace(job, settings=red_settings(tmp_path)), identity=Identity("digest")
-    )
+    record = process_file(replace(job, settings=red_settings(tmp_path)), folder=tmp_path / "out")
     assert record.error is not None
     assert "internal error, please report it (ZeroDivisionError: no scale)" in record.error
     result = run("detect-video", job.source, tmp_path / "out" / "single.mp4")

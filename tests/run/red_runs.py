@@ -90,7 +90,7 @@ def result_of(
         Track(number, each, 0.9, state="seen") if isinstance(each, Box) else each
         for number, each in enumerate(vehicles, start=1)
     )
-    return FrameResult(source, frame, NO_BOXES, tracks, found)
+    return FrameResult(source, frame, NO_BOXES, tracks, {"lane": found} if found else {})
 
 
 def stages_of_trace(image: Image, detections: Boxes) -> dict[str, Image]:

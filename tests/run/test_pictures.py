@@ -82,14 +82,14 @@ class TestPlan:
     def test_one_output_that_is_there_already_refuses_all(self, tmp_path: Path) -> None:
         sources = [tmp_path / "a.png", tmp_path / "b.png"]
         touch(tmp_path / "out" / "b.png")
-        with pytest.raises(OutputError, match=r"b\.png: is there already"):
+        with pytest.raises(OutputError, match=r"b\.png: already exists"):
             plan_pictures(sources, tmp_path / "out", None, overwrite=False)
         assert len(plan_pictures(sources, tmp_path / "out", None, overwrite=True)) == 2
 
     def test_a_file_where_the_folder_should_be_is_refused(self, tmp_path: Path) -> None:
         touch(tmp_path / "out")
         sources = [tmp_path / "a.png", tmp_path / "b.png"]
-        with pytest.raises(OutputError, match=r"the folder .*out is no folder"):
+        with pytest.raises(OutputError, match=r"the folder .*out is not a folder"):
             plan_pictures(sources, tmp_path / "out", None, overwrite=True)
 
 

@@ -9,7 +9,7 @@ import pytest
 from boxing import moved_to, rounded
 from red_cars import CAR, PERSPECTIVE, SETTINGS, WIDTH, drive, road
 from run.red_runs import follow, model_for, outputs, run_red
-from vdet.batch.task import Identity
+from vdet.batch.task import result_digest
 from vdet.boxes import Box
 from vdet.config.camera import CameraSettings
 from vdet.config.schema import Settings
@@ -80,12 +80,8 @@ def test_the_stages_show_the_regions(tmp_path: Path) -> None:
 def test_a_mask_that_is_drawn_anew_makes_results_out_of_date(tmp_path: Path) -> None:
     mask = tmp_path / "mask.png"
     run = Run(Path("a.mp4"), settings=within(Settings(), mask=str(mask)))
-
-    def digest() -> str:
-        return Identity.of(run, ["tracks"]).digest
-
     write_image(mask, np.zeros((24, 32, 3), np.uint8))
-    before = digest()
-    assert before == digest()
+    before = result_digest(run)
+    assert before == result_digest(run)
     write_image(mask, np.full((24, 32, 3), 255, np.uint8), overwrite=True)
-    assert before != digest()
+    assert before != result_digest(run)

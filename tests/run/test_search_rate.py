@@ -12,7 +12,7 @@ from red_cars import CAR, PERSPECTIVE, SETTINGS, drive, road
 from run.red_runs import follow, write
 from vdet.config.schema import MotionTrackerSettings, NetworkSettings, Settings, SvmSettings
 from vdet.media import Frame, Picture
-from vdet.run.loop import SearchRate
+from vdet.run.rate import SearchRate
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output
 

@@ -2,7 +2,6 @@
 
 import signal
 import threading
-import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
 from itertools import islice
@@ -11,7 +10,6 @@ import pytest
 
 from running import SOON, until
 from vdet.run.threads import (
-    StalledError,
     map_ordered,
     prefetch,
     write_async,
@@ -113,19 +111,6 @@ class TestPrefetch:
         opened, closed = threads
         assert opened is closed is not threading.current_thread()
 
-    def test_a_source_that_hangs_is_abandoned(self, hang: threading.Event) -> None:
-        first_waits = threading.Event()
-
-        def items() -> Iterator[int]:
-            yield 1
-            first_waits.set()
-            hang.wait()
-
-        read: list[int] = []
-        with pytest.raises(StalledError), prefetch(items(), timeout=0.2) as given:
-            read.extend(after(first_waits, given))
-        assert read == [1]
-
     def test_ctrl_c_ends_the_wait_for_a_source_that_hangs(
         self, hang: threading.Event, ctrl_c: Callable[[], None]
     ) -> None:
@@ -176,44 +161,6 @@ class TestWriteAsync:
         assert caught.value is error
         assert taken == [0, 1]
         assert len(seen) == 1
-
-    @pytest.mark.parametrize("place", ["last item", "one before", "end of the context"])
-    def test_a_taker_that_hangs_at_its_end_is_abandoned(
-        self, place: str, hang: threading.Event
-    ) -> None:
-        def take(item: int) -> None:
-            if place == ("last item" if item == 3 else "one before" if item == 2 else ""):
-                hang.wait()
-
-        @contextmanager
-        def context() -> Iterator[None]:
-            yield
-            if place == "end of the context":
-                hang.wait()
-
-        def give() -> None:
-            with write_async(take, within=context(), timeout=0.1) as put:
-                for item in range(4):
-                    put(item)
-
-        with pytest.raises(StalledError):
-            give()
-        assert threads_of_vdet() == ["vdet-write"]
-
-    def test_the_end_has_the_time_that_it_is_given_and_as_long_as_it_gets_on(
-        self, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        monkeypatch.setattr("vdet.run.threads.DEPTH", 9)
-        passed: list[int] = []
-
-        def take(item: int) -> None:
-            time.sleep(0.2)
-            passed.append(item)
-
-        with write_async(take, within=nullcontext(), timeout=0.1, extra=lambda: SOON) as put:
-            for item in range(5):
-                put(item)
-        assert passed == list(range(5))
 
 
 class TestMapOrdered:

@@ -5,7 +5,6 @@ import logging
 import os
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from fnmatch import fnmatch
 from pathlib import Path
 
 from vdet.errors import BatchError, VideoError
@@ -61,20 +60,6 @@ def find_sources(clips: Sequence[Path]) -> list[InputVideo]:
         for source in sources:
             found.setdefault((source.path.resolve(), source.place), source)
     return list(found.values())
-
-
-def matches_in(clip: Path, folder: Path) -> bool:
-    """Return whether a clip, a folder or a pattern, can give videos that lie in `folder`."""
-    if clip.is_dir():
-        return folder.resolve().is_relative_to(clip.resolve())
-    if clip.exists():
-        return False
-    for part, name in zip(clip.absolute().parts, folder.absolute().parts, strict=False):
-        if part == "**":
-            return True
-        if not fnmatch(name, part):
-            return False
-    return True
 
 
 def _videos_of(clip: Path) -> Iterable[InputVideo]:

@@ -1,21 +1,58 @@
-"""The manifest: a line of JSON for every file of a batch, added as soon as the file is done."""
+"""The manifest: a line of JSON for every file of a batch, added as soon as the file is done.
+
+Whoever processes a file leaves its record as a note in a hidden folder of the batch, just before
+the outputs get their names. The note moves into the manifest when the file is done, or when the
+next batch begins, so no kill can separate outputs from their record.
+"""
 
 import errno
+import hashlib
 import json
 import os
-import stat
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, BinaryIO
 
 from vdet.errors import OutputError
-from vdet.files import output_errors
+from vdet.files import output_errors, remove_stale
 from vdet.system import lock
 from vdet.version import __version__
 
+MANIFEST = "manifest.jsonl"
+_NOTES = ".vdet-notes"
 _FLAGS = sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY"))
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """An output that was written.
+
+    Attributes
+    ----------
+    sink, path
+        The name of its sink; its absolute path.
+    bytes, changed
+        Its size, and the time of its last change (nanoseconds since 1970); of a folder the sum and
+        the latest of the files in it.
+    digest
+        SHA-256 of all that it depends on: see `vdet.batch.task`.
+    summary
+        What a file over all videos needs of it: see `BatchTotal`.
+    """
+
+    sink: str
+    path: str
+    bytes: int
+    changed: int
+    digest: str
+    summary: Any = None
+
+    @property
+    def state(self) -> tuple[int, int]:
+        """Its size and time, as of `output_state`."""
+        return self.bytes, self.changed
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,130 +61,125 @@ class Record:
 
     Attributes
     ----------
-    input, outputs
-        Absolute paths; that of each output is under the name of its sink, or all of them where the
-        sink writes several.
+    input
+        Its absolute path.
     started
         In UTC, as ISO 8601 writes it.
     seconds
         Wall time.
+    model, model_sha256
+        Name and SHA-256 of the model file; None for a detector without one.
     width, height
         Size of the upright picture, pixels.
     frames, tracks
         Number of frames read, and of tracks shown.
     begin
         When the video was recorded, and where that is known from, if it is.
+    facts
+        What steps found out about the whole video, by their names.
+    outputs
+        Empty after an error.
     error
         None if all went well; else there are no outputs, and of the numbers only the seconds.
-    digest
-        SHA-256 of all that the outputs depend on: see `vdet.batch.task`. None without outputs.
-    sizes, times
-        Bytes of each output and the time of its last change (nanoseconds since 1970), by its path;
-        of a folder the sum and the latest of the files in it.
-    summaries
-        What the sinks say of the outputs, by their paths: see `BatchTotal`.
     program
         The program with its version.
-    model, model_sha256
-        Name and SHA-256 of the model file; None for a detector without one.
     """
 
     input: str
-    outputs: Mapping[str, str | tuple[str, ...]]
     started: str
-    seconds: float
+    seconds: float = 0.0
+    model: str | None = None
+    model_sha256: str | None = None
     width: int | None = None
     height: int | None = None
     frames: int | None = None
     tracks: int | None = None
     begin: str | None = None
+    facts: Mapping[str, Any] = field(default_factory=dict)
+    outputs: tuple[Written, ...] = ()
     warnings: tuple[str, ...] = ()
     error: str | None = None
-    digest: str | None = None
-    sizes: Mapping[str, int] = field(default_factory=dict)
-    times: Mapping[str, int] = field(default_factory=dict)
-    summaries: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     program: str = f"vdet {__version__}"
-    model: str | None = None
-    model_sha256: str | None = None
+
+    @property
+    def line(self) -> str:
+        """The line of the manifest."""
+        return json.dumps(asdict(self), allow_nan=False) + "\n"
 
 
-class Written(NamedTuple):
-    """What the manifest says about an output, as in `Record`."""
-
-    digest: str | None
-    size: int
-    time: int
-    summary: Mapping[str, Any] | None
+def note_path(folder: Path, path: Path) -> Path:
+    """Return the note in the folder of a batch about the run whose first output has a path."""
+    name = hashlib.sha256(os.fsencode(path.absolute())).hexdigest()
+    return folder / _NOTES / f"{name[:32]}.json"
 
 
-def check_manifest(path: Path) -> None:
-    """Refuse a link, which may lead out of the folder, and a FIFO, which may block for ever.
-
-    Raises
-    ------
-    OutputError
-        What is there is not a regular file.
-    """
-    if os.path.lexists(path) and not stat.S_ISREG(path.lstat().st_mode):
-        raise OutputError(f"{path}: is not a regular file; remove it, or give another folder")
-
-
-def read_written(path: Path) -> dict[str, Written]:
-    """Return what is written of each output, by its real path; the latest record counts.
-
-    Lines that are no records of outputs are skipped. Without a manifest there is none.
+def read_records(*paths: Path) -> Iterator[Record]:
+    """Yield the records in some files; what does not exist, or is not a record, is skipped.
 
     Raises
     ------
     OutputError
-        The manifest cannot be read.
+        A file cannot be read.
     """
-    found: dict[str, Written] = {}
-    if not os.path.lexists(path):
-        return found
-    with output_errors(path), os.fdopen(os.open(path, os.O_RDONLY | _FLAGS), "rb") as file:
-        for text in file:
-            with suppress(ValueError, TypeError, KeyError, AttributeError):
-                line = json.loads(text)
-                for name, size in line["sizes"].items():
-                    summary = line.get("summaries", {}).get(name)
-                    written = Written(line["digest"], size, line["times"][name], summary)
-                    found[os.path.realpath(name)] = written
-    return found
+    for path in filter(os.path.lexists, paths):
+        with output_errors(path), os.fdopen(os.open(path, os.O_RDONLY | _FLAGS), "rb") as file:
+            for text in file:
+                with suppress(ValueError, TypeError, KeyError):
+                    line = json.loads(text)
+                    outputs = tuple(Written(**each) for each in line["outputs"])
+                    yield Record(**{**line, "outputs": outputs})
+
+
+def read_batch(folder: Path) -> Iterator[Record]:
+    """Yield the records of all batches into a folder, in order. Errors as of `read_records`."""
+    return read_records(folder / MANIFEST, *_notes(folder))
+
+
+def _notes(folder: Path) -> list[Path]:
+    return sorted((folder / _NOTES).glob("*.json"))
 
 
 @contextmanager
-def open_manifest(path: Path) -> Iterator[Callable[[Record], None]]:
+def open_manifest(folder: Path) -> Iterator[Callable[[Record], None]]:
     """Give a function that adds a record to the manifest; it returns when the disk has it.
 
-    The manifest is locked: no other batch can write into the folder until the block ends.
+    The manifest is locked: no other batch can write into the folder until the block ends. Notes
+    that an earlier batch left move into it.
 
     Raises
     ------
     OutputError
         The file cannot be written (from the function, too), or another batch has locked it.
     """
-    check_manifest(path)
+    path = folder / MANIFEST
     with output_errors(path):
         descriptor = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT | _FLAGS, 0o666)
     with os.fdopen(descriptor, "r+b", buffering=0) as file:
         try:
             lock(descriptor)
         except BlockingIOError:
-            message = f"{path}: another batch writes here; wait, or give another folder"
+            message = f"{path}: another batch writes here; wait, or use another folder"
             raise OutputError(message) from None
 
         def add(record: Record) -> None:
-            line = json.dumps(asdict(record), allow_nan=False) + "\n"
             with output_errors(path):
-                if file.write(line.encode()) != len(line):
+                if file.write(record.line.encode()) != len(record.line):
                     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
                 os.fsync(descriptor)
+            if record.outputs:
+                note_path(folder, Path(record.outputs[0].path)).unlink(missing_ok=True)
 
         with output_errors(path):
             _end_last_line(file)
-        yield add
+        for note in _notes(folder):
+            for record in read_records(note):
+                add(record)
+        try:
+            yield add
+        finally:
+            remove_stale(folder / _NOTES)
+            with suppress(OSError):  # a worker of an earlier batch may still write into it
+                (folder / _NOTES).rmdir()
 
 
 def _end_last_line(file: BinaryIO) -> None:

@@ -1,153 +1,152 @@
-"""One file of a batch: what it is processed with, what its result depends on, and its record."""
+"""One file of a batch: what its result depends on, whether it is done, and its record."""
 
 import hashlib
 import logging
 import os
 import pickle
 import time
-import traceback
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import UTC, datetime
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Self
 
-from vdet.batch.manifest import Record
-from vdet.config.schema import Settings
+from vdet.batch.manifest import Record, Written, note_path, read_records
 from vdet.detect.factory import load_detector, model_file
 from vdet.detect.protocol import DetectorModel
-from vdet.errors import in_one_line
+from vdet.errors import BatchError, in_one_line
+from vdet.files import OutputFiles, recorded_inputs, write_whole
 from vdet.run.sinks.protocol import output_state
-from vdet.run.video import Run, run_video
+from vdet.run.video import Run, write_outputs
 from vdet.version import __version__
+from vdet.workers import limit_library_threads
 
-_SEARCH = {"input", "camera", "detector", "tracker", "regions", "steps", "lanes"}
-"""The sections of the settings that tracks depend on."""
-
-_READ_BY = {"tracks": set[str](), "counts": {"traffic"}, "flows": {"traffic"}, "crops": set[str]()}
-"""The sections that a sink reads too. Another sink may read all but `train` and `labels`."""
+Known = Mapping[str, Sequence[Written]]
+"""What records say of outputs, by their real paths; the latest comes last."""
 
 
-@dataclass(frozen=True, slots=True)
-class Identity:
-    """What the outputs of a batch depend on, beside each video.
+def result_digest(run: Run) -> str:
+    """Return a digest of all that the outputs of a run depend on.
 
-    Attributes
-    ----------
-    digest
-        SHA-256 of program, model and settings, and of the part that is wanted.
-    model, model_sha256
-        Name and SHA-256 of the model file; None for a detector without one.
+    These are the program, the files of model and masks, the settings, the part, the time zone of
+    this computer, and the size and the time of the input; numbered pictures count by those of all
+    files in their folder.
     """
-
-    digest: str
-    model: str | None = None
-    model_sha256: str | None = None
-
-    @classmethod
-    def of(cls, run: Run, sinks: Iterable[str]) -> Self:
-        """Return the identity of runs that differ from `run` in their video and outputs only.
-
-        Raises
-        ------
-        ConfigError, ModelError
-            The detector cannot be loaded.
-        """
-        settings = run.settings
-        load_detector(settings.detector)
-        file = model_file(settings.detector)
-        sha256 = _digest_of(file) or None
-        # What decides in still pictures only does not count, nor where the model file lies.
-        detector = settings.detector.showing_all().model_copy(update={"model": None})
-        shown = settings.model_copy(update={"detector": detector})
-        wanted = (
-            *(f"vdet {__version__}", sha256, run.start, run.end, run.frames),
-            *(_digest_of(each.mask) for each in settings.regions),
-            shown.model_dump_json(include=_sections(sinks)),
-        )
-        return cls(_digest(*map(repr, wanted)), file.name if file else None, sha256)
+    settings = run.settings
+    files = model_file(settings.detector), *(each.mask for each in settings.regions)
+    wanted = (
+        *(f"vdet {__version__}", run.start, run.end, run.frames, time.timezone, time.tzname),
+        *(_digest_of(file) for file in files),
+        *((file.name, stat.st_size, stat.st_mtime_ns) for file, stat in _states(run.source)),
+        settings.with_paths(lambda _: "").model_dump_json(
+            exclude={"train": True, "labels": True, "detector": {"model"}}
+        ),
+    )
+    return hashlib.sha256("\0".join(map(repr, wanted)).encode()).hexdigest()
 
 
-def _sections(sinks: Iterable[str]) -> set[str]:
-    """Return the sections of the settings that outputs depend on."""
-    all_of_them = set(Settings.model_fields) - {"train", "labels"}
-    return _SEARCH.union(*(_READ_BY.get(sink, all_of_them) for sink in sinks))
-
-
-def result_digest(identity: Identity, source: Path) -> str:
-    """Return a digest of all that the result for an input depends on.
-
-    Parameters
-    ----------
-    identity
-        That of the batch.
-    source
-        The input. It counts by its size and the time of its last change; numbered pictures count by
-        those of all files in their folder.
-    """
-    states = []
+def _states(source: Path) -> list[tuple[Path, os.stat_result]]:
+    folder = source if source.is_dir() else source.parent
     with suppress(OSError):  # there is no such input; reading it is an error soon
-        states = [(file.name, file.stat()) for file in _files(source)]
-    return _digest(identity.digest, *(repr((name, s.st_size, s.st_mtime_ns)) for name, s in states))
+        files = [source] if source.is_file() else sorted(folder.iterdir())
+        return [(file, file.stat()) for file in files]
+    return []
 
 
-def _files(source: Path) -> list[Path]:
-    if source.is_file():
-        return [source]
-    return sorted((source if source.is_dir() else source.parent).iterdir())
-
-
-def _digest(*parts: str) -> str:
-    return hashlib.sha256("\0".join(parts).encode("utf-8", "surrogateescape")).hexdigest()
-
-
-def _digest_of(path: Path | str | None) -> str:
-    """Return a digest of a file; nothing where there is none."""
+def _digest_of(path: Path | str | None) -> str | None:
+    """Return the SHA-256 of a file; None where there is none."""
     with suppress(OSError):
-        return hashlib.sha256(Path(path).read_bytes()).hexdigest() if path else ""
-    return ""
+        if path:
+            state = Path(path).stat()
+            return _kept_digest(str(path), state.st_ino, state.st_mtime_ns, state.st_size)
+    return None
 
 
-def process_file(run: Run, *, identity: Identity) -> Record:
-    """Process a video, and return its record.
+@lru_cache(maxsize=16)
+def _kept_digest(path: str, *_state: int) -> str:
+    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
 
-    Errors are recorded, and not raised.
+
+def known_outputs(records: Iterable[Record]) -> Known:
+    """Return what some records say of outputs."""
+    found: dict[str, list[Written]] = {}
+    for written in (written for record in records for written in record.outputs):
+        found.setdefault(os.path.realpath(written.path), []).append(written)
+    return found
+
+
+def is_done(run: Run, known: Known) -> bool:
+    """Return whether the outputs of a run have their sizes, and were made as it would make them."""
+    digest = result_digest(run)
+    for output in run.outputs:
+        state, written = output_state(output), known.get(os.path.realpath(output.path))
+        if not (state and written) or (written[-1].digest, written[-1].bytes) != (digest, state[0]):
+            return False
+    return True
+
+
+def replacing_ours(run: Run, known: Known) -> Run:
+    """Return a run that replaces its outputs, where vdet wrote all of them that exist.
+
+    Raises
+    ------
+    BatchError
+        One exists that has another size or time than all records say, and is not empty.
     """
-    began, record = time.perf_counter(), _record(run, identity)
-    digest = result_digest(identity, run.source)
-    with _collected_warnings(run) as warnings:
+    for output in run.outputs:
+        state, ours = output_state(output), known.get(os.path.realpath(output.path), ())
+        if state and state[0] and state not in {written.state for written in ours}:
+            raise BatchError(f"{output.path}: is not as vdet wrote it; remove it, or --overwrite")
+    return replace(run, overwrite=any(os.path.lexists(output.path) for output in run.outputs))
+
+
+@recorded_inputs()
+def process_file(run: Run, *, folder: Path) -> Record:
+    """Process a video, and return its record, which is left as a note in the folder of the batch.
+
+    Errors are recorded, and not raised. It can be called again where its process was killed: then
+    the outputs are made again, or else were complete.
+    """
+    limit_library_threads()
+    began, record = time.perf_counter(), new_record(run)
+    note = note_path(folder, run.outputs[0].path)
+    with _collected_warnings() as warnings:
         try:
-            record = replace(record, digest=digest, **_process(run, identity))
+            for earlier in read_records(note):
+                known = known_outputs([earlier])
+                if is_done(run, known):
+                    return earlier
+                run = run if run.overwrite else replacing_ours(run, known)
+            with OutputFiles(overwrite=run.overwrite) as files:
+                record = replace(_written(run, record, files), warnings=tuple(warnings))
+                write_whole(note, record.line, overwrite=True)
         except Exception as failure:
-            record = replace(record, error=in_one_line(failure))
-            if os.environ.get("VDET_DEBUG") == "1":
-                traceback.print_exc()
-    seconds = round(time.perf_counter() - began, 3)
-    return replace(record, seconds=seconds, warnings=tuple(warnings))
+            note.unlink(missing_ok=True)
+            seconds, error = round(time.perf_counter() - began, 3), in_one_line(failure)
+            return replace(new_record(run), seconds=seconds, error=error, warnings=tuple(warnings))
+    return record
 
 
-def record_of_killed(run: Run, identity: Identity) -> Record:
-    """Return the record of a run whose process was killed each time."""
-    error = f"{run.source}: its process was killed, or crashed; there may be too little memory"
-    return replace(_record(run, identity), error=error)
-
-
-def _process(run: Run, identity: Identity) -> dict[str, Any]:
-    """Process a video, and return what its record says about the result."""
+def _written(run: Run, record: Record, files: OutputFiles) -> Record:
+    """Write the outputs, which have not their names yet, and return the record about them."""
+    digest = result_digest(run)
     chosen = pickle.dumps(run.settings.detector)  # settings of other packages may be unhashable
-    totals = run_video(run, _kept_detector(chosen, identity.model_sha256))
-    states = {str(each.path.absolute()): output_state(each) or (0, 0) for each in run.outputs}
-    return {
+    totals = write_outputs(run, _kept_detector(chosen, record.model_sha256), files)
+    states = [output_state(each, files.place_of(each.path)) or (0, 0) for each in run.outputs]
+    return replace(
+        record,
+        seconds=round(totals.seconds, 3),
         **{name: getattr(totals, name) for name in ("width", "height", "frames", "tracks")},
-        "begin": str(totals.clock) if totals.clock else None,
-        "sizes": {path: size for path, (size, _) in states.items()},
-        "times": {path: changed for path, (_, changed) in states.items()},
-        "summaries": {
-            str(Path(path).absolute()): summary for path, summary in totals.summaries.items()
-        },
-    }
+        begin=str(totals.clock) if totals.clock else None,
+        facts={name: fact.record() for name, fact in totals.facts.items()},
+        outputs=tuple(
+            Written(
+                each.sink, str(each.path.absolute()), *state, digest, totals.summaries[each.path]
+            )
+            for each, state in zip(run.outputs, states, strict=True)
+        ),
+    )
 
 
 @lru_cache(maxsize=1)
@@ -156,28 +155,22 @@ def _kept_detector(chosen: bytes, _sha256: str | None) -> DetectorModel:
     return load_detector(pickle.loads(chosen))
 
 
-def _record(run: Run, identity: Identity) -> Record:
+def new_record(run: Run) -> Record:
     """Return the record of a run that begins now."""
-    paths: dict[str, tuple[str, ...]] = {}
-    for output in run.outputs:
-        paths[output.sink] = (*paths.get(output.sink, ()), str(output.path.absolute()))
-    outputs = {sink: each[0] if len(each) == 1 else each for sink, each in paths.items()}
     source, now = str(run.source.absolute()), datetime.now(UTC).isoformat(timespec="seconds")
-    model, sha256 = identity.model, identity.model_sha256
-    return Record(source, outputs, now, 0.0, model=model, model_sha256=sha256)
+    model = model_file(run.settings.detector)
+    return Record(source, now, 0.0, model.name if model else None, _digest_of(model))
 
 
 @contextmanager
-def _collected_warnings(run: Run) -> Iterator[list[str]]:
-    """Give a list of the warnings about a run; other threads may log about other files."""
-    prefixes = tuple(f"{path}: " for path in (run.source, *(each.path for each in run.outputs)))
+def _collected_warnings() -> Iterator[list[str]]:
+    """Give a list of the warnings of the block; whoever gets the record prints them."""
     messages: list[str] = []
 
     def collect(record: logging.LogRecord) -> bool:
-        message = record.getMessage()
-        if record.levelno >= logging.WARNING and message.startswith(prefixes):
-            messages.append(message)
-        return True
+        if record.levelno == logging.WARNING:
+            messages.append(record.getMessage())
+        return record.levelno != logging.WARNING
 
     log = logging.getLogger("vdet")
     log.addFilter(collect)

@@ -192,10 +192,9 @@ def _in_and_out(clips: tuple[Path, ...], *, no_video: bool) -> tuple[Path, list[
 
 def _process_one(run: "Run") -> None:
     from vdet.detect.factory import load_detector
-    from vdet.run.video import check_run, run_video
+    from vdet.run.video import run_video
 
     model = load_detector(run.settings.detector)
-    check_run(run)
     with progress_steps(" frames") as steps:
         steps("opening", None)
         totals = run_video(run, model, progress=partial(steps, ""))
@@ -235,7 +234,6 @@ def _process_batch(
 ) -> int:
     """Process a batch, or list what would be written, and return the exit code."""
     from vdet.batch.plan import make_plan
-    from vdet.batch.run import write_totals
 
     folder = batch.folder or Path()
     if batch.scheduler:  # the workers were started in other folders
@@ -243,13 +241,9 @@ def _process_batch(
     plan = make_plan(clips, folder, common, suffixes, skip_existing=batch.skip_existing)
     if batch.dry_run:
         print_lines(
-            *(f"{run.source}: {_output_names(run)} there already" for run in plan.skipped),
+            *(f"{run.source}: {_output_names(run)} up to date" for run in plan.skipped),
             *(f"{run.source} → {_output_names(run)}" for run in plan.runs),
         )
-        return 0
-    if not plan.runs:
-        write_totals(plan)  # a run that was interrupted may have left them out
-        print_message(f"{plan.folder}: {counted(len(plan.skipped), 'file')} there already")
         return 0
     workers, threads = _workers(batch, len(plan.runs))
     failed = _run(plan, workers, threads)
@@ -267,7 +261,7 @@ def _workers(batch: BatchOptions, files: int) -> "tuple[Workers, int]":
     if batch.scheduler:
         return DaskCluster(batch.scheduler), 1
     cores = core_count()
-    jobs = min(batch.jobs or cores, files)
+    jobs = max(1, min(batch.jobs or cores, files))
     return LocalProcesses(jobs), max(1, cores // jobs)
 
 
@@ -286,9 +280,9 @@ def _run(plan: "Plan", workers: "Workers", threads: int) -> int:
             failed += record.error is not None
             advance(1)
     if not is_quiet():
-        skipped = f"{len(plan.skipped)} there already, " if plan.skipped else ""
+        skipped = f"{len(plan.skipped)} skipped, " if plan.skipped else ""
         done = counted(len(plan.runs) - failed, "file")
-        print_message(f"{plan.manifest}: {done} done, {skipped}{failed} failed")
+        print_message(f"{plan.folder}: {done} done, {skipped}{failed} failed")
     return failed
 
 

@@ -31,7 +31,7 @@ class Results:
         """
         paths = [path for path in (self._json_file, self._page_file) if path]
         if len({path.resolve() for path in paths}) < len(paths):
-            raise OutputError(f"{paths[0]}: is given for two outputs; name another file for one")
+            raise OutputError(f"{paths[0]}: is used for two outputs; rename one")
         for path in paths:
             makes_folder = self.page is not None and self.page.is_relative_to(path.parent)
             check_output(path, overwrite=self.overwrite, makes_folder=makes_folder)

@@ -1,5 +1,6 @@
 """What commands need that look at a whole clip: one of its frames, and its vehicles."""
 
+import math
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -55,13 +56,20 @@ class Watched:
         """
         from vdet.detect.factory import load_detector
         from vdet.labels.reading import read_tracks
+        from vdet.media.reader import VideoReader
         from vdet.run.video import Run, open_video
         from vdet.traffic.records import VehicleRecords
 
         records = VehicleRecords(width)
         if self.tracks is not None:
-            for frame in read_tracks(self.tracks, rate=1.0):
-                records.add(frame)
+            rate, zero = 1.0, 0.0
+            if self.start is not None or self.end is not None:
+                with VideoReader(clip, settings=settings.input) as reader:
+                    rate, zero = float(reader.info.rate), float(reader.info.start)
+            end = math.inf if self.end is None else zero + self.end
+            for frame in read_tracks(self.tracks, rate):
+                if zero + (self.start or 0) <= frame.time < end:
+                    records.add(frame)
             return records.end()
         run = Run(clip, (), settings, self.start, self.end)
         model = load_detector(settings.detector)

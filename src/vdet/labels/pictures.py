@@ -222,7 +222,8 @@ class PictureFormat:
         """
         pictures, labels = (folder / name for name in self.folders)
         parse = self.parser(folder)
-        names = (file.relative_to(labels) for file in labels.rglob(f"*{self.suffix}"))
+        found = filter(Path.is_file, labels.rglob(f"*{self.suffix}"))  # a FIFO may never end
+        names = (file.relative_to(labels) for file in found)
         files = {name.with_suffix(""): labels / name for name in names if not _is_other(name)}
         used = set()
         for picture in sorted(filter(is_picture_name, pictures.rglob("*"))):

@@ -1,14 +1,20 @@
-"""The loop: frames → detector → tracker → steps → results."""
+"""The loop: frames → detector → tracker → steps → results.
+
+`build` makes the `Pipeline` of a video, and `Pipeline.follow` leads its frames through:
+
+1. `search`, in threads: what needs one frame alone;
+2. `observe`, in the order of the frames: the detections go into the tracker;
+3. a wait of `look_ahead` seconds of video, for the tracker to see what comes;
+4. `complete`: the tracks at the time of the frame, and then every step.
+"""
 
 import itertools
-import math
 from collections import deque
 from collections.abc import Generator, Iterable, Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
-from statistics import fmean
 from typing import Any
 
 from vdet.boxes import NO_BOXES, Boxes, Image
@@ -16,8 +22,9 @@ from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel, VideoDetector
 from vdet.errors import ConfigError, ImageError, VdetError
 from vdet.media import Frame, VideoInfo
-from vdet.run.result import FrameResult
-from vdet.run.steps import ParallelStep, Step, StepContext, make_steps
+from vdet.run.rate import EVERY_FRAME, SearchRate
+from vdet.run.result import Facts, FrameResult
+from vdet.run.steps import FindingStep, ParallelStep, Step, StepContext, make_steps
 from vdet.run.threads import map_ordered
 from vdet.track.factory import make_tracker, timed
 from vdet.track.track import TimedTracker, Track, VideoTracker
@@ -26,70 +33,7 @@ FIRST_FRAMES = 2
 """Number of frames that `DetectorModel.for_video` gets."""
 
 _MOST_WAITING = 60
-"""Largest number of frames that wait for later ones, in memory."""
-
-_STEPS = 25
-"""Number of the latest steps from frame to frame that give the usual step."""
-
-_SLACK = 0.1
-"""How far apart searches may be beyond 1 / `searches`, in frames.
-
-With 12 searches a second, every second frame is searched at 23.976 frames/s, as at 24.
-"""
-
-
-@dataclass(frozen=True, slots=True)
-class SearchRate:
-    """How often the frames of a video are searched; the first one always is.
-
-    Frames are chosen by their times, because the frame rate that a file declares may be wrong.
-
-    Attributes
-    ----------
-    searches
-        Least number of searches a second; None for every frame.
-    stride
-        Search every `stride`-th frame, whatever `searches` is; None to go by `searches`.
-    """
-
-    searches: float | None = None
-    stride: int | None = None
-
-    def choose(self, frames: Iterable[Frame]) -> Iterator[tuple[Frame, bool]]:
-        """Yield each frame, and whether it is searched.
-
-        Raises
-        ------
-        ValueError
-            A time is not a finite number, or is not later than that of the frame before.
-        """
-        steps: deque[float] = deque(maxlen=_STEPS)
-        before, since = None, 0.0  # time of the frame before; seconds since the latest search
-        for position, frame in enumerate(frames):
-            if before is not None:
-                steps.append(float(frame.time - before))
-                if not 0 < steps[-1] < math.inf:
-                    raise ValueError(
-                        f"frame {frame.index} at {float(frame.time):g} s is not after the last one"
-                    )
-                since += steps[-1]
-            before, is_searched = frame.time, self._is_due(position, since, steps)
-            since = 0.0 if is_searched else since
-            yield frame, is_searched
-
-    def _is_due(self, position: int, since: float, steps: Sequence[float]) -> bool:
-        if self.stride is not None:
-            return position % self.stride == 0
-        if self.searches is None or not position:
-            return True
-        ordered, quarter = sorted(steps), len(steps) // 4
-        usual = fmean(ordered[quarter : len(steps) - quarter])  # a few odd steps do not change it
-        longest = 1 / self.searches
-        apart = max(1, int(longest / usual + _SLACK))  # frames
-        return since >= min((apart - 0.5) * usual, longest)
-
-
-EVERY_FRAME = SearchRate()
+"""Maximum number of frames that wait for later ones, in memory."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,21 +76,17 @@ class Pipeline:
         ValueError
             The times of the frames do not increase.
         """
-        with closing(self._searched(frames, source, threads)) as results:
-            for result in _delayed(results, self.look_ahead):
-                yield self.complete(result)
-
-    def _searched(
-        self, frames: Iterable[Frame], source: Path, threads: int
-    ) -> Generator[FrameResult]:
-        """Search the frames and update the tracker; yield the results, without tracks."""
         chosen = self.rate.choose(frames)
         in_all = any(isinstance(step, ParallelStep) for step in self.steps)
         with map_ordered(
-            self.search, chosen, threads, is_work=lambda each: each[1] or in_all
-        ) as results:
-            for (frame, searched), candidates in results:
-                yield self.observe(frame, candidates, source, searched=searched)
+            self.search, chosen, threads, is_work=lambda pair: pair[1] or in_all
+        ) as found:
+            observed = (
+                self.observe(frame, candidates, source, searched=searched)
+                for (frame, searched), candidates in found
+            )
+            for result in _delayed(observed, self.look_ahead):
+                yield self.complete(result)
 
     def search(self, chosen: tuple[Frame, bool]) -> Any:
         """Do what needs one frame alone, and search it or not; return the candidates.
@@ -177,6 +117,11 @@ class Pipeline:
         for step in self.steps:
             complete = step.apply(complete)
         return complete
+
+    def facts(self) -> Facts:
+        """Return what the steps found out about the whole video, after its last frame."""
+        finding = (step for step in self.steps if isinstance(step, FindingStep))
+        return {name: fact for step in finding for name, fact in step.finish().items()}
 
 
 def _delayed(results: Iterable[FrameResult], seconds: Fraction) -> Iterator[FrameResult]:

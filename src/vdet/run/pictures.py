@@ -16,7 +16,7 @@ from vdet.media.images import PICTURE_SUFFIXES, is_picture_name, read_image
 from vdet.progress import Progress, no_progress
 from vdet.run.loop import build, named_errors
 from vdet.run.result import FrameResult
-from vdet.run.sinks.protocol import Output, Sink, SinkContext, check_sinks, open_sinks
+from vdet.run.sinks.protocol import Output, SinkContext, Sinks, check_sinks, open_sinks
 from vdet.run.threads import map_ordered
 
 
@@ -124,7 +124,7 @@ class PictureSearch:
         return finish
 
     @contextmanager
-    def open_sinks(self, outputs: Sequence[Output], *, overwrite: bool) -> Iterator[Sequence[Sink]]:
+    def open_sinks(self, outputs: Sequence[Output], *, overwrite: bool) -> Iterator[Sinks]:
         """Give the sinks of outputs that appear together at the end of the block."""
 
         def stage_pictures(image: Image, detections: Boxes) -> dict[str, Image]:
@@ -177,8 +177,8 @@ def run_pictures(
                     raise searched
                 result = searched()
                 with search.open_sinks(job.outputs, overwrite=overwrite) as own:
-                    for sink in (*own, *sinks):
-                        sink.write(result)
+                    own.write(result)
+                    sinks.write(result)
                 on_result(result)
             except ImageError as error:
                 failures.append(error)

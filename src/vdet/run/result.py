@@ -1,8 +1,9 @@
-"""The result of one frame."""
+"""The result of one frame, and what steps find out beside its tracks."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Protocol, cast
 
 import cv2
 
@@ -15,9 +16,23 @@ if TYPE_CHECKING:
     from vdet.lanes.road import Road
 
 
+class Fact(Protocol):
+    """What a step finds out of a frame or of a whole video: a frozen value of a type of its own.
+
+    `str` of a fact about a whole video is a warning for people; empty, where there is none.
+    """
+
+    def record(self) -> Any:
+        """Return it as values for JSON."""
+
+
+Facts = Mapping[str, Fact]
+"""Facts by their names, which are their keys in JSON."""
+
+
 @dataclass(frozen=True, slots=True)
 class FrameResult:
-    """A frame, what was detected in it, and the vehicles that are shown.
+    """A frame, what was detected in it, the vehicles that are shown, and facts about it.
 
     Attributes
     ----------
@@ -27,8 +42,8 @@ class FrameResult:
         The frame as it was read. All sinks get the same image, so none may change it.
     detections, tracks
         In pixels of that frame.
-    road
-        The lane; None if lanes are not looked for.
+    facts
+        What steps found out of it; the lane is "lane".
     searched
         Whether the detector searched the frame: see `detector.stride`. Where it did not, there are
         no detections.
@@ -38,13 +53,18 @@ class FrameResult:
     frame: Frame
     detections: Boxes
     tracks: tuple[Track, ...]
-    road: "Road | None" = None
+    facts: Facts = field(default_factory=dict)
     searched: bool = True
 
     @property
+    def road(self) -> "Road | None":
+        """The lane; None if lanes are not looked for."""
+        return cast("Road | None", self.facts.get("lane"))
+
+    @property
     def frame_tracks(self) -> FrameTracks:
-        """The tracks with the number and the time of the frame, and its lane if there is one."""
-        facts = {"lane": self.road.record()} if self.road else {}
+        """The tracks with the number and the time of the frame, and its facts."""
+        facts = {name: fact.record() for name, fact in self.facts.items()}
         return FrameTracks(self.frame.index, float(self.frame.time), self.tracks, facts)
 
     def _repr_png_(self) -> bytes:

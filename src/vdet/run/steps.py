@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 from vdet.config.schema import Settings
 from vdet.media import Frame, VideoInfo
 from vdet.plugins import STEPS, load_plugin
-from vdet.run.result import FrameResult
+from vdet.run.result import Facts, FrameResult
 from vdet.track.track import Track
 
 if TYPE_CHECKING:
@@ -36,6 +36,14 @@ class ParallelStep(Step, Protocol):
 
     def prepare(self, frame: Frame) -> None:
         """Do that part; several threads call this at once, each before `apply` for its frame."""
+
+
+@runtime_checkable
+class FindingStep(Step, Protocol):
+    """A step that finds out something about the whole video."""
+
+    def finish(self) -> Facts:
+        """Return it, after the last frame; sinks get it as `SinkContext.facts` when they finish."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,8 +74,18 @@ def make_steps(context: StepContext, others: Sequence[Step] = ()) -> list[Step]:
     ConfigError
         There is no step with a name in `settings.steps.names`.
     """
-    chosen = [load_plugin(STEPS, name) for name in context.settings.steps.names]
-    steps = [make(context) for make in (lane_step, region_step, *chosen)]
+    settings, width, height = context.settings, context.width, context.height
+    steps: list[Step | None] = []
+    if settings.lanes.enabled:
+        from vdet.lanes.road import RoadFinder
+
+        roads = RoadFinder(settings.camera.lens, settings.lanes, width, height)
+        steps.append(LaneStep(roads, settings.detector.foot))
+    if settings.regions:
+        from vdet.regions import Regions
+
+        steps.append(RegionStep(Regions(settings.regions, width, height)))
+    steps += [load_plugin(STEPS, name)(context) for name in settings.steps.names]
     return [step for step in (*steps, *others) if step is not None]
 
 
@@ -87,7 +105,8 @@ class LaneStep:
         """Add the road, and where the vehicles are on it."""
         view = self._views.pop(result.frame.index)
         road = self._roads.update(view, (track.box for track in result.tracks))
-        return replace(result, road=road, tracks=with_positions(result.tracks, road, self._foot))
+        tracks = with_positions(result.tracks, road, self._foot)
+        return replace(result, tracks=tracks, facts={**result.facts, "lane": road})
 
 
 def with_positions(tracks: Sequence[Track], road: "Road", foot: float) -> tuple[Track, ...]:
@@ -122,23 +141,3 @@ class RegionStep:
         detections = found[[n for n, each in enumerate(found) if contains(each.box.foot)]]
         tracks = tuple(track for track in result.tracks if contains(track.foot))
         return replace(result, detections=detections, tracks=tracks)
-
-
-def lane_step(context: StepContext) -> Step | None:
-    """Make a `LaneStep` if lanes are looked for."""
-    settings = context.settings
-    if not settings.lanes.enabled:
-        return None
-    from vdet.lanes.road import RoadFinder
-
-    roads = RoadFinder(settings.camera.lens, settings.lanes, context.width, context.height)
-    return LaneStep(roads, settings.detector.foot)
-
-
-def region_step(context: StepContext) -> Step | None:
-    """Make a `RegionStep` if there are regions."""
-    if not context.settings.regions:
-        return None
-    from vdet.regions import Regions
-
-    return RegionStep(Regions(context.settings.regions, context.width, context.height))

@@ -5,16 +5,13 @@ a thread that hangs in a read or write (for instance on a network disk that is g
 after `JOIN_TIMEOUT`, together with the files that only it has open.
 """
 
-import queue
 import sys
-import threading
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import AbstractContextManager, contextmanager
 from contextvars import copy_context
-from functools import partial
-from typing import Any, Self, TypeVar
+from typing import Any, TypeVar
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -26,72 +23,37 @@ _AHEAD = 8
 """Largest number of items that `map_ordered` takes ahead for each thread."""
 
 
-class StalledError(Exception):
-    """A read or a write did not end in time."""
+class _Thread(ThreadPoolExecutor):
+    """A thread that makes calls in turn, each in the context (`contextvars`) of its caller.
 
-
-class _Thread(threading.Thread):
-    """A thread that makes calls in turn; unlike a pool, it does not keep the program from ending.
-
-    It is a context manager. At the end of the block, all calls are still made.
+    At the end of the block all calls are still made, but nobody waits long for them.
     """
 
     def __init__(self, name: str) -> None:
-        super().__init__(name=name, daemon=True)
-        self._calls: queue.SimpleQueue[tuple[Future[Any], partial[Any]] | None]
-        self._calls = queue.SimpleQueue()
+        super().__init__(1, thread_name_prefix=name)
 
-    def __enter__(self) -> Self:
-        self.start()
-        return self
+    def call(self, function: Callable[..., R], *arguments: Any) -> Future[R]:
+        return self.submit(copy_context().run, function, *arguments)
 
     def __exit__(self, *_: object) -> None:
-        self._calls.put(None)
-        self.join(JOIN_TIMEOUT)
-
-    def submit(self, call: Callable[..., R], *arguments: Any) -> Future[R]:
-        future: Future[R] = Future()
-        self._calls.put((future, partial(copy_context().run, call, *arguments)))
-        return future
-
-    def run(self) -> None:
-        while entry := self._calls.get():
-            future, call = entry
-            if future.set_running_or_notify_cancel():
-                try:
-                    future.set_result(call())
-                except BaseException as error:
-                    future.set_exception(error)
-            del entry, future, call  # otherwise they hold an item until the next one comes
-
-
-def _result(future: Future[R], timeout: float | None) -> R:
-    """Wait for a result; raise `StalledError` if it does not come within `timeout` seconds."""
-    try:
-        return future.result(timeout)
-    except TimeoutError:
-        if future.done():  # then it is an error of the call itself
-            raise
-        raise StalledError from None
+        hangs = wait([self.submit(int)], JOIN_TIMEOUT).not_done
+        self.shutdown(wait=not hangs)
 
 
 @contextmanager
-def prefetch(items: Iterable[T], *, timeout: float | None = None) -> Iterator[Iterator[T]]:
+def prefetch(items: Iterable[T]) -> Iterator[Iterator[T]]:
     """Take `items` in a thread, at most `DEPTH` ahead of the reader.
 
-    A generator is closed in that thread too. If the next item does not come within `timeout`
-    seconds, `StalledError` is raised.
+    A generator is closed in that thread too.
     """
     iterator = iter(items)
-    ahead: deque[Future[Any]] = deque()
-    take_one = partial(next, iterator, _END)
 
     with _Thread("vdet-prefetch") as thread:
-        ahead.extend(thread.submit(take_one) for _ in range(DEPTH))
+        ahead = deque(thread.call(next, iterator, _END) for _ in range(DEPTH))
 
         def taken() -> Iterator[T]:
-            while (item := _result(ahead.popleft(), timeout)) is not _END:
-                ahead.append(thread.submit(take_one))
+            while (item := ahead.popleft().result()) is not _END:
+                ahead.append(thread.call(next, iterator, _END))
                 yield item
 
         try:
@@ -100,46 +62,34 @@ def prefetch(items: Iterable[T], *, timeout: float | None = None) -> Iterator[It
             for future in ahead:
                 future.cancel()
             if isinstance(iterator, Generator):
-                thread.submit(iterator.close)
+                thread.call(iterator.close)
 
 
 @contextmanager
 def write_async(
-    take: Callable[[T], object],
-    *,
-    within: AbstractContextManager[object],
-    timeout: float | None = None,
-    extra: Callable[[], float] = lambda: 0.0,
+    take: Callable[[T], object], *, within: AbstractContextManager[object]
 ) -> Iterator[Callable[[T], None]]:
     """Give a function that passes items to `take` in a thread; at most `DEPTH` items wait.
 
     The thread enters and leaves the context manager `within`, with an error if the block ends with
-    one. An error in the thread is raised by a later call, or when the block ends. A call raises
-    `StalledError` if there is no room within `timeout` seconds. So does the end of the block if the
-    last items, or leaving `within`, get no further within `timeout` and the `extra` seconds.
+    one. An error in the thread is raised by a later call, or when the block ends.
     """
-    waiting: deque[Future[object]] = deque()
-
     with _Thread("vdet-write") as thread:
-
-        def wait(most: int, limit: float | None) -> None:
-            """Wait until at most `most` calls are not done."""
-            while waiting and (len(waiting) > most or waiting[0].done()):
-                _result(waiting.popleft(), limit)
+        waiting: deque[Future[Any]] = deque([thread.call(within.__enter__)])
 
         def put(item: T) -> None:
-            wait(DEPTH - 1, timeout)
-            waiting.append(thread.submit(take, item))
+            while waiting and (len(waiting) >= DEPTH or waiting[0].done()):
+                waiting.popleft().result()
+            waiting.append(thread.call(take, item))
 
-        waiting.append(thread.submit(within.__enter__))
         try:
             yield put
-            limit = None if timeout is None else timeout + extra()
-            wait(0, limit)
+            for future in waiting:
+                future.result()
         except BaseException:
-            thread.submit(within.__exit__, *sys.exc_info())
+            thread.call(within.__exit__, *sys.exc_info())
             raise
-        _result(thread.submit(within.__exit__, None, None, None), limit)
+        thread.call(within.__exit__, None, None, None).result()
 
 
 @contextmanager
@@ -157,21 +107,25 @@ def map_ordered(
     """
     running: deque[tuple[T, Future[R] | None]] = deque()
 
+    def first() -> tuple[T, Any]:
+        item, future = running.popleft()
+        return item, future and future.result()
+
     with ThreadPoolExecutor(threads, thread_name_prefix="vdet-search") as pool:
 
+        def start(item: T) -> Future[R]:
+            return pool.submit(copy_context().run, function, item)
+
         def pairs() -> Iterator[tuple[T, Any]]:
-            work = 0
             for item in items:
-                call = partial(copy_context().run, function, item)
-                running.append((item, pool.submit(call) if is_work(item) else None))
-                work += running[-1][1] is not None
-                while work > threads or len(running) > _AHEAD * threads:
-                    first, future = running.popleft()
-                    work -= future is not None
-                    yield first, future and future.result()
+                running.append((item, start(item) if is_work(item) else None))
+                while (
+                    sum(future is not None for _, future in running) > threads
+                    or len(running) > _AHEAD * threads
+                ):
+                    yield first()
             while running:
-                first, future = running.popleft()
-                yield first, future and future.result()
+                yield first()
 
         try:
             yield pairs()

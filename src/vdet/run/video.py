@@ -18,10 +18,10 @@ from vdet.files import OutputFiles, record_input, recorded_inputs
 from vdet.media.reader import VideoReader
 from vdet.progress import Progress, no_progress
 from vdet.run.loop import Pipeline, build, named_errors, peek
-from vdet.run.result import FrameResult
+from vdet.run.result import Facts, FrameResult
 from vdet.run.sinks.protocol import Output, SinkContext, check_sinks, open_sinks, sink_kind
 from vdet.run.steps import Step
-from vdet.run.threads import StalledError, prefetch
+from vdet.run.threads import prefetch
 from vdet.track.track import VideoTracker
 from vdet.traffic.clock import Clock, find_clock
 from vdet.traffic.live import LiveTraffic
@@ -30,9 +30,7 @@ from vdet.workers import core_count, return_freed_memory
 log = logging.getLogger("vdet")
 
 LEAD = Fraction(2)
-"""Seconds before the frame at `Run.at` that are processed too, for detector and tracker."""
-
-IO_TIMEOUT = 120.0  # seconds
+"""Seconds around the time `Run.at` that are processed too, for detector and tracker."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,20 +44,14 @@ class Run:
     start, end
         Seconds from the first frame; frames with start ≤ time < end are processed.
     frames
-        Largest number of frames to process.
+        Maximum number of frames to process.
     at
         Time of the stage pictures, seconds from the first frame. If no output needs more, only the
-        frames from 2 s before it are processed.
+        frames from 2 s before it to 2 s after it are processed.
     overwrite
-        Replace outputs that are there already.
+        Replace outputs that already exist.
     threads
-        Number of threads that search; None for one per core.
-    codec_threads
-        Number of threads of the encoder; None for one per core.
-    timeout
-        Seconds in which the next frame must be read or written. After that the run fails, so that
-        a disk or a network that hangs does not stop a batch. Reading gets the duration of the part
-        before `start` in addition.
+        Number of threads that search, and of those that encode; None for one per core.
     """
 
     source: Path
@@ -71,8 +63,6 @@ class Run:
     at: Fraction = Fraction(0)
     overwrite: bool = False
     threads: int | None = None
-    codec_threads: int | None = None
-    timeout: float = IO_TIMEOUT
 
     def __post_init__(self) -> None:
         check_positive(frames=self.frames, threads=self.threads)
@@ -81,11 +71,6 @@ class Run:
     def is_part(self) -> bool:
         """Whether only a part of the video is processed."""
         return (self.start, self.end, self.frames) != (None, None, None)
-
-    @property
-    def shows_at(self) -> bool:
-        """Whether an output shows the frame at `at`."""
-        return any(sink_kind(output.sink).one_frame for output in self.outputs)
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,8 +87,10 @@ class RunTotals:
         Wall time.
     clock
         When the video was recorded, if that is known.
+    facts
+        What the steps found out about the whole video.
     summaries
-        What sinks say of their outputs, by the path of the output.
+        What sinks say of their outputs, by the path of the output: see `BaseSink`.
     """
 
     width: int
@@ -112,7 +99,8 @@ class RunTotals:
     tracks: int
     seconds: float
     clock: Clock | None = None
-    summaries: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    facts: Facts = field(default_factory=dict)
+    summaries: Mapping[Path, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,12 +111,6 @@ class OpenVideo:
     pipeline: Pipeline
     results: Generator[FrameResult]
     traffic: LiveTraffic
-
-
-def check_run(run: Run) -> None:
-    """Refuse a run whose outputs cannot be written, before any work. Raises `OutputError`."""
-    record_input(run.source)
-    check_sinks(run.outputs, overwrite=run.overwrite)
 
 
 @contextmanager
@@ -143,30 +125,23 @@ def open_video(
 
     Reading and searching run in threads.
     """
-    timeout = run.timeout + float(run.start or 0)
-    reading = _reader_and_frames(run)
-    try:
-        with named_errors(run.source, VideoError), prefetch(reading, timeout=timeout) as read:
-            reader: VideoReader = next(read)
-            latest = max(run.start or Fraction(0), run.at if run.shows_at else Fraction(0))
-            if reader.length is not None and latest >= reader.length:
-                raise _no_frame(run, f"{float(latest):.2f} s is beyond its end", reader.length)
-            images, frames = peek(read)
-            settings, info = run.settings, reader.info
-            try:
-                pipeline = build(model, settings, info, images, tracker=tracker, steps=steps)
-            except FrameSizeError as error:
-                log.warning("%s: gets no boxes: %s", run.source, error)
-                pipeline = build(as_model(lambda _: NO_BOXES), settings, info, images)
+    with named_errors(run.source, VideoError), prefetch(_reader_and_frames(run)) as read:
+        reader: VideoReader = next(read)
+        latest = max(run.start or Fraction(0), run.at)
+        if reader.length is not None and latest >= reader.length:
+            raise _no_frame(run, f"{float(latest):.2f} s is beyond its end", reader)
+        images, frames = peek(read)
+        settings, info = run.settings, reader.info
+        try:
+            pipeline = build(model, settings, info, images, tracker=tracker, steps=steps)
+        except FrameSizeError as error:
+            log.warning("%s: gets no boxes: %s", run.source, error)
+            pipeline = build(as_model(lambda _: NO_BOXES), settings, info, images)
+        del images  # otherwise they stay in memory for the whole run
+        threads = run.threads or core_count()
+        with closing(pipeline.follow(frames, run.source, threads=threads)) as results:
             traffic = LiveTraffic(settings, info.width, info.height)
-            del images  # otherwise they stay in memory for the whole run
-            threads = run.threads or core_count()
-            with closing(pipeline.follow(frames, run.source, threads=threads)) as results:
-                yield OpenVideo(reader, pipeline, results, traffic)
-    except StalledError as error:
-        raise VideoError(
-            f"{run.source}: nothing was read or written for {timeout:g} s; check the disk"
-        ) from error
+            yield OpenVideo(reader, pipeline, results, traffic)
 
 
 def _reader_and_frames(run: Run) -> Generator[Any]:
@@ -205,50 +180,57 @@ def run_video(
         The video cannot be read, too much of it is damaged, or the regions, the lines or the camera
         do not fit its frames.
     OutputError
-        An output cannot be written.
+        An output cannot be written; before any work, where that can be known.
 
     No output is left after an error.
     """
+    record_input(run.source)
+    check_sinks(run.outputs, overwrite=run.overwrite)
+    with OutputFiles(overwrite=run.overwrite) as files:
+        return write_outputs(run, model, files, tracker=tracker, steps=steps, progress=progress)
+
+
+def write_outputs(
+    run: Run,
+    model: DetectorModel,
+    files: OutputFiles,
+    *,
+    tracker: VideoTracker | None = None,
+    steps: Sequence[Step] = (),
+    progress: Progress = no_progress,
+) -> RunTotals:
+    """Do as `run_video`, into `files`: the outputs are complete, but do not have their names yet.
+
+    The others are those of `run_video`.
+    """
     began = time.perf_counter()
     return_freed_memory()
-    only_at = run.shows_at and all(sink_kind(each.sink).one_frame for each in run.outputs)
-    if only_at and run.frames is None:
-        run = replace(run, start=max(run.at - LEAD, run.start or Fraction(0)))
+    if run.outputs and all(sink_kind(output.sink).one_frame for output in run.outputs):
+        start = max(run.at - LEAD, run.start or Fraction(0))
+        run = replace(run, start=start, end=run.end or run.at + LEAD)
     with (
-        OutputFiles(overwrite=run.overwrite) as files,
         open_video(run, model, tracker=tracker, steps=steps) as video,
         open_sinks(run.outputs, context := _context(run, files, video)) as sinks,
     ):
         info = video.reader.info
-        advance = progress(None if only_at else video.reader.expected)
-        frames, writing, last, ids = 0, 0.0, None, set[int]()
+        advance = progress(video.reader.expected)
+        frames, ids = 0, set[int]()
         for result in video.results:
             video.traffic.add(result.frame_tracks)
-            written = time.perf_counter()
-            for sink in sinks:
-                sink.write(result)
-            writing += time.perf_counter() - written
+            sinks.write(result)
             ids.update(track.id for track in result.tracks)
             frames += 1
             advance(1)
-            if result.searched:
-                last = result.frame.time - info.start
-                if only_at and last >= run.at:
-                    break
-        if last is None or (run.shows_at and last < run.at):
-            when = "in the times given" if last is None else f"at {float(run.at):.2f} s or later"
-            raise _no_frame(run, f"no frame is read {when}", video.reader.length)
+        if not frames:
+            raise _no_frame(run, "there is no frame at these times", video.reader)
+        context.facts.update(video.pipeline.facts())
         counts = video.traffic.counts()
-        for warning in counts.warnings if counts else ():
+        found = map(str, context.facts.values())
+        for warning in (*(counts.warnings if counts else ()), *filter(None, found)):
             log.warning("%s: %s", run.source, warning)
     seconds = time.perf_counter() - began
-    log.info(
-        "%s: finding the vehicles took %.1f s, drawing and writing them %.1f s",
-        *(run.source, seconds - writing, writing),
-    )
-    pairs = zip(run.outputs, sinks, strict=True)
-    summaries = {str(output.path): sink.summary for output, sink in pairs if sink.summary}
-    return RunTotals(info.width, info.height, frames, len(ids), seconds, context.clock, summaries)
+    totals = info.width, info.height, frames, len(ids), seconds
+    return RunTotals(*totals, context.clock, context.facts, sinks.summaries)
 
 
 def _context(run: Run, files: OutputFiles, video: OpenVideo) -> SinkContext:
@@ -259,16 +241,15 @@ def _context(run: Run, files: OutputFiles, video: OpenVideo) -> SinkContext:
         info,
         is_part=run.is_part,
         at=run.at,
-        threads=run.codec_threads or core_count(),
+        threads=run.threads or core_count(),
         clock=find_clock(run.source, run.settings, info.tags.creation_time, float(info.start)),
-        timeout=run.timeout,
         outputs=run.outputs,
         traffic=video.traffic,
         stage_pictures=stage_pictures_of(video.pipeline.detector),
     )
 
 
-def _no_frame(run: Run, words: str, length: Fraction | None) -> VideoError:
+def _no_frame(run: Run, words: str, reader: VideoReader) -> VideoError:
     """Return the error of a time at which there is no frame."""
-    end = "check them" if length is None else f"it ends at {float(length):.2f} s"
+    end = "check them" if reader.length is None else f"it ends at {float(reader.length):.2f} s"
     return VideoError(f"{run.source}: {words}; {end}")

@@ -17,7 +17,7 @@ from vdet.boxes import Float32Array, Float64Array, Image
 from vdet.config.schema import OutputSettings
 from vdet.files import staged
 from vdet.media import Frame, Picture, VideoInfo
-from vdet.media.writer import VideoWriter, may_replace_video
+from vdet.media.writer import VideoWriter
 from vdet.synthetic.camera import NEAR, shaded
 from vdet.synthetic.scene import LINE_WIDTH, PERIOD, LaneLine, Scene
 from vdet.synthetic.vehicle import draw_vehicle
@@ -119,7 +119,7 @@ def write_clip(path: Path, scene: Scene, *, overwrite: bool = False) -> None:
     camera, rate = scene.camera, scene.rate
     info = VideoInfo(path, camera.width, camera.height, rate, 1 / rate, frames=scene.frames)
     with (
-        staged(path, overwrite=overwrite, may_replace=may_replace_video) as temporary,
+        staged(path, overwrite=overwrite) as temporary,
         VideoWriter(temporary, info, OutputSettings(crf=_CRF), name=path) as writer,
     ):
         for frame in frames(scene):

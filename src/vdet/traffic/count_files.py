@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from vdet.traffic.counts import Counts, Event, FlowRow, count_table, flow_table, zone_table
-from vdet.traffic.tables import VIDEO, is_json, join, plain_moment, write_json, write_table
+from vdet.traffic.tables import VIDEO, is_json, join_tables, plain_moment, write_content
 
 _EVENTS = (
     *("time", "clock", "frame", "name", "direction"),
@@ -24,7 +24,6 @@ _ZONES = (
     *("mean", "most", "mean_stay", "longest_stay"),
 )
 _FLOWS = ("start", "end", "from", "to", "class", "count")
-_COUNTS = {".totals": _TOTALS, ".zones": _ZONES}
 
 NOWHERE = "(none)"
 """In tables, where a flow leads that ends at its first line or zone."""
@@ -49,21 +48,25 @@ def write_counts(path: Path, videos: Videos, interval: int | None = None) -> Non
     ConfigError
         As `count_table`.
     """
+    write_content(path, counts_content(path, videos, interval))
+
+
+def counts_content(path: Path, videos: Videos, interval: int | None = None) -> Any:
+    """Return what `write_counts` writes, as `write_content` takes it."""
     every = list(videos.values())
     if is_json(path):
         tables = {
             "totals": _items(_TOTALS, count_table(every, interval)),
             "zones": _items(_ZONES, zone_table(every, interval)),
         }
-        _write_json(path, videos, interval, tables, events=True)
-    elif _is_table(path, ".totals"):
-        write_table(path, _TOTALS, map(_cells, count_table(every, interval)))
-    elif _is_table(path, ".zones"):
-        write_table(path, _ZONES, map(_cells, zone_table(every, interval)))
-    else:
-        alone = len(videos) == 1  # then the name is left out
-        rows = [(name, *_event(each, e)) for name, each in videos.items() for e in each.events]
-        write_table(path, (VIDEO, *_EVENTS)[alone:], [row[alone:] for row in rows])
+        return _json(videos, interval, tables, events=True)
+    if _is_table(path, ".totals"):
+        return [_TOTALS, *map(_cells, count_table(every, interval))]
+    if _is_table(path, ".zones"):
+        return [_ZONES, *map(_cells, zone_table(every, interval))]
+    alone = len(videos) == 1  # then the name is left out
+    rows = [(name, *_event(each, e)) for name, each in videos.items() for e in each.events]
+    return [(VIDEO, *_EVENTS)[alone:], *(row[alone:] for row in rows)]
 
 
 def write_flows(path: Path, videos: Videos, interval: int | None = None) -> None:
@@ -71,18 +74,20 @@ def write_flows(path: Path, videos: Videos, interval: int | None = None) -> None
 
     Parameters and errors as of `write_counts`.
     """
+    write_content(path, flows_content(path, videos, interval))
+
+
+def flows_content(path: Path, videos: Videos, interval: int | None = None) -> Any:
+    """Return what `write_flows` writes, as `write_content` takes it."""
     every = list(videos.values())
     rows = flow_table(every, interval)
     if is_json(path):
         tables = {"flows": _items(_FLOWS, rows), "matrix": flow_matrix(every, rows)}
-        _write_json(path, videos, interval, tables, events=False)
-    elif _is_table(path, ".matrix"):
+        return _json(videos, interval, tables, events=False)
+    if _is_table(path, ".matrix"):
         matrix = flow_matrix(every, rows)
-        write_table(
-            path, _matrix_columns(every), [(name, *row.values()) for name, row in matrix.items()]
-        )
-    else:
-        write_table(path, _FLOWS, map(_cells, rows))
+        return [_matrix_columns(every), *((name, *row.values()) for name, row in matrix.items())]
+    return [_FLOWS, *map(_cells, rows)]
 
 
 def flow_matrix(videos: Sequence[Counts], rows: Iterable[FlowRow]) -> dict[str, dict[str, int]]:
@@ -98,19 +103,22 @@ def _matrix_columns(videos: Iterable[Counts]) -> tuple[str, ...]:
     return ("from", *dict.fromkeys(name for each in videos for name, _ in each.ways), NOWHERE)
 
 
-def join_counts(outputs: Mapping[str, Path], path: Path) -> None:
-    """Write the counts of the videos of a batch into one file, from the file of each.
+def join_counts(videos: Mapping[str, Any], path: Path) -> None:
+    """Write one file over the videos of a batch, from the content for each.
 
-    A row gets the name of its video. Errors as of `join`.
+    A row gets the name of its video; JSON has the totals over all videos, and the JSON of each.
     """
-    columns = next((c for kind, c in _COUNTS.items() if _is_table(path, kind)), _EVENTS)
-    join(outputs, path, columns, lambda videos: _joined("totals", _TOTALS[2:-1], videos))
+    _join(videos, path, "totals", _TOTALS)
 
 
-def join_flows(outputs: Mapping[str, Path], path: Path) -> None:
+def join_flows(videos: Mapping[str, Any], path: Path) -> None:
     """Write the flows of the videos of a batch into one file, as `join_counts` does."""
-    columns = None if _is_table(path, ".matrix") else _FLOWS
-    join(outputs, path, columns, lambda videos: _joined("flows", _FLOWS[2:-1], videos))
+    _join(videos, path, "flows", _FLOWS)
+
+
+def _join(videos: Mapping[str, Any], path: Path, table: str, columns: Sequence[str]) -> None:
+    content = _joined(table, columns[2:-1], videos) if is_json(path) else join_tables(videos)
+    write_content(path, content)
 
 
 def _joined(table: str, keys: Sequence[str], videos: Mapping[str, Any]) -> dict[str, Any]:
@@ -122,9 +130,9 @@ def _joined(table: str, keys: Sequence[str], videos: Mapping[str, Any]) -> dict[
     return {table: rows, "videos": videos}
 
 
-def _write_json(
-    path: Path, videos: Videos, interval: int | None, tables: Mapping[str, Any], *, events: bool
-) -> None:
+def _json(
+    videos: Videos, interval: int | None, tables: Mapping[str, Any], *, events: bool
+) -> dict[str, Any]:
     facts: dict[str, Any] = {}
     for name, each in videos.items():
         begin = plain_moment(each.clock and each.clock.at(each.spans[0][0]))
@@ -134,7 +142,7 @@ def _write_json(
                 dict(zip(_EVENTS, _event(each, event), strict=True)) for event in each.events
             ]
     alone = facts.popitem()[1] if len(facts) == 1 else {"videos": facts}
-    write_json(path, {"interval": interval, **tables, **alone})
+    return {"interval": interval, **tables, **alone}
 
 
 def _is_table(path: Path, kind: str) -> bool:

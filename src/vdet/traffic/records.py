@@ -12,7 +12,7 @@ from vdet.polygons import Point
 from vdet.track.track import FrameTracks, State, Track
 from vdet.traffic.clock import Clock
 from vdet.traffic.speeds import KMH, SpeedMeter, Speeds
-from vdet.traffic.tables import VIDEO, is_json, join, plain_moment, write_json, write_table
+from vdet.traffic.tables import VIDEO, is_json, join_tables, plain_moment, write_content
 
 PATH_STEP = 0.01
 """Distance after which a path gets its next point, as a share of the frame's width.
@@ -161,23 +161,24 @@ class VehicleRecords:
 
 def write_records(records: Iterable[VehicleRecord], path: Path, clock: Clock | None = None) -> None:
     """Write the records; the suffix of `path` chooses the format."""
+    write_content(path, records_content(records, path, clock))
+
+
+def records_content(
+    records: Iterable[VehicleRecord], path: Path, clock: Clock | None = None
+) -> list[Any]:
+    """Return what the file `path` says of the records, as `write_content` takes it."""
     rows = [_row(each, clock) for each in records]
-    if is_json(path):
-        write_json(path, [_item(*row) for row in rows])
+    return [_item(*row) for row in rows] if is_json(path) else [_COLUMNS, *rows]
+
+
+def join_records(videos: Mapping[str, list[Any]], target: Path) -> None:
+    """Write one file over many videos, from the content for each; each record gets its video."""
+    if is_json(target):
+        items = [{VIDEO: name, **item} for name, items in videos.items() for item in items]
+        write_content(target, items)
     else:
-        write_table(path, _COLUMNS, rows)
-
-
-def join_records(outputs: Mapping[str, Path], target: Path) -> None:
-    """Write one file over those of many videos, by their names; each record gets its video.
-
-    Errors as of `join`.
-    """
-    join(outputs, target, _COLUMNS, _with_videos)
-
-
-def _with_videos(videos: Mapping[str, Any]) -> list[dict[str, Any]]:
-    return [{VIDEO: name, **item} for name, items in videos.items() for item in items]
+        write_content(target, join_tables(videos))
 
 
 def _row(record: VehicleRecord, clock: Clock | None) -> list[Any]:

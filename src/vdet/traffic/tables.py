@@ -3,13 +3,11 @@
 import csv
 import json
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from vdet.errors import OutputError
 from vdet.files import write_text
 
 SUFFIXES = (".csv", ".json")
@@ -56,55 +54,17 @@ def write_json(path: Path, value: Any) -> None:
     write_text(path, text)
 
 
-def join(
-    outputs: Mapping[str, Path],
-    path: Path,
-    columns: tuple[str, ...] | None,
-    joined: Callable[[Mapping[str, Any]], Any],
-) -> None:
-    """Join the files of many videos, given by the names of the videos, into one of the same form.
-
-    `joined` makes the JSON of all videos from that of each. Tables have `columns`; None for those
-    of the first one.
-
-    Raises
-    ------
-    OutputError
-        One of `outputs` has another content.
-    """
-    if not is_json(path):
-        rows = _rows(outputs, columns)
-        write_table(path, next(rows, [VIDEO]), rows)
-        return
-    values: dict[str, Any] = {}
-    for name, each in outputs.items():
-        with _checked(each):
-            values[name] = json.loads(each.read_text("utf-8"))
-            joined({name: values[name]})
-    write_json(path, joined(values))
+def write_content(path: Path, content: Any) -> None:
+    """Write JSON or a table (a list: heading, rows), as the suffix of `path` says."""
+    if is_json(path):
+        write_json(path, content)
+    else:
+        heading, *rows = content
+        write_table(path, heading, rows)
 
 
-def _rows(outputs: Mapping[str, Path], columns: tuple[str, ...] | None) -> Iterator[Sequence[str]]:
-    """Yield the heading, and the rows of all tables."""
-    if columns:
-        yield VIDEO, *columns
-    for name, path in outputs.items():
-        with _checked(path), path.open(encoding="utf-8", newline="") as file:
-            rows = csv.reader(file, strict=True)
-            heading = tuple(next(rows, ()))
-            if columns is None:
-                columns = heading
-                yield VIDEO, *columns
-            if heading != columns:
-                raise ValueError("other columns")
-            yield from ([name, *row] for row in rows)
-
-
-@contextmanager
-def _checked(path: Path) -> Iterator[None]:
-    """Turn what is raised for an unexpected content into an `OutputError`."""
-    try:
-        yield
-    except (ValueError, TypeError, LookupError, csv.Error) as error:
-        message = f"{path}: has other content than expected; remove it, and run again"
-        raise OutputError(message) from error
+def join_tables(tables: Mapping[str, Sequence[Sequence[Any]]]) -> list[Sequence[Any]]:
+    """Return one table over those of many videos, by their names, with the name in each row."""
+    heading = next((table[0] for table in tables.values()), ())
+    rows = ([name, *row] for name, table in tables.items() for row in table[1:])
+    return [[VIDEO, *heading], *rows]

@@ -39,7 +39,7 @@ def test_a_run_writes_a_page_that_shows_the_video_of_the_run(
     made = page_of(tmp_path / "page")
     (video,) = made.all("video")
     assert video["src"] == "../out.mp4"
-    facts = totals.summaries[str(tmp_path / "page")]
+    facts = totals.summaries[tmp_path / "page"]
     assert (facts["frames"], facts["vehicles"], facts["most"]) == (COUNT, 1, 1)
     assert facts["seconds"] == pytest.approx(COUNT / 25)
     (thumbnail,) = (each for each in made.all("img") if each.get("alt") == "vehicle 1")

@@ -21,13 +21,14 @@ from vdet.media import Frame, Picture, VideoInfo
 from vdet.media.writer import VideoWriter
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import (
+    BaseSink,
     Output,
     SinkContext,
     SinkKind,
     check_sinks,
     open_sink,
 )
-from vdet.run.video import Run, check_run
+from vdet.run.video import Run
 
 MOMENTS = ("open", "enter", "first", "middle", "end")
 
@@ -147,7 +148,6 @@ class TestFailure:
             run_red(job)
         assert list(tmp_path.iterdir()) == []
         self.set_failure(register, "never", RuntimeError())
-        check_run(job)
         run_red(job)
         names = {path.name for path in tmp_path.iterdir()}
         assert names == {"fragile.txt", "out.csv", "out.mp4", "stages", "page", "crops"}
@@ -180,7 +180,7 @@ def test_frames_too_small_to_be_searched_get_no_boxes_but_every_output(
         video=tmp_path / "out.mp4",
         tracks=tmp_path / "out.csv",
         stages=tmp_path / "stages",
-        collects=tmp_path,
+        collects=tmp_path / "collects",
     )
     totals = run_red(Run(source, wanted))
     assert (totals.frames, totals.tracks) == (5, 0)
@@ -205,14 +205,62 @@ def test_a_sink_refuses_results_that_it_cannot_take(
     output = Output(sink, tmp_path / name)
     with OutputFiles() as files:
         context = SinkContext(files, SETTINGS, video_info() if is_video else None)
-        with pytest.raises(OutputError, match=f"{name}: the sink {sink} {words}"):
-            open_sink(output, context)
+        with (
+            pytest.raises(OutputError, match=f"{name}: the sink {sink} {words}"),
+            open_sink(output, context),
+        ):
+            pass
     assert list(tmp_path.iterdir()) == []
+
+
+@dataclass(frozen=True)
+class MostAtOnce:
+    """A fact about a whole video."""
+
+    vehicles: int
+
+    def __str__(self) -> str:
+        return f"shows {self.vehicles} vehicle at once"
+
+    def record(self) -> dict[str, int]:
+        return {"vehicles": self.vehicles}
+
+
+class CountsMost:
+    """A step that finds out the largest number of tracks in a frame."""
+
+    most = 0
+
+    def apply(self, result: FrameResult) -> FrameResult:
+        self.most = max(self.most, len(result.tracks))
+        return result
+
+    def finish(self) -> dict[str, MostAtOnce]:
+        return {"most": MostAtOnce(self.most)}
+
+
+def test_what_a_step_finds_out_of_a_video_reaches_its_sinks_totals_and_warnings(
+    red_clip: Path, tmp_path: Path, register: Register, caplog: pytest.LogCaptureFixture
+) -> None:
+    seen: list[object] = []
+
+    class Reads(BaseSink):
+        def write(self, _: FrameResult) -> None:
+            assert not self.context.facts
+
+        def finish(self) -> None:
+            seen.append(dict(self.context.facts))
+
+    register("reads", SinkKind(Reads))
+    totals = run_red(Run(red_clip, outputs(reads=tmp_path / "a")), steps=[CountsMost()])
+    assert totals.facts == {"most": MostAtOnce(1)}
+    assert seen == [totals.facts]
+    assert f"{red_clip}: shows 1 vehicle at once" in caplog.messages
 
 
 class TestCheck:
     def test_a_folder_that_was_written_before_is_refused(self, tmp_path: Path) -> None:
         (tmp_path / "3-boxes.png").touch()
-        with pytest.raises(OutputError, match=r"3-boxes\.png: is there already"):
+        with pytest.raises(OutputError, match=r"3-boxes\.png: already exists"):
             check_sinks([Output("stages", tmp_path)], overwrite=False)
         check_sinks([Output("stages", tmp_path)], overwrite=True)

@@ -12,6 +12,7 @@ from red_cars import CAR, HEIGHT, SETTINGS, WIDTH, road
 from run.red_runs import model_for, result_of, write
 from run.sinks.test_overlay import LANE, LENS, road_seen
 from vdet.boxes import Box, Boxes, Image
+from vdet.errors import OutputError
 from vdet.lanes.road import Lane, Road
 from vdet.media.images import read_image
 from vdet.run.result import FrameResult
@@ -37,7 +38,8 @@ def stages(folder: Path, at: Fraction, *results: FrameResult) -> list[str]:
 
 def test_pictures_are_made_of_the_first_frame_at_or_after_the_moment(tmp_path: Path) -> None:
     early, late = (detected(time=Fraction(t)) for t in (1, 3))
-    assert stages(tmp_path / "a", Fraction(2), early) == []
+    with pytest.raises(OutputError, match=r"red\.mp4: no frame at 2\.00 s or later"):
+        stages(tmp_path / "a", Fraction(2), early)
     assert stages(tmp_path / "b", Fraction(2), early, late) == NAMES
     assert stages(tmp_path / "c", Fraction(3), early, late) == NAMES
 

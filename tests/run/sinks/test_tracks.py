@@ -101,7 +101,9 @@ def road(lane: Lane | None) -> Road:
 
 def written_with_lanes(path: Path) -> str:
     lanes = (LANE, None, None)
-    found = [replace(one, road=road(lane)) for one, lane in zip(RESULTS, lanes, strict=True)]
+    found = [
+        replace(one, facts={"lane": road(lane)}) for one, lane in zip(RESULTS, lanes, strict=True)
+    ]
     return written(path, found)
 
 

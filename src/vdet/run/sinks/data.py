@@ -16,12 +16,12 @@ from vdet.files import print_now
 from vdet.labels.formats import SourceVideo, TrackWriter, format_for, track_suffixes
 from vdet.labels.records import JSON_LINES, track_record
 from vdet.run.result import FrameResult
-from vdet.run.sinks.protocol import STANDARD_OUTPUT, BaseSink, SinkContext, SinkKind, of_files
+from vdet.run.sinks.protocol import STANDARD_OUTPUT, BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.traffic import count_files
-from vdet.traffic.records import VehicleRecords, join_records, write_records
-from vdet.traffic.tables import SUFFIXES
+from vdet.traffic.records import VehicleRecords, join_records, records_content
+from vdet.traffic.tables import SUFFIXES, write_content
 
-WriteCounts = Callable[[Path, count_files.Videos, int | None], None]
+MakeContent = Callable[[Path, count_files.Videos, int | None], Any]
 
 
 class TrackSink(BaseSink):
@@ -109,18 +109,29 @@ class JsonSink(BaseSink):
 JSON = SinkKind(JsonSink, what="lists of boxes", writes_standard_output=True, takes="pictures")
 
 
-class VehicleSink(BaseSink):
+class _TableSink(BaseSink):
+    """Writes a table or JSON at the end; `make_content` is what `write_content` takes."""
+
+    make_content: Callable[[], Any]
+
+    def finish(self) -> None:
+        """Write it, and keep it for the file over all videos."""
+        self.summary = self.make_content()
+        write_content(self.context.files.stage(self.path), self.summary)
+
+
+class VehicleSink(_TableSink):
     """Keeps a record of each vehicle, and writes all at the end, as `.csv` or `.json`."""
 
     def __init__(self, path: Path, context: SinkContext) -> None:
         super().__init__(path, context)
         self._records = VehicleRecords(self.video.width)
 
-    def finish(self) -> None:
-        """Write the records."""
+    def make_content(self) -> Any:
+        """Return the records."""
         traffic = self.context.traffic
         records = self._records.end(traffic.speeds if traffic else None)
-        write_records(records, self.context.files.stage(self.path), self.context.clock)
+        return records_content(records, self.path, self.context.clock)
 
     def write(self, result: FrameResult) -> None:
         """Add a frame."""
@@ -128,39 +139,41 @@ class VehicleSink(BaseSink):
 
 
 VEHICLES = SinkKind(
-    VehicleSink, SUFFIXES, "records of vehicles", takes="videos", total=of_files(join_records)
+    VehicleSink,
+    SUFFIXES,
+    "records of vehicles",
+    takes="videos",
+    total=BatchTotal("all", join_records),
 )
 
 
-class CountsSink(BaseSink):
+class CountsSink(_TableSink):
     """Writes which vehicles cross lines and visit zones, or their flows, at the end of the video.
 
-    `write_table` is `write_counts` or `write_flows`; the end of the name chooses the table.
+    `make` is `counts_content` or `flows_content`; the end of the name chooses the table.
     """
 
-    def __init__(self, write_table: WriteCounts, path: Path, context: SinkContext) -> None:
+    def __init__(self, make: MakeContent, path: Path, context: SinkContext) -> None:
         super().__init__(path, context)
-        self._write_table = write_table
+        self._make = make
         if not context.settings.traffic:
-            raise OutputError(f"{path}: there is nothing to count at; give lines or zones")
+            raise OutputError(f"{path}: there is nothing to count at; add lines or zones")
 
-    def finish(self) -> None:
-        """Write the table."""
+    def make_content(self) -> Any:
+        """Return the table."""
         counts = self.context.traffic.counts() if self.context.traffic else None
-        if counts:
-            counts = replace(counts, clock=self.context.clock)
-            target = self.context.files.stage(self.path)
-            interval = self.context.settings.traffic.seconds
-            self._write_table(target, {self.video.path.name: counts}, interval)
+        assert counts  # the settings have lines or zones
+        videos = {self.video.path.name: replace(counts, clock=self.context.clock)}
+        return self._make(self.path, videos, self.context.settings.traffic.seconds)
 
     def write(self, result: FrameResult) -> None:
         """Do nothing: the run counts the vehicles."""
 
 
 COUNTS, FLOWS = (
-    SinkKind(partial(CountsSink, write), ends, what, takes="videos", total=of_files(join))
-    for what, write, ends, join in (
-        ("counts", count_files.write_counts, count_files.COUNT_SUFFIXES, count_files.join_counts),
-        ("flows", count_files.write_flows, count_files.FLOW_SUFFIXES, count_files.join_flows),
+    SinkKind(partial(CountsSink, make), ends, what, takes="videos", total=BatchTotal("all", join))
+    for what, make, ends, join in (
+        ("counts", count_files.counts_content, count_files.COUNT_SUFFIXES, count_files.join_counts),
+        ("flows", count_files.flows_content, count_files.FLOW_SUFFIXES, count_files.join_flows),
     )
 )

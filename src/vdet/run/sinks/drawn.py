@@ -13,7 +13,7 @@ from vdet.draw.paint import Color, Surface, draw_lines
 from vdet.errors import OutputError
 from vdet.media import Frame, Picture, Planes, VideoInfo
 from vdet.media.images import PICTURE_SUFFIXES, encode_image
-from vdet.media.writer import VIDEO_SUFFIXES, VideoWriter, may_replace_video
+from vdet.media.writer import VIDEO_SUFFIXES, VideoWriter
 from vdet.polygons import Point
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import BaseSink, SinkContext, SinkKind
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from vdet.traffic.counter import VehicleCounter
 
 PICTURE_LABEL = ("score",)
-FINISH_RATE = 5_000_000
-"""Bytes a second. At its end an .mp4 is written once more, with its index in front."""
 
 
 class Overlay:
@@ -155,7 +153,7 @@ class VideoSink(BaseSink):
         counter = context.traffic.counter if context.traffic else None
         self._overlay = Overlay(context.settings, self.video, counter)
         writer = VideoWriter(
-            context.files.stage(self.path, may_replace_video),
+            context.files.stage(self.path),
             self.video,
             context.settings.output,
             name=self.path,
@@ -169,12 +167,7 @@ class VideoSink(BaseSink):
             if planes := frame.picture.planes:
                 self._used.append(planes)
 
-        self._encoding = write_async(
-            write,
-            within=writer,
-            timeout=context.timeout,
-            extra=lambda: writer.size / FINISH_RATE,
-        )
+        self._encoding = write_async(write, within=writer)
         self._encode = self._encoding.__enter__()
         return self
 
@@ -187,7 +180,7 @@ class VideoSink(BaseSink):
         self._encode(Frame(result.frame.index, result.frame.time, Picture(surface)))
 
 
-VIDEO = SinkKind(VideoSink, VIDEO_SUFFIXES, "videos", takes="videos", may_replace=may_replace_video)
+VIDEO = SinkKind(VideoSink, VIDEO_SUFFIXES, "videos", takes="videos")
 
 
 class PictureSink(BaseSink):

@@ -3,10 +3,12 @@
 import re
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from vdet.boxes import Image
 from vdet.config.rendering import render
 from vdet.draw.boxes import WHITE, color_of, draw_box, draw_label, draw_regions
+from vdet.errors import OutputError
 from vdet.files import write_text
 from vdet.lanes.drawing import stage_pictures
 from vdet.media import Picture
@@ -17,7 +19,7 @@ from vdet.pages.video import Player, VideoPage
 from vdet.regions import lay_regions
 from vdet.run.result import FrameResult
 from vdet.run.sinks.drawn import PICTURE_LABEL, label_text
-from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind, VideoPart
+from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.traffic.overview import BestCrops, Crop
 from vdet.traffic.records import VehicleRecords
 
@@ -34,6 +36,13 @@ class StagesSink(BaseSink):
         super().__init__(path, context)
         self._time = context.at + (context.video.start if context.video else 0)
         self._is_done = False
+
+    def finish(self) -> None:
+        """Refuse a time that no frame has. Raises `OutputError`."""
+        if not self._is_done:
+            source = self.context.video.path if self.context.video else self.path
+            at = float(self.context.at)
+            raise OutputError(f"{source}: no frame at {at:.2f} s or later; use an earlier --at")
 
     def write(self, result: FrameResult) -> None:
         """Write the pictures if it is the frame."""
@@ -122,7 +131,7 @@ class PageSink(BaseSink):
         """Write the page."""
         self._keep(self._crops.end())
         page = self._page()
-        self.summary = page.facts.model_dump()
+        self.summary = {"folder": self.path.name, **page.facts.model_dump()}
         write_text(self._file, page.html())
 
     def write(self, result: FrameResult) -> None:
@@ -183,9 +192,12 @@ class PageSink(BaseSink):
         return Player(path.name, link_to(path, self.path), bool(drawn), start)
 
 
-def _write_index(parts: Mapping[str, VideoPart], target: Path) -> None:
-    pages = [(name, part.place / PAGE_NAME, part.summary) for name, part in parts.items()]
-    write_index([(name, page, VideoFacts(**facts)) for name, page, facts in pages if facts], target)
+def _write_index(summaries: Mapping[str, dict[str, Any]], target: Path) -> None:
+    pages = [
+        (name, Path(name).parent / facts["folder"] / PAGE_NAME, VideoFacts(**facts))
+        for name, facts in summaries.items()
+    ]
+    write_index(pages, target)
 
 
 _INDEX = BatchTotal("index", _write_index, suffix=".html")

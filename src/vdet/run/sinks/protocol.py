@@ -3,7 +3,7 @@
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, Literal, Protocol, Self
@@ -11,10 +11,10 @@ from typing import Any, Literal, Protocol, Self
 from vdet.config.schema import Settings
 from vdet.detect.protocol import StagePictures
 from vdet.errors import OutputError
-from vdet.files import MayReplace, OutputFiles, any_file, check_output, output_errors
+from vdet.files import OutputFiles, check_output, output_errors
 from vdet.media import VideoInfo
 from vdet.plugins import SINKS, load_plugin
-from vdet.run.result import FrameResult
+from vdet.run.result import Fact, FrameResult
 from vdet.traffic.clock import Clock
 from vdet.traffic.live import LiveTraffic
 
@@ -59,12 +59,12 @@ class SinkContext:
         Number of threads of an encoder; None lets it choose.
     clock
         When the video begins; None where it is not known.
-    timeout
-        Seconds after which a write that does not end is an error.
     outputs
         All outputs of the run, for a sink that refers to another.
     traffic
         The counts and the speeds of a video, up to the latest result; None for still pictures.
+    facts
+        What the steps found out about the whole video; empty before sinks finish.
     stage_pictures
         Returns a picture of each stage of the detection by its name, in order. It takes the image
         of a frame and its detections.
@@ -77,19 +77,19 @@ class SinkContext:
     at: Fraction = Fraction(0)
     threads: int | None = None
     clock: Clock | None = None
-    timeout: float | None = None
     outputs: tuple[Output, ...] = ()
     traffic: LiveTraffic | None = None
+    facts: dict[str, Fact] = field(default_factory=dict)
     stage_pictures: StagePictures = lambda *_: {}
 
 
 class BaseSink:
     """What most sinks have in common: they finish where the run ends without an error.
 
-    `summary` is what a batch keeps of the output in its manifest, as values for JSON.
+    `summary` is what a file over all videos of a batch needs of the output, as values for JSON.
     """
 
-    summary: Mapping[str, Any] | None = None
+    summary: Any = None
 
     def __init__(self, path: Path, context: SinkContext) -> None:
         self.path = path
@@ -113,41 +113,22 @@ class BaseSink:
 
 
 @dataclass(frozen=True, slots=True)
-class VideoPart:
-    """An output of one video of a batch, from which a `BatchTotal` is made.
-
-    Attributes
-    ----------
-    path
-        The output.
-    place
-        Where it lies as seen from the folder of the total.
-    summary
-        What the sink returned as its `summary`; None if it is not known.
-    """
-
-    path: Path
-    place: Path
-    summary: Mapping[str, Any] | None = None
-
-
-@dataclass(frozen=True, slots=True)
 class BatchTotal:
-    """A file over all videos of a batch, made from the outputs of each.
+    """A file over all videos of a batch, made from what the sinks say of their outputs.
 
     Attributes
     ----------
     name
         Its name in the folder of the batch, without suffix.
     write
-        Function that gets the outputs that exist, by the name of their video (as in the folder of
-        the batch, without suffix), and the file to write.
+        Function that gets the `summary` of each output that was made, by the name of its video (as
+        in the folder of the batch, without suffix), and the file to write.
     suffix
         Suffix of the file; None for that of the outputs.
     """
 
     name: str
-    write: Callable[[Mapping[str, VideoPart], Path], None]
+    write: Callable[[Mapping[str, Any], Path], None]
     suffix: str | None = None
 
 
@@ -174,9 +155,6 @@ class SinkKind:
         frames are read than it needs.
     takes
         "videos" or "pictures" if the sink can take results of these only.
-    may_replace
-        Says whether `--overwrite` may replace a file that is there. `OutputFiles.stage` takes it
-        too, for a file that appears during the run.
     total
         What a batch writes in addition, over all its videos.
     """
@@ -188,7 +166,6 @@ class SinkKind:
     writes_standard_output: bool = False
     one_frame: bool = False
     takes: Literal["videos", "pictures", "both"] = "both"
-    may_replace: MayReplace = any_file
     total: BatchTotal | None = None
 
     @property
@@ -217,7 +194,7 @@ def check_sinks(outputs: Sequence[Output], *, overwrite: bool, makes_folder: boo
     ------
     OutputError
         Two outputs have one path, a suffix is not one of the sink's, or an output cannot be written
-        or exists already.
+        or already exists.
     ConfigError
         There is no sink with such a name.
     """
@@ -225,35 +202,36 @@ def check_sinks(outputs: Sequence[Output], *, overwrite: bool, makes_folder: boo
     for output in outputs:
         kind, path = _kind_for(output), output.path
         if path.resolve() in seen:
-            raise OutputError(f"{path}: is given for two outputs; name another file for one")
+            raise OutputError(f"{path}: is used for two outputs; rename one")
         seen.add(path.resolve())
         if path == STANDARD_OUTPUT and kind.writes_standard_output:
             continue
         if kind.marker:
-            path = min(path.glob(kind.marker), default=path / kind.marker)
+            written = path.glob(kind.marker) if os.path.isdir(path) else ()  # noqa: PTH112
+            path = min(written, default=path / kind.marker)
         check_output(
             path,
             overwrite=overwrite,
             makes_folder=makes_folder or bool(kind.marker),
-            may_replace=kind.may_replace,
         )
 
 
-def output_state(output: Output) -> tuple[int, int] | None:
+def output_state(output: Output, place: Path | None = None) -> tuple[int, int] | None:
     """Return the bytes of an output and the time of its last change; None if it is not there.
 
     The time is in nanoseconds since 1970. Of a folder they are the sum and the latest of the files
-    in it that the sink writes.
+    in it that the sink writes. Before they have their names, they lie at `place`.
     """
-    marker, path = sink_kind(output.sink).marker, output.path
+    marker, path = sink_kind(output.sink).marker, place or output.path
     if not (os.path.isdir if marker else os.path.isfile)(path):  # its name may be too long
         return None
     states = [file.stat() for file in (path.glob(marker) if marker else [path])]
     return sum(s.st_size for s in states), max((s.st_mtime_ns for s in states), default=0)
 
 
-def open_sink(output: Output, context: SinkContext) -> "_NamedSink":
-    """Open the sink of an output. An `OSError` of the sink becomes an `OutputError` with its path.
+@contextmanager
+def open_sink(output: Output, context: SinkContext) -> Iterator[Sink]:
+    """Open the sink of an output. An `OSError` of its `with` block is that of the output.
 
     Raises
     ------
@@ -267,49 +245,33 @@ def open_sink(output: Output, context: SinkContext) -> "_NamedSink":
     source = "pictures" if context.video is None else "videos"
     if kind.takes not in ("both", source):
         raise OutputError(f"{output.path}: the sink {output.sink} is for {kind.takes}")
-    with output_errors(output.path):
-        return _NamedSink(kind.open(output.path, context), output.path)
+    with output_errors(output.path), kind.open(output.path, context) as sink:
+        yield sink
+
+
+class Sinks:
+    """The open sinks of several outputs, which get the same results."""
+
+    def __init__(self, sinks: Mapping[Path, Sink]) -> None:
+        self._sinks = sinks
+
+    def write(self, result: FrameResult) -> None:
+        """Give a result to all of them. Raises `OutputError`."""
+        for path, sink in self._sinks.items():
+            with output_errors(path):
+                sink.write(result)
+
+    @property
+    def summaries(self) -> dict[Path, Any]:
+        """The `summary` of each, by the path of its output."""
+        return {path: getattr(sink, "summary", None) for path, sink in self._sinks.items()}
 
 
 @contextmanager
-def open_sinks(outputs: Iterable[Output], context: SinkContext) -> Iterator[list["_NamedSink"]]:
+def open_sinks(outputs: Iterable[Output], context: SinkContext) -> Iterator[Sinks]:
     """Open the sinks of several outputs; errors as of `open_sink`."""
     with ExitStack() as stack:
-        yield [stack.enter_context(open_sink(output, context)) for output in outputs]
-
-
-def of_files(join: Callable[[Mapping[str, Path], Path], None]) -> BatchTotal:
-    """Return the total `all` that a function makes from the files of all videos."""
-
-    def write(parts: Mapping[str, VideoPart], target: Path) -> None:
-        join({name: part.path for name, part in parts.items()}, target)
-
-    return BatchTotal("all", write)
-
-
-class _NamedSink:
-    """A `Sink` whose `OSError` becomes an `OutputError` with the path of its output."""
-
-    def __init__(self, sink: Sink, path: Path) -> None:
-        self._sink = sink
-        self._path = path
-
-    def __enter__(self) -> Self:
-        with output_errors(self._path):
-            self._sink.__enter__()
-        return self
-
-    def __exit__(self, *raised: Any) -> None:
-        with output_errors(self._path):
-            self._sink.__exit__(*raised)
-
-    def write(self, result: FrameResult) -> None:
-        with output_errors(self._path):
-            self._sink.write(result)
-
-    @property
-    def summary(self) -> Mapping[str, Any] | None:
-        return getattr(self._sink, "summary", None)
+        yield Sinks({each.path: stack.enter_context(open_sink(each, context)) for each in outputs})
 
 
 def _kind_for(output: Output) -> SinkKind:
