@@ -121,7 +121,7 @@ def test_a_notebook_shows_a_result_as_its_frame_with_the_vehicles() -> None:
     result = vdet.FrameResult(Path("a.mp4"), frame, vdet.Boxes([], []), (), searched=False)
     shown = replace(result, tracks=(vdet.Track(1, box, 0.9, "seen", "car"),))
     plain, drawn = (
-        cv2.imdecode(np.frombuffer(each._repr_png_(), np.uint8), cv2.IMREAD_COLOR)
+        np.asarray(cv2.imdecode(np.frombuffer(each._repr_png_(), np.uint8), cv2.IMREAD_COLOR))
         for each in (result, shown)
     )
     assert np.array_equal(plain, frame.image)

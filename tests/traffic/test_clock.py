@@ -30,9 +30,11 @@ def clock_of(
     given: str | None = None,
     created: str | None = None,
     start: float = 0.0,
-    **clock: str | None,
+    *,
+    pattern: str | None = None,
+    zone: str | None = None,
 ) -> Clock | None:
-    camera = CameraSettings(clock=ClockSettings(**clock))
+    camera = CameraSettings(clock=ClockSettings(pattern=pattern, zone=zone))
     settings = Settings(input=InputSettings(begin=given), camera=camera)
     return find_clock(Path("clips", name), settings, created, start)
 
@@ -107,7 +109,7 @@ def test_the_beginning_is_that_of_the_first_frame() -> None:
     assert found.at(86_410.0).isoformat() == "2026-05-01T07:00:10+02:00"
 
 
-BERLIN = {"zone": "Europe/Berlin"}
+BERLIN = "Europe/Berlin"
 
 
 class TestZone:
@@ -124,15 +126,15 @@ class TestZone:
         assert str(clock_of(name, zone=zone)) == f"{text} (from its name)"
 
     def test_a_given_time_is_shown_in_the_zone_of_the_camera(self) -> None:
-        found = clock_of("a.mp4", "2026-05-01 07:00-03:00", **BERLIN)
+        found = clock_of("a.mp4", "2026-05-01 07:00-03:00", zone=BERLIN)
         assert str(found) == "2026-05-01 12:00:00+02:00 (as given)"
 
-    @pytest.mark.parametrize("clock", [{}, BERLIN])
-    def test_each_moment_has_the_offset_of_that_moment(self, clock: dict[str, str]) -> None:
-        if not clock:  # that of this computer
+    @pytest.mark.parametrize("zone", [None, BERLIN])
+    def test_each_moment_has_the_offset_of_that_moment(self, zone: str | None) -> None:
+        if zone is None:  # that of this computer
             os.environ["TZ"] = "CET-1CEST,M3.5.0,M10.5.0/3"
             time.tzset()
-        found = clock_of("20261025_015000.mp4", **clock)
+        found = clock_of("20261025_015000.mp4", zone=zone)
         assert found is not None
         moments = [str(found.at(seconds)) for seconds in (0, 3600, 7200)]
         assert moments == [

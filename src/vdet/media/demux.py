@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
+from typing import cast
 
 import av
 from av.container import InputContainer
@@ -134,7 +135,7 @@ def moving_streams(container: InputContainer) -> list[VideoStream]:
 
 def describe(path: Path, stream: VideoStream, first: av.VideoFrame) -> VideoInfo:
     """Describe a video, of which the `first` picture has been decoded."""
-    container = stream.container
+    container = cast("InputContainer", stream.container)
     time_base = time_base_of(stream)
     rate = rate_of(stream)
     start = (first.pts or 0) * time_base

@@ -158,7 +158,8 @@ def test_a_window_sums_the_weights_of_its_histogram(features: FeatureSettings) -
     strip = split(NOISE, features)
     weights = np.random.default_rng(1).normal(size=(2, 3, 32)).astype(np.float32)
     sums = table_sums(strip, np.repeat(weights, 8, axis=2), features, X, Y)
-    assert (sums.shape, sums.dtype) == ((4, 2), np.float32)
+    assert sums.shape == (4, 2)
+    assert sums.dtype == np.float32
     for x, y, values in zip(X, Y, sums, strict=True):
         counts = FeatureExtractor(features).describe(NOISE[y : y + 64, x : x + 64])[-96:]
         np.testing.assert_allclose(values, weights.reshape(2, 96) @ counts, atol=1e-2)

@@ -114,7 +114,7 @@ class Blocks:
         columns = self._cells(x)[:, np.newaxis, np.newaxis] + steps[:, np.newaxis]
         rows = self._cells(y)[:, np.newaxis, np.newaxis] + steps
         by_block = self._blocks[columns, rows].reshape(len(x), len(steps) ** 2, 3, -1)
-        return by_block.swapaxes(1, 2).reshape(len(x), -1)
+        return np.asarray(by_block.swapaxes(1, 2).reshape(len(x), -1), np.float32)
 
     def values(self, weights: Float32Array, x: IndexArray, y: IndexArray) -> Float32Array:
         """Return the HOG of windows times weights, `(m, h)` → float32 `(n, m)`."""

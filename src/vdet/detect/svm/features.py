@@ -58,7 +58,7 @@ class FeatureExtractor:
 
 def split(image: Image, settings: FeatureSettings) -> Channels:
     """Return the channels of an image, BGR uint8 `(H, W, 3)`."""
-    converted = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2YCrCb))
+    converted = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2YCrCb), np.uint8)
     luma, red, blue = (
         halve(channel) if number in settings.halved else channel
         for number, channel in enumerate(split_channels(converted))

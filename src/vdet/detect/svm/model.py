@@ -95,9 +95,10 @@ def save_model(model: LinearModel, path: Path) -> None:
         "features": model.features.model_dump(mode="json"),
         "provenance": model.provenance,
     }
+    arrays: dict[str, Any] = _arrays(model)
     text = np.frombuffer(json.dumps(header).encode(), np.uint8)
     with path.open("wb") as file:
-        np.savez_compressed(file, header=text, **_arrays(model))
+        np.savez_compressed(file, header=text, **arrays)
 
 
 def _arrays(model: LinearModel) -> dict[str, Float32Array]:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vdet.boxes import Box, Float64Array, area, coverage, from_sizes, iou_matrix, visible
+from vdet.boxes import BoolArray, Box, Float64Array, area, coverage, from_sizes, iou_matrix, visible
 from vdet.detect.svm.heat import HotRegion
 from vdet.detect.svm.windows import Windows
 
@@ -97,10 +97,10 @@ def split_regions(regions: Sequence[HotRegion], votes: Votes, least: float) -> l
     found = [vehicle for group in groups for vehicle in _vehicles(votes.within(group), least)]
     boxes = np.reshape([box for box, _, _ in found], (-1, 4))
     position = np.array([weight for _, weight, _ in found])
-    parts = coverage(boxes, boxes) > _INSIDE
+    parts: BoolArray = coverage(boxes, boxes) > _INSIDE
     parts &= area(boxes) > area(boxes)[:, np.newaxis]
     parts &= _FAR_STRONGER * position > position[:, np.newaxis]
-    kept = zip(boxes.tolist(), found, parts.any(axis=1), strict=True)
+    kept = zip(boxes.tolist(), found, np.any(parts, axis=1).tolist(), strict=True)
     pairs = [(Box(*box), presence) for box, (_, _, presence), is_part in kept if not is_part]
     return [HotRegion(box.rounded, box.center, presence) for box, presence in pairs]
 

@@ -141,7 +141,7 @@ def fit_boxes(
     """
     hogs, sides, tested_hogs, tested_sides = [], [], [], []
     for data, out in zip(sets, held, strict=True):
-        known = np.isfinite(data.sides).any(axis=1)
+        known: BoolArray = np.asarray(np.isfinite(data.sides).any(axis=1))
         learnt, tested = known & ~out[data.origins], data.patches[out]
         tested = tested[known[tested]]
         hogs.append(data.vectors[learnt, :hog_length])
