@@ -7,34 +7,39 @@ Source: Lin et al., "Microsoft COCO: Common Objects in Context", 2014; cocodatas
 format"; Dave et al., "TAO: A Large-Scale Benchmark for Tracking Any Object", 2020.
 """
 
+import io
 import json
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
+from itertools import islice
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any, BinaryIO
 
-from pydantic import AfterValidator, FailFast, Field, TypeAdapter, ValidationError
+import ijson
+from pydantic import AfterValidator, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
 from vdet.errors import TruthError, printable
-from vdet.labels.documents import read_json
+from vdet.files import record_input
+from vdet.labels.documents import json_entries
 from vdet.labels.formats import Format, SourceVideo, last_classes
-from vdet.labels.label import NO_ID, Label, Size, from_size, line_error
-from vdet.labels.parsing import (
-    Index,
-    Number,
-    Times,
-    checked_times,
-    first_mistake,
-    read_bytes,
-)
+from vdet.labels.label import MAX_LABELS, NO_ID, Label, Size, from_size, line_error
+from vdet.labels.parsing import Index, Number, Times, checked_times, first_mistake
 from vdet.labels.pictures import LabelledPicture, is_file
 from vdet.labels.video import SavedTracks
 from vdet.track.track import FrameTracks, State
 
 _VIDEO = 1
 """Id of the only video."""
+
+MAX_IMAGES = 1_000_000
+"""Largest number of images in a file, and of categories."""
+
+_MOST_NAMES = 1000
+
+Opened = Callable[[], BinaryIO]
+"""Opens the document, to read it from its beginning."""
 
 _ANNOTATIONS = "annotations"  # the folder of label files in the COCO set itself
 
@@ -120,43 +125,49 @@ class _Image:
         return (self.width, self.height) if self.width and self.height else None
 
 
-@_entry
-class _Info:
-    unlabelled_classes: tuple[str, ...] = ()  # of our own: they may be there without a label
+_LISTS = {
+    "images": TypeAdapter(_Image),
+    "categories": TypeAdapter(_Category),
+    "annotations": TypeAdapter(_Annotation),
+}
 
 
-@_entry
-class _Document:
-    images: Annotated[list[_Image], FailFast()]
-    annotations: Annotated[list[_Annotation], FailFast()]
-    categories: Annotated[list[_Category], FailFast()]
-    info: _Info | None = None
+def _entries(path: Path, opened: Opened, name: str) -> Iterator[Any]:
+    """Yield the entries of a list. Raises `TruthError`."""
+    for number, values in enumerate(json_entries(path, opened, name)):
+        try:
+            yield _LISTS[name].validate_python(values)
+        except ValidationError as error:
+            what = f"{name}.{number}: {first_mistake(error)}"
+            raise TruthError(f"{path}: is not COCO: {what}") from error
 
 
-_DOCUMENT = TypeAdapter(_Document)
-
-
-def _read(path: Path, data: bytes) -> _Document:
-    """Return a document whose images have their labels. Raises `TruthError`."""
-    try:
-        document = _DOCUMENT.validate_python(read_json(path, data))
-    except ValidationError as error:
-        raise TruthError(f"{path}: is not COCO: {first_mistake(error)}") from error
-    images = {image.id: image for image in document.images}
-    names = {category.id: category.name for category in document.categories}
-    if len(images) < len(document.images) or len(names) < len(document.categories):
-        raise TruthError(f"{path}: is not COCO: an id of images or categories occurs twice")
-    for number, each in enumerate(document.annotations):
+def _read(path: Path, opened: Opened) -> list[_Image]:
+    """Return the images with their labels. Raises `TruthError`."""
+    images = {image.id: image for image in _distinct(path, opened, "images")}
+    names = {category.id: category.name for category in _distinct(path, opened, "categories")}
+    for number, entry in enumerate(_entries(path, opened, "annotations")):
         place = f"annotations.{number}"
-        if each.image_id not in images or each.category_id not in names:
-            what = f"image {each.image_id} or category {each.category_id} not found"
+        if number == MAX_LABELS:
+            raise line_error(path, place, f"has more than {MAX_LABELS:,} boxes; cut it into parts")
+        if entry.image_id not in images or entry.category_id not in names:
+            what = f"image {entry.image_id} or category {entry.category_id} not found"
             raise line_error(path, place, what)
-        image, box = images[each.image_id], from_size(*each.bbox)
-        state: State = "lost" if (each.attributes or {}).get("occluded") else "seen"
-        id_, frame = NO_ID if each.track_id is None else each.track_id, image.frame_index or 0
-        known = frame + 1, id_, each.score, each.iscrowd, state
-        image.labels.append(Label(place, box, names[each.category_id], *known))
-    return document
+        image, box = images[entry.image_id], from_size(*entry.bbox)
+        state: State = "lost" if (entry.attributes or {}).get("occluded") else "seen"
+        id_, frame = NO_ID if entry.track_id is None else entry.track_id, image.frame_index or 0
+        known = frame + 1, id_, entry.score, entry.iscrowd, state
+        image.labels.append(Label(place, box, names[entry.category_id], *known))
+    return list(images.values())
+
+
+def _distinct(path: Path, opened: Opened, name: str) -> list[Any]:
+    found = list(islice(_entries(path, opened, name), MAX_IMAGES + 1))
+    if len(found) > MAX_IMAGES:
+        raise TruthError(f"{path}: has more than {MAX_IMAGES:,} {name}; cut the file into parts")
+    if len({entry.id for entry in found}) < len(found):
+        raise TruthError(f"{path}: is not COCO: an id of {name} occurs twice")
+    return found
 
 
 def read_coco(path: Path, data: bytes) -> SavedTracks:
@@ -168,7 +179,7 @@ def read_coco(path: Path, data: bytes) -> SavedTracks:
         The file is not of this form or too large, an id of images or categories or a frame occurs
         twice, a time is wrong, or an annotation names an image or a category that is not there.
     """
-    images = _read(path, data).images
+    images = _read(path, lambda: io.BytesIO(data))
     labels = tuple(label for image in images for label in image.labels)
     frames = [image.frame_index for image in images if image.frame_index is not None]
     if len(frames) < len(images) or any(label.id == NO_ID for label in labels):
@@ -200,12 +211,24 @@ def read_coco_pictures(path: Path) -> Iterator[LabelledPicture]:
         The file is not of this form, an annotation names a picture or a category that is not
         there, an id occurs twice, or a picture lies outside.
     """
-    document, folder = _read(path, read_bytes(path)), None
-    unlabelled = document.info.unlabelled_classes if document.info else ()
-    for image in document.images:
+    folder, unlabelled = None, _unlabelled(path)
+    for image in _read(path, lambda: path.open("rb")):
         folder = folder or _picture_folder(path, image.file_name)
         picture, labels = folder / image.file_name, tuple(image.labels)
         yield LabelledPicture(picture, path, labels, image.size, unlabelled)
+
+
+def _unlabelled(path: Path) -> tuple[str, ...]:
+    """Return the classes that the set does not label, although they may be there."""
+    try:
+        with path.open("rb") as file:
+            record_input(file.fileno())
+            names = list(islice(ijson.items(file, "info.unlabelled_classes.item"), _MOST_NAMES))
+    except OSError as error:
+        raise TruthError(f"{path}: cannot be read: {error.strerror}") from error
+    except ijson.JSONError as error:
+        raise TruthError(f"{path}: is not JSON: {error}") from error
+    return tuple(map(str, names))
 
 
 def _picture_folder(path: Path, name: str) -> Path:

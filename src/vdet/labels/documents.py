@@ -1,10 +1,10 @@
-"""JSON and XML documents, read as a whole if they take little memory."""
+"""JSON and XML documents: read as a whole if they take little memory, or lists entry by entry."""
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 from xml.etree import ElementTree as ET
 from xml.parsers import expat
 
@@ -14,6 +14,9 @@ from vdet.labels.parsing import parse_whole
 
 MAX_MEMORY = 700_000_000
 """Bytes that the values of a document may take, estimated, beside its text."""
+
+MAX_ENTRY = 4_000_000
+"""Largest number of bytes of an entry of a list that is read entry by entry."""
 
 MAX_NAMES = 1000
 """Largest number of different names in a document, each of which takes ten times its text."""
@@ -39,6 +42,48 @@ def read_json(path: Path, data: bytes) -> Any:
         return json.loads(data.decode("utf-8-sig"))
     except (ValueError, RecursionError) as error:
         raise TruthError(f"{path}: is not JSON: {error}") from error
+
+
+def json_entries(path: Path, opened: Callable[[], BinaryIO], name: str) -> Iterator[Any]:
+    """Yield the entries of a list in the object that a JSON document is; memory holds one of them.
+
+    Raises
+    ------
+    TruthError
+        It is not JSON, has no such list, or an entry is larger than `MAX_ENTRY`.
+    """
+    import ijson
+
+    start = None
+    try:
+        with opened() as file:
+            for prefix, event, _ in ijson.parse(file):
+                if (prefix, event) == (name, "start_array"):
+                    start = file.tell()
+                    break
+        if start is None:
+            raise TruthError(f"{path}: is not COCO: the list {name} is missing")
+        with opened() as file:
+            limited = _LimitedEntries(file, start)
+            for entry in ijson.items(limited, f"{name}.item", use_float=True):
+                limited.begin = file.tell()
+                yield entry
+    except (ijson.JSONError, ValueError) as error:
+        raise TruthError(f"{path}: {name}: invalid JSON: {error}") from error
+
+
+class _LimitedEntries:
+    """A file of which no more than an entry is read from `begin` on, until that is moved."""
+
+    def __init__(self, file: BinaryIO, begin: int) -> None:
+        self._file = file
+        self.begin = begin
+
+    def read(self, size: int) -> bytes:
+        """Return the next bytes. Raises ValueError where an entry is too large."""
+        if self._file.tell() > self.begin + MAX_ENTRY:
+            raise ValueError(f"an entry is larger than {MAX_ENTRY:,} bytes")
+        return self._file.read(size)
 
 
 def read_xml(path: Path, data: bytes, root: str) -> ET.Element:
