@@ -102,7 +102,7 @@ OVERTAKING = (
 def test_perfect_detections_give_each_vehicle_one_id(rate: int) -> None:
     clip = [truth_at(OVERTAKING, n / rate) for n in range(int(SECONDS * rate))]
     scores = track_scores(clip, rate, PERFECT)
-    assert (scores.tracks, scores.id_switches) == (4, 0)
+    assert (scores.tracks, scores.id_switches, scores.delays.count(None)) == (4, 0, 0)
     assert scores.precision == 1
     assert scores.recall > 1 - 2.5 / (SECONDS * min(rate, 10))
     assert scores.mean_iou > 0.9
