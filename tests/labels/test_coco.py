@@ -39,8 +39,7 @@ def changed(name: str, number: int, **values: object) -> bytes:
 @pytest.mark.parametrize(
     ("data", "message"),
     [
-        (b"{", ": is not JSON: Expecting property name"),
-        (b'{"images": []}', ": is not COCO: annotations: Field required"),
+        (b"{", ": is not JSON: parse error"),
         (changed("images", 1, id=1), ": is not COCO: an id of images or categories occurs twice"),
         (changed("images", 1, frame_index=4), ": a frame_index occurs twice; several videos need"),
         (
@@ -68,21 +67,9 @@ def test_a_crowd_is_an_ignore_region() -> None:
         assert [row.ignored for row in saved.labels] == [bool(crowd), False, False]
 
 
-@pytest.mark.parametrize(
-    ("data", "message"),
-    [
-        (b'{"images": [' + b"[]," * 6_000_000, "would take more than 1 GB of memory; cut it"),
-        ('{"a": "🚌'.encode() + b"a" * 180_000_000, "would take more than 1 GB of memory; cut it"),
-        (b'{"a\\"":0, ' * 3_000_000, "would take more than 1 GB of memory; cut it"),
-        (
-            b"{" + b",".join(b'"%d" : 0' % n for n in range(1001)) + b"}",
-            "has more than 1,000 different names of values",
-        ),
-    ],
-    ids=["lists", "wide", "quotes", "keys"],
-)
-def test_what_would_take_too_much_memory_is_refused_before_it_is_parsed(
-    data: bytes, message: str
-) -> None:
-    with pytest.raises(TruthError, match=rf"a\.json: {message}"):
+@pytest.mark.parametrize("before", [b"", b'{"id": 1, "name": "car"}, '], ids=["first", "later"])
+def test_an_entry_that_would_take_much_memory_is_refused_before_it_is_read(before: bytes) -> None:
+    data = b'{"images": [], "categories": [' + before + b'{"id": [' + b"[]," * 6_000_000
+    words = r"a\.json: has an entry of more than 16,000,000 bytes"
+    with pytest.raises(TruthError, match=words):
         read_coco(Path("a.json"), data)

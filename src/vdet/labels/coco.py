@@ -10,13 +10,11 @@ format"; Dave et al., "TAO: A Large-Scale Benchmark for Tracking Any Object", 20
 import io
 import json
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
-from itertools import islice
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any, BinaryIO
 
-import ijson
 from pydantic import AfterValidator, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
@@ -32,14 +30,6 @@ from vdet.track.track import FrameTracks, State
 
 _VIDEO = 1
 """Id of the only video."""
-
-MAX_IMAGES = 1_000_000
-"""Largest number of images in a file, and of categories."""
-
-_MOST_NAMES = 1000
-
-Opened = Callable[[], BinaryIO]
-"""Opens the document, to read it from its beginning."""
 
 _ANNOTATIONS = "annotations"  # the folder of label files in the COCO set itself
 
@@ -132,42 +122,45 @@ _LISTS = {
 }
 
 
-def _entries(path: Path, opened: Opened, name: str) -> Iterator[Any]:
-    """Yield the entries of a list. Raises `TruthError`."""
-    for number, values in enumerate(json_entries(path, opened, name)):
+_UNLABELLED = "info.unlabelled_classes"  # of our own: they may be there without a label
+
+
+@dataclass
+class _Document:
+    """What a document holds: images by id with their labels, and classes without labels."""
+
+    images: dict[int, _Image]
+    unlabelled: tuple[str, ...]
+
+
+def _read(path: Path, file: BinaryIO) -> _Document:
+    """Return the images of a document with their labels. Raises `TruthError`."""
+    found: dict[str, list[Any]] = {name: [] for name in (*_LISTS, _UNLABELLED)}
+    for name, values in json_entries(path, file, *found):
+        entries = found[name]
+        if len(entries) == MAX_LABELS:
+            raise TruthError(f"{path}: has more than {MAX_LABELS:,} {name}; cut it into parts")
         try:
-            yield _LISTS[name].validate_python(values)
+            entries.append(_LISTS[name].validate_python(values) if name in _LISTS else str(values))
         except ValidationError as error:
-            what = f"{name}.{number}: {first_mistake(error)}"
-            raise TruthError(f"{path}: is not COCO: {what}") from error
-
-
-def _read(path: Path, opened: Opened) -> list[_Image]:
-    """Return the images with their labels. Raises `TruthError`."""
-    images = {image.id: image for image in _distinct(path, opened, "images")}
-    names = {category.id: category.name for category in _distinct(path, opened, "categories")}
-    for number, entry in enumerate(_entries(path, opened, "annotations")):
+            place = f"{name}.{len(entries)}" + (": ", ".")[bool(error.errors()[0]["loc"])]
+            raise TruthError(f"{path}: is not COCO: {place}{first_mistake(error)}") from error
+    images, categories, annotations, unlabelled = found.values()
+    by_id = {image.id: image for image in images}
+    names = {category.id: category.name for category in categories}
+    if len(by_id) < len(images) or len(names) < len(categories):
+        raise TruthError(f"{path}: is not COCO: an id of images or categories occurs twice")
+    for number, entry in enumerate(annotations):
         place = f"annotations.{number}"
-        if number == MAX_LABELS:
-            raise line_error(path, place, f"has more than {MAX_LABELS:,} boxes; cut it into parts")
-        if entry.image_id not in images or entry.category_id not in names:
+        if entry.image_id not in by_id or entry.category_id not in names:
             what = f"image {entry.image_id} or category {entry.category_id} not found"
             raise line_error(path, place, what)
-        image, box = images[entry.image_id], from_size(*entry.bbox)
+        image, box = by_id[entry.image_id], from_size(*entry.bbox)
         state: State = "lost" if (entry.attributes or {}).get("occluded") else "seen"
         id_, frame = NO_ID if entry.track_id is None else entry.track_id, image.frame_index or 0
         known = frame + 1, id_, entry.score, entry.iscrowd, state
         image.labels.append(Label(place, box, names[entry.category_id], *known))
-    return list(images.values())
-
-
-def _distinct(path: Path, opened: Opened, name: str) -> list[Any]:
-    found = list(islice(_entries(path, opened, name), MAX_IMAGES + 1))
-    if len(found) > MAX_IMAGES:
-        raise TruthError(f"{path}: has more than {MAX_IMAGES:,} {name}; cut the file into parts")
-    if len({entry.id for entry in found}) < len(found):
-        raise TruthError(f"{path}: is not COCO: an id of {name} occurs twice")
-    return found
+    return _Document(by_id, tuple(unlabelled))
 
 
 def read_coco(path: Path, data: bytes) -> SavedTracks:
@@ -179,7 +172,7 @@ def read_coco(path: Path, data: bytes) -> SavedTracks:
         The file is not of this form or too large, an id of images or categories or a frame occurs
         twice, a time is wrong, or an annotation names an image or a category that is not there.
     """
-    images = _read(path, lambda: io.BytesIO(data))
+    images = list(_read(path, io.BytesIO(data)).images.values())
     labels = tuple(label for image in images for label in image.labels)
     frames = [image.frame_index for image in images if image.frame_index is not None]
     if len(frames) < len(images) or any(label.id == NO_ID for label in labels):
@@ -211,24 +204,17 @@ def read_coco_pictures(path: Path) -> Iterator[LabelledPicture]:
         The file is not of this form, an annotation names a picture or a category that is not
         there, an id occurs twice, or a picture lies outside.
     """
-    folder, unlabelled = None, _unlabelled(path)
-    for image in _read(path, lambda: path.open("rb")):
-        folder = folder or _picture_folder(path, image.file_name)
-        picture, labels = folder / image.file_name, tuple(image.labels)
-        yield LabelledPicture(picture, path, labels, image.size, unlabelled)
-
-
-def _unlabelled(path: Path) -> tuple[str, ...]:
-    """Return the classes that the set does not label, although they may be there."""
+    folder = None
     try:
         with path.open("rb") as file:
             record_input(file.fileno())
-            names = list(islice(ijson.items(file, "info.unlabelled_classes.item"), _MOST_NAMES))
+            document = _read(path, file)
     except OSError as error:
         raise TruthError(f"{path}: cannot be read: {error.strerror}") from error
-    except ijson.JSONError as error:
-        raise TruthError(f"{path}: is not JSON: {error}") from error
-    return tuple(map(str, names))
+    for image in document.images.values():
+        folder = folder or _picture_folder(path, image.file_name)
+        picture, labels = folder / image.file_name, tuple(image.labels)
+        yield LabelledPicture(picture, path, labels, image.size, document.unlabelled)
 
 
 def _picture_folder(path: Path, name: str) -> Path:

@@ -2,21 +2,27 @@
 
 import json
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
 from xml.etree import ElementTree as ET
 from xml.parsers import expat
 
-from vdet.errors import TruthError
+import ijson
+
+from vdet.errors import TruthError, printable
 from vdet.labels.label import Size, line_error
 from vdet.labels.parsing import parse_whole
 
 MAX_MEMORY = 700_000_000
 """Bytes that the values of a document may take, estimated, beside its text."""
 
-MAX_ENTRY = 4_000_000
+MAX_ENTRY = 16_000_000
 """Largest number of bytes of an entry of a list that is read entry by entry."""
+
+_CHUNK = 8192  # bytes
+_NESTING = {b"[": 1, b"{": 1, b"]": -1, b"}": -1}
+_MAX_DEPTH = 1000
 
 MAX_NAMES = 1000
 """Largest number of different names in a document, each of which takes ten times its text."""
@@ -44,46 +50,44 @@ def read_json(path: Path, data: bytes) -> Any:
         raise TruthError(f"{path}: is not JSON: {error}") from error
 
 
-def json_entries(path: Path, opened: Callable[[], BinaryIO], name: str) -> Iterator[Any]:
-    """Yield the entries of a list in the object that a JSON document is; memory holds one of them.
+def json_entries(path: Path, file: BinaryIO, *lists: str) -> Iterator[tuple[str, Any]]:
+    """Yield the entries of some lists in the object that a JSON document is, with their list.
+
+    The lists are named as in `info.names`. Memory holds a few entries at a time.
 
     Raises
     ------
     TruthError
-        It is not JSON, has no such list, or an entry is larger than `MAX_ENTRY`.
+        It is not JSON, is nested too deeply, or has an entry of more than `MAX_ENTRY` bytes.
     """
-    import ijson
-
-    start = None
+    found = {name: ijson.sendable_list() for name in lists}
+    readers = [
+        ijson.items_coro(entries, f"{name}.item", use_float=True) for name, entries in found.items()
+    ]
+    size = depth = 0
     try:
-        with opened() as file:
-            for prefix, event, _ in ijson.parse(file):
-                if (prefix, event) == (name, "start_array"):
-                    start = file.tell()
-                    break
-        if start is None:
-            raise TruthError(f"{path}: is not COCO: the list {name} is missing")
-        with opened() as file:
-            limited = _LimitedEntries(file, start)
-            for entry in ijson.items(limited, f"{name}.item", use_float=True):
-                limited.begin = file.tell()
-                yield entry
+        while chunk := file.read(_CHUNK):
+            size += len(chunk)
+            depth += sum(chunk.count(part) * step for part, step in _NESTING.items())
+            _check_entry(path, size, depth)
+            for reader in readers:
+                reader.send(chunk)
+            for name, entries in found.items():
+                size = 0 if entries else size
+                yield from ((name, entry) for entry in entries)
+                entries.clear()
+        for reader in readers:
+            reader.close()
     except (ijson.JSONError, ValueError) as error:
-        raise TruthError(f"{path}: {name}: invalid JSON: {error}") from error
+        what = printable(str(error).partition("\n")[0].strip())
+        raise TruthError(f"{path}: is not JSON: {what}") from error
 
 
-class _LimitedEntries:
-    """A file of which no more than an entry is read from `begin` on, until that is moved."""
-
-    def __init__(self, file: BinaryIO, begin: int) -> None:
-        self._file = file
-        self.begin = begin
-
-    def read(self, size: int) -> bytes:
-        """Return the next bytes. Raises ValueError where an entry is too large."""
-        if self._file.tell() > self.begin + MAX_ENTRY:
-            raise ValueError(f"an entry is larger than {MAX_ENTRY:,} bytes")
-        return self._file.read(size)
+def _check_entry(path: Path, size: int, depth: int) -> None:
+    if depth > _MAX_DEPTH:  # each level takes the memory of all above it
+        raise TruthError(f"{path}: is not JSON: nested too deeply")
+    if size > MAX_ENTRY:
+        raise TruthError(f"{path}: has an entry of more than {MAX_ENTRY:,} bytes")
 
 
 def read_xml(path: Path, data: bytes, root: str) -> ET.Element:
