@@ -127,7 +127,7 @@ def test_a_batch_is_done_by_the_workers(
     monkeypatch.chdir(tmp_path)  # relative names are those of this place, not of the workers'
     result = run("detect-video", "in", "-d", "out", "--tracks", ".txt", "--scheduler", address)
     assert result.code == 3, result.err
-    assert "bad.mp4: is not a video" in result.err
+    assert "bad.mp4: cannot be opened, is not a video" in result.err
     made = [f"{name}.{suffix}" for name in "abc" for suffix in ("mp4", "txt")]
     assert names(tmp_path / "out") == [*made, "manifest.jsonl"]
     lines = (tmp_path / "out" / "manifest.jsonl").read_text().splitlines()

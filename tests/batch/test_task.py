@@ -93,7 +93,7 @@ def test_an_error_is_recorded_without_numbers(job: Run, tmp_path: Path) -> None:
     job.source.write_bytes(b"no video")
     record = process_file(job, folder=tmp_path / "out")
     assert record.error is not None
-    assert record.error.startswith(f"{job.source}: is not a video")
+    assert record.error.startswith(f"{job.source}: cannot be opened, is not a video")
     assert (record.width, record.height, record.frames, record.tracks) == (None,) * 4
     assert record.outputs == ()
 

@@ -11,6 +11,7 @@ import pytest
 from red_cars import CAR, PERSPECTIVE, SETTINGS, drive, road
 from run.red_runs import follow, write
 from vdet.config.schema import MotionTrackerSettings, NetworkSettings, Settings, SvmSettings
+from vdet.errors import OutputError
 from vdet.media import Frame, Picture
 from vdet.run.rate import SearchRate
 from vdet.run.result import FrameResult
@@ -135,7 +136,8 @@ def test_between_searched_frames_the_boxes_of_the_rules_move_straight() -> None:
 
 def test_a_stage_sink_waits_for_a_searched_frame(tmp_path: Path) -> None:
     results = followed(3, 6)
-    write(Output("stages", tmp_path / "stages"), results[1:3])
+    with pytest.raises(OutputError, match=r"no frame at 0\.00 s or later; use an earlier --at"):
+        write(Output("stages", tmp_path / "stages"), results[1:3])
     assert not (tmp_path / "stages").exists()
     write(Output("stages", tmp_path / "stages"), results[1:4])
     assert (tmp_path / "stages" / "4-boxes.png").exists()

@@ -24,6 +24,8 @@ from vdet.media.numbered import find_sequence
 MAX_PIXELS = 8192 * 4608
 """Of a frame. 8K video, in both its widths, has fewer; a damaged header may claim far more."""
 
+_MAX_BOXES = 200_000  # of an MP4 file that are looked at
+
 _STREAM = re.compile(r"[a-z][a-z0-9+.-]+:/|-$", re.IGNORECASE)  # "rtsp://…" as a path, or "-"
 _MAX_FAILURES = 100  # in a row; a file with nothing but errors must end too
 
@@ -131,6 +133,25 @@ def moving_streams(container: InputContainer) -> list[VideoStream]:
     """Return the streams of moving pictures: not those of a cover or of thumbnails."""
     stills = Disposition.attached_pic | Disposition.timed_thumbnails
     return [stream for stream in container.streams.video if not stream.disposition & stills]
+
+
+def joined_videos(path: Path) -> int:
+    """Return how many MP4 or MOV videos, each with an index, were joined byte by byte."""
+    if not path.is_file() or path.suffix.lower() not in {".mp4", ".mov", ".m4v"}:
+        return 1
+    position, found, size = 0, 0, path.stat().st_size
+    with path.open("rb") as file:
+        for _ in range(_MAX_BOXES):
+            file.seek(position)
+            head = file.read(16)
+            length, kind = int.from_bytes(head[:4]), head[4:8]
+            if length == 1:  # it follows, in 64 bits
+                length = int.from_bytes(head[8:16])
+            found += kind == b"moov"
+            position += length
+            if length < 8 or position >= size:
+                break
+    return found
 
 
 def describe(path: Path, stream: VideoStream, first: av.VideoFrame) -> VideoInfo:

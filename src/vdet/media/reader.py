@@ -228,6 +228,8 @@ class VideoReader:
             )
         if restarts := self._decoder.clock.restarts:
             self._faults.append(f"its clock restarts {restarts}×; the parts follow one another")
+        if (videos := demux.joined_videos(self.info.path)) > 1:
+            self._faults.append(f"{videos} videos joined in one file; only the first is read")
         if self._is_scaled:
             self._faults.append("frames of other sizes are scaled to that of the first")
         if self._faults:

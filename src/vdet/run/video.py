@@ -51,7 +51,7 @@ class Run:
     overwrite
         Replace outputs that already exist.
     threads
-        Number of threads that search, and of those that encode; None for one per core.
+        Number of threads that search; None for one per core.
     """
 
     source: Path
@@ -241,7 +241,7 @@ def _context(run: Run, files: OutputFiles, video: OpenVideo) -> SinkContext:
         info,
         is_part=run.is_part,
         at=run.at,
-        threads=run.threads or core_count(),
+        threads=core_count(),  # more or fewer would write other bytes
         clock=find_clock(run.source, run.settings, info.tags.creation_time, float(info.start)),
         outputs=run.outputs,
         traffic=video.traffic,

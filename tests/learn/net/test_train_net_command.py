@@ -97,7 +97,9 @@ def test_a_base_that_is_not_there_is_said_before_the_training(run: Run, tmp_path
 def test_it_says_what_becomes_of_each_label(run: Run, tmp_path: Path) -> None:
     pictures = tmp_path / "set"
     boxes = [Boxed(name, (20, 30, 60, 40)) for name in ("car", "bus", "ignore")]
-    labels = write_coco(pictures, {"a": Labelled(160, 96, (*boxes, CAR))})
+    labels = write_coco(
+        pictures, {"a": Labelled(160, 96, (*boxes, Boxed("car", (100, 30, 40, 40))))}
+    )
     document = json.loads(labels.read_text(encoding="utf-8"))
     document["info"]["unlabelled_classes"] = ["cyclist", "dog"]
     document["categories"] += [{"id": 6, "name": "rickshaw"}, {"id": 7, "name": "person"}]

@@ -13,7 +13,7 @@ from vdet.draw.paint import Color, Surface, draw_lines
 from vdet.errors import OutputError
 from vdet.media import Frame, Picture, Planes, VideoInfo
 from vdet.media.images import PICTURE_SUFFIXES, encode_image
-from vdet.media.writer import VIDEO_SUFFIXES, VideoWriter
+from vdet.media.writer import VIDEO_SUFFIXES, VideoWriter, may_replace_video
 from vdet.polygons import Point
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import BaseSink, SinkContext, SinkKind
@@ -180,7 +180,7 @@ class VideoSink(BaseSink):
         self._encode(Frame(result.frame.index, result.frame.time, Picture(surface)))
 
 
-VIDEO = SinkKind(VideoSink, VIDEO_SUFFIXES, "videos", takes="videos")
+VIDEO = SinkKind(VideoSink, VIDEO_SUFFIXES, "videos", takes="videos", may_replace=may_replace_video)
 
 
 class PictureSink(BaseSink):

@@ -155,6 +155,8 @@ class SinkKind:
         frames are read than it needs.
     takes
         "videos" or "pictures" if the sink can take results of these only.
+    may_replace
+        Whether `--overwrite` may replace a file.
     total
         What a batch writes in addition, over all its videos.
     """
@@ -166,6 +168,7 @@ class SinkKind:
     writes_standard_output: bool = False
     one_frame: bool = False
     takes: Literal["videos", "pictures", "both"] = "both"
+    may_replace: Callable[[Path], bool] = lambda _: True
     total: BatchTotal | None = None
 
     @property
@@ -214,6 +217,9 @@ def check_sinks(outputs: Sequence[Output], *, overwrite: bool, makes_folder: boo
             overwrite=overwrite,
             makes_folder=makes_folder or bool(kind.marker),
         )
+        if os.path.lexists(path) and not kind.may_replace(path):
+            what = "was not written by vdet and will not be replaced; choose another name"
+            raise OutputError(f"{path}: {what}")
 
 
 def output_state(output: Output, place: Path | None = None) -> tuple[int, int] | None:
