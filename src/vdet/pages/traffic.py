@@ -9,7 +9,7 @@ import numpy as np
 
 from vdet.boxes import Image
 from vdet.draw.boxes import color_of
-from vdet.pages.charts import Series, hex_color
+from vdet.pages.charts import hex_color
 from vdet.traffic.counts import Counts, Event, vehicle_trips
 from vdet.traffic.paths import draw_flows
 from vdet.traffic.records import VehicleRecord
@@ -89,12 +89,3 @@ def _speeds(counts: Counts) -> Table:
             numbers = np.quantile(speeds, [0.5, 0.85]).tolist()
             rows.append((*way, str(len(speeds)), *(f"{number:.0f}" for number in numbers)))
     return ("line or zone", "direction", "vehicles", "median km/h", "85 % km/h"), rows
-
-
-def counts_by_interval(counts: Counts, interval: int) -> Series:
-    """Return the counts of each direction by the number of the interval, in seconds."""
-    series: Series = {}
-    for each in counts.events:
-        numbers = series.setdefault(f"{each.name}: {each.direction}", Counter())
-        numbers[int(each.time // interval)] += 1
-    return series

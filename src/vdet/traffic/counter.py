@@ -112,23 +112,21 @@ class VehicleCounter:
         if path.seconds < self._confirmed:
             return None
         found = {border.name: crossings(path, border) for border in self._borders}
-        ends = [
-            *([0] if path.times[0] > self.spans[0][0] else []),
-            *([path.seen - 1] if path.times[path.seen - 1] < self._now else []),
+        events = [_event(path, name, each) for name, some in found.items() for each in some]
+        heights: dict[str, list[float]] = {
+            name: path.heights[[each.row for each in some]].tolist()
+            for name, some in found.items()
+            if some
+        }
+        last = path.seen - 1
+        is_end = {0: path.times[0] > self.spans[0][0], last: path.times[last] < self._now}
+        rows = [row for row, lies_in_video in is_end.items() if lies_in_video]
+        missed = [
+            line.name
+            for line in self.lines
+            if line.name not in heights and _is_near(path, line, rows)
         ]
-        return _Passage(
-            [_event(path, name, each) for name, some in found.items() for each in some],
-            {
-                name: path.heights[[each.row for each in some]].tolist()
-                for name, some in found.items()
-                if some
-            },
-            [
-                line.name
-                for line in self.lines
-                if not found[line.name] and _is_near(path, line, ends)
-            ],
-        )
+        return _Passage(events, heights, missed)
 
 
 def _event(path: VehiclePath, name: str, crossing: Crossing) -> Event:

@@ -127,10 +127,8 @@ class TrackLinker:
         for track in frame.tracks:
             vehicle = self._vehicles.get(track.id) or self._begin(track, lost)
             vehicle.see(track, self._now, frame.index)
-            if vehicle.back is not None and vehicle.is_judged():
-                if vehicle.is_another():
-                    paths.append(self._split(track.id))
-                vehicle.back = None
+            if vehicle.is_another():
+                paths.append(self._split(track.id))
             self._vehicles[track.id].classes.add(track.class_name, track.score)
         return paths
 
@@ -169,7 +167,7 @@ class TrackLinker:
         """Return the path until a vehicle was out of sight; since then it is another one."""
         self.begun += 1
         vehicle = self._vehicles[key]
-        at = _COLUMNS * (vehicle.back or 0)
+        at = vehicle.back or 0
         self._vehicles[key] = _Vehicle(
             self.begun, vehicle.box, self._now, vehicle.tracks.copy(), vehicle.rows[at:]
         )
@@ -190,7 +188,7 @@ class _Vehicle:
     rows
         All that was seen of it, one frame after the other: see `_table`.
     back
-        Number of the first row after it was out of sight, until it is judged.
+        Where in `rows` it came back after it was out of sight, until it is clear who that is.
     """
 
     number: int
@@ -204,7 +202,7 @@ class _Vehicle:
     def see(self, track: Track, time: float, frame: int) -> None:
         """Add the next frame that shows it."""
         if time - self.shown > _OUT_OF_SIGHT:
-            self.back = len(self.rows) // _COLUMNS
+            self.back = len(self.rows)
         self.box, self.shown = track.box, time
         self.rows.extend((time, *track.foot, self.box.y1, self.box.y2, track.score, frame))
         if len(self.rows) % (_STAY * _COLUMNS) == 0 and self.back is None:
@@ -212,18 +210,21 @@ class _Vehicle:
             if np.ptp(stay[:, 1:3], axis=0).max() <= _STANDS * stay[-1, 3]:
                 del self.rows[(1 - _STAY) * _COLUMNS : -_COLUMNS]
 
-    def is_judged(self) -> bool:
-        """Return whether it is clear whether one that was out of sight is another one."""
-        return self.shown - self.rows[_COLUMNS * (self.back or 0)] >= _JUDGED
-
     def is_another(self) -> bool:
         """Return whether it drives the other way than before it was out of sight."""
-        at = _COLUMNS * (self.back or 0)
-        before, (first, *_, last) = _velocity(self.rows[:at]), _table(self.rows[at:])
+        if self.back is None or self.shown - self.rows[self.back] < _JUDGED:
+            return False
+        before, (first, *_, last) = (
+            _velocity(self.rows[: self.back]),
+            _table(self.rows[self.back :]),
+        )
         way, speed, height = complex(*(last - first)[1:3]), abs(before), last[3]
         onward = (way * before.conjugate()).real / max(speed, 1e-9)
-        back = max(_TURNED * height, _OPPOSITE * abs(way))
-        return bool(speed > _LEAVES * height and onward < -back)
+        is_another = speed > _LEAVES * height
+        is_another &= onward < -max(_TURNED * height, _OPPOSITE * abs(way))
+        if not is_another:
+            self.back = None
+        return bool(is_another)
 
     def is_leaving(self, width: int, height: int) -> bool:
         """Return whether it moves out at the edge of the frame, and so was not lost."""

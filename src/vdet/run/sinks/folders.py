@@ -139,7 +139,7 @@ class PageSink(BaseSink):
             self._thumbnails[crop.id] = crop.time, jpeg_uri(crop.image, _THUMBNAIL)
 
     def _page(self) -> VideoPage:
-        settings, clock, traffic = self.context.settings, self.context.clock, self.context.traffic
+        settings, traffic = self.context.settings, self.context.traffic
         return VideoPage(
             video=self.video,
             frames=self._frames,
@@ -153,7 +153,7 @@ class PageSink(BaseSink):
             counts=traffic.counts() if traffic else None,
             interval=settings.traffic.seconds or 60,
             gaps=self._gaps,
-            zero=clock.second_of_day if clock else None,
+            clock=self.context.clock,
         )
 
     def _player(self) -> Player | None:
