@@ -1,5 +1,6 @@
 """The counter: from the tracks of each frame to events. `vdet.traffic` explains the rule."""
 
+import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -13,6 +14,8 @@ from vdet.traffic.crossings import Crossing, crossings
 from vdet.traffic.intervals import Span, add_frame
 from vdet.traffic.linking import GAP, TrackLinker, VehiclePath
 
+_OLDEST = 0.2
+"""Seconds after which running counts are counted anew."""
 _NEAR = 0.5
 """Distance in heights of its box within which a track that begins or ends is at a line."""
 _FEW = 0.05
@@ -56,6 +59,8 @@ class VehicleCounter:
         self._ended: list[_Passage] = []
         self._tally: Counter[Way] = Counter()
         self._latest: FrameTracks | None = None
+        self._so_far: Counter[Way] = Counter()
+        self._counted = -math.inf
 
     @property
     def begun(self) -> int:
@@ -91,32 +96,41 @@ class VehicleCounter:
         )
 
     def so_far(self) -> Counter[Way]:
-        """Return how often each direction was counted; vehicles that are in a zone stay there."""
-        found = self._tally.copy()
-        for path in self._linker.open_paths():
-            if passage := self._passage(path):
+        """Return how often each direction was counted; vehicles that are in a zone stay there.
+
+        The counts are at most `_OLDEST` seconds old, so that this may be asked for each frame.
+        """
+        if self._now - self._counted >= _OLDEST:
+            self._counted, self._so_far = self._now, self._tally.copy()
+            for path in self._linker.open_paths():
                 is_there = self._now - path.times[path.seen - 1] <= GAP
-                found.update(
-                    (each.name, each.direction)
-                    for each in passage.events
+                self._so_far.update(
+                    (name, each.direction)
+                    for name, some in self._crossed(path).items()
+                    for each in some
                     if not (is_there and each.direction == VANISH)
                 )
-        return found
+        return self._so_far
 
     @property
     def _now(self) -> float:
         return self.spans[-1][1]
 
+    def _crossed(self, path: VehiclePath) -> dict[str, list[Crossing]]:
+        """Return what a vehicle does, by line or zone; nothing if it is seen too shortly."""
+        if path.seconds < self._confirmed:
+            return {}
+        found = {border.name: crossings(path, border) for border in self._borders}
+        return {name: some for name, some in found.items() if some}
+
     def _passage(self, path: VehiclePath) -> _Passage | None:
         """Return what a vehicle does; None where it is seen too shortly to count."""
         if path.seconds < self._confirmed:
             return None
-        found = {border.name: crossings(path, border) for border in self._borders}
+        found = self._crossed(path)
         events = [_event(path, name, each) for name, some in found.items() for each in some]
         heights: dict[str, list[float]] = {
-            name: path.heights[[each.row for each in some]].tolist()
-            for name, some in found.items()
-            if some
+            name: path.heights[[each.row for each in some]].tolist() for name, some in found.items()
         }
         last = path.seen - 1
         is_end = {0: path.times[0] > self.spans[0][0], last: path.times[last] < self._now}
@@ -124,7 +138,7 @@ class VehicleCounter:
         missed = [
             line.name
             for line in self.lines
-            if line.name not in heights and _is_near(path, line, rows)
+            if line.name not in found and _is_near(path, line, rows)
         ]
         return _Passage(events, heights, missed)
 
@@ -145,7 +159,7 @@ def _event(path: VehiclePath, name: str, crossing: Crossing) -> Event:
 
 
 def _is_near(path: VehiclePath, line: PlacedLine, rows: Sequence[int]) -> bool:
-    distances = distances_to((line.start, line.end), path.points[rows])
+    distances = distances_to([(line.start, line.end)], path.points[rows])[:, 0]
     return bool((distances <= _NEAR * path.heights[rows]).any())
 
 
