@@ -5,7 +5,7 @@ Rule 8 of `vdet.traffic` is here.
 
 import math
 from array import array
-from collections.abc import Iterable
+from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -123,7 +123,11 @@ class TrackLinker:
         ended = [key for key, each in self._vehicles.items() if each.shown < oldest]
         paths = [self._vehicles.pop(key).path(self._now) for key in ended]
         shown = {track.id for track in frame.tracks}
-        lost = None if shown <= self._vehicles.keys() else self._lost(shown)
+        lost = (
+            None
+            if shown <= self._vehicles.keys()
+            else _Lost(self._vehicles, shown, self._now, self._size)
+        )
         for track in frame.tracks:
             vehicle = self._vehicles.get(track.id) or self._begin(track, lost)
             vehicle.see(track, self._now, frame.index)
@@ -139,17 +143,6 @@ class TrackLinker:
     def open_paths(self) -> list[VehiclePath]:
         """Return the paths so far of the vehicles that may still be shown again."""
         return [each.path(self._now) for each in self._vehicles.values()]
-
-    def _lost(self, shown: set[int]) -> "_Lost":
-        """Return the vehicles that have just ended inside the frame; those of `shown` go on."""
-        vehicles = {
-            key: each
-            for key, each in self._vehicles.items()
-            if key not in shown
-            and self._now - each.shown <= GAP
-            and not each.is_leaving(*self._size)
-        }
-        return _Lost(vehicles, self._now, self._size)
 
     def _begin(self, track: Track, lost: "_Lost | None") -> "_Vehicle":
         """Remember a new vehicle, or one that goes on under a new id."""
@@ -275,14 +268,18 @@ def _velocity(rows: "array[float]") -> complex:
 class _Lost:
     """Vehicles that may go on under a new id: those that have just ended inside the frame.
 
-    One that would be outside it now has left: who comes in there is another. Each has two rows, for
-    the place where it was last and for that where it would be now.
+    Those with a key in `shown` go on anyway. One that would be outside the frame now has left: who
+    comes in there is another. Each has two rows, for the place where it was last and for that where
+    it would be now.
     """
 
-    def __init__(self, vehicles: dict[int, _Vehicle], now: float, size: _Size) -> None:
+    def __init__(
+        self, vehicles: Mapping[int, _Vehicle], shown: Container[int], now: float, size: _Size
+    ) -> None:
         rows = [
             (*row[1:4], key)
             for key, each in vehicles.items()
+            if key not in shown and now - each.shown <= GAP and not each.is_leaving(*size)
             for places in [each.onward(now).tolist()]
             if 0 <= places[1][1] <= size[0] and 0 <= places[1][2] <= size[1]
             for row in places

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vdet.boxes import BoolArray, Float64Array
+from vdet.boxes import Float64Array
 from vdet.lanes.ground import Ground
 from vdet.track.track import FrameTracks
 from vdet.traffic.counts import Counts
@@ -187,19 +187,21 @@ def measure(ground: Ground, rows: Float64Array) -> Speeds | None:
 
     `rows` are time, x and y of the foot, width and height of the box, `(n, 5)`.
     """
-    seen = _Sight.of(ground, rows)
-    seen = seen.only(np.isfinite(seen.weights))
-    if len(seen.rows) < 3 or seen.times[-1] - seen.times[0] < LEAST:
+    rows = rows[np.isfinite(_Sight.of(ground, rows).weights)]
+    if len(rows) < 3 or rows[-1, 0] - rows[0, 0] < LEAST:
         return None
-    off = seen.off(_Line.of(seen.times, seen.places, seen.weights))
-    seen = seen.only(off <= max(_OUTLIERS[0], _OUTLIERS[1] * float(np.median(off))))
+    seen = _Sight.of(ground, rows)
+    line = _Line.of(seen.times, seen.places, seen.weights)
+    off = np.hypot(*(seen.places - line.fitted).T) * np.sqrt(seen.weights)  # in heights of the box
+    is_near = off <= max(_OUTLIERS[0], _OUTLIERS[1] * float(np.median(off)))
+    seen = _Sight.of(ground, rows[is_near])
     line = _Line.of(seen.times, seen.places, seen.weights)
     middles = seen.middles(line.velocities)
     line = _Line.of(seen.times, middles, seen.weights)
     speeds = np.hypot(*line.velocities.T)
     at = np.arange(seen.times[0], seen.times[-1] + _SPACING, _SPACING)
     thin = np.unique(np.minimum(np.searchsorted(seen.times, at), len(speeds) - 1))
-    common = _common(ground, seen.rows)
+    common = _common(ground, rows[is_near])
     return Speeds(seen.times[thin], middles[thin], speeds[thin], line.deviations[thin], common)
 
 
@@ -226,7 +228,7 @@ class _Sight:
     `weights` those of the places.
     """
 
-    rows: Float64Array
+    times: Float64Array
     places: Float64Array
     depth: Float64Array
     away: Float64Array
@@ -244,21 +246,7 @@ class _Sight:
         row = np.sum(depth * away, axis=1)[:, None]
         weights = 1 / (np.abs(row[:, 0]) * rows[:, 4]) ** 2
         away, depth = away / np.abs(row), depth * np.sign(row)
-        return cls(rows, places, depth, away, pixel * rows[:, 3], weights)
-
-    @property
-    def times(self) -> Float64Array:
-        """The time of each row."""
-        return self.rows[:, 0]
-
-    def only(self, which: BoolArray) -> "_Sight":
-        """Return some of the rows."""
-        each = (self.rows, self.places, self.depth, self.away, self.widths, self.weights)
-        return _Sight(*(values[which] for values in each))
-
-    def off(self, line: "_Line") -> Float64Array:
-        """Return how far places are from a line, in heights of the box."""
-        return np.asarray(np.hypot(*(self.places - line.fitted).T) * np.sqrt(self.weights))
+        return cls(rows[:, 0], places, depth, away, pixel * rows[:, 3], weights)
 
     def middles(self, velocities: Float64Array) -> Float64Array:
         """Return the middles of the vehicle on the road, `(n, 2)`.
