@@ -9,16 +9,16 @@ import numpy as np
 
 from vdet.boxes import Image
 from vdet.draw.boxes import color_of
+from vdet.lanes.ground import Ground
 from vdet.pages.charts import hex_color
-from vdet.traffic.counts import Counts, Event, vehicle_trips
-from vdet.traffic.paths import draw_flows
+from vdet.pages.place import NOWHERE, draw_marks, flows_of, place_marks
+from vdet.traffic.borders import Border
+from vdet.traffic.counts import Counts, Event
 from vdet.traffic.records import VehicleRecord
 from vdet.traffic.speeds import KMH
 
 Table = tuple[Sequence[str], Sequence[Sequence[str]]]
 """Headings and rows."""
-
-_UNKNOWN = "–"
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,33 +36,31 @@ class TrafficPart:
 
 
 def traffic_part(
-    counts: Counts, records: Iterable[VehicleRecord], frame: Image | None
+    counts: Counts,
+    records: Iterable[VehicleRecord],
+    frame: Image | None,
+    borders: Sequence[Border] = (),
+    ground: Ground | None = None,
 ) -> TrafficPart:
-    """Return the part of a page; `frame` is drawn over."""
+    """Return the part of a page; `frame` is drawn over, with its lines and zones."""
     known = {record.id: record for record in records}
-    flows: dict[tuple[str, str], list[tuple[Event, Event]]] = {}
-    for first, *others in vehicle_trips(counts):
-        way = first.name, others[-1].name if others else _UNKNOWN
-        flows.setdefault(way, []).append((first, others[-1] if others else first))
-    ordered = sorted(flows.items(), key=lambda flow: -len(flow[1]))
+    flows = flows_of(counts)
     classes = sorted(
         {first.class_name or "unknown" for each in flows.values() for first, _ in each}
     )
     several = classes if len(classes) > 1 else []
-    rows, arrows = [], []
-    for number, (way, trips) in enumerate(ordered):
+    rows = []
+    for way, trips in flows.items():
         found = Counter(first.class_name or "unknown" for first, _ in trips)
         speeds = [speed for trip in trips if (speed := _mean_speed(known, *trip)) is not None]
-        shown = f"{median(speeds):.0f}" if speeds else _UNKNOWN
+        shown = f"{median(speeds):.0f}" if speeds else NOWHERE
         rows.append((*way, *(str(found[name]) for name in several), str(len(trips)), shown))
-        paths = sorted((known[last.id].path for _, last in trips if last.id in known), key=len)
-        if paths:
-            arrows.append((paths[len(paths) // 2], len(trips), color_of(number)))
     if frame is not None:
         frame = frame.copy()
-        draw_flows(frame, arrows)
+        size = frame.shape[1], frame.shape[0]
+        draw_marks(frame, place_marks(size, borders, counts, known, ground))
     headings = ("from", "to", *several, "vehicles", "mean km/h")
-    if all(row[-1] == _UNKNOWN for row in rows):
+    if all(row[-1] == NOWHERE for row in rows):
         headings, rows = headings[:-1], [row[:-1] for row in rows]
     colors = [hex_color(color_of(number)) for number, _ in enumerate(rows)]
     return TrafficPart((headings, rows), colors, frame, _speeds(counts))

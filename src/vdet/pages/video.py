@@ -10,11 +10,13 @@ from pydantic import BaseModel, ConfigDict, Field
 from vdet.boxes import Image
 from vdet.errors import named
 from vdet.files import write_text
+from vdet.lanes.ground import Ground
 from vdet.media import VideoInfo
 from vdet.pages import charts
 from vdet.pages.charts import Axis, Plot, Span, Timeline
 from vdet.pages.render import jpeg_uri, link_to, render
-from vdet.pages.traffic import traffic_part
+from vdet.pages.traffic import TrafficPart, traffic_part
+from vdet.traffic.borders import Border
 from vdet.traffic.clock import Clock
 from vdet.traffic.counts import Counts
 from vdet.traffic.intervals import Intervals
@@ -92,6 +94,10 @@ class VideoPage:
         Times without frames, from the frame before to the one after, seconds.
     clock
         None where it is not known.
+    borders
+        The lines and zones at which vehicles were counted.
+    ground
+        The road plane, where it is known.
     """
 
     video: VideoInfo
@@ -107,6 +113,8 @@ class VideoPage:
     interval: int = 60
     gaps: Sequence[tuple[float, float]] = ()
     clock: Clock | None = None
+    borders: Sequence[Border] = ()
+    ground: Ground | None = None
 
     @property
     def facts(self) -> VideoFacts:
@@ -137,7 +145,7 @@ class VideoPage:
             timeline=_timeline(shown, x),
             interval_plots=self._interval_plots(),
             speed_plot=charts.histogram(speeds, _SPEED_STEP, title, "km/h") if speeds else None,
-            traffic=traffic_part(self.counts, self.records, self.poster) if self.counts else None,
+            traffic=self._traffic(),
             paths=self._paths(),
         )
 
@@ -194,6 +202,12 @@ class VideoPage:
             for name, some in series.items()
             if some
         ]
+
+    def _traffic(self) -> TrafficPart | None:
+        """Return what is shown of the counts."""
+        if self.counts is None:
+            return None
+        return traffic_part(self.counts, self.records, self.poster, self.borders, self.ground)
 
     def _paths(self) -> Image | None:
         """Return the frame with the paths of all vehicles."""

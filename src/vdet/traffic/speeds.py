@@ -128,12 +128,14 @@ class SpeedMeter:
 
     Parameters
     ----------
+    ground
+        The road plane, which is kept.
     width, height
         Size of the frames, pixels.
     """
 
     def __init__(self, ground: Ground, width: int, height: int) -> None:
-        self._ground = ground
+        self.ground = ground
         self._sides = _EDGE * width, (1 - _EDGE) * width, (1 - _EDGE) * height
         self._rows: dict[int, array[float]] = {}
         self._known: dict[int, Speeds | None] = {}
@@ -158,7 +160,7 @@ class SpeedMeter:
 
     def _close(self, number: int) -> None:
         rows = np.array(self._rows.pop(number)).reshape(-1, _COLUMNS)
-        self._known[number] = measure(self._ground, rows) or self._known.get(number)
+        self._known[number] = measure(self.ground, rows) or self._known.get(number)
 
 
 def with_speeds(counts: Counts, meter: SpeedMeter | None) -> Counts:

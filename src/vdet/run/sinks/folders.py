@@ -140,12 +140,13 @@ class PageSink(BaseSink):
 
     def _page(self) -> VideoPage:
         settings, traffic = self.context.settings, self.context.traffic
+        counter, speeds = (traffic.counter, traffic.speeds) if traffic else (None, None)
         return VideoPage(
             video=self.video,
             frames=self._frames,
             start=self._start,
             end=self._last + float(1 / self.video.rate),
-            records=self._records.end(traffic.speeds if traffic else None),
+            records=self._records.end(speeds),
             thumbnails=self._thumbnails,
             poster=self._fullest.image if self._fullest else None,
             player=self._player(),
@@ -154,6 +155,8 @@ class PageSink(BaseSink):
             interval=settings.traffic.seconds or 60,
             gaps=self._gaps,
             clock=self.context.clock,
+            borders=(*counter.lines, *counter.zones) if counter else (),
+            ground=speeds.ground if speeds else None,
         )
 
     def _player(self) -> Player | None:

@@ -1,0 +1,137 @@
+"""The picture of a place for reports: lines, zones and flows with their counts, and a scale.
+
+It is made of marks, which are painted into an image or written as SVG.
+"""
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vdet.boxes import Image
+from vdet.draw import paint
+from vdet.draw.boxes import LINE, WHITE, ZONE, color_of, draw_label, line_width
+from vdet.draw.paint import Color
+from vdet.lanes.ground import Ground
+from vdet.pages.render import render
+from vdet.polygons import Point
+from vdet.traffic.borders import Border, PlacedLine
+from vdet.traffic.counts import Counts, Event, vehicle_trips
+from vdet.traffic.records import VehicleRecord
+
+Flow = tuple[str, str]
+"""The first and the last line or zone of a vehicle; the last is `NOWHERE` where it is the first."""
+
+NOWHERE = "–"
+
+_WIDEST = 0.012
+"""Width of the arrow of the largest flow, as a fraction of the frame's width."""
+_SIDE = 0.04
+"""Length of the arrows to the sides of a line, as a fraction of the frame's height."""
+_SHADE = 0.18
+"""Opacity of the colour over a zone."""
+_SCALES = (1, 2, 5, 10, 20, 50, 100)
+"""Lengths of a scale, metres."""
+_SCALE = 0.2
+"""Longest scale, as a fraction of the frame's width."""
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """A line through `points`, closed or an arrow; its label lies at `at`, in pixels."""
+
+    points: Sequence[Point]
+    color: Color
+    width: int
+    label: str
+    at: Point
+    is_closed: bool = False
+    is_arrow: bool = False
+
+
+def flows_of(counts: Counts) -> dict[Flow, list[tuple[Event, Event]]]:
+    """Return the first and the last event of each vehicle, by flow, the largest flow first."""
+    flows: dict[Flow, list[tuple[Event, Event]]] = {}
+    for first, *others in vehicle_trips(counts):
+        way = first.name, others[-1].name if others else NOWHERE
+        flows.setdefault(way, []).append((first, others[-1] if others else first))
+    return dict(sorted(flows.items(), key=lambda flow: -len(flow[1])))
+
+
+def place_marks(
+    size: tuple[int, int],
+    borders: Sequence[Border],
+    counts: Counts,
+    records: Mapping[int, VehicleRecord],
+    ground: Ground | None = None,
+) -> list[Mark]:
+    """Return what is drawn over frames of this size, width and height in pixels."""
+    width, height = size
+    thin = line_width(np.empty((height, width)))
+    totals = {(each.name, each.direction): each.count for each in counts.totals}
+    marks = []
+    for border in borders:
+        if isinstance(border, PlacedLine):
+            marks += _line_marks(border, totals, thin, _SIDE * height)
+        else:
+            top = min(border.corners, key=lambda corner: corner[1])
+            marks.append(Mark(border.corners, ZONE, thin, border.name, top, is_closed=True))
+    flows = flows_of(counts)
+    most = max(map(len, flows.values()), default=1)
+    for number, trips in enumerate(flows.values()):
+        paths = sorted((records[e.id].path for _, e in trips if e.id in records), key=len)
+        path = [(x, y) for x, y in paths[len(paths) // 2] if 0 <= x < width and 0 <= y < height]
+        if len(path) > 1:
+            wide = max(2, round(_WIDEST * width * len(trips) / most))
+            label, at = str(len(trips)), path[len(path) // 2]
+            marks.insert(0, Mark(path, color_of(number), wide, label, at, is_arrow=True))
+    return [*marks, *(_scale(ground, thin, width) if ground else ())]
+
+
+def _line_marks(
+    line: PlacedLine, totals: Mapping[tuple[str, str], int], width: int, reach: float
+) -> Iterator[Mark]:
+    """Yield a line, and an arrow to each side from its start, where no vehicle crosses it."""
+    (ax, ay), (bx, by) = line.start, line.end
+    yield Mark((line.start, line.end), LINE, width, line.name, line.end)
+    left = (by - ay) / line.length, (ax - bx) / line.length
+    for sign, direction in zip((1, -1), line.directions, strict=True):
+        tip = ax + sign * reach * left[0], ay + sign * reach * left[1]
+        label = f"{direction} {totals.get((line.name, direction), 0)}"
+        yield Mark((line.start, tip), LINE, width, label, tip, is_arrow=True)
+
+
+def _scale(ground: Ground, width: int, columns: int) -> Iterator[Mark]:
+    """Yield a scale across the picture in the middle of the calibrated area."""
+    x, y = ground.pixels(ground.area.mean(axis=0, keepdims=True))[0].tolist()
+    here, beside = ground.place(np.array([(x, y), (x + 1, y)]))
+    metres = math.dist(here, beside)
+    if metres > 0:
+        lengths = [each for each in _SCALES if each <= _SCALE * columns * metres]
+        length = max(lengths, default=_SCALES[0])
+        half = length / metres / 2
+        yield Mark(((x - half, y), (x + half, y)), WHITE, width, f"{length} m", (x - half, y))
+
+
+def draw_marks(image: Image, marks: Iterable[Mark]) -> None:
+    """Draw marks into an image, their labels above all lines."""
+    drawn = list(marks)
+    for mark in drawn:
+        if mark.is_closed:
+            paint.shade(image, mark.points, mark.color, _SHADE)
+        paint.draw_lines(image, mark.points, mark.color, mark.width, closed=mark.is_closed)
+        if mark.is_arrow:
+            end, length = mark.points[-1], 3 * mark.width
+            back = (point for point in reversed(mark.points) if math.dist(point, end) >= length)
+            start = next(back, mark.points[0])
+            tip = length / max(length, math.dist(start, end))
+            paint.draw_arrow(image, start, end, mark.color, mark.width, tip=tip)
+    for mark in drawn:
+        draw_label(image, mark.label, mark.at, mark.color)
+
+
+def svg(image: Image, marks: Sequence[Mark]) -> str:
+    """Return a picture as SVG, with the image in it and the marks as shapes and text."""
+    height, width = image.shape[:2]
+    return render("place.svg", picture=image, width=width, height=height, marks=marks)
