@@ -192,5 +192,5 @@ def pack(paths: Sequence[VehiclePath]) -> dict[str, Any]:
     ]
     return {
         "vehicles": vehicles,
-        "data": base64.b64encode(zlib.compress(planes.tobytes(), 9)).decode("ascii"),
+        "data": base64.b64encode(zlib.compress(planes.tobytes())).decode("ascii"),
     }

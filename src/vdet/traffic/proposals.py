@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vdet.boxes import Float64Array, Int64Array
+from vdet.boxes import BoolArray, Float64Array, Int64Array
 from vdet.polygons import Point, Segment, meeting
 from vdet.traffic.linking import VehiclePath
 
@@ -25,24 +25,24 @@ _MIN_LENGTH = 1.5
 _MIN_VEHICLES = 5
 """Smallest stream that gets a line: vehicles, and as a fraction of all."""
 _MIN_FRACTION = 0.08
-_MAX_TRIED = 60
+_MAX_TRIED = 30
 """Number of paths of a group along which lines are tried."""
 _PLACES = (0.3, 0.4, 0.5, 0.6, 0.7)
 """Where on a path lines are tried, as fractions of its length."""
 _CLEAR = 0.12
 """Smallest way from where a vehicle is first or last seen to a line, as a fraction of its path."""
-_GAP = 3.0
+_GAP = 4.0
 """Largest gap between vehicles of one stream, in heights of their boxes."""
 _MARGIN = 0.5
 """How far a line goes on beyond the outermost vehicle, in heights of their boxes."""
 _SAME_WAY = 0.7
 """Smallest cosine of the angle between a line's normal and the ways of the vehicles it counts."""
-_GROUP = 1.0
+_GROUP = 1.25
 """Distance of groups: of unit vectors of the first and of the last heading, together."""
 _MAX_OTHERS = 0.34
 """Largest number of others that cross a line, as a fraction of the vehicles that it is for."""
 _NEAR_BEST = 0.9
-"""Fraction of the best result from which a place is taken where vehicles are larger."""
+"""Fraction of the best result from which the place farthest from the ends of paths is taken."""
 _SPACING = 0.01
 """Distance of the points of a path, as a fraction of the frame's width."""
 _AROUND = 4
@@ -85,19 +85,25 @@ class _Paths:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Candidate:
-    """A line, the numbers of the vehicles it is for and of others that cross it."""
+    """A line, the numbers of the vehicles it is for and of others that cross it.
+
+    `clear` is its distance from the nearer end of a path, as a fraction of its length.
+    """
 
     ends: Segment
     way: Float64Array
-    size: float
+    clear: float
     own: Int64Array
     others: Int64Array
 
-    def gain(self, left: np.ndarray) -> int:
-        """Return how many vehicles it adds to those that are `left`; 0 where others spoil it."""
+    def gain(self, left: BoolArray, needed: float) -> int:
+        """Return how many vehicles it adds to those that are `left`, less all others that cross it.
+
+        It is 0 where these are fewer than `needed`, or others spoil it.
+        """
         own = int(left[self.own].sum())
         others = len(self.others) + len(self.own) - own
-        return own - others if others <= _MAX_OTHERS * own else 0
+        return own - others if own >= needed and others <= _MAX_OTHERS * own else 0
 
 
 def propose_lines(
@@ -140,21 +146,15 @@ def _length(path: VehiclePath) -> float:
 
 def _chosen(candidates: Sequence[_Candidate], vehicles: int) -> Iterator[tuple[_Candidate, int]]:
     """Yield the lines, each with the number of vehicles that no line before it counts."""
-    left, used = np.ones(vehicles, np.bool_), list[Segment]()
-    while candidates := [
-        each
-        for each in candidates
-        if each.gain(left) >= max(_MIN_VEHICLES, _MIN_FRACTION * vehicles)
-        and all(meeting(each.ends, other) is None for other in used)
-    ]:
-        best = max(each.gain(left) for each in candidates)
+    left, needed = np.ones(vehicles, np.bool_), max(_MIN_VEHICLES, _MIN_FRACTION * vehicles)
+    while gains := [(gain, each) for each in candidates if (gain := each.gain(left, needed))]:
+        best = max(gain for gain, _ in gains)
         line = max(
-            (each for each in candidates if each.gain(left) >= _NEAR_BEST * best),
-            key=lambda each: each.size,
+            (each for gain, each in gains if gain >= _NEAR_BEST * best), key=lambda each: each.clear
         )
         yield line, int(left[line.own].sum())
         left[line.own] = False
-        used.append(line.ends)
+        candidates = [each for each in candidates if meeting(each.ends, line.ends) is None]
 
 
 def _directions(way: Float64Array, facing: str | None) -> tuple[str, str]:
@@ -247,5 +247,6 @@ def _across(paths: _Paths, row: int, group: int, size: tuple[int, int]) -> _Cand
     if start == end:
         return None
     who = np.unique(paths.numbers[own])
+    clear = 0.5 - abs(float(paths.gone[row]) - 0.5)
     others = np.setdiff1d(paths.numbers[inside], who)
-    return _Candidate((start, end), way, height, who, others)
+    return _Candidate((start, end), way, clear, who, others)

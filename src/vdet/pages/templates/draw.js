@@ -12,11 +12,6 @@ const AT_EDGE = 0.002; // of the frame's side: points so near to the edge lie on
 const MAX_AT_EDGE = 0.005;
 const INSIDE = 0.01; // pixels
 
-/** Return how far a point is to the right of someone who looks from a to b. */
-function sideOf([ax, ay], [bx, by], x, y) {
-  return ((bx - ax) * (y - ay) - (by - ay) * (x - ax)) / Math.hypot(bx - ax, by - ay);
-}
-
 /** Return where the way from a to b meets the segment from c to d, from 0 to 1, or null. */
 function meeting([ax, ay], [bx, by], [[cx, cy], [dx, dy]]) {
   const ux = bx - ax, uy = by - ay, vx = dx - cx, vy = dy - cy;
@@ -35,17 +30,19 @@ function sidesOf(corners) {
   return corners.map((corner, i) => [corners.at(i - 1), corner]);
 }
 
-function isInside(corners, x, y) {
+/** Return whether a point lies in a polygon, given its sides. */
+function isInside(sides, x, y) {
   let inside = false;
-  for (const [[ax, ay], [bx, by]] of sidesOf(corners))
-    if ((ay > y) !== (by > y) && x < ax + (y - ay) * ((bx - ax) / (by - ay))) inside = !inside;
+  for (const [a, b] of sides)
+    if ((a[1] > y) !== (b[1] > y) && x < a[0] + (y - a[1]) * ((b[0] - a[0]) / (b[1] - a[1]))) inside = !inside;
   return inside;
 }
 
-function distanceTo([[ax, ay], [bx, by]], x, y) {
-  const wx = bx - ax, wy = by - ay;
-  const at = Math.min(1, Math.max(0, ((x - ax) * wx + (y - ay) * wy) / (wx * wx + wy * wy)));
-  return Math.hypot(x - ax - at * wx, y - ay - at * wy);
+function distanceTo(segment, x, y) {
+  const [a, b] = segment, wx = b[0] - a[0], wy = b[1] - a[1];
+  const at = clamp(((x - a[0]) * wx + (y - a[1]) * wy) / (wx * wx + wy * wy), 0, 1);
+  const dx = x - a[0] - at * wx, dy = y - a[1] - at * wy;
+  return Math.sqrt(dx * dx + dy * dy); // Math.hypot is ten times as slow
 }
 
 function clamp(value, low, high) {
@@ -68,9 +65,8 @@ function snapped(point, size) {
 /** Place a line, whose positive side is its left; at the frame's edge it goes on beyond. */
 function placeLine(line, size) {
   const [start, end] = [snapped(line.start, size), snapped(line.end, size)];
-  const length = Math.hypot(end[0] - start[0], end[1] - start[1]);
-  const factor = (size[0] + size[1]) / length;
-  const [dx, dy] = [factor * (end[0] - start[0]), factor * (end[1] - start[1])];
+  const [ax, ay] = end, wx = start[0] - ax, wy = start[1] - ay, length = Math.hypot(wx, wy);
+  const dx = -wx * (size[0] + size[1]) / length, dy = -wy * (size[0] + size[1]) / length;
   const atEdge = point => point.some((value, i) => value === 0 || value === size[i]);
   const reach = [
     atEdge(start) ? [start[0] - dx, start[1] - dy] : start,
@@ -79,7 +75,7 @@ function placeLine(line, size) {
   return {
     isZone: false, name: line.name, directions: [line.left, line.right], start, end, length, size,
     bounds: boundsOf(reach),
-    distance: (x, y) => sideOf(end, start, x, y),
+    distance: (x, y) => (wx * (y - ay) - wy * (x - ax)) / length,
     meeting: (a, b) => meeting(a, b, reach),
   };
 }
@@ -87,21 +83,22 @@ function placeLine(line, size) {
 /** Place a zone, whose positive side is the inside; at the frame's edge it goes on beyond. */
 function placeZone(zone, size) {
   const corners = zone.points.map(point => snapped(point, size));
-  const sides = sidesOf(corners).filter(([a, b]) =>
-    ![0, 1].some(i => a[i] === b[i] && (a[i] === 0 || a[i] === size[i])));
-  const inFrame = (x, y) => [clamp(x, INSIDE, size[0] - INSIDE), clamp(y, INSIDE, size[1] - INSIDE)];
+  const every = sidesOf(corners), isAtEdge = ([a, b], i) => a[i] === b[i] && (a[i] === 0 || a[i] === size[i]);
+  const sides = every.filter(side => !isAtEdge(side, 0) && !isAtEdge(side, 1));
+  const right = size[0] - INSIDE, bottom = size[1] - INSIDE;
+  const inFrame = ([x, y]) => [clamp(x, INSIDE, right), clamp(y, INSIDE, bottom)];
   return {
-    isZone: true, name: zone.name, directions: ["enter", "exit", "appear", "vanish"], size,
+    isZone: true, name: zone.name, directions: ["enter", "exit", "appear", "vanish"], corners, size,
     bounds: boundsOf(corners),
     distance(x, y) {
-      [x, y] = inFrame(x, y);
+      x = clamp(x, INSIDE, right);
+      y = clamp(y, INSIDE, bottom);
       let distance = Infinity;
       for (const side of sides) distance = Math.min(distance, distanceTo(side, x, y));
-      return isInside(corners, x, y) ? distance : -distance;
+      return isInside(every, x, y) ? distance : -distance;
     },
     meeting(a, b) {
-      const shares = sides.map(side => meeting(inFrame(...a), inFrame(...b), side));
-      const met = shares.filter(share => share !== null);
+      const met = sides.map(side => meeting(inFrame(a), inFrame(b), side)).filter(share => share !== null);
       return met.length ? Math.max(...met) : 1;
     },
   };
@@ -184,7 +181,8 @@ function settle(path, border, distances) {
     const seconds = Math.round(1e4 * (path.times[row] - since)) / 1e4;
     settles[row] = far || (isOff && seconds >= SETTLED) || (row === count - 1 && isFar);
     isClear[row] = isFar || far;
-    [wasOff, wasFar] = [isOff, isFar];
+    wasOff = isOff;
+    wasFar = isFar;
   }
   return { settles, isClear };
 }
@@ -615,7 +613,7 @@ async function openPage(data) {
   function within(path, regions) {
     const shows = regions.some(each => each.kind !== "exclude");
     const rows = [...path.times.keys()].filter(row => {
-      const inside = each => isInside(each.points, clamp(path.xs[row], 0, width - 1), clamp(path.ys[row], 0, height - 1));
+      const inside = each => isInside(sidesOf(each.points), clamp(path.xs[row], 0, width - 1), clamp(path.ys[row], 0, height - 1));
       return (!shows || regions.some(each => each.kind !== "exclude" && inside(each))) &&
         !regions.some(each => each.kind === "exclude" && inside(each));
     });
