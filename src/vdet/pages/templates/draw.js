@@ -136,66 +136,52 @@ function crossings(path, border) {
 
 /** Return the changes of the settled side, and where it begins in a zone. */
 function changes(path, border) {
-  const count = path.times.length, found = [];
-  const distances = new Float64Array(count);
-  let turns = 0;
-  for (let row = 0; row < count; row++) {
-    distances[row] = border.distance(path.xs[row], path.ys[row]);
-    if (row && (distances[row] >= 0) !== (distances[row - 1] >= 0)) turns++;
-  }
-  if (!turns && !(distances[0] >= 0 && border.isZone)) return found;
-  const settling = settle(path, border, distances);
+  const { times, xs, ys, heights } = path, count = times.length, found = [];
+  const distances = Float64Array.from(xs, (x, row) => border.distance(x, ys[row]));
+  const isPositive = row => distances[row] >= 0;
+  const mayBegin = border.isZone && isPositive(0);
+  if (!mayBegin && distances.every((_, row) => isPositive(row) === isPositive(0))) return found;
+  const { settles, isClear } = settle(path, border, distances);
   let settled = null, crossed = null; // the side, and where it crossed last
   for (let row = 0, end; row < count; row = end) {
-    const isPositive = distances[row] >= 0;
-    const rows = [];
-    for (end = row; end < count && (distances[end] >= 0) === isPositive; end++)
-      if (settling.settles[end]) rows.push(end);
-    if (!rows.length || settled === isPositive) continue;
+    const side = isPositive(row), rows = [];
+    for (end = row; end < count && isPositive(end) === side; end++) if (settles[end]) rows.push(end);
+    if (!rows.length || settled === side) continue;
     if (settled !== null) {
-      const { share, time, place } = meet(path, border, row);
+      const a = [xs[row - 1], ys[row - 1]], b = [xs[row], ys[row]];
+      const share = border.meeting(a, b), along = share ?? 1;
+      const place = [0, 1].map(i => a[i] + along * (b[i] - a[i]));
       const way = crossed ? Math.hypot(crossed[0] - place[0], crossed[1] - place[1]) : Infinity;
-      if (!rows.some(each => settling.isClear[each] || path.heights[each] <= way)) continue;
+      if (!rows.some(each => isClear[each] || heights[each] <= way)) continue; // back, but not far
       crossed = share === null ? null : place;
-      if (share !== null)
-        found.push({ time, row: share ? row : row - 1, direction: border.directions[isPositive ? 0 : 1] });
-    } else if (isPositive && border.isZone) {
-      found.push({ time: path.times[0], row: 0, direction: "appear" });
+      const time = times[row - 1] + along * (times[row] - times[row - 1]);
+      const direction = border.directions[side ? 0 : 1];
+      if (share !== null) found.push({ time, row: share ? row : row - 1, direction });
+    } else if (side && border.isZone) {
+      found.push({ time: times[0], row: 0, direction: "appear" });
     }
-    settled = isPositive;
+    settled = side;
   }
   return found;
 }
 
 /** Return the rows that settle the side, and those one height of the box away from the border. */
-function settle(path, border, distances) {
+function settle({ times, heights }, border, distances) {
   const count = distances.length, settles = new Uint8Array(count), isClear = new Uint8Array(count);
   let since = 0, wasOff = false, wasFar = false;
   for (let row = 0; row < count; row++) {
-    const away = Math.abs(distances[row]), height = path.heights[row];
-    const isOff = away > Math.max(BAND * height, MIN_BAND * border.size[1]);
-    const isFar = isOff && away >= height;
+    const away = Math.abs(distances[row]);
+    const isOff = away > Math.max(BAND * heights[row], MIN_BAND * border.size[1]);
+    const isFar = isOff && away >= heights[row];
     const isSame = row > 0 && (distances[row] >= 0) === (distances[row - 1] >= 0);
-    if (!(isOff && wasOff && isSame)) since = path.times[row];
-    const far = wasFar && isSame;
-    const seconds = Math.round(1e4 * (path.times[row] - since)) / 1e4;
+    if (!(isOff && wasOff && isSame)) since = times[row];
+    const far = wasFar && isSame, seconds = Math.round(1e4 * (times[row] - since)) / 1e4;
     settles[row] = far || (isOff && seconds >= SETTLED) || (row === count - 1 && isFar);
     isClear[row] = isFar || far;
     wasOff = isOff;
     wasFar = isFar;
   }
   return { settles, isClear };
-}
-
-/** Return where a path meets a border between a row and the one before. */
-function meet(path, border, row) {
-  const a = [path.xs[row - 1], path.ys[row - 1]], b = [path.xs[row], path.ys[row]];
-  const share = border.meeting(a, b), along = share ?? 1;
-  return {
-    share,
-    time: path.times[row - 1] + along * (path.times[row] - path.times[row - 1]),
-    place: [a[0] + along * (b[0] - a[0]), a[1] + along * (b[1] - a[1])],
-  };
 }
 
 // ---------------------------------------------------------------- what follows from crossings
@@ -205,25 +191,19 @@ const FEW = 0.05; // fraction of the crossings up to which there is no warning
 
 /** Return the sentences of a run about a line; visits are [path, its crossings]. */
 function warningsOf(line, visits, paths, span) {
-  if (!paths.length) return [];
-  const found = [], crossed = new Set(visits.map(([path]) => path)), few = FEW * visits.length;
-  const isNear = (path, row) =>
+  const crossed = new Set(visits.map(([path]) => path)), few = FEW * visits.length;
+  const isMissed = path => !crossed.has(path) && [0, path.seen - 1].some(row =>
     path.times[row] > span[0] && path.times[row] < span[1] &&
-    distanceTo([line.start, line.end], path.xs[row], path.ys[row]) <= NEAR * path.heights[row];
-  const missed = paths.filter(path =>
-    !crossed.has(path) && [0, path.seen - 1].some(row => isNear(path, row))).length;
-  const again = visits.filter(([, some]) => some.length > 1).length;
+    distanceTo([line.start, line.end], path.xs[row], path.ys[row]) <= NEAR * path.heights[row]);
+  const missed = paths.filter(isMissed).length, again = visits.filter(([, some]) => some.length > 1).length;
   const heights = visits.flatMap(([path, some]) => some.map(each => path.heights[each.row]));
-  if (!visits.length) found.push("no path crosses this line; move it");
-  if (missed > few)
-    found.push(`tracks that begin or end at this line and are not counted: ${missed}; ` +
-      "move it to where vehicles are followed longer");
-  if (again > few)
-    found.push(`paths that cross this line more than once: ${again}; ` +
-      "place it across the way of the vehicles");
-  if (heights.length && line.length < quantile(heights, 0.5))
-    found.push("this line is shorter than a vehicle; make it longer");
-  return found;
+  return [
+    paths.length && !visits.length && "no path crosses this line; move it",
+    missed > few && `tracks that begin or end at this line and are not counted: ${missed}; ` +
+      "move it to where vehicles are followed longer",
+    again > few && `paths that cross this line more than once: ${again}; place it across the way of the vehicles`,
+    heights.length && line.length < quantile(heights, 0.5) && "this line is shorter than a vehicle; make it longer",
+  ].filter(text => text);
 }
 
 function quantile(values, share) {
@@ -232,23 +212,18 @@ function quantile(values, share) {
   return sorted[low] + (at - low) * (sorted[high] - sorted[low]);
 }
 
-/** Return how many vehicles go from which place to which: a Map of Maps, with null for nowhere. */
+/** Return how many vehicles go from one place to another, by "from\nto"; to nothing for a single place. */
 function flowsOf(found) {
-  const trips = new Map();
-  for (const { border, visits } of found)
+  const trips = new Map(), flows = {};
+  for (const { border: { name }, visits } of found)
     for (const [path, some] of visits)
-      for (const each of some)
-        if (each.direction !== "exit" && each.direction !== "vanish") {
-          if (!trips.has(path)) trips.set(path, []);
-          trips.get(path).push({ name: border.name, time: Math.round(1000 * each.time), row: each.row });
-        }
-  const flows = new Map();
+      for (const { direction, time, row } of some)
+        if (direction !== "exit" && direction !== "vanish")
+          trips.set(path, [...trips.get(path) ?? [], { name, time: Math.round(1000 * time), row }]);
   for (const trip of trips.values()) {
     trip.sort((a, b) => a.time - b.time || a.row - b.row || (a.name < b.name ? -1 : 1));
-    const to = trip.length > 1 ? trip.at(-1).name : null;
-    if (!flows.has(trip[0].name)) flows.set(trip[0].name, new Map());
-    const row = flows.get(trip[0].name);
-    row.set(to, (row.get(to) ?? 0) + 1);
+    const flow = `${trip[0].name}\n${trip.length > 1 ? trip.at(-1).name : ""}`;
+    flows[flow] = (flows[flow] ?? 0) + 1;
   }
   return flows;
 }
@@ -348,23 +323,19 @@ function speedAt(path, time, ground) {
 // ---------------------------------------------------------------- the file
 
 const MARK = "# Drawn with vdet draw";
-const FORMS = { // the lists of the file: their section, and what their items have
-  ground: ["camera", ["pixel", "metres"]],
-  regions: ["", ["name", "kind", "points", "mask"]],
-  lines: ["traffic", ["name", "start", "end", "left", "right"]],
-  zones: ["traffic", ["name", "points"]],
+const FORMS = { // the lists of the file, and what their items have
+  ground: ["pixel", "metres"], regions: ["name", "kind", "points", "mask"],
+  lines: ["name", "start", "end", "left", "right"], zones: ["name", "points"],
 };
 
 /** Write the settings of the camera as YAML; `rest` has the lines of everything else. */
 function writeYaml(places, size, rest, name) {
   const write = value => Array.isArray(value) ? `[${value.map(write).join(", ")}]` :
-    typeof value === "number" ? String(Math.round(1000 * value) / 1000) :
-    value === "include" || value === "exclude" ? value : JSON.stringify(value);
-  const list = (kind, indent, note) => places[kind].length ? [
-    `${indent}${kind}:  # ${note}`,
-    ...places[kind].map(item => `${indent}  - {${FORMS[kind][1].filter(key => item[key] !== undefined && item[key] !== null)
-      .map(key => `${key}: ${key === "name" || key === "left" || key === "right" ? JSON.stringify(item[key]) : write(item[key])}`).join(", ")}}`),
-  ] : [];
+    typeof value === "number" ? String(Math.round(1000 * value) / 1000) : JSON.stringify(value);
+  const line = (kind, item) => FORMS[kind].filter(key => item[key] != null)
+    .map(key => `${key}: ${key === "kind" ? item.kind : write(item[key])}`).join(", ");
+  const list = (kind, indent, note) => places[kind].length ? [`${indent}${kind}:  # ${note}`,
+    ...places[kind].map(item => `${indent}  - {${line(kind, item)}}`)] : [];
   const traffic = [
     ...list("lines", "  ", "left and right of someone who looks from start to end"),
     ...list("zones", "  ", "polygons in which vehicles are counted"), ...rest.traffic];
@@ -381,22 +352,18 @@ function writeYaml(places, size, rest, name) {
 /** Read a file that `writeYaml` has written: size, places and rest. Raises an Error for others. */
 function readYaml(text) {
   if (!text.startsWith(MARK)) throw Error("not written by this page; open it with vdet draw CLIP -c FILE");
-  const places = { ground: [], regions: [], lines: [], zones: [] };
-  const rest = { camera: [], traffic: [], other: [] };
+  const places = { ground: [], regions: [], lines: [], zones: [] }, rest = { camera: [], traffic: [], other: [] };
   let section = "other", list = null, size = null;
   for (const line of text.split("\n").filter(line => line.trim() && !line.startsWith("#"))) {
-    const key = /^( *)(\w+):/.exec(line);
-    const item = /^ *- (\{.*\})$/.exec(line);
-    const isTop = key && !key[1];
-    if (isTop) section = key[2] === "camera" || key[2] === "traffic" ? key[2] : "other";
-    if (key && FORMS[key[2]] && FORMS[key[2]][0] === (isTop ? "" : section) && key[1].length < 3) list = key[2];
+    const [, indent, key] = /^( *)(\w+):/.exec(line) ?? [], item = /^ *- (\{.*\})$/.exec(line);
+    if (indent === "") section = key in rest ? key : "other";
+    if (FORMS[key] && indent === (key === "regions" ? "" : "  ")) list = key;
     else if (list && item) places[list].push(readItem(item[1]));
-    else if (/^ *-/.test(line) && list) throw Error(`not as this page writes it: ${line.trim()}`);
+    else if (list && /^ *-/.test(line)) throw Error(`not as this page writes it: ${line.trim()}`);
     else {
       list = null;
-      const given = section === "camera" && /^  size: (\[.*?\])/.exec(line);
-      if (given) size = JSON.parse(given[1]);
-      else if (!isTop || section === "other") rest[section].push(line);
+      if (section === "camera" && key === "size") size = JSON.parse(/\[.*?\]/.exec(line)[0]);
+      else if (indent !== "" || section === "other") rest[section].push(line);
     }
   }
   if (!size) throw Error("has no camera.size");
@@ -410,25 +377,19 @@ function readItem(text) {
 }
 
 /** Return what is wrong with places, in sentences; a run would refuse them. */
-function problemsOf(places, size) {
-  const found = [], names = new Set();
-  for (const item of [...places.lines, ...places.zones]) {
-    if (names.has(item.name)) found.push(`${item.name}: this name is used twice`);
-    names.add(item.name);
-  }
-  if (new Set(places.regions.map(item => item.name)).size < places.regions.length)
-    found.push("regions: a name is used twice");
-  for (const line of places.lines) {
-    const length = [0, 1].map(i => Math.abs(line.start[i] - line.end[i]) / size[i]);
-    if (Math.max(...length) < 0.01) found.push(`${line.name}: is shorter than 1 % of the frame`);
-    if (line.left === line.right) found.push(`${line.name}: both sides have one name`);
-  }
-  for (const item of [...places.zones, ...places.regions])
-    if (item.points && crossesItself(item.points)) found.push(`${item.name}: crosses or touches itself`);
-  if (places.ground.length && !fitGround(places.ground))
-    found.push(places.ground.length < 4 ? "ground: needs four points or more, with their metres" :
-      "ground: these points do not fix a plane; check their metres");
-  return found;
+function problemsOf({ lines, zones, regions, ground }, size) {
+  const isTwice = (each, i, all) => all.findIndex(other => other.name === each.name) < i;
+  const isShort = ({ start, end }) => [0, 1].every(i => Math.abs(start[i] - end[i]) < 0.01 * size[i]);
+  const say = (some, text) => some.map(each => `${each.name}: ${text}`);
+  return [
+    ...say([...lines, ...zones].filter(isTwice), "this name is used twice"),
+    ...say(regions.filter(isTwice), "this name is used twice"),
+    ...say(lines.filter(isShort), "is shorter than 1 % of the frame"),
+    ...say(lines.filter(line => line.left === line.right), "both sides have one name"),
+    ...say([...zones, ...regions].filter(each => each.points && crossesItself(each.points)), "crosses or touches itself"),
+    ...(ground.length && ground.length < 4 ? ["ground: needs four points or more, with their metres"] :
+      ground.length && !fitGround(ground) ? ["ground: these points do not fix a plane; check their metres"] : []),
+  ];
 }
 
 function crossesItself(corners) {
@@ -439,56 +400,38 @@ function crossesItself(corners) {
 
 // ---------------------------------------------------------------- the linked paths
 
-/** Return the paths that Python packs: differences in four planes of bytes, deflated. */
+/** Return the paths that Python packs: second differences in four planes of bytes, deflated. */
 async function readPaths(packed) {
   const bytes = Uint8Array.from(atob(packed.data), char => char.charCodeAt(0));
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
   const planes = new Uint8Array(await new Response(stream).arrayBuffer()), count = planes.length / 4;
-  const steps = Int32Array.from({ length: count }, (_, i) =>
-    planes[i] | planes[count + i] << 8 | planes[2 * count + i] << 16 | planes[3 * count + i] << 24);
-  const rows = count / 4;
   let first = 0;
   return packed.vehicles.map(([vehicle, kind, start, seen, length]) => {
-    const column = (number, unit, before = 0) => {
-      let step = 0, value = 0;
-      return Float64Array.from({ length }, (_, i) => {
-        step += steps[number * rows + first + i];
-        value += step;
-        return before + value / unit;
+    const [times, xs, ys, heights] = [0, 1, 2, 3].map(column => {
+      let at = column * count / 4 + first, step = 0, value = 0;
+      return Float64Array.from({ length }, () => {
+        step += planes[at] | planes[count + at] << 8 | planes[2 * count + at] << 16 | planes[3 * count + at] << 24;
+        at++;
+        return value += step;
       });
-    };
-    const path = {
-      vehicle, kind, seen,
-      times: column(0, 1e6).map(time => Math.round(1e6 * (start + time)) / 1e6),
-      xs: column(1, 100), ys: column(2, 100), heights: column(3, 1),
-    };
+    });
     first += length;
-    return path;
+    return { vehicle, kind, seen, heights, times: times.map(time => Math.round(1e6 * start + time) / 1e6),
+      xs: xs.map(x => x / 100), ys: ys.map(y => y / 100) };
   });
 }
-
-if (typeof module !== "undefined") module.exports = {
-  placeLine, placeZone, crossings, warningsOf, flowsOf, fitGround, speedAt, writeYaml, readYaml, problemsOf, readPaths,
-};
 
 // ---------------------------------------------------------------- the page
 
 const KINDS = { lines: "line", zones: "zone", regions: "region", ground: "point" };
-const HINTS = {
-  select: "Click a line, a zone or a path; drag it or its handles. Click a dashed line to take it over.",
-  line: "Click where the line begins, then where it ends, across the way of the vehicles.",
-  zone: "Click the corners; end with Enter, a double click, or a click on the first corner.",
-  include: "Click the corners of the region in which vehicles count; end with Enter or a double click.",
-  exclude: "Click the corners of the region in which vehicles do not count; end with Enter.",
-  ground: "Click a point of the road, then type its metres. From four points on, a grid appears.",
-};
-const KEYS = { v: "select", l: "line", z: "zone", i: "include", x: "exclude", g: "ground" };
+const SHAPES = ["g", "line", "polygon", "polyline", "circle", "text", "tspan"];
+const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 const LENS = { side: 132, zoom: 4 };
 
 /** Make an element; texts are never read as HTML. */
 function el(tag, attributes = {}, ...children) {
-  const isDrawn = ["g", "line", "polygon", "polyline", "circle", "path", "text", "tspan"].includes(tag);
-  const made = isDrawn ? document.createElementNS("http://www.w3.org/2000/svg", tag) : document.createElement(tag);
+  const space = `http://www.w3.org/${SHAPES.includes(tag) ? "2000/svg" : "1999/xhtml"}`;
+  const made = document.createElementNS(space, tag);
   for (const [name, value] of Object.entries(attributes))
     if (name.startsWith("on")) made.addEventListener(name.slice(2), value);
     else made.setAttribute(name, value);
@@ -501,21 +444,22 @@ function get(id) {
 }
 
 async function openPage(data) {
-  const [width, height] = data.size, size = data.size;
+  const { size } = data, [width, height] = size;
   const stage = get("stage"), view = get("view"), marks = get("marks"), lens = get("lens");
-  const every = await readPaths(data.paths);
-  const kinds = [...new Set(every.map(path => path.kind))].sort();
-  const image = new Image();
-  image.src = data.picture;
+  const every = await readPaths(data.paths), kinds = [...new Set(every.map(path => path.kind))].sort();
+  const image = Object.assign(new Image(), { src: data.picture });
   await image.decode();
+  data.places.lines = data.places.lines.map(line => ({ left: "left", right: "right", ...line }));
 
-  for (const line of data.places.lines) Object.assign(line, { left: "left", right: "right", ...line });
-  let places = data.places, rest = data.rest;
-  let past = [], future = [], saved = JSON.stringify(places);
-  let tool = "select", selected = null, drawn = [], pointer = null, drag = null, hovered = null;
-  const hidden = new Set();
-  let paths = every, regionsKey = "[]", found = [];
-  const known = new Map(); // results by the geometry of a border
+  let { places, rest } = data, past = [], future = [], saved = JSON.stringify(places);
+  let tool = "select", selected = null; // what is selected: kind, index, and the number of a point
+  let drawn = [], pointer = null, drag = null, hovered = null;
+  let paths = every, found = []; // those inside the regions, and what they do at each line and zone
+  const known = new Map(), hidden = new Set(); // results by geometry; classes that are not shown
+
+  const unit = () => width / Math.max(1, stage.clientWidth); // pixels of the frame in one of the screen
+  const item = () => selected && places[selected.kind][selected.index];
+  const say = text => { get("hint").textContent = text; };
 
   // ------------------------------------------------ changes, with their history
 
@@ -529,339 +473,289 @@ async function openPage(data) {
   function travel(from, to) {
     if (!from.length) return;
     to.push(JSON.stringify(places));
-    places = JSON.parse(from.pop());
-    selected = null;
-    drawn = [];
+    [places, selected, drawn] = [JSON.parse(from.pop()), null, []];
     refresh();
   }
 
-  function item() {
-    return selected && places[selected.kind][selected.index];
-  }
-
   function freeName(stem) {
-    const names = new Set([...places.lines, ...places.zones, ...places.regions].map(each => each.name));
+    const names = [...places.lines, ...places.zones, ...places.regions].map(each => each.name);
     let number = 1;
-    while (names.has(`${stem} ${number}`)) number++;
+    while (names.includes(`${stem} ${number}`)) number++;
     return `${stem} ${number}`;
   }
 
   function add(kind, made) {
-    change(() => {
-      places[kind].push(made);
-      selected = { kind, index: places[kind].length - 1, point: null };
-    });
+    change(() => { selected = { kind, index: places[kind].push(made) - 1, point: null }; });
   }
 
+  /** Delete the selected corner of a polygon, else the whole. */
   function remove() {
-    if (!selected) return;
-    const points = item().points;
-    change(() => {
-      if (points && selected.point !== null && points.length > 3) points.splice(selected.point, 1);
-      else places[selected.kind].splice(selected.index, 1), selected = null;
-      if (selected) selected.point = null;
-    });
+    const points = item()?.points, { kind, index, point } = selected ?? {};
+    if (points?.length > 3 && point !== null) change(() => { points.splice(point, 1); selected.point = null; });
+    else if (selected) change(() => { places[kind].splice(index, 1); selected = null; });
   }
 
   function swap() {
-    if (selected?.kind === "lines")
-      change(() => { const line = item(); [line.left, line.right] = [line.right, line.left]; });
+    const line = item();
+    if (line?.start) change(() => { [line.left, line.right] = [line.right, line.left]; });
   }
 
-  /** Return the points of an item, each as it is shown; ground points are middles of pixels. */
+  /** Return the points of an item as they are shown; those of the ground are middles of pixels. */
   function pointsOf(kind, each) {
     if (kind === "lines") return [each.start, each.end];
     return kind === "ground" ? [each.pixel.map(value => value + 0.5)] : each.points ?? [];
   }
 
-  function setPoint(kind, each, number, [x, y]) {
-    const point = [clamp(x, 0, width), clamp(y, 0, height)].map(value => Math.round(10 * value) / 10);
-    if (kind === "lines") each[number ? "end" : "start"] = point;
-    else if (kind === "ground") each.pixel = point.map(value => value - 0.5);
-    else each.points[number] = point;
+  function move(dx, dy) {
+    const each = item(), { kind, point } = selected;
+    pointsOf(kind, each).forEach(([x, y], number) => {
+      if (point !== null && point !== number) return;
+      const moved = inside([x + dx, y + dy]);
+      if (kind === "lines") each[number ? "end" : "start"] = moved;
+      else if (kind === "ground") each.pixel = moved.map(value => value - 0.5);
+      else each.points[number] = moved;
+    });
   }
 
-  function move(dx, dy) {
-    const each = item(), points = pointsOf(selected.kind, each);
-    points.forEach(([x, y], number) => {
-      if (selected.point === null || selected.point === number) setPoint(selected.kind, each, number, [x + dx, y + dy]);
-    });
+  function inside(point) {
+    return point.map((value, i) => Math.round(10 * clamp(value, 0, size[i])) / 10);
   }
 
   // ------------------------------------------------ counts
 
   function recount() {
     const regions = places.regions.filter(each => each.points);
-    const key = JSON.stringify(regions.map(each => [each.kind, each.points]));
-    if (key !== regionsKey) {
-      regionsKey = key;
-      known.clear();
-      paths = regions.length ? every.map(path => within(path, regions)).filter(path => path) : every;
-    }
-    found = [...places.lines.map(line => placeLine(line, size)), ...places.zones.map(zone => placeZone(zone, size))]
-      .map(border => {
-        const shape = JSON.stringify([border.isZone, border.bounds, border.start ?? border.corners, border.isZone ? 0 : border.directions]);
-        if (!known.has(shape)) {
-          if (known.size > 50) known.clear();
-          known.set(shape, paths.map(path => [path, crossings(path, border)]).filter(([, some]) => some.length));
-        }
-        return { border, visits: known.get(shape) };
-      });
+    const visits = (key, work) => {
+      if (known.size > 50) known.clear();
+      if (!known.has(key)) known.set(key, work());
+      return known.get(key);
+    };
+    const area = JSON.stringify(regions.map(each => [each.kind, each.points]));
+    paths = visits(area, () => regions.length ? every.map(path => within(path, regions)).filter(path => path) : every);
+    found = [...places.lines.map(each => placeLine(each, size)), ...places.zones.map(each => placeZone(each, size))]
+      .map(border => ({ border, visits: visits(
+        area + JSON.stringify([border.start, border.end, border.corners, border.isZone || border.directions]),
+        () => paths.map(path => [path, crossings(path, border)]).filter(([, some]) => some.length)) }));
   }
 
   /** Return the part of a path inside the regions; null where nothing is left. */
   function within(path, regions) {
-    const shows = regions.some(each => each.kind !== "exclude");
+    const [shown, left] = ["include", "exclude"].map(kind => regions.filter(each => (each.kind ?? "include") === kind)
+      .map(each => sidesOf(each.points)));
     const rows = [...path.times.keys()].filter(row => {
-      const inside = each => isInside(sidesOf(each.points), clamp(path.xs[row], 0, width - 1), clamp(path.ys[row], 0, height - 1));
-      return (!shows || regions.some(each => each.kind !== "exclude" && inside(each))) &&
-        !regions.some(each => each.kind === "exclude" && inside(each));
+      const has = sides => isInside(sides, clamp(path.xs[row], 0, width - 1), clamp(path.ys[row], 0, height - 1));
+      return (!shown.length || shown.some(has)) && !left.some(has);
     });
     if (rows.length === path.times.length) return path;
-    const seen = rows.filter(row => row < path.seen).length;
-    const pick = values => Float64Array.from(rows, row => values[row]);
-    return seen ? { ...path, bounds: undefined, seen, times: pick(path.times), xs: pick(path.xs),
-      ys: pick(path.ys), heights: pick(path.heights) } : null;
+    const seen = rows.filter(row => row < path.seen).length, pick = values => Float64Array.from(rows, row => values[row]);
+    return seen && { ...path, bounds: undefined, seen, times: pick(path.times), xs: pick(path.xs), ys: pick(path.ys),
+      heights: pick(path.heights) };
   }
 
+  /** Return how many vehicles go in a direction, and as text how many of each class. */
   function countOf({ visits }, direction) {
-    const counts = new Map();
-    for (const [path, some] of visits)
-      for (const each of some)
-        if (each.direction === direction) counts.set(path.kind, (counts.get(path.kind) ?? 0) + 1);
-    const total = [...counts.values()].reduce((sum, count) => sum + count, 0);
-    const classes = [...counts].sort(([, a], [, b]) => b - a).map(([kind, count]) => `${count} ${kind}`).join(", ");
-    return { total, classes: kinds.length > 1 ? classes : "" };
+    const counts = {};
+    for (const [{ kind }, some] of visits)
+      for (const each of some) if (each.direction === direction) counts[kind] = (counts[kind] ?? 0) + 1;
+    const classes = Object.entries(counts).sort(([, a], [, b]) => b - a).map(([kind, count]) => `${count} ${kind}`);
+    return { total: Object.values(counts).reduce((sum, count) => sum + count, 0), classes: kinds.length > 1 ? classes.join(", ") : "" };
   }
 
-  function speedsOf({ border, visits }, ground) {
-    return border.directions.slice(0, 2).map(direction => visits.flatMap(([path, some]) =>
-      some.filter(each => each.direction === direction)
-        .map(each => speedAt(path, each.time, ground)).filter(speed => speed !== null)));
-  }
-
-  // ------------------------------------------------ the picture
-
-  function hue([x1, y1], [x2, y2]) {
-    return `hsl(${Math.round(Math.atan2(y2 - y1, x2 - x1) * 180 / Math.PI + 360) % 360} 90% 58%)`;
-  }
+  // ------------------------------------------------ what is drawn
 
   function paintPaths() {
-    const context = view.getContext("2d"), scale = width / Math.max(1, stage.clientWidth);
+    const context = view.getContext("2d"), scale = unit();
     [view.width, view.height] = size;
     context.drawImage(image, 0, 0, width, height);
-    if (!get("paths").checked) return;
     context.lineWidth = Math.max(1.5, 1.5 * scale);
     context.globalAlpha = clamp(8 / Math.sqrt(every.length), 0.2, 0.8);
-    for (const path of every) {
-      if (hidden.has(path.kind)) continue;
-      const last = path.seen - 1, step = 2 * scale;
-      context.strokeStyle = hue([path.xs[0], path.ys[0]], [path.xs[last], path.ys[last]]);
+    for (const { kind, xs, ys, seen } of get("paths").checked ? every : []) {
+      if (hidden.has(kind)) continue;
+      const turn = Math.atan2(ys[seen - 1] - ys[0], xs[seen - 1] - xs[0]) * 180 / Math.PI;
+      context.strokeStyle = `hsl(${Math.round(turn + 360) % 360} 90% 58%)`;
       context.beginPath();
-      let [x, y] = [-1e9, 0];
-      for (let row = 0; row <= last; row++)
-        if (row === last || Math.abs(path.xs[row] - x) + Math.abs(path.ys[row] - y) > step)
-          context.lineTo([x] = [path.xs[row]], [y] = [path.ys[row]]);
+      for (let row = 0, last = 0; row < seen; row++) {
+        if (row && row < seen - 1 && Math.abs(xs[row] - xs[last]) + Math.abs(ys[row] - ys[last]) < 2 * scale) continue;
+        context.lineTo(xs[row], ys[row]);
+        last = row;
+      }
       context.stroke();
     }
   }
 
-  function label(at, lines, anchor, name) {
-    const unit = width / stage.clientWidth, letter = stage.clientWidth < 600 ? 10 : 13;
-    const text = el("text", {
-      x: at[0], y: at[1], "font-size": letter * unit, "text-anchor": anchor, class: name });
-    lines.forEach((line, i) => text.append(el("tspan", { x: at[0], dy: i ? 1.15 * letter * unit : 0 }, line)));
-    return text;
+  function label([x, y], lines, anchor = "middle", name = "") {
+    const letter = (stage.clientWidth < 600 ? 10 : 13) * unit();
+    return el("text", { x, y, "font-size": letter, "text-anchor": anchor, class: name },
+      ...lines.filter(line => line).map((line, i) => el("tspan", { x, dy: i ? 1.15 * letter : 0 }, line)));
+  }
+
+  function segment([[x1, y1], [x2, y2]]) {
+    return [el("line", { x1, y1, x2, y2, class: "grip" }), el("line", { x1, y1, x2, y2 })];
+  }
+
+  function dot([cx, cy], r, name, more = {}) {
+    return el("circle", { cx, cy, r: r * unit(), class: name, ...more });
   }
 
   function drawMarks() {
-    const unit = width / Math.max(1, stage.clientWidth);
-    marks.replaceChildren();
-    const ground = fitGround(places.ground);
-    if (ground) drawGrid(ground, unit);
-    data.proposals.forEach((each, number) => {
-      const isTaken = places.lines.some(line => JSON.stringify([line.start, line.end]) === JSON.stringify([each.start, each.end]));
-      if (isTaken || tool !== "select") return;
-      const ends = { x1: each.start[0], y1: each.start[1], x2: each.end[0], y2: each.end[1] };
-      marks.append(el("g", { class: "proposal", "data-proposal": number },
-        el("line", { ...ends, class: "grip" }), el("line", ends),
-        label([(ends.x1 + ends.x2) / 2, (ends.y1 + ends.y2) / 2 - 8 * unit], [`+ ${each.name}: ${each.vehicles}`], "middle", "")));
-    });
-    for (const kind of ["regions", "zones", "lines", "ground"])
-      places[kind].forEach((each, index) => drawItem(kind, each, index, unit));
-    if (hovered) {
-      const points = Array.from({ length: hovered.seen }, (_, row) => `${hovered.xs[row]},${hovered.ys[row]}`);
-      marks.append(el("polyline", { points: points.join(" "), class: "hovered" }));
-    }
-    if (drawn.length) {
-      const points = pointer ? [...drawn, pointer] : drawn;
-      marks.append(el("polyline", { points: points.join(" "), class: "new" }),
-        ...drawn.map(([cx, cy]) => el("circle", { cx, cy, r: 5 * unit, class: "new" })));
-    } else if (pointer && tool !== "select") {
-      marks.append(el("circle", { cx: pointer[0], cy: pointer[1], r: 5 * unit, class: "new" }));
-    }
+    const ground = fitGround(places.ground), isTaken = each => places.lines.some(line =>
+      String([line.start, line.end]) === String([each.start, each.end]));
+    marks.replaceChildren(...(ground ? gridOf(ground) : []), ...data.proposals.map((each, number) => {
+      const { start, end, name, vehicles } = each, middle = start.map((value, i) => (value + end[i]) / 2);
+      return isTaken(each) || tool !== "select" ? "" : el("g", { class: "proposal", "data-proposal": number },
+        ...segment([start, end]), label([middle[0], middle[1] - 8 * unit()], [`+ ${name}: ${vehicles}`]));
+    }), ...["regions", "zones", "lines", "ground"].flatMap(kind => places[kind].map((each, index) => drawItem(kind, each, index))));
+    if (hovered)
+      marks.append(el("polyline", { class: "hovered", points: Array.from({ length: hovered.seen },
+        (_, row) => `${hovered.xs[row]},${hovered.ys[row]}`).join(" ") }));
+    const shown = pointer && tool !== "select" ? [...drawn, pointer] : drawn;
+    if (shown.length) marks.append(el("polyline", { points: shown.join(" "), class: "new" }), ...shown.map(each => dot(each, 5, "new")));
   }
 
-  function drawItem(kind, each, index, unit) {
+  function drawItem(kind, each, index) {
     const isSelected = selected?.kind === kind && selected.index === index, points = pointsOf(kind, each);
-    if (!points.length) return; // a mask
-    const group = el("g", { class: `${each.kind ?? kind} ${isSelected ? "selected" : ""}`, "data-kind": kind, "data-index": index });
+    if (!points.length) return ""; // a mask
+    const name = `${kind === "regions" ? each.kind ?? "include" : kind}${isSelected ? " selected" : ""}`;
+    const group = el("g", { class: name, "data-kind": kind, "data-index": index });
     if (kind === "lines") {
-      const [[x1, y1], [x2, y2]] = points, ends = { x1, y1, x2, y2 };
-      group.append(el("line", { ...ends, class: "grip" }), el("line", ends));
-      const length = Math.hypot(x2 - x1, y2 - y1) || 1, result = found[index];
-      const left = [(y2 - y1) / length, (x1 - x2) / length], middle = [(x1 + x2) / 2, (y1 + y2) / 2];
-      [[left, each.left], [left.map(value => -value), each.right]].forEach(([way, name]) => {
-        const tip = middle.map((value, i) => value + 26 * unit * way[i]);
-        const wing = angle => [0, 1].map(i => tip[i] - 8 * unit * (way[i] * Math.cos(angle) - (i ? -1 : 1) * way[1 - i] * Math.sin(angle)));
-        const { total, classes } = countOf(result, name);
-        const at = [clamp(tip[0] + 10 * unit * way[0], 4 * unit, width - 4 * unit), clamp(tip[1] + (way[1] > 0.3 ? 16 : way[1] < -0.3 ? (classes ? -22 : -7) : 4) * unit, 14 * unit, height - 4 * unit)];
-        group.append(el("polyline", { points: [middle, tip, wing(0.5), tip, wing(-0.5)].join(" ") }),
-          label(at, [`${name} ${total}`, ...(classes ? [classes] : [])], way[0] > 0.5 ? "start" : way[0] < -0.5 ? "end" : "middle", "count"));
-      });
-      group.append(label([x1, y1 - 9 * unit], [each.name], x1 < width / 12 ? "start" : x1 > width * 11 / 12 ? "end" : "middle", ""));
+      const [start, end] = points, length = Math.hypot(end[0] - start[0], end[1] - start[1]) || 1;
+      const left = [(end[1] - start[1]) / length, (start[0] - end[0]) / length];
+      group.append(...segment(points), ...sideOf(each.left, left, points, index),
+        ...sideOf(each.right, left.map(value => -value), points, index), label([start[0], start[1] - 9 * unit()], [each.name]));
     } else if (kind === "ground") {
-      group.append(label([points[0][0] + 9 * unit, points[0][1] - 6 * unit], [`${metresOf(each)} m`], points[0][0] > 0.85 * width ? "end" : "start", ""));
+      group.append(label([points[0][0], points[0][1] - 11 * unit()], [`${metresOf(each)} m`]));
     } else {
       const top = points.reduce((best, point) => point[1] < best[1] ? point : best);
-      const texts = [each.name];
-      if (kind === "zones") {
-        const result = found[places.lines.length + index];
-        const [enter, exit, appear, vanish] = ["enter", "exit", "appear", "vanish"].map(name => countOf(result, name).total);
-        texts.push(`in ${enter + appear}, out ${exit + vanish}`);
-      }
-      group.append(el("polygon", { points: points.join(" ") }), label([top[0], top[1] + 18 * unit], texts, "middle", ""));
+      const sum = (...names) => names.reduce((total, way) => total + countOf(found[places.lines.length + index], way).total, 0);
+      const counts = kind === "zones" ? `in ${sum("enter", "appear")}, out ${sum("exit", "vanish")}` : "";
+      group.append(el("polygon", { points: points.join(" ") }), label([top[0], top[1] + 18 * unit()], [each.name, counts]));
     }
     if (isSelected || kind === "ground")
-      points.forEach(([cx, cy], point) => group.append(
-        el("circle", { cx, cy, r: 15 * unit, class: "grip", "data-point": point }),
-        el("circle", { cx, cy, r: (selected?.point === point && isSelected ? 8 : 6) * unit, class: "handle" })));
-    marks.append(group);
+      group.append(...points.flatMap((point, number) => [dot(point, 15, "grip", { "data-point": number }),
+        dot(point, isSelected && selected.point === number ? 8 : 6, "handle")]));
+    return group;
   }
 
-  function drawGrid(ground, unit) {
-    const metres = places.ground.map(each => each.metres), [left, low, right, high] = boundsOf(metres);
-    const step = [1, 2, 5, 10, 20, 50, 100].find(step => Math.max(right - left, high - low) / step <= 14) ?? 200;
-    const grid = (from, to, at) => {
-      for (let value = Math.ceil(from / step) * step; value <= to + 1e-9; value += step) {
-        const points = Array.from({ length: 25 }, (_, i) => ground.toPixels(at(value, i / 24))).filter(point => point);
-        marks.append(el("polyline", { points: points.map(([x, y]) => [x + 0.5, y + 0.5]).join(" "), class: "grid" }));
-        if (points.length) marks.append(label(points[0], [`${value} m`], "middle", "grid"));
-      }
-    };
-    grid(left, right, (x, share) => [x, low + share * (high - low)]);
-    grid(low, high, (y, share) => [left + share * (right - left), y]);
+  /** Return the arrow to a side of a line, with what goes there; `way` has length 1. */
+  function sideOf(name, way, [start, end], index) {
+    const { total, classes } = countOf(found[index], name), middle = start.map((value, i) => (value + end[i]) / 2);
+    const tip = middle.map((value, i) => value + 26 * unit() * way[i]);
+    const wing = sign => [tip[0] - 7 * unit() * (way[0] - sign * way[1] / 2), tip[1] - 7 * unit() * (way[1] + sign * way[0] / 2)];
+    const down = way[1] > 0.3 ? 16 : way[1] > -0.3 ? 4 : classes ? -22 : -7;
+    const at = [clamp(tip[0] + 10 * unit() * way[0], 0, width), clamp(tip[1] + down * unit(), 14 * unit(), height - 4 * unit())];
+    return [el("polyline", { points: [middle, tip, wing(1), tip, wing(-1)].join(" ") }),
+      label(at, [`${name} ${total}`, classes], way[0] > 0.5 ? "start" : way[0] < -0.5 ? "end" : "middle", "count")];
+  }
+
+  function gridOf(ground) {
+    const [left, low, right, high] = boundsOf(places.ground.map(each => each.metres)), longest = Math.max(right - left, high - low);
+    const step = [1, 2, 5, 10, 20, 50, 100].find(each => longest / each <= 14) ?? 200;
+    const lines = (from, to, at) => Array.from({ length: 1 + Math.floor(to / step) - Math.ceil(from / step) }, (_, n) => {
+      const value = (Math.ceil(from / step) + n) * step;
+      const points = Array.from({ length: 25 }, (_, i) => ground.toPixels(at(value, i / 24))).filter(point => point);
+      return [el("polyline", { points: points.join(" "), class: "grid" }), points.length ? label(points[0], [`${value} m`], "middle", "grid") : ""];
+    }).flat();
+    return [...lines(left, right, (x, share) => [x, low + share * (high - low)]),
+      ...lines(low, high, (y, share) => [left + share * (right - left), y])];
   }
 
   function showLens() {
-    const isNeeded = pointer && (drag?.moved ? selected?.point !== null : tool !== "select");
-    lens.hidden = !isNeeded;
-    if (!isNeeded) return;
-    const { side, zoom } = LENS, context = lens.getContext("2d"), scale = stage.clientWidth / width;
-    const [x, y] = pointer.map(value => value * scale), part = side / zoom / scale;
+    lens.hidden = !(pointer && (drag?.moved ? selected?.point !== null : tool !== "select"));
+    if (lens.hidden) return;
+    const { side, zoom } = LENS, context = lens.getContext("2d"), part = side / zoom * unit();
+    const [x, y] = pointer.map(value => value / unit());
     lens.style.left = `${clamp(x - side / 2, 0, Math.max(0, stage.clientWidth - side))}px`;
     lens.style.top = `${y > side + 40 ? y - side - 30 : y + 40}px`;
     [lens.width, lens.height] = [side, side];
     context.fillRect(0, 0, side, side);
     context.imageSmoothingEnabled = false;
     context.drawImage(view, pointer[0] - part / 2, pointer[1] - part / 2, part, part, 0, 0, side, side);
-    context.strokeStyle = "#fff";
     context.globalCompositeOperation = "difference";
+    context.strokeStyle = "#fff";
     context.stroke(new Path2D(`M${side / 2} 0V${side}M0 ${side / 2}H${side}`));
   }
 
   // ------------------------------------------------ the panel
 
-  function input(value, set, more = {}) {
-    return el("input", { value, ...more, onchange: event => change(() => set(event.target.value)) });
-  }
-
   function showDetails() {
-    const each = item(), box = get("details"), number = { type: "number", step: "0.01" };
-    const field = (name, control) => el("label", {}, name, control);
-    const named = key => input(each[key], value => { each[key] = value.trim().slice(0, 80) || each[key]; }, { maxlength: 80, id: `field-${key}` });
+    const each = item(), box = get("details"), button = (text, onclick, id) => el("button", { onclick, id }, text);
     box.hidden = !each;
     if (!each) return box.replaceChildren();
-    const parts = [el("h3", {}, `Selected ${KINDS[selected.kind]}`)];
-    if (each.name !== undefined) parts.push(field("Name", named("name")));
-    if (selected.kind === "lines")
-      parts.push(field("Left", named("left")), field("Right", named("right")), el("button", { onclick: swap }, "Swap sides (S)"));
-    if (selected.kind === "ground") {
-      ["across", "along"].forEach((name, i) => parts.push(field(`Metres ${name}`,
-        input(each.metres[i], value => { each.metres[i] = Number(value) || 0; }, { ...number, id: `metres-${i}` }))));
-      if (places.ground.length === 4) {
-        const sides = [3.5, 20].map(value => el("input", { ...number, value }));
-        const apply = () => change(() => [[0, 0], [1, 0], [1, 1], [0, 1]].forEach((corner, i) => {
-          places.ground[i].metres = corner.map((value, axis) => value * (Number(sides[axis].value) || 1));
-        }));
-        parts.push(el("p", {}, "Clicked near left, near right, far right, far left of a straight stretch of road?"),
-          field("It is wide, m", sides[0]), field("long, m", sides[1]), el("button", { onclick: apply, id: "stretch" }, "Set these metres"));
-      }
-    }
-    box.replaceChildren(...parts, el("button", { onclick: remove }, "Delete (Del)"));
+    const field = (text, id, value, set, type = "text") => el("label", {}, text,
+      el("input", { id, value, type, step: "any", maxlength: 80, onchange: event => change(() => set(event.target.value.trim())) }));
+    const names = ["name", "left", "right"].filter(key => each[key] !== undefined).map(key =>
+      field(key[0].toUpperCase() + key.slice(1), `field-${key}`, each[key], text => { each[key] = text || each[key]; }));
+    const metres = (each.metres ?? []).map((value, i) => field(`Metres ${i ? "along" : "across"}`, `metres-${i}`, value,
+      text => { each.metres[i] = Number(text) || 0; }, "number"));
+    box.replaceChildren(el("h3", {}, `Selected ${KINDS[selected.kind]}`), ...names, ...metres,
+      each.start ? button("Swap sides (S)", swap, "swap") : "", button("Delete (Del)", remove, "delete"),
+      ...(each.metres && places.ground.length === 4 ? stretch(button) : []));
+  }
+
+  /** Return fields that set the metres of four points at once. */
+  function stretch(button) {
+    const [wide, long] = [3.5, 20].map(value => el("input", { type: "number", step: "any", value }));
+    const set = () => change(() => [[0, 0], [1, 0], [1, 1], [0, 1]].forEach(([x, y], i) => {
+      places.ground[i].metres = [x * (Number(wide.value) || 1), y * (Number(long.value) || 1)];
+    }));
+    return [el("p", {}, "Are the four points near left, near right, far right and far left of a straight lane?"),
+      el("label", {}, "Its width, m", wide), el("label", {}, "its length, m", long), button("Set the metres", set, "stretch")];
   }
 
   function showList() {
     const rows = Object.keys(KINDS).flatMap(kind => places[kind].map((each, index) => {
-      const isSelected = selected?.kind === kind && selected.index === index;
-      const result = kind === "lines" ? found[index] : kind === "zones" ? found[places.lines.length + index] : null;
-      const counts = result ? result.border.directions.map(name => [name, countOf(result, name)]).filter(([, count], i) => i < 2 || count.total)
-        .map(([name, { total, classes }]) => `${name} ${total}${classes ? ` (${classes})` : ""}`).join(" · ") : "";
-      const note = counts || (kind === "ground" ? `${metresOf(each)} m${errorOf(index)}` : each.mask ? `mask ${each.mask}` : each.kind ?? "include");
-      return el("button", { class: "row", "aria-pressed": isSelected, onclick: () => choose({ kind, index, point: null }) },
+      const result = { lines: found[index], zones: found[places.lines.length + index] }[kind];
+      const counts = result?.border.directions.map(name => [name, countOf(result, name)]).filter(([, { total }], i) => i < 2 || total)
+        .map(([name, { total, classes }]) => `${name} ${total}${classes && ` (${classes})`}`).join(" · ");
+      const note = counts ?? (each.metres ? `${metresOf(each)} m${errorOf(each)}` : each.mask ? `mask ${each.mask}` : each.kind ?? "include");
+      const choose = () => { selected = { kind, index, point: null }; refresh(); };
+      return el("button", { class: "row", "aria-pressed": each === item(), onclick: choose },
         el("b", {}, each.name ?? `ground ${index + 1}`), el("span", {}, note));
     }));
     get("list").replaceChildren(...(rows.length ? rows : [el("p", {}, "Nothing is drawn yet.")]));
   }
 
-  function errorOf(index) {
-    const ground = fitGround(places.ground), there = ground?.toMetres(places.ground[index].pixel);
-    if (!there || places.ground.length < 5) return "";
-    const [x, y] = places.ground[index].metres;
-    return `, off by ${Math.hypot(there[0] - x, there[1] - y).toFixed(2)} m`;
+  function errorOf({ pixel, metres }) {
+    const there = places.ground.length > 4 && fitGround(places.ground)?.toMetres(pixel);
+    return there ? `, off by ${Math.hypot(there[0] - metres[0], there[1] - metres[1]).toFixed(2)} m` : "";
   }
 
   function showResults() {
-    const ground = fitGround(places.ground), lines = found.slice(0, places.lines.length);
+    const ground = fitGround(places.ground), lines = found.slice(0, places.lines.length), problems = problemsOf(places, size);
     const warnings = lines.flatMap(({ border, visits }) => warningsOf(border, visits, paths, data.span).map(text => `${border.name}: ${text}`));
-    const problems = problemsOf(places, size);
     get("warnings").replaceChildren(...problems.map(text => el("li", { class: "problem" }, text)), ...warnings.map(text => el("li", {}, text)));
     get("save").disabled = problems.length > 0;
-    const table = get("flows"), names = found.map(({ border }) => border.name), flows = flowsOf(found);
-    table.parentElement.hidden = names.length < 2;
-    table.replaceChildren(el("tr", {}, ...["from", ...names.map(name => `to ${name}`), "to none"].map(text => el("th", {}, text))),
-      ...names.map(from => el("tr", {}, el("td", {}, from), ...[...names, null].map(to => el("td", {}, String(flows.get(from)?.get(to) ?? 0))))));
-    get("speeds").replaceChildren(...(ground ? lines.flatMap(result => speedsOf(result, ground).map((speeds, i) => speedRow(result.border, i, speeds))) : []));
-    get("speeds").hidden = !ground;
+    const names = found.map(({ border }) => border.name), flows = flowsOf(found);
+    get("flows").parentElement.hidden = names.length < 2;
+    get("flows").replaceChildren(el("tr", {}, ...["from", ...names.map(name => `to ${name}`), "to none"].map(text => el("th", {}, text))),
+      ...names.map(from => el("tr", {}, el("td", {}, from), ...[...names, ""].map(to => el("td", {}, String(flows[`${from}\n${to}`] ?? 0))))));
+    get("speeds").replaceChildren(...(ground ? lines.flatMap(line => line.border.directions.map(way => speedRow(line, way, ground))) : []));
     get("text").textContent = writeYaml(places, size, rest, data.name);
     get("undo").disabled = !past.length;
     get("redo").disabled = !future.length;
   }
 
-  function speedRow(border, side, speeds) {
+  function speedRow({ border, visits }, direction, ground) {
+    const speeds = visits.flatMap(([path, some]) => some.filter(each => each.direction === direction)
+      .map(each => speedAt(path, each.time, ground)).filter(speed => speed !== null));
     if (!speeds.length) return "";
-    const bars = new Array(16).fill(0);
-    for (const speed of speeds) bars[Math.min(15, Math.floor(speed / 10))]++;
-    const most = Math.max(...bars), text = `median ${quantile(speeds, 0.5).toFixed(0)} km/h, 85 % ${quantile(speeds, 0.85).toFixed(0)} km/h`;
-    return el("div", { class: "speed" }, el("b", {}, `${border.name}: ${border.directions[side]}`), el("span", {}, text),
-      el("div", { class: "bars", title: "0 to 160 km/h, by 10 km/h" }, ...bars.map(count => el("i", { style: `height: ${100 * count / most}%` }))));
-  }
-
-  function choose(what) {
-    selected = what;
-    refresh();
+    const bars = Array.from({ length: 16 }, (_, i) => speeds.filter(speed => Math.min(15, Math.floor(speed / 10)) === i).length);
+    const [middle, most] = [0.5, 0.85].map(share => quantile(speeds, share).toFixed(0));
+    return el("div", { class: "speed" }, el("b", {}, `${border.name}: ${direction}`),
+      el("span", {}, `median ${middle} km/h, 85 % ${most} km/h`), el("div", { class: "bars", title: "0 to 160 km/h" },
+        ...bars.map(count => el("i", { style: `height: ${100 * count / Math.max(...bars)}%` }))));
   }
 
   function setTool(name) {
     [tool, drawn] = [name, []];
     for (const button of document.querySelectorAll("[data-tool]")) button.setAttribute("aria-pressed", button.dataset.tool === name);
-    say(HINTS[name]);
+    say(hintOf(name));
     drawMarks();
     showLens();
   }
 
-  function say(text) {
-    get("hint").textContent = text;
+  function hintOf(name) {
+    return document.querySelector(`[data-tool=${name}]`).dataset.hint;
   }
 
   function refresh(isDragging = false) {
@@ -877,19 +771,17 @@ async function openPage(data) {
 
   function place(event) {
     const box = marks.getBoundingClientRect();
-    return [(event.clientX - box.left) * width / box.width, (event.clientY - box.top) * height / box.height]
-      .map((value, i) => Math.round(10 * clamp(value, 0, size[i])) / 10);
+    return inside([(event.clientX - box.left) * width / box.width, (event.clientY - box.top) * height / box.height]);
   }
 
   function putPoint(point) {
     if (tool === "ground") {
       add("ground", { pixel: point.map(value => value - 0.5), metres: [0, 0] });
-      get("metres-0").focus({ preventScroll: true });
-      return;
+      return get("metres-0").focus({ preventScroll: true });
     }
-    const unit = width / stage.clientWidth, isNear = (a, b) => Math.hypot(a[0] - b[0], a[1] - b[1]) < 10 * unit;
-    if (drawn.length > 2 && isNear(drawn[0], point)) return endShape();
-    if (!drawn.length || !isNear(drawn.at(-1), point)) drawn.push(point);
+    const isAt = other => Math.hypot(other[0] - point[0], other[1] - point[1]) < 10 * unit();
+    if (drawn.length > 2 && isAt(drawn[0])) return endShape();
+    if (!drawn.length || !isAt(drawn.at(-1))) drawn.push(point);
     if (tool === "line" && drawn.length === 2) endShape();
     drawMarks();
   }
@@ -898,49 +790,44 @@ async function openPage(data) {
     const points = drawn, kind = tool;
     if (points.length < (kind === "line" ? 2 : 3)) return;
     setTool("select");
-    if (kind === "line") add("lines", { name: freeName("line"), start: points[0], end: points[1], left: "left", right: "right" });
+    const [start, end] = points;
+    if (kind === "line") add("lines", { name: freeName("line"), start, end, left: "left", right: "right" });
     else if (kind === "zone") add("zones", { name: freeName("zone"), points });
     else add("regions", { name: freeName("region"), kind, points });
-    get("field-name")?.select();
+    get("field-name").select();
   }
 
   function press(event) {
     if (event.button) return;
     pointer = place(event);
     stage.setPointerCapture(event.pointerId);
-    if (tool !== "select") {
-      drag = { from: pointer, moved: false };
-      if (event.pointerType === "mouse" || drawn.length) return;
-      return showLens();
-    }
+    drag = { from: pointer, moved: false };
+    if (tool !== "select") return showLens();
     const target = event.target.closest("[data-kind], [data-proposal]"), point = event.target.dataset.point;
     if (target?.dataset.proposal) {
-      const { name, left, right, start, end } = data.proposals[target.dataset.proposal];
+      const { name, start, end, left, right } = data.proposals[target.dataset.proposal];
       const isUsed = places.lines.some(line => line.name === name);
+      drag = null;
       return add("lines", { name: isUsed ? freeName(name) : name, start, end, left, right });
     }
-    selected = target && { kind: target.dataset.kind, index: Number(target.dataset.index), point: point === undefined ? null : Number(point) };
-    if (selected?.kind === "ground") selected.point = 0;
-    drag = selected && { from: pointer, moved: false, before: JSON.stringify(places) };
+    selected = target && { kind: target.dataset.kind, index: Number(target.dataset.index), point: point ? Number(point) : null };
+    drag = selected && { ...drag, before: JSON.stringify(places) };
     refresh();
   }
 
   function slide(event) {
     pointer = place(event);
-    if (drag && !drag.moved && Math.hypot(pointer[0] - drag.from[0], pointer[1] - drag.from[1]) > 4 * width / stage.clientWidth) {
+    if (drag && !drag.moved && Math.hypot(pointer[0] - drag.from[0], pointer[1] - drag.from[1]) > 4 * unit()) {
       drag.moved = true;
-      if (drag.before) past.push(drag.before), future = [];
+      if (drag.before) [past, future] = [[...past, drag.before], []];
       else if (tool === "line" && !drawn.length) drawn.push(drag.from);
     }
     if (drag?.moved && drag.before) {
       move(pointer[0] - drag.from[0], pointer[1] - drag.from[1]);
       drag.from = pointer;
       refresh(true);
-    } else if (!drag && tool === "select") {
-      hover(event);
-    } else {
-      drawMarks();
-    }
+    } else if (!drag && tool === "select") hover(event);
+    else drawMarks();
     showLens();
   }
 
@@ -954,53 +841,49 @@ async function openPage(data) {
 
   /** Show when and what the path nearest to the pointer is. */
   function hover(event) {
-    let best = 8 * width / stage.clientWidth, nearest = null;
-    for (const path of event.target.closest("[data-kind], [data-proposal]") ? [] : every) {
-      if (hidden.has(path.kind) || !get("paths").checked) continue;
-      for (let row = 1; row < path.seen; row++) {
-        if (Math.abs(path.xs[row] - pointer[0]) > 60 || Math.abs(path.ys[row] - pointer[1]) > 60) continue;
-        const away = distanceTo([[path.xs[row - 1], path.ys[row - 1]], [path.xs[row] + 1e-9, path.ys[row]]], ...pointer);
+    const isOver = event.target.closest("[data-kind], [data-proposal]") || !get("paths").checked;
+    let best = 8 * unit(), nearest = null;
+    for (const path of isOver ? [] : every.filter(path => !hidden.has(path.kind)))
+      for (let row = 0; row < path.seen; row++) {
+        const away = Math.abs(path.xs[row] - pointer[0]) + Math.abs(path.ys[row] - pointer[1]);
         if (away < best) [best, nearest] = [away, path];
       }
-    }
     if (nearest === hovered) return;
     hovered = nearest;
     const time = seconds => `${Math.floor(seconds / 60)}:${(seconds % 60).toFixed(1).padStart(4, "0")}`;
-    say(nearest ? `Vehicle ${nearest.vehicle}: ${nearest.kind}, ${time(nearest.times[0])} to ${time(nearest.times[nearest.seen - 1])}` : HINTS.select);
+    say(nearest ? `Vehicle ${nearest.vehicle}: ${nearest.kind}, ${time(nearest.times[0])} to ${time(nearest.times[nearest.seen - 1])}` : hintOf(tool));
     drawMarks();
   }
 
   function type(event) {
-    const isField = /INPUT|SELECT|TEXTAREA/.test(event.target.tagName) && event.target.type !== "checkbox";
-    const isControl = event.ctrlKey || event.metaKey, key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
-    const arrow = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[key];
+    const key = event.key.length === 1 ? event.key.toLowerCase() : event.key, isControl = event.ctrlKey || event.metaKey;
+    const isField = event.target.tagName === "INPUT" && event.target.type !== "checkbox";
+    const button = document.querySelector(`[data-key="${CSS.escape((isControl ? "^" : "") + key)}"]`), arrow = ARROWS[key];
     if (isField && (key === "Enter" || key === "Escape")) return stage.focus({ preventScroll: true });
-    if (isField || event.altKey) return;
-    if (isControl && key === "z") event.shiftKey ? travel(future, past) : travel(past, future);
-    else if (isControl && key === "y") travel(future, past);
-    else if (isControl && key === "s") save();
+    if (isField || event.altKey || (event.target.tagName === "BUTTON" && key === "Enter")) return;
+    if (isControl && event.shiftKey && key === "z") travel(future, past);
+    else if (button) button.click(), stage.focus({ preventScroll: true });
     else if (isControl) return;
-    else if (KEYS[key]) setTool(KEYS[key]), stage.focus({ preventScroll: true });
     else if (key === "s") swap();
-    else if (key === "n" && selected) selected.point = ((selected.point ?? -1) + 1) % pointsOf(selected.kind, item()).length, refresh();
+    else if (key === "n" && selected) selected.point = ((selected.point ?? -1) + 1) % pointsOf(selected.kind, item()).length, drawMarks();
     else if (key === "Delete" || key === "Backspace") drawn.length ? (drawn.pop(), drawMarks()) : remove();
-    else if (key === "Escape") drawn.length ? (drawn = [], drawMarks()) : (setTool("select"), choose(null));
+    else if (key === "Escape") [drawn, selected] = [[], null], setTool("select"), refresh();
     else if (key === "Enter" && tool !== "select") pressEnter();
-    else if (arrow) step(...arrow.map(value => value * (event.shiftKey ? 20 : 1)));
+    else if (arrow) step(arrow.map(value => value * (event.shiftKey ? 20 : 1)));
     else return;
     event.preventDefault();
   }
 
   /** Put a point where the crosshair is; where it was just put, the shape ends. */
   function pressEnter() {
-    const isPut = drawn.length && String(drawn.at(-1)) === String(pointer);
-    if (drawn.length > 2 && (isPut || !pointer)) endShape();
+    if (drawn.length > 2 && (!pointer || String(drawn.at(-1)) === String(pointer))) endShape();
     else putPoint(pointer ?? [width / 2, height / 2]);
   }
 
-  function step(dx, dy) {
+  function step([dx, dy]) {
     if (tool === "select") return selected ? change(() => move(dx, dy)) : undefined;
-    pointer = (pointer ?? [width / 2, height / 2]).map((value, i) => clamp(value + (i ? dy : dx), 0, size[i]));
+    const [x, y] = pointer ?? [width / 2, height / 2];
+    pointer = inside([x + dx, y + dy]);
     drawMarks();
     showLens();
   }
@@ -1008,63 +891,60 @@ async function openPage(data) {
   // ------------------------------------------------ files
 
   function save() {
-    if (get("save").disabled) return say("Mend what is marked first.");
-    const address = URL.createObjectURL(new Blob([get("text").textContent], { type: "application/yaml" }));
-    el("a", { href: address, download: data.name }).click();
-    URL.revokeObjectURL(address);
+    const href = URL.createObjectURL(new Blob([get("text").textContent], { type: "application/yaml" }));
+    el("a", { href, download: data.name }).click();
+    URL.revokeObjectURL(href);
     saved = JSON.stringify(places);
     say(`Saved as ${data.name}. Use it: vdet detect-video CLIP -c ${data.name}`);
   }
 
-  async function open(event) {
-    const [file] = event.target.files;
-    event.target.value = "";
-    if (!file) return;
+  async function open({ target }) {
+    const [file] = target.files;
     try {
       const read = readYaml(await file.text()), factor = size.map((side, i) => side / read.size[i]);
       if (Math.abs(factor[0] / factor[1] - 1) > 0.01) throw Error("is for frames of another shape");
       const scaled = point => point.map((value, i) => value * factor[i]);
-      change(() => {
-        places = read.places;
-        rest = read.rest;
-        places.lines.forEach(line => { line.start = scaled(line.start); line.end = scaled(line.end); });
-        [...places.zones, ...places.regions].forEach(each => { if (each.points) each.points = each.points.map(scaled); });
-        places.ground.forEach(each => { each.pixel = scaled(each.pixel); });
-        [selected, drawn] = [null, []];
-      });
+      for (const each of Object.values(read.places).flat()) {
+        for (const key of ["start", "end", "pixel"]) if (each[key]) each[key] = scaled(each[key]);
+        if (each.points) each.points = each.points.map(scaled);
+      }
+      change(() => { [places, rest, selected, drawn] = [read.places, read.rest, null, []]; });
       say(`Opened ${file.name}.`);
     } catch (error) {
       say(`${file.name}: ${error.message}`);
     }
+    target.value = "";
+  }
+
+  function copy() {
+    getSelection().selectAllChildren(get("text"));
+    document.execCommand("copy");
+    say("Copied.");
   }
 
   // ------------------------------------------------ start
 
-  stage.style.aspectRatio = `${width} / ${height}`;
-  marks.setAttribute("viewBox", `0 0 ${width} ${height}`);
+  const actions = { undo: () => travel(past, future), redo: () => travel(future, past), save, copy };
+  for (const [id, action] of Object.entries(actions)) get(id).addEventListener("click", action);
   for (const button of document.querySelectorAll("[data-tool]")) button.addEventListener("click", () => setTool(button.dataset.tool));
-  get("undo").addEventListener("click", () => travel(past, future));
-  get("redo").addEventListener("click", () => travel(future, past));
-  get("save").addEventListener("click", save);
-  get("copy").addEventListener("click", () => { getSelection().selectAllChildren(get("text")); document.execCommand("copy"); say("Copied."); });
+  const show = kind => event => { hidden[event.target.checked ? "delete" : "add"](kind); paintPaths(); };
+  get("classes").replaceChildren(...(kinds.length > 1 ? kinds : []).map(kind =>
+    el("label", {}, el("input", { type: "checkbox", checked: "", onchange: show(kind) }), kind)));
+  get("ways").replaceChildren(...Array.from("→↘↓↙←↖↑↗", (arrow, i) => el("span", { style: `color: hsl(${45 * i} 90% 45%)` }, arrow)));
   get("open").addEventListener("change", open);
   get("paths").addEventListener("change", paintPaths);
-  get("classes").replaceChildren(...(kinds.length > 1 ? kinds : []).map(kind => el("label", {}, el("input", { type: "checkbox", checked: "",
-    onchange: event => { event.target.checked ? hidden.delete(kind) : hidden.add(kind); paintPaths(); } }), kind)));
-  ["→", "↘", "↓", "↙", "←", "↖", "↑", "↗"].forEach((arrow, i) => get("ways").append(el("span", { style: `color: hsl(${45 * i} 90% 45%)` }, arrow)));
-  stage.addEventListener("pointerdown", press);
-  stage.addEventListener("pointermove", slide);
-  stage.addEventListener("pointerup", release);
-  stage.addEventListener("pointercancel", () => { drag = null; showLens(); });
-  stage.addEventListener("pointerleave", () => { if (!drag) { pointer = hovered = null; drawMarks(); showLens(); } });
-  stage.addEventListener("dblclick", endShape);
+  const leave = () => { if (!drag) [pointer, hovered] = [null, null], drawMarks(), showLens(); };
+  const handlers = { pointerdown: press, pointermove: slide, pointerup: release, pointercancel: () => { drag = null; }, pointerleave: leave, dblclick: endShape };
+  for (const [name, handler] of Object.entries(handlers)) stage.addEventListener(name, handler);
   addEventListener("keydown", type);
   addEventListener("beforeunload", event => { if (JSON.stringify(places) !== saved) event.preventDefault(); });
-  new ResizeObserver(() => { paintPaths(); drawMarks(); }).observe(stage);
+  stage.style.aspectRatio = `${width} / ${height}`;
+  stage.style.setProperty("--ratio", width / height);
+  marks.setAttribute("viewBox", `0 0 ${width} ${height}`);
   refresh();
   setTool("select");
+  new ResizeObserver(() => { paintPaths(); drawMarks(); }).observe(stage);
   document.body.dataset.ready = "yes";
 }
 
-if (typeof document !== "undefined")
-  openPage(JSON.parse(get("data").textContent)).catch(error => { get("hint").textContent = `This page cannot be shown: ${error.message}`; });
+openPage(JSON.parse(get("data").textContent)).catch(error => { get("hint").textContent = `This page cannot be shown: ${error.message}`; });
