@@ -4,13 +4,15 @@
 // file, and at last what is drawn and edited. Points are [x, y] in pixels of the frame.
 
 // ---------------------------------------------------------------- the rule, as vdet.traffic has it
-
 const SETTLED = 0.1; // seconds after which a vehicle off the band has changed the side
 const BAND = 0.05; // of the height of its box
 const MIN_BAND = 0.003; // of the frame's height
 const AT_EDGE = 0.002; // of the frame's side: points so near to the edge lie on it
 const MAX_AT_EDGE = 0.005;
 const INSIDE = 0.01; // pixels
+
+const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
+const sidesOf = corners => corners.map((corner, i) => [corners.at(i - 1), corner]);
 
 /** Return where the way from a to b meets the segment from c to d, from 0 to 1, or null. */
 function meeting([ax, ay], [bx, by], [[cx, cy], [dx, dy]]) {
@@ -20,14 +22,6 @@ function meeting([ax, ay], [bx, by], [[cx, cy], [dx, dy]]) {
   const along = ((cx - ax) * vy - (cy - ay) * vx) / area;
   const across = ((cx - ax) * uy - (cy - ay) * ux) / area;
   return along >= 0 && along <= 1 && across >= 0 && across <= 1 ? along : null;
-}
-
-function metresOf(point) {
-  return point.metres.map(value => Math.round(100 * value) / 100).join(", ");
-}
-
-function sidesOf(corners) {
-  return corners.map((corner, i) => [corners.at(i - 1), corner]);
 }
 
 /** Return whether a point lies in a polygon, given its sides. */
@@ -43,10 +37,6 @@ function distanceTo(segment, x, y) {
   const at = clamp(((x - a[0]) * wx + (y - a[1]) * wy) / (wx * wx + wy * wy), 0, 1);
   const dx = x - a[0] - at * wx, dy = y - a[1] - at * wy;
   return Math.sqrt(dx * dx + dy * dy); // Math.hypot is ten times as slow
-}
-
-function clamp(value, low, high) {
-  return Math.min(Math.max(value, low), high);
 }
 
 /** Return the smallest box around points: [left, top, right, bottom]. */
@@ -68,10 +58,7 @@ function placeLine(line, size) {
   const [ax, ay] = end, wx = start[0] - ax, wy = start[1] - ay, length = Math.hypot(wx, wy);
   const dx = -wx * (size[0] + size[1]) / length, dy = -wy * (size[0] + size[1]) / length;
   const atEdge = point => point.some((value, i) => value === 0 || value === size[i]);
-  const reach = [
-    atEdge(start) ? [start[0] - dx, start[1] - dy] : start,
-    atEdge(end) ? [end[0] + dx, end[1] + dy] : end,
-  ];
+  const reach = [atEdge(start) ? [start[0] - dx, start[1] - dy] : start, atEdge(end) ? [ax + dx, ay + dy] : end];
   return {
     isZone: false, name: line.name, directions: [line.left, line.right], start, end, length, size,
     bounds: boundsOf(reach),
@@ -139,8 +126,7 @@ function changes(path, border) {
   const { times, xs, ys, heights } = path, count = times.length, found = [];
   const distances = Float64Array.from(xs, (x, row) => border.distance(x, ys[row]));
   const isPositive = row => distances[row] >= 0;
-  const mayBegin = border.isZone && isPositive(0);
-  if (!mayBegin && distances.every((_, row) => isPositive(row) === isPositive(0))) return found;
+  if (!(border.isZone && isPositive(0)) && distances.every((_, row) => isPositive(row) === isPositive(0))) return found;
   const { settles, isClear } = settle(path, border, distances);
   let settled = null, crossed = null; // the side, and where it crossed last
   for (let row = 0, end; row < count; row = end) {
@@ -155,8 +141,7 @@ function changes(path, border) {
       if (!rows.some(each => isClear[each] || heights[each] <= way)) continue; // back, but not far
       crossed = share === null ? null : place;
       const time = times[row - 1] + along * (times[row] - times[row - 1]);
-      const direction = border.directions[side ? 0 : 1];
-      if (share !== null) found.push({ time, row: share ? row : row - 1, direction });
+      if (share !== null) found.push({ time, row: share ? row : row - 1, direction: border.directions[side ? 0 : 1] });
     } else if (side && border.isZone) {
       found.push({ time: times[0], row: 0, direction: "appear" });
     }
@@ -185,7 +170,6 @@ function settle({ times, heights }, border, distances) {
 }
 
 // ---------------------------------------------------------------- what follows from crossings
-
 const NEAR = 0.5; // heights of the box within which a path that begins or ends is at a line
 const FEW = 0.05; // fraction of the crossings up to which there is no warning
 
@@ -229,7 +213,6 @@ function flowsOf(found) {
 }
 
 // ---------------------------------------------------------------- the road plane
-
 /** Solve a system of linear equations by Gaussian elimination; null where it has no solution. */
 function solve(rows, values) {
   const size = rows.length, table = rows.map((row, i) => [...row, values[i]]);
@@ -247,14 +230,6 @@ function solve(rows, values) {
   return table.map((row, i) => row[size] / row[i]);
 }
 
-/** Return a function that moves points by a homography; null where they would be behind it. */
-function mapping(h) {
-  return ([x, y]) => {
-    const depth = h[6] * x + h[7] * y + h[8];
-    return depth > 1e-9 ? [(h[0] * x + h[1] * y + h[2]) / depth, (h[3] * x + h[4] * y + h[5]) / depth] : null;
-  };
-}
-
 function inverse(h) {
   const [a, b, c, d, e, f, g, i, j] = h;
   return [e * j - f * i, c * i - b * j, b * f - c * e, f * g - d * j, a * j - c * g, c * d - a * f,
@@ -268,7 +243,7 @@ function normalized(points) {
   return { middle, scale, points: points.map(point => point.map((value, i) => (value - middle[i]) / scale)) };
 }
 
-/** Fit the road plane to points with pixel and metres; null where they do not fix one. */
+/** Fit the road plane to points (Hartley and Zisserman, ch. 4); null where they do not fix one. */
 function fitGround(points) {
   if (points.length < 4) return null;
   const pixels = normalized(points.map(each => each.pixel)), metres = normalized(points.map(each => each.metres));
@@ -276,23 +251,16 @@ function fitGround(points) {
     const [x, y] = metres.points[n], [u, v] = pixels.points[n];
     return [[[x, y, 1, 0, 0, 0, -u * x, -u * y], u], [[0, 0, 0, x, y, 1, -v * x, -v * y], v]];
   });
-  let h = null;
-  for (let pass = 0; pass < 4; pass++) { // from the second pass on, by distances in pixels
-    const weights = points.map((_, n) => {
-      const depth = h ? h[6] * metres.points[n][0] + h[7] * metres.points[n][1] + 1 : 1;
-      return 1 / (depth * depth);
-    });
-    const sum = (i, j) => equations.reduce((total, [row, value], n) =>
-      total + weights[n >> 1] * row[i] * (j < 8 ? row[j] : value), 0);
-    const rows = Array.from({ length: 8 }, (_, i) => Array.from({ length: 8 }, (_, j) => sum(i, j)));
-    h = solve(rows, Array.from({ length: 8 }, (_, i) => sum(i, 8)));
-    if (!h) return null;
-  }
+  const sum = (i, j) => equations.reduce((total, [row, value]) => total + row[i] * (j < 8 ? row[j] : value), 0);
+  const rows = Array.from({ length: 8 }, (_, i) => Array.from({ length: 8 }, (_, j) => sum(i, j)));
+  const h = solve(rows, rows.map((_, i) => sum(i, 8)));
+  if (!h) return null;
   const toPixels = oriented([...h, 1], metres.points), toMetres = oriented(inverse([...h, 1]), pixels.points);
   if (!toPixels || !toMetres) return null;
-  const via = (from, matrix, to) => point => {
-    const moved = mapping(matrix)(point.map((value, i) => (value - from.middle[i]) / from.scale));
-    return moved && moved.map((value, i) => to.middle[i] + to.scale * value);
+  const via = (from, matrix, to) => point => { // null for what would be behind the camera
+    const [x, y] = point.map((value, i) => (value - from.middle[i]) / from.scale);
+    const [u, v, depth] = [0, 3, 6].map(i => matrix[i] * x + matrix[i + 1] * y + matrix[i + 2]);
+    return depth > 1e-9 ? [u, v].map((value, i) => to.middle[i] + to.scale * value / depth) : null;
   };
   return { toMetres: via(pixels, toMetres, metres), toPixels: via(metres, toPixels, pixels) };
 }
@@ -321,7 +289,6 @@ function speedAt(path, time, ground) {
 }
 
 // ---------------------------------------------------------------- the file
-
 const MARK = "# Drawn with vdet draw";
 const FORMS = { // the lists of the file, and what their items have
   ground: ["pixel", "metres"], regions: ["name", "kind", "points", "mask"],
@@ -353,6 +320,8 @@ function writeYaml(places, size, rest, name) {
 function readYaml(text) {
   if (!text.startsWith(MARK)) throw Error("not written by this page; open it with vdet draw CLIP -c FILE");
   const places = { ground: [], regions: [], lines: [], zones: [] }, rest = { camera: [], traffic: [], other: [] };
+  const quoted = part => part.startsWith('"') ? part : JSON.stringify(part); // items are JSON, but for plain words
+  const readItem = item => JSON.parse(item.replace(/"(?:\\.|[^"\\])*"|[A-Za-z_]\w*/g, quoted));
   let section = "other", list = null, size = null;
   for (const line of text.split("\n").filter(line => line.trim() && !line.startsWith("#"))) {
     const [, indent, key] = /^( *)(\w+):/.exec(line) ?? [], item = /^ *- (\{.*\})$/.exec(line);
@@ -368,12 +337,6 @@ function readYaml(text) {
   }
   if (!size) throw Error("has no camera.size");
   return { size, places, rest };
-}
-
-/** Read `{name: "gate", start: [1, 2]}`: JSON, but for the quotes of plain words. */
-function readItem(text) {
-  return JSON.parse(text.replace(/"(?:\\.|[^"\\])*"|[A-Za-z_]\w*/g,
-    part => part.startsWith('"') ? part : JSON.stringify(part)));
 }
 
 /** Return what is wrong with places, in sentences; a run would refuse them. */
@@ -399,7 +362,6 @@ function crossesItself(corners) {
 }
 
 // ---------------------------------------------------------------- the linked paths
-
 /** Return the paths that Python packs: second differences in four planes of bytes, deflated. */
 async function readPaths(packed) {
   const bytes = Uint8Array.from(atob(packed.data), char => char.charCodeAt(0));
@@ -422,11 +384,11 @@ async function readPaths(packed) {
 }
 
 // ---------------------------------------------------------------- the page
-
 const KINDS = { lines: "line", zones: "zone", regions: "region", ground: "point" };
 const SHAPES = ["g", "line", "polygon", "polyline", "circle", "text", "tspan"];
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
-const LENS = { side: 132, zoom: 4 };
+const get = id => document.getElementById(id);
+const metresOf = point => `${point.metres.map(value => Math.round(100 * value) / 100).join(", ")} m`;
 
 /** Make an element; texts are never read as HTML. */
 function el(tag, attributes = {}, ...children) {
@@ -439,14 +401,10 @@ function el(tag, attributes = {}, ...children) {
   return made;
 }
 
-function get(id) {
-  return document.getElementById(id);
-}
-
 async function openPage(data) {
   const { size } = data, [width, height] = size;
   const stage = get("stage"), view = get("view"), marks = get("marks"), lens = get("lens");
-  const every = await readPaths(data.paths), kinds = [...new Set(every.map(path => path.kind))].sort();
+  const every = await readPaths(data.paths), hasClasses = new Set(every.map(path => path.kind)).size > 1;
   const image = Object.assign(new Image(), { src: data.picture });
   await image.decode();
   data.places.lines = data.places.lines.map(line => ({ left: "left", right: "right", ...line }));
@@ -455,14 +413,18 @@ async function openPage(data) {
   let tool = "select", selected = null; // what is selected: kind, index, and the number of a point
   let drawn = [], pointer = null, drag = null, hovered = null;
   let paths = every, found = []; // those inside the regions, and what they do at each line and zone
-  const known = new Map(), hidden = new Set(); // results by geometry; classes that are not shown
+  const known = new Map(); // results by geometry
 
   const unit = () => width / Math.max(1, stage.clientWidth); // pixels of the frame in one of the screen
   const item = () => selected && places[selected.kind][selected.index];
+  const buttons = [...document.querySelectorAll("[data-tool]")];
+  const hint = () => buttons.find(button => button.dataset.tool === tool).dataset.hint;
   const say = text => { get("hint").textContent = text; };
 
-  // ------------------------------------------------ changes, with their history
+  const segment = ([[x1, y1], [x2, y2]]) => ["grip", "drawn"].map(name => el("line", { x1, y1, x2, y2, class: name }));
+  const dot = ([cx, cy], r, name, more = {}) => el("circle", { cx, cy, r: r * unit(), class: name, ...more });
 
+  // ------------------------------------------------ changes, with their history
   function change(action) {
     past.push(JSON.stringify(places));
     future = [];
@@ -479,9 +441,7 @@ async function openPage(data) {
 
   function freeName(stem) {
     const names = [...places.lines, ...places.zones, ...places.regions].map(each => each.name);
-    let number = 1;
-    while (names.includes(`${stem} ${number}`)) number++;
-    return `${stem} ${number}`;
+    for (let number = 1; ; number++) if (!names.includes(`${stem} ${number}`)) return `${stem} ${number}`;
   }
 
   function add(kind, made) {
@@ -522,7 +482,6 @@ async function openPage(data) {
   }
 
   // ------------------------------------------------ counts
-
   function recount() {
     const regions = places.regions.filter(each => each.points);
     const visits = (key, work) => {
@@ -531,25 +490,30 @@ async function openPage(data) {
       return known.get(key);
     };
     const area = JSON.stringify(regions.map(each => [each.kind, each.points]));
-    paths = visits(area, () => regions.length ? every.map(path => within(path, regions)).filter(path => path) : every);
+    paths = visits(area, () => every.map(path => within(path, regions)).filter(path => path));
     found = [...places.lines.map(each => placeLine(each, size)), ...places.zones.map(each => placeZone(each, size))]
-      .map(border => ({ border, visits: visits(
-        area + JSON.stringify([border.start, border.end, border.corners, border.isZone || border.directions]),
-        () => paths.map(path => [path, crossings(path, border)]).filter(([, some]) => some.length)) }));
+      .map(border => {
+        const key = area + JSON.stringify([border.start, border.end, border.corners, border.directions]);
+        const find = () => paths.map(path => [path, crossings(path, border)]).filter(([, some]) => some.length);
+        return { border, visits: visits(key, find) };
+      });
   }
 
   /** Return the part of a path inside the regions; null where nothing is left. */
   function within(path, regions) {
-    const [shown, left] = ["include", "exclude"].map(kind => regions.filter(each => (each.kind ?? "include") === kind)
-      .map(each => sidesOf(each.points)));
+    if (!regions.length) return path;
+    const [shown, left] = [false, true].map(isLeft =>
+      regions.filter(each => (each.kind === "exclude") === isLeft).map(each => sidesOf(each.points)));
     const rows = [...path.times.keys()].filter(row => {
-      const has = sides => isInside(sides, clamp(path.xs[row], 0, width - 1), clamp(path.ys[row], 0, height - 1));
+      const [x, y] = [clamp(path.xs[row], 0, width - 1), clamp(path.ys[row], 0, height - 1)];
+      const has = sides => isInside(sides, x, y);
       return (!shown.length || shown.some(has)) && !left.some(has);
     });
     if (rows.length === path.times.length) return path;
-    const seen = rows.filter(row => row < path.seen).length, pick = values => Float64Array.from(rows, row => values[row]);
-    return seen && { ...path, bounds: undefined, seen, times: pick(path.times), xs: pick(path.xs), ys: pick(path.ys),
-      heights: pick(path.heights) };
+    const [times, xs, ys, heights] = [path.times, path.xs, path.ys, path.heights].map(values =>
+      Float64Array.from(rows, row => values[row]));
+    const seen = rows.filter(row => row < path.seen).length;
+    return seen && { ...path, bounds: undefined, seen, times, xs, ys, heights };
   }
 
   /** Return how many vehicles go in a direction, and as text how many of each class. */
@@ -558,19 +522,18 @@ async function openPage(data) {
     for (const [{ kind }, some] of visits)
       for (const each of some) if (each.direction === direction) counts[kind] = (counts[kind] ?? 0) + 1;
     const classes = Object.entries(counts).sort(([, a], [, b]) => b - a).map(([kind, count]) => `${count} ${kind}`);
-    return { total: Object.values(counts).reduce((sum, count) => sum + count, 0), classes: kinds.length > 1 ? classes.join(", ") : "" };
+    const total = Object.values(counts).reduce((sum, count) => sum + count, 0);
+    return { total, classes: hasClasses ? classes.join(", ") : "" };
   }
 
   // ------------------------------------------------ what is drawn
-
   function paintPaths() {
     const context = view.getContext("2d"), scale = unit();
     [view.width, view.height] = size;
     context.drawImage(image, 0, 0, width, height);
     context.lineWidth = Math.max(1.5, 1.5 * scale);
     context.globalAlpha = clamp(8 / Math.sqrt(every.length), 0.2, 0.8);
-    for (const { kind, xs, ys, seen } of get("paths").checked ? every : []) {
-      if (hidden.has(kind)) continue;
+    for (const { xs, ys, seen } of get("paths").checked ? every : []) {
       const turn = Math.atan2(ys[seen - 1] - ys[0], xs[seen - 1] - xs[0]) * 180 / Math.PI;
       context.strokeStyle = `hsl(${Math.round(turn + 360) % 360} 90% 58%)`;
       context.beginPath();
@@ -589,14 +552,6 @@ async function openPage(data) {
       ...lines.filter(line => line).map((line, i) => el("tspan", { x, dy: i ? 1.15 * letter : 0 }, line)));
   }
 
-  function segment([[x1, y1], [x2, y2]]) {
-    return [el("line", { x1, y1, x2, y2, class: "grip" }), el("line", { x1, y1, x2, y2 })];
-  }
-
-  function dot([cx, cy], r, name, more = {}) {
-    return el("circle", { cx, cy, r: r * unit(), class: name, ...more });
-  }
-
   function drawMarks() {
     const ground = fitGround(places.ground), isTaken = each => places.lines.some(line =>
       String([line.start, line.end]) === String([each.start, each.end]));
@@ -604,12 +559,14 @@ async function openPage(data) {
       const { start, end, name, vehicles } = each, middle = start.map((value, i) => (value + end[i]) / 2);
       return isTaken(each) || tool !== "select" ? "" : el("g", { class: "proposal", "data-proposal": number },
         ...segment([start, end]), label([middle[0], middle[1] - 8 * unit()], [`+ ${name}: ${vehicles}`]));
-    }), ...["regions", "zones", "lines", "ground"].flatMap(kind => places[kind].map((each, index) => drawItem(kind, each, index))));
+    }));
+    for (const kind of ["regions", "zones", "lines", "ground"])
+      marks.append(...places[kind].map((each, index) => drawItem(kind, each, index)));
     if (hovered)
       marks.append(el("polyline", { class: "hovered", points: Array.from({ length: hovered.seen },
         (_, row) => `${hovered.xs[row]},${hovered.ys[row]}`).join(" ") }));
     const shown = pointer && tool !== "select" ? [...drawn, pointer] : drawn;
-    if (shown.length) marks.append(el("polyline", { points: shown.join(" "), class: "new" }), ...shown.map(each => dot(each, 5, "new")));
+    marks.append(el("polyline", { points: shown.join(" "), class: "new" }), ...shown.map(each => dot(each, 5, "new")));
   }
 
   function drawItem(kind, each, index) {
@@ -621,13 +578,14 @@ async function openPage(data) {
       const [start, end] = points, length = Math.hypot(end[0] - start[0], end[1] - start[1]) || 1;
       const left = [(end[1] - start[1]) / length, (start[0] - end[0]) / length];
       group.append(...segment(points), ...sideOf(each.left, left, points, index),
-        ...sideOf(each.right, left.map(value => -value), points, index), label([start[0], start[1] - 9 * unit()], [each.name]));
+        ...sideOf(each.right, left.map(value => -value), points, index),
+        label([start[0], start[1] - 9 * unit()], [each.name]));
     } else if (kind === "ground") {
-      group.append(label([points[0][0], points[0][1] - 11 * unit()], [`${metresOf(each)} m`]));
+      group.append(label([points[0][0], points[0][1] - 11 * unit()], [metresOf(each)]));
     } else {
       const top = points.reduce((best, point) => point[1] < best[1] ? point : best);
-      const sum = (...names) => names.reduce((total, way) => total + countOf(found[places.lines.length + index], way).total, 0);
-      const counts = kind === "zones" ? `in ${sum("enter", "appear")}, out ${sum("exit", "vanish")}` : "";
+      const count = way => countOf(found[places.lines.length + index], way).total;
+      const counts = kind === "zones" ? `in ${count("enter") + count("appear")}, out ${count("exit") + count("vanish")}` : "";
       group.append(el("polygon", { points: points.join(" ") }), label([top[0], top[1] + 18 * unit()], [each.name, counts]));
     }
     if (isSelected || kind === "ground")
@@ -640,20 +598,22 @@ async function openPage(data) {
   function sideOf(name, way, [start, end], index) {
     const { total, classes } = countOf(found[index], name), middle = start.map((value, i) => (value + end[i]) / 2);
     const tip = middle.map((value, i) => value + 26 * unit() * way[i]);
-    const wing = sign => [tip[0] - 7 * unit() * (way[0] - sign * way[1] / 2), tip[1] - 7 * unit() * (way[1] + sign * way[0] / 2)];
+    const wing = sign => tip.map((value, i) => value - 7 * unit() * (way[i] + (i ? sign : -sign) * way[1 - i] / 2));
     const down = way[1] > 0.3 ? 16 : way[1] > -0.3 ? 4 : classes ? -22 : -7;
-    const at = [clamp(tip[0] + 10 * unit() * way[0], 0, width), clamp(tip[1] + down * unit(), 14 * unit(), height - 4 * unit())];
+    const at = [tip[0] + 10 * unit() * way[0], clamp(tip[1] + down * unit(), 14 * unit(), height - 4 * unit())];
+    const anchor = way[0] > 0.5 ? "start" : way[0] < -0.5 ? "end" : "middle";
     return [el("polyline", { points: [middle, tip, wing(1), tip, wing(-1)].join(" ") }),
-      label(at, [`${name} ${total}`, classes], way[0] > 0.5 ? "start" : way[0] < -0.5 ? "end" : "middle", "count")];
+      label(at, [`${name} ${total}`, classes], anchor, "count")];
   }
 
   function gridOf(ground) {
-    const [left, low, right, high] = boundsOf(places.ground.map(each => each.metres)), longest = Math.max(right - left, high - low);
-    const step = [1, 2, 5, 10, 20, 50, 100].find(each => longest / each <= 14) ?? 200;
+    const [left, low, right, high] = boundsOf(places.ground.map(each => each.metres));
+    const step = [1, 2, 5, 10, 20, 50, 100].find(each => Math.max(right - left, high - low) / each <= 14) ?? 200;
     const lines = (from, to, at) => Array.from({ length: 1 + Math.floor(to / step) - Math.ceil(from / step) }, (_, n) => {
       const value = (Math.ceil(from / step) + n) * step;
       const points = Array.from({ length: 25 }, (_, i) => ground.toPixels(at(value, i / 24))).filter(point => point);
-      return [el("polyline", { points: points.join(" "), class: "grid" }), points.length ? label(points[0], [`${value} m`], "middle", "grid") : ""];
+      return [el("polyline", { points: points.join(" "), class: "grid" }),
+        label(points[0] ?? [0, 0], [points.length && `${value} m`], "middle", "grid")];
     }).flat();
     return [...lines(left, right, (x, share) => [x, low + share * (high - low)]),
       ...lines(low, high, (y, share) => [left + share * (right - left), y])];
@@ -662,13 +622,11 @@ async function openPage(data) {
   function showLens() {
     lens.hidden = !(pointer && (drag?.moved ? selected?.point !== null : tool !== "select"));
     if (lens.hidden) return;
-    const { side, zoom } = LENS, context = lens.getContext("2d"), part = side / zoom * unit();
+    const side = 132, context = lens.getContext("2d"), part = side / 4 * unit(); // it shows four times as much
     const [x, y] = pointer.map(value => value / unit());
     lens.style.left = `${clamp(x - side / 2, 0, Math.max(0, stage.clientWidth - side))}px`;
     lens.style.top = `${y > side + 40 ? y - side - 30 : y + 40}px`;
     [lens.width, lens.height] = [side, side];
-    context.fillRect(0, 0, side, side);
-    context.imageSmoothingEnabled = false;
     context.drawImage(view, pointer[0] - part / 2, pointer[1] - part / 2, part, part, 0, 0, side, side);
     context.globalCompositeOperation = "difference";
     context.strokeStyle = "#fff";
@@ -676,7 +634,6 @@ async function openPage(data) {
   }
 
   // ------------------------------------------------ the panel
-
   function showDetails() {
     const each = item(), box = get("details"), button = (text, onclick, id) => el("button", { onclick, id }, text);
     box.hidden = !each;
@@ -705,12 +662,13 @@ async function openPage(data) {
   function showList() {
     const rows = Object.keys(KINDS).flatMap(kind => places[kind].map((each, index) => {
       const result = { lines: found[index], zones: found[places.lines.length + index] }[kind];
-      const counts = result?.border.directions.map(name => [name, countOf(result, name)]).filter(([, { total }], i) => i < 2 || total)
-        .map(([name, { total, classes }]) => `${name} ${total}${classes && ` (${classes})`}`).join(" · ");
-      const note = counts ?? (each.metres ? `${metresOf(each)} m${errorOf(each)}` : each.mask ? `mask ${each.mask}` : each.kind ?? "include");
+      const counts = result?.border.directions.map(name => ({ name, ...countOf(result, name) }))
+        .filter(({ total }, i) => i < 2 || total)
+        .map(({ name, total, classes }) => `${name} ${total}${classes && ` (${classes})`}`).join(" · ");
+      const note = each.metres ? metresOf(each) + errorOf(each) : each.mask ? `mask ${each.mask}` : each.kind ?? "include";
       const choose = () => { selected = { kind, index, point: null }; refresh(); };
       return el("button", { class: "row", "aria-pressed": each === item(), onclick: choose },
-        el("b", {}, each.name ?? `ground ${index + 1}`), el("span", {}, note));
+        el("b", {}, each.name ?? `ground ${index + 1}`), el("span", {}, counts ?? note));
     }));
     get("list").replaceChildren(...(rows.length ? rows : [el("p", {}, "Nothing is drawn yet.")]));
   }
@@ -722,14 +680,18 @@ async function openPage(data) {
 
   function showResults() {
     const ground = fitGround(places.ground), lines = found.slice(0, places.lines.length), problems = problemsOf(places, size);
-    const warnings = lines.flatMap(({ border, visits }) => warningsOf(border, visits, paths, data.span).map(text => `${border.name}: ${text}`));
-    get("warnings").replaceChildren(...problems.map(text => el("li", { class: "problem" }, text)), ...warnings.map(text => el("li", {}, text)));
+    const warnings = lines.flatMap(({ border, visits }) =>
+      warningsOf(border, visits, paths, data.span).map(text => `${border.name}: ${text}`));
+    get("warnings").replaceChildren(...[...problems, ...warnings].map((text, i) =>
+      el("li", { class: i < problems.length ? "problem" : "" }, text)));
     get("save").disabled = problems.length > 0;
     const names = found.map(({ border }) => border.name), flows = flowsOf(found);
     get("flows").parentElement.hidden = names.length < 2;
-    get("flows").replaceChildren(el("tr", {}, ...["from", ...names.map(name => `to ${name}`), "to none"].map(text => el("th", {}, text))),
-      ...names.map(from => el("tr", {}, el("td", {}, from), ...[...names, ""].map(to => el("td", {}, String(flows[`${from}\n${to}`] ?? 0))))));
-    get("speeds").replaceChildren(...(ground ? lines.flatMap(line => line.border.directions.map(way => speedRow(line, way, ground))) : []));
+    const row = (cell, ...texts) => el("tr", {}, ...texts.map(text => el(cell, {}, String(text))));
+    get("flows").replaceChildren(row("th", "from", ...names.map(name => `to ${name}`), "to none"),
+      ...names.map(from => row("td", from, ...[...names, ""].map(to => flows[`${from}\n${to}`] ?? 0))));
+    get("speeds").replaceChildren(...lines.flatMap(line =>
+      ground ? line.border.directions.map(way => speedRow(line, way, ground)) : []));
     get("text").textContent = writeYaml(places, size, rest, data.name);
     get("undo").disabled = !past.length;
     get("redo").disabled = !future.length;
@@ -748,14 +710,10 @@ async function openPage(data) {
 
   function setTool(name) {
     [tool, drawn] = [name, []];
-    for (const button of document.querySelectorAll("[data-tool]")) button.setAttribute("aria-pressed", button.dataset.tool === name);
-    say(hintOf(name));
+    for (const button of buttons) button.setAttribute("aria-pressed", button.dataset.tool === name);
+    say(hint());
     drawMarks();
     showLens();
-  }
-
-  function hintOf(name) {
-    return document.querySelector(`[data-tool=${name}]`).dataset.hint;
   }
 
   function refresh(isDragging = false) {
@@ -768,7 +726,6 @@ async function openPage(data) {
   }
 
   // ------------------------------------------------ pointer and keys
-
   function place(event) {
     const box = marks.getBoundingClientRect();
     return inside([(event.clientX - box.left) * width / box.width, (event.clientY - box.top) * height / box.height]);
@@ -810,7 +767,8 @@ async function openPage(data) {
       drag = null;
       return add("lines", { name: isUsed ? freeName(name) : name, start, end, left, right });
     }
-    selected = target && { kind: target.dataset.kind, index: Number(target.dataset.index), point: point ? Number(point) : null };
+    const { kind, index } = target?.dataset ?? {};
+    selected = target && { kind, index: Number(index), point: point ? Number(point) : null };
     drag = selected && { ...drag, before: JSON.stringify(places) };
     refresh();
   }
@@ -843,7 +801,7 @@ async function openPage(data) {
   function hover(event) {
     const isOver = event.target.closest("[data-kind], [data-proposal]") || !get("paths").checked;
     let best = 8 * unit(), nearest = null;
-    for (const path of isOver ? [] : every.filter(path => !hidden.has(path.kind)))
+    for (const path of isOver ? [] : every)
       for (let row = 0; row < path.seen; row++) {
         const away = Math.abs(path.xs[row] - pointer[0]) + Math.abs(path.ys[row] - pointer[1]);
         if (away < best) [best, nearest] = [away, path];
@@ -851,7 +809,8 @@ async function openPage(data) {
     if (nearest === hovered) return;
     hovered = nearest;
     const time = seconds => `${Math.floor(seconds / 60)}:${(seconds % 60).toFixed(1).padStart(4, "0")}`;
-    say(nearest ? `Vehicle ${nearest.vehicle}: ${nearest.kind}, ${time(nearest.times[0])} to ${time(nearest.times[nearest.seen - 1])}` : hintOf(tool));
+    const when = nearest && [0, nearest.seen - 1].map(row => time(nearest.times[row])).join(" to ");
+    say(nearest ? `Vehicle ${nearest.vehicle}: ${nearest.kind}, ${when}` : hint());
     drawMarks();
   }
 
@@ -865,13 +824,18 @@ async function openPage(data) {
     else if (button) button.click(), stage.focus({ preventScroll: true });
     else if (isControl) return;
     else if (key === "s") swap();
-    else if (key === "n" && selected) selected.point = ((selected.point ?? -1) + 1) % pointsOf(selected.kind, item()).length, drawMarks();
+    else if (key === "n" && selected) nextPoint();
     else if (key === "Delete" || key === "Backspace") drawn.length ? (drawn.pop(), drawMarks()) : remove();
     else if (key === "Escape") [drawn, selected] = [[], null], setTool("select"), refresh();
     else if (key === "Enter" && tool !== "select") pressEnter();
     else if (arrow) step(arrow.map(value => value * (event.shiftKey ? 20 : 1)));
     else return;
     event.preventDefault();
+  }
+
+  function nextPoint() {
+    selected.point = ((selected.point ?? -1) + 1) % pointsOf(selected.kind, item()).length;
+    drawMarks();
   }
 
   /** Put a point where the crosshair is; where it was just put, the shape ends. */
@@ -889,7 +853,6 @@ async function openPage(data) {
   }
 
   // ------------------------------------------------ files
-
   function save() {
     const href = URL.createObjectURL(new Blob([get("text").textContent], { type: "application/yaml" }));
     el("a", { href, download: data.name }).click();
@@ -901,13 +864,8 @@ async function openPage(data) {
   async function open({ target }) {
     const [file] = target.files;
     try {
-      const read = readYaml(await file.text()), factor = size.map((side, i) => side / read.size[i]);
-      if (Math.abs(factor[0] / factor[1] - 1) > 0.01) throw Error("is for frames of another shape");
-      const scaled = point => point.map((value, i) => value * factor[i]);
-      for (const each of Object.values(read.places).flat()) {
-        for (const key of ["start", "end", "pixel"]) if (each[key]) each[key] = scaled(each[key]);
-        if (each.points) each.points = each.points.map(scaled);
-      }
+      const read = readYaml(await file.text());
+      if (String(read.size) !== String(size)) throw Error(`is for frames of ${read.size.join("×")}; open it with -c`);
       change(() => { [places, rest, selected, drawn] = [read.places, read.rest, null, []]; });
       say(`Opened ${file.name}.`);
     } catch (error) {
@@ -916,25 +874,16 @@ async function openPage(data) {
     target.value = "";
   }
 
-  function copy() {
-    getSelection().selectAllChildren(get("text"));
-    document.execCommand("copy");
-    say("Copied.");
-  }
-
   // ------------------------------------------------ start
-
-  const actions = { undo: () => travel(past, future), redo: () => travel(future, past), save, copy };
+  const actions = { undo: () => travel(past, future), redo: () => travel(future, past), save };
   for (const [id, action] of Object.entries(actions)) get(id).addEventListener("click", action);
-  for (const button of document.querySelectorAll("[data-tool]")) button.addEventListener("click", () => setTool(button.dataset.tool));
-  const show = kind => event => { hidden[event.target.checked ? "delete" : "add"](kind); paintPaths(); };
-  get("classes").replaceChildren(...(kinds.length > 1 ? kinds : []).map(kind =>
-    el("label", {}, el("input", { type: "checkbox", checked: "", onchange: show(kind) }), kind)));
-  get("ways").replaceChildren(...Array.from("→↘↓↙←↖↑↗", (arrow, i) => el("span", { style: `color: hsl(${45 * i} 90% 45%)` }, arrow)));
+  for (const button of buttons) button.addEventListener("click", () => setTool(button.dataset.tool));
+  get("ways").append(...Array.from("→↘↓↙←↖↑↗", (arrow, i) => el("span", { style: `color: hsl(${45 * i} 90% 45%)` }, arrow)));
   get("open").addEventListener("change", open);
   get("paths").addEventListener("change", paintPaths);
-  const leave = () => { if (!drag) [pointer, hovered] = [null, null], drawMarks(), showLens(); };
-  const handlers = { pointerdown: press, pointermove: slide, pointerup: release, pointercancel: () => { drag = null; }, pointerleave: leave, dblclick: endShape };
+  const leave = () => { [pointer, hovered] = [null, null]; drawMarks(); showLens(); };
+  const handlers = { pointerdown: press, pointermove: slide, pointerup: release, pointercancel: release,
+    pointerleave: leave, dblclick: endShape };
   for (const [name, handler] of Object.entries(handlers)) stage.addEventListener(name, handler);
   addEventListener("keydown", type);
   addEventListener("beforeunload", event => { if (JSON.stringify(places) !== saved) event.preventDefault(); });
@@ -947,4 +896,6 @@ async function openPage(data) {
   document.body.dataset.ready = "yes";
 }
 
-openPage(JSON.parse(get("data").textContent)).catch(error => { get("hint").textContent = `This page cannot be shown: ${error.message}`; });
+openPage(JSON.parse(get("data").textContent)).catch(error => {
+  get("hint").textContent = `This page cannot be shown: ${error.message}`;
+});
