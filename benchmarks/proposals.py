@@ -2,11 +2,13 @@
 
     python -m benchmarks.proposals               # from the true boxes of the thirty scenes
 
-A stream is the trips of vehicles from one line of the scene to another. It has a line where a
-proposed one counts at least 70 % of its vehicles in one direction, and they are most of those that
-this direction counts. A line is useless where it is for no stream, or for one that has a line.
+A stream is the trips of vehicles from one line of the scene to another, of those that can be
+followed. It has a line where a proposed one counts at least 70 % of its vehicles in one direction,
+and they are most of those that this direction counts. A line is useless where it is for no stream,
+or for one that has a line.
 """
 
+import math
 from collections import Counter
 from dataclasses import dataclass
 
@@ -21,6 +23,8 @@ LARGE = 0.08
 """Fraction of the vehicles from which a stream should have a line."""
 LEAST = 5
 ALL, MOST = 0.7, 0.5
+LENGTHS = 1.5
+"""Way of a vehicle that can be followed, in heights of its largest box."""
 
 
 @dataclass(frozen=True)
@@ -36,8 +40,13 @@ class Proposed:
 def proposed(scene: PoleScene) -> Proposed:
     """Compare the proposed lines of a scene with its streams."""
     frames = list(scene.true_tracks())
-    lines = propose_lines(link_tracks(frames, WIDTH, HEIGHT), WIDTH, HEIGHT)
-    size: Counter[tuple[str, str]] = Counter(trip.flow for trip in scene.trips.values())
+    paths = link_tracks(frames, WIDTH, HEIGHT)
+    lines = propose_lines(paths, WIDTH, HEIGHT)
+    size = Counter(
+        scene.trips[path.tracks[0][1]].flow
+        for path in paths
+        if math.dist(path.points[0], path.points[path.seen - 1]) >= LENGTHS * path.heights.max()
+    )
     large = {flow for flow, n in size.items() if n >= max(LEAST, LARGE * size.total())}
     settings = Settings(
         traffic=TrafficSettings(

@@ -16,7 +16,7 @@ _OTHERS = "What is processed"
 HEADINGS: Mapping[str, Sequence[str]] = {
     "Outputs": (
         *("--output", "--no-video", "--tracks", "--counts", "--flows", "--interval", "--vehicles"),
-        *("--crops", "--json", "--page", "--stages", "--at", "--sink", "--overwrite"),
+        *("--crops", "--json", "--page", "--propose", "--stages", "--at", "--sink", "--overwrite"),
     ),
     _OTHERS: (),
     "Several videos": ("--directory", "--skip-existing", "--dry-run"),

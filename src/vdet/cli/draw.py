@@ -37,7 +37,7 @@ _ROWS = 64
 @click.argument("clip", type=options.INPUT, metavar="CLIP")
 @options.option(
     "-o, --output FILE",
-    "Page to write, .html; or a picture of the place for a report, .jpg, .png or .svg.",
+    "Page to write, .html, or picture of the place for a report, .jpg, .png or .svg.",
     options.PATH,
 )
 @options.option(

@@ -1,5 +1,4 @@
 "use strict";
-
 // The page of `vdet draw`. First the counting rule, which is pure; then numbers for the panel, the
 // file, and at last what is drawn and edited. Points are [x, y] in pixels of the frame.
 
