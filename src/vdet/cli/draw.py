@@ -1,6 +1,7 @@
 """`vdet draw`: a page in which lines are drawn over the paths of vehicles."""
 
 import math
+from collections.abc import Iterable, Iterator
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,12 +21,11 @@ if TYPE_CHECKING:
     from vdet.media.frame import Frame
     from vdet.track.track import FrameTracks
 
-_MAX_SAMPLES = 30
+_MAX_SAMPLES = 20
 """Number of frames that the picture of the place is made of; at least half as many."""
 _STILL_FRAMES = 5000
 """Number of frames of the video that are read for it where the tracks are known."""
-_ROWS = 64
-"""Rows of the frames of which the median is taken at once."""
+_OUTPUTS, _SETTINGS = (".html", ".jpg", ".png", ".svg"), (".yaml", ".yml")
 
 
 @command(
@@ -73,7 +73,14 @@ def draw(
 
     outputs = [path for path in (output, propose) if path]
     settings = choice.read()
-    _check(output, propose, settings, overwrite)
+    if not outputs:
+        raise click.UsageError("there is nothing to write; use -o FILE or --propose FILE")
+    for path, suffixes in ((output, _OUTPUTS), (propose, _SETTINGS)):
+        if path:
+            options.check_suffix(path, *suffixes, what="pages" if path is output else "settings")
+            check_output(path, overwrite=overwrite)
+    if output and output.suffix.lower() != ".html" and not settings.traffic:
+        raise ConfigError(f"{output}: has nothing to show; add lines or zones with -c FILE")
     with progress_steps(" frames") as steps:
         image, frames = _watched(clip, tracks, settings, (start, end), steps)
     settings.camera.check_frames(image.shape[1], image.shape[0])
@@ -91,22 +98,6 @@ def draw(
     )
 
 
-def _check(
-    output: Path | None, propose: Path | None, settings: "Settings", overwrite: bool
-) -> None:
-    """Refuse outputs before any work. Raises `VdetError`, `click.UsageError`."""
-    if output:
-        options.check_suffix(output, ".html", ".jpg", ".png", ".svg", what="pages")
-        check_output(output, overwrite=overwrite)
-        if output.suffix.lower() != ".html" and not settings.traffic:
-            raise ConfigError(f"{output}: has nothing to show; add lines or zones with -c FILE")
-    if propose:
-        options.check_suffix(propose, ".yaml", ".yml", what="settings")
-        check_output(propose, overwrite=overwrite)
-    if not (output or propose):
-        raise click.UsageError("there is nothing to write; use -o FILE or --propose FILE")
-
-
 _Part = tuple[Fraction | None, Fraction | None]
 """The part of the clip that is used: start and end, seconds."""
 
@@ -121,6 +112,8 @@ def _watched(
     VdetError
         The clip or the file of tracks cannot be used.
     """
+    import numpy as np
+
     from vdet.detect.factory import load_detector
     from vdet.media.images import is_picture_name, read_image
     from vdet.media.reader import VideoReader
@@ -128,26 +121,42 @@ def _watched(
 
     if is_picture_name(clip) and "%" not in clip.name:
         return read_image(clip), _saved(tracks, None, part) if tracks else []
-    still, found = _Still(), list["FrameTracks"]()
-    if tracks:
+    found: list[FrameTracks] = []
+
+    def frames() -> "Iterator[Frame]":
         start, end = part
-        with VideoReader(
-            clip, start=start, end=end, frames=_STILL_FRAMES, settings=settings.input
-        ) as reader:
-            advance = steps("the place", reader.expected)
-            for frame in reader:
-                still.add(frame)
+        if tracks:
+            with VideoReader(
+                clip, start=start, end=end, frames=_STILL_FRAMES, settings=settings.input
+            ) as reader:
+                found.extend(_saved(tracks, float(reader.info.rate), part))
+                steps("reading the place", None)
+                yield from reader
+            return
+        # All vehicles: the page shows what regions leave out.
+        run = Run(clip, (), settings.model_copy(update={"regions": ()}), start, end)
+        with open_video(run, load_detector(settings.detector)) as video:
+            advance = steps("", video.reader.expected)
+            for result in video.results:
+                found.append(result.frame_tracks)
+                yield result.frame
                 advance(1)
-        return still.image(clip), _saved(tracks, float(reader.info.rate), part)
-    # All vehicles: the page shows what regions leave out.
-    run = Run(clip, (), settings.model_copy(update={"regions": ()}), *part)
-    with open_video(run, load_detector(settings.detector)) as video:
-        advance = steps("", video.reader.expected)
-        for result in video.results:
-            still.add(result.frame)
-            found.append(result.frame_tracks)
-            advance(1)
-    return still.image(clip), found
+
+    images = _spread(frames())
+    if not images:
+        raise VideoError(f"{clip}: has no frame in this part; check --start")
+    return np.median(images, axis=0).astype(np.uint8), found
+
+
+def _spread(frames: "Iterable[Frame]") -> "list[Image]":
+    """Return some of the images, at even distances."""
+    images, step = list["Image"](), 1
+    for number, frame in enumerate(frames):
+        if number % step == 0:
+            images.append(frame.image)
+        if len(images) > _MAX_SAMPLES:
+            images, step = images[::2], 2 * step
+    return images
 
 
 def _saved(tracks: Path, rate: float | None, part: _Part) -> "list[FrameTracks]":
@@ -159,31 +168,3 @@ def _saved(tracks: Path, rate: float | None, part: _Part) -> "list[FrameTracks]"
         raise TruthError(f"{tracks}: has no times; CLIP must be the video")
     start, end = part[0] or -math.inf, part[1] or math.inf
     return [frame for frame in saved if start <= frame.time < end]
-
-
-class _Still:
-    """The median of some frames that are spread over a video: it shows no vehicle that moves."""
-
-    def __init__(self) -> None:
-        self._images: list[Image] = []
-        self._step, self._number = 1, 0
-
-    def add(self, frame: "Frame") -> None:
-        """Look at the next frame."""
-        if self._number % self._step == 0:
-            self._images.append(frame.image)
-            if len(self._images) > _MAX_SAMPLES:
-                self._images, self._step = self._images[::2], 2 * self._step
-        self._number += 1
-
-    def image(self, clip: Path) -> "Image":
-        """Return it, BGR uint8. Raises `VideoError` where there was no frame."""
-        import numpy as np
-
-        if not self._images:
-            raise VideoError(f"{clip}: has no frame in this part; check --start")
-        strips = [
-            np.sort([image[top : top + _ROWS] for image in self._images], axis=0)
-            for top in range(0, len(self._images[0]), _ROWS)
-        ]
-        return np.concatenate([strip[len(strip) // 2] for strip in strips])

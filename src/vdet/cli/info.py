@@ -63,15 +63,14 @@ def _settings(choice: SettingsChoice) -> Facts:
     lines, zones = place(settings.traffic, *size)
     facts: Facts = {
         "file": choice.name,
-        "kind": "settings",
-        "size": settings.camera.size and f"{size[0]}x{size[1]}",
+        "kind": "settings of a camera",
         "regions": [each.name for each in settings.regions],
         "lines": [each.name for each in lines],
         "zones": [each.name for each in zones],
+        "ground": None,
     }
-    ground = ground_of(settings.camera, *size)
-    if ground is None:
-        return facts | {"ground": None}
+    if (ground := ground_of(settings.camera, *size)) is None:
+        return facts
     facts["ground"] = (
         f"{counted(len(settings.camera.ground), 'point')}, off by {ground.error:.2f} m "
         f"({ground.pixel_error:.1f} px, root mean square), over {ground.length:.0f} m"

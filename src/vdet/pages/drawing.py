@@ -18,14 +18,13 @@ from vdet.config.schema import Settings
 from vdet.labels.formats import UNKNOWN
 from vdet.lanes.ground import ground_of
 from vdet.media.images import encode_image
-from vdet.pages.place import draw_marks, place_marks, svg
+from vdet.pages.place import Mark, draw_marks, place_marks, svg
 from vdet.pages.render import TEMPLATES, jpeg_uri, render
 from vdet.track.track import FrameTracks
 from vdet.traffic.borders import place
 from vdet.traffic.counting import count_frames
 from vdet.traffic.linking import VehiclePath, link_tracks
 from vdet.traffic.proposals import ProposedLine, propose_lines
-from vdet.traffic.records import VehicleRecords
 
 _PLACES = {"ground": "camera", "regions": "other", "lines": "traffic", "zones": "traffic"}
 """The lists that the page changes, and the part of the file that each is in."""
@@ -116,16 +115,12 @@ class Drawing:
         ]
         return "\n".join([_PROPOSED, *as_yaml(values), ""])
 
-    def _marks(self) -> list[Any]:
-        width, height = self._size
-        records = VehicleRecords(width)
-        for frame in self._frames:
-            records.add(frame)
+    def _marks(self) -> list[Mark]:
         counts = count_frames(self._frames, self._settings, self._size)
-        lines, zones = place(self._settings.traffic, width, height)
-        known = {record.id: record for record in records.end()}
-        ground = ground_of(self._settings.camera, width, height)
-        return place_marks(self._size, (*lines, *zones), counts, known, ground)
+        lines, zones = place(self._settings.traffic, *self._size)
+        ground = ground_of(self._settings.camera, *self._size)
+        ways = {key: path.points.tolist() for path in self.paths for _, key in path.tracks}
+        return place_marks(self._size, (*lines, *zones), counts, ways, ground)
 
 
 _PROPOSED = """\

@@ -18,7 +18,6 @@ from vdet.pages.render import render
 from vdet.polygons import Point
 from vdet.traffic.borders import Border, PlacedLine
 from vdet.traffic.counts import Counts, Event, vehicle_trips
-from vdet.traffic.records import VehicleRecord
 
 Flow = tuple[str, str]
 """The first and the last line or zone of a vehicle; the last is `NOWHERE` where it is the first."""
@@ -63,10 +62,13 @@ def place_marks(
     size: tuple[int, int],
     borders: Sequence[Border],
     counts: Counts,
-    records: Mapping[int, VehicleRecord],
+    ways: Mapping[int, Sequence[Point]],
     ground: Ground | None = None,
 ) -> list[Mark]:
-    """Return what is drawn over frames of this size, width and height in pixels."""
+    """Return what is drawn over frames of this size, width and height in pixels.
+
+    `ways` are the paths of tracks by their ids, pixels.
+    """
     width, height = size
     thin = line_width(np.empty((height, width)))
     totals = {(each.name, each.direction): each.count for each in counts.totals}
@@ -80,8 +82,9 @@ def place_marks(
     flows = flows_of(counts)
     most = max(map(len, flows.values()), default=1)
     for number, trips in enumerate(flows.values()):
-        paths = sorted((records[e.id].path for _, e in trips if e.id in records), key=len)
-        path = [(x, y) for x, y in paths[len(paths) // 2] if 0 <= x < width and 0 <= y < height]
+        paths = sorted((ways[last.id] for _, last in trips if last.id in ways), key=len)
+        middle = paths[len(paths) // 2] if paths else ()
+        path = [(x, y) for x, y in middle if 0 <= x < width and 0 <= y < height]
         if len(path) > 1:
             wide = max(2, round(_WIDEST * width * len(trips) / most))
             label, at = str(len(trips)), path[len(path) // 2]

@@ -58,7 +58,8 @@ def traffic_part(
     if frame is not None:
         frame = frame.copy()
         size = frame.shape[1], frame.shape[0]
-        draw_marks(frame, place_marks(size, borders, counts, known, ground))
+        ways = {number: record.path for number, record in known.items()}
+        draw_marks(frame, place_marks(size, borders, counts, ways, ground))
     headings = ("from", "to", *several, "vehicles", "mean km/h")
     if all(row[-1] == NOWHERE for row in rows):
         headings, rows = headings[:-1], [row[:-1] for row in rows]

@@ -15,7 +15,7 @@ from vdet.media import VideoInfo
 from vdet.pages import charts
 from vdet.pages.charts import Axis, Plot, Span, Timeline
 from vdet.pages.render import jpeg_uri, link_to, render
-from vdet.pages.traffic import TrafficPart, traffic_part
+from vdet.pages.traffic import traffic_part
 from vdet.traffic.borders import Border
 from vdet.traffic.clock import Clock
 from vdet.traffic.counts import Counts
@@ -145,7 +145,8 @@ class VideoPage:
             timeline=_timeline(shown, x),
             interval_plots=self._interval_plots(),
             speed_plot=charts.histogram(speeds, _SPEED_STEP, title, "km/h") if speeds else None,
-            traffic=self._traffic(),
+            traffic=self.counts
+            and traffic_part(self.counts, self.records, self.poster, self.borders, self.ground),
             paths=self._paths(),
         )
 
@@ -202,12 +203,6 @@ class VideoPage:
             for name, some in series.items()
             if some
         ]
-
-    def _traffic(self) -> TrafficPart | None:
-        """Return what is shown of the counts."""
-        if self.counts is None:
-            return None
-        return traffic_part(self.counts, self.records, self.poster, self.borders, self.ground)
 
     def _paths(self) -> Image | None:
         """Return the frame with the paths of all vehicles."""
