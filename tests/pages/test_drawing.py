@@ -20,7 +20,7 @@ from vdet.config.loading import given_values, load_settings
 from vdet.config.schema import Settings
 from vdet.pages.drawing import Drawing
 from vdet.track.track import FrameTracks, Track
-from vdet.traffic.borders import place
+from vdet.traffic.borders import Border, place
 from vdet.traffic.counting import count_frames
 from vdet.traffic.crossings import crossings
 
@@ -76,9 +76,10 @@ def test_the_page_counts_as_python_does(window: Browser, tmp_path: Path) -> None
     for seed in range(4):
         made = drawing(wandering(seed), json.loads(settings.model_dump_json()), settings)
         lines, zones = place(settings.traffic, WIDTH, HEIGHT)
+        borders: tuple[Border, ...] = *lines, *zones
         expected = [
             [path.vehicle, border.name, each.direction, each.row, round(each.time, 3)]
-            for border in (*lines, *zones)
+            for border in borders
             for path in made.paths
             for each in crossings(path, border)
         ]

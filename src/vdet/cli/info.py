@@ -64,7 +64,6 @@ def _settings(choice: SettingsChoice) -> Facts:
     facts: Facts = {
         "file": choice.name,
         "kind": "settings of a camera",
-        "regions": [each.name for each in settings.regions],
         "lines": [each.name for each in lines],
         "zones": [each.name for each in zones],
         "ground": None,

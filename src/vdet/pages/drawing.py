@@ -103,16 +103,10 @@ class Drawing:
     def _proposed_settings(self) -> str:
         values = in_pixels(self._values, self._size)
         traffic = values["traffic"] = values.get("traffic") or {}
-        traffic["lines"] = (traffic.get("lines") or []) + [
-            {
-                "name": each.name,
-                "start": list(each.start),
-                "end": list(each.end),
-                "left": each.left,
-                "right": each.right,
-            }
-            for each in self.proposals
-        ]
+        lines = [asdict(each) for each in self.proposals]
+        for line in lines:
+            del line["vehicles"]
+        traffic["lines"] = [*(traffic.get("lines") or []), *lines]
         return "\n".join([_PROPOSED, *as_yaml(values), ""])
 
     def _marks(self) -> list[Mark]:
@@ -166,6 +160,9 @@ class _Dumper(yaml.SafeDumper):
     def represent_sequence(self, tag: str, sequence: Any, flow_style: Any = None) -> Any:
         is_flat = not any(isinstance(each, dict) for each in sequence)
         return super().represent_sequence(tag, sequence, is_flat or flow_style)
+
+
+_Dumper.add_representer(tuple, _Dumper.represent_list)
 
 
 def pack(paths: Sequence[VehiclePath]) -> dict[str, Any]:

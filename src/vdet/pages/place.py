@@ -12,17 +12,15 @@ import numpy as np
 from vdet.boxes import Image
 from vdet.draw import paint
 from vdet.draw.boxes import LINE, WHITE, ZONE, color_of, draw_label, line_width
-from vdet.draw.paint import Color
+from vdet.draw.paint import Color, Surface
 from vdet.lanes.ground import Ground
 from vdet.pages.render import render
 from vdet.polygons import Point
 from vdet.traffic.borders import Border, PlacedLine
-from vdet.traffic.counts import Counts, Event, vehicle_trips
-
-Flow = tuple[str, str]
-"""The first and the last line or zone of a vehicle; the last is `NOWHERE` where it is the first."""
+from vdet.traffic.counts import Counts, Event, Way, vehicle_trips
 
 NOWHERE = "–"
+"""The end of a flow that was at one line or zone only."""
 
 _WIDEST = 0.012
 """Width of the arrow of the largest flow, as a fraction of the frame's width."""
@@ -49,9 +47,9 @@ class Mark:
     is_arrow: bool = False
 
 
-def flows_of(counts: Counts) -> dict[Flow, list[tuple[Event, Event]]]:
+def flows_of(counts: Counts) -> dict[Way, list[tuple[Event, Event]]]:
     """Return the first and the last event of each vehicle, by flow, the largest flow first."""
-    flows: dict[Flow, list[tuple[Event, Event]]] = {}
+    flows: dict[Way, list[tuple[Event, Event]]] = {}
     for first, *others in vehicle_trips(counts):
         way = first.name, others[-1].name if others else NOWHERE
         flows.setdefault(way, []).append((first, others[-1] if others else first))
@@ -70,15 +68,8 @@ def place_marks(
     `ways` are the paths of tracks by their ids, pixels.
     """
     width, height = size
-    thin = line_width(np.empty((height, width)))
     totals = {(each.name, each.direction): each.count for each in counts.totals}
-    marks = []
-    for border in borders:
-        if isinstance(border, PlacedLine):
-            marks += _line_marks(border, totals, thin, _SIDE * height)
-        else:
-            top = min(border.corners, key=lambda corner: corner[1])
-            marks.append(Mark(border.corners, ZONE, thin, border.name, top, is_closed=True))
+    marks = [mark for border in borders for mark in border_marks(border, totals)]
     flows = flows_of(counts)
     most = max(map(len, flows.values()), default=1)
     for number, trips in enumerate(flows.values()):
@@ -89,49 +80,55 @@ def place_marks(
             wide = max(2, round(_WIDEST * width * len(trips) / most))
             label, at = str(len(trips)), path[len(path) // 2]
             marks.insert(0, Mark(path, color_of(number), wide, label, at, is_arrow=True))
-    return [*marks, *(_scale(ground, thin, width) if ground else ())]
+    return [*marks, *(_scale(ground, width) if ground else ())]
 
 
-def _line_marks(
-    line: PlacedLine, totals: Mapping[tuple[str, str], int], width: int, reach: float
-) -> Iterator[Mark]:
-    """Yield a line, and an arrow to each side from its start, where no vehicle crosses it."""
-    (ax, ay), (bx, by) = line.start, line.end
-    yield Mark((line.start, line.end), LINE, width, line.name, line.end)
-    left = (by - ay) / line.length, (ax - bx) / line.length
-    for sign, direction in zip((1, -1), line.directions, strict=True):
-        tip = ax + sign * reach * left[0], ay + sign * reach * left[1]
-        label = f"{direction} {totals.get((line.name, direction), 0)}"
-        yield Mark((line.start, tip), LINE, width, label, tip, is_arrow=True)
+def border_marks(border: Border, totals: Mapping[Way, int], text: str = "") -> Iterator[Mark]:
+    """Yield a zone with its name and a text, or a line with its name and its counts.
+
+    The arrows to both sides are at the start of a line, where no vehicle crosses it.
+    """
+    height = border.size[1]
+    width = line_width(np.empty((int(height), 0), np.uint8))
+    if not isinstance(border, PlacedLine):
+        top = min(border.corners, key=lambda corner: corner[1])
+        yield Mark(border.corners, ZONE, width, border.name + text, top, is_closed=True)
+        return
+    (ax, ay), (bx, by) = border.start, border.end
+    yield Mark((border.start, border.end), LINE, width, border.name, border.end)
+    left = (by - ay) / border.length, (ax - bx) / border.length
+    for reach, direction in zip((_SIDE, -_SIDE), border.directions, strict=True):
+        tip = ax + reach * height * left[0], ay + reach * height * left[1]
+        label = f"{direction} {totals.get((border.name, direction), 0)}"
+        yield Mark((border.start, tip), LINE, width, label, tip, is_arrow=True)
 
 
-def _scale(ground: Ground, width: int, columns: int) -> Iterator[Mark]:
+def _scale(ground: Ground, columns: int) -> Iterator[Mark]:
     """Yield a scale across the picture in the middle of the calibrated area."""
     x, y = ground.pixels(ground.area.mean(axis=0, keepdims=True))[0].tolist()
-    here, beside = ground.place(np.array([(x, y), (x + 1, y)]))
-    metres = math.dist(here, beside)
+    metres = math.dist(*ground.place(np.array([(x, y), (x + 1, y)])))
     if metres > 0:
         lengths = [each for each in _SCALES if each <= _SCALE * columns * metres]
         length = max(lengths, default=_SCALES[0])
         half = length / metres / 2
-        yield Mark(((x - half, y), (x + half, y)), WHITE, width, f"{length} m", (x - half, y))
+        yield Mark(((x - half, y), (x + half, y)), WHITE, 3, f"{length} m", (x - half, y))
 
 
-def draw_marks(image: Image, marks: Iterable[Mark]) -> None:
-    """Draw marks into an image, their labels above all lines."""
+def draw_marks(surface: Surface, marks: Iterable[Mark]) -> None:
+    """Draw marks, their labels above all lines."""
     drawn = list(marks)
     for mark in drawn:
         if mark.is_closed:
-            paint.shade(image, mark.points, mark.color, _SHADE)
-        paint.draw_lines(image, mark.points, mark.color, mark.width, closed=mark.is_closed)
+            paint.shade(surface, mark.points, mark.color, _SHADE)
+        paint.draw_lines(surface, mark.points, mark.color, mark.width, closed=mark.is_closed)
         if mark.is_arrow:
             end, length = mark.points[-1], 3 * mark.width
             back = (point for point in reversed(mark.points) if math.dist(point, end) >= length)
             start = next(back, mark.points[0])
             tip = length / max(length, math.dist(start, end))
-            paint.draw_arrow(image, start, end, mark.color, mark.width, tip=tip)
+            paint.draw_arrow(surface, start, end, mark.color, mark.width, tip=tip)
     for mark in drawn:
-        draw_label(image, mark.label, mark.at, mark.color)
+        draw_label(surface, mark.label, mark.at, mark.color)
 
 
 def svg(image: Image, marks: Sequence[Mark]) -> str:

@@ -1,21 +1,20 @@
 """What the page of a video shows of its traffic: flows, counts by interval, and speeds."""
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from statistics import median
 
 import numpy as np
 
 from vdet.boxes import Image
 from vdet.draw.boxes import color_of
+from vdet.labels.formats import UNKNOWN
 from vdet.lanes.ground import Ground
 from vdet.pages.charts import hex_color
-from vdet.pages.place import NOWHERE, draw_marks, flows_of, place_marks
+from vdet.pages.place import draw_marks, flows_of, place_marks
 from vdet.traffic.borders import Border
-from vdet.traffic.counts import Counts, Event
+from vdet.traffic.counts import Counts
 from vdet.traffic.records import VehicleRecord
-from vdet.traffic.speeds import KMH
 
 Table = tuple[Sequence[str], Sequence[Sequence[str]]]
 """Headings and rows."""
@@ -43,37 +42,21 @@ def traffic_part(
     ground: Ground | None = None,
 ) -> TrafficPart:
     """Return the part of a page; `frame` is drawn over, with its lines and zones."""
-    known = {record.id: record for record in records}
     flows = flows_of(counts)
-    classes = sorted(
-        {first.class_name or "unknown" for each in flows.values() for first, _ in each}
-    )
+    classes = sorted({first.class_name or UNKNOWN for each in flows.values() for first, _ in each})
     several = classes if len(classes) > 1 else []
     rows = []
     for way, trips in flows.items():
-        found = Counter(first.class_name or "unknown" for first, _ in trips)
-        speeds = [speed for trip in trips if (speed := _mean_speed(known, *trip)) is not None]
-        shown = f"{median(speeds):.0f}" if speeds else NOWHERE
-        rows.append((*way, *(str(found[name]) for name in several), str(len(trips)), shown))
+        found = Counter(first.class_name or UNKNOWN for first, _ in trips)
+        rows.append((*way, *(str(found[name]) for name in several), str(len(trips))))
     if frame is not None:
         frame = frame.copy()
+        ways = {record.id: record.path for record in records}
         size = frame.shape[1], frame.shape[0]
-        ways = {number: record.path for number, record in known.items()}
         draw_marks(frame, place_marks(size, borders, counts, ways, ground))
-    headings = ("from", "to", *several, "vehicles", "mean km/h")
-    if all(row[-1] == NOWHERE for row in rows):
-        headings, rows = headings[:-1], [row[:-1] for row in rows]
+    headings = ("from", "to", *several, "vehicles")
     colors = [hex_color(color_of(number)) for number, _ in enumerate(rows)]
     return TrafficPart((headings, rows), colors, frame, _speeds(counts))
-
-
-def _mean_speed(records: Mapping[int, VehicleRecord], first: Event, last: Event) -> float | None:
-    """Return the mean speed of a vehicle from one event to another, km/h; None if not known."""
-    record = records.get(last.id)
-    if first.id != last.id or record is None or record.speeds is None:
-        return None
-    found = record.speeds.between(first.time, last.time)
-    return found and KMH * found[1]
 
 
 def _speeds(counts: Counts) -> Table:

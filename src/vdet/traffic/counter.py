@@ -43,6 +43,8 @@ class VehicleCounter:
         Places in its frames.
     spans
         From when to when there is video, seconds.
+    linker
+        It says how many vehicles have begun.
 
     Raises
     ------
@@ -55,34 +57,29 @@ class VehicleCounter:
         self.spans: list[Span] = []
         self._borders: tuple[Border, ...] = (*self.lines, *self.zones)
         self._confirmed = settings.confirmed
-        self._linker = TrackLinker(width, height, begun)
+        self.linker = TrackLinker(width, height, begun)
         self._ended: list[_Passage] = []
         self._tally: Counter[Way] = Counter()  # of those
         self._latest: FrameTracks | None = None
         self._so_far: Counter[Way] = Counter()
         self._counted = -math.inf
 
-    @property
-    def begun(self) -> int:
-        """How many vehicles have begun in it and before it."""
-        return self._linker.begun
-
     def update(self, frame: FrameTracks) -> None:
         """Add the tracks of the next frame."""
         add_frame(self.spans, frame, self._latest)
         self._latest = frame
-        ended = self._passages(self._linker.add(frame))
+        ended = self._passages(self.linker.add(frame))
         self._ended += ended
         self._tally.update((each.name, each.direction) for some in ended for each in some.events)
 
     def start_video(self) -> None:
         """Take the ids of the next frames for those of other tracks: they are of another video."""
         self._latest = None
-        self._linker.start_video()
+        self.linker.start_video()
 
     def counts(self) -> Counts:
         """Return all results, as if the video ended now."""
-        passages = self._ended + self._passages(self._linker.open_paths())
+        passages = self._ended + self._passages(self.linker.open_paths())
         events = [event for each in passages for event in each.events]
         events.sort(key=lambda each: (each.time, each.frame, each.id, each.name))
         return Counts(
@@ -101,7 +98,7 @@ class VehicleCounter:
         now = self.spans[-1][1]
         if now - self._counted >= _OLDEST:
             self._counted = now
-            still = self._passages(self._linker.open_paths())
+            still = self._passages(self.linker.open_paths())
             self._so_far = self._tally + Counter(
                 (each.name, each.direction)
                 for some in still

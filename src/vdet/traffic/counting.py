@@ -73,7 +73,7 @@ def count_files(
         first = min(saved.times.values(), default=None)
         if group is None or not group.goes_on(place, clock, first):
             counted |= group.counts() if group else {}
-            group = _Group(settings, place, group.counter.begun if group else 0)
+            group = _Group(settings, place, group.counter.linker.begun if group else 0)
         group.add(str(path), clock, first or 0.0, saved)
         advance(1)
     return counted | (group.counts() if group else {})

@@ -4,8 +4,6 @@ import colorsys
 import math
 from collections.abc import Iterable, Sequence
 
-import numpy as np
-
 from vdet.boxes import Image
 from vdet.draw.boxes import line_width
 from vdet.draw.paint import Color, draw_arrow, draw_lines
@@ -21,9 +19,9 @@ _TIP = 0.02
 def draw_paths(image: Image, records: Iterable[VehicleRecord]) -> None:
     """Draw the paths of vehicles, each in the colour of its direction, with a tip at its end.
 
-    A dot is where a vehicle was first seen. The arrows at the lower left show the colours.
+    A dot is where a vehicle was first seen.
     """
-    height, width = image.shape[:2]
+    width = image.shape[1]
     thin = max(1, line_width(image) // 2)
     for record in records:
         path = _inside(record.path, image)
@@ -33,10 +31,6 @@ def draw_paths(image: Image, records: Iterable[VehicleRecord]) -> None:
         draw_lines(image, path, color, thin)
         draw_lines(image, [path[0], path[0]], color, 4 * thin)
         draw_arrow(image, _tip(path, _TIP * width), path[-1], color, 2 * thin, tip=0.7)
-    middle, reach = (0.07 * width, height - 0.07 * width), 0.05 * width
-    for angle in np.linspace(0, 2 * math.pi, 8, endpoint=False).tolist():
-        end = middle[0] + reach * math.cos(angle), middle[1] + reach * math.sin(angle)
-        draw_arrow(image, middle, end, direction_color(middle, end), 2 * thin, tip=0.3)
 
 
 def _inside(path: Sequence[Point], image: Image) -> list[Point]:

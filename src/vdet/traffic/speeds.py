@@ -105,16 +105,15 @@ class Speeds:
         )
         return speed, float(np.hypot(scatter, self.common * speed))
 
-    def between(self, first: float, last: float) -> tuple[float, float] | None:
-        """Return the metres from the place at a time to that at a later one, and the mean speed.
+    def between(self, first: float, last: float) -> float | None:
+        """Return the mean speed from the place at a time to that at a later one, m/s.
 
         It rests on two places alone, so it checks what is smoothed. None where one is unknown.
         """
         if not self.times[0] <= first < last <= self.times[-1]:
             return None
         ends = [np.interp((first, last), self.times, each) for each in self.places.T]
-        metres = float(np.hypot(*np.diff(ends)[:, 0]))
-        return metres, metres / (last - first)
+        return float(np.hypot(*np.diff(ends)[:, 0])) / (last - first)
 
     @property
     def _ways(self) -> Float64Array:
@@ -171,8 +170,7 @@ def with_speeds(counts: Counts, meter: SpeedMeter | None) -> Counts:
     for event in counts.events:
         values: list[float | None] = [None] * 3
         if speeds := known.get(event.id):
-            before = latest.get(event.id, math.inf)
-            _, mean = speeds.between(before, event.time) or (None, None)
+            mean = speeds.between(latest.get(event.id, math.inf), event.time)
             values = [*(speeds.at(event.time) or (None, None)), mean]
         latest[event.id] = event.time
         speed, deviation, mean = map(_kmh, values)
