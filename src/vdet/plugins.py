@@ -23,7 +23,7 @@ _BUILT_IN: dict[str, dict[str, str]] = {
         name: "vdet.cli.{0}:{0}".format(name.replace("-", "_"))
         for name in (
             *("calibrate", "config", "count", "demo", "detect-image", "detect-video", "doctor"),
-            *("ground", "info", "mine", "paths", "suggest-lines", "train", "train-net"),
+            *("draw", "info", "mine", "train", "train-net"),
         )
     },
     DETECTORS: {"svm": "vdet.detect.svm.kind:SVM", "net": "vdet.detect.onnx.detector:NET"},

@@ -11,10 +11,13 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from vdet.boxes import Box
-from vdet.draw.boxes import BLACK, draw_box, draw_label, draw_line, draw_zone
+from vdet.config.places import LineSettings, TrafficSettings, ZoneSettings
+from vdet.draw.boxes import BLACK, draw_box, draw_label
 from vdet.draw.paint import Color, Surface, draw_arrow, draw_lines, fill, shade, write_text
 from vdet.media.coding import Coding
 from vdet.media.frame import Planes
+from vdet.pages.place import border_marks, draw_marks
+from vdet.traffic.borders import place
 
 Mask = NDArray[np.bool_]
 WIDTH, HEIGHT = 320, 240
@@ -33,6 +36,11 @@ def ground(coding: Coding, width: int = WIDTH, height: int = HEIGHT) -> Planes:
     return planes
 
 
+PLACES = TrafficSettings(
+    lines=(LineSettings(name="a", start=(0.06, 0.8), end=(0.9, 0.75), left="in", right="out"),),
+    zones=(ZoneSettings(name="z", points=((0, 0.1), (0.5, 0.12), (0.3, 0.5))),),
+)
+[LINE], [ZONE] = place(PLACES, WIDTH, HEIGHT)
 CORNERS = np.array([[11, 21], [151, 61], [90, 200]], np.int32)
 BEYOND = np.array([[-30, 21], [151, 61], [400, 300]], np.int32)
 Draw = Callable[[Surface], object]
@@ -55,8 +63,8 @@ STROKES: dict[str, Draw] = {
     "box": lambda surface: draw_box(surface, Box.sized(51, 61, 101, 83), RED, "#1 0.9"),
     "label": lambda surface: draw_label(surface, "0:01:02.500", (0, HEIGHT), RED),
     "lines": lambda surface: draw_lines(surface, [(20 + 5 * n, 60 + n) for n in range(40)], RED, 6),
-    "zone": lambda surface: draw_zone(surface, [(-20, 20), (150, 30), (90, 120)], "z: 4"),
-    "counts": lambda surface: draw_line(surface, (20, 200), (300, 180), ("a in: 3", "a out: 2")),
+    "zone": lambda surface: draw_marks(surface, border_marks(ZONE, {}, ": 4")),
+    "counts": lambda surface: draw_marks(surface, border_marks(LINE, {("a", "in"): 3})),
 }
 """Drawings that are mostly edges, where 4:2:0 has less of the colour than an image."""
 DRAWINGS = AREAS | STROKES

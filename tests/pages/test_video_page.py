@@ -17,6 +17,7 @@ from pages.html import Elements
 from run.red_runs import video_info
 from traffic.passing import HEIGHT, WIDTH, frame, passing, summarize, track
 from vdet.boxes import Box
+from vdet.pages import charts
 from vdet.pages.batch import VehicleRow
 from vdet.pages.render import jpeg_uri, link_to
 from vdet.pages.video import Player, VideoPage
@@ -126,6 +127,15 @@ class TestVideoPage:
         assert f"{NASTY}: in: 1" in made.text
         assert "At lines and zones" not in seen(replace(page(), counts=counts)).text
 
+    def test_intervals_begin_at_round_times_of_the_clock_as_in_tables(self) -> None:
+        counts = counted(*(("north", "in", at) for at in (60, 360, 840)))
+        clock = Clock(datetime.fromisoformat("2026-05-01 07:10+02:00"), "as given")
+        made = seen(replace(page(end=900), counts=counts, interval=900, clock=clock))
+        tips = re.findall(r"07:..: . north: in", made.text)
+        assert tips == ["07:00: 1 north: in", "07:15: 2 north: in"]
+        rows = replace(counts, spans=((0, 899.96),), clock=clock).table(900)
+        assert [(f"{row.start:%H:%M}", row.count) for row in rows] == [("07:00", 1), ("07:15", 2)]
+
     def test_flows_have_a_row_and_an_arrow_each(self) -> None:
         counts = counted(("north", "in", 1, 1), ("south", "out", 2, 1), ("north", "in", 1, 2))
         made = seen(replace(page(), counts=counts))
@@ -144,13 +154,21 @@ class TestVideoPage:
         assert re.search(r"north\s*in\s*2\s*38\s*39", made.text)
         assert "median speed" not in seen(page()).text
 
+    def test_charts_are_made_once_and_not_for_each_vehicle(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        made: list[int] = []
+        monkeypatch.setattr(charts, "histogram", lambda values, *_: made.append(len(values)))
+        slow = Speeds(np.arange(5.0), np.zeros((5, 2)), np.full(5, 10.0), np.full(5, 0.1), 0.01)
+        replace(page(), records=[replace(each, speeds=slow) for each in TWO]).html()
+        assert made == [2]
+
     def test_a_vehicle_that_was_lost_has_a_gap_in_its_bar(self) -> None:
         states = ("seen", "seen", "lost", "lost", "between", "seen")
         frames = [frame(n, track(1, BOX, state=state)) for n, state in enumerate(states)]
-        found = replace(page(), records=records(*frames))
-        assert [(span.first, span.last) for span in found.timeline.spans] == [
-            (0, 0.04), (0.16, 0.2),
-        ]  # fmt: skip
+        made = seen(replace(page(end=0.2), records=records(*frames)))
+        spans = [(each["x"], each["width"]) for each in made.all("svg", **{"class": "span"})]
+        assert spans == [("0.0%", "20.0%"), ("80.0%", "20.0%")]
 
     def test_gaps_of_the_video_are_named(self) -> None:
         assert "There are no frames from 0:01 to 0:02" in seen(replace(page(), gaps=[(1, 2)])).text

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from traffic.scenes import HEIGHT, LINE, WIDTH, ZONE, Path, frames, settings_for, through
+from traffic.scenes import HEIGHT, WIDTH, Path, frames, through
 from vdet.boxes import Image
 from vdet.polygons import Point
-from vdet.traffic.borders import place
-from vdet.traffic.paths import direction_color, draw_grid, draw_paths, draw_places
+from vdet.traffic.paths import direction_color, draw_paths
 from vdet.traffic.records import VehicleRecords
 
 GREY = 90
@@ -44,19 +43,3 @@ def test_vehicles_that_stand_have_no_path(image: Image) -> None:
     paths_drawn(empty)
     paths_drawn(image, through((0, 600, 300), (5, 610, 300)))
     assert (image == empty).all()
-
-
-def test_the_grid_has_lines_at_round_numbers_of_pixels(image: Image) -> None:
-    draw_grid(image)
-    assert (image[650, 100::100] != GREY).all()
-    assert (image[100:700:100, 650] != GREY).all()
-    assert (image[650, 550:598] == GREY).all()
-
-
-def test_lines_and_zones_are_drawn_where_they_lie(image: Image) -> None:
-    settings = settings_for(LINE, ZONE).traffic
-    draw_places(image, *place(settings, WIDTH, HEIGHT))
-    changed = (image != GREY).any(axis=2)
-    assert changed[400, 210:990].all()
-    assert changed[310:490, 410:790].all()
-    assert not changed[600:].any()

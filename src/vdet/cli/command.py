@@ -16,18 +16,8 @@ _OTHERS = "What is processed"
 HEADINGS: Mapping[str, Sequence[str]] = {
     "Outputs": (
         *("--output", "--no-video", "--tracks", "--counts", "--flows", "--interval", "--vehicles"),
-        *(
-            "--crops",
-            "--clips",
-            "--margin",
-            "--exact",
-            "--json",
-            "--page",
-            "--stages",
-            "--at",
-            "--sink",
-            "--overwrite",
-        ),
+        *("--crops", "--clips", "--margin", "--exact", "--json", "--page", "--propose"),
+        *("--stages", "--at", "--sink", "--overwrite"),
     ),
     _OTHERS: (),
     "Several videos": ("--directory", "--skip-existing", "--dry-run"),

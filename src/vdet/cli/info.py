@@ -7,33 +7,84 @@ from typing import Any
 import click
 
 from vdet.cli.command import command
-from vdet.cli.options import INPUT
+from vdet.cli.options import INPUT, SettingsChoice, settings_options
 from vdet.cli.results import Results, facts_options
-from vdet.errors import printable
+from vdet.errors import counted, printable
 
 Facts = dict[str, Any]
 """Values for JSON, by name; each is also a line of text."""
 
+_SPEED = 50
+"""Speed whose error is given where both places that it follows from are off by a pixel, km/h."""
+_ANY_SIZE = 1000, 1000
+"""Size of the frames, pixels, where points are fractions of them."""
 
-@command("vdet info in.mp4", "vdet info in.mp4 --json -", "vdet info model.npz")
-@click.argument("path", type=INPUT, metavar="FILE")
+
+@command(
+    "vdet info in.mp4", "vdet info in.mp4 --json -", "vdet info model.npz", "vdet info -c gate.yaml"
+)
+@click.argument("path", type=INPUT, metavar="[FILE]", required=False)
 @facts_options
-def info(path: Path, results: Results) -> None:
-    """Describe a video, a picture or a model file.
+@settings_options("camera.size=[960,540]")
+def info(path: Path | None, results: Results, choice: SettingsChoice) -> None:
+    """Describe a video, a picture, a model file, or the settings of a camera.
 
     FILE is a video or numbered pictures (what it holds, where the horizon is), a picture, a linear
     model (.npz), or a network (.onnx) of vdet or of another tool. With --json, a model's file also
-    says how it was trained.
+    says how it was trained. Without FILE, the places and points of the ground in settings (-c) are
+    checked, and what an error of a pixel there means for speeds.
     """
     from vdet.media.images import is_picture_name
 
     results.check()
-    describe = {".npz": _linear_model, ".onnx": _network}.get(path.suffix.lower())
-    if describe is None:
-        describe = _picture if is_picture_name(path) and "%" not in path.name else _video
-    facts = {"file": str(path)} | describe(path)
+    if path is None:
+        facts = _settings(choice)
+    else:
+        describe = {".npz": _linear_model, ".onnx": _network}.get(path.suffix.lower())
+        if describe is None:
+            describe = _picture if is_picture_name(path) and "%" not in path.name else _video
+        facts = {"file": str(path)} | describe(path)
     shown = {name.replace("_", " "): facts[name] for name in facts if name != "provenance"}
     results.print([f"{name}: {_text(value)}" for name, value in shown.items()], facts)
+
+
+def _settings(choice: SettingsChoice) -> Facts:
+    """Return what settings say of a camera, and how well the points of its ground fit."""
+    import numpy as np
+
+    from vdet.lanes.ground import ground_of
+    from vdet.traffic.borders import place
+    from vdet.traffic.speeds import KMH, WINDOW
+
+    if not choice.configs:
+        raise click.UsageError("nothing to describe; give FILE or -c FILE")
+    settings = choice.read()
+    size = settings.camera.size or _ANY_SIZE
+    lines, zones = place(settings.traffic, *size)
+    facts: Facts = {
+        "file": choice.name,
+        "kind": "settings of a camera",
+        "lines": [each.name for each in lines],
+        "zones": [each.name for each in zones],
+        "ground": None,
+    }
+    if (ground := ground_of(settings.camera, *size)) is None:
+        return facts
+    facts["ground"] = (
+        f"{counted(len(settings.camera.ground), 'point')}, off by {ground.error:.2f} m "
+        f"({ground.pixel_error:.1f} px, root mean square), over {ground.length:.0f} m"
+    )
+    for line in lines:
+        x, y = np.mean([line.start, line.end], axis=0)
+        here, beside, above = ground.place(np.array([(x, y), (x + 1, y), (x, y - 1)]))
+        across, along = np.hypot(*(beside - here)), np.hypot(*(above - here))
+        error = 100 * np.hypot(ground.scale_error, 2**0.5 * along / (WINDOW * _SPEED / KMH))
+        facts[f"at {line.name}"] = (
+            f"a pixel is {across:.3f} × {along:.3f} m, {_SPEED} km/h ± {error:.1f} %"
+            if np.isfinite(along)
+            else "too far from the points of the ground, no speeds"
+        )
+    return facts
 
 
 def _text(value: Any) -> str:

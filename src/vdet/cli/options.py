@@ -220,6 +220,13 @@ class SettingsChoice:
 
         return [find_config(name) for name in self.configs]
 
+    def given(self) -> dict[str, Any]:
+        """Return what the files say that are not shipped ones; see `given_values`."""
+        from vdet.config.loading import given_values, shipped_configs
+
+        shipped = set(shipped_configs().values())
+        return given_values([path for path in self._files() if path not in shipped])
+
     @property
     def name(self) -> str | None:
         """The names of the files as the user gave them; None for the defaults."""

@@ -135,6 +135,20 @@ def load_settings(
     return Settings.model_construct(**dict(checked))
 
 
+def given_values(paths: Sequence[Path]) -> dict[str, Any]:
+    """Return what files say, merged and not checked: points as fractions, paths as they stand.
+
+    Raises
+    ------
+    ConfigError
+        A file cannot be read, is not YAML, or chooses an unknown kind.
+    """
+    layers = [document.read_document(path) for path in paths]
+    for layer in layers:
+        to_fractions(layer.values)
+    return _merge(layers)[0].values
+
+
 def _read_file(path: Path) -> Document:
     """Read a file as a layer, with paths as seen from the working folder."""
     layer = document.read_document(path)

@@ -1,4 +1,4 @@
-"""Boxes with labels, lines and zones with their counts, and regions."""
+"""Boxes with labels, and regions."""
 
 import colorsys
 import math
@@ -26,10 +26,6 @@ _DASH = 4
 """Length of a dash and of the gap after it, in line widths."""
 _DARK = 0.3
 """Brightness outside the regions."""
-_SHADE = 0.18
-"""Opacity of the colour over a zone."""
-_ARROW = 0.035
-"""Length of the arrows, share of the surface's height."""
 
 
 def color_of(number: int) -> Color:
@@ -139,30 +135,6 @@ def _dashes(side: float, dash: int | None) -> list[tuple[int, int]]:
     dash = min(dash, max(1, length // 3))
     starts = np.linspace(0, length - dash, gaps + 1).round().astype(int).tolist()
     return [(start, dash) for start in starts]
-
-
-def draw_zone(surface: Surface, corners: Sequence[Point], label: str) -> None:
-    """Draw a zone with a label at its highest corner; corners are in pixels."""
-    paint.shade(surface, corners, ZONE, _SHADE)
-    draw_outline(surface, corners, ZONE, label)
-
-
-def draw_line(surface: Surface, start: Point, end: Point, labels: tuple[str, str]) -> None:
-    """Draw a line from `start` to `end`, pixels, with an arrow at its end.
-
-    At its start, where no vehicle crosses it, an arrow points to the left and one to the right,
-    each with its label.
-    """
-    width, reach = line_width(surface), _ARROW * surface.shape[0]
-    length = math.dist(start, end)
-    paint.draw_arrow(surface, start, end, LINE, width, tip=min(1.0, reach / length))
-    x, y = (end[1] - start[1]) / length, (start[0] - end[0]) / length  # to the left
-    for label, way in zip(labels, ((x, y), (-x, -y)), strict=True):
-        tip = start[0] + reach * way[0], start[1] + reach * way[1]
-        paint.draw_arrow(surface, start, tip, LINE, width, tip=0.4)
-        tag = label_tag(surface, label, (0, 0))  # its middle lies beyond the tip
-        left = tip[0] + (way[0] - 1) * tag.width / 2
-        draw_label(surface, label, (left, tip[1] + (way[1] + 1) * tag.height / 2), LINE)
 
 
 def draw_regions(image: Image, regions: Regions) -> Image:

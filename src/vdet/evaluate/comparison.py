@@ -201,7 +201,7 @@ def assign(weights: npt.NDArray[Any]) -> tuple[Int64Array, Int64Array]:
     -------
     Rows and columns of the pairs with a weight above 0, rows ascending.
     """
-    from scipy.optimize import linear_sum_assignment  # type: ignore[import-untyped]
+    from scipy.optimize import linear_sum_assignment
 
     rows, columns = linear_sum_assignment(weights, maximize=True)
     paired = weights[rows, columns] > np.finfo(np.float64).eps

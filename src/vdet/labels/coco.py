@@ -115,7 +115,7 @@ class _Image:
         return (self.width, self.height) if self.width and self.height else None
 
 
-_LISTS = {
+_LISTS: dict[str, TypeAdapter[Any]] = {
     "images": TypeAdapter(_Image),
     "categories": TypeAdapter(_Category),
     "annotations": TypeAdapter(_Annotation),

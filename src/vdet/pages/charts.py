@@ -99,9 +99,8 @@ class Timeline:
         return max([len(self.names), *(span.row + 1 for span in self.spans)])
 
 
-Series = dict[str, Counter[int]]
-"""How often something happened in each interval, by its name; intervals are numbered from time 0.
-"""
+Series = dict[str, Counter[float]]
+"""How often something happened in each interval, by its name; intervals by their start, seconds."""
 
 
 def color(number: int) -> str:
@@ -136,12 +135,15 @@ def time_axis(start: float, end: float, zero: float | None = None) -> Axis:
     length, since = max(end - start, _NOTHING), zero or 0.0
     step = next((step for step in _TIMES if length / step <= _TICKS), length / _TICKS)
     numbers = range(math.ceil((start + since) / step), math.floor((end + since) / step) + 1)
-    label = clock if zero is None else _day_time
-    return Axis(start, end, [(number * step - since, label(number * step)) for number in numbers])
+    times = [number * step - since for number in numbers]
+    return Axis(start, end, [(time, _time_text(time, zero)) for time in times])
 
 
-def _day_time(seconds: float) -> str:
-    minutes, rest = divmod(round(seconds) % 86400, 60)
+def _time_text(seconds: float, zero: float | None) -> str:
+    """Write a time in the video, or the time of the day where it is known."""
+    if zero is None:
+        return clock(seconds)
+    minutes, rest = divmod(round(seconds + zero) % 86400, 60)
     return f"{minutes // 60:02}:{minutes % 60:02}" + (f":{rest:02}" if rest else "")
 
 
@@ -189,18 +191,20 @@ def level_plot(
     return Plot(title, x, y, bars, legend=legend)
 
 
-def interval_plot(series: Series, x: Axis, interval: int, title: str) -> Plot:
+def interval_plot(
+    series: Series, x: Axis, interval: int, title: str, zero: float | None = None
+) -> Plot:
     """Return a bar for each interval with an event, in which the series are stacked; and a legend.
 
-    `interval` is in seconds.
+    `interval` is in seconds, `zero` as of `time_axis`.
     """
     bars = []
     for at in sorted(set().union(*series.values())):
         below = 0
         for number, (name, counts) in enumerate(series.items()):
             if count := counts[at]:
-                tip = f"{clock(interval * at)}: {count} {name}"
-                place = interval * (at + 0.1), interval * (at + 0.9), below, below + count
+                tip = f"{_time_text(at, zero)}: {count} {name}"
+                place = at + 0.1 * interval, at + 0.9 * interval, below, below + count
                 bars.append(Bar(*place, color(number), tip))
                 below += count
     sums = [f"{name}: {counts.total()}" for name, counts in series.items()]

@@ -11,11 +11,12 @@ import numpy as np
 
 from vdet.boxes import Image
 from vdet.errors import counted, escaped
-from vdet.pages.charts import clock
+from vdet.pages.charts import clock, hex_color
 from vdet.version import __version__
 
 PAGE_NAME = "page.html"
 """Name of the file of a page in its folder."""
+TEMPLATES = Path(__file__).parent / "templates"
 _QUALITY = 84  # of JPEG pictures
 
 
@@ -24,13 +25,13 @@ def render(template: str, **values: Any) -> str:
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     environment = Environment(
-        loader=FileSystemLoader(Path(__file__).parent / "templates"),
+        loader=FileSystemLoader(TEMPLATES),
         undefined=StrictUndefined,
         autoescape=True,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"clock": clock, "counted": counted, "jpeg": jpeg_uri}
+    environment.filters |= {"clock": clock, "counted": counted, "jpeg": jpeg_uri, "hex": hex_color}
     environment.filters["line"] = lambda text: escaped(str(text))
     return environment.get_template(template).render(values, version=__version__)
 

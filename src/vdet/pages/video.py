@@ -1,20 +1,22 @@
 """The page of a video: when vehicles were there, where, and what they looked like."""
 
-import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from vdet.boxes import Image
 from vdet.errors import named
+from vdet.lanes.ground import Ground
 from vdet.media import VideoInfo
 from vdet.pages import charts
 from vdet.pages.batch import NO_STILL, VehicleRow, VideoFacts
-from vdet.pages.charts import Axis, Plot, Span, Timeline, clock
+from vdet.pages.charts import Axis, Plot, Span, Timeline
 from vdet.pages.render import jpeg_uri, render
-from vdet.pages.traffic import counts_by_interval, traffic_part
+from vdet.pages.traffic import traffic_part
+from vdet.traffic.borders import Border
 from vdet.traffic.clock import Clock
 from vdet.traffic.counts import Counts
+from vdet.traffic.intervals import Intervals
 from vdet.traffic.paths import draw_paths
 from vdet.traffic.records import VehicleRecord
 from vdet.traffic.speeds import KMH
@@ -74,6 +76,10 @@ class VideoPage:
     pictures
         By id, the address of the picture of a vehicle as seen from the page, where the run writes
         one.
+    borders
+        The lines and zones at which vehicles were counted.
+    ground
+        The road plane, where it is known.
     """
 
     video: VideoInfo
@@ -90,17 +96,20 @@ class VideoPage:
     gaps: Sequence[tuple[float, float]] = ()
     clock: Clock | None = None
     pictures: Mapping[int, str] = field(default_factory=dict)
+    borders: Sequence[Border] = ()
+    ground: Ground | None = None
 
     @property
     def facts(self) -> VideoFacts:
         """The video in numbers."""
+        totals = self.counts.totals if self.counts else ()
         return VideoFacts(
             seconds=max(0.0, self.seconds),
             frames=self.frames,
             vehicles=len(self.records),
-            most=self.most,
+            most=1 + max(charts.pack(self._spans), default=-1),
             still=NO_STILL if self.poster is None else jpeg_uri(self.poster, _SMALL),
-            counts=self._totals,
+            counts={f"{each.name}: {each.direction}": each.count for each in totals if each.count},
             rows=tuple(self._row(record) for record in self.records),
         )
 
@@ -120,14 +129,29 @@ class VideoPage:
 
     def html(self) -> str:
         """Return the page; it loads nothing but the video."""
-        traffic = traffic_part(self.counts, self.records, self.poster) if self.counts else None
-        return render("video.html", page=self, traffic=traffic)
+        longest = sorted(self.records, key=lambda record: -record.seconds)[:_MOST_VEHICLES]
+        shown = sorted(longest, key=lambda record: (record.first, record.id))
+        x = charts.time_axis(self.start, self.end, self.zero)
+        speeds = [KMH * each.speeds.quantile(0.5) for each in self.records if each.speeds]
+        title = "Vehicles by their median speed"
+        return render(
+            "video.html",
+            page=self,
+            figures=self._figures(),
+            shown=shown,
+            level_plot=charts.level_plot(self._spans, x, "Number of vehicles at once", self.gaps),
+            timeline=_timeline(shown, x),
+            interval_plots=self._interval_plots(),
+            speed_plot=charts.histogram(speeds, _SPEED_STEP, title, "km/h") if speeds else None,
+            traffic=self.counts
+            and traffic_part(self.counts, self.records, self.poster, self.borders, self.ground),
+            paths=self._paths(),
+        )
 
     @property
-    def _totals(self) -> dict[str, int]:
-        """The number of vehicles in each direction of a line or zone that has some."""
-        totals = self.counts.totals if self.counts else ()
-        return {f"{each.name}: {each.direction}": each.count for each in totals if each.count}
+    def _spans(self) -> list[tuple[float, float]]:
+        """When each vehicle is first and last shown, in the order of their first times."""
+        return sorted((record.first, record.last) for record in self.records)
 
     @property
     def seconds(self) -> float:
@@ -135,90 +159,71 @@ class VideoPage:
         return self.end - self.start
 
     @property
-    def spans(self) -> list[tuple[float, float]]:
-        """When each vehicle is first and last shown, in the order of their first times."""
-        return sorted((record.first, record.last) for record in self.records)
+    def zero(self) -> float | None:
+        """The second of the day at time 0; None where it is not known."""
+        return self.clock.second_of_day if self.clock else None
 
-    @property
-    def most(self) -> int:
-        """The most vehicles at once."""
-        return 1 + max(charts.pack(self.spans), default=-1)
-
-    @property
-    def figures(self) -> list[tuple[str, str]]:
-        """The key figures."""
+    def _figures(self) -> list[tuple[str, str]]:
+        """Return the key figures."""
+        facts = self.facts
         count = len(self.records)
         shown = sum(record.seconds for record in self.records) / max(1, count)
         classes = Counter(record.class_name for record in self.records if record.class_name)
         return [
             (named(count, "vehicle"), str(count)),
             *((named(n, name), str(n)) for name, n in classes.most_common(4)),
-            ("most at once", str(self.most)),
+            ("most at once", str(facts.most)),
             ("mean seconds shown", f"{shown:.1f}"),
-            *((name, str(count)) for name, count in self._totals.items()),
+            *((name, str(count)) for name, count in facts.counts.items()),
         ]
 
-    @property
-    def shown(self) -> list[VehicleRecord]:
-        """The vehicles that are shown one by one, in the order of their first time."""
-        longest = sorted(self.records, key=lambda record: -record.seconds)[:_MOST_VEHICLES]
-        return sorted(longest, key=lambda record: (record.first, record.id))
+    def _interval_plots(self) -> list[Plot]:
+        """Return vehicles, and the counts of lines and zones, by the intervals of the tables.
 
-    @property
-    def level_plot(self) -> Plot:
-        """How many vehicles are shown at once."""
-        title = "Number of vehicles at once"
-        return charts.level_plot(self.spans, self._times, title, self.gaps)
-
-    @property
-    def timeline(self) -> Timeline:
-        """When each vehicle is shown; those that are not there at once share a row."""
-        shown = self.shown
-        rows = charts.pack((record.first, record.last) for record in shown)
-        spans = [span for each, row in zip(shown, rows, strict=True) for span in _spans(each, row)]
-        return Timeline("When each vehicle is shown", self._times, spans)
-
-    @property
-    def interval_plots(self) -> list[Plot]:
-        """Vehicles, and the counts of lines and zones, by interval."""
-        step = self.interval
-        came = Counter(int(record.first // step) for record in self.records)
-        counted = counts_by_interval(self.counts, step) if self.counts else {}
+        There is nothing to compare where there is only one interval.
+        """
+        step, last = self.interval, self.end - float(1 / self.video.rate)
+        begins = [self.start, *(end for _, end in self.gaps)]
+        ends = [*(begin for begin, _ in self.gaps), last]
+        intervals = Intervals([(self.clock, list(zip(begins, ends, strict=True)))], step)
+        first = {number: intervals.start_in(0, number) for number in intervals.numbers}
+        if len(first) == 1:
+            return []
+        came = Counter(first[intervals.number(0, record.first)] for record in self.records)
+        counted: dict[str, Counter[float]] = {}
+        for each in self.counts.events if self.counts else ():
+            found = counted.setdefault(f"{each.name}: {each.direction}", Counter())
+            found[first[intervals.number(0, each.time)]] += 1
         series = {"First seen": {"vehicles": came}, "At lines and zones": counted}
-        ends = step * (self.start // step), step * math.ceil(self.end / step)
-        x = charts.time_axis(*ends, self._zero)
-        return [charts.interval_plot(some, x, step, name) for name, some in series.items() if some]
+        x = charts.time_axis(min(first.values()), max(first.values()) + step, self.zero)
+        return [
+            charts.interval_plot(some, x, step, name, self.zero)
+            for name, some in series.items()
+            if some
+        ]
 
-    @property
-    def speed_plot(self) -> Plot | None:
-        """How many vehicles have which speed; None where none is known."""
-        known = [KMH * each.speeds.quantile(0.5) for each in self.records if each.speeds]
-        title = "Vehicles by their median speed"
-        return charts.histogram(known, _SPEED_STEP, title, "km/h") if known else None
-
-    @property
-    def paths(self) -> Image | None:
-        """The frame with the paths of all vehicles."""
+    def _paths(self) -> Image | None:
+        """Return the frame with the paths of all vehicles."""
         if self.poster is None:
             return None
         drawn = self.poster.copy()
         draw_paths(drawn, self.records)
         return drawn
 
-    @property
-    def _zero(self) -> float | None:
-        """The second of the day at time 0, if it is known."""
-        return self.clock.second_of_day if self.clock else None
 
-    @property
-    def _times(self) -> Axis:
-        return charts.time_axis(self.start, self.end, self._zero)
+def _timeline(shown: Sequence[VehicleRecord], x: Axis) -> Timeline:
+    """Return when each vehicle is shown; those that are not there at once share a row."""
+    rows = charts.pack((record.first, record.last) for record in shown)
+    spans = [span for each, row in zip(shown, rows, strict=True) for span in _spans(each, row)]
+    return Timeline("When each vehicle is shown", x, spans)
 
 
 def _spans(record: VehicleRecord, row: int) -> list[Span]:
     """Return a bar for each time in which a vehicle is shown and not lost; the longest is named."""
     name = f" ({record.class_name})" if record.class_name else ""
-    title = f"vehicle {record.id}{name}: {clock(record.first)} to {clock(record.last)}"
+    title = (
+        f"vehicle {record.id}{name}: {charts.clock(record.first)} to {charts.clock(record.last)}"
+    )
     fill, ink = charts.vehicle_colors(record.id)
     longest = max(record.followed, key=lambda span: span[1] - span[0])
     return [

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vdet.boxes import Float64Array
+from vdet.boxes import BoolArray, Float64Array
 from vdet.config.places import TrafficSettings
 from vdet.polygons import Point, Segment, meeting, side_of, sides
 
@@ -78,10 +78,11 @@ class Zone:
         The distances are infinite where there are no sides.
         """
         points = self._in_frame(points)
-        distances = np.full(len(points), np.inf)
-        for side in self.sides:
-            distances = np.minimum(distances, distances_to(side, points))
-        return np.where(_are_inside(self.corners, points), distances, -distances)
+        inside = _are_inside(self.corners, points)
+        if not self.sides:
+            return np.where(inside, np.inf, -np.inf)
+        distances = distances_to(self.sides, points).min(axis=1)
+        return np.asarray(np.where(inside, distances, -distances))
 
     def meeting(self, path: Segment) -> float:
         """Return the share of the way along `path`, over the border, at which it last meets it."""
@@ -97,24 +98,24 @@ Border = PlacedLine | Zone
 """The first of its directions leads to its positive side, the second to its negative side."""
 
 
-def distances_to(segment: Segment, points: Float64Array) -> Float64Array:
-    """Return the distances `(n,)` of points `(n, 2)` from the nearest point of a segment."""
-    start, way = np.array(segment[0]), np.subtract(segment[1], segment[0])
-    shares = np.clip((points - start) @ way / (way @ way), 0, 1)
-    return np.asarray(np.hypot(*(points - start - shares[:, np.newaxis] * way).T))
+def distances_to(segments: Sequence[Segment], points: Float64Array) -> Float64Array:
+    """Return how far points `(n, 2)` are from the nearest points of segments `(m)`, `(n, m)`."""
+    starts, ends = np.array(segments).swapaxes(0, 1)
+    ways, there = ends - starts, points[:, np.newaxis] - starts
+    shares = np.clip((there * ways).sum(axis=2) / (ways**2).sum(axis=1), 0, 1)
+    return np.asarray(np.hypot(*np.moveaxis(there - shares[..., np.newaxis] * ways, 2, 0)))
 
 
-def _are_inside(corners: Sequence[Point], points: Float64Array) -> np.ndarray:
+def _are_inside(corners: Sequence[Point], points: Float64Array) -> BoolArray:
     """Return which of the points `(n, 2)` lie in a polygon; those on a side may be in or out.
 
     A point is in where a ray from it meets an odd number of sides (Shimrat 1962).
     """
-    x, y = points.T
-    inside = np.zeros(len(points), np.bool_)
-    for (ax, ay), (bx, by) in sides(corners):
-        if ay != by:
-            inside ^= ((ay > y) != (by > y)) & (x < ax + (y - ay) / (by - ay) * (bx - ax))
-    return inside
+    x, y = points.T[..., np.newaxis]
+    (ax, bx), (ay, by) = np.array(sides(corners)).T
+    slopes = (bx - ax) / np.where(ay == by, 1, by - ay)
+    met = ((ay > y) != (by > y)) & (x < ax + (y - ay) * slopes)
+    return np.asarray(met.sum(axis=1) % 2 == 1)
 
 
 def place(

@@ -1,7 +1,8 @@
 """The counter: from the tracks of each frame to events. `vdet.traffic` explains the rule."""
 
+import math
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from statistics import median
 
@@ -13,6 +14,8 @@ from vdet.traffic.crossings import Crossing, crossings
 from vdet.traffic.intervals import Span, add_frame
 from vdet.traffic.linking import GAP, TrackLinker, VehiclePath
 
+_OLDEST = 0.2
+"""Seconds after which running counts are counted anew."""
 _NEAR = 0.5
 """Distance in heights of its box within which a track that begins or ends is at a line."""
 _FEW = 0.05
@@ -40,6 +43,8 @@ class VehicleCounter:
         Places in its frames.
     spans
         From when to when there is video, seconds.
+    linker
+        It says how many vehicles have begun.
 
     Raises
     ------
@@ -52,34 +57,29 @@ class VehicleCounter:
         self.spans: list[Span] = []
         self._borders: tuple[Border, ...] = (*self.lines, *self.zones)
         self._confirmed = settings.confirmed
-        self._linker = TrackLinker(width, height, begun)
+        self.linker = TrackLinker(width, height, begun)
         self._ended: list[_Passage] = []
-        self._tally: Counter[Way] = Counter()
+        self._tally: Counter[Way] = Counter()  # of those
         self._latest: FrameTracks | None = None
-
-    @property
-    def begun(self) -> int:
-        """How many vehicles have begun in it and before it."""
-        return self._linker.begun
+        self._so_far: Counter[Way] = Counter()
+        self._counted = -math.inf
 
     def update(self, frame: FrameTracks) -> None:
         """Add the tracks of the next frame."""
         add_frame(self.spans, frame, self._latest)
         self._latest = frame
-        for path in self._linker.add(frame):
-            if passage := self._passage(path):
-                self._ended.append(passage)
-                self._tally.update((each.name, each.direction) for each in passage.events)
+        ended = self._passages(self.linker.add(frame))
+        self._ended += ended
+        self._tally.update((each.name, each.direction) for some in ended for each in some.events)
 
     def start_video(self) -> None:
         """Take the ids of the next frames for those of other tracks: they are of another video."""
         self._latest = None
-        self._linker.start_video()
+        self.linker.start_video()
 
     def counts(self) -> Counts:
         """Return all results, as if the video ended now."""
-        still = map(self._passage, self._linker.open_paths())
-        passages = [*self._ended, *(each for each in still if each)]
+        passages = self._ended + self._passages(self.linker.open_paths())
         events = [event for each in passages for event in each.events]
         events.sort(key=lambda each: (each.time, each.frame, each.id, each.name))
         return Counts(
@@ -87,46 +87,47 @@ class VehicleCounter:
             tuple((border.name, way) for border in self._borders for way in border.directions),
             tuple(zone.name for zone in self.zones),
             tuple(self.spans) or ((0.0, 0.0),),
-            warnings=tuple(line_warnings(self.lines if passages else (), passages)),
+            warnings=tuple(_line_warnings(self.lines, passages)),
         )
 
     def so_far(self) -> Counter[Way]:
-        """Return how often each direction was counted; vehicles that are in a zone stay there."""
-        found = self._tally.copy()
-        for path in self._linker.open_paths():
-            if passage := self._passage(path):
-                is_there = self._now - path.times[path.seen - 1] <= GAP
-                found.update(
-                    (each.name, each.direction)
-                    for each in passage.events
-                    if not (is_there and each.direction == VANISH)
-                )
-        return found
+        """Return how often each direction was counted; vehicles that are in a zone stay there.
 
-    @property
-    def _now(self) -> float:
-        return self.spans[-1][1]
+        The counts are at most `_OLDEST` seconds old, so that this may be asked for each frame.
+        """
+        now = self.spans[-1][1]
+        if now - self._counted >= _OLDEST:
+            self._counted = now
+            still = self._passages(self.linker.open_paths())
+            self._so_far = self._tally + Counter(
+                (each.name, each.direction)
+                for some in still
+                for each in some.events
+                if each.direction != VANISH or now - each.time > GAP
+            )
+        return self._so_far
 
-    def _passage(self, path: VehiclePath) -> _Passage | None:
-        """Return what a vehicle does; None where it is seen too shortly to count."""
-        if path.seconds < self._confirmed:
-            return None
+    def _passages(self, paths: Iterable[VehiclePath]) -> list[_Passage]:
+        """Return what vehicles do, but for those that are seen too shortly to count."""
+        return [self._passage(path) for path in paths if path.seconds >= self._confirmed]
+
+    def _passage(self, path: VehiclePath) -> _Passage:
         found = {border.name: crossings(path, border) for border in self._borders}
-        ends = [
-            *([0] if path.times[0] > self.spans[0][0] else []),
-            *([path.seen - 1] if path.times[path.seen - 1] < self._now else []),
-        ]
+        last, (start, _), (_, now) = path.seen - 1, self.spans[0], self.spans[-1]
+        # Where it begins and ends, but for the ends of the video.
+        rows = [row for row in (0, last) if start < path.times[row] < now]
+        points, reach = path.points[rows], _NEAR * path.heights[rows]
         return _Passage(
             [_event(path, name, each) for name, some in found.items() for each in some],
             {
                 name: path.heights[[each.row for each in some]].tolist()
                 for name, some in found.items()
-                if some
             },
             [
                 line.name
                 for line in self.lines
-                if not found[line.name] and _is_near(path, line, ends)
+                if not found[line.name]
+                and (distances_to([(line.start, line.end)], points)[:, 0] <= reach).any()
             ],
         )
 
@@ -146,15 +147,10 @@ def _event(path: VehiclePath, name: str, crossing: Crossing) -> Event:
     )
 
 
-def _is_near(path: VehiclePath, line: PlacedLine, rows: Sequence[int]) -> bool:
-    distances = distances_to((line.start, line.end), path.points[rows])
-    return bool((distances <= _NEAR * path.heights[rows]).any())
-
-
-def line_warnings(lines: Sequence[PlacedLine], passages: Sequence[_Passage]) -> Iterator[str]:
+def _line_warnings(lines: Sequence[PlacedLine], passages: Sequence[_Passage]) -> Iterator[str]:
     """Yield a sentence for each thing that is wrong with a line, as the tracks of a run show."""
-    for line in lines:
-        found = [each.heights[line.name] for each in passages if line.name in each.heights]
+    for line in lines if passages else ():
+        found = [heights for each in passages if (heights := each.heights[line.name])]
         few = _FEW * len(found)
         missed = sum(line.name in each.missed for each in passages)
         again = sum(len(heights) > 1 for heights in found)

@@ -1,7 +1,7 @@
 """Counting in saved tracks: of one video, or of many that may follow one another in time."""
 
 import math
-from bisect import bisect_left
+from bisect import bisect_right
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,7 +14,7 @@ from vdet.progress import Advance
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Clock, find_clock
 from vdet.traffic.counter import VehicleCounter
-from vdet.traffic.counts import Counts, Event
+from vdet.traffic.counts import Counts
 from vdet.traffic.intervals import Span
 from vdet.traffic.speeds import SpeedMeter, with_speeds
 
@@ -70,7 +70,7 @@ def count_files(
         first = min(saved.times.values(), default=None)
         if group is None or not group.goes_on(place, clock, first):
             counted |= group.counts() if group else {}
-            group = _Group(settings, place, group.begun if group else 0)
+            group = _Group(settings, place, group.counter.linker.begun if group else 0)
         group.add(str(path), clock, first or 0.0, saved)
         advance(1)
     return counted | (group.counts() if group else {})
@@ -127,13 +127,8 @@ class _Group:
         settings.camera.check_frames(*size)
         self._size = size
         self._ground = ground_of(settings.camera, *size)
-        self._counter = VehicleCounter(settings.traffic, *size, begun=begun)
+        self.counter = VehicleCounter(settings.traffic, *size, begun=begun)
         self._videos: list[_Video] = []
-
-    @property
-    def begun(self) -> int:
-        """How many vehicles have begun in it and before it."""
-        return self._counter.begun
 
     def goes_on(self, size: tuple[int, int], clock: Clock | None, first: float | None) -> bool:
         """Return whether a video follows the last one; `first` is the time of its first frame."""
@@ -155,42 +150,39 @@ class _Group:
                 shift = (clock.zero - begin.clock.zero).total_seconds()
             if first + shift - before.end < _SEAM:
                 shift = before.end + _STEP - first
-            self._counter.start_video()
-        begun, latest = len(self._counter.spans), -math.inf
+            self.counter.start_video()
+        begun, latest = len(self.counter.spans), -math.inf
         for frame in frames:
             if not latest <= frame.time < math.inf:
                 raise TruthError(
                     f"frame {frame.index}: {frame.time:g} s is before {latest:g} s; times must rise"
                 )
             latest = frame.time
-            self._counter.update(replace(frame, time=latest + shift) if shift else frame)
+            self.counter.update(replace(frame, time=latest + shift) if shift else frame)
             if meter:
                 meter.add(frame)
         spans = [
             (round(begin - shift, 6), round(end - shift, 6))
-            for begin, end in self._counter.spans[begun:]
+            for begin, end in self.counter.spans[begun:]
         ]
         self._videos.append(_Video(name, clock, tuple(spans) or ((first, first),), shift, meter))
 
     def counts(self) -> dict[str, Counts]:
-        """Return the counts of each video, with its own times; the last one has ended."""
-        whole = self._counter.counts()
-        events: list[list[Event]] = [[] for _ in self._videos]
-        ends = [video.end for video in self._videos[:-1]]
-        for event in whole.events:
-            number = bisect_left(ends, event.time)
-            time = round(event.time - self._videos[number].shift, 3)
-            events[number].append(replace(event, time=time))
-        return {
-            video.name: with_speeds(
-                replace(
-                    whole,
-                    events=tuple(own),
-                    spans=video.spans,
-                    clock=video.clock,
-                    warnings=whole.warnings if video is self._videos[0] else (),
-                ),
-                video.meter,
+        """Return the counts of each video, with its own times."""
+        whole = self.counter.counts()
+        ends = [
+            bisect_right(whole.events, video.end, key=lambda event: event.time)
+            for video in self._videos[:-1]
+        ]
+        found: dict[str, Counts] = {}
+        for video, first, end in zip(self._videos, [0, *ends], [*ends, None], strict=True):
+            events = tuple(
+                replace(each, time=round(each.time - video.shift, 3))
+                for each in whole.events[first:end]
             )
-            for video, own in zip(self._videos, events, strict=True)
-        }
+            warnings = () if found else whole.warnings
+            counts = replace(
+                whole, events=events, spans=video.spans, clock=video.clock, warnings=warnings
+            )
+            found[video.name] = with_speeds(counts, video.meter)
+        return found

@@ -108,7 +108,8 @@ class Intervals:
 
     def start_in(self, which: int, number: int) -> float:
         """Return when an interval begins, in the time of one of the videos."""
-        return (self._first if self._length is None else number * self._length) - self._zeros[which]
+        begin = self._first if self._length is None else number * self._length
+        return round(begin - self._zeros[which], 3)
 
     def covered(self, number: int) -> float:
         """Return the seconds of video in an interval."""

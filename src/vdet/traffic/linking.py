@@ -5,7 +5,7 @@ Rule 8 of `vdet.traffic` is here.
 
 import math
 from array import array
-from collections.abc import Iterable
+from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass, field
 from operator import itemgetter
 
@@ -123,14 +123,16 @@ class TrackLinker:
         ended = [key for key, each in self._vehicles.items() if each.shown < oldest]
         paths = [self._vehicles.pop(key).path(self._now) for key in ended]
         shown = {track.id for track in frame.tracks}
-        lost = None if shown <= self._vehicles.keys() else self._lost(shown)
+        lost = (
+            None
+            if shown <= self._vehicles.keys()
+            else _Lost(self._vehicles, shown, self._now, self._size)
+        )
         for track in frame.tracks:
             vehicle = self._vehicles.get(track.id) or self._begin(track, lost)
             vehicle.see(track, self._now, frame.index)
-            if vehicle.back is not None and vehicle.is_judged():
-                if vehicle.is_another():
-                    paths.append(self._split(track.id))
-                vehicle.back = None
+            if vehicle.is_another():
+                paths.append(self._split(track.id))
             self._vehicles[track.id].name(track)
         return paths
 
@@ -141,17 +143,6 @@ class TrackLinker:
     def open_paths(self) -> list[VehiclePath]:
         """Return the paths so far of the vehicles that may still be shown again."""
         return [each.path(self._now) for each in self._vehicles.values()]
-
-    def _lost(self, shown: set[int]) -> "_Lost":
-        """Return the vehicles that have just ended inside the frame; those of `shown` go on."""
-        vehicles = {
-            key: each
-            for key, each in self._vehicles.items()
-            if key not in shown
-            and self._now - each.shown <= GAP
-            and not each.is_leaving(*self._size)
-        }
-        return _Lost(vehicles, self._now, self._size)
 
     def _begin(self, track: Track, lost: "_Lost | None") -> "_Vehicle":
         """Remember a new vehicle, or one that goes on under a new id."""
@@ -169,7 +160,7 @@ class TrackLinker:
         """Return the path until a vehicle was out of sight; since then it is another one."""
         self.begun += 1
         vehicle = self._vehicles[key]
-        at = _COLUMNS * (vehicle.back or 0)
+        at = vehicle.back or 0
         self._vehicles[key] = _Vehicle(
             self.begun, vehicle.box, self._now, vehicle.tracks.copy(), vehicle.rows[at:]
         )
@@ -192,7 +183,7 @@ class _Vehicle:
     classes
         By track its largest height, pixels, and its class so far.
     back
-        Number of the first row after it was out of sight, until it is judged.
+        Where in `rows` it came back after it was out of sight, until it is clear who that is.
     """
 
     number: int
@@ -206,7 +197,7 @@ class _Vehicle:
     def see(self, track: Track, time: float, frame: int) -> None:
         """Add the next frame that shows it."""
         if time - self.shown > _OUT_OF_SIGHT:
-            self.back = len(self.rows) // _COLUMNS
+            self.back = len(self.rows)
         self.box, self.shown = track.box, time
         self.rows.extend((time, *track.foot, self.box.y1, self.box.y2, track.score, frame))
         if len(self.rows) % (_STAY * _COLUMNS) == 0 and self.back is None:
@@ -219,18 +210,21 @@ class _Vehicle:
         largest, _ = self.classes.get(track.id, (0, None))
         self.classes[track.id] = max(largest, track.box.xywh[3]), track.class_name
 
-    def is_judged(self) -> bool:
-        """Return whether it is clear whether one that was out of sight is another one."""
-        return self.shown - self.rows[_COLUMNS * (self.back or 0)] >= _JUDGED
-
     def is_another(self) -> bool:
         """Return whether it drives the other way than before it was out of sight."""
-        at = _COLUMNS * (self.back or 0)
-        before, (first, *_, last) = _velocity(self.rows[:at]), _table(self.rows[at:])
+        if self.back is None or self.shown - self.rows[self.back] < _JUDGED:
+            return False
+        before, (first, *_, last) = (
+            _velocity(self.rows[: self.back]),
+            _table(self.rows[self.back :]),
+        )
         way, speed, height = complex(*(last - first)[1:3]), abs(before), last[3]
         onward = (way * before.conjugate()).real / max(speed, 1e-9)
-        back = max(_TURNED * height, _OPPOSITE * abs(way))
-        return bool(speed > _LEAVES * height and onward < -back)
+        is_another = speed > _LEAVES * height
+        is_another &= onward < -max(_TURNED * height, _OPPOSITE * abs(way))
+        if not is_another:
+            self.back = None
+        return bool(is_another)
 
     def is_leaving(self, width: int, height: int) -> bool:
         """Return whether it moves out at the edge of the frame, and so was not lost."""
@@ -282,14 +276,18 @@ def _velocity(rows: "array[float]") -> complex:
 class _Lost:
     """Vehicles that may go on under a new id: those that have just ended inside the frame.
 
-    One that would be outside it now has left: who comes in there is another. Each has two rows, for
-    the place where it was last and for that where it would be now.
+    Those with a key in `shown` go on anyway. One that would be outside the frame now has left: who
+    comes in there is another. Each has two rows, for the place where it was last and for that where
+    it would be now.
     """
 
-    def __init__(self, vehicles: dict[int, _Vehicle], now: float, size: _Size) -> None:
+    def __init__(
+        self, vehicles: Mapping[int, _Vehicle], shown: Container[int], now: float, size: _Size
+    ) -> None:
         rows = [
             (*row[1:4], key)
             for key, each in vehicles.items()
+            if key not in shown and now - each.shown <= GAP and not each.is_leaving(*size)
             for places in [each.onward(now).tolist()]
             if 0 <= places[1][1] <= size[0] and 0 <= places[1][2] <= size[1]
             for row in places

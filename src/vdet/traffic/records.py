@@ -169,7 +169,9 @@ def records_content(
 ) -> list[Any]:
     """Return what the file `path` says of the records, as `write_content` takes it."""
     rows = [_row(each, clock) for each in records]
-    return [_item(*row) for row in rows] if is_json(path) else [_COLUMNS, *rows]
+    if is_json(path):
+        return [_item(row) for row in rows]
+    return [_COLUMNS, *(list(row.values()) for row in rows)]
 
 
 def join_records(videos: Mapping[str, list[Any]], target: Path) -> None:
@@ -181,31 +183,33 @@ def join_records(videos: Mapping[str, list[Any]], target: Path) -> None:
         write_content(target, join_tables(videos))
 
 
-def _row(record: VehicleRecord, clock: Clock | None) -> list[Any]:
-    """Return the values of a record in the order of `_COLUMNS`."""
+def _row(record: VehicleRecord, clock: Clock | None) -> dict[str, Any]:
+    """Return the values of a record by the names of the columns."""
     begin = plain_moment(clock and clock.at(round(record.first, 3)))
     times = round(record.first, 6), round(record.last, 6), round(record.seconds, 3)
+    states = [record.states[state] for state in get_args(State)]
     scores = round(record.mean_score, 4), round(record.best_score, 4)
     ends = [round(value, 1) for point in (record.path[0], record.path[-1]) for value in point]
     lengths = round(record.length, 1), round(record.share, 4)
-    states = [record.states[state] for state in get_args(State)]
-    known = record.id, record.class_name, begin, *times, *states, *scores
-    return [*known, *ends, *lengths, *record.largest.xywh, *_speeds(record.speeds)]
+    speeds: list[float | None] = [None] * 4
+    if known := record.speeds:
+        in_kmh = [
+            KMH * each for each in (known.quantile(0.5), known.quantile(0.85), known.deviation)
+        ]
+        speeds = [round(value, 1) for value in (known.metres, *in_kmh)]
+    who = record.id, record.class_name, begin
+    values = *who, *times, *states, *scores, *ends, *lengths, *record.largest.xywh, *speeds
+    return dict(zip(_COLUMNS, values, strict=True))
 
 
-def _speeds(speeds: Speeds | None) -> list[float | None]:
-    """Return the metres, the median, the 85th percentile and the standard deviation, km/h."""
-    if speeds is None:
-        return [None] * 4
-    known = speeds.quantile(0.5), speeds.quantile(0.85), speeds.deviation
-    return [round(speeds.metres, 1), *(round(KMH * value, 1) for value in known)]
-
-
-def _item(*row: Any) -> dict[str, Any]:
-    """Return a row as values for JSON."""
-    *ends, length, share = row[11:17]
-    path = {"start": ends[:2], "end": ends[2:], "length": length, "length_share": share}
-    largest = dict(zip(_COLUMNS[17:21], row[17:21], strict=True))
-    known = dict(zip(_COLUMNS[:11], row, strict=False))
-    speeds = dict(zip(_COLUMNS[21:], row[21:], strict=True))
-    return {**known, "path": path, "largest": largest, **speeds}
+def _item(row: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a row as values for JSON, with the path and the largest box as objects."""
+    path = {
+        "start": [row["start_x"], row["start_y"]],
+        "end": [row["end_x"], row["end_y"]],
+        "length": row["length"],
+        "length_share": row["length_share"],
+    }
+    largest = {name: row[name] for name in ("x", "y", "width", "height")}
+    first, last = ({name: row[name] for name in some} for some in (_COLUMNS[:11], _COLUMNS[-4:]))
+    return {**first, "path": path, "largest": largest, **last}

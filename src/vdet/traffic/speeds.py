@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vdet.boxes import BoolArray, Float64Array
+from vdet.boxes import Float64Array
 from vdet.lanes.ground import Ground
 from vdet.track.track import FrameTracks
 from vdet.traffic.counts import Counts
@@ -105,16 +105,15 @@ class Speeds:
         )
         return speed, float(np.hypot(scatter, self.common * speed))
 
-    def between(self, first: float, last: float) -> tuple[float, float] | None:
-        """Return the metres from the place at a time to that at a later one, and the mean speed.
+    def between(self, first: float, last: float) -> float | None:
+        """Return the mean speed from the place at a time to that at a later one, m/s.
 
         It rests on two places alone, so it checks what is smoothed. None where one is unknown.
         """
         if not self.times[0] <= first < last <= self.times[-1]:
             return None
         ends = [np.interp((first, last), self.times, each) for each in self.places.T]
-        metres = float(np.hypot(*np.diff(ends)[:, 0]))
-        return metres, metres / (last - first)
+        return float(np.hypot(*np.diff(ends)[:, 0])) / (last - first)
 
     @property
     def _ways(self) -> Float64Array:
@@ -128,12 +127,14 @@ class SpeedMeter:
 
     Parameters
     ----------
+    ground
+        The road plane, which is kept.
     width, height
         Size of the frames, pixels.
     """
 
     def __init__(self, ground: Ground, width: int, height: int) -> None:
-        self._ground = ground
+        self.ground = ground
         self._sides = _EDGE * width, (1 - _EDGE) * width, (1 - _EDGE) * height
         self._rows: dict[int, array[float]] = {}
         self._known: dict[int, Speeds | None] = {}
@@ -158,7 +159,7 @@ class SpeedMeter:
 
     def _close(self, number: int) -> None:
         rows = np.array(self._rows.pop(number)).reshape(-1, _COLUMNS)
-        self._known[number] = measure(self._ground, rows) or self._known.get(number)
+        self._known[number] = measure(self.ground, rows) or self._known.get(number)
 
 
 def with_speeds(counts: Counts, meter: SpeedMeter | None) -> Counts:
@@ -169,8 +170,7 @@ def with_speeds(counts: Counts, meter: SpeedMeter | None) -> Counts:
     for event in counts.events:
         values: list[float | None] = [None] * 3
         if speeds := known.get(event.id):
-            before = latest.get(event.id, math.inf)
-            _, mean = speeds.between(before, event.time) or (None, None)
+            mean = speeds.between(latest.get(event.id, math.inf), event.time)
             values = [*(speeds.at(event.time) or (None, None)), mean]
         latest[event.id] = event.time
         speed, deviation, mean = map(_kmh, values)
@@ -187,19 +187,21 @@ def measure(ground: Ground, rows: Float64Array) -> Speeds | None:
 
     `rows` are time, x and y of the foot, width and height of the box, `(n, 5)`.
     """
-    seen = _Sight.of(ground, rows)
-    seen = seen.only(np.isfinite(seen.weights))
-    if len(seen.rows) < 3 or seen.times[-1] - seen.times[0] < LEAST:
+    rows = rows[np.isfinite(_Sight.of(ground, rows).weights)]
+    if len(rows) < 3 or rows[-1, 0] - rows[0, 0] < LEAST:
         return None
-    off = seen.off(_Line.of(seen.times, seen.places, seen.weights))
-    seen = seen.only(off <= max(_OUTLIERS[0], _OUTLIERS[1] * float(np.median(off))))
+    seen = _Sight.of(ground, rows)
+    line = _Line.of(seen.times, seen.places, seen.weights)
+    off = np.hypot(*(seen.places - line.fitted).T) * np.sqrt(seen.weights)  # in heights of the box
+    is_near = off <= max(_OUTLIERS[0], _OUTLIERS[1] * float(np.median(off)))
+    seen = _Sight.of(ground, rows[is_near])
     line = _Line.of(seen.times, seen.places, seen.weights)
     middles = seen.middles(line.velocities)
     line = _Line.of(seen.times, middles, seen.weights)
     speeds = np.hypot(*line.velocities.T)
     at = np.arange(seen.times[0], seen.times[-1] + _SPACING, _SPACING)
     thin = np.unique(np.minimum(np.searchsorted(seen.times, at), len(speeds) - 1))
-    common = _common(ground, seen.rows)
+    common = _common(ground, rows[is_near])
     return Speeds(seen.times[thin], middles[thin], speeds[thin], line.deviations[thin], common)
 
 
@@ -226,7 +228,7 @@ class _Sight:
     `weights` those of the places.
     """
 
-    rows: Float64Array
+    times: Float64Array
     places: Float64Array
     depth: Float64Array
     away: Float64Array
@@ -244,21 +246,7 @@ class _Sight:
         row = np.sum(depth * away, axis=1)[:, None]
         weights = 1 / (np.abs(row[:, 0]) * rows[:, 4]) ** 2
         away, depth = away / np.abs(row), depth * np.sign(row)
-        return cls(rows, places, depth, away, pixel * rows[:, 3], weights)
-
-    @property
-    def times(self) -> Float64Array:
-        """The time of each row."""
-        return self.rows[:, 0]
-
-    def only(self, which: BoolArray) -> "_Sight":
-        """Return some of the rows."""
-        each = (self.rows, self.places, self.depth, self.away, self.widths, self.weights)
-        return _Sight(*(values[which] for values in each))
-
-    def off(self, line: "_Line") -> Float64Array:
-        """Return how far places are from a line, in heights of the box."""
-        return np.asarray(np.hypot(*(self.places - line.fitted).T) * np.sqrt(self.weights))
+        return cls(rows[:, 0], places, depth, away, pixel * rows[:, 3], weights)
 
     def middles(self, velocities: Float64Array) -> Float64Array:
         """Return the middles of the vehicle on the road, `(n, 2)`.

@@ -135,14 +135,14 @@ def _class_number(name: str | None) -> int:
 
 def draw_running_counts(surface: Surface, counter: "VehicleCounter") -> None:
     """Draw the lines and zones, and what is counted so far; vehicles are drawn over them."""
+    from vdet.pages.place import border_marks, draw_marks
+
     found = counter.so_far()
+    marks = [mark for line in counter.lines for mark in border_marks(line, found)]
     for zone in counter.zones:
         enter, leave, appear, vanish = (found[zone.name, way] for way in zone.directions)
-        inside = enter + appear - leave - vanish
-        boxes.draw_zone(surface, zone.corners, f"{zone.name}: {inside}")
-    for line in counter.lines:
-        left, right = (f"{line.name} {way}: {found[line.name, way]}" for way in line.directions)
-        boxes.draw_line(surface, line.start, line.end, (left, right))
+        marks += border_marks(zone, found, f": {enter + appear - leave - vanish}")
+    draw_marks(surface, marks)
 
 
 class VideoSink(BaseSink):

@@ -153,13 +153,14 @@ class PageSink(BaseSink):
             self._thumbnails[crop.id] = crop.time, jpeg_uri(crop.image, _THUMBNAIL)
 
     def _page(self) -> VideoPage:
-        settings, clock, traffic = self.context.settings, self.context.clock, self.context.traffic
+        settings, traffic = self.context.settings, self.context.traffic
+        counter, speeds = (traffic.counter, traffic.speeds) if traffic else (None, None)
         return VideoPage(
             video=self.video,
             frames=self._frames,
             start=self._start,
             end=self._last + float(1 / self.video.rate),
-            records=self._records.end(traffic.speeds if traffic else None),
+            records=self._records.end(speeds),
             thumbnails=self._thumbnails,
             poster=self._fullest.image if self._fullest else None,
             player=self._player(),
@@ -167,8 +168,10 @@ class PageSink(BaseSink):
             counts=traffic.counts() if traffic else None,
             interval=settings.traffic.seconds or 60,
             gaps=self._gaps,
-            clock=clock,
+            clock=self.context.clock,
             pictures=self._pictures(),
+            borders=(*counter.lines, *counter.zones) if counter else (),
+            ground=speeds.ground if speeds else None,
         )
 
     def _pictures(self) -> dict[int, str]:

@@ -1,4 +1,4 @@
-"""`vdet ground`, and points of the ground in the commands that measure."""
+"""Points of the ground in the commands that measure."""
 
 import csv
 from collections.abc import Iterable
@@ -45,23 +45,24 @@ def ahead(speed: float, aside: float = 1.0) -> Float64Array:
     return np.column_stack([np.full(len(times), aside), 14 + speed * times])
 
 
-def test_the_points_are_checked(run: Run) -> None:
-    result = run("ground", "-c", "gate.yaml")
+def test_a_file_is_checked_with_what_a_pixel_is_worth(run: Run) -> None:
+    result = run("info", "-c", "gate.yaml")
     assert result.code == 0, result.err
-    assert "4 points, off by 0.00 m" in result.out
-    assert "the area is 38 m long" in result.out
-    without = run("ground")
-    assert (without.code, "camera.ground: has no points" in without.err) == (1, True)
+    for text in (
+        "lines: near; far",
+        "ground: 4 points, off by 0.00 m (0.0 px, root mean square), over 38 m",
+        "at near: a pixel is 0.021 × 0.057 m, 50 km/h ± 0.7 %",
+        "at far: a pixel is 0.041 × 0.210 m, 50 km/h ± 2.2 %",
+    ):
+        assert text in result.out
+    without = run("info")
+    assert (without.code, "nothing to describe" in without.err) == (2, True)
 
 
 def test_bad_points_are_refused_in_words(run: Run) -> None:
     Path("gate.yaml").write_text(ground_text(seen(CORNERS)[[0, 2, 1, 3]], CORNERS) + LINES)
-    for command in (
-        ("ground",),
-        ("paths", "frame.png", "-o", "grid.png"),
-        ("count", "tracks.csv"),
-    ):
-        write_tracks([ahead(12)])
+    write_tracks([ahead(12)])
+    for command in (("info",), ("count", "tracks.csv")):
         result = run(*command, "-c", "gate.yaml")
         assert result.code == 1
         assert "camera.ground: the horizon would run between them" in result.err
@@ -96,9 +97,3 @@ def test_records_of_vehicles_have_speeds(run: Run, red: tuple[str, ...]) -> None
     assert float(row["speed"]) == pytest.approx(3.6 * 2.5, rel=0.2)  # a pixel a frame, 0.1 m
     assert float(row["metres"]) == pytest.approx(0.1 * float(row["length"]), rel=0.3)
     assert float(row["speed_85"]) >= float(row["speed"])
-
-
-def test_the_grid_in_metres_is_drawn(run: Run) -> None:
-    for name, more in (("plain.png", ()), ("grid.png", ("-c", "gate.yaml"))):
-        assert run("paths", "frame.png", "-o", name, *more).code == 0
-    assert Path("plain.png").read_bytes() != Path("grid.png").read_bytes()

@@ -1,0 +1,96 @@
+"""Lines that are proposed for drawn pole cameras, compared with the streams of their traffic.
+
+    python -m benchmarks.proposals               # from the true boxes of the thirty scenes
+
+A stream is the trips of vehicles from one line of the scene to another, of those that can be
+followed. It has a line where a proposed one counts at least 70 % of its vehicles in one direction,
+and they are most of those that this direction counts. A line is useless where it is for no stream,
+or for one that has a line.
+"""
+
+import math
+from collections import Counter
+from dataclasses import dataclass
+
+from benchmarks.pole_cameras import HEIGHT, WIDTH, PoleScene, pole_scenes
+from vdet.config.places import LineSettings, TrafficSettings
+from vdet.config.schema import Settings
+from vdet.traffic.counting import count_frames
+from vdet.traffic.linking import link_tracks
+from vdet.traffic.proposals import propose_lines
+
+LARGE = 0.08
+"""Fraction of the vehicles from which a stream should have a line."""
+LEAST = 5
+ALL, MOST = 0.7, 0.5
+LENGTHS = 1.5
+"""Way of a vehicle that can be followed, in heights of its largest box."""
+
+
+@dataclass(frozen=True)
+class Proposed:
+    """Numbers of streams, of those with a line, of lines, and of useless ones."""
+
+    streams: int
+    found: int
+    lines: int
+    useless: int
+
+
+def proposed(scene: PoleScene) -> Proposed:
+    """Compare the proposed lines of a scene with its streams."""
+    frames = list(scene.true_tracks())
+    paths = link_tracks(frames, WIDTH, HEIGHT)
+    lines = propose_lines(paths, WIDTH, HEIGHT)
+    size = Counter(
+        scene.trips[path.tracks[0][1]].flow
+        for path in paths
+        if math.dist(path.points[0], path.points[path.seen - 1]) >= LENGTHS * path.heights.max()
+    )
+    large = {flow for flow, n in size.items() if n >= max(LEAST, LARGE * size.total())}
+    settings = Settings(
+        traffic=TrafficSettings(
+            lines=tuple(
+                LineSettings(
+                    name=each.name,
+                    start=(each.start[0] / WIDTH, each.start[1] / HEIGHT),
+                    end=(each.end[0] / WIDTH, each.end[1] / HEIGHT),
+                )
+                for each in lines
+            )
+        )
+    )
+    used: set[tuple[str, str]] = set()
+    useless = 0
+    events = count_frames(frames, settings, (WIDTH, HEIGHT)).events if lines else ()
+    for line in lines:
+        counted = Counter(
+            scene.trips[event.id].flow
+            for event in events
+            if (event.name, event.direction) == (line.name, "left")
+        )
+        flow, found = next(iter(counted.most_common(1)), (None, 0))
+        fits = flow and found >= ALL * size[flow] and found >= MOST * counted.total()
+        if flow is None or not fits or flow in used:
+            useless += 1
+        else:
+            used.add(flow)
+    return Proposed(len(large), len(used & large), len(lines), useless)
+
+
+def main() -> None:
+    """Print a row for each scene, and the fractions of all."""
+    rows = []
+    for scene in pole_scenes():
+        rows.append(proposed(scene))
+        print(scene.name, "|", rows[-1], flush=True)
+    streams, found = sum(row.streams for row in rows), sum(row.found for row in rows)
+    lines, useless = sum(row.lines for row in rows), sum(row.useless for row in rows)
+    print(
+        f"{found / streams:.0%} of {streams} streams have a line; "
+        f"{useless / lines:.0%} of {lines} lines are useless"
+    )
+
+
+if __name__ == "__main__":
+    main()

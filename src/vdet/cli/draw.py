@@ -1,0 +1,170 @@
+"""`vdet draw`: a page in which lines are drawn over the paths of vehicles."""
+
+import math
+from collections.abc import Iterable, Iterator
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from vdet.cli import options
+from vdet.cli.command import command
+from vdet.cli.messages import print_lines, progress_steps
+from vdet.errors import ConfigError, TruthError, VideoError, counted
+from vdet.files import OutputFiles, check_output, output_errors
+from vdet.progress import Steps
+
+if TYPE_CHECKING:
+    from vdet.boxes import Image
+    from vdet.config.schema import Settings
+    from vdet.media.frame import Frame
+    from vdet.track.track import FrameTracks
+
+_MAX_SAMPLES = 20
+"""Number of frames that the picture of the place is made of; at least half as many."""
+_STILL_FRAMES = 5000
+"""Number of frames of the video that are read for it where the tracks are known."""
+_OUTPUTS, _SETTINGS = (".html", ".jpg", ".png", ".svg"), (".yaml", ".yml")
+
+
+@command(
+    "vdet draw in.mp4 -o gate.html",
+    "vdet draw in.mp4 -c gate.yaml -o gate.html --tracks-from tracks.jsonl",
+    "vdet draw in.mp4 --propose gate.yaml",
+    "vdet draw in.mp4 -c gate.yaml -o place.jpg",
+)
+@click.argument("clip", type=options.INPUT, metavar="CLIP")
+@options.option(
+    "-o, --output FILE",
+    "Page to write, .html, or picture of the place for a report, .jpg, .png or .svg.",
+    options.PATH,
+)
+@options.option(
+    "--propose FILE", "Write settings with a line across each main stream, .yaml.", options.PATH
+)
+@options.option(
+    "--facing DIRECTION",
+    "Where the camera looks, as in N or SW, to name proposed lines.",
+    click.Choice(("N", "NE", "E", "SE", "S", "SW", "W", "NW"), case_sensitive=False),
+)
+@options.option("--tracks-from FILE", "Take the vehicles from this file of tracks.", name="tracks")
+@options.start_option
+@options.end_option
+@options.settings_options("detector.stride=2", options.model_option)
+@options.overwrite_option
+def draw(
+    clip: Path,
+    output: Path | None,
+    propose: Path | None,
+    facing: str | None,
+    tracks: Path | None,
+    start: Fraction | None,
+    end: Fraction | None,
+    choice: options.SettingsChoice,
+    overwrite: bool,
+) -> None:
+    """Draw where vehicles are counted, in a page with their paths.
+
+    CLIP is a video, or with --tracks-from also a picture of its frames. The page shows at once what
+    a line counts, and saves settings for -c. It is one file and needs no network.
+    """
+    from vdet.pages.drawing import Drawing
+
+    outputs = [path for path in (output, propose) if path]
+    settings = choice.read()
+    if not outputs:
+        raise click.UsageError("there is nothing to write; use -o FILE or --propose FILE")
+    for path, suffixes in ((output, _OUTPUTS), (propose, _SETTINGS)):
+        if path:
+            options.check_suffix(path, *suffixes, what="pages" if path is output else "settings")
+            check_output(path, overwrite=overwrite)
+    if output and output.suffix.lower() != ".html" and not settings.traffic:
+        raise ConfigError(f"{output}: has nothing to show; add lines or zones with -c FILE")
+    with progress_steps(" frames") as steps:
+        image, frames = _watched(clip, tracks, settings, (start, end), steps)
+    settings.camera.check_frames(image.shape[1], image.shape[0])
+    drawing = Drawing(image, frames, settings, choice.given(), facing)
+    if propose and not drawing.proposals:
+        raise ConfigError(f"{clip}: no stream has enough vehicles; draw lines with -o gate.html")
+    with OutputFiles(overwrite=overwrite) as files:
+        for path in outputs:
+            with output_errors(path):
+                name = Path((choice.configs or [path.name])[-1]).with_suffix(".yaml").name
+                files.stage(path).write_bytes(drawing.output(path, name))
+    print_lines(
+        *(f"{path}: {counted(len(drawing.paths), 'vehicle')}" for path in outputs),
+        *(f"{line.name}: {counted(line.vehicles, 'vehicle')}" for line in drawing.proposals),
+    )
+
+
+_Part = tuple[Fraction | None, Fraction | None]
+"""The part of the clip that is used: start and end, seconds."""
+
+
+def _watched(
+    clip: Path, tracks: Path | None, settings: "Settings", part: _Part, steps: Steps
+) -> "tuple[Image, list[FrameTracks]]":
+    """Return the place, BGR uint8, without the vehicles of a video, and their tracks.
+
+    Raises
+    ------
+    VdetError
+        The clip or the file of tracks cannot be used.
+    """
+    import numpy as np
+
+    from vdet.detect.factory import load_detector
+    from vdet.media.images import is_picture_name, read_image
+    from vdet.media.reader import VideoReader
+    from vdet.run.video import Run, open_video
+
+    if is_picture_name(clip) and "%" not in clip.name:
+        return read_image(clip), _saved(tracks, None, part) if tracks else []
+    found: list[FrameTracks] = []
+
+    def frames() -> "Iterator[Frame]":
+        start, end = part
+        if tracks:
+            with VideoReader(
+                clip, start=start, end=end, frames=_STILL_FRAMES, settings=settings.input
+            ) as reader:
+                found.extend(_saved(tracks, float(reader.info.rate), part))
+                steps("reading the place", None)
+                yield from reader
+            return
+        # All vehicles: the page shows what regions leave out.
+        run = Run(clip, (), settings.model_copy(update={"regions": ()}), start, end)
+        with open_video(run, load_detector(settings.detector)) as video:
+            advance = steps("", video.reader.expected)
+            for result in video.results:
+                found.append(result.frame_tracks)
+                yield result.frame
+                advance(1)
+
+    images = _spread(frames())
+    if not images:
+        raise VideoError(f"{clip}: has no frame in this part; check --start")
+    return np.median(images, axis=0).astype(np.uint8), found
+
+
+def _spread(frames: "Iterable[Frame]") -> "list[Image]":
+    """Return some of the images, at even distances."""
+    images, step = list["Image"](), 1
+    for number, frame in enumerate(frames):
+        if number % step == 0:
+            images.append(frame.image)
+        if len(images) > _MAX_SAMPLES:
+            images, step = images[::2], 2 * step
+    return images
+
+
+def _saved(tracks: Path, rate: float | None, part: _Part) -> "list[FrameTracks]":
+    """Return the frames of a file of tracks. Raises `TruthError`."""
+    from vdet.labels.reading import read_tracks
+
+    saved = read_tracks(tracks, rate)
+    if not saved.has_times:
+        raise TruthError(f"{tracks}: has no times; CLIP must be the video")
+    start, end = part[0] or -math.inf, part[1] or math.inf
+    return [frame for frame in saved if start <= frame.time < end]

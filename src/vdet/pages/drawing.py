@@ -1,0 +1,188 @@
+"""A place where vehicles are counted: the page in which it is drawn, its settings, its picture."""
+
+import base64
+import zlib
+from collections.abc import Mapping, Sequence
+from copy import deepcopy
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from markupsafe import Markup
+
+from vdet.boxes import Float64Array, Image
+from vdet.config.points import to_pixels
+from vdet.config.schema import Settings
+from vdet.detect.classes import UNKNOWN
+from vdet.lanes.ground import ground_of
+from vdet.media.images import encode_image
+from vdet.pages.place import Mark, draw_marks, place_marks, svg
+from vdet.pages.render import TEMPLATES, jpeg_uri, render
+from vdet.track.track import FrameTracks
+from vdet.traffic.borders import place
+from vdet.traffic.counting import count_frames
+from vdet.traffic.linking import VehiclePath, link_tracks
+from vdet.traffic.proposals import ProposedLine, propose_lines
+
+_PLACES = {"ground": "camera", "regions": "other", "lines": "traffic", "zones": "traffic"}
+"""The lists that the page changes, and the part of the file that each is in."""
+
+
+class Drawing:
+    """What is drawn of a place.
+
+    Parameters
+    ----------
+    image
+        The place, BGR uint8 `(H, W, 3)`.
+    frames
+        The tracks of its vehicles.
+    values
+        What settings files say so far, with fractions of the frame.
+    facing
+        As of `propose_lines`.
+
+    Attributes
+    ----------
+    paths
+        Those of the vehicles that count.
+    proposals
+        A line across each main stream.
+    """
+
+    def __init__(
+        self,
+        image: Image,
+        frames: Sequence[FrameTracks],
+        settings: Settings,
+        values: Mapping[str, Any],
+        facing: str | None = None,
+    ) -> None:
+        height, width = image.shape[:2]
+        self._image, self._frames, self._size = image, frames, (width, height)
+        self._settings, self._values = settings, values
+        confirmed, every = settings.traffic.confirmed, link_tracks(frames, width, height)
+        self.paths: list[VehiclePath] = [each for each in every if each.seconds >= confirmed]
+        self.proposals: tuple[ProposedLine, ...] = propose_lines(self.paths, width, height, facing)
+
+    def output(self, path: Path, name: str) -> bytes:
+        """Return the file that the suffix of `path` asks for: a page, settings or a picture.
+
+        `name` is that of the settings file that the page saves. Raises `ConfigError`.
+        """
+        match path.suffix.lower():
+            case ".html":
+                return self._page(name).encode("utf-8", "backslashreplace")
+            case ".yaml" | ".yml":
+                return self._proposed_settings().encode()
+        marks = self._marks()
+        if path.suffix.lower() == ".svg":
+            return svg(self._image, marks).encode("utf-8", "backslashreplace")
+        drawn = self._image.copy()
+        draw_marks(drawn, marks)
+        return encode_image(drawn, path)
+
+    def _page(self, name: str) -> str:
+        places, rest = split(self._values, self._size)
+        times = [frame.time for frame in self._frames]
+        data = {
+            "name": name,
+            "size": self._size,
+            "span": (times[0], times[-1]) if times else (0, 0),
+            "picture": jpeg_uri(self._image),
+            "paths": pack(self.paths),
+            "places": places,
+            "rest": rest,
+            "proposals": [asdict(each) for each in self.proposals],
+        }
+        script = Markup((TEMPLATES / "draw.js").read_text("utf-8"))
+        return render("draw.html", data=data, name=name, script=script)
+
+    def _proposed_settings(self) -> str:
+        values = in_pixels(self._values, self._size)
+        traffic = values["traffic"] = values.get("traffic") or {}
+        lines = [asdict(each) for each in self.proposals]
+        for line in lines:
+            del line["vehicles"]
+        traffic["lines"] = [*(traffic.get("lines") or []), *lines]
+        return "\n".join([_PROPOSED, *as_yaml(values), ""])
+
+    def _marks(self) -> list[Mark]:
+        counts = count_frames(self._frames, self._settings, self._size)
+        lines, zones = place(self._settings.traffic, *self._size)
+        ground = ground_of(self._settings.camera, *self._size)
+        ways = {key: path.points.tolist() for path in self.paths for _, key in path.tracks}
+        return place_marks(self._size, (*lines, *zones), counts, ways, ground)
+
+
+_PROPOSED = """\
+# Lines across the main streams, proposed by vdet draw. The stream crosses a line to its left: that
+# of someone who looks from start to end. Look at them, and move them:
+# vdet draw CLIP -c THIS_FILE -o gate.html"""
+
+
+def split(
+    values: Mapping[str, Any], size: tuple[int, int]
+) -> tuple[dict[str, list[Any]], dict[str, list[str]]]:
+    """Return the places in settings, in pixels, and the lines of YAML of all the rest."""
+    whole = in_pixels(values, size)
+    sections = {"camera": whole.pop("camera"), "traffic": whole.pop("traffic", None) or {}}
+    sections["other"] = whole
+    places = {kind: sections[name].pop(kind, None) or [] for kind, name in _PLACES.items()}
+    del sections["camera"]["size"]
+    rest = {
+        name: [line if name == "other" else f"  {line}" for line in as_yaml(section)]
+        for name, section in sections.items()
+    }
+    return places, rest
+
+
+def in_pixels(values: Mapping[str, Any], size: tuple[int, int]) -> dict[str, Any]:
+    """Return settings with pixels of frames of this size, width and height, for fractions."""
+    sized = deepcopy(dict(values))
+    sized["camera"] = {**(sized.get("camera") or {}), "size": list(size)}
+    to_pixels(sized)
+    return sized
+
+
+def as_yaml(values: Mapping[str, Any]) -> list[str]:
+    """Return settings as the lines of a file."""
+    if not values:
+        return []
+    return yaml.dump(dict(values), Dumper=_Dumper, sort_keys=False, allow_unicode=True).splitlines()
+
+
+class _Dumper(yaml.SafeDumper):
+    """Writes lists on one line, apart from those of sections."""
+
+    def represent_sequence(self, tag: str, sequence: Any, flow_style: Any = None) -> Any:
+        is_flat = not any(isinstance(each, dict) for each in sequence)
+        return super().represent_sequence(tag, sequence, is_flat or flow_style)
+
+
+_Dumper.add_representer(tuple, _Dumper.represent_list)
+
+
+def pack(paths: Sequence[VehiclePath]) -> dict[str, Any]:
+    """Return paths as JSON: second differences of rows, in planes of bytes, deflated.
+
+    Times are µs since the first row, feet hundredths of a pixel; the page turns them back exactly.
+    """
+    columns: list[list[Float64Array]] = [[], [], [], []]
+    for path in paths:
+        times = 1e6 * (path.times - path.times[0])
+        rows = times, *(100 * path.points.T), path.heights
+        for column, values in zip(columns, rows, strict=True):
+            column.append(np.diff(np.diff(np.rint(values), prepend=0), prepend=0))
+    joined = np.concatenate([np.empty(0), *(part for column in columns for part in column)])
+    planes = joined.astype("<i4").view(np.uint8).reshape(-1, 4).T
+    vehicles = [
+        (path.vehicle, path.class_name or UNKNOWN, path.times[0], path.seen, len(path.times))
+        for path in paths
+    ]
+    return {
+        "vehicles": vehicles,
+        "data": base64.b64encode(zlib.compress(planes.tobytes())).decode("ascii"),
+    }

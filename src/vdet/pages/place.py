@@ -1,0 +1,137 @@
+"""The picture of a place for reports: lines, zones and flows with their counts, and a scale.
+
+It is made of marks, which are painted into an image or written as SVG.
+"""
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vdet.boxes import Image
+from vdet.draw import paint
+from vdet.draw.boxes import LINE, WHITE, ZONE, color_of, draw_label, line_width
+from vdet.draw.paint import Color, Surface
+from vdet.lanes.ground import Ground
+from vdet.pages.render import render
+from vdet.polygons import Point
+from vdet.traffic.borders import Border, PlacedLine
+from vdet.traffic.counts import Counts, Event, Way, vehicle_trips
+
+NOWHERE = "–"
+"""The end of a flow that was at one line or zone only."""
+
+_WIDEST = 0.012
+"""Width of the arrow of the largest flow, as a fraction of the frame's width."""
+_SIDE = 0.04
+"""Length of the arrows to the sides of a line, as a fraction of the frame's height."""
+_SHADE = 0.18
+"""Opacity of the colour over a zone."""
+_SCALES = (1, 2, 5, 10, 20, 50, 100)
+"""Lengths of a scale, metres."""
+_SCALE = 0.2
+"""Longest scale, as a fraction of the frame's width."""
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """A line through `points`, closed or an arrow; its label lies at `at`, in pixels."""
+
+    points: Sequence[Point]
+    color: Color
+    width: int
+    label: str
+    at: Point
+    is_closed: bool = False
+    is_arrow: bool = False
+
+
+def flows_of(counts: Counts) -> dict[Way, list[tuple[Event, Event]]]:
+    """Return the first and the last event of each vehicle, by flow, the largest flow first."""
+    flows: dict[Way, list[tuple[Event, Event]]] = {}
+    for first, *others in vehicle_trips(counts):
+        way = first.name, others[-1].name if others else NOWHERE
+        flows.setdefault(way, []).append((first, others[-1] if others else first))
+    return dict(sorted(flows.items(), key=lambda flow: -len(flow[1])))
+
+
+def place_marks(
+    size: tuple[int, int],
+    borders: Sequence[Border],
+    counts: Counts,
+    ways: Mapping[int, Sequence[Point]],
+    ground: Ground | None = None,
+) -> list[Mark]:
+    """Return what is drawn over frames of this size, width and height in pixels.
+
+    `ways` are the paths of tracks by their ids, pixels.
+    """
+    width, height = size
+    totals = {(each.name, each.direction): each.count for each in counts.totals}
+    marks = [mark for border in borders for mark in border_marks(border, totals)]
+    flows = flows_of(counts)
+    most = max(map(len, flows.values()), default=1)
+    for number, trips in enumerate(flows.values()):
+        paths = sorted((ways[last.id] for _, last in trips if last.id in ways), key=len)
+        middle = paths[len(paths) // 2] if paths else ()
+        path = [(x, y) for x, y in middle if 0 <= x < width and 0 <= y < height]
+        if len(path) > 1:
+            wide = max(2, round(_WIDEST * width * len(trips) / most))
+            label, at = str(len(trips)), path[len(path) // 2]
+            marks.insert(0, Mark(path, color_of(number), wide, label, at, is_arrow=True))
+    return [*marks, *(_scale(ground, width) if ground else ())]
+
+
+def border_marks(border: Border, totals: Mapping[Way, int], text: str = "") -> Iterator[Mark]:
+    """Yield a zone with its name and a text, or a line with its name and its counts.
+
+    The arrows to both sides are at the start of a line, where no vehicle crosses it.
+    """
+    height = border.size[1]
+    width = line_width(np.empty((int(height), 0), np.uint8))
+    if not isinstance(border, PlacedLine):
+        top = min(border.corners, key=lambda corner: corner[1])
+        yield Mark(border.corners, ZONE, width, border.name + text, top, is_closed=True)
+        return
+    (ax, ay), (bx, by) = border.start, border.end
+    yield Mark((border.start, border.end), LINE, width, border.name, border.end)
+    left = (by - ay) / border.length, (ax - bx) / border.length
+    for reach, direction in zip((_SIDE, -_SIDE), border.directions, strict=True):
+        tip = ax + reach * height * left[0], ay + reach * height * left[1]
+        label = f"{direction} {totals.get((border.name, direction), 0)}"
+        yield Mark((border.start, tip), LINE, width, label, tip, is_arrow=True)
+
+
+def _scale(ground: Ground, columns: int) -> Iterator[Mark]:
+    """Yield a scale across the picture in the middle of the calibrated area."""
+    x, y = ground.pixels(ground.area.mean(axis=0, keepdims=True))[0].tolist()
+    metres = math.dist(*ground.place(np.array([(x, y), (x + 1, y)])))
+    if metres > 0:
+        lengths = [each for each in _SCALES if each <= _SCALE * columns * metres]
+        length = max(lengths, default=_SCALES[0])
+        half = length / metres / 2
+        yield Mark(((x - half, y), (x + half, y)), WHITE, 3, f"{length} m", (x - half, y))
+
+
+def draw_marks(surface: Surface, marks: Iterable[Mark]) -> None:
+    """Draw marks, their labels above all lines."""
+    drawn = list(marks)
+    for mark in drawn:
+        if mark.is_closed:
+            paint.shade(surface, mark.points, mark.color, _SHADE)
+        paint.draw_lines(surface, mark.points, mark.color, mark.width, closed=mark.is_closed)
+        if mark.is_arrow:
+            end, length = mark.points[-1], 3 * mark.width
+            back = (point for point in reversed(mark.points) if math.dist(point, end) >= length)
+            start = next(back, mark.points[0])
+            tip = length / max(length, math.dist(start, end))
+            paint.draw_arrow(surface, start, end, mark.color, mark.width, tip=tip)
+    for mark in drawn:
+        draw_label(surface, mark.label, mark.at, mark.color)
+
+
+def svg(image: Image, marks: Sequence[Mark]) -> str:
+    """Return a picture as SVG, with the image in it and the marks as shapes and text."""
+    height, width = image.shape[:2]
+    return render("place.svg", picture=image, width=width, height=height, marks=marks)

@@ -1,0 +1,900 @@
+"use strict";
+// The page of `vdet draw`. First the counting rule, which is pure; then numbers for the panel, the
+// file, and at last what is drawn and edited. Points are [x, y] in pixels of the frame.
+
+// ---------------------------------------------------------------- the rule, as vdet.traffic has it
+const SETTLED = 0.1; // seconds after which a vehicle off the band has changed the side
+const BAND = 0.05; // of the height of its box
+const MIN_BAND = 0.003; // of the frame's height
+const AT_EDGE = 0.002; // of the frame's side: points so near to the edge lie on it
+const MAX_AT_EDGE = 0.005;
+const INSIDE = 0.01; // pixels
+
+const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
+const sidesOf = corners => corners.map((corner, i) => [corners.at(i - 1), corner]);
+
+/** Return where the way from a to b meets the segment from c to d, from 0 to 1, or null. */
+function meeting([ax, ay], [bx, by], [[cx, cy], [dx, dy]]) {
+  const ux = bx - ax, uy = by - ay, vx = dx - cx, vy = dy - cy;
+  const area = ux * vy - uy * vx;
+  if (area === 0) return null;
+  const along = ((cx - ax) * vy - (cy - ay) * vx) / area;
+  const across = ((cx - ax) * uy - (cy - ay) * ux) / area;
+  return along >= 0 && along <= 1 && across >= 0 && across <= 1 ? along : null;
+}
+
+/** Return whether a point lies in a polygon, given its sides. */
+function isInside(sides, x, y) {
+  let inside = false;
+  for (const [a, b] of sides)
+    if ((a[1] > y) !== (b[1] > y) && x < a[0] + (y - a[1]) * ((b[0] - a[0]) / (b[1] - a[1]))) inside = !inside;
+  return inside;
+}
+
+function distanceTo(segment, x, y) {
+  const [a, b] = segment, wx = b[0] - a[0], wy = b[1] - a[1];
+  const at = clamp(((x - a[0]) * wx + (y - a[1]) * wy) / (wx * wx + wy * wy), 0, 1);
+  const dx = x - a[0] - at * wx, dy = y - a[1] - at * wy;
+  return Math.sqrt(dx * dx + dy * dy); // Math.hypot is ten times as slow
+}
+
+/** Return the smallest box around points: [left, top, right, bottom]. */
+function boundsOf(points) {
+  const xs = points.map(point => point[0]), ys = points.map(point => point[1]);
+  return [Math.min(...xs), Math.min(...ys), Math.max(...xs), Math.max(...ys)];
+}
+
+function snapped(point, size) {
+  return point.map((value, i) => {
+    const near = Math.max(Math.min(1, MAX_AT_EDGE * size[i]), AT_EDGE * size[i]);
+    return value <= near ? 0 : size[i] - value <= near ? size[i] : value;
+  });
+}
+
+/** Place a line, whose positive side is its left; at the frame's edge it goes on beyond. */
+function placeLine(line, size) {
+  const [start, end] = [snapped(line.start, size), snapped(line.end, size)];
+  const [ax, ay] = end, wx = start[0] - ax, wy = start[1] - ay, length = Math.hypot(wx, wy);
+  const dx = -wx * (size[0] + size[1]) / length, dy = -wy * (size[0] + size[1]) / length;
+  const atEdge = point => point.some((value, i) => value === 0 || value === size[i]);
+  const reach = [atEdge(start) ? [start[0] - dx, start[1] - dy] : start, atEdge(end) ? [ax + dx, ay + dy] : end];
+  return {
+    isZone: false, name: line.name, directions: [line.left, line.right], start, end, length, size,
+    bounds: boundsOf(reach),
+    distance: (x, y) => (wx * (y - ay) - wy * (x - ax)) / length,
+    meeting: (a, b) => meeting(a, b, reach),
+  };
+}
+
+/** Place a zone, whose positive side is the inside; at the frame's edge it goes on beyond. */
+function placeZone(zone, size) {
+  const corners = zone.points.map(point => snapped(point, size));
+  const every = sidesOf(corners), isAtEdge = ([a, b], i) => a[i] === b[i] && (a[i] === 0 || a[i] === size[i]);
+  const sides = every.filter(side => !isAtEdge(side, 0) && !isAtEdge(side, 1));
+  const right = size[0] - INSIDE, bottom = size[1] - INSIDE;
+  const inFrame = ([x, y]) => [clamp(x, INSIDE, right), clamp(y, INSIDE, bottom)];
+  return {
+    isZone: true, name: zone.name, directions: ["enter", "exit", "appear", "vanish"], corners, size,
+    bounds: boundsOf(corners),
+    distance(x, y) {
+      x = clamp(x, INSIDE, right);
+      y = clamp(y, INSIDE, bottom);
+      let distance = Infinity;
+      for (const side of sides) distance = Math.min(distance, distanceTo(side, x, y));
+      return isInside(every, x, y) ? distance : -distance;
+    },
+    meeting(a, b) {
+      const met = sides.map(side => meeting(inFrame(a), inFrame(b), side)).filter(share => share !== null);
+      return met.length ? Math.max(...met) : 1;
+    },
+  };
+}
+
+/** Return whether a path comes near a border at all; most paths do not. */
+function mayMeet(path, border) {
+  const [left, top, right, bottom] = border.bounds, [width, height] = border.size;
+  let [x1, y1, x2, y2] = path.bounds ??= boundsOf(Array.from(path.xs, (x, i) => [x, path.ys[i]]));
+  if (border.isZone) {
+    [x1, x2] = [x1, x2].map(x => clamp(x, 0, width));
+    [y1, y2] = [y1, y2].map(y => clamp(y, 0, height));
+  }
+  return x1 <= right && x2 >= left && y1 <= bottom && y2 >= top;
+}
+
+/**
+ * Return what a vehicle does at a border, in order: time, row, direction, and for a zone seconds.
+ * A path has times, xs, ys and heights; rows from `seen` on are where it would have driven on.
+ */
+function crossings(path, border) {
+  if (!mayMeet(path, border)) return [];
+  const found = changes(path, border);
+  if (!border.isZone || !found.length) return found;
+  found.forEach((each, i) => {
+    if (i && each.direction === "exit") each.seconds = each.time - found[i - 1].time;
+  });
+  const last = path.seen - 1, final = found.at(-1);
+  if (final.direction !== "exit") {
+    const time = Math.max(path.times[last], final.time); // it may enter where it drives on
+    found.push({ time, row: last, direction: "vanish", seconds: time - final.time });
+  }
+  return found;
+}
+
+/** Return the changes of the settled side, and where it begins in a zone. */
+function changes(path, border) {
+  const { times, xs, ys, heights } = path, count = times.length, found = [];
+  const distances = Float64Array.from(xs, (x, row) => border.distance(x, ys[row]));
+  const isPositive = row => distances[row] >= 0;
+  if (!(border.isZone && isPositive(0)) && distances.every((_, row) => isPositive(row) === isPositive(0))) return found;
+  const { settles, isClear } = settle(path, border, distances);
+  let settled = null, crossed = null; // the side, and where it crossed last
+  for (let row = 0, end; row < count; row = end) {
+    const side = isPositive(row), rows = [];
+    for (end = row; end < count && isPositive(end) === side; end++) if (settles[end]) rows.push(end);
+    if (!rows.length || settled === side) continue;
+    if (settled !== null) {
+      const a = [xs[row - 1], ys[row - 1]], b = [xs[row], ys[row]];
+      const share = border.meeting(a, b), along = share ?? 1;
+      const place = [0, 1].map(i => a[i] + along * (b[i] - a[i]));
+      const way = crossed ? Math.hypot(crossed[0] - place[0], crossed[1] - place[1]) : Infinity;
+      if (!rows.some(each => isClear[each] || heights[each] <= way)) continue; // back, but not far
+      crossed = share === null ? null : place;
+      const time = times[row - 1] + along * (times[row] - times[row - 1]);
+      if (share !== null) found.push({ time, row: share ? row : row - 1, direction: border.directions[side ? 0 : 1] });
+    } else if (side && border.isZone) {
+      found.push({ time: times[0], row: 0, direction: "appear" });
+    }
+    settled = side;
+  }
+  return found;
+}
+
+/** Return the rows that settle the side, and those one height of the box away from the border. */
+function settle({ times, heights }, border, distances) {
+  const count = distances.length, settles = new Uint8Array(count), isClear = new Uint8Array(count);
+  let since = 0, wasOff = false, wasFar = false;
+  for (let row = 0; row < count; row++) {
+    const away = Math.abs(distances[row]);
+    const isOff = away > Math.max(BAND * heights[row], MIN_BAND * border.size[1]);
+    const isFar = isOff && away >= heights[row];
+    const isSame = row > 0 && (distances[row] >= 0) === (distances[row - 1] >= 0);
+    if (!(isOff && wasOff && isSame)) since = times[row];
+    const far = wasFar && isSame, seconds = Math.round(1e4 * (times[row] - since)) / 1e4;
+    settles[row] = far || (isOff && seconds >= SETTLED) || (row === count - 1 && isFar);
+    isClear[row] = isFar || far;
+    wasOff = isOff;
+    wasFar = isFar;
+  }
+  return { settles, isClear };
+}
+
+// ---------------------------------------------------------------- what follows from crossings
+const NEAR = 0.5; // heights of the box within which a path that begins or ends is at a line
+const FEW = 0.05; // fraction of the crossings up to which there is no warning
+
+/** Return the sentences of a run about a line; visits are [path, its crossings]. */
+function warningsOf(line, visits, paths, span) {
+  const crossed = new Set(visits.map(([path]) => path)), few = FEW * visits.length;
+  const isMissed = path => !crossed.has(path) && [0, path.seen - 1].some(row =>
+    path.times[row] > span[0] && path.times[row] < span[1] &&
+    distanceTo([line.start, line.end], path.xs[row], path.ys[row]) <= NEAR * path.heights[row]);
+  const missed = paths.filter(isMissed).length, again = visits.filter(([, some]) => some.length > 1).length;
+  const heights = visits.flatMap(([path, some]) => some.map(each => path.heights[each.row]));
+  return [
+    paths.length && !visits.length && "no path crosses this line; move it",
+    missed > few && `tracks that begin or end at this line and are not counted: ${missed}; ` +
+      "move it to where vehicles are followed longer",
+    again > few && `paths that cross this line more than once: ${again}; place it across the way of the vehicles`,
+    heights.length && line.length < quantile(heights, 0.5) && "this line is shorter than a vehicle; make it longer",
+  ].filter(text => text);
+}
+
+function quantile(values, share) {
+  const sorted = [...values].sort((a, b) => a - b), at = share * (sorted.length - 1);
+  const low = Math.floor(at), high = Math.ceil(at);
+  return sorted[low] + (at - low) * (sorted[high] - sorted[low]);
+}
+
+/** Return how many vehicles go from one place to another, by "from\nto"; to nothing for a single place. */
+function flowsOf(found) {
+  const trips = new Map(), flows = {};
+  for (const { border: { name }, visits } of found)
+    for (const [path, some] of visits)
+      for (const { direction, time, row } of some)
+        if (direction !== "exit" && direction !== "vanish")
+          trips.set(path, [...trips.get(path) ?? [], { name, time: Math.round(1000 * time), row }]);
+  for (const trip of trips.values()) {
+    trip.sort((a, b) => a.time - b.time || a.row - b.row || (a.name < b.name ? -1 : 1));
+    const flow = `${trip[0].name}\n${trip.length > 1 ? trip.at(-1).name : ""}`;
+    flows[flow] = (flows[flow] ?? 0) + 1;
+  }
+  return flows;
+}
+
+// ---------------------------------------------------------------- the road plane
+/** Solve a system of linear equations by Gaussian elimination; null where it has no solution. */
+function solve(rows, values) {
+  const size = rows.length, table = rows.map((row, i) => [...row, values[i]]);
+  for (let column = 0; column < size; column++) {
+    let best = column;
+    for (let row = column; row < size; row++)
+      if (Math.abs(table[row][column]) > Math.abs(table[best][column])) best = row;
+    [table[column], table[best]] = [table[best], table[column]];
+    if (Math.abs(table[column][column]) < 1e-12) return null;
+    for (let row = 0; row < size; row++) {
+      const factor = row === column ? 0 : table[row][column] / table[column][column];
+      for (let at = column; factor && at <= size; at++) table[row][at] -= factor * table[column][at];
+    }
+  }
+  return table.map((row, i) => row[size] / row[i]);
+}
+
+function inverse(h) {
+  const [a, b, c, d, e, f, g, i, j] = h;
+  return [e * j - f * i, c * i - b * j, b * f - c * e, f * g - d * j, a * j - c * g, c * d - a * f,
+    d * i - e * g, b * g - a * i, a * e - b * d];
+}
+
+/** Move and scale points so that they lie around 0 at a distance of about 1. */
+function normalized(points) {
+  const middle = [0, 1].map(i => points.reduce((sum, point) => sum + point[i], 0) / points.length);
+  const scale = Math.max(...points.map(point => Math.hypot(point[0] - middle[0], point[1] - middle[1]))) || 1;
+  return { middle, scale, points: points.map(point => point.map((value, i) => (value - middle[i]) / scale)) };
+}
+
+/** Fit the road plane to points (Hartley and Zisserman, ch. 4); null where they do not fix one. */
+function fitGround(points) {
+  if (points.length < 4) return null;
+  const pixels = normalized(points.map(each => each.pixel)), metres = normalized(points.map(each => each.metres));
+  const equations = points.flatMap((_, n) => {
+    const [x, y] = metres.points[n], [u, v] = pixels.points[n];
+    return [[[x, y, 1, 0, 0, 0, -u * x, -u * y], u], [[0, 0, 0, x, y, 1, -v * x, -v * y], v]];
+  });
+  const sum = (i, j) => equations.reduce((total, [row, value]) => total + row[i] * (j < 8 ? row[j] : value), 0);
+  const rows = Array.from({ length: 8 }, (_, i) => Array.from({ length: 8 }, (_, j) => sum(i, j)));
+  const h = solve(rows, rows.map((_, i) => sum(i, 8)));
+  if (!h) return null;
+  const toPixels = oriented([...h, 1], metres.points), toMetres = oriented(inverse([...h, 1]), pixels.points);
+  if (!toPixels || !toMetres) return null;
+  const via = (from, matrix, to) => point => { // null for what would be behind the camera
+    const [x, y] = point.map((value, i) => (value - from.middle[i]) / from.scale);
+    const [u, v, depth] = [0, 3, 6].map(i => matrix[i] * x + matrix[i + 1] * y + matrix[i + 2]);
+    return depth > 1e-9 ? [u, v].map((value, i) => to.middle[i] + to.scale * value / depth) : null;
+  };
+  return { toMetres: via(pixels, toMetres, metres), toPixels: via(metres, toPixels, pixels) };
+}
+
+/** Return a homography with positive depths at points; null where the horizon is between them. */
+function oriented(h, points) {
+  const signs = new Set(points.map(([x, y]) => Math.sign(h[6] * x + h[7] * y + h[8])));
+  const [sign] = signs;
+  return signs.size === 1 && sign ? h.map(value => sign * value) : null;
+}
+
+/** Return the speed of a vehicle at a moment in km/h, from the places of one second; or null. */
+function speedAt(path, time, ground) {
+  const last = path.seen - 1, from = clamp(time - 0.5, path.times[0], Math.max(path.times[0], path.times[last] - 1));
+  const places = [];
+  for (let row = 0; row <= last; row++)
+    if (path.times[row] >= from && path.times[row] <= from + 1) {
+      const place = ground.toMetres([path.xs[row] - 0.5, path.ys[row] - 0.5]);
+      if (place) places.push([path.times[row], ...place]);
+    }
+  if (places.length < 3 || places.at(-1)[0] - places[0][0] < 0.5) return null;
+  const mean = [0, 1, 2].map(i => places.reduce((sum, each) => sum + each[i], 0) / places.length);
+  const slope = i => places.reduce((sum, each) => sum + (each[0] - mean[0]) * (each[i] - mean[i]), 0) /
+    places.reduce((sum, each) => sum + (each[0] - mean[0]) ** 2, 0);
+  return 3.6 * Math.hypot(slope(1), slope(2));
+}
+
+// ---------------------------------------------------------------- the file
+const MARK = "# Drawn with vdet draw";
+const FORMS = { // the lists of the file, and what their items have
+  ground: ["pixel", "metres"], regions: ["name", "kind", "points", "mask"],
+  lines: ["name", "start", "end", "left", "right"], zones: ["name", "points"],
+};
+
+/** Write the settings of the camera as YAML; `rest` has the lines of everything else. */
+function writeYaml(places, size, rest, name) {
+  const write = value => Array.isArray(value) ? `[${value.map(write).join(", ")}]` :
+    typeof value === "number" ? String(Math.round(1000 * value) / 1000) : JSON.stringify(value);
+  const line = (kind, item) => FORMS[kind].filter(key => item[key] != null)
+    .map(key => `${key}: ${key === "kind" ? item.kind : write(item[key])}`).join(", ");
+  const list = (kind, indent, note) => places[kind].length ? [`${indent}${kind}:  # ${note}`,
+    ...places[kind].map(item => `${indent}  - {${line(kind, item)}}`)] : [];
+  const traffic = [
+    ...list("lines", "  ", "left and right of someone who looks from start to end"),
+    ...list("zones", "  ", "polygons in which vehicles are counted"), ...rest.traffic];
+  return [
+    `${MARK}: this file says where the vehicles of a camera are counted.`,
+    `# vdet detect-video CLIP --no-video -c ${name} --flows flows.csv --interval 15min`,
+    "camera:", `  size: ${write(size)}  # points below are pixels of such frames`,
+    ...list("ground", "  ", "points of the road in pixels and metres"), ...rest.camera,
+    ...list("regions", "", "parts of the frame in which vehicles are shown"),
+    ...(traffic.length ? ["traffic:", ...traffic] : []), ...rest.other, "",
+  ].join("\n");
+}
+
+/** Read a file that `writeYaml` has written: size, places and rest. Raises an Error for others. */
+function readYaml(text) {
+  if (!text.startsWith(MARK)) throw Error("not written by this page; open it with vdet draw CLIP -c FILE");
+  const places = { ground: [], regions: [], lines: [], zones: [] }, rest = { camera: [], traffic: [], other: [] };
+  const quoted = part => part.startsWith('"') ? part : JSON.stringify(part); // items are JSON, but for plain words
+  const readItem = item => JSON.parse(item.replace(/"(?:\\.|[^"\\])*"|[A-Za-z_]\w*/g, quoted));
+  let section = "other", list = null, size = null;
+  for (const line of text.split("\n").filter(line => line.trim() && !line.startsWith("#"))) {
+    const [, indent, key] = /^( *)(\w+):/.exec(line) ?? [], item = /^ *- (\{.*\})$/.exec(line);
+    if (indent === "") section = key in rest ? key : "other";
+    if (FORMS[key] && indent === (key === "regions" ? "" : "  ")) list = key;
+    else if (list && item) places[list].push(readItem(item[1]));
+    else if (list && /^ *-/.test(line)) throw Error(`not as this page writes it: ${line.trim()}`);
+    else {
+      list = null;
+      if (section === "camera" && key === "size") size = JSON.parse(/\[.*?\]/.exec(line)[0]);
+      else if (indent !== "" || section === "other") rest[section].push(line);
+    }
+  }
+  if (!size) throw Error("has no camera.size");
+  return { size, places, rest };
+}
+
+/** Return what is wrong with places, in sentences; a run would refuse them. */
+function problemsOf({ lines, zones, regions, ground }, size) {
+  const isTwice = (each, i, all) => all.findIndex(other => other.name === each.name) < i;
+  const isShort = ({ start, end }) => [0, 1].every(i => Math.abs(start[i] - end[i]) < 0.01 * size[i]);
+  const say = (some, text) => some.map(each => `${each.name}: ${text}`);
+  return [
+    ...say([...lines, ...zones].filter(isTwice), "this name is used twice"),
+    ...say(regions.filter(isTwice), "this name is used twice"),
+    ...say(lines.filter(isShort), "is shorter than 1 % of the frame"),
+    ...say(lines.filter(line => line.left === line.right), "both sides have one name"),
+    ...say([...zones, ...regions].filter(each => each.points && crossesItself(each.points)), "crosses or touches itself"),
+    ...(ground.length && ground.length < 4 ? ["ground: needs four points or more, with their metres"] :
+      ground.length && !fitGround(ground) ? ["ground: these points do not fix a plane; check their metres"] : []),
+  ];
+}
+
+function crossesItself(corners) {
+  const sides = sidesOf(corners);
+  return sides.some((side, i) => sides.some((other, j) =>
+    j > i + 1 && !(i === 0 && j === sides.length - 1) && meeting(...side, other) !== null));
+}
+
+// ---------------------------------------------------------------- the linked paths
+/** Return the paths that Python packs: second differences in four planes of bytes, deflated. */
+async function readPaths(packed) {
+  const bytes = Uint8Array.from(atob(packed.data), char => char.charCodeAt(0));
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+  const planes = new Uint8Array(await new Response(stream).arrayBuffer()), count = planes.length / 4;
+  let first = 0;
+  return packed.vehicles.map(([vehicle, kind, start, seen, length]) => {
+    const [times, xs, ys, heights] = [0, 1, 2, 3].map(column => {
+      let at = column * count / 4 + first, step = 0, value = 0;
+      return Float64Array.from({ length }, () => {
+        step += planes[at] | planes[count + at] << 8 | planes[2 * count + at] << 16 | planes[3 * count + at] << 24;
+        at++;
+        return value += step;
+      });
+    });
+    first += length;
+    return { vehicle, kind, seen, heights, times: times.map(time => Math.round(1e6 * start + time) / 1e6),
+      xs: xs.map(x => x / 100), ys: ys.map(y => y / 100) };
+  });
+}
+
+// ---------------------------------------------------------------- the page
+const KINDS = { lines: "line", zones: "zone", regions: "region", ground: "point" };
+const SHAPES = ["g", "line", "polygon", "polyline", "circle", "text", "tspan"];
+const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+const get = id => document.getElementById(id);
+const metresOf = point => `${point.metres.map(value => Math.round(100 * value) / 100).join(", ")} m`;
+
+/** Make an element; texts are never read as HTML. */
+function el(tag, attributes = {}, ...children) {
+  const space = `http://www.w3.org/${SHAPES.includes(tag) ? "2000/svg" : "1999/xhtml"}`;
+  const made = document.createElementNS(space, tag);
+  for (const [name, value] of Object.entries(attributes))
+    if (name.startsWith("on")) made.addEventListener(name.slice(2), value);
+    else made.setAttribute(name, value);
+  made.append(...children);
+  return made;
+}
+
+async function openPage(data) {
+  const { size } = data, [width, height] = size;
+  const stage = get("stage"), view = get("view"), marks = get("marks"), lens = get("lens");
+  const every = await readPaths(data.paths), hasClasses = new Set(every.map(path => path.kind)).size > 1;
+  const image = Object.assign(new Image(), { src: data.picture });
+  await image.decode();
+  data.places.lines = data.places.lines.map(line => ({ left: "left", right: "right", ...line }));
+
+  let { places, rest } = data, past = [], future = [], saved = JSON.stringify(places);
+  let tool = "select", selected = null; // what is selected: kind, index, and the number of a point
+  let drawn = [], pointer = null, drag = null, hovered = null;
+  let paths = every, found = []; // those inside the regions, and what they do at each line and zone
+  const known = new Map(); // results by geometry
+
+  const unit = () => width / Math.max(1, stage.clientWidth); // pixels of the frame in one of the screen
+  const item = () => selected && places[selected.kind][selected.index];
+  const buttons = [...document.querySelectorAll("[data-tool]")];
+  const hint = () => buttons.find(button => button.dataset.tool === tool).dataset.hint;
+  const say = text => { get("hint").textContent = text; };
+
+  const segment = ([[x1, y1], [x2, y2]]) => ["grip", "drawn"].map(name => el("line", { x1, y1, x2, y2, class: name }));
+  const dot = ([cx, cy], r, name, more = {}) => el("circle", { cx, cy, r: r * unit(), class: name, ...more });
+
+  // ------------------------------------------------ changes, with their history
+  function change(action) {
+    past.push(JSON.stringify(places));
+    future = [];
+    action();
+    refresh();
+  }
+
+  function travel(from, to) {
+    if (!from.length) return;
+    to.push(JSON.stringify(places));
+    [places, selected, drawn] = [JSON.parse(from.pop()), null, []];
+    refresh();
+  }
+
+  function freeName(stem) {
+    const names = [...places.lines, ...places.zones, ...places.regions].map(each => each.name);
+    for (let number = 1; ; number++) if (!names.includes(`${stem} ${number}`)) return `${stem} ${number}`;
+  }
+
+  function add(kind, made) {
+    change(() => { selected = { kind, index: places[kind].push(made) - 1, point: null }; });
+  }
+
+  /** Delete the selected corner of a polygon, else the whole. */
+  function remove() {
+    const points = item()?.points, { kind, index, point } = selected ?? {};
+    if (points?.length > 3 && point !== null) change(() => { points.splice(point, 1); selected.point = null; });
+    else if (selected) change(() => { places[kind].splice(index, 1); selected = null; });
+  }
+
+  function swap() {
+    const line = item();
+    if (line?.start) change(() => { [line.left, line.right] = [line.right, line.left]; });
+  }
+
+  /** Return the points of an item as they are shown; those of the ground are middles of pixels. */
+  function pointsOf(kind, each) {
+    if (kind === "lines") return [each.start, each.end];
+    return kind === "ground" ? [each.pixel.map(value => value + 0.5)] : each.points ?? [];
+  }
+
+  function move(dx, dy) {
+    const each = item(), { kind, point } = selected;
+    pointsOf(kind, each).forEach(([x, y], number) => {
+      if (point !== null && point !== number) return;
+      const moved = inside([x + dx, y + dy]);
+      if (kind === "lines") each[number ? "end" : "start"] = moved;
+      else if (kind === "ground") each.pixel = moved.map(value => value - 0.5);
+      else each.points[number] = moved;
+    });
+  }
+
+  function inside(point) {
+    return point.map((value, i) => Math.round(10 * clamp(value, 0, size[i])) / 10);
+  }
+
+  // ------------------------------------------------ counts
+  function recount() {
+    const regions = places.regions.filter(each => each.points);
+    const visits = (key, work) => {
+      if (known.size > 50) known.clear();
+      if (!known.has(key)) known.set(key, work());
+      return known.get(key);
+    };
+    const area = JSON.stringify(regions.map(each => [each.kind, each.points]));
+    paths = visits(area, () => every.map(path => within(path, regions)).filter(path => path));
+    found = [...places.lines.map(each => placeLine(each, size)), ...places.zones.map(each => placeZone(each, size))]
+      .map(border => {
+        const key = area + JSON.stringify([border.start, border.end, border.corners, border.directions]);
+        const find = () => paths.map(path => [path, crossings(path, border)]).filter(([, some]) => some.length);
+        return { border, visits: visits(key, find) };
+      });
+  }
+
+  /** Return the part of a path inside the regions; null where nothing is left. */
+  function within(path, regions) {
+    if (!regions.length) return path;
+    const [shown, left] = [false, true].map(isLeft =>
+      regions.filter(each => (each.kind === "exclude") === isLeft).map(each => sidesOf(each.points)));
+    const rows = [...path.times.keys()].filter(row => {
+      const [x, y] = [clamp(path.xs[row], 0, width - 1), clamp(path.ys[row], 0, height - 1)];
+      const has = sides => isInside(sides, x, y);
+      return (!shown.length || shown.some(has)) && !left.some(has);
+    });
+    if (rows.length === path.times.length) return path;
+    const [times, xs, ys, heights] = [path.times, path.xs, path.ys, path.heights].map(values =>
+      Float64Array.from(rows, row => values[row]));
+    const seen = rows.filter(row => row < path.seen).length;
+    return seen && { ...path, bounds: undefined, seen, times, xs, ys, heights };
+  }
+
+  /** Return how many vehicles go in a direction, and as text how many of each class. */
+  function countOf({ visits }, direction) {
+    const counts = {};
+    for (const [{ kind }, some] of visits)
+      for (const each of some) if (each.direction === direction) counts[kind] = (counts[kind] ?? 0) + 1;
+    const classes = Object.entries(counts).sort(([, a], [, b]) => b - a).map(([kind, count]) => `${count} ${kind}`);
+    const total = Object.values(counts).reduce((sum, count) => sum + count, 0);
+    return { total, classes: hasClasses ? classes.join(", ") : "" };
+  }
+
+  // ------------------------------------------------ what is drawn
+  function paintPaths() {
+    const context = view.getContext("2d"), scale = unit();
+    [view.width, view.height] = size;
+    context.drawImage(image, 0, 0, width, height);
+    context.lineWidth = Math.max(1.5, 1.5 * scale);
+    context.globalAlpha = clamp(8 / Math.sqrt(every.length), 0.2, 0.8);
+    for (const { xs, ys, seen } of get("paths").checked ? every : []) {
+      const turn = Math.atan2(ys[seen - 1] - ys[0], xs[seen - 1] - xs[0]) * 180 / Math.PI;
+      context.strokeStyle = `hsl(${Math.round(turn + 360) % 360} 90% 58%)`;
+      context.beginPath();
+      for (let row = 0, last = 0; row < seen; row++) {
+        if (row && row < seen - 1 && Math.abs(xs[row] - xs[last]) + Math.abs(ys[row] - ys[last]) < 2 * scale) continue;
+        context.lineTo(xs[row], ys[row]);
+        last = row;
+      }
+      context.stroke();
+    }
+  }
+
+  function label([x, y], lines, anchor = "middle", name = "") {
+    const letter = (stage.clientWidth < 600 ? 10 : 13) * unit();
+    return el("text", { x, y, "font-size": letter, "text-anchor": anchor, class: name },
+      ...lines.filter(line => line).map((line, i) => el("tspan", { x, dy: i ? 1.15 * letter : 0 }, line)));
+  }
+
+  function drawMarks() {
+    const ground = fitGround(places.ground), isTaken = each => places.lines.some(line =>
+      String([line.start, line.end]) === String([each.start, each.end]));
+    marks.replaceChildren(...(ground ? gridOf(ground) : []), ...data.proposals.map((each, number) => {
+      const { start, end, name, vehicles } = each, middle = start.map((value, i) => (value + end[i]) / 2);
+      return isTaken(each) || tool !== "select" ? "" : el("g", { class: "proposal", "data-proposal": number },
+        ...segment([start, end]), label([middle[0], middle[1] - 8 * unit()], [`+ ${name}: ${vehicles}`]));
+    }));
+    for (const kind of ["regions", "zones", "lines", "ground"])
+      marks.append(...places[kind].map((each, index) => drawItem(kind, each, index)));
+    if (hovered)
+      marks.append(el("polyline", { class: "hovered", points: Array.from({ length: hovered.seen },
+        (_, row) => `${hovered.xs[row]},${hovered.ys[row]}`).join(" ") }));
+    const shown = pointer && tool !== "select" ? [...drawn, pointer] : drawn;
+    marks.append(el("polyline", { points: shown.join(" "), class: "new" }), ...shown.map(each => dot(each, 5, "new")));
+  }
+
+  function drawItem(kind, each, index) {
+    const isSelected = selected?.kind === kind && selected.index === index, points = pointsOf(kind, each);
+    if (!points.length) return ""; // a mask
+    const name = `${kind === "regions" ? each.kind ?? "include" : kind}${isSelected ? " selected" : ""}`;
+    const group = el("g", { class: name, "data-kind": kind, "data-index": index });
+    if (kind === "lines") {
+      const [start, end] = points, length = Math.hypot(end[0] - start[0], end[1] - start[1]) || 1;
+      const left = [(end[1] - start[1]) / length, (start[0] - end[0]) / length];
+      group.append(...segment(points), ...sideOf(each.left, left, points, index),
+        ...sideOf(each.right, left.map(value => -value), points, index),
+        label([start[0], start[1] - 9 * unit()], [each.name]));
+    } else if (kind === "ground") {
+      group.append(label([points[0][0], points[0][1] - 11 * unit()], [metresOf(each)]));
+    } else {
+      const top = points.reduce((best, point) => point[1] < best[1] ? point : best);
+      const count = way => countOf(found[places.lines.length + index], way).total;
+      const counts = kind === "zones" ? `in ${count("enter") + count("appear")}, out ${count("exit") + count("vanish")}` : "";
+      group.append(el("polygon", { points: points.join(" ") }), label([top[0], top[1] + 18 * unit()], [each.name, counts]));
+    }
+    if (isSelected || kind === "ground")
+      group.append(...points.flatMap((point, number) => [dot(point, 15, "grip", { "data-point": number }),
+        dot(point, isSelected && selected.point === number ? 8 : 6, "handle")]));
+    return group;
+  }
+
+  /** Return the arrow to a side of a line, with what goes there; `way` has length 1. */
+  function sideOf(name, way, [start, end], index) {
+    const { total, classes } = countOf(found[index], name), middle = start.map((value, i) => (value + end[i]) / 2);
+    const tip = middle.map((value, i) => value + 26 * unit() * way[i]);
+    const wing = sign => tip.map((value, i) => value - 7 * unit() * (way[i] + (i ? sign : -sign) * way[1 - i] / 2));
+    const down = way[1] > 0.3 ? 16 : way[1] > -0.3 ? 4 : classes ? -22 : -7;
+    const at = [tip[0] + 10 * unit() * way[0], clamp(tip[1] + down * unit(), 14 * unit(), height - 4 * unit())];
+    const anchor = way[0] > 0.5 ? "start" : way[0] < -0.5 ? "end" : "middle";
+    return [el("polyline", { points: [middle, tip, wing(1), tip, wing(-1)].join(" ") }),
+      label(at, [`${name} ${total}`, classes], anchor, "count")];
+  }
+
+  function gridOf(ground) {
+    const [left, low, right, high] = boundsOf(places.ground.map(each => each.metres));
+    const step = [1, 2, 5, 10, 20, 50, 100].find(each => Math.max(right - left, high - low) / each <= 14) ?? 200;
+    const lines = (from, to, at) => Array.from({ length: 1 + Math.floor(to / step) - Math.ceil(from / step) }, (_, n) => {
+      const value = (Math.ceil(from / step) + n) * step;
+      const points = Array.from({ length: 25 }, (_, i) => ground.toPixels(at(value, i / 24))).filter(point => point);
+      return [el("polyline", { points: points.join(" "), class: "grid" }),
+        label(points[0] ?? [0, 0], [points.length && `${value} m`], "middle", "grid")];
+    }).flat();
+    return [...lines(left, right, (x, share) => [x, low + share * (high - low)]),
+      ...lines(low, high, (y, share) => [left + share * (right - left), y])];
+  }
+
+  function showLens() {
+    lens.hidden = !(pointer && (drag?.moved ? selected?.point !== null : tool !== "select"));
+    if (lens.hidden) return;
+    const side = 132, context = lens.getContext("2d"), part = side / 4 * unit(); // it shows four times as much
+    const [x, y] = pointer.map(value => value / unit());
+    lens.style.left = `${clamp(x - side / 2, 0, Math.max(0, stage.clientWidth - side))}px`;
+    lens.style.top = `${y > side + 40 ? y - side - 30 : y + 40}px`;
+    [lens.width, lens.height] = [side, side];
+    context.drawImage(view, pointer[0] - part / 2, pointer[1] - part / 2, part, part, 0, 0, side, side);
+    context.globalCompositeOperation = "difference";
+    context.strokeStyle = "#fff";
+    context.stroke(new Path2D(`M${side / 2} 0V${side}M0 ${side / 2}H${side}`));
+  }
+
+  // ------------------------------------------------ the panel
+  function showDetails() {
+    const each = item(), box = get("details"), button = (text, onclick, id) => el("button", { onclick, id }, text);
+    box.hidden = !each;
+    if (!each) return box.replaceChildren();
+    const field = (text, id, value, set, type = "text") => el("label", {}, text,
+      el("input", { id, value, type, step: "any", maxlength: 80, onchange: event => change(() => set(event.target.value.trim())) }));
+    const names = ["name", "left", "right"].filter(key => each[key] !== undefined).map(key =>
+      field(key[0].toUpperCase() + key.slice(1), `field-${key}`, each[key], text => { each[key] = text || each[key]; }));
+    const metres = (each.metres ?? []).map((value, i) => field(`Metres ${i ? "along" : "across"}`, `metres-${i}`, value,
+      text => { each.metres[i] = Number(text) || 0; }, "number"));
+    box.replaceChildren(el("h3", {}, `Selected ${KINDS[selected.kind]}`), ...names, ...metres,
+      each.start ? button("Swap sides (S)", swap, "swap") : "", button("Delete (Del)", remove, "delete"),
+      ...(each.metres && places.ground.length === 4 ? stretch(button) : []));
+  }
+
+  /** Return fields that set the metres of four points at once. */
+  function stretch(button) {
+    const [wide, long] = [3.5, 20].map(value => el("input", { type: "number", step: "any", value }));
+    const set = () => change(() => [[0, 0], [1, 0], [1, 1], [0, 1]].forEach(([x, y], i) => {
+      places.ground[i].metres = [x * (Number(wide.value) || 1), y * (Number(long.value) || 1)];
+    }));
+    return [el("p", {}, "Are the four points near left, near right, far right and far left of a straight lane?"),
+      el("label", {}, "Its width, m", wide), el("label", {}, "its length, m", long), button("Set the metres", set, "stretch")];
+  }
+
+  function showList() {
+    const rows = Object.keys(KINDS).flatMap(kind => places[kind].map((each, index) => {
+      const result = { lines: found[index], zones: found[places.lines.length + index] }[kind];
+      const counts = result?.border.directions.map(name => ({ name, ...countOf(result, name) }))
+        .filter(({ total }, i) => i < 2 || total)
+        .map(({ name, total, classes }) => `${name} ${total}${classes && ` (${classes})`}`).join(" · ");
+      const note = each.metres ? metresOf(each) + errorOf(each) : each.mask ? `mask ${each.mask}` : each.kind ?? "include";
+      const choose = () => { selected = { kind, index, point: null }; refresh(); };
+      return el("button", { class: "row", "aria-pressed": each === item(), onclick: choose },
+        el("b", {}, each.name ?? `ground ${index + 1}`), el("span", {}, counts ?? note));
+    }));
+    get("list").replaceChildren(...(rows.length ? rows : [el("p", {}, "Nothing is drawn yet.")]));
+  }
+
+  function errorOf({ pixel, metres }) {
+    const there = places.ground.length > 4 && fitGround(places.ground)?.toMetres(pixel);
+    return there ? `, off by ${Math.hypot(there[0] - metres[0], there[1] - metres[1]).toFixed(2)} m` : "";
+  }
+
+  function showResults() {
+    const ground = fitGround(places.ground), lines = found.slice(0, places.lines.length), problems = problemsOf(places, size);
+    const warnings = lines.flatMap(({ border, visits }) =>
+      warningsOf(border, visits, paths, data.span).map(text => `${border.name}: ${text}`));
+    get("warnings").replaceChildren(...[...problems, ...warnings].map((text, i) =>
+      el("li", { class: i < problems.length ? "problem" : "" }, text)));
+    get("save").disabled = problems.length > 0;
+    const names = found.map(({ border }) => border.name), flows = flowsOf(found);
+    get("flows").parentElement.hidden = names.length < 2;
+    const row = (cell, ...texts) => el("tr", {}, ...texts.map(text => el(cell, {}, String(text))));
+    get("flows").replaceChildren(row("th", "from", ...names.map(name => `to ${name}`), "to none"),
+      ...names.map(from => row("td", from, ...[...names, ""].map(to => flows[`${from}\n${to}`] ?? 0))));
+    get("speeds").replaceChildren(...lines.flatMap(line =>
+      ground ? line.border.directions.map(way => speedRow(line, way, ground)) : []));
+    get("text").textContent = writeYaml(places, size, rest, data.name);
+    get("undo").disabled = !past.length;
+    get("redo").disabled = !future.length;
+  }
+
+  function speedRow({ border, visits }, direction, ground) {
+    const speeds = visits.flatMap(([path, some]) => some.filter(each => each.direction === direction)
+      .map(each => speedAt(path, each.time, ground)).filter(speed => speed !== null));
+    if (!speeds.length) return "";
+    const bars = Array.from({ length: 16 }, (_, i) => speeds.filter(speed => Math.min(15, Math.floor(speed / 10)) === i).length);
+    const [middle, most] = [0.5, 0.85].map(share => quantile(speeds, share).toFixed(0));
+    return el("div", { class: "speed" }, el("b", {}, `${border.name}: ${direction}`),
+      el("span", {}, `median ${middle} km/h, 85 % ${most} km/h`), el("div", { class: "bars", title: "0 to 160 km/h" },
+        ...bars.map(count => el("i", { style: `height: ${100 * count / Math.max(...bars)}%` }))));
+  }
+
+  function setTool(name) {
+    [tool, drawn] = [name, []];
+    for (const button of buttons) button.setAttribute("aria-pressed", button.dataset.tool === name);
+    say(hint());
+    drawMarks();
+    showLens();
+  }
+
+  function refresh(isDragging = false) {
+    recount();
+    drawMarks();
+    showList();
+    if (isDragging) return;
+    showDetails();
+    showResults();
+  }
+
+  // ------------------------------------------------ pointer and keys
+  function place(event) {
+    const box = marks.getBoundingClientRect();
+    return inside([(event.clientX - box.left) * width / box.width, (event.clientY - box.top) * height / box.height]);
+  }
+
+  function putPoint(point) {
+    if (tool === "ground") {
+      add("ground", { pixel: point.map(value => value - 0.5), metres: [0, 0] });
+      return get("metres-0").focus({ preventScroll: true });
+    }
+    const isAt = other => Math.hypot(other[0] - point[0], other[1] - point[1]) < 10 * unit();
+    if (drawn.length > 2 && isAt(drawn[0])) return endShape();
+    if (!drawn.length || !isAt(drawn.at(-1))) drawn.push(point);
+    if (tool === "line" && drawn.length === 2) endShape();
+    drawMarks();
+  }
+
+  function endShape() {
+    const points = drawn, kind = tool;
+    if (points.length < (kind === "line" ? 2 : 3)) return;
+    setTool("select");
+    const [start, end] = points;
+    if (kind === "line") add("lines", { name: freeName("line"), start, end, left: "left", right: "right" });
+    else if (kind === "zone") add("zones", { name: freeName("zone"), points });
+    else add("regions", { name: freeName("region"), kind, points });
+    get("field-name").select();
+  }
+
+  function press(event) {
+    if (event.button) return;
+    pointer = place(event);
+    stage.setPointerCapture(event.pointerId);
+    drag = { from: pointer, moved: false };
+    if (tool !== "select") return showLens();
+    const target = event.target.closest("[data-kind], [data-proposal]"), point = event.target.dataset.point;
+    if (target?.dataset.proposal) {
+      const { name, start, end, left, right } = data.proposals[target.dataset.proposal];
+      const isUsed = places.lines.some(line => line.name === name);
+      drag = null;
+      return add("lines", { name: isUsed ? freeName(name) : name, start, end, left, right });
+    }
+    const { kind, index } = target?.dataset ?? {};
+    selected = target && { kind, index: Number(index), point: point ? Number(point) : null };
+    drag = selected && { ...drag, before: JSON.stringify(places) };
+    refresh();
+  }
+
+  function slide(event) {
+    pointer = place(event);
+    if (drag && !drag.moved && Math.hypot(pointer[0] - drag.from[0], pointer[1] - drag.from[1]) > 4 * unit()) {
+      drag.moved = true;
+      if (drag.before) [past, future] = [[...past, drag.before], []];
+      else if (tool === "line" && !drawn.length) drawn.push(drag.from);
+    }
+    if (drag?.moved && drag.before) {
+      move(pointer[0] - drag.from[0], pointer[1] - drag.from[1]);
+      drag.from = pointer;
+      refresh(true);
+    } else if (!drag && tool === "select") hover(event);
+    else drawMarks();
+    showLens();
+  }
+
+  function release() {
+    const ended = drag;
+    drag = null;
+    if (ended && tool !== "select") putPoint(pointer);
+    else if (ended?.moved) refresh();
+    showLens();
+  }
+
+  /** Show when and what the path nearest to the pointer is. */
+  function hover(event) {
+    const isOver = event.target.closest("[data-kind], [data-proposal]") || !get("paths").checked;
+    let best = 8 * unit(), nearest = null;
+    for (const path of isOver ? [] : every)
+      for (let row = 0; row < path.seen; row++) {
+        const away = Math.abs(path.xs[row] - pointer[0]) + Math.abs(path.ys[row] - pointer[1]);
+        if (away < best) [best, nearest] = [away, path];
+      }
+    if (nearest === hovered) return;
+    hovered = nearest;
+    const time = seconds => `${Math.floor(seconds / 60)}:${(seconds % 60).toFixed(1).padStart(4, "0")}`;
+    const when = nearest && [0, nearest.seen - 1].map(row => time(nearest.times[row])).join(" to ");
+    say(nearest ? `Vehicle ${nearest.vehicle}: ${nearest.kind}, ${when}` : hint());
+    drawMarks();
+  }
+
+  function type(event) {
+    const key = event.key.length === 1 ? event.key.toLowerCase() : event.key, isControl = event.ctrlKey || event.metaKey;
+    const isField = event.target.tagName === "INPUT" && event.target.type !== "checkbox";
+    const button = document.querySelector(`[data-key="${CSS.escape((isControl ? "^" : "") + key)}"]`), arrow = ARROWS[key];
+    if (isField && (key === "Enter" || key === "Escape")) return stage.focus({ preventScroll: true });
+    if (isField || event.altKey || (event.target.tagName === "BUTTON" && key === "Enter")) return;
+    if (isControl && event.shiftKey && key === "z") travel(future, past);
+    else if (button) button.click(), stage.focus({ preventScroll: true });
+    else if (isControl) return;
+    else if (key === "s") swap();
+    else if (key === "n" && selected) nextPoint();
+    else if (key === "Delete" || key === "Backspace") drawn.length ? (drawn.pop(), drawMarks()) : remove();
+    else if (key === "Escape") [drawn, selected] = [[], null], setTool("select"), refresh();
+    else if (key === "Enter" && tool !== "select") pressEnter();
+    else if (arrow) step(arrow.map(value => value * (event.shiftKey ? 20 : 1)));
+    else return;
+    event.preventDefault();
+  }
+
+  function nextPoint() {
+    selected.point = ((selected.point ?? -1) + 1) % pointsOf(selected.kind, item()).length;
+    drawMarks();
+  }
+
+  /** Put a point where the crosshair is; where it was just put, the shape ends. */
+  function pressEnter() {
+    if (drawn.length > 2 && (!pointer || String(drawn.at(-1)) === String(pointer))) endShape();
+    else putPoint(pointer ?? [width / 2, height / 2]);
+  }
+
+  function step([dx, dy]) {
+    if (tool === "select") return selected ? change(() => move(dx, dy)) : undefined;
+    const [x, y] = pointer ?? [width / 2, height / 2];
+    pointer = inside([x + dx, y + dy]);
+    drawMarks();
+    showLens();
+  }
+
+  // ------------------------------------------------ files
+  function save() {
+    const href = URL.createObjectURL(new Blob([get("text").textContent], { type: "application/yaml" }));
+    el("a", { href, download: data.name }).click();
+    URL.revokeObjectURL(href);
+    saved = JSON.stringify(places);
+    say(`Saved as ${data.name}. Use it: vdet detect-video CLIP -c ${data.name}`);
+  }
+
+  async function open({ target }) {
+    const [file] = target.files;
+    try {
+      const read = readYaml(await file.text());
+      if (String(read.size) !== String(size)) throw Error(`is for frames of ${read.size.join("×")}; open it with -c`);
+      change(() => { [places, rest, selected, drawn] = [read.places, read.rest, null, []]; });
+      say(`Opened ${file.name}.`);
+    } catch (error) {
+      say(`${file.name}: ${error.message}`);
+    }
+    target.value = "";
+  }
+
+  // ------------------------------------------------ start
+  const actions = { undo: () => travel(past, future), redo: () => travel(future, past), save };
+  for (const [id, action] of Object.entries(actions)) get(id).addEventListener("click", action);
+  for (const button of buttons) button.addEventListener("click", () => setTool(button.dataset.tool));
+  get("ways").append(...Array.from("→↘↓↙←↖↑↗", (arrow, i) => el("span", { style: `color: hsl(${45 * i} 90% 45%)` }, arrow)));
+  get("open").addEventListener("change", open);
+  get("paths").addEventListener("change", paintPaths);
+  const leave = () => { [pointer, hovered] = [null, null]; drawMarks(); showLens(); };
+  const handlers = { pointerdown: press, pointermove: slide, pointerup: release, pointercancel: release,
+    pointerleave: leave, dblclick: endShape };
+  for (const [name, handler] of Object.entries(handlers)) stage.addEventListener(name, handler);
+  addEventListener("keydown", type);
+  addEventListener("beforeunload", event => { if (JSON.stringify(places) !== saved) event.preventDefault(); });
+  stage.style.aspectRatio = `${width} / ${height}`;
+  stage.style.setProperty("--ratio", width / height);
+  marks.setAttribute("viewBox", `0 0 ${width} ${height}`);
+  refresh();
+  setTool("select");
+  new ResizeObserver(() => { paintPaths(); drawMarks(); }).observe(stage);
+  document.body.dataset.ready = "yes";
+}
+
+openPage(JSON.parse(get("data").textContent)).catch(error => {
+  get("hint").textContent = `This page cannot be shown: ${error.message}`;
+});

@@ -1,0 +1,204 @@
+"""Lines across the main streams of a video, proposed from the paths of its vehicles.
+
+Vehicles that head the same way at both ends of their paths form a group. The streams of a group are
+where a line across the road meets its vehicles side by side. Lines are chosen one by one
+(greedily): the one that counts most vehicles of its group that no line counts so far, less all
+others that cross it.
+"""
+
+import math
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vdet.boxes import BoolArray, Float64Array, Int64Array
+from vdet.polygons import Point, Segment, meeting
+from vdet.traffic.linking import VehiclePath
+
+_MIN_LENGTH = 1.5
+"""Length of the shortest path that counts, in heights of the vehicle's largest box."""
+_MIN_VEHICLES, _MIN_FRACTION = 5, 0.08
+"""Smallest stream that gets a line: vehicles, and as a fraction of all."""
+_MAX_TRIED = 30
+"""Number of paths of a group along which lines are tried."""
+_PLACES = (0.5, 0.4, 0.6, 0.3, 0.7)
+"""Where on a path lines are tried, as fractions of its length; the first ones are better."""
+_CLEAR = 0.12
+"""Smallest way from where a vehicle is first or last seen to a line, as a fraction of its path."""
+_GAP, _MARGIN = 4.0, 0.5
+"""Largest gap between vehicles of one stream, and how far a line goes on beyond the outermost one,
+in heights of their boxes.
+"""
+_SAME_WAY = 0.7
+"""Smallest cosine of the angle between a line's normal and the ways of the vehicles it counts."""
+_GROUP = 1.25
+"""Distance of groups: of unit vectors of the first and of the last heading, together."""
+_MAX_OTHERS = 0.34
+"""Largest number of others that cross a line, as a fraction of the vehicles that it is for."""
+_NEAR_BEST = 0.9
+"""Fraction of the best result from which a better place is taken."""
+_SPACING, _AROUND = 0.01, 4
+"""Distance of the points of a path, as a fraction of the frame's width, and the number of points
+before and after one that its way follows from.
+"""
+_WORDS = ("right", "down", "left", "up")
+_NAMES = ("north", "northeast", "east", "southeast", "south", "southwest", "west", "northwest")
+COMPASS = ("N", "NE", "E", "SE", "S", "SW", "W", "NW")
+"""Directions in which a camera may look."""
+
+
+@dataclass(frozen=True, slots=True)
+class ProposedLine:
+    """A line that a stream of `vehicles` crosses to the left of someone who looks along it.
+
+    `left` is the name of the direction of the stream, `right` of the other one. `start` and `end`
+    are in pixels.
+    """
+
+    name: str
+    start: Point
+    end: Point
+    left: str
+    right: str
+    vehicles: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Candidate:
+    """A line across a `way`, and the numbers of the vehicles it is for and of others it meets.
+
+    `place` is where it is on a path, an index of `_PLACES`.
+    """
+
+    ends: Segment
+    way: Float64Array
+    place: int
+    own: Int64Array
+    others: Int64Array
+
+    def gain(self, left: BoolArray) -> int:
+        """Return how many vehicles it adds to those that are `left`, less all others; 0 for few."""
+        own = int(left[self.own].sum())
+        others = len(self.others) + len(self.own) - own
+        is_enough = own >= max(_MIN_VEHICLES, _MIN_FRACTION * len(left))
+        return own - others if is_enough and others <= _MAX_OTHERS * own else 0
+
+
+def propose_lines(
+    paths: Sequence[VehiclePath], width: int, height: int, facing: str | None = None
+) -> tuple[ProposedLine, ...]:
+    """Return a line across each stream that has enough vehicles, the busiest first.
+
+    Parameters
+    ----------
+    width, height
+        Size of the frames, pixels.
+    facing
+        Where the camera looks, one of `COMPASS`; None where that is not known.
+    """
+    moving = [
+        each
+        for each in paths
+        if math.dist(each.points[0], each.points[each.seen - 1]) >= _MIN_LENGTH * each.heights.max()
+    ]
+    if len(moving) < _MIN_VEHICLES:
+        return ()
+    candidates = list(_Streams(moving, width, height).candidates())
+    left, lines, names = np.ones(len(moving), np.bool_), [], Counter[str]()
+    while gains := [(gain, each) for each in candidates if (gain := each.gain(left))]:
+        best = max(gain for gain, _ in gains)
+        good = (each for gain, each in gains if gain >= _NEAR_BEST * best)
+        line = min(good, key=lambda each: each.place)
+        ahead, back = _directions(line.way, facing)
+        names[ahead] += 1
+        name = f"{ahead} {names[ahead]}" if names[ahead] > 1 else ahead
+        lines.append(ProposedLine(name, *line.ends, ahead, back, int(left[line.own].sum())))
+        left[line.own] = False
+        candidates = [each for each in candidates if meeting(each.ends, line.ends) is None]
+    return tuple(lines)
+
+
+def _directions(way: Float64Array, facing: str | None) -> tuple[str, str]:
+    """Return the names of a direction in the picture and of the opposite one."""
+    turn = round(math.atan2(way[1], way[0]) / (math.pi / 2)) % 4
+    if facing is None:
+        return _WORDS[turn], _WORDS[turn - 2]
+    ahead = COMPASS.index(facing) + 2 * (1 + turn)
+    return f"{_NAMES[ahead % 8]}bound", f"{_NAMES[(ahead + 4) % 8]}bound"
+
+
+class _Streams:
+    """The points of all paths: where, in which direction, of which vehicle and group, how far."""
+
+    def __init__(self, paths: Sequence[VehiclePath], width: int, height: int) -> None:
+        rows = [_spaced(path, _SPACING * width) for path in paths]
+        self._size = width, height
+        self._numbers = np.repeat(np.arange(len(paths)), [len(each) for each in rows])
+        joined = np.concatenate(rows)
+        self._points, self._ways = joined[:, :2], joined[:, 2:4]
+        self._heights, self._gone = joined[:, 4:].T
+        self._groups = _groups(rows)[self._numbers]
+
+    def candidates(self) -> Iterator[_Candidate]:
+        for group in range(self._groups.max() + 1):
+            members = np.unique(self._numbers[self._groups == group])
+            tried = np.linspace(0, len(members) - 1, min(len(members), _MAX_TRIED)).astype(int)
+            for number in members[tried].tolist():
+                rows = np.flatnonzero(self._numbers == number)
+                for place, gone in enumerate(_PLACES):
+                    row = int(rows[np.searchsorted(self._gone[rows], gone)])
+                    if candidate := self._across(row, place):
+                        yield candidate
+
+    def _across(self, row: int, place: int) -> _Candidate | None:
+        """Return the line across a path at one of its points; None where it is for nobody."""
+        base, way, numbers = self._points[row], self._ways[row], self._numbers
+        across = np.array([-way[1], way[0]])
+        ahead, aside = (self._points - base) @ way, (self._points - base) @ across
+        at = np.flatnonzero(((ahead[:-1] < 0) != (ahead[1:] < 0)) & (numbers[:-1] == numbers[1:]))
+        at = at[np.argsort(aside[at])]
+        own = at[
+            (self._groups[at] == self._groups[row])
+            & (self._ways[at] @ way >= _SAME_WAY)
+            & (np.abs(self._gone[at] - 0.5) <= 0.5 - _CLEAR)
+        ]
+        if not len(own):
+            return None
+        height = float(np.median(self._heights[own]))
+        parts = np.concatenate([[0], np.cumsum(np.diff(aside[own]) > _GAP * height)])
+        own = own[parts == parts[np.argmin(np.abs(aside[own]))]]
+        # It ends half the way to the next vehicle of another stream.
+        (low, high), beside = aside[own[[0, -1]]].tolist(), aside[at]
+        low = max([low - _MARGIN * height, *((low + beside[beside < low]) / 2)])
+        high = min([high + _MARGIN * height, *((high + beside[beside > high]) / 2)])
+        ends = np.clip(np.rint([base + low * across, base + high * across]), 0, self._size)
+        start, end = map(tuple, ends.tolist())
+        who = np.unique(numbers[own])
+        others = np.setdiff1d(numbers[at[(beside >= low) & (beside <= high)]], who)
+        return _Candidate((start, end), way, place, who, others) if start != end else None
+
+
+def _spaced(path: VehiclePath, spacing: float) -> Float64Array:
+    """Return points of a path: x, y, the way x and y, the height, the fraction gone: `(n, 6)`."""
+    feet, heights = path.points[: path.seen], path.heights[: path.seen]
+    along = np.concatenate([[0], np.cumsum(np.hypot(*np.diff(feet, axis=0).T))])
+    at = np.linspace(0, along[-1], max(9, math.ceil(along[-1] / spacing) + 1))
+    x, y, height = (np.interp(at, along, values) for values in (*feet.T, heights))
+    rows = np.arange(len(at))
+    after, before = np.minimum(rows + _AROUND, rows[-1]), np.maximum(rows - _AROUND, 0)
+    ways = np.array([x[after] - x[before], y[after] - y[before]])
+    ways /= np.maximum(np.hypot(*ways), 1e-9)
+    return np.column_stack([x, y, *ways, height, at / along[-1]])
+
+
+def _groups(rows: Sequence[Float64Array]) -> Int64Array:
+    """Return the number of the group of each path: where it heads first and last."""
+    from scipy.cluster.hierarchy import fcluster, linkage
+
+    quarters = [each[[0, len(each) // 4, 3 * len(each) // 4, -1], :2] for each in rows]
+    headings = np.diff(quarters, axis=1)[:, [0, 2]]
+    headings /= np.maximum(np.linalg.norm(headings, axis=2, keepdims=True), 1e-9)
+    tree = linkage(headings.reshape(-1, 4), "average")
+    return np.asarray(fcluster(tree, _GROUP, "distance") - 1, np.int64)

@@ -1,0 +1,126 @@
+"""`vdet draw`: the page, proposals, and the picture for a report."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from conftest import Run
+from pages.html import Elements
+from running import write_drive
+from vdet.config.loading import load_settings
+from vdet.media.images import write_image
+
+LINES = """
+camera: {size: [320, 240]}
+output: {crf: 30}
+traffic: {lines: [{name: gate, start: [100, 20], end: [100, 220]}]}
+"""
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Six cars that go to the right, 4 pixels a frame, before a grey picture."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "lines.yaml").write_text(LINES)
+    rows = [
+        f"{n},{n / 25:.6f},{number},{4 * n},{40 + 20 * number},40,20"
+        for n in range(60)
+        for number in range(1, 7)
+    ]
+    text = "\n".join(["frame,time,id,x,y,width,height", *rows])
+    (tmp_path / "tracks.csv").write_text(text + "\n")
+    write_image(tmp_path / "frame.png", np.full((240, 320, 3), 90, np.uint8))
+    return tmp_path
+
+
+def data_of(page: str) -> dict[str, Any]:
+    text = Path(page).read_text("utf-8").split('id="data">')[1].split("</script>")[0]
+    data: dict[str, Any] = json.loads(text)
+    return data
+
+
+def test_a_page_has_the_vehicles_that_the_run_finds(run: Run, red: tuple[str, ...]) -> None:
+    write_drive(Path("in.mp4"), 50)
+    result = run("draw", "in.mp4", "-o", "gate.html", *red, "-c", "lines.yaml")
+    assert (result.code, result.out) == (0, "gate.html: 1 vehicle\n"), result.err
+    data = data_of("gate.html")
+    assert (data["name"], data["size"]) == ("lines.yaml", [320, 240])
+    assert "  crf: 30" in data["rest"]["other"]
+    assert Elements(Path("gate.html").read_text("utf-8")).addresses() == []
+
+
+def test_the_picture_shows_no_vehicle_that_moves(run: Run) -> None:
+    write_drive(Path("in.mp4"), 150)
+    Path("none.csv").write_text("frame,time,id,x,y,width,height\n")
+    far = LINES.replace("[100, 20], end: [100, 220]", "[5, 5], end: [5, 20]")
+    Path("far.yaml").write_text(far)
+    given = ("--tracks-from", "none.csv", "-c", "far.yaml")
+    result = run("draw", "in.mp4", "-o", "place.png", *given)
+    assert (result.code, result.out) == (0, "place.png: 0 vehicles\n"), result.err
+    image = cv2.imread("place.png")
+    assert image is not None
+    blue, green, red = image[60:].astype(int).transpose(2, 0, 1)
+    assert not (red - np.maximum(blue, green) > 60).any()
+
+
+def test_proposed_lines_work_at_once_beside_what_a_file_has(run: Run) -> None:
+    tracks = ("--tracks-from", "tracks.csv")
+    result = run("draw", "frame.png", *tracks, "-c", "lines.yaml", "--propose", "new.yaml")
+    assert (result.code, result.out) == (0, "new.yaml: 6 vehicles\nright: 6 vehicles\n"), result.err
+    settings = load_settings([Path("new.yaml")])
+    assert [line.name for line in settings.traffic.lines] == ["gate", "right"]
+    assert settings.output.crf == 30
+    counted = run("count", "tracks.csv", "-c", "new.yaml")
+    rows = [line.split()[1:4] for line in counted.out.splitlines()]
+    assert ["right", "right", "6"] in rows
+    assert ["gate", "left", "6"] in rows
+    facing = run("draw", "frame.png", *tracks, "--facing", "n", "--propose", "east.yaml")
+    assert "eastbound: 6 vehicles" in facing.out
+
+
+def test_a_part_of_saved_tracks_is_used(run: Run) -> None:
+    tracks = ("--tracks-from", "tracks.csv")
+    result = run("draw", "frame.png", *tracks, "--start", "10", "-o", "gate.html")
+    assert (result.code, result.out) == (0, "gate.html: 0 vehicles\n"), result.err
+
+
+def test_the_picture_for_a_report_has_lines_flows_and_numbers(run: Run) -> None:
+    given = ("frame.png", "--tracks-from", "tracks.csv", "-c", "lines.yaml")
+    assert run("draw", *given, "-o", "place.png").code == 0
+    image = cv2.imread("place.png")
+    assert image is not None
+    changed = (image != 90).any(axis=2)
+    assert changed[40:200, 100].all()
+    assert changed[60:180, 110:180].any(axis=0).all()  # the arrow of the flow
+    assert run("draw", *given, "-o", "place.svg").code == 0
+    drawn = Elements(Path("place.svg").read_text("utf-8"))
+    assert drawn.text.split() == ["6", "gate", "left", "6", "right", "0"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((), "there is nothing to write"),
+        (("-o", "a.txt"), "pages are written as .html"),
+        (("--propose", "a.txt"), "settings are written as .yaml"),
+        (("-o", "a.jpg"), "a.jpg: has nothing to show"),
+        (("-o", "lines.html", "-c", "wide.yaml"), "another shape"),
+        (("--propose", "a.yaml", "--tracks-from", "few.csv"), "no stream has enough vehicles"),
+        (("-o", "frame.png", "-c", "lines.yaml", "--overwrite"), "frame.png"),
+        (("-o", "a.html", "--tracks-from", "t.txt"), "t.txt: has no times"),
+    ],
+)
+def test_wrong_use_is_refused(run: Run, arguments: tuple[str, ...], message: str) -> None:
+    Path("wide.yaml").write_text(LINES.replace("240]", "100]").replace("220", "90"))
+    Path("few.csv").write_text("frame,time,id,x,y,width,height\n")
+    Path("t.txt").write_text("1,1,10,10,20,20,1,-1,-1,-1\n")
+    result = run("draw", "frame.png", *arguments)
+    assert result.code in (1, 2)
+    assert message in result.err
+    assert not {"a.html", "a.jpg", "a.yaml", "lines.html"} & {
+        path.name for path in Path().iterdir()
+    }
