@@ -37,6 +37,8 @@ class Record:
         Number of frames read, and of tracks shown.
     begin
         When the video was recorded, and where that is known from, if it is.
+    conditions
+        What makes the result doubtful: `Finding.record` of each.
     error
         None if all went well; else there are no outputs, and of the numbers only the seconds.
     digest
@@ -62,6 +64,7 @@ class Record:
     tracks: int | None = None
     begin: str | None = None
     warnings: tuple[str, ...] = ()
+    conditions: tuple[Mapping[str, Any], ...] = ()
     error: str | None = None
     digest: str | None = None
     sizes: Mapping[str, int] = field(default_factory=dict)

@@ -141,6 +141,7 @@ def _process(run: Run, identity: Identity) -> dict[str, Any]:
     states = {str(each.path.absolute()): output_state(each) or (0, 0) for each in run.outputs}
     return {
         **{name: getattr(totals, name) for name in ("width", "height", "frames", "tracks")},
+        "conditions": tuple(each.record() for each in totals.findings),
         "begin": str(totals.clock) if totals.clock else None,
         "sizes": {path: size for path, (size, _) in states.items()},
         "times": {path: changed for path, (_, changed) in states.items()},

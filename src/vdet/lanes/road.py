@@ -52,9 +52,11 @@ class Lane:
     """1/m, positive in a bend to the right; smoothed over more frames than the lines."""
     radius: float | None
     """Radius of the bend, metres; None if the road is straight (5000 m or more)."""
-    offset: float
-    """Distance of the camera from the middle of the lane, metres; positive: it is to the right."""
-    width: float
+    offset: float | None
+    """Distance of the camera from the middle of the lane, metres; positive: it is to the right.
+    None where the camera is not described; then the radius and the width are not known either.
+    """
+    width: float | None
     """Width of the lane, metres."""
     left: Float64Array
     right: Float64Array
@@ -62,11 +64,14 @@ class Lane:
     def record(self) -> dict[str, Any]:
         """Return plain values for JSON, of the same meaning.
 
-        `radius` (None on a straight road), `offset` and `width` are metres, rounded to millimetres.
+        `radius` (None on a straight road), `offset` and `width` are metres, rounded to millimetres;
+        all are None where the camera is not described.
         `left` and `right` are `[[x, y], …]`, pixels, rounded to tenths.
         """
-        record: dict[str, Any] = {"radius": self.radius and round(self.radius, 3)}
-        record |= {"offset": round(self.offset, 3), "width": round(self.width, 3)}
+        metres = {"radius": self.radius, "offset": self.offset, "width": self.width}
+        record: dict[str, Any] = {
+            key: None if value is None else round(value, 3) for key, value in metres.items()
+        }
         lines = {"left": self.left, "right": self.right}
         return record | {side: np.round(line, 1).tolist() for side, line in lines.items()}
 
@@ -132,6 +137,8 @@ class Road:
     top_view: TopView
     undistorter: Undistorter
     """Moves boxes and points of the frame to the undistorted one."""
+    has_metres: bool = True
+    """Whether the camera is described, so that places on the road are known."""
 
     def record(self) -> dict[str, Any] | None:
         """Return the lane as plain values for JSON."""
@@ -147,9 +154,9 @@ class Road:
         """Return where on the road a vehicle is that stands at `foot` in the frame.
 
         `foot` is `(x, y)` in pixels; whole numbers are the edges of pixels, as in boxes. None
-        without a lane, and where the lane does not reach: see `position_on_road`.
+        without a lane or metres, and where the lane does not reach: see `position_on_road`.
         """
-        if self.curves is None:
+        if self.curves is None or not self.has_metres:
             return None
         [[x, y]] = self.undistorter.points(np.array([foot]) - 0.5)
         return position_on_road((x, y), self.curves, self.top_view)
@@ -171,7 +178,8 @@ class RoadFinder:
     """Warps the frames of one video, `width` × `height` pixels, and finds the lane in them.
 
     Several threads may call `observe` at the same time. `update` must get the results one by one,
-    in the order of the frames.
+    in the order of the frames. `has_metres` says whether the camera is described; else the lane is
+    found, but nothing is known in metres.
 
     Raises
     ------
@@ -180,8 +188,15 @@ class RoadFinder:
     """
 
     def __init__(
-        self, lens: LensSettings | None, settings: LaneSettings, width: int, height: int
+        self,
+        lens: LensSettings | None,
+        settings: LaneSettings,
+        width: int,
+        height: int,
+        *,
+        has_metres: bool = True,
     ) -> None:
+        self._has_metres = has_metres
         self._undistorter = Undistorter(lens, width, height)
         self._top_view = TopView(settings, width, height)
         self._state: _LaneState | None = None
@@ -217,7 +232,7 @@ class RoadFinder:
         view = replace(view, mask=hide(view.mask, self._top_view, placed))
         self._state = state = self._next_state(view.mask)
         lane, curves = (self._lane(state), state.curves) if state else (None, None)
-        return Road(view, lane, curves, self._top_view, self._undistorter)
+        return Road(view, lane, curves, self._top_view, self._undistorter, self._has_metres)
 
     def _next_state(self, mask: Image) -> _LaneState | None:
         """Fit near the last lane; else find a new one; else keep the last one for some frames."""
@@ -234,6 +249,8 @@ class RoadFinder:
         z = self._lane_z
         lines = self._top_view.ground_to_frame(np.concatenate(curves.at(z)), np.tile(z, 2))
         left, right = np.split(self._undistorter.distorted(lines), 2)
+        if not self._has_metres:
+            return Lane(curvature, None, None, None, left, right)
         radius = None if abs(curvature) * _STRAIGHT < 1 else 1 / abs(curvature)
         offset = -(curves.left + curves.right) / 2
         return Lane(curvature, radius, offset, curves.width, left, right)

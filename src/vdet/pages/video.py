@@ -9,6 +9,7 @@ from pathlib import Path
 from pydantic import BaseModel, ConfigDict, Field
 
 from vdet.boxes import Image
+from vdet.conditions.finding import Finding
 from vdet.errors import named
 from vdet.files import write_text
 from vdet.media import VideoInfo
@@ -24,6 +25,7 @@ from vdet.traffic.speeds import KMH
 _MOST_VEHICLES = 300  # that are shown one by one
 _SPEED_STEP = 5  # km/h, of the classes of speeds
 _SMALL = 200  # columns of the still in the pages over many videos
+_DOUBT = "#f3d9a4", "#333"  # colours of the row that says when the results are doubtful
 _NO_PICTURE = "data:image/jpeg;base64,"
 
 
@@ -31,7 +33,8 @@ class VideoFacts(BaseModel):
     """A video in numbers: pages over many videos are made from it.
 
     `seconds` is how much of the video was searched, `most` how many vehicles were shown at once.
-    `counts` are by name; `still` is a small picture as a data URI.
+    `counts` are by name, `conditions` say what makes them doubtful; `still` is a small picture as a
+    data URI.
     """
 
     model_config = ConfigDict(frozen=True)
@@ -42,6 +45,7 @@ class VideoFacts(BaseModel):
     most: int = Field(ge=0)
     still: str = Field(pattern=r"^data:image/jpeg;base64,[A-Za-z0-9+/=]*$")
     counts: dict[str, int] = {}
+    conditions: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,6 +95,8 @@ class VideoPage:
         Times without frames, from the frame before to the one after, seconds.
     zero
         Second of the day at time 0; None where it is not known.
+    findings
+        What makes the results doubtful.
     """
 
     video: VideoInfo
@@ -106,6 +112,7 @@ class VideoPage:
     interval: int = 60
     gaps: Sequence[tuple[float, float]] = ()
     zero: float | None = None
+    findings: Sequence[Finding] = ()
 
     @property
     def facts(self) -> VideoFacts:
@@ -117,6 +124,7 @@ class VideoPage:
             most=self.most,
             still=_NO_PICTURE if self.poster is None else jpeg_uri(self.poster, _SMALL),
             counts=self._totals,
+            conditions=tuple(each.text for each in self.findings if each.severity == "warning"),
         )
 
     def html(self) -> str:
@@ -176,8 +184,18 @@ class VideoPage:
         """When each vehicle is shown; those that are not there at once share a row."""
         shown = self.shown
         rows = charts.pack((record.first, record.last) for record in shown)
-        spans = [span for each, row in zip(shown, rows, strict=True) for span in _spans(each, row)]
-        return Timeline("When each vehicle is shown", self._times, spans)
+        doubts = [
+            Span(0, first, last, each.text, *_DOUBT, each.code, first)
+            for each in self.findings
+            for first, last in each.spans
+        ]
+        above = bool(doubts)  # their row is the first one
+        spans = [
+            span
+            for each, row in zip(shown, rows, strict=True)
+            for span in _spans(each, row + above)
+        ]
+        return Timeline("When each vehicle is shown", self._times, [*doubts, *spans])
 
     @property
     def interval_plots(self) -> list[Plot]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 from statistics import fmean
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from vdet.boxes import NO_BOXES, Boxes, Image
 from vdet.config.schema import Settings
@@ -17,10 +17,13 @@ from vdet.detect.protocol import DetectorModel, VideoDetector
 from vdet.errors import ConfigError, ImageError, VdetError
 from vdet.media import Frame, VideoInfo
 from vdet.run.result import FrameResult
-from vdet.run.steps import ParallelStep, Step, StepContext, make_steps
+from vdet.run.steps import ConditionStep, ParallelStep, Step, StepContext, make_steps
 from vdet.run.threads import map_ordered
 from vdet.track.factory import make_tracker, timed
 from vdet.track.track import TimedTracker, Track, VideoTracker
+
+if TYPE_CHECKING:
+    from vdet.conditions.watch import Conditions
 
 FIRST_FRAMES = 2
 """Number of frames that `DetectorModel.for_video` gets."""
@@ -114,6 +117,12 @@ class Pipeline:
     rate: SearchRate = EVERY_FRAME
     look_ahead: Fraction = Fraction(0)
     is_still: bool = False
+
+    @property
+    def conditions(self) -> "Conditions | None":
+        """What makes the results so far doubtful; None for a still picture."""
+        own = (step.conditions for step in self.steps if isinstance(step, ConditionStep))
+        return next(own, None)
 
     def follow(
         self, frames: Iterable[Frame], source: Path = Path(), *, threads: int = 1
@@ -224,7 +233,8 @@ def build(
     height, width = (video.height, video.width) if video else images[0].shape[:2]
     settings.camera.check_frames(width, height)
     detector = model.for_video(width, height, images)
-    made = make_steps(StepContext(settings, width, height, video), steps)
+    unknown = getattr(detector, "unknown_classes", ())
+    made = make_steps(StepContext(settings, width, height, video, unknown), steps)
     if video is None:
         return Pipeline(detector, timed(StillTracker()), made, is_still=True)
     followed_by = timed(tracker) if tracker else make_tracker(settings, width, height)

@@ -16,6 +16,7 @@ from vdet.run.result import FrameResult
 from vdet.track.track import Track
 
 if TYPE_CHECKING:
+    from vdet.conditions.watch import Conditions
     from vdet.lanes.road import FrameView, Road, RoadFinder
     from vdet.regions import Regions
 
@@ -48,12 +49,15 @@ class StepContext:
         Size of the frames, pixels.
     video
         None for a still picture.
+    unknown
+        Classes that the settings ask for and the detector does not know.
     """
 
     settings: Settings
     width: int
     height: int
     video: VideoInfo | None = None
+    unknown: Sequence[str] = ()
 
 
 def make_steps(context: StepContext, others: Sequence[Step] = ()) -> list[Step]:
@@ -67,7 +71,7 @@ def make_steps(context: StepContext, others: Sequence[Step] = ()) -> list[Step]:
         There is no step with a name in `settings.steps.names`.
     """
     chosen = [load_plugin(STEPS, name) for name in context.settings.steps.names]
-    steps = [make(context) for make in (lane_step, region_step, *chosen)]
+    steps = [make(context) for make in (condition_step, lane_step, region_step, *chosen)]
     return [step for step in (*steps, *others) if step is not None]
 
 
@@ -124,6 +128,30 @@ class RegionStep:
         return replace(result, detections=detections, tracks=tracks)
 
 
+class ConditionStep:
+    """Watches what makes the results doubtful; it changes none."""
+
+    def __init__(self, conditions: "Conditions") -> None:
+        self.conditions = conditions
+
+    def apply(self, result: FrameResult) -> FrameResult:
+        """Look at a frame that was searched."""
+        if result.searched:
+            frame = result.frame
+            found = float(frame.time), frame.picture, result.detections, result.tracks
+            self.conditions.add(*found)
+        return result
+
+
+def condition_step(context: StepContext) -> Step | None:
+    """Make a `ConditionStep` for a video."""
+    if context.video is None:
+        return None
+    from vdet.conditions.watch import Conditions
+
+    return ConditionStep(Conditions(context.settings, context.width, context.unknown))
+
+
 def lane_step(context: StepContext) -> Step | None:
     """Make a `LaneStep` if lanes are looked for."""
     settings = context.settings
@@ -131,7 +159,8 @@ def lane_step(context: StepContext) -> Step | None:
         return None
     from vdet.lanes.road import RoadFinder
 
-    roads = RoadFinder(settings.camera.lens, settings.lanes, context.width, context.height)
+    camera = settings.camera.lens, settings.lanes, context.width, context.height
+    roads = RoadFinder(*camera, has_metres=not settings.missing_for_metres)
     return LaneStep(roads, settings.detector.foot)
 
 

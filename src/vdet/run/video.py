@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from vdet.boxes import NO_BOXES
+from vdet.conditions.finding import Finding
 from vdet.config.schema import Settings
 from vdet.detect.factory import as_model
 from vdet.detect.protocol import DetectorModel, stage_pictures_of
@@ -102,6 +103,8 @@ class RunTotals:
         Wall time.
     clock
         When the video was recorded, if that is known.
+    findings
+        What makes the results doubtful.
     summaries
         What sinks say of their outputs, by the path of the output.
     """
@@ -113,6 +116,7 @@ class RunTotals:
     seconds: float
     clock: Clock | None = None
     summaries: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -248,7 +252,8 @@ def run_video(
     )
     pairs = zip(run.outputs, sinks, strict=True)
     summaries = {str(output.path): sink.summary for output, sink in pairs if sink.summary}
-    return RunTotals(info.width, info.height, frames, len(ids), seconds, context.clock, summaries)
+    size, found = (info.width, info.height), (context.clock, summaries, context.findings)
+    return RunTotals(*size, frames, len(ids), seconds, *found)
 
 
 def _context(run: Run, files: OutputFiles, video: OpenVideo) -> SinkContext:
@@ -264,6 +269,7 @@ def _context(run: Run, files: OutputFiles, video: OpenVideo) -> SinkContext:
         timeout=run.timeout,
         outputs=run.outputs,
         traffic=video.traffic,
+        conditions=video.pipeline.conditions,
         stage_pictures=stage_pictures_of(video.pipeline.detector),
     )
 

@@ -67,6 +67,16 @@ class NetworkDetector:
     numbers: Int32Array
     settings: NetworkSettings
 
+    @property
+    def unknown_classes(self) -> tuple[str, ...]:
+        """Classes of the settings that the network does not know; some are asked for by default."""
+        usual = NetworkSettings().classes
+        return tuple(
+            name
+            for number, name in enumerate(self.settings.classes)
+            if number not in self.numbers and name not in usual
+        )
+
     def search(self, picture: Picture, index: int | None) -> Candidates:
         """Return the vehicles, in pixels of the frame."""
         network = self.for_stills if index is None else self.network

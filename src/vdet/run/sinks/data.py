@@ -127,6 +127,20 @@ class VehicleSink(BaseSink):
         self._records.add(result.frame_tracks)
 
 
+class ConditionSink(BaseSink):
+    """Writes what makes the results of a video doubtful, at the end: a list of findings."""
+
+    def finish(self) -> None:
+        """Write the findings."""
+        found = [finding.record() for finding in self.context.findings]
+        self.context.files.stage(self.path).write_text(json.dumps(found, indent=2) + "\n", "utf-8")
+
+    def write(self, result: FrameResult) -> None:
+        """Do nothing: the run watches the conditions."""
+
+
+CONDITIONS = SinkKind(ConditionSink, (".json",), "findings", takes="videos")
+
 VEHICLES = SinkKind(
     VehicleSink, SUFFIXES, "records of vehicles", takes="videos", total=of_files(join_records)
 )

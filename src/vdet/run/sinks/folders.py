@@ -154,6 +154,7 @@ class PageSink(BaseSink):
             interval=settings.traffic.seconds or 60,
             gaps=self._gaps,
             zero=clock.second_of_day if clock else None,
+            findings=self.context.findings,
         )
 
     def _player(self) -> Player | None:

@@ -8,6 +8,8 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any, Literal, Protocol, Self
 
+from vdet.conditions.finding import Finding
+from vdet.conditions.watch import Conditions
 from vdet.config.schema import Settings
 from vdet.detect.protocol import StagePictures
 from vdet.errors import OutputError
@@ -65,6 +67,8 @@ class SinkContext:
         All outputs of the run, for a sink that refers to another.
     traffic
         The counts and the speeds of a video, up to the latest result; None for still pictures.
+    conditions
+        What makes the results of a video doubtful, up to the latest one; None for still pictures.
     stage_pictures
         Returns a picture of each stage of the detection by its name, in order. It takes the image
         of a frame and its detections.
@@ -80,7 +84,13 @@ class SinkContext:
     timeout: float | None = None
     outputs: tuple[Output, ...] = ()
     traffic: LiveTraffic | None = None
+    conditions: Conditions | None = None
     stage_pictures: StagePictures = lambda *_: {}
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What makes the results doubtful so far."""
+        return self.conditions.findings() if self.conditions else ()
 
 
 class BaseSink:

@@ -1,0 +1,67 @@
+"""A finding: what makes a result doubtful, from when to when, and how much."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from vdet.config.conditions import Code
+
+Span = tuple[float, float]
+"""From when to when, seconds as in the tracks."""
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """What makes a result doubtful.
+
+    Attributes
+    ----------
+    code
+        What it is, in short: `conditions.ignore` leaves findings out by it.
+    text
+        A sentence: what was found, and what it means.
+    spans
+        When, in order; none if it holds for the whole video.
+    severity
+        "warning": the result may be wrong. "note": good to know.
+    value
+        How much, where there is a measure: the fraction of the frame's width, of the motion, or of
+        the vehicles that the network finds.
+    """
+
+    code: Code
+    text: str
+    spans: tuple[Span, ...] = ()
+    severity: Literal["warning", "note"] = "warning"
+    value: float | None = None
+
+    def record(self) -> dict[str, Any]:
+        """Return it as values for JSON; times are rounded to milliseconds."""
+        times = [[round(first, 3), round(last, 3)] for first, last in self.spans]
+        value = None if self.value is None else round(self.value, 3)
+        known = {"code": self.code, "severity": self.severity, "text": self.text}
+        return {**known, "times": times, "value": value}
+
+
+def joined(times: Iterable[float], gap: float) -> list[Span]:
+    """Return the spans of ascending times that are at most `gap` seconds apart."""
+    spans: list[Span] = []
+    for time in times:
+        if spans and time - spans[-1][1] <= gap:
+            spans[-1] = spans[-1][0], time
+        else:
+            spans.append((time, time))
+    return spans
+
+
+def when(spans: Sequence[Span]) -> str:
+    """Return "from 0:05 to 0:32"; of several spans, the longest and how many more there are."""
+    first, last = max(spans, key=lambda span: span[1] - span[0])
+    others = f" (and {len(spans) - 1} more)" if len(spans) > 1 else ""
+    return f"from {_clock(first)} to {_clock(last)}{others}"
+
+
+def _clock(seconds: float) -> str:
+    minutes, seconds = divmod(int(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02}:{seconds:02}" if hours else f"{minutes}:{seconds:02}"
