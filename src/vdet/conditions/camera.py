@@ -50,6 +50,7 @@ class CameraWatch:
         self._place = np.zeros((4, 2))
         self._since = self._found = 0.0
         self._stood: list[bool] = []
+        self._lost: list[bool] = []
 
     def add(self, time: float, plane: Image, boxes: Iterable[Box]) -> bool:
         """Add the next plane, uint8 `(h, w)`; return whether the camera stands as before.
@@ -62,6 +63,7 @@ class CameraWatch:
         self.times.append(time)
         self.places.append(self._place + moved / plane.shape[1])
         is_found = bool(np.isfinite(moved).all())
+        self._lost.append(not is_found and len(self._points) >= _FEWEST)
         self._found = time if is_found else self._found
         late = time - self._since > _RENEWED if is_found else time - self._found > _GIVEN_UP
         if self._plane is None or late:
@@ -87,7 +89,7 @@ class CameraWatch:
         places, times = np.array(self.places), np.array(self.times)
         base = np.nanmedian(places[:5], axis=0)  # the first is known
         off = np.hypot(*np.moveaxis(places - base, -1, 0)).mean(axis=1)
-        away = np.isnan(off) & is_clear | (off > _LIMIT)
+        away = np.array(self._lost) & is_clear | (off > _LIMIT)
         spans = [span for span in joined(times[away].tolist(), _GAP) if _is_real(off, times, span)]
         if not spans:
             return []

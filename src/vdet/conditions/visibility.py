@@ -28,8 +28,8 @@ _LEAST = 1.0
 """Seconds of bad sight that are reported."""
 _GAP = 2.0
 """Seconds of good sight that end a span."""
-_SMOOTH = 5
-"""Number of planes whose measures count together."""
+_AROUND = 2
+"""Number of planes before and after one whose reasons count with its own."""
 _SURE = 0.4
 """Score of a vehicle that is shown."""
 _NOTED = 0.65
@@ -93,7 +93,7 @@ def findings(times: Sequence[float], sights: Sequence[Sight], *, is_shipped: boo
 
     `is_shipped` says whether the shipped network was used: what it finds is known.
     """
-    codes = [_usual(sights[max(0, n - _SMOOTH + 1) : n + 1]) for n in range(len(sights))]
+    codes = [_usual(sights[max(0, n - _AROUND) : n + _AROUND + 1]) for n in range(len(sights))]
     found = []
     for code, words in _WORDS.items():
         bad = [time for time, each in zip(times, codes, strict=True) if each == code]

@@ -52,9 +52,9 @@ class Conditions:
             return
         plane = small_luma(picture)
         scale = plane.shape[1] / picture.width
-        boxes = [_enlarged(track.box, scale) for track in tracks]
+        boxes = {track.id: _enlarged(track.box, scale) for track in tracks}
         self._times.append(time)
-        if not self._camera.add(time, plane, boxes):
+        if not self._camera.add(time, plane, boxes.values()):
             self._motion.reset()
         self._motion.add(time, plane, boxes)
         scores = np.array([each.score for each in found], np.float64)

@@ -8,7 +8,7 @@ from vdet.config.section import Section
 
 Code = Literal[
     "camera-moves", "camera-moved", "unexplained-motion", "dark", "haze", "blur",
-    "lane-geometry", "lens", "classes", "small-frames",
+    "lane-geometry", "classes", "small-frames",
 ]  # fmt: skip
 """What makes a result doubtful; docs/conditions.md explains each."""
 
@@ -18,5 +18,5 @@ class ConditionSettings(Section):
 
     ignore: tuple[Code, ...] = Field((), max_length=100)
     """Codes of findings to leave out: camera-moves, camera-moved, unexplained-motion, dark, haze,
-    blur, lane-geometry, lens, classes, small-frames.
+    blur, lane-geometry, classes, small-frames.
     """

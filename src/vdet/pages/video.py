@@ -26,6 +26,7 @@ _MOST_VEHICLES = 300  # that are shown one by one
 _SPEED_STEP = 5  # km/h, of the classes of speeds
 _SMALL = 200  # columns of the still in the pages over many videos
 _DOUBT = "#f3d9a4", "#333"  # colours of the row that says when the results are doubtful
+_STOOD = {"standing": "standing", "unknown": "not seen moving"}
 _NO_PICTURE = "data:image/jpeg;base64,"
 
 
@@ -120,7 +121,7 @@ class VideoPage:
         return VideoFacts(
             seconds=max(0.0, self.seconds),
             frames=self.frames,
-            vehicles=len(self.records),
+            vehicles=sum(record.has_driven for record in self.records),
             most=self.most,
             still=_NO_PICTURE if self.poster is None else jpeg_uri(self.poster, _SMALL),
             counts=self._totals,
@@ -156,12 +157,16 @@ class VideoPage:
     @property
     def figures(self) -> list[tuple[str, str]]:
         """The key figures."""
-        count = len(self.records)
-        shown = sum(record.seconds for record in self.records) / max(1, count)
-        classes = Counter(record.class_name for record in self.records if record.class_name)
+        count = sum(record.has_driven for record in self.records)
+        stood = Counter(each.motion for each in self.records if not each.has_driven)
+        shown = sum(record.seconds for record in self.records) / max(1, len(self.records))
+        classes = Counter(
+            each.class_name for each in self.records if each.class_name and each.has_driven
+        )
         return [
             (named(count, "vehicle"), str(count)),
             *((named(n, name), str(n)) for name, n in classes.most_common(4)),
+            *((_STOOD[motion], str(n)) for motion, n in stood.items() if motion in _STOOD),
             ("most at once", str(self.most)),
             ("mean seconds shown", f"{shown:.1f}"),
             *((name, str(count)) for name, count in self._totals.items()),

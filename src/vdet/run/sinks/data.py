@@ -119,7 +119,9 @@ class VehicleSink(BaseSink):
     def finish(self) -> None:
         """Write the records."""
         traffic = self.context.traffic
-        records = self._records.end(traffic.speeds if traffic else None)
+        records = self._records.end(
+            traffic.speeds if traffic else None, is_still=self.context.is_still
+        )
         write_records(records, self.context.files.stage(self.path), self.context.clock)
 
     def write(self, result: FrameResult) -> None:

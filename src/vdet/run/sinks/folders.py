@@ -145,7 +145,9 @@ class PageSink(BaseSink):
             frames=self._frames,
             start=self._start,
             end=self._last + float(1 / self.video.rate),
-            records=self._records.end(traffic.speeds if traffic else None),
+            records=self._records.end(
+                traffic.speeds if traffic else None, is_still=self.context.is_still
+            ),
             thumbnails=self._thumbnails,
             poster=self._fullest.image if self._fullest else None,
             player=self._player(),

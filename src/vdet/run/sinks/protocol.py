@@ -92,6 +92,11 @@ class SinkContext:
         """What makes the results doubtful so far."""
         return self.conditions.findings() if self.conditions else ()
 
+    @property
+    def is_still(self) -> bool:
+        """Whether the camera stood still so far."""
+        return self.conditions is not None and self.conditions.is_still
+
 
 class BaseSink:
     """What most sinks have in common: they finish where the run ends without an error.
