@@ -236,7 +236,7 @@ class SettingsChoice:
 def warn_of_lanes(settings: "Settings") -> None:
     """Warn if the lane is looked for with a camera that is not described."""
     if settings.lanes.enabled and (missing := settings.missing_for_metres):
-        log.warning("the lane has no metres: %s not given", " and ".join(missing))
+        log.warning("lanes: nothing is given in metres without %s", ", ".join(missing))
 
 
 def settings_options(example: str, *more: Callable[..., Any]) -> Callable[[F], F]:

@@ -119,7 +119,7 @@ class CameraWatch:
         if len(self._points) < _FEWEST:
             return unknown
         found, status, _ = cv2.calcOpticalFlowPyrLK(
-            self._plane, plane, self._points, np.empty(0), winSize=(9, 9), maxLevel=3
+            self._plane, plane, self._points, np.empty(0), winSize=(9, 9), maxLevel=2
         )
         seen = status.ravel() > 0
         if seen.sum() < _FEWEST:

@@ -86,7 +86,7 @@ class MotionWatch:
         self._background, self._movers = None, []
 
     def add(self, time: float, plane: Image, boxes: Mapping[int, Box]) -> None:
-        """Add the next plane, uint8 `(h, w)`; `boxes` are those of vehicles by id, in its pixels."""
+        """Add the next plane, uint8 `(h, w)`; `boxes` are those of vehicles by id, its pixels."""
         step, self._time = time - self._time, time
         before, self._covered = self._covered, np.zeros_like(plane)
         for number, box in boxes.items():

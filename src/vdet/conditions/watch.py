@@ -78,7 +78,7 @@ class Conditions:
         found = []
         settings = self._settings
         if settings.lanes.enabled and (missing := settings.missing_for_metres):
-            text = f"the lane and the vehicles have no metres: {' and '.join(missing)} not given"
+            text = f"lanes: nothing is given in metres without {', '.join(missing)}"
             found.append(Finding("lane-geometry", text))
         if self._unknown:
             names = ", ".join(self._unknown)
