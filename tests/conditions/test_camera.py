@@ -34,7 +34,7 @@ def watched(place: Callable[[float], Place], seconds: float = 20.0) -> CameraWat
 
 def codes(watch: CameraWatch) -> list[tuple[str, float]]:
     """Return the code and the start of each finding."""
-    is_clear = np.ones(len(watch.times), bool)
+    is_clear = np.ones(len(watch._times), bool)
     return [(each.code, each.spans[0][0]) for each in watch.findings(is_clear)]
 
 
@@ -47,7 +47,7 @@ def test_a_camera_that_stands_or_trembles_a_little_is_still() -> None:
 def test_a_camera_that_is_bumped_stands_differently_from_then_on() -> None:
     watch = watched(lambda time: (0, 0, 0) if time < 8 else (6, -3, 1.5))
     assert codes(watch) == [("camera-moved", 8.0)]
-    (finding,) = watch.findings(np.ones(len(watch.times), bool))
+    (finding,) = watch.findings(np.ones(len(watch._times), bool))
     assert finding.spans == ((8.0, 19.75),)
     assert finding.value == pytest.approx(np.hypot(6, 3) / WIDTH, rel=0.15)
     assert "moved at 0:08" in finding.text

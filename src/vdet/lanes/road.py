@@ -133,12 +133,15 @@ class Road:
     lane: Lane | None
     """The lane, smoothed over this frame and those before; None if it is not reliably known."""
     curves: LaneCurves | None
-    """The lines of `lane` on the ground; None if there is no lane."""
+    """The lines of `lane` on the ground; None without a lane, or without metres."""
     top_view: TopView
     undistorter: Undistorter
     """Moves boxes and points of the frame to the undistorted one."""
-    has_metres: bool = True
-    """Whether the camera is described, so that places on the road are known."""
+
+    def without_metres(self) -> "Road":
+        """Return the road as a camera sees it that nobody described."""
+        lane = self.lane and replace(self.lane, radius=None, offset=None, width=None)
+        return replace(self, lane=lane, curves=None)
 
     def record(self) -> dict[str, Any] | None:
         """Return the lane as plain values for JSON."""
@@ -156,7 +159,7 @@ class Road:
         `foot` is `(x, y)` in pixels; whole numbers are the edges of pixels, as in boxes. None
         without a lane or metres, and where the lane does not reach: see `position_on_road`.
         """
-        if self.curves is None or not self.has_metres:
+        if self.curves is None:
             return None
         [[x, y]] = self.undistorter.points(np.array([foot]) - 0.5)
         return position_on_road((x, y), self.curves, self.top_view)
@@ -178,8 +181,7 @@ class RoadFinder:
     """Warps the frames of one video, `width` × `height` pixels, and finds the lane in them.
 
     Several threads may call `observe` at the same time. `update` must get the results one by one,
-    in the order of the frames. `has_metres` says whether the camera is described; else the lane is
-    found, but nothing is known in metres.
+    in the order of the frames.
 
     Raises
     ------
@@ -188,15 +190,8 @@ class RoadFinder:
     """
 
     def __init__(
-        self,
-        lens: LensSettings | None,
-        settings: LaneSettings,
-        width: int,
-        height: int,
-        *,
-        has_metres: bool = True,
+        self, lens: LensSettings | None, settings: LaneSettings, width: int, height: int
     ) -> None:
-        self._has_metres = has_metres
         self._undistorter = Undistorter(lens, width, height)
         self._top_view = TopView(settings, width, height)
         self._state: _LaneState | None = None
@@ -232,7 +227,7 @@ class RoadFinder:
         view = replace(view, mask=hide(view.mask, self._top_view, placed))
         self._state = state = self._next_state(view.mask)
         lane, curves = (self._lane(state), state.curves) if state else (None, None)
-        return Road(view, lane, curves, self._top_view, self._undistorter, self._has_metres)
+        return Road(view, lane, curves, self._top_view, self._undistorter)
 
     def _next_state(self, mask: Image) -> _LaneState | None:
         """Fit near the last lane; else find a new one; else keep the last one for some frames."""
@@ -249,8 +244,6 @@ class RoadFinder:
         z = self._lane_z
         lines = self._top_view.ground_to_frame(np.concatenate(curves.at(z)), np.tile(z, 2))
         left, right = np.split(self._undistorter.distorted(lines), 2)
-        if not self._has_metres:
-            return Lane(curvature, None, None, None, left, right)
         radius = None if abs(curvature) * _STRAIGHT < 1 else 1 / abs(curvature)
         offset = -(curves.left + curves.right) / 2
         return Lane(curvature, radius, offset, curves.width, left, right)

@@ -76,9 +76,10 @@ def make_steps(context: StepContext, others: Sequence[Step] = ()) -> list[Step]:
 
 
 class LaneStep:
-    """Finds the lane, and the distance and the lane of each vehicle."""
+    """Finds the lane, and with `has_metres` the distance and the lane of each vehicle."""
 
-    def __init__(self, roads: "RoadFinder", foot: float) -> None:
+    def __init__(self, roads: "RoadFinder", foot: float, *, has_metres: bool = True) -> None:
+        self._has_metres = has_metres
         self._roads = roads
         self._foot = foot
         self._views: dict[int, FrameView] = {}
@@ -91,6 +92,7 @@ class LaneStep:
         """Add the road, and where the vehicles are on it."""
         view = self._views.pop(result.frame.index)
         road = self._roads.update(view, (track.box for track in result.tracks))
+        road = road if self._has_metres else road.without_metres()
         return replace(result, road=road, tracks=with_positions(result.tracks, road, self._foot))
 
 
@@ -159,9 +161,9 @@ def lane_step(context: StepContext) -> Step | None:
         return None
     from vdet.lanes.road import RoadFinder
 
-    camera = settings.camera.lens, settings.lanes, context.width, context.height
-    roads = RoadFinder(*camera, has_metres=not settings.missing_for_metres)
-    return LaneStep(roads, settings.detector.foot)
+    roads = RoadFinder(settings.camera.lens, settings.lanes, context.width, context.height)
+    has_metres = not settings.missing_for_metres
+    return LaneStep(roads, settings.detector.foot, has_metres=has_metres)
 
 
 def region_step(context: StepContext) -> Step | None:
