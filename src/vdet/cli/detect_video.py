@@ -206,11 +206,16 @@ def _process_one(run: "Run") -> bool:
 
 
 def _warn(run: "Run", findings: "Iterable[Mapping[str, Any]]") -> bool:
-    """Print the warnings among the findings about a video; return whether there are some."""
-    warnings = [each for each in findings if each["severity"] == "warning"]
-    for each in warnings:
-        log.warning("%s: %s [%s]", run.source, each["text"], each["code"])
-    return bool(warnings)
+    """Print the findings about a video; return whether there is a warning among them."""
+    is_doubtful = False
+    for each in findings:
+        text = f"{run.source}: {each['text']} [{each['code']}]"
+        if each["severity"] == "warning":
+            is_doubtful = True
+            log.warning("%s", text)
+        elif not is_quiet():
+            print_message(text)
+    return is_doubtful
 
 
 def _read_suffixes(wanted: Sequence[options.Wanted], *, no_video: bool) -> "list[OutputSuffix]":

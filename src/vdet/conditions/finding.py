@@ -8,6 +8,7 @@ from vdet.config.conditions import Code
 
 Span = tuple[float, float]
 """From when to when, seconds as in the tracks."""
+Severity = Literal["warning", "note"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +33,7 @@ class Finding:
     code: Code
     text: str
     spans: tuple[Span, ...] = ()
-    severity: Literal["warning", "note"] = "warning"
+    severity: Severity = "warning"
     value: float | None = None
 
     def record(self) -> dict[str, Any]:

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from vdet.boxes import Float64Array, Image
-from vdet.conditions.finding import Finding, Span, joined, when
+from vdet.conditions.finding import Finding, Severity, joined, when
 from vdet.config.conditions import Code
 
 _TOP = 0.35
@@ -22,17 +22,19 @@ _HAZY = 0.07
 """Local contrast of what is hazy, as a fraction of the mean."""
 _BLURRED = 0.3
 """Fine contrast of what is blurred, as a fraction of the coarse."""
+_DOUBTED = 0.5, 1.2
+"""Recall below which these limits are wider, by this factor: the scores say the same."""
 _PLAIN = 1.0
 """Local contrast of a plane that shows nothing to be seen, grey levels."""
-_LEAST = 1.0
-"""Seconds of bad sight that are reported."""
+_LEAST = 3.0
+"""Seconds of bad sight that are reported, or half of a shorter video; an underpass is shorter."""
 _GAP = 2.0
 """Seconds of good sight that end a span."""
 _AROUND = 2
 """Number of planes before and after one whose reasons count with its own."""
 _SURE = 0.4
 """Score of a vehicle that is shown."""
-_NOTED = 0.65
+_NOTED = 0.6
 """Recall from which bad sight is only noted."""
 _WEIGHTS = np.array([-0.18, 0.56, 2.31, -4.58, 3.02])
 _BIAS = 0.71
@@ -75,11 +77,13 @@ class Sight:
         """Why one does not see well; None if one does."""
         if self.contrast < _PLAIN:
             return None
-        if self.brightness < _DARK:
+        recall, factor = _DOUBTED
+        wide = factor if self.recall < recall else 1.0
+        if self.brightness < wide * _DARK:
             return "dark"
-        if self.contrast < _HAZY * (self.brightness + 5):
+        if self.contrast < wide * _HAZY * (self.brightness + 5):
             return "haze"
-        return "blur" if self.sharpness < _BLURRED else None
+        return "blur" if self.sharpness < wide * _BLURRED else None
 
     @property
     def recall(self) -> float:
@@ -93,32 +97,26 @@ def findings(times: Sequence[float], sights: Sequence[Sight], *, is_shipped: boo
 
     `is_shipped` says whether the shipped network was used: what it finds is known.
     """
+    least = min(_LEAST, (times[-1] - times[0]) / 2) if times else _LEAST
     codes = [_usual(sights[max(0, n - _AROUND) : n + _AROUND + 1]) for n in range(len(sights))]
     found = []
     for code, words in _WORDS.items():
-        bad = [time for time, each in zip(times, codes, strict=True) if each == code]
-        spans = [span for span in joined(bad, _GAP) if span[1] - span[0] >= _LEAST]
-        if spans:
-            inside = [s for t, s in zip(times, sights, strict=True) if _is_in(t, spans)]
-            recall = float(np.mean([sight.recall for sight in inside])) if is_shipped else None
-            found.append(_finding(code, words, spans, recall))
+        bad = dict.fromkeys(time for time, each in zip(times, codes, strict=True) if each == code)
+        spans = [span for span in joined(bad, _GAP) if span[1] - span[0] >= least]
+        if not spans:
+            continue
+        tells, recall = "fewer vehicles are found in such pictures", None
+        if is_shipped:
+            seen = [sight.recall for time, sight in zip(times, sights, strict=True) if time in bad]
+            recall = float(np.mean(seen))
+            tells = f"in such pictures the network finds about {10 * recall:.0f} of 10 vehicles"
+        severity: Severity = "warning" if recall is None or recall < _NOTED else "note"
+        text = f"{words} {when(spans)}: {tells}"
+        found.append(Finding(code, text, tuple(spans), severity, recall))
     return found
-
-
-def _finding(code: Code, words: str, spans: list[Span], recall: float | None) -> Finding:
-    tells = "fewer vehicles are found in such pictures"
-    if recall is not None:
-        tells = f"in such pictures the network finds about {10 * recall:.0f} of 10 vehicles"
-    is_bad = recall is None or recall < _NOTED
-    text = f"{words} {when(spans)}: {tells}"
-    return Finding(code, text, tuple(spans), "warning" if is_bad else "note", recall)
 
 
 def _usual(sights: Sequence[Sight]) -> Code | None:
     """Return the code that most of them have."""
     codes = [sight.code for sight in sights]
     return max(codes, key=lambda code: (codes.count(code), code is None))
-
-
-def _is_in(time: float, spans: Sequence[Span]) -> bool:
-    return any(first <= time <= last for first, last in spans)
