@@ -75,14 +75,12 @@ class Conditions:
 
     def _of_settings(self) -> list[Finding]:
         """Return what the settings and the size of the frames make doubtful."""
-        found = []
-        settings = self._settings
+        found, settings = [], self._settings
         if settings.lanes.enabled and (missing := settings.missing_for_metres):
             text = f"lanes: nothing is given in metres without {', '.join(missing)}"
             found.append(Finding("lane-geometry", text))
         if self._unknown:
-            names = ", ".join(self._unknown)
-            text = f"detector.classes: the network does not know {names}; it finds none of them"
+            text = f"detector.classes: the network does not know {', '.join(self._unknown)}"
             found.append(Finding("classes", text))
         if self._width < _NARROW:
             text = f"frames are {self._width} pixels wide, fewer than detectors are measured on"
@@ -94,17 +92,17 @@ def small_luma(picture: Picture) -> Image:
     """Return the luma of a picture, full range, at most `_WIDTH` pixels wide, uint8 `(h, w)`."""
     width = min(_WIDTH, picture.width)
     size = width, max(1, round(picture.height * width / picture.width))
-    if planes := picture.planes:
-        small = cv2.resize(planes.luma, size, interpolation=cv2.INTER_AREA)
-        if not planes.coding.full_range:
-            small = cv2.convertScaleAbs(cv2.subtract(small, np.array([16.0])), alpha=255 / 219)
-        return np.asarray(small, np.uint8)
-    small = cv2.resize(picture.image, size, interpolation=cv2.INTER_AREA)
-    return np.asarray(cv2.cvtColor(small, cv2.COLOR_BGR2GRAY), np.uint8)
+    planes = picture.planes
+    pixels = planes.luma if planes else picture.image
+    small = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)
+    if planes is None:
+        small = cv2.cvtColor(small, cv2.COLOR_BGR2GRAY)
+    elif not planes.coding.full_range:
+        small = cv2.convertScaleAbs(small, alpha=255 / 219, beta=-16 * 255 / 219)
+    return np.asarray(small, np.uint8)
 
 
 def _enlarged(box: Box, scale: float) -> Box:
     """Return a box in pixels of a plane, with a vehicle's shadow around it."""
-    x, y = box.width / 4, box.height / 4
-    sides = box.x1 - x, box.y1 - y, box.x2 + x, box.y2 + y
-    return Box(*(scale * side for side in sides))
+    x, y, width, height = (scale * side for side in (box.x1, box.y1, box.width, box.height))
+    return Box.sized(x - width / 4, y - height / 4, 1.5 * width, 1.5 * height)

@@ -70,12 +70,9 @@ class NetworkDetector:
     @property
     def unknown_classes(self) -> tuple[str, ...]:
         """Classes of the settings that the network does not know; some are asked for by default."""
-        usual = NetworkSettings().classes
-        return tuple(
-            name
-            for number, name in enumerate(self.settings.classes)
-            if number not in self.numbers and name not in usual
-        )
+        known = [self.settings.classes[number] for number in self.numbers if number >= 0]
+        known += NetworkSettings().classes
+        return tuple(name for name in self.settings.classes if name not in known)
 
     def search(self, picture: Picture, index: int | None) -> Candidates:
         """Return the vehicles, in pixels of the frame."""
