@@ -35,6 +35,7 @@ def test_a_record_is_there_as_soon_as_it_is_added(tmp_path: Path) -> None:
         "tracks": 1,
         "begin": None,
         "warnings": [],
+        "conditions": [],
         "error": None,
         "digest": None,
         "sizes": {},
