@@ -106,7 +106,7 @@ def _change(kind: str, rng: np.random.Generator) -> Callable[[Image, float], Ima
     """Return a function that changes an image at a time."""
     grey, veil = rng.uniform(150, 210), rng.uniform(0.7, 0.9)
     gain, gamma = rng.uniform(0.15, 0.35), rng.uniform(1.3, 2.0)
-    sigma = rng.uniform(4, 8)
+    sigma = rng.uniform(6, 10)
     far, phase, turn = rng.uniform(0.02, 0.05), rng.uniform(0, 2 * np.pi, 3), rng.uniform(-2, 2)
 
     def moved(image: Image, x: float, y: float, degrees: float) -> Image:

@@ -35,7 +35,7 @@ class CameraWatch:
     """Follows the place of the camera through the planes of one video."""
 
     def __init__(self) -> None:
-        self._even = cv2.createCLAHE(40, (10, 6))
+        self._even = cv2.createCLAHE(4, (10, 6))
         """Makes contrast even, so that light and fog do not matter (Zuiderveld 1994)."""
         self._times: list[float] = []
         self._places: list[Float64Array] = []
