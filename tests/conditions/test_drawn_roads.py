@@ -6,10 +6,12 @@ from benchmarks.conditions import EXPECTED, SETTINGS, Changed, drawn_road
 
 from vdet import load_settings
 from vdet.boxes import NO_BOXES
-from vdet.conditions.watch import Conditions
+from vdet.conditions.watch import Conditions, small_luma
 from vdet.config.conditions import ConditionSettings
 from vdet.config.schema import Settings
 from vdet.media import Picture
+from vdet.media.coding import Coding
+from vdet.media.frame import Planes
 
 
 @pytest.fixture(scope="module")
@@ -47,3 +49,11 @@ def test_findings_are_left_out_by_their_codes() -> None:
     ignoring = ConditionSettings(ignore=("lane-geometry", "small-frames"))
     lanes = load_settings((), ["lanes.enabled=true"])
     assert found(lanes.model_copy(update={"conditions": ignoring}), width=300) == []
+
+
+def test_a_plane_is_the_same_from_a_decoder_and_from_an_image() -> None:
+    image = np.random.default_rng(1).integers(40, 200, (90, 160, 3), np.uint8)
+    image = np.repeat(np.repeat(image, 4, axis=0), 4, axis=1)
+    decoded = small_luma(Picture(Planes.of_image(image, Coding())))
+    assert decoded.shape == (90, 160)
+    np.testing.assert_allclose(decoded.astype(float), small_luma(Picture(image)), atol=3)

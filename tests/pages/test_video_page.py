@@ -16,6 +16,7 @@ from pages.html import Elements
 from run.red_runs import video_info
 from traffic.passing import HEIGHT, WIDTH, frame, passing, summarize, track
 from vdet.boxes import Box
+from vdet.conditions.finding import Finding
 from vdet.pages.render import jpeg_uri, link_to
 from vdet.pages.video import Player, VideoPage, write_index
 from vdet.track.track import FrameTracks
@@ -188,6 +189,29 @@ def test_the_facts_have_the_counts() -> None:
     facts = replace(page(), counts=counts).facts
     assert (facts.frames, facts.vehicles, facts.most) == (52, 2, 1)
     assert facts.counts == {"</script><b>: in": 8}
+
+
+class TestDoubts:
+    FINDING = Finding("dark", "it <was> dark", ((0.5, 1.5),), "warning", 0.3)
+
+    def test_what_makes_it_doubtful_is_listed_with_its_times(self) -> None:
+        made = seen(replace(page(), findings=(self.FINDING,)))
+        assert "it <was> dark" in made.text
+        assert "How far to trust it" in made.text
+        assert "How far to trust it" not in seen(page()).text
+
+    def test_its_times_are_a_row_above_the_vehicles(self) -> None:
+        plain, marked = (replace(page(), findings=each).timeline for each in ((), (self.FINDING,)))
+        band, *vehicles = marked.spans
+        assert (band.row, band.first, band.last, band.label) == (0, 0.5, 1.5, "dark")
+        assert [each.row - 1 for each in vehicles] == [each.row for each in plain.spans]
+
+    def test_vehicles_that_stood_are_counted_apart(self) -> None:
+        stood = [replace(record, motion="standing") for record in TWO]
+        made = replace(page(), records=[replace(TWO[0], motion="drove"), *stood[1:]])
+        assert made.figures[0] == ("vehicle", "1")
+        assert ("standing", "1") in made.figures
+        assert made.facts.vehicles == 1
 
 
 class TestIndex:
