@@ -8,9 +8,10 @@ from pathlib import Path
 
 from benchmarks.plain import transcode
 from benchmarks.rounds import Task, measure_both
-from vdet.config.camera import CameraSettings, GroundPoint, LensSettings
+from vdet.config.camera import CameraSettings, GroundPoint
+from vdet.config.loading import find_config, load_settings
 from vdet.config.places import LineSettings, RegionSettings, TrafficSettings, ZoneSettings
-from vdet.config.schema import DrawSettings, InputSettings, LaneSettings, Settings, SvmSettings
+from vdet.config.schema import DrawSettings, InputSettings, Settings, SvmSettings
 from vdet.detect.factory import load_detector
 from vdet.detect.protocol import DetectorModel
 from vdet.media.images import write_image
@@ -19,15 +20,6 @@ from vdet.run.sinks.protocol import Output
 from vdet.run.video import Run, run_video
 
 FRAMES = 250
-LENS = LensSettings(
-    width=1280,
-    height=720,
-    matrix=((1157, 0, 668), (0, 1153, 388), (0, 0, 1)),
-    distortion=(-0.25, 0.0, 0.0, 0.0, 0.0),
-    rms=0.0,
-)
-"""Similar to the project video's camera; the numbers do not change the time of undistortion."""
-
 REGION = RegionSettings(name="all", points=((0, 0), (1, 0), (1, 1), (0, 1)))
 """It leaves nothing out."""
 
@@ -65,7 +57,7 @@ def run_times(path: Path, folder: Path, rounds: int) -> dict[str, tuple[float, f
     video = (Output("video", out),)
     files = Output("counts", folder / "counts.csv"), Output("vehicles", folder / "cars.csv")
     default, svm = Settings(), Settings(detector=SvmSettings())
-    lanes = Settings(camera=CameraSettings(lens=LENS), lanes=LaneSettings(enabled=True))
+    lanes = load_settings([find_config("project-camera")], ["lanes.enabled=true"])
     answering = Settings(regions=(REGION,), traffic=TRAFFIC, draw=DrawSettings(trails=2))
     counting = Settings(
         traffic=TRAFFIC,

@@ -17,8 +17,8 @@ LONGEST = 400
 
 ROOMS = (
     "__main__", "process", "cli", "demo", "testing", "api", "batch", "learn", "evaluate", "run",
-    "pages", "traffic", "labels", "lanes", "track", "detect", "synthetic", "draw", "regions",
-    "media", "config", "plugins", "workers", "archives", "files", "polygons", "boxes",
+    "pages", "conditions", "traffic", "labels", "lanes", "track", "detect", "synthetic", "draw",
+    "regions", "media", "config", "plugins", "workers", "archives", "files", "polygons", "boxes",
     "errors", "progress", "system", "__init__", "version",
 )  # fmt: skip
 """From top to bottom: a room imports only what stands below it."""

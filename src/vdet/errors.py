@@ -1,12 +1,13 @@
 """Kinds of errors, each with the exit code of the program; names and numbers in messages.
 
 Exit codes: 0 success, 1 an error below, 2 wrong usage (click's own), 3 some files of a batch
-failed, 130 interrupted.
+failed, 4 a result is doubtful and `--strict` was given, 130 interrupted.
 A message is one line (a `ConfigError` may be several, one for each mistake): what is wrong, where,
 and what to do about it.
 """
 
 SOME_FAILED = 3
+DOUBTFUL = 4
 INTERRUPTED = 130
 _MAX_SHOWN = 80  # characters of a name
 

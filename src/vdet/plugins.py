@@ -40,6 +40,7 @@ _BUILT_IN: dict[str, dict[str, str]] = {
         "page": "vdet.run.sinks.folders:PAGE",
         "counts": "vdet.run.sinks.data:COUNTS",
         "flows": "vdet.run.sinks.data:FLOWS",
+        "conditions": "vdet.run.sinks.data:CONDITIONS",
     },
     FORMATS: {
         "mot": "vdet.labels.mot:MOT",

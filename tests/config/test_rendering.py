@@ -137,7 +137,7 @@ def test_the_config_svm_is_the_linear_model_with_a_longer_look_ahead() -> None:
 
 def test_no_other_config_ships() -> None:
     names = sorted(path.name for path in CONFIGS.iterdir())
-    assert names == ["default.yaml", "seed.yaml", "svm.yaml"]
+    assert names == ["default.yaml", "project-camera.yaml", "seed.yaml", "svm.yaml"]
 
 
 @pytest.mark.parametrize("settings", [Settings(), SEED, RULES], ids=["default", "seed", "rules"])

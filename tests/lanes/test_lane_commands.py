@@ -228,16 +228,18 @@ def test_the_lane_and_the_boxes_of_a_picture_are_reported_and_drawn(
     assert (drawn[CORNER] == read_image(files.picture)[CORNER]).all()
 
 
-def test_without_a_camera_no_distortion_is_corrected_and_one_warning_says_so(
-    run: Run, files: Files, road: Scene, tmp_path: Path
+def test_without_a_camera_the_lane_has_no_metres_and_one_warning_says_so(
+    run: Run, files: Files, tmp_path: Path
 ) -> None:
     pictures, out = (files.plain, files.bare), tmp_path / "out"
     result = run("detect-image", *pictures, "-o", out, "--json", "-", *files.red, "--lanes")
     plain, bare = read_json(result)
-    check_lane(plain["lane"], road.camera, Undistorter(None, WIDTH, HEIGHT))
+    assert [plain["lane"].pop(key) for key in ("radius", "offset", "width")] == [None] * 3
+    assert set(plain["lane"]) == {"left", "right"}
+    assert plain["boxes"] == []
     assert bare["lane"] is None
     assert result.err.count("warning") == 1
-    assert "lanes.enabled without camera.lens: lens distortion is not corrected" in result.err
+    assert "lanes: nothing is given in metres without camera.lens" in result.err
     assert (read_image(out / "bare.png") == read_image(files.bare)).all()
 
 

@@ -5,12 +5,14 @@ from pathlib import Path
 
 import pytest
 
-from vdet.config.schema import LaneSettings
+from vdet.config.loading import find_config, load_settings
 from vdet.lanes.calibration import Calibration, calibrate
 from vdet.lanes.road import Lane, RoadFinder
 from vdet.media import Picture
 from vdet.media.images import read_image
 from vdet.media.reader import VideoReader
+
+PROJECT_LANE = load_settings([find_config("project-camera")]).lanes
 
 pytestmark = pytest.mark.realdata
 
@@ -39,7 +41,7 @@ def test_the_real_camera_is_recovered(calibration: Calibration) -> None:
 
 
 def finder_of(calibration: Calibration) -> RoadFinder:
-    return RoadFinder(calibration.camera, LaneSettings(), 1280, 720)
+    return RoadFinder(calibration.camera, PROJECT_LANE, 1280, 720)
 
 
 def lane_in(calibration: Calibration, path: Path) -> Lane:

@@ -17,6 +17,7 @@ from pages.html import Elements
 from run.red_runs import video_info
 from traffic.passing import HEIGHT, WIDTH, frame, passing, summarize, track
 from vdet.boxes import Box
+from vdet.conditions.finding import Finding
 from vdet.pages import charts
 from vdet.pages.batch import VehicleRow
 from vdet.pages.render import jpeg_uri, link_to
@@ -229,6 +230,28 @@ def test_the_facts_have_the_counts_and_a_row_for_each_vehicle() -> None:
             clock="2026-05-01T07:00:02+00:00",
         ),
     )
+
+
+class TestDoubts:
+    FINDING = Finding("dark", "it <was> dark", ((0.5, 1.5),), "warning", 0.3)
+
+    def test_what_makes_it_doubtful_is_listed_with_its_times(self) -> None:
+        made = seen(replace(page(), findings=(self.FINDING,)))
+        assert "it <was> dark" in made.text
+        assert "How far to trust it" in made.text
+        assert "How far to trust it" not in seen(page()).text
+
+    def test_its_times_are_a_row_above_the_vehicles(self) -> None:
+        plain, marked = (replace(page(), findings=found) for found in ((), (self.FINDING,)))
+        assert marked.html().count("it &lt;was&gt; dark") == 2, "in the list and in the row"
+        assert plain.html().count("dark") == 0
+
+    def test_vehicles_that_stood_are_counted_apart(self) -> None:
+        stood = [replace(record, motion="standing") for record in TWO]
+        made = replace(page(), records=[replace(TWO[0], motion="drove"), *stood[1:]])
+        assert "1vehicle" in seen(made).text
+        assert "1standing" in seen(made).text
+        assert made.facts.vehicles == 1
 
 
 @pytest.mark.skipif(not shutil.which("chromium"), reason="needs Chromium")

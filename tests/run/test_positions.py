@@ -10,6 +10,7 @@ from benchmarks.drawn_traffic import lane_view, true_places
 from red_cars import NullDetector
 from run.red_runs import follow
 from vdet.boxes import Box, Boxes
+from vdet.config.camera import CameraSettings, LensSettings
 from vdet.config.schema import MotionTrackerSettings, Settings
 from vdet.lanes.road import Road, RoadFinder
 from vdet.media import Picture
@@ -24,7 +25,15 @@ from vdet.track.track import Track
 WIDTH, HEIGHT = 640, 360
 AHEAD = 18.0
 CAMERA = PinholeCamera.dashboard(WIDTH, HEIGHT)
+LENS = LensSettings(
+    width=WIDTH,
+    height=HEIGHT,
+    matrix=((CAMERA.focal, 0, WIDTH / 2), (0, CAMERA.focal, HEIGHT / 2), (0, 0, 1)),
+    distortion=(0, 0, 0, 0, 0),
+    rms=0,
+)
 SETTINGS = Settings(
+    camera=CameraSettings(lens=LENS),
     lanes=lane_view(CAMERA, near=6, far=42).model_copy(update={"enabled": True}),
     tracker=MotionTrackerSettings(needed=0.05),
 )

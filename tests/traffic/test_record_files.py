@@ -11,10 +11,11 @@ from vdet.traffic.records import join_records, records_content, write_records
 
 HEADING = (
     "id,class,clock,first,last,seconds,seen,between,lost,mean_score,best_score,"
-    "start_x,start_y,end_x,end_y,length,length_share,x,y,width,height,metres,speed,speed_85,speed_sd\n"
+    "start_x,start_y,end_x,end_y,length,length_share,x,y,width,height,metres,speed,speed_85,speed_sd,"
+    "motion\n"
 )
 BOX = Box.sized(-30, 5, 30, 30)
-FIRST = "1,,,0.0,1.0,1.04,26,0,0,0.9,0.9,30.0,130.0,80.0,130.0,50.0,0.1562,10,100,40,30,,,,\n"
+FIRST = "1,,,0.0,1.0,1.04,26,0,0,0.9,0.9,30.0,130.0,80.0,130.0,50.0,0.1562,10,100,40,30,,,,,\n"
 
 
 def written(path: Path, *frames: FrameTracks) -> str:
@@ -48,6 +49,7 @@ def test_json_is_a_list_of_vehicles(tmp_path: Path) -> None:
         "speed": None,
         "speed_85": None,
         "speed_sd": None,
+        "motion": None,
     }
     assert json.loads(written(tmp_path / "none.json")) == []
 

@@ -5,7 +5,7 @@ import pytest
 from traffic.passing import RATE, WIDTH, frame, passing, summarize, track
 from vdet.boxes import Box
 from vdet.track.track import FrameTracks
-from vdet.traffic.records import PATH_STEP, VehicleRecord
+from vdet.traffic.records import PATH_STEP, VehicleRecord, VehicleRecords
 
 PLACE = Box.sized(100, 100, 40, 30)
 
@@ -81,3 +81,30 @@ class TestPath:
         found = record(*frames)
         assert (found.path[0], found.path[-1]) == ((130, 130), (150, 130))
         assert found.states == {"seen": 3, "lost": 2}
+
+
+class TestMotion:
+    def records_before(self, *, is_still: bool) -> dict[int, tuple[str | None, float]]:
+        """Return the motion and the mean score of vehicles that drive, stand and only seem so."""
+        made = VehicleRecords(WIDTH)
+        for second in range(70):
+            tracks = [track(1, Box.sized(3 * second, 100, 40, 30)), track(2, PLACE)]
+            tracks.append(track(3, Box.sized(250, 10, 30, 30), score=0.5))  # a sign
+            if second < 30:
+                tracks.append(track(4, Box.sized(200, 180, 50, 40)))
+            made.add(frame(second, *tracks, rate=1))
+        return {each.id: (each.motion, each.mean_score) for each in made.end(is_still=is_still)}
+
+    def test_what_stands_is_told_apart_from_what_drives(self) -> None:
+        found = self.records_before(is_still=True)
+        assert {number: motion for number, (motion, _) in found.items()} == {
+            1: "drove",
+            2: "standing",
+            4: "unknown",
+        }
+
+    def test_a_camera_that_moves_leaves_it_open(self) -> None:
+        found = self.records_before(is_still=False)
+        assert {number: motion for number, (motion, _) in found.items()} == dict.fromkeys(
+            (1, 2, 3, 4)
+        )

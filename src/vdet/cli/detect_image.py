@@ -49,7 +49,7 @@ def detect_image(
     score, and box in pixels, as x, y, width and height.
     """
     settings = choice.read()
-    options.warn_of_lens(settings)
+    options.warn_of_lanes(settings)
     from vdet.detect.factory import load_detector
     from vdet.regions import check_masks
     from vdet.run.pictures import PictureSearch, find_images, plan_pictures, run_pictures

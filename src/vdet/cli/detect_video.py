@@ -17,7 +17,7 @@ from vdet.cli import options
 from vdet.cli.command import command
 from vdet.cli.counting import check_counting, counting_options
 from vdet.cli.messages import is_quiet, print_lines, print_message, progress_steps
-from vdet.errors import counted, failure_code
+from vdet.errors import DOUBTFUL, counted, failure_code
 
 if TYPE_CHECKING:
     from vdet.batch.manifest import Record
@@ -121,6 +121,9 @@ _batch_options = options.bundle(
 @options.option(
     f"--at {options.TIME_FORM}", "Show the frame at this time with --stages.", options.parse_time
 )
+@options.option(
+    "--strict", "Exit with code 4 if a result is doubtful. The outputs are written all the same."
+)
 @_batch_options
 @options.lanes_option
 @options.settings_options("output.crf=18", options.model_option)
@@ -135,6 +138,7 @@ def detect_video(
     at: Fraction | None,
     choice: options.SettingsChoice,
     overwrite: bool,
+    strict: bool,
     batch: BatchOptions,
 ) -> int:
     """Find and follow vehicles in one video, or in many.
@@ -158,7 +162,6 @@ def detect_video(
     if no_video and not wanted:
         raise click.UsageError("nothing would be written; give an output, such as --tracks")
     settings = choice.read()
-    options.warn_of_lens(settings)
     check_counting(settings, several=batch.folder is not None)
     from vdet.regions import check_masks
     from vdet.run.video import Run
@@ -167,9 +170,10 @@ def detect_video(
     part = start, end, frames, at or Fraction(0)
     run = Run(source, (), settings, *part, overwrite, threads)
     if batch.folder is None:
-        _process_one(replace(run, outputs=options.as_outputs(wanted)))
-        return 0
-    return _process_batch(videos, run, _read_suffixes(wanted, no_video=no_video), batch)
+        is_doubtful = _process_one(replace(run, outputs=options.as_outputs(wanted)))
+        return DOUBTFUL if strict and is_doubtful else 0
+    suffixes = _read_suffixes(wanted, no_video=no_video)
+    return _process_batch(videos, run, suffixes, batch, strict=strict)
 
 
 def _in_and_out(clips: tuple[Path, ...], *, no_video: bool) -> tuple[Path, list[options.Wanted]]:
@@ -190,8 +194,10 @@ def _in_and_out(clips: tuple[Path, ...], *, no_video: bool) -> tuple[Path, list[
     return source, [("video", path) for path in outputs]
 
 
-def _process_one(run: "Run") -> None:
+def _process_one(run: "Run") -> bool:
+    """Process a video, and return whether the result is doubtful."""
     from vdet.detect.factory import load_detector
+    from vdet.run.result import findings_in
     from vdet.run.video import run_video
 
     model = load_detector(run.settings.detector)
@@ -204,6 +210,7 @@ def _process_one(run: "Run") -> None:
         print_message(f"{run.source}: {found}, {totals.seconds:.1f} s, {rate:.1f} frames/s")
         if totals.clock and run.settings.traffic:
             print_message(f"{run.source}: begins {totals.clock}")
+    return findings_in(totals.facts).is_doubtful
 
 
 def _read_suffixes(wanted: Sequence[options.Wanted], *, no_video: bool) -> "list[OutputSuffix]":
@@ -230,7 +237,12 @@ def _suffix(sink: str, path: Path) -> str:
 
 
 def _process_batch(
-    clips: Sequence[Path], common: "Run", suffixes: "Sequence[OutputSuffix]", batch: BatchOptions
+    clips: Sequence[Path],
+    common: "Run",
+    suffixes: "Sequence[OutputSuffix]",
+    batch: BatchOptions,
+    *,
+    strict: bool,
 ) -> int:
     """Process a batch, or list what would be written, and return the exit code."""
     from vdet.batch.plan import make_plan
@@ -246,8 +258,9 @@ def _process_batch(
         )
         return 0
     workers, threads = _workers(batch, len(plan.runs))
-    failed = _run(plan, workers, threads)
-    return failure_code(failed, len(plan.runs) + len(plan.skipped))
+    failed, doubtful = _run(plan, workers, threads)
+    code = failure_code(failed, len(plan.runs) + len(plan.skipped))
+    return code or (DOUBTFUL if strict and doubtful else 0)
 
 
 def _output_names(run: "Run") -> str:
@@ -265,11 +278,12 @@ def _workers(batch: BatchOptions, files: int) -> "tuple[Workers, int]":
     return LocalProcesses(jobs), max(1, cores // jobs)
 
 
-def _run(plan: "Plan", workers: "Workers", threads: int) -> int:
-    """Run the batch, print the result of each file, and return how many failed."""
+def _run(plan: "Plan", workers: "Workers", threads: int) -> tuple[int, int]:
+    """Run the batch, print the results; return how many files failed, and how many are doubtful."""
     from vdet.batch.run import run_batch
+    from vdet.run.result import CONDITIONS
 
-    failed = 0
+    failed = doubtful = 0
     with (
         progress_steps(" files") as steps,
         closing(run_batch(plan, workers=workers, threads=threads)) as results,
@@ -278,12 +292,14 @@ def _run(plan: "Plan", workers: "Workers", threads: int) -> int:
         for run, record in results:
             _print_result(run, record)
             failed += record.error is not None
+            found = record.facts.get(CONDITIONS, ())
+            doubtful += any(finding["severity"] == "warning" for finding in found)
             advance(1)
     if not is_quiet():
         skipped = f"{len(plan.skipped)} skipped, " if plan.skipped else ""
         done = counted(len(plan.runs) - failed, "file")
         print_message(f"{plan.folder}: {done} done, {skipped}{failed} failed")
-    return failed
+    return failed, doubtful
 
 
 def _print_result(run: "Run", record: "Record") -> None:

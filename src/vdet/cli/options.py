@@ -240,10 +240,10 @@ class SettingsChoice:
         return settings
 
 
-def warn_of_lens(settings: "Settings") -> None:
-    """Warn if the lane is looked for in frames whose lens is not known."""
-    if settings.lanes.enabled and settings.camera.lens is None:
-        log.warning("lanes.enabled without camera.lens: lens distortion is not corrected")
+def warn_of_lanes(settings: "Settings") -> None:
+    """Warn if the lane is looked for with a camera that is not described."""
+    if settings.lanes.enabled and (missing := settings.missing_for_metres):
+        log.warning("lanes: nothing is given in metres without %s", ", ".join(missing))
 
 
 def settings_options(example: str, *more: Callable[..., Any]) -> Callable[[F], F]:

@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field, SerializeAsAny, field_validator, model_validator
 
 from vdet.config.camera import CameraSettings, moment
+from vdet.config.conditions import ConditionSettings
 from vdet.config.detector import DetectorSettings, NetworkSettings
 from vdet.config.places import RegionList, TrafficSettings
 from vdet.config.section import Section, Share
@@ -28,9 +29,10 @@ class StepSettings(Section):
 class LaneSettings(Section):
     """The lane: whether it is looked for, and a trapezoid whose sides are its lines on a straight.
 
-    For another camera, take an undistorted frame of a straight and level road. Choose two rows:
-    the nearer one above the bonnet, the farther one a little below the horizon. Note the columns
-    at which the lines of the vehicle's lane cross them.
+    The trapezoid here is where many dashboard cameras see their lane. For a camera of your own,
+    take an undistorted frame of a straight and level road. Choose two rows: the nearer one above
+    the bonnet, the farther one a little below the horizon. Note the columns at which the lines of
+    the vehicle's lane cross them.
     """
 
     enabled: bool = False
@@ -39,20 +41,20 @@ class LaneSettings(Section):
     """Farther row, as a share of the frame's height."""
     bottom: Share = 0.93
     """Nearer row, as a share of the frame's height."""
-    top_left: float = Field(0.4602, ge=-2, le=3)
+    top_left: float = Field(0.46, ge=-2, le=3)
     """Column of the left line in the farther row, as a share of the frame's width."""
-    top_right: float = Field(0.5382, ge=-2, le=3)
+    top_right: float = Field(0.54, ge=-2, le=3)
     """Column of the right line in the farther row."""
-    bottom_left: float = Field(0.2086, ge=-2, le=3)
+    bottom_left: float = Field(0.21, ge=-2, le=3)
     """Column of the left line in the nearer row."""
-    bottom_right: float = Field(0.7898, ge=-2, le=3)
+    bottom_right: float = Field(0.79, ge=-2, le=3)
     """Column of the right line in the nearer row."""
-    lane_width: float = Field(3.7, gt=0, le=20)
-    """Width of the lane in metres."""
-    length: float = Field(37.0, gt=1, le=200)
+    lane_width: float | None = Field(None, gt=0, le=20)
+    """Width of the lane in metres. null: not known, so nothing is given in metres."""
+    length: float | None = Field(None, gt=1, le=200)
     """Distance between the two rows on the road, in metres. Measure it by dashes of known length,
     or compute focal length × lane_width × (1 / lane width in the farther row − 1 / lane width in
-    the nearer row), all but lane_width in pixels.
+    the nearer row), all but lane_width in pixels. null: not known, so nothing is given in metres.
     """
 
     @model_validator(mode="after")
@@ -157,6 +159,7 @@ class Settings(Section):
     steps: StepSettings = StepSettings()
     traffic: TrafficSettings = TrafficSettings()
     lanes: LaneSettings = LaneSettings()
+    conditions: ConditionSettings = ConditionSettings()
     train: TrainSettings = TrainSettings()
     labels: LabelSettings = LabelSettings()
     input: InputSettings = InputSettings()
@@ -173,6 +176,16 @@ class Settings(Section):
         model = self.detector.model
         detector = self.detector.model_copy(update={"model": change(model) if model else None})
         return self.model_copy(update={"regions": regions, "detector": detector})
+
+    @property
+    def missing_for_metres(self) -> tuple[str, ...]:
+        """The keys that are not given, and without which the lane has no metres."""
+        needed = {
+            "camera.lens": self.camera.lens,
+            "lanes.lane_width": self.lanes.lane_width,
+            "lanes.length": self.lanes.length,
+        }
+        return tuple(key for key, value in needed.items() if value is None)
 
     def __hash__(self) -> int:  # some fields are dictionaries
         return hash(self.model_dump_json())

@@ -20,7 +20,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from vdet.boxes import Float64Array, Image
-from vdet.config.schema import LaneSettings
 from vdet.lanes.paint import (
     FINE_MARGIN,
     MARGIN,
@@ -178,7 +177,7 @@ def _fit(mask: Image, top_view: TopView, positions: LinePositions, guess: LaneCu
         equations = normal_equations(left, right, guess)
         guess = solve(equations, width)
         positions = guess.at(top_view.distances)
-    if not _is_plausible(guess, top_view.settings):
+    if not _is_plausible(guess, top_view):
         return FrameFit(guess, equations, (False, False))
     left_seen = _is_seen(left, top_view, positions[0])
     right_seen = _is_seen(right, top_view, positions[1])
@@ -190,11 +189,11 @@ def _fit(mask: Image, top_view: TopView, positions: LinePositions, guess: LaneCu
     return FrameFit(guess, equations, (left_seen, right_seen))
 
 
-def _is_plausible(curves: LaneCurves, settings: LaneSettings) -> bool:
+def _is_plausible(curves: LaneCurves, top_view: TopView) -> bool:
     """Check width, parallel lines and bend against those of real roads."""
     return (
-        abs(curves.width - settings.lane_width) <= WIDTH_TOLERANCE
-        and abs(curves.pitch) * settings.length * curves.width <= _CONVERGENCE
+        abs(curves.width - top_view.lane_width) <= WIDTH_TOLERANCE
+        and abs(curves.pitch) * top_view.length * curves.width <= _CONVERGENCE
         and 2 * abs(curves.bend) * _LEAST_RADIUS <= 1
     )
 

@@ -17,13 +17,18 @@ _SCALE = 2  # top views are small, so their pictures are enlarged
 def draw_lane(surface: Surface, lane: Lane) -> None:
     """Draw the lane's area and lines into a frame, and write its numbers."""
     _draw_area(surface, lane.left, lane.right)
-    first, second = lane_text(lane)
-    tag = draw_label(surface, first, (0, 0), AREA)
-    draw_label(surface, second, (0, 2 * tag.height), AREA)
+    y = 0.0
+    for line in lane_text(lane):
+        y += 2 * draw_label(surface, line, (0, y), AREA).height
 
 
-def lane_text(lane: Lane) -> tuple[str, str]:
-    """Return two lines of text: the lane's width and bend, and the camera's place in it."""
+def lane_text(lane: Lane) -> tuple[str, ...]:
+    """Return two lines of text: the lane's width and bend, and the camera's place in it.
+
+    There is none for a lane without metres.
+    """
+    if lane.width is None or lane.offset is None:
+        return ()
     side = "left" if lane.curvature < 0 else "right"
     bend = f"bends {side}, radius {lane.radius:.0f} m" if lane.radius else "straight"
     place = "right" if lane.offset > 0 else "left"

@@ -134,7 +134,7 @@ def find_base(mask: Image, top_view: TopView) -> tuple[float, float] | None:
     counts = np.count_nonzero(mask[near] == PAINT, axis=0).astype(np.float64)
     spread = round(FINE_MARGIN * ACROSS) | 1
     histogram = np.asarray(cv2.blur(counts[None], (spread, 1)), np.float64).ravel()
-    expected = top_view.settings.lane_width
+    expected = top_view.lane_width
     least, most = (round((expected + off) * ACROSS) for off in (-WIDTH_TOLERANCE, WIDTH_TOLERANCE))
     best, base = 0.0, None
     for gap in range(max(1, least), most + 1):

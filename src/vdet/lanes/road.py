@@ -52,9 +52,11 @@ class Lane:
     """1/m, positive in a bend to the right; smoothed over more frames than the lines."""
     radius: float | None
     """Radius of the bend, metres; None if the road is straight (5000 m or more)."""
-    offset: float
-    """Distance of the camera from the middle of the lane, metres; positive: it is to the right."""
-    width: float
+    offset: float | None
+    """Distance of the camera from the middle of the lane, metres; positive: it is to the right.
+    None where the camera is not described; then the radius and the width are not known either.
+    """
+    width: float | None
     """Width of the lane, metres."""
     left: Float64Array
     right: Float64Array
@@ -62,11 +64,14 @@ class Lane:
     def record(self) -> dict[str, Any]:
         """Return plain values for JSON, of the same meaning.
 
-        `radius` (None on a straight road), `offset` and `width` are metres, rounded to millimetres.
+        `radius` (None on a straight road), `offset` and `width` are metres, rounded to millimetres;
+        all are None where the camera is not described.
         `left` and `right` are `[[x, y], …]`, pixels, rounded to tenths.
         """
-        record: dict[str, Any] = {"radius": self.radius and round(self.radius, 3)}
-        record |= {"offset": round(self.offset, 3), "width": round(self.width, 3)}
+        metres = {"radius": self.radius, "offset": self.offset, "width": self.width}
+        record: dict[str, Any] = {
+            key: None if value is None else round(value, 3) for key, value in metres.items()
+        }
         lines = {"left": self.left, "right": self.right}
         return record | {side: np.round(line, 1).tolist() for side, line in lines.items()}
 
@@ -128,10 +133,15 @@ class Road:
     lane: Lane | None
     """The lane, smoothed over this frame and those before; None if it is not reliably known."""
     curves: LaneCurves | None
-    """The lines of `lane` on the ground; None if there is no lane."""
+    """The lines of `lane` on the ground; None without a lane, or without metres."""
     top_view: TopView
     undistorter: Undistorter
     """Moves boxes and points of the frame to the undistorted one."""
+
+    def without_metres(self) -> "Road":
+        """Return the road as a camera sees it that nobody described."""
+        lane = self.lane and replace(self.lane, radius=None, offset=None, width=None)
+        return replace(self, lane=lane, curves=None)
 
     def record(self) -> dict[str, Any] | None:
         """Return the lane as plain values for JSON."""
@@ -147,7 +157,7 @@ class Road:
         """Return where on the road a vehicle is that stands at `foot` in the frame.
 
         `foot` is `(x, y)` in pixels; whole numbers are the edges of pixels, as in boxes. None
-        without a lane, and where the lane does not reach: see `position_on_road`.
+        without a lane or metres, and where the lane does not reach: see `position_on_road`.
         """
         if self.curves is None:
             return None

@@ -15,6 +15,8 @@ ACROSS = 30.0
 """Pixels per metre, across the road."""
 ALONG = 8.0
 """Pixels per metre, along the road."""
+_USUAL_WIDTH, _USUAL_LENGTH = 3.7, 37.0
+"""Metres of a lane that nobody measured, across and along: for the search, not for results."""
 _MARGIN = 3.0
 """Metres of road that are shown on each side of the lane."""
 
@@ -23,13 +25,16 @@ class TopView:
     """Converts between ground, undistorted frames of one size, and pictures from above."""
 
     def __init__(self, settings: LaneSettings, width: int, height: int) -> None:
-        self.settings = settings
+        self.lane_width = settings.lane_width or _USUAL_WIDTH
+        """Of the lane that is looked for, metres."""
+        self.length = settings.length or _USUAL_LENGTH
+        """Of the trapezoid, metres."""
         near = settings.bottom_right - settings.bottom_left  # of the frame's width
         far = settings.top_right - settings.top_left
-        start = settings.length * far / (near - far)  # widths in the frame are proportional to 1/z
-        end = start + settings.length
-        left = (settings.bottom_left - settings.top_left) / (near - far) * settings.lane_width
-        right = left + settings.lane_width
+        start = self.length * far / (near - far)  # widths in the frame are proportional to 1/z
+        end = start + self.length
+        left = (settings.bottom_left - settings.top_left) / (near - far) * self.lane_width
+        right = left + self.lane_width
         corners = [
             (settings.bottom_left, settings.bottom),
             (settings.bottom_right, settings.bottom),
@@ -43,8 +48,8 @@ class TopView:
         self._to_frame = np.asarray(cv2.getPerspectiveTransform(ground, frame), np.float64)
         """From `(x, z, 1)`, metres, to pixels of the undistorted frame."""
         self._to_ground = np.linalg.inv(self._to_frame)
-        rows = round(settings.length * ALONG)
-        columns = round((settings.lane_width + 2 * _MARGIN) * ACROSS)
+        rows = round(self.length * ALONG)
+        columns = round((self.lane_width + 2 * _MARGIN) * ACROSS)
         self.distances = start + (rows - 0.5 - np.arange(rows, dtype=np.float64)) / ALONG
         """z of each row, metres; the first row is the farthest."""
         self.laterals = (np.arange(columns, dtype=np.float64) + 0.5 - columns / 2) / ACROSS

@@ -35,6 +35,8 @@ class VehicleRow(BaseModel):
         Its median, km/h; None where it is not known.
     way
         The lines and zones where it was counted, in order.
+    motion
+        Whether it drove or stood, as records say it; empty where that is not known.
     picture
         Address of its picture as seen from the page of its video; empty where there is none.
     """
@@ -48,6 +50,7 @@ class VehicleRow(BaseModel):
     clock: str | None = None
     speed: float | None = None
     way: str = ""
+    motion: str = ""
     picture: str = ""
 
 
@@ -55,7 +58,8 @@ class VideoFacts(BaseModel):
     """A video in numbers: pages over many videos are made from it.
 
     `seconds` is how much of the video was searched, `most` how many vehicles were shown at once.
-    `counts` are by name; `still` is a small picture as a data URI.
+    `counts` are by name, `conditions` say what makes them doubtful; `still` is a small picture as a
+    data URI.
     """
 
     model_config = ConfigDict(frozen=True)
@@ -66,6 +70,7 @@ class VideoFacts(BaseModel):
     most: int = Field(ge=0)
     still: str = Field(pattern=r"^data:image/jpeg;base64,[A-Za-z0-9+/=]*$")
     counts: dict[str, int] = {}
+    conditions: tuple[str, ...] = ()
     rows: tuple[VehicleRow, ...] = ()
 
 
@@ -86,13 +91,16 @@ def _table(videos: Sequence[tuple[str, Path, VideoFacts]]) -> dict[str, Any]:
     folders = [page.parent for _, page, _ in videos]
     classes, kinds = _numbered(row.class_name or "vehicle" for _, row in rows)
     ways, ways_of = _numbered(row.way for _, row in rows)
+    states, states_of = _numbered(row.motion for _, row in rows)
     return {
         "videos": [{"name": name, "page": link_to(page, Path())} for name, page, _ in videos],
         "classes": classes,
         "ways": ways,
+        "states": states,
         "video": [number for number, _ in rows],
         "class": kinds,
         "way": ways_of,
+        "state": states_of,
         "first": [row.first for _, row in rows],
         "moment": [row.moment for _, row in rows],
         "seconds": [row.seconds for _, row in rows],

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from vdet.boxes import Image
+from vdet.conditions.finding import Finding
 from vdet.errors import named
 from vdet.lanes.ground import Ground
 from vdet.media import VideoInfo
@@ -23,6 +24,8 @@ from vdet.traffic.speeds import KMH
 
 _MOST_VEHICLES = 300  # that are shown one by one
 _SPEED_STEP = 5  # km/h, of the classes of speeds
+_DOUBT = "#f3d9a4", "#333"  # colours of the row that says when the results are doubtful
+_STOOD = {"standing": "standing", "unknown": "not seen moving"}
 _SMALL = 200  # columns of the still in the pages over many videos
 
 
@@ -80,6 +83,8 @@ class VideoPage:
         The lines and zones at which vehicles were counted.
     ground
         The road plane, where it is known.
+    findings
+        What makes the results doubtful.
     """
 
     video: VideoInfo
@@ -98,6 +103,7 @@ class VideoPage:
     pictures: Mapping[int, str] = field(default_factory=dict)
     borders: Sequence[Border] = ()
     ground: Ground | None = None
+    findings: Sequence[Finding] = ()
 
     @property
     def facts(self) -> VideoFacts:
@@ -106,16 +112,23 @@ class VideoPage:
         return VideoFacts(
             seconds=max(0.0, self.seconds),
             frames=self.frames,
-            vehicles=len(self.records),
+            vehicles=sum(record.has_driven for record in self.records),
             most=1 + max(charts.pack(self._spans), default=-1),
             still=NO_STILL if self.poster is None else jpeg_uri(self.poster, _SMALL),
             counts={f"{each.name}: {each.direction}": each.count for each in totals if each.count},
-            rows=tuple(self._row(record) for record in self.records),
+            conditions=tuple(each.text for each in self.findings if each.severity == "warning"),
+            rows=self._rows(),
         )
 
-    def _row(self, record: VehicleRecord) -> VehicleRow:
-        events = self.counts.events if self.counts else ()
-        names = [event.name for event in events if event.id == record.id]
+    def _rows(self) -> tuple[VehicleRow, ...]:
+        ways: dict[int, dict[str, None]] = {}
+        for event in self.counts.events if self.counts else ():
+            ways.setdefault(event.id, {})[event.name] = None
+        return tuple(
+            self._row(record, " → ".join(ways.get(record.id, ()))) for record in self.records
+        )
+
+    def _row(self, record: VehicleRecord, way: str) -> VehicleRow:
         return VehicleRow(
             class_name=record.class_name,
             first=round(record.first, 3),
@@ -123,8 +136,9 @@ class VideoPage:
             seconds=round(record.seconds, 1),
             clock=self.clock and self.clock.at(record.first).isoformat(timespec="seconds"),
             speed=round(KMH * record.speeds.quantile(0.5), 1) if record.speeds else None,
-            way=" → ".join(dict.fromkeys(names)),
+            way=way,
             picture=self.pictures.get(record.id, ""),
+            motion=record.motion or "",
         )
 
     def html(self) -> str:
@@ -140,7 +154,7 @@ class VideoPage:
             figures=self._figures(),
             shown=shown,
             level_plot=charts.level_plot(self._spans, x, "Number of vehicles at once", self.gaps),
-            timeline=_timeline(shown, x),
+            timeline=_timeline(shown, self.findings, x),
             interval_plots=self._interval_plots(),
             speed_plot=charts.histogram(speeds, _SPEED_STEP, title, "km/h") if speeds else None,
             traffic=self.counts
@@ -166,12 +180,15 @@ class VideoPage:
     def _figures(self) -> list[tuple[str, str]]:
         """Return the key figures."""
         facts = self.facts
-        count = len(self.records)
-        shown = sum(record.seconds for record in self.records) / max(1, count)
-        classes = Counter(record.class_name for record in self.records if record.class_name)
+        shown = sum(record.seconds for record in self.records) / max(1, len(self.records))
+        stood = Counter(each.motion for each in self.records if not each.has_driven)
+        classes = Counter(
+            each.class_name for each in self.records if each.class_name and each.has_driven
+        )
         return [
-            (named(count, "vehicle"), str(count)),
+            (named(facts.vehicles, "vehicle"), str(facts.vehicles)),
             *((named(n, name), str(n)) for name, n in classes.most_common(4)),
+            *((_STOOD[motion], str(n)) for motion, n in stood.items() if motion in _STOOD),
             ("most at once", str(facts.most)),
             ("mean seconds shown", f"{shown:.1f}"),
             *((name, str(count)) for name, count in facts.counts.items()),
@@ -211,11 +228,23 @@ class VideoPage:
         return drawn
 
 
-def _timeline(shown: Sequence[VehicleRecord], x: Axis) -> Timeline:
-    """Return when each vehicle is shown; those that are not there at once share a row."""
+def _timeline(shown: Sequence[VehicleRecord], findings: Sequence[Finding], x: Axis) -> Timeline:
+    """Return when each vehicle is shown; those that are not there at once share a row.
+
+    Where the results are doubtful, the first row says when.
+    """
+    doubts = [
+        Span(0, *span, finding.text, *_DOUBT, finding.code, span[0])
+        for finding in findings
+        for span in finding.spans
+    ]
     rows = charts.pack((record.first, record.last) for record in shown)
-    spans = [span for each, row in zip(shown, rows, strict=True) for span in _spans(each, row)]
-    return Timeline("When each vehicle is shown", x, spans)
+    spans = [
+        span
+        for record, row in zip(shown, rows, strict=True)
+        for span in _spans(record, row + bool(doubts))
+    ]
+    return Timeline("When each vehicle is shown", x, [*doubts, *spans])
 
 
 def _spans(record: VehicleRecord, row: int) -> list[Span]:

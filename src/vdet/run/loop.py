@@ -169,7 +169,8 @@ def build(
     height, width = (video.height, video.width) if video else images[0].shape[:2]
     settings.camera.check_frames(width, height)
     detector = model.for_video(width, height, images)
-    made = make_steps(StepContext(settings, width, height, video), steps)
+    unknown = getattr(detector, "unknown_classes", ())
+    made = make_steps(StepContext(settings, width, height, video, unknown), steps)
     if video is None:
         return Pipeline(detector, timed(StillTracker()), made, is_still=True)
     followed_by = timed(tracker) if tracker else make_tracker(settings, width, height)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol, cast
 import cv2
 
 from vdet.boxes import Boxes
+from vdet.conditions.finding import Findings
 from vdet.draw.boxes import color_of, draw_box
 from vdet.media import Frame
 from vdet.track.track import FrameTracks, Track
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 class Fact(Protocol):
     """What a step finds out of a frame or of a whole video: a frozen value of a type of its own.
 
-    `str` of a fact about a whole video is a warning for people; empty, where there is none.
+    Each line of `str` of a fact about a whole video is a warning for people; empty for none.
     """
 
     def record(self) -> Any:
@@ -28,6 +29,14 @@ class Fact(Protocol):
 
 Facts = Mapping[str, Fact]
 """Facts by their names, which are their keys in JSON."""
+
+CONDITIONS = "conditions"
+"""Name of the fact about a video that says what makes its results doubtful."""
+
+
+def findings_in(facts: Facts) -> Findings:
+    """Return what makes the results of a video doubtful."""
+    return cast("Findings", facts.get(CONDITIONS, Findings()))
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,13 +9,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
+from vdet.conditions.finding import Findings
 from vdet.config.schema import Settings
 from vdet.media import Frame, VideoInfo
 from vdet.plugins import STEPS, load_plugin
-from vdet.run.result import Facts, FrameResult
+from vdet.run.result import CONDITIONS, Facts, FrameResult
 from vdet.track.track import Track
 
 if TYPE_CHECKING:
+    from vdet.conditions.watch import Conditions
     from vdet.lanes.road import FrameView, Road, RoadFinder
     from vdet.regions import Regions
 
@@ -56,12 +58,15 @@ class StepContext:
         Size of the frames, pixels.
     video
         None for a still picture.
+    unknown
+        Classes that the settings ask for and the detector does not know.
     """
 
     settings: Settings
     width: int
     height: int
     video: VideoInfo | None = None
+    unknown: Sequence[str] = ()
 
 
 def make_steps(context: StepContext, others: Sequence[Step] = ()) -> list[Step]:
@@ -76,11 +81,16 @@ def make_steps(context: StepContext, others: Sequence[Step] = ()) -> list[Step]:
     """
     settings, width, height = context.settings, context.width, context.height
     steps: list[Step | None] = []
+    if context.video is not None:
+        from vdet.conditions.watch import Conditions
+
+        steps.append(ConditionStep(Conditions(settings, width, context.unknown)))
     if settings.lanes.enabled:
         from vdet.lanes.road import RoadFinder
 
         roads = RoadFinder(settings.camera.lens, settings.lanes, width, height)
-        steps.append(LaneStep(roads, settings.detector.foot))
+        has_metres = not settings.missing_for_metres
+        steps.append(LaneStep(roads, settings.detector.foot, has_metres=has_metres))
     if settings.regions:
         from vdet.regions import Regions
 
@@ -90,9 +100,10 @@ def make_steps(context: StepContext, others: Sequence[Step] = ()) -> list[Step]:
 
 
 class LaneStep:
-    """Finds the lane, and the distance and the lane of each vehicle."""
+    """Finds the lane, and with `has_metres` the distance and the lane of each vehicle."""
 
-    def __init__(self, roads: "RoadFinder", foot: float) -> None:
+    def __init__(self, roads: "RoadFinder", foot: float, *, has_metres: bool = True) -> None:
+        self._has_metres = has_metres
         self._roads = roads
         self._foot = foot
         self._views: dict[int, FrameView] = {}
@@ -105,6 +116,7 @@ class LaneStep:
         """Add the road, and where the vehicles are on it."""
         view = self._views.pop(result.frame.index)
         road = self._roads.update(view, (track.box for track in result.tracks))
+        road = road if self._has_metres else road.without_metres()
         tracks = with_positions(result.tracks, road, self._foot)
         return replace(result, tracks=tracks, facts={**result.facts, "lane": road})
 
@@ -141,3 +153,23 @@ class RegionStep:
         detections = found[[n for n, each in enumerate(found) if contains(each.box.foot)]]
         tracks = tuple(track for track in result.tracks if contains(track.foot))
         return replace(result, detections=detections, tracks=tracks)
+
+
+class ConditionStep:
+    """Watches what makes the results doubtful; it changes none."""
+
+    def __init__(self, conditions: "Conditions") -> None:
+        self._conditions = conditions
+
+    def apply(self, result: FrameResult) -> FrameResult:
+        """Look at a frame that was searched."""
+        if result.searched:
+            frame = result.frame
+            found = float(frame.time), frame.picture, result.detections, result.tracks
+            self._conditions.add(*found)
+        return result
+
+    def finish(self) -> Facts:
+        """Return what was found out about the video."""
+        found = Findings(self._conditions.findings(), self._conditions.is_still)
+        return {CONDITIONS: found}

@@ -225,8 +225,8 @@ def write_outputs(
             raise _no_frame(run, "there is no frame at these times", video.reader)
         context.facts.update(video.pipeline.facts())
         counts = video.traffic.counts()
-        found = map(str, context.facts.values())
-        for warning in (*(counts.warnings if counts else ()), *filter(None, found)):
+        found = [line for fact in context.facts.values() for line in str(fact).splitlines()]
+        for warning in (*(counts.warnings if counts else ()), *found):
             log.warning("%s: %s", run.source, warning)
     seconds = time.perf_counter() - began
     totals = info.width, info.height, frames, len(ids), seconds

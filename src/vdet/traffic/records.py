@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, Literal, get_args
 
 from vdet.boxes import Box
 from vdet.polygons import Point
@@ -25,10 +25,22 @@ _COLUMNS = (
     *("mean_score", "best_score"),
     *("start_x", "start_y", "end_x", "end_y", "length", "length_share"),
     *("x", "y", "width", "height"),
-    *("metres", "speed", "speed_85", "speed_sd"),
+    *("metres", "speed", "speed_85", "speed_sd", "motion"),
 )
 """Columns of a `.csv`; `clock` is the moment of `first`, x, y, width and height are those of the
 largest box, speeds are km/h.
+"""
+
+_MOVED = 0.5
+"""Distance by which a vehicle has moved, as a multiple of its size."""
+_STANDING = 60.0
+"""Seconds after which a vehicle that has not moved is standing."""
+_MIDDLING = 0.6
+"""Mean score below which what never moved, where nothing ever drove, is taken for a false alarm."""
+
+Motion = Literal["drove", "standing", "unknown"]
+"""Whether a vehicle moved before a still camera; "unknown": it did not, but was seen for less than
+a minute.
 """
 
 
@@ -60,6 +72,8 @@ class VehicleRecord:
         From when to when it is shown without being lost, seconds; all of it, if it always is.
     speeds
         None where they are not known.
+    motion
+        None where the camera may have moved.
     """
 
     id: int
@@ -75,6 +89,12 @@ class VehicleRecord:
     path: list[Point] = field(default_factory=list)
     followed: list[tuple[float, float]] = field(default_factory=list)
     speeds: Speeds | None = None
+    motion: Motion | None = None
+
+    @property
+    def has_driven(self) -> bool:
+        """Whether it moved, or may have: it is not known to have stood."""
+        return self.motion in (None, "drove")
 
     @property
     def mean_score(self) -> float:
@@ -108,6 +128,13 @@ class VehicleRecord:
             first = self.followed.pop()[0] if goes_on else time
             self.followed.append((first, time))
         self.states[track.state] += 1
+
+    def judge(self) -> None:
+        """Set `motion`, before a camera that stood still."""
+        size = (self.largest.width + self.largest.height) / 2
+        way = max(math.dist(self.path[0], point) for point in self.path)
+        stood: Motion = "standing" if self.seconds >= _STANDING else "unknown"
+        self.motion = "drove" if way >= _MOVED * size else stood
 
     def _go_to(self, point: Point) -> None:
         """Continue the path; its last point stays only if it is a step away from the one before."""
@@ -147,12 +174,30 @@ class VehicleRecords:
             self._vehicles[track.id].add(track, frame.time, before)
         self._latest = frame
 
-    def end(self, meter: SpeedMeter | None = None) -> tuple[VehicleRecord, ...]:
-        """Return the records by id, with the speeds of a meter; call it once, at the end."""
+    def end(
+        self, meter: SpeedMeter | None = None, *, is_still: bool = False
+    ) -> tuple[VehicleRecord, ...]:
+        """Return the records by id, with the speeds of a meter; call it once, at the end.
+
+        `is_still` says whether the camera stood still. Then each has its `motion`, and what looks
+        like a false alarm is left out: it never moved, nothing drove there, its score is middling.
+        """
         self._show()
         for number, speeds in (meter.speeds() if meter else {}).items():
             self._vehicles[number].speeds = speeds
-        return tuple(record for _, record in sorted(self._vehicles.items()))
+        records = [record for _, record in sorted(self._vehicles.items())]
+        if not is_still:
+            return tuple(records)
+        for record in records:
+            record.judge()
+        ways = [point for record in records if record.has_driven for point in record.path]
+        return tuple(
+            record
+            for record in records
+            if record.has_driven
+            or record.mean_score >= _MIDDLING
+            or any(map(record.largest.contains, ways))
+        )
 
     def _show(self) -> None:
         for track in self._latest.tracks if self._latest else ():
@@ -198,7 +243,17 @@ def _row(record: VehicleRecord, clock: Clock | None) -> dict[str, Any]:
         ]
         speeds = [round(value, 1) for value in (known.metres, *in_kmh)]
     who = record.id, record.class_name, begin
-    values = *who, *times, *states, *scores, *ends, *lengths, *record.largest.xywh, *speeds
+    values = (
+        *who,
+        *times,
+        *states,
+        *scores,
+        *ends,
+        *lengths,
+        *record.largest.xywh,
+        *speeds,
+        record.motion,
+    )
     return dict(zip(_COLUMNS, values, strict=True))
 
 
@@ -211,5 +266,5 @@ def _item(row: Mapping[str, Any]) -> dict[str, Any]:
         "length_share": row["length_share"],
     }
     largest = {name: row[name] for name in ("x", "y", "width", "height")}
-    first, last = ({name: row[name] for name in some} for some in (_COLUMNS[:11], _COLUMNS[-4:]))
+    first, last = ({name: row[name] for name in some} for some in (_COLUMNS[:11], _COLUMNS[-5:]))
     return {**first, "path": path, "largest": largest, **last}

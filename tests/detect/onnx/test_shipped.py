@@ -40,3 +40,12 @@ def test_a_still_picture_has_a_larger_input_than_a_frame() -> None:
         detections = detector.detect(detector.search(Picture(image), index))
         inputs.append(stage_pictures_of(detector)(image, detections)["input"].shape)
     assert inputs == [(352, 640, 3), (416, 768, 3)]
+
+
+def test_it_says_which_classes_it_does_not_know() -> None:
+    def unknown(*classes: str) -> tuple[str, ...]:
+        model = load_detector(NetworkSettings(classes=classes))
+        return getattr(model.for_video(640, 360, []), "unknown_classes", ("?",))
+
+    assert unknown("car", "tram") == ("tram",)
+    assert unknown(*NetworkSettings().classes) == ()

@@ -67,6 +67,13 @@ class NetworkDetector:
     numbers: Int32Array
     settings: NetworkSettings
 
+    @property
+    def unknown_classes(self) -> tuple[str, ...]:
+        """Classes of the settings that the network does not know; some are asked for by default."""
+        known = [self.settings.classes[number] for number in self.numbers if number >= 0]
+        known += NetworkSettings().classes
+        return tuple(name for name in self.settings.classes if name not in known)
+
     def search(self, picture: Picture, index: int | None) -> Candidates:
         """Return the vehicles, in pixels of the frame."""
         network = self.for_stills if index is None else self.network

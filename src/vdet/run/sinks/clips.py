@@ -7,7 +7,7 @@ from fractions import Fraction
 from pathlib import Path
 
 from vdet.media.cutting import can_copy, copied_suffix, copy_part, encode_part
-from vdet.run.result import FrameResult
+from vdet.run.result import FrameResult, findings_in
 from vdet.run.sinks.protocol import BaseSink, SinkContext, SinkKind
 from vdet.traffic.records import VehicleRecord, VehicleRecords
 
@@ -72,7 +72,7 @@ class ClipSink(BaseSink):
                 )
 
     def _chosen(self) -> Sequence[VehicleRecord]:
-        records = self._records.end()
+        records = self._records.end(is_still=findings_in(self.context.facts).is_still)
         counts = self.context.traffic.counts() if self.context.traffic else None
         if counts is None:
             return records

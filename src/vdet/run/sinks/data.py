@@ -15,7 +15,7 @@ from vdet.errors import OutputError
 from vdet.files import print_now
 from vdet.labels.formats import SourceVideo, TrackWriter, format_for, track_suffixes
 from vdet.labels.records import JSON_LINES, track_record
-from vdet.run.result import FrameResult
+from vdet.run.result import FrameResult, findings_in
 from vdet.run.sinks.protocol import STANDARD_OUTPUT, BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.traffic import count_files
 from vdet.traffic.records import VehicleRecords, join_records, records_content
@@ -130,7 +130,8 @@ class VehicleSink(_TableSink):
     def make_content(self) -> Any:
         """Return the records."""
         traffic = self.context.traffic
-        records = self._records.end(traffic.speeds if traffic else None)
+        is_still = findings_in(self.context.facts).is_still
+        records = self._records.end(traffic.speeds if traffic else None, is_still=is_still)
         return records_content(records, self.path, self.context.clock)
 
     def write(self, result: FrameResult) -> None:
@@ -138,6 +139,19 @@ class VehicleSink(_TableSink):
         self._records.add(result.frame_tracks)
 
 
+class ConditionSink(BaseSink):
+    """Writes what makes the results of a video doubtful, at the end: a list of findings."""
+
+    def finish(self) -> None:
+        """Write the findings."""
+        found = findings_in(self.context.facts).record()
+        self.context.files.stage(self.path).write_text(json.dumps(found, indent=2) + "\n", "utf-8")
+
+    def write(self, result: FrameResult) -> None:
+        """Do nothing: a step watches the conditions."""
+
+
+CONDITIONS = SinkKind(ConditionSink, (".json",), "findings", takes="videos")
 VEHICLES = SinkKind(
     VehicleSink,
     SUFFIXES,

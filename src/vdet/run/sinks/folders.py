@@ -17,7 +17,7 @@ from vdet.pages.batch import VideoFacts, write_index
 from vdet.pages.render import PAGE_NAME, jpeg_uri, link_to
 from vdet.pages.video import Player, VideoPage
 from vdet.regions import lay_regions
-from vdet.run.result import FrameResult
+from vdet.run.result import FrameResult, findings_in
 from vdet.run.sinks.drawn import PICTURE_LABEL, label_text
 from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.traffic.overview import BestCrops, Crop
@@ -155,12 +155,13 @@ class PageSink(BaseSink):
     def _page(self) -> VideoPage:
         settings, traffic = self.context.settings, self.context.traffic
         counter, speeds = (traffic.counter, traffic.speeds) if traffic else (None, None)
+        findings = findings_in(self.context.facts)
         return VideoPage(
             video=self.video,
             frames=self._frames,
             start=self._start,
             end=self._last + float(1 / self.video.rate),
-            records=self._records.end(speeds),
+            records=self._records.end(speeds, is_still=findings.is_still),
             thumbnails=self._thumbnails,
             poster=self._fullest.image if self._fullest else None,
             player=self._player(),
@@ -172,6 +173,7 @@ class PageSink(BaseSink):
             pictures=self._pictures(),
             borders=(*counter.lines, *counter.zones) if counter else (),
             ground=speeds.ground if speeds else None,
+            findings=findings.found,
         )
 
     def _pictures(self) -> dict[int, str]:

@@ -1,0 +1,1 @@
+"""What makes a result doubtful: typed findings about a video, and why."""

@@ -1,0 +1,98 @@
+"""A finding: what makes a result doubtful, from when to when, and how much."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from vdet.config.conditions import Code
+
+Span = tuple[float, float]
+"""From when to when, seconds as in the tracks."""
+Severity = Literal["warning", "note"]
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """What makes a result doubtful.
+
+    Attributes
+    ----------
+    code
+        What it is, in short: `conditions.ignore` leaves findings out by it.
+    text
+        A sentence: what was found, and what it means.
+    spans
+        When, in order; none if it holds for the whole video.
+    severity
+        "warning": the result may be wrong. "note": good to know.
+    value
+        How much, where there is a measure: the fraction of the frame's width, of the motion, or of
+        the vehicles that the network finds.
+    """
+
+    code: Code
+    text: str
+    spans: tuple[Span, ...] = ()
+    severity: Severity = "warning"
+    value: float | None = None
+
+    def record(self) -> dict[str, Any]:
+        """Return it as values for JSON; times are rounded to milliseconds."""
+        times = [[round(first, 3), round(last, 3)] for first, last in self.spans]
+        value = None if self.value is None else round(self.value, 3)
+        known = {"code": self.code, "severity": self.severity, "text": self.text}
+        return {**known, "times": times, "value": value}
+
+
+@dataclass(frozen=True, slots=True)
+class Findings:
+    """What makes the results of a video doubtful.
+
+    Attributes
+    ----------
+    found
+        All findings.
+    is_still
+        Whether the camera stood still.
+    """
+
+    found: tuple[Finding, ...] = ()
+    is_still: bool = False
+
+    @property
+    def is_doubtful(self) -> bool:
+        """Whether a result may be wrong."""
+        return any(finding.severity == "warning" for finding in self.found)
+
+    def record(self) -> list[dict[str, Any]]:
+        """Return them as values for JSON."""
+        return [finding.record() for finding in self.found]
+
+    def __str__(self) -> str:
+        warnings = (finding for finding in self.found if finding.severity == "warning")
+        return "\n".join(f"{finding.text} [{finding.code}]" for finding in warnings)
+
+
+def joined(times: Iterable[float], gap: float) -> list[Span]:
+    """Return the spans of ascending times that are at most `gap` seconds apart."""
+    spans: list[Span] = []
+    for time in times:
+        if spans and time - spans[-1][1] <= gap:
+            spans[-1] = spans[-1][0], time
+        else:
+            spans.append((time, time))
+    return spans
+
+
+def when(spans: Sequence[Span]) -> str:
+    """Return "from 0:05 to 0:32"; of several spans, the longest and how many more there are."""
+    first, last = max(spans, key=lambda span: span[1] - span[0])
+    others = f" (and {len(spans) - 1} more)" if len(spans) > 1 else ""
+    return f"from {moment(first)} to {moment(last)}{others}"
+
+
+def moment(seconds: float) -> str:
+    """Return a time as 1:05 or 2:01:05."""
+    minutes, seconds = divmod(int(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02}:{seconds:02}" if hours else f"{minutes}:{seconds:02}"

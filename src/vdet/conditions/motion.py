@@ -1,0 +1,158 @@
+"""What moves before a still camera, and is no vehicle that was found.
+
+The background follows the planes as a running median (McFarlane and Schofield 1995). What differs
+from it, outside the boxes, is linked from plane to plane. Only what travels counts: leaves, flags
+and drops on the lens do not.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+
+from vdet.boxes import Box, Float32Array, Image
+from vdet.conditions.finding import Finding, joined, when
+from vdet.polygons import Point
+
+_RATE = 8.0
+"""Grey levels by which the background follows in a second."""
+_NOISE, _CONTRAST = 4.0, 12.0
+"""What differs does so by this many times a pixel's usual difference, and by these grey levels."""
+_SMALLEST, _LARGEST = 0.0015, 0.25
+"""Of what counts, as fractions of the frame's area; more is a cloud, or a change of the light."""
+_OUTSIDE = 0.5
+"""Fraction of it that lies outside the boxes; less is a shadow, or the edge of a vehicle."""
+_TRAVEL = 0.08
+"""Distance of what travels from where it began, as a fraction of the frame's width."""
+_STRAIGHT = 0.7
+"""The same, as a fraction of its way."""
+_PLANES = 4
+"""Number of planes that show what travels."""
+_REACH = 1.5
+"""How far it moves to the next plane, as a multiple of its size."""
+_FEWEST, _FRACTION = 2, 0.15
+"""Number of things, and fraction of all that travelled, from which a finding is reported."""
+_GAP = 5.0
+"""Seconds between two of them that end a span."""
+
+
+@dataclass(slots=True)
+class Mover:
+    """What moved: from when to when, from where to where (pixels of planes `width` pixels wide).
+
+    `is_found` says whether it came out of the box of a vehicle, or was found in the end.
+    """
+
+    width: int
+    first: float
+    start: Point
+    place: Point
+    is_found: bool
+    last: float = 0.0
+    size: float = 0.0
+    planes: int = 0
+    way: float = 0.0
+
+    def add(self, time: float, place: Point, size: float) -> None:
+        """Add the next plane that shows it."""
+        self.way += math.dist(self.place, place)
+        self.place, self.last, self.size = place, time, size
+        self.planes += 1
+
+    @property
+    def has_travelled(self) -> bool:
+        """Whether it moved on."""
+        least = max(_TRAVEL * self.width, self.size, _STRAIGHT * self.way)
+        return self.planes >= _PLANES and math.dist(self.start, self.place) >= least
+
+
+@dataclass(slots=True)
+class MotionWatch:
+    """Follows what moves through the planes of one video."""
+
+    _ended: list[Mover] = field(default_factory=list)
+    _movers: list[Mover] = field(default_factory=list)
+    _starts: dict[int, Point] = field(default_factory=dict)
+    _driven: set[int] = field(default_factory=set)
+    _background: Float32Array | None = None
+    _usual: Float32Array = field(default_factory=lambda: np.empty((0, 0), np.float32))
+    _covered: Image = field(default_factory=lambda: np.empty((0, 0), np.uint8))
+    _time: float = 0.0
+
+    def reset(self) -> None:
+        """Begin anew: the camera has moved."""
+        self._background, self._movers = None, []
+
+    def add(self, time: float, plane: Image, boxes: Mapping[int, Box]) -> None:
+        """Add the next plane, uint8 `(h, w)`; `boxes` are those of vehicles by id, its pixels."""
+        step, self._time = time - self._time, time
+        before, self._covered = self._covered, np.zeros_like(plane)
+        for number, box in boxes.items():
+            box.cut(self._covered)[:] = 1
+            start = self._starts.setdefault(number, box.center)
+            if math.dist(start, box.center) >= _TRAVEL * plane.shape[1]:
+                self._driven.add(number)
+        if self._background is None:
+            self._background = plane.astype(np.float32)
+            self._usual = np.full(plane.shape, _CONTRAST / _NOISE, np.float32)
+            return
+        difference = plane - self._background
+        difference -= np.median(difference[::2, ::2])
+        size = np.abs(difference)
+        differs = size > np.maximum(_CONTRAST, _NOISE * self._usual)
+        follow = np.float32(min(1.0, step) * _RATE)
+        self._background += np.clip(difference, -follow, follow)
+        self._usual += np.clip(size - self._usual, -follow / 8, follow / 8)
+        self._link(time, differs.astype(np.uint8), before)
+
+    def findings(self) -> list[Finding]:
+        """Return how much of what travelled is no vehicle that was found, and when."""
+        every = self._ended + [each for each in self._movers if each.has_travelled]
+        left = [each for each in every if not each.is_found]
+        fraction = len(left) / max(1, len(left) + len(self._driven))
+        if len(left) < _FEWEST or fraction < _FRACTION:
+            return []
+        spans = joined(sorted(time for each in left for time in (each.first, each.last)), _GAP)
+        text = (
+            f"{fraction:.0%} of what moved is no vehicle that was found, most of it {when(spans)}: "
+            "it is hard to see, or of a kind that the detector does not look for"
+        )
+        return [Finding("unexplained-motion", text, tuple(spans), value=fraction)]
+
+    def _link(self, time: float, differs: Image, before: Image) -> None:
+        """Continue the movers; `before` is where boxes were in the plane before."""
+        left, going = list(self._movers), []
+        for center, size in self._things(differs):
+            mover = min(left, key=lambda each: math.dist(each.place, center), default=None)
+            if mover and math.dist(mover.place, center) < _REACH * size:
+                left.remove(mover)
+            else:
+                mover = Mover(differs.shape[1], time, center, center, _is_in(center, before))
+            mover.add(time, center, size)
+            going.append(mover)
+        for mover in left:
+            mover.is_found |= _is_in(mover.place, self._covered)
+        self._ended += [each for each in left if each.has_travelled]
+        self._movers = going
+
+    def _things(self, differs: Image) -> list[tuple[Point, float]]:
+        """Return the middle and the size of what differs outside the boxes, the largest first."""
+        joined_up = cv2.morphologyEx(differs, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
+        _, labels, stats, _ = cv2.connectedComponentsWithStats(joined_up)
+        things = []
+        for number in np.argsort(-stats[1:, cv2.CC_STAT_AREA]) + 1:
+            x, y, width, height, area = stats[number].tolist()
+            if not _SMALLEST <= area / differs.size <= _LARGEST:
+                continue
+            part = np.s_[y : y + height, x : x + width]
+            rows, columns = np.nonzero((labels[part] == number) & (self._covered[part] == 0))
+            if len(rows) >= max(_OUTSIDE * area, _SMALLEST * differs.size):
+                center = x + float(columns.mean()), y + float(rows.mean())
+                things.append((center, float(max(np.ptp(rows), np.ptp(columns)) + 1)))
+        return things
+
+
+def _is_in(point: Point, covered: Image) -> bool:
+    return bool(covered.size) and bool(covered[int(point[1]), int(point[0])])

@@ -1,0 +1,78 @@
+"""Whether the camera moves: planes cut out of one large picture, with known motion."""
+
+from collections.abc import Callable
+
+import cv2
+import numpy as np
+import pytest
+
+from vdet.boxes import Image
+from vdet.conditions.camera import CameraWatch
+
+WIDTH, HEIGHT = 160, 90
+WORLD = cv2.GaussianBlur(
+    np.random.default_rng(3).integers(0, 256, (400, 600), np.uint8), (0, 0), 2.5
+)
+WORLD = np.asarray(cv2.normalize(WORLD, None, 0, 255, cv2.NORM_MINMAX), np.uint8)
+Place = tuple[float, float, float]
+"""Where the camera looks: x, y in planes' pixels, and degrees."""
+
+
+def view(x: float, y: float, degrees: float) -> Image:
+    matrix = cv2.getRotationMatrix2D((300 + x, 200 + y), degrees, 1)
+    matrix[:, 2] += np.array((WIDTH / 2 - 300 - x, HEIGHT / 2 - 200 - y))
+    noise = np.random.default_rng(int(1000 * (x + y + 500))).integers(-3, 4, (HEIGHT, WIDTH))
+    return np.uint8(np.clip(cv2.warpAffine(WORLD, matrix, (WIDTH, HEIGHT)) + noise, 0, 255))
+
+
+def watched(place: Callable[[float], Place], seconds: float = 20.0) -> CameraWatch:
+    watch = CameraWatch()
+    for time in np.arange(0, seconds, 0.25).tolist():
+        watch.add(time, view(*place(time)), [])
+    return watch
+
+
+def codes(watch: CameraWatch) -> list[tuple[str, float]]:
+    """Return the code and the start of each finding."""
+    is_clear = np.ones(len(watch._times), bool)
+    return [(each.code, each.spans[0][0]) for each in watch.findings(is_clear)]
+
+
+def test_a_camera_that_stands_or_trembles_a_little_is_still() -> None:
+    watch = watched(lambda time: (0.4 * np.sin(9 * time), 0.3 * np.cos(7 * time), 0.0))
+    assert watch.is_still
+    assert codes(watch) == []
+
+
+def test_a_camera_that_is_bumped_stands_differently_from_then_on() -> None:
+    watch = watched(lambda time: (0, 0, 0) if time < 8 else (6, -3, 1.5))
+    assert codes(watch) == [("camera-moved", 8.0)]
+    (finding,) = watch.findings(np.ones(len(watch._times), bool))
+    assert finding.spans == ((8.0, 19.75),)
+    assert finding.value == pytest.approx(np.hypot(6, 3) / WIDTH, rel=0.15)
+    assert "moved at 0:08" in finding.text
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        lambda time: (5 * np.sin(4 * time), 3 * np.cos(5 * time), 0),
+        lambda time: (0, 0, 3 * np.sin(3 * time)),
+        lambda time: (6 * time, 0, 0),
+    ],
+    ids=["by hand", "it rolls", "it pans"],
+)
+def test_a_camera_that_moves_is_reported_from_its_start(place: Callable[[float], Place]) -> None:
+    watch = watched(lambda time: place(time - 5) if time >= 5 else place(0), 15.0)
+    [(code, start)] = codes(watch)
+    assert code == "camera-moves"
+    assert start == pytest.approx(5, abs=1)
+    assert not watch.is_still
+
+
+def test_what_hides_the_view_for_a_moment_does_not_move_the_camera() -> None:
+    watch = CameraWatch()
+    for time in np.arange(0, 10, 0.25).tolist():
+        hidden = np.random.default_rng(1).integers(0, 256, (HEIGHT, WIDTH), np.uint8)
+        watch.add(time, hidden if 4 <= time < 6 else view(0, 0, 0), [])
+    assert codes(watch) == []
