@@ -126,8 +126,8 @@ def _change(kind: str, rng: np.random.Generator) -> Callable[[Image, float], Ima
     changes: dict[str, Callable[[Image, float], Image]] = {
         "shaken": shaken,
         "bumped": bumped,
-        "night": lambda image, _: np.uint8((image / 255) ** gamma * gain * 255),
-        "fog": lambda image, _: np.uint8(image * (1 - veil) + grey * veil),
+        "night": lambda image, _: ((image / 255) ** gamma * gain * 255).astype(np.uint8),
+        "fog": lambda image, _: (image * (1 - veil) + grey * veil).astype(np.uint8),
         "blur": lambda image, _: np.asarray(cv2.GaussianBlur(image, (0, 0), sigma)),
     }
     return changes.get(kind, lambda image, _: image)

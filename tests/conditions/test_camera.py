@@ -13,7 +13,7 @@ WIDTH, HEIGHT = 160, 90
 WORLD = cv2.GaussianBlur(
     np.random.default_rng(3).integers(0, 256, (400, 600), np.uint8), (0, 0), 2.5
 )
-WORLD = np.asarray(cv2.normalize(WORLD, None, 0, 255, cv2.NORM_MINMAX), np.uint8)
+WORLD = np.asarray(cv2.normalize(WORLD, np.empty(0), 0, 255, cv2.NORM_MINMAX), np.uint8)
 Place = tuple[float, float, float]
 """Where the camera looks: x, y in planes' pixels, and degrees."""
 
@@ -22,7 +22,7 @@ def view(x: float, y: float, degrees: float) -> Image:
     matrix = cv2.getRotationMatrix2D((300 + x, 200 + y), degrees, 1)
     matrix[:, 2] += np.array((WIDTH / 2 - 300 - x, HEIGHT / 2 - 200 - y))
     noise = np.random.default_rng(int(1000 * (x + y + 500))).integers(-3, 4, (HEIGHT, WIDTH))
-    return np.uint8(np.clip(cv2.warpAffine(WORLD, matrix, (WIDTH, HEIGHT)) + noise, 0, 255))
+    return np.clip(cv2.warpAffine(WORLD, matrix, (WIDTH, HEIGHT)) + noise, 0, 255).astype(np.uint8)
 
 
 def watched(place: Callable[[float], Place], seconds: float = 20.0) -> CameraWatch:

@@ -53,11 +53,11 @@ def test_a_batch_says_it_in_the_manifest_and_in_the_index(
     assert found.code == 4
     assert TEXT in found.err
     (record,) = map(json.loads, (tmp_path / "found" / "manifest.jsonl").read_text().splitlines())
-    assert (record["conditions"], record["warnings"]) == ([FINDING], [])
+    assert record["facts"]["conditions"] == [FINDING]
     assert f"<td>{TEXT}</td>" in (tmp_path / "found" / "index.html").read_text()
 
 
 def test_python_gets_it_too(clip: Path, config: Path, tmp_path: Path) -> None:
     settings = vdet.load_settings(config, ["lanes.enabled=true"])
     totals = vdet.detect_video(clip, tracks=tmp_path / "a.csv", settings=settings)
-    assert [each.record() for each in totals.findings] == [FINDING]
+    assert totals.facts["conditions"].record() == [FINDING]

@@ -121,8 +121,9 @@ def _moved(earlier: Image | None, plane: Image, points: Float32Array) -> Float64
     """Return how far the corners of a frame are from those of an earlier plane, `(4, 2)` pixels."""
     if earlier is None or len(points) < _FEWEST:
         return _UNKNOWN
-    window = {"winSize": (9, 9), "maxLevel": 2}
-    found, status, _ = cv2.calcOpticalFlowPyrLK(earlier, plane, points, np.empty(0), **window)
+    found, status, _ = cv2.calcOpticalFlowPyrLK(
+        earlier, plane, points, np.empty(0), winSize=(9, 9), maxLevel=2
+    )
     seen = status.ravel() > 0
     if seen.sum() < _FEWEST:
         return _UNKNOWN
