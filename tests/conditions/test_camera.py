@@ -22,7 +22,8 @@ def view(x: float, y: float, degrees: float) -> Image:
     matrix = cv2.getRotationMatrix2D((300 + x, 200 + y), degrees, 1)
     matrix[:, 2] += np.array((WIDTH / 2 - 300 - x, HEIGHT / 2 - 200 - y))
     noise = np.random.default_rng(int(1000 * (x + y + 500))).integers(-3, 4, (HEIGHT, WIDTH))
-    return np.clip(cv2.warpAffine(WORLD, matrix, (WIDTH, HEIGHT)) + noise, 0, 255).astype(np.uint8)
+    shown = cv2.warpAffine(WORLD, matrix, (WIDTH, HEIGHT))
+    return np.asarray(np.clip(shown + noise, 0, 255), np.uint8)
 
 
 def watched(place: Callable[[float], Place], seconds: float = 20.0) -> CameraWatch:

@@ -195,7 +195,7 @@ def _spaced(path: VehiclePath, spacing: float) -> Float64Array:
 
 def _groups(rows: Sequence[Float64Array]) -> Int64Array:
     """Return the number of the group of each path: where it heads first and last."""
-    from scipy.cluster.hierarchy import fcluster, linkage  # type: ignore[import-untyped]
+    from scipy.cluster.hierarchy import fcluster, linkage
 
     quarters = [each[[0, len(each) // 4, 3 * len(each) // 4, -1], :2] for each in rows]
     headings = np.diff(quarters, axis=1)[:, [0, 2]]
