@@ -1,6 +1,7 @@
 "use strict";
 // The page of `vdet draw`. First the counting rule, which is pure; then numbers for the panel, the
-// file, and at last what is drawn and edited. Points are [x, y] in pixels of the frame.
+// file, and at last what is drawn and edited. Points are [x, y] in pixels of the frame. A path has
+// times, xs, ys and heights; rows from `seen` on are where the vehicle would have driven on.
 
 // ---------------------------------------------------------------- the rule, as vdet.traffic has it
 const SETTLED = 0.1; // seconds after which a vehicle off the band has changed the side
@@ -26,13 +27,15 @@ function meeting([ax, ay], [bx, by], [[cx, cy], [dx, dy]]) {
 /** Return whether a point lies in a polygon, given its sides. */
 function isInside(sides, x, y) {
   let inside = false;
-  for (const [a, b] of sides)
+  for (const side of sides) {
+    const a = side[0], b = side[1];
     if ((a[1] > y) !== (b[1] > y) && x < a[0] + (y - a[1]) * ((b[0] - a[0]) / (b[1] - a[1]))) inside = !inside;
+  }
   return inside;
 }
 
 function distanceTo(segment, x, y) {
-  const [a, b] = segment, wx = b[0] - a[0], wy = b[1] - a[1];
+  const a = segment[0], b = segment[1], wx = b[0] - a[0], wy = b[1] - a[1];
   const at = clamp(((x - a[0]) * wx + (y - a[1]) * wy) / (wx * wx + wy * wy), 0, 1);
   const dx = x - a[0] - at * wx, dy = y - a[1] - at * wy;
   return Math.sqrt(dx * dx + dy * dy); // Math.hypot is ten times as slow
@@ -68,18 +71,20 @@ function placeLine(line, size) {
 
 /** Place a zone, whose positive side is the inside; at the frame's edge it goes on beyond. */
 function placeZone(zone, size) {
-  const corners = zone.points.map(point => snapped(point, size));
+  const corners = zone.points.map(point => snapped(point, size)), bounds = boundsOf(corners);
   const every = sidesOf(corners), isAtEdge = ([a, b], i) => a[i] === b[i] && (a[i] === 0 || a[i] === size[i]);
   const sides = every.filter(side => !isAtEdge(side, 0) && !isAtEdge(side, 1));
   const right = size[0] - INSIDE, bottom = size[1] - INSIDE;
   const inFrame = ([x, y]) => [clamp(x, INSIDE, right), clamp(y, INSIDE, bottom)];
   return {
     isZone: true, name: zone.name, directions: ["enter", "exit", "appear", "vanish"], corners, size,
-    bounds: boundsOf(corners),
-    distance(x, y) {
+    bounds,
+    distance(x, y, height) {
       x = clamp(x, INSIDE, right);
       y = clamp(y, INSIDE, bottom);
+      const away = Math.max(bounds[0] - x, x - bounds[2], bounds[1] - y, y - bounds[3]);
       let distance = Infinity;
+      if (away > height + 10) return -away; // the rule asks no more than whether it is that far
       for (const side of sides) distance = Math.min(distance, distanceTo(side, x, y));
       return isInside(every, x, y) ? distance : -distance;
     },
@@ -101,17 +106,13 @@ function mayMeet(path, border) {
   return x1 <= right && x2 >= left && y1 <= bottom && y2 >= top;
 }
 
-/**
- * Return what a vehicle does at a border, in order: time, row, direction, and for a zone seconds.
- * A path has times, xs, ys and heights; rows from `seen` on are where it would have driven on.
- */
+/** Return what a vehicle does at a border, in order: time, row, direction, and for a zone seconds. */
 function crossings(path, border) {
   if (!mayMeet(path, border)) return [];
   const found = changes(path, border);
   if (!border.isZone || !found.length) return found;
-  found.forEach((each, i) => {
-    if (i && each.direction === "exit") each.seconds = each.time - found[i - 1].time;
-  });
+  for (let i = 1; i < found.length; i++)
+    if (found[i].direction === "exit") found[i].seconds = found[i].time - found[i - 1].time;
   const last = path.seen - 1, final = found.at(-1);
   if (final.direction !== "exit") {
     const time = Math.max(path.times[last], final.time); // it may enter where it drives on
@@ -123,9 +124,13 @@ function crossings(path, border) {
 /** Return the changes of the settled side, and where it begins in a zone. */
 function changes(path, border) {
   const { times, xs, ys, heights } = path, count = times.length, found = [];
-  const distances = Float64Array.from(xs, (x, row) => border.distance(x, ys[row]));
-  const isPositive = row => distances[row] >= 0;
-  if (!(border.isZone && isPositive(0)) && distances.every((_, row) => isPositive(row) === isPositive(0))) return found;
+  const distances = new Float64Array(count), isPositive = row => distances[row] >= 0;
+  let turns = 0;
+  for (let row = 0; row < count; row++) {
+    distances[row] = border.distance(xs[row], ys[row], heights[row]);
+    if (row && isPositive(row) !== isPositive(row - 1)) turns++;
+  }
+  if (!turns && !(border.isZone && isPositive(0))) return found;
   const { settles, isClear } = settle(path, border, distances);
   let settled = null, crossed = null; // the side, and where it crossed last
   for (let row = 0, end; row < count; row = end) {
@@ -823,18 +828,13 @@ async function openPage(data) {
     else if (button) button.click(), stage.focus({ preventScroll: true });
     else if (isControl) return;
     else if (key === "s") swap();
-    else if (key === "n" && selected) nextPoint();
+    else if (key === "n" && selected) selected.point = ((selected.point ?? -1) + 1) % pointsOf(selected.kind, item()).length, drawMarks();
     else if (key === "Delete" || key === "Backspace") drawn.length ? (drawn.pop(), drawMarks()) : remove();
     else if (key === "Escape") [drawn, selected] = [[], null], setTool("select"), refresh();
     else if (key === "Enter" && tool !== "select") pressEnter();
     else if (arrow) step(arrow.map(value => value * (event.shiftKey ? 20 : 1)));
     else return;
     event.preventDefault();
-  }
-
-  function nextPoint() {
-    selected.point = ((selected.point ?? -1) + 1) % pointsOf(selected.kind, item()).length;
-    drawMarks();
   }
 
   /** Put a point where the crosshair is; where it was just put, the shape ends. */
