@@ -50,7 +50,6 @@ def test_a_record_is_there_as_soon_as_it_is_added(tmp_path: Path) -> None:
             }
         ],
         "warnings": [],
-        "conditions": [],
         "error": None,
         "program": "vdet 1.2",
     }

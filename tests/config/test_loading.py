@@ -247,4 +247,5 @@ class TestFindConfig:
     def test_an_unknown_name_names_the_shipped_configs(self, name: str) -> None:
         with pytest.raises(ConfigError) as error:
             find_config(name)
-        assert str(error.value) == f"{name}: no such file; shipped configs are: default, seed, svm"
+        shipped = "default, project-camera, seed, svm"
+        assert str(error.value) == f"{name}: no such file; shipped configs are: {shipped}"

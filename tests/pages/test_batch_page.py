@@ -28,7 +28,13 @@ def row(kind: str | None, first: float, **more: Any) -> VehicleRow:
 
 VIDEOS = {
     "a": facts(
-        row("car", 0.0, clock="2026-05-01T07:00:02+02:00", way="north → south", speed=51.5),
+        row(
+            *("car", 0.0),
+            clock="2026-05-01T07:00:02+02:00",
+            way="north → south",
+            speed=51.5,
+            motion="drove",
+        ),
         row(None, 1.0, picture="../a.crops/vehicle-0002.jpg"),
     ),
     "day/b #1": facts(row(NASTY, 3.5), row("car", 2.0)),
@@ -64,6 +70,8 @@ def test_its_table_has_every_vehicle(tmp_path: Path) -> None:
         "video": [0, 0, 1, 1],
         "class": [1, 2, 3, 1],
         "way": [1, 0, 0, 0],
+        "states": ["", "drove"],
+        "state": [1, 0, 0, 0],
         "first": [0.0, 1.0, 3.5, 2.0],
         "moment": ["0.000", "1.000", "3.500", "2.000"],
         "seconds": [1.5] * 4,
@@ -108,10 +116,10 @@ document.title = JSON.stringify(seen);
     (title,) = re.findall("<title>(.*?)</title>", done.stdout.decode())
     assert json.loads(unescape(title)) == {
         "all": [
-            ["", "car", "a", "page.html#t=0.000", "1.5", "52", "north → south"],
-            ["", "vehicle", "a", "page.html#t=1.000", "1.5", "–", ""],
-            ["", NASTY, "day/b #1", "page.html#t=3.500", "1.5", "–", ""],
-            ["", "car", "day/b #1", "page.html#t=2.000", "1.5", "–", ""],
+            ["", "car", "a", "page.html#t=0.000", "1.5", "52", "north → south", "drove"],
+            ["", "vehicle", "a", "page.html#t=1.000", "1.5", "–", "", ""],
+            ["", NASTY, "day/b #1", "page.html#t=3.500", "1.5", "–", "", ""],
+            ["", "car", "day/b #1", "page.html#t=2.000", "1.5", "–", "", ""],
         ],
         "sorted": [NASTY, "car", "car", "vehicle"],
         "cars": ["a", "day/b #1"],

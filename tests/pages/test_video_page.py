@@ -130,7 +130,8 @@ class TestVideoPage:
 
     def test_intervals_begin_at_round_times_of_the_clock_as_in_tables(self) -> None:
         counts = counted(*(("north", "in", at) for at in (60, 360, 840)))
-        clock = Clock(datetime.fromisoformat("2026-05-01 07:10+02:00"), "as given")
+        begin = datetime.fromisoformat("2026-05-01 07:10+02:00")
+        clock = Clock(begin, "as given", begin.tzinfo)
         made = seen(replace(page(end=900), counts=counts, interval=900, clock=clock))
         tips = re.findall(r"07:..: . north: in", made.text)
         assert tips == ["07:00: 1 north: in", "07:15: 2 north: in"]
@@ -207,7 +208,7 @@ class TestVideoPage:
 
 def test_the_facts_have_the_counts_and_a_row_for_each_vehicle() -> None:
     counts = counted(("north", "in", 1, 1), ("south", "in", 2, 1), *[("</script><b>", "in", 1)] * 8)
-    clock = Clock(datetime(2026, 5, 1, 7, tzinfo=UTC), "as given")
+    clock = Clock(datetime(2026, 5, 1, 7, tzinfo=UTC), "as given", UTC)
     known = {1: "../a.crops/vehicle-0001.jpg"}
     facts = replace(page(), counts=counts, clock=clock, pictures=known).facts
     assert (facts.frames, facts.vehicles, facts.most) == (52, 2, 1)
@@ -244,7 +245,7 @@ class TestDoubts:
     def test_its_times_are_a_row_above_the_vehicles(self) -> None:
         plain, marked = (replace(page(), findings=found) for found in ((), (self.FINDING,)))
         assert marked.html().count("it &lt;was&gt; dark") == 2, "in the list and in the row"
-        assert plain.html().count("dark") == 0
+        assert "it &lt;was&gt; dark" not in plain.html()
 
     def test_vehicles_that_stood_are_counted_apart(self) -> None:
         stood = [replace(record, motion="standing") for record in TWO]

@@ -14,6 +14,7 @@ from red_cars import HEIGHT, SETTINGS
 from run.conftest import Register
 from run.red_runs import COUNT, outputs, read, run_red, video_info
 from vdet.boxes import Image
+from vdet.conditions.finding import Findings
 from vdet.config.schema import OutputSettings
 from vdet.errors import OutputError
 from vdet.files import OutputFiles
@@ -253,7 +254,7 @@ def test_what_a_step_finds_out_of_a_video_reaches_its_sinks_totals_and_warnings(
 
     register("reads", SinkKind(Reads))
     totals = run_red(Run(red_clip, outputs(reads=tmp_path / "a")), steps=[CountsMost()])
-    assert totals.facts == {"most": MostAtOnce(1)}
+    assert totals.facts == {"conditions": Findings(), "most": MostAtOnce(1)}
     assert seen == [totals.facts]
     assert f"{red_clip}: shows 1 vehicle at once" in caplog.messages
 
