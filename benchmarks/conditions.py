@@ -55,7 +55,7 @@ _SEEDS = 12
 _SMALLEST = 0.025
 """Width of vehicles that are counted in pictures, as a fraction of the picture's."""
 _FOUND = 0.45
-"""Least intersection over union of a vehicle that was found."""
+"""Minimum intersection over union of a vehicle that was found."""
 _MOST = 150
 """Pictures of a set that are searched."""
 
@@ -75,11 +75,11 @@ class Changed:
         conditions = Conditions(SETTINGS, self.scene.camera.width)
         for index, image in self.images.items():
             time = self.scene.time(index)
-            boxes = [(each.id, each.box) for each in true_boxes(self.scene, index)]
+            boxes = [(true_box.id, true_box.box) for true_box in true_boxes(self.scene, index)]
             if kind == "hidden":
                 boxes = [(number, box) for number, box in boxes if number % 3]
             shown = change(image, time) if time >= CHANGE else image
-            tracks = [Track(number, box, 0.9, "seen") for number, box in boxes]
+            tracks = [Track(number, box, 0.9, "detected") for number, box in boxes]
             sides = [(box.x1, box.y1, box.x2, box.y2) for _, box in boxes]
             found = Boxes(sides, np.full(len(sides), 0.9))
             conditions.add(time, Picture(shown), found, tracks)
@@ -87,7 +87,7 @@ class Changed:
 
     def is_right(self, kind: str) -> bool:
         """Return whether the right finding, and no other warning, is there in time."""
-        codes = {each.code: each for each in self.findings(kind)}
+        codes = {finding.code: finding for finding in self.findings(kind)}
         expected = EXPECTED[kind]
         if expected is None:
             return not codes
@@ -146,11 +146,11 @@ def compare_drawn() -> None:
 
 def measure_pictures(roads: Path) -> None:
     """Print the recall by sight in sets that the network has not seen, and the weights."""
-    settings = load_settings(assignments=["detector.still_score=0.1"])
+    settings = load_settings(assignments=["detector.min_score_still=0.1"])
     search = PictureSearch(load_detector(settings.detector), settings)
     seen = trained_on(settings.detector)
     rows = []
-    for path in sorted(each for each in roads.iterdir() if each.name not in seen and each.is_dir()):
+    for path in sorted(item for item in roads.iterdir() if item.name not in seen and item.is_dir()):
         rows += [(path.name, *row) for row in _measured(path, search)]
     names = np.array([row[0] for row in rows])
     sights = [row[1] for row in rows]
@@ -200,8 +200,8 @@ def _measured(path: Path, search: PictureSearch) -> Iterator[tuple[Sight, int, i
         ]
         if truth:
             found = search.detect(labelled.path, image).detections
-            scores = np.array([each.score for each in found], np.float64)
-            sure = [each.box for each in found if each.score >= 0.4]
+            scores = np.array([item.score for item in found], np.float64)
+            sure = [item.box for item in found if item.score >= 0.4]
             hits = sum(any(_iou(box, other) >= _FOUND for other in sure) for box in truth)
             yield Sight.of(small_luma(Picture(image)), scores), len(truth), hits
 

@@ -29,9 +29,9 @@ from vdet.workers import limit_library_threads
 
 SCENES = range(30)
 _SECONDS = 6
-_LORRIES = 0.15  # share of vehicles
+_LORRIES = 0.15  # fraction of vehicles
 _SPACE = 0.9, 2.5
-"""Least and most room between two vehicles of a lane, in lengths of the one in front."""
+"""Minimum and most room between two vehicles of a lane, in lengths of the one in front."""
 
 
 def crowd(number: int) -> Scene:
@@ -99,7 +99,7 @@ def main() -> None:
     print("camera      scenes   F1     IDF1   HOTA   id switches   fragmentations")
     for camera, numbers in (("windscreen", SCENES[::2]), ("pole", SCENES[1::2])):
         scores = [scores_of(crowd(number), model, settings) for number in numbers]
-        means = (fmean(getattr(each, name) for each in scores) for name in ("f1", "idf1", "hota"))
+        means = (fmean(getattr(score, name) for score in scores) for name in ("f1", "idf1", "hota"))
         sums = sum(s.id_switches for s in scores), sum(s.fragmentations for s in scores)
         row = "   ".join(f"{mean:.3f}" for mean in means)
         print(f"{camera:<12}{len(scores):4}   {row}{sums[0]:12}{sums[1]:17}")

@@ -49,7 +49,7 @@ EDGES = (0, 10, 20, 30, 40, 55)
 """Ranges of the true distance, metres."""
 MOST = 40
 RIGHT = 0.1
-"""Largest error of a distance that counts as right, share of it."""
+"""Largest error of a distance that counts as right, fraction of it."""
 LEAST_IOU = 0.5
 """Of a shown box with the vehicle whose place it is compared with."""
 
@@ -130,7 +130,7 @@ def scene_of(camera: PinholeCamera, radius: float, seed: int) -> Scene:
     bent = replace(camera, curvature=1 / radius)
     scene = traffic_scene(bent, lane=seed % 3, lanes=3, frames=FRAMES, seed=seed)
     return replace(
-        scene, vehicles=tuple(moving(each, off=seed % 2 == 0) for each in scene.vehicles)
+        scene, vehicles=tuple(moving(vehicle, off=seed % 2 == 0) for vehicle in scene.vehicles)
     )
 
 
@@ -161,7 +161,7 @@ def found_lines(drive: Drive) -> Iterator[Sample]:
     finder = drive.finder()
     for index, image in enumerate(drive.images()):
         scene = drive.at(index)
-        vehicles = [each.box for each in true_boxes(scene, index)]
+        vehicles = [true_box.box for true_box in true_boxes(scene, index)]
         road = finder.update(finder.observe(Picture(image)), vehicles)
         if index in COUNTED:
             yield from by_true_boxes(scene, index, road)
@@ -170,10 +170,10 @@ def found_lines(drive: Drive) -> Iterator[Sample]:
 def by_true_boxes(scene: Scene, index: int, road: Road) -> Iterator[Sample]:
     """Give the vehicles that must be found."""
     places = {place.id: place for place in true_places(scene, index)}
-    for each in true_boxes(scene, index):
-        if must_be_found(each, scene.camera.height):
-            [track] = with_positions([Track(each.id, each.box, 1.0, "seen")], road, 0.0)
-            yield Sample(places[each.id], track)
+    for true_box in true_boxes(scene, index):
+        if must_be_found(true_box, scene.camera.height):
+            [track] = with_positions([Track(true_box.id, true_box.box, 1.0, "detected")], road, 0.0)
+            yield Sample(places[true_box.id], track)
 
 
 class Shown:
@@ -203,7 +203,7 @@ def _matched(scene: Scene, index: int, tracks: Sequence[Track]) -> Iterator[Samp
     places = {place.id: place for place in true_places(scene, index)}
     boxes = true_boxes(scene, index)
     for track in tracks:
-        best = max(boxes, key=lambda each: each.box.iou(track.box))
+        best = max(boxes, key=lambda box: box.box.iou(track.box))
         counts = must_be_found(best, scene.camera.height)
         if counts and best.box.iou(track.box) > LEAST_IOU:
             yield Sample(places[best.id], track)

@@ -105,9 +105,14 @@ def shown_labels(results: Iterable[FrameResult]) -> LabelledVideo:
 def true_labels(scene: Scene, indices: Iterable[int]) -> LabelledVideo:
     """Return the true boxes of frames; vehicles that do not count are ignore regions."""
     return LabelledVideo.of(
-        _label(index, each.id, each.box, ignored=not must_be_found(each, scene.camera.height))
+        _label(
+            index,
+            true_box.id,
+            true_box.box,
+            ignored=not must_be_found(true_box, scene.camera.height),
+        )
         for index in indices
-        for each in true_boxes(scene, index)
+        for true_box in true_boxes(scene, index)
     )
 
 

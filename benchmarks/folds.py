@@ -47,8 +47,8 @@ SWEEPS = {
     "detector.search.probability": (0.2, 0.3, 0.4, 0.5),
     "detector.heat.votes": (0.06, 0.12, 0.18),
     "detector.score.middle": (0.3, 0.4, 0.5, 0.6),
-    "tracker.leak": (0.1, 0.2, 0.3),
-    "tracker.needed": (0.06, 0.1, 0.16),
+    "tracker.decay": (0.1, 0.2, 0.3),
+    "tracker.confirm_seconds": (0.06, 0.1, 0.16),
 }
 
 Numbers = npt.NDArray[np.intp]
@@ -166,7 +166,7 @@ def _search(
             for model in models
         ]
         searching = Searching(detectors, last)
-        searches = SearchRate(settings.detector.searches, settings.detector.stride)
+        searches = SearchRate(settings.detector.searches_per_second, settings.detector.stride)
         tracker = make_tracker(settings, info.width, info.height)
         count = sum(1 for _ in Pipeline(searching, tracker, rate=searches).follow(frames))
     return SearchedVideo(info.width, info.height, info.rate, count, searches, searching.windows)
@@ -182,10 +182,10 @@ def _sweep(
     """Yield the lines of a table: the F1 of each value, over all blocks and by block."""
     variants = [load_settings((), [f"{key}={value}"], detector="svm") for value in values]
     found = [_tracks(searched, model, settings) for settings in variants]
-    by_block = np.array([_f1_by_block(each, truth) for each in found])
+    by_block = np.array([_f1_by_block(item, truth) for item in found])
     yield f"\n{key}: F1, id switches, false tracks, frames until shown; F1 of the blocks"
-    for value, each, blocks in zip(values, found, by_block, strict=True):
-        whole = score(each, truth)
+    for value, item, blocks in zip(values, found, by_block, strict=True):
+        whole = score(item, truth)
         numbers = "  ".join(f"{f1:.3f}" for f1 in blocks)
         delay = "-" if whole.mean_delay is None else f"{whole.mean_delay:.1f}"
         yield (
@@ -218,7 +218,7 @@ def _tracks(searched: SearchedVideo, model: LinearModel, settings: Settings) -> 
 def _f1_by_block(found: LabelledVideo, truth: LabelledVideo) -> list[float]:
     last = truth.last_frame
     parts = [
-        [each.where(_block_of(each.frames, last) == block) for each in (found, truth)]
+        [item.where(_block_of(item.frames, last) == block) for item in (found, truth)]
         for block in range(BLOCKS)
     ]
     return [score(prediction, part).f1 for prediction, part in parts]

@@ -60,7 +60,7 @@ def write_hour(path: Path, seed: int = 0) -> None:
         for index, (x, y) in enumerate(feet.tolist(), first):
             height = 20 + y / 12
             box = Box(x - 0.7 * height, y - height, x + 0.7 * height, y)
-            tracks[index].append(Track(number, box, 0.9, "seen", "car", (x, y)))
+            tracks[index].append(Track(number, box, 0.9, "detected", "car", (x, y)))
         left -= life
     form = format_for(path)
     assert form is not None

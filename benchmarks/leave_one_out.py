@@ -58,7 +58,7 @@ ByKind = Mapping[str, list[ImagesResult]]
 """The results of all groups, by their kind."""
 
 _NEAR, _FAR = 0.03, 0.02
-"""Narrower vehicles are ignore regions, share of the picture's width: of the first kind, and of
+"""Narrower vehicles are ignore regions, fraction of the picture's width: of the first kind, and of
 cameras on poles and bridges.
 """
 
@@ -71,7 +71,7 @@ _SAME_CAMERA = {
 
 _LEAST_SCORE = 5e-5  # of a calibrated network; its output is about 0.02 there
 _OURS = "trained without them"
-_FROM_RANDOM = "train.net.rate=0.002"  # the default rate is for a training from a base
+_FROM_RANDOM = "train.net.learning_rate=0.002"  # the default rate is for a training from a base
 
 
 def _fifth(picture: str) -> str:
@@ -92,7 +92,7 @@ SPLITS = {"traffic_cams": _fifth, "overpass": _camera}
 def split_sets(roads: Path, folder: Path) -> list[Path]:
     """Return all sets; those of `SPLITS` in parts, which are written into `folder`."""
     sets = []
-    for path in sorted(each for each in roads.iterdir() if each.is_dir()):
+    for path in sorted(item for item in roads.iterdir() if item.is_dir()):
         if path.name in SPLITS:
             sets += _split(path, SPLITS[path.name], folder)
         else:
@@ -109,7 +109,7 @@ def _split(path: Path, part_of: Callable[[str], str], folder: Path) -> list[Path
         part = folder / f"{path.name}.{name}"
         part.mkdir(parents=True, exist_ok=True)
         numbers = {image["id"] for image in images}
-        boxes = [each for each in labels["annotations"] if each["image_id"] in numbers]
+        boxes = [label for label in labels["annotations"] if label["image_id"] in numbers]
         text = json.dumps({**labels, "images": images, "annotations": boxes})
         (part / "annotations.json").write_text(text, encoding="utf-8")
         for image in images:
@@ -129,7 +129,7 @@ def train(job: NetworkJob, settings: Settings) -> Path:
 
 def measure(sets: Sequence[Path], network: Path) -> ImagesResult:
     """Search the sets of a group."""
-    detector = NetworkSettings(least=_LEAST_SCORE, model=str(network)).showing_all()
+    detector = NetworkSettings(min_score=_LEAST_SCORE, model=str(network)).showing_all()
     is_far = sets[0].name.partition(".")[0] in SPLITS
     counting = Counting(detector.shown_score, _FAR if is_far else _NEAR)
     labelled = [read_labelled_pictures(path) for path in sets]
@@ -182,7 +182,7 @@ def main() -> None:
         clips = () if groups is trainings[-1] else (clip,)
         output = arguments.work / f"without_{names[0]}.onnx"
         ours = train(NetworkJob(learnt, clips, output, arguments.base), settings)
-        networks = {_OURS: ours, **{str(each): each for each in arguments.model}}
+        networks = {_OURS: ours, **{str(item): item for item in arguments.model}}
         for kind, group in zip(KINDS, groups, strict=True):
             if not group:
                 continue
@@ -192,7 +192,7 @@ def main() -> None:
                 results[name][kind].append(result)
                 best = figure(result.mean.best_f1)
                 print(f"{', '.join(group)}: best F1 {best} ({name})", flush=True)
-    summaries = {name: summarize(each) for name, each in results.items()}
+    summaries = {name: summarize(result) for name, result in results.items()}
     print("\n".join(summary_lines(summaries, settings.train.net.score)))
     for model in arguments.model:
         seen = trained_on(NetworkSettings(model=str(model)))
@@ -240,9 +240,9 @@ def summary_lines(summaries: Mapping[str, Summary], given: NetworkScoreSettings)
     names = [Path(name).name for name in summaries][1:]
     headings = ("left out", "vehicles", "F1", "best F1", "at score", "AP50", *names)
     rows = []
-    for each, *more in zip(ours.sets, *(other.sets for other in others), strict=True):
-        ratios = each.f1, each.best_f1, each.best_score, each.ap50, *(one.best_f1 for one in more)
-        rows.append([each.name, str(each.vehicles), *map(figure, ratios)])
+    for set_, *more in zip(ours.sets, *(other.sets for other in others), strict=True):
+        ratios = set_.f1, set_.best_f1, set_.best_score, set_.ap50, *(one.best_f1 for one in more)
+        rows.append([set_.name, str(set_.vehicles), *map(figure, ratios)])
     for kind, (f1, best) in ours.means.items():
         theirs = (share(other.means[kind][1]) for other in others)
         rows.append([f"mean, {kind}", "", share(f1), share(best), "", "", *theirs])
@@ -254,15 +254,15 @@ def summary_lines(summaries: Mapping[str, Summary], given: NetworkScoreSettings)
 
 def summarize(by_kind: ByKind) -> Summary:
     """Return the scores at one score for all groups, and fit the calibration to all detections."""
-    results = [result for each in by_kind.values() for result in each]
+    results = [result for item in by_kind.values() for result in item]
     sources = [source for result in results for source in result.sources]
-    scores = np.unique(np.concatenate([each.ranked.scores for each in sources]))
+    scores = np.unique(np.concatenate([source.ranked.scores for source in sources]))
     common = scores[np.argmax(_mean_f1(results, scores))]
     slope, offset = fit_calibration(*ranked_logits(sources))
     means = {}
-    for kind, each in by_kind.items():
-        bests = [result.mean.best_f1 for result in each]
-        means[kind] = float(_mean_f1(each, common)), float(np.mean(bests))
+    for kind, item in by_kind.items():
+        bests = [result.mean.best_f1 for result in item]
+        means[kind] = float(_mean_f1(item, common)), float(np.mean(bests))
     return Summary(
         sets=tuple(
             SetScores(

@@ -46,7 +46,7 @@ NEAR = 0.05
 LEAST_IOU = 0.5
 """Of a shown box with that of the vehicle that it shows."""
 LEAST_WIDTH = 0.015
-"""Share of the frame's width from which a true box is shown, as a tracker does."""
+"""Fraction of the frame's width from which a true box is shown, as a tracker does."""
 
 _FAR, _NEAR, _SIDE = 90.0, -15.0, -30.0  # metres; where lanes and the side road begin and end
 _EDGE = 1.5 * LANE_WIDTH  # metres from the camera to the left edge of the road
@@ -101,9 +101,9 @@ class PoleScene:
                 index,
                 self.scene.time(index),
                 tuple(
-                    Track(each.id, each.box, 1.0, "seen", "car")
-                    for each in true_boxes(self.scene, index)
-                    if each.box.width >= LEAST_WIDTH * WIDTH
+                    Track(true_box.id, true_box.box, 1.0, "detected", "car")
+                    for true_box in true_boxes(self.scene, index)
+                    if true_box.box.width >= LEAST_WIDTH * WIDTH
                 ),
             )
 
@@ -328,13 +328,13 @@ def main() -> None:
             )
     for name, some in outcomes.items():
         rows, vehicles = (
-            sum(len(each) for each in lists)
-            for lists in ([each.flows for each in some], [each.speeds for each in some])
+            sum(len(list_) for list_ in lists)
+            for lists in ([window.flows for window in some], [window.speeds for window in some])
         )
-        sigmas = np.abs([sigma for each in some for sigma in each.sigmas])
+        sigmas = np.abs([sigma for window in some for sigma in window.sigmas])
         print(
-            f"{name}: {sum(each.exact for each in some) / rows:.1%} of {rows} flows exact, "
-            f"{sum(each.near for each in some) / vehicles:.1%} of {vehicles} speeds within 5 %, "
+            f"{name}: {sum(window.exact for window in some) / rows:.1%} of {rows} flows exact, "
+            f"{sum(w.near for w in some) / vehicles:.1%} of {vehicles} speeds within 5 %, "
             f"{np.mean(sigmas <= 2):.1%} of them within two standard deviations"
         )
 

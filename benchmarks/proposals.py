@@ -52,11 +52,11 @@ def proposed(scene: PoleScene) -> Proposed:
         traffic=TrafficSettings(
             lines=tuple(
                 LineSettings(
-                    name=each.name,
-                    start=(each.start[0] / WIDTH, each.start[1] / HEIGHT),
-                    end=(each.end[0] / WIDTH, each.end[1] / HEIGHT),
+                    name=line.name,
+                    start=(line.start[0] / WIDTH, line.start[1] / HEIGHT),
+                    end=(line.end[0] / WIDTH, line.end[1] / HEIGHT),
                 )
-                for each in lines
+                for line in lines
             )
         )
     )

@@ -115,7 +115,7 @@ def start_times(path: Path, folder: Path, rounds: int) -> dict[str, tuple[float,
     environment.pop("PYTHONDONTWRITEBYTECODE", None)  # programs that are installed have bytecode
     run = partial(subprocess.run, check=True, capture_output=True, env=environment)
     tasks: dict[str, Task] = {
-        name: partial(run, [sys.executable, *each]) for name, each in commands.items()
+        name: partial(run, [sys.executable, *command]) for name, command in commands.items()
     }
     return measure_both(tasks, rounds)
 

@@ -10,4 +10,4 @@ def moved_to(box: Box, x: float, y: float) -> Box:
 
 def rounded(found: Boxes) -> list[Box]:
     """Return the boxes in whole pixels."""
-    return [each.box.rounded for each in found]
+    return [item.box.rounded for item in found]

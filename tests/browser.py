@@ -107,7 +107,7 @@ class Browser:
             {"type": "pointerMove", "x": x, "y": y, "duration": 30}
             for x, y in (self.at(*point) for point in points)
         )
-        pressed, left = ({"type": each, "button": 0} for each in ("pointerDown", "pointerUp"))
+        pressed, left = ({"type": item, "button": 0} for item in ("pointerDown", "pointerUp"))
         steps = [first, pressed, *others, left]
         parameters = {"pointerType": kind}
         self._act({"type": "pointer", "id": kind, "parameters": parameters, "actions": steps})
@@ -117,8 +117,8 @@ class Browser:
         steps: list[dict[str, str]] = []
         for key in keys:
             for chord in [key] if key[0] in (CONTROL, SHIFT) else list(key):
-                steps += [{"type": "keyDown", "value": each} for each in chord]
-                steps += [{"type": "keyUp", "value": each} for each in reversed(chord)]
+                steps += [{"type": "keyDown", "value": item} for item in chord]
+                steps += [{"type": "keyUp", "value": item} for item in reversed(chord)]
         self._act({"type": "key", "id": "keys", "actions": steps})
 
     def _act(self, *actions: dict[str, Any]) -> None:

@@ -26,9 +26,9 @@ PATCH = 64
 VEHICLE_GROUPS: tuple[str, ...] = ("near", "far")
 BACKGROUND_GROUPS: tuple[str, ...] = ("road", "roadside", "parts")
 
-_MAX_VEHICLE = 0.15  # largest share of a background patch that vehicles fill
+_MAX_VEHICLE = 0.15  # largest fraction of a background patch that vehicles fill
 _FAR = 130  # windows narrower than this many pixels are `far`
-_SMALLEST = 32  # least side of a window, pixels of the frame
+_SMALLEST = 32  # minimum side of a window, pixels of the frame
 _OBJECTS = 8  # most roadside objects taken from a frame
 
 

@@ -34,5 +34,5 @@ def only_windows(settings: str) -> tuple[str, ...]:
     )
 
 
-FEW_OPTIONS = ("--set", "tracker.needed=5", "--set", "output.preset=ultrafast")
+FEW_OPTIONS = ("--set", "tracker.confirm_seconds=5", "--set", "output.preset=ultrafast")
 """Options with which a run takes little time and shows no vehicle."""

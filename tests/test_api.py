@@ -54,7 +54,7 @@ def test_the_page_runs_and_leaves_its_files(page: tuple[Path, dict[str, Any]]) -
     assert frames_of(folder / "out.mp4") == frames_of(folder / "in.mp4")
     assert isinstance(names["detections"], vdet.Boxes)
     (track,) = names["tracks"]
-    assert (track.id, track.state) == (1, "seen")
+    assert (track.id, track.state) == (1, "detected")
     assert abs(track.box.x1 - 657) <= 10
 
 
@@ -119,10 +119,10 @@ def test_a_notebook_shows_a_result_as_its_frame_with_the_vehicles() -> None:
     (frame,) = drive(1)
     box = vdet.Box(96, 120, 160, 168)
     result = vdet.FrameResult(Path("a.mp4"), frame, vdet.Boxes([], []), (), searched=False)
-    shown = replace(result, tracks=(vdet.Track(1, box, 0.9, "seen", "car"),))
+    shown = replace(result, tracks=(vdet.Track(1, box, 0.9, "detected", "car"),))
     plain, drawn = (
-        np.asarray(cv2.imdecode(np.frombuffer(each._repr_png_(), np.uint8), cv2.IMREAD_COLOR))
-        for each in (result, shown)
+        np.asarray(cv2.imdecode(np.frombuffer(item._repr_png_(), np.uint8), cv2.IMREAD_COLOR))
+        for item in (result, shown)
     )
     assert np.array_equal(plain, frame.image)
     assert np.any(drawn != plain, axis=2)[120, 96:160].all()
@@ -133,8 +133,8 @@ def test_tracks_are_handed_to_pandas_and_supervision(monkeypatch: pytest.MonkeyP
         module = ModuleType(name)
         vars(module)[kind] = lambda *rows, **columns: (*rows, columns)
         monkeypatch.setitem(sys.modules, name, module)
-    car = vdet.Track(4, vdet.Box(1, 2, 3, 5), 0.9, "seen", "car", (2.0, 5.0), 12.5, -1)
-    bus = vdet.Track(5, vdet.Box(0, 0, 9, 9), 0.8, "lost", "bus")
+    car = vdet.Track(4, vdet.Box(1, 2, 3, 5), 0.9, "detected", "car", (2.0, 5.0), 12.5, -1)
+    bus = vdet.Track(5, vdet.Box(0, 0, 9, 9), 0.8, "predicted", "bus")
     frame = vdet.FrameTracks(7, 0.28, (car, bus))
     (first, _), columns = frame.to_pandas()
     expected = {"frame": 7, "time": 0.28, "x1": 1, "y1": 2, "x2": 3, "y2": 5} | asdict(car)
@@ -205,7 +205,7 @@ def test_a_tracker_knows_its_vehicles_in_frames_in_which_nobody_looked() -> None
     for number in range(40):
         looks = number % 4 == 0
         tracks = tracker.update(found, number / 25) if looks else tracker.at(number / 25)
-    assert [(track.id, track.state) for track in tracks] == [(1, "between")]
+    assert [(track.id, track.state) for track in tracks] == [(1, "interpolated")]
 
 
 def test_follow_can_be_left_early(clip_path: Path) -> None:
@@ -255,8 +255,8 @@ class Latest:
         picture: vdet.Picture | None = None,  # noqa: ARG002
     ) -> list[vdet.Track]:
         return [
-            vdet.Track(number, each.box, 0.9, state="seen")
-            for number, each in enumerate(detections, start=1)
+            vdet.Track(number, detection.box, 0.9, state="detected")
+            for number, detection in enumerate(detections, start=1)
         ]
 
 
@@ -306,7 +306,7 @@ def test_detect_video_takes_what_the_command_takes(red_clip: Path, tmp_path: Pat
     assert str(totals.clock) == "2026-05-01 07:00:00+02:00 (as given)"
     assert seen == [(number, 6) for number in range(1, 7)]
     records = [json.loads(line) for line in (tmp_path / "a.jsonl").read_text().splitlines()]
-    assert [len(each["tracks"]) for each in records] == [1, 0] * 3
+    assert [len(record["tracks"]) for record in records] == [1, 0] * 3
     assert "lane" in records[0]
     assert (tmp_path / "stages" / "1-boxes.png").exists()
     assert (tmp_path / "a.csv").exists()
@@ -351,7 +351,7 @@ def test_live_counts_are_those_of_the_file_and_of_the_frames(
     from_file = vdet.count_tracks(tracks, settings)
     assert sum(total.count for total in from_file.totals) == 1
     live = json.loads((tmp_path / "c.json").read_text())
-    assert [each["count"] for each in live["totals"]] == [each.count for each in from_file.totals]
+    assert [item["count"] for item in live["totals"]] == [total.count for total in from_file.totals]
     frames = [result.frame_tracks for result in results]
     size = WIDTH, HEIGHT
     assert from_file == vdet.count_tracks(frames, settings, size=size)

@@ -36,7 +36,7 @@ def test_a_member_is_read_as_it_was_written(data: bytes, compression: int) -> No
         (zipped("a", b"x", zipfile.ZIP_BZIP2), "its member a is compressed in an unusual way"),
         (zipped("a", b"x", zipfile.ZIP_LZMA), "its member a is compressed in an unusual way"),
         (zipped("b", b"x"), "its member a is damaged or missing"),
-        (b"no zip file", "is neither a folder nor a readable zip file"),
+        (b"no zip file", "is not a folder or a readable zip file"),
     ],
 )
 def test_the_error_says_why_a_member_is_not_read(data: bytes, words: str) -> None:

@@ -218,8 +218,8 @@ class TestSupervision:
         made.data |= {"centroid": np.array(SIDES)[:, :2], "words": np.array(["a", "b", "c"])}
         back = Boxes.from_supervision(made)
         assert list(back) == list(FOUND)
-        assert {name: each.tolist() for name, each in back.data.items()} == {
-            **{name: each.tolist() for name, each in FOUND.data.items()},
+        assert {name: item.tolist() for name, item in back.data.items()} == {
+            **{name: item.tolist() for name, item in FOUND.data.items()},
             "centroid": [sides[:2] for sides in SIDES],
         }
         bare: Any = SimpleNamespace(
@@ -231,7 +231,7 @@ class TestSupervision:
             metadata={},
         )
         assert Boxes.from_supervision(bare).class_names == ["car", "bus", "car"]
-        assert [each.score for each in Boxes.from_supervision(bare)] == [1, 1, 1]
+        assert [item.score for item in Boxes.from_supervision(bare)] == [1, 1, 1]
 
     @pytest.mark.parametrize("found", [FOUND, FOUND[:0], Boxes(SIDES, SCORES)])
     def test_the_real_package_takes_it_and_gives_it_back(self, found: Boxes) -> None:

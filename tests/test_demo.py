@@ -47,7 +47,7 @@ def test_draws_finds_counts_trains_and_compares(
 
     again = run("demo", folder)
     assert again.code == 1
-    assert "is not empty; give another folder, or --overwrite" in again.err
+    assert "is not empty; choose another folder, or use --overwrite" in again.err
     assert again.err.count("\n") == 1
 
 
@@ -56,5 +56,5 @@ def test_a_file_for_a_folder(run: Run, tmp_path: Path) -> None:
     result = run("demo", tmp_path / "demo")
     assert result.code == 1
     assert result.err.count("\n") == 1
-    assert "cannot be made a folder" in result.err
+    assert "cannot be created" in result.err
     assert (tmp_path / "demo").read_text() == "precious"

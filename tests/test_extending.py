@@ -74,7 +74,7 @@ def test_all_three_run_through_detect_video(package: Path, clip: Path, tmp_path:
     records = [json.loads(line) for line in tracks.read_text().splitlines()]
     for number, record in enumerate(records):
         (track,) = record["tracks"]
-        assert (track["id"], track["score"], track["state"]) == (1, 0.9, "seen")
+        assert (track["id"], track["score"], track["state"]) == (1, 0.9, "detected")
         assert abs(track["x"] - car_at(number).x1) <= 2
     names = sorted(path.name for path in (tmp_path / "stages").iterdir())
     assert names == ["1-red.png", "2-boxes.png"]
@@ -188,7 +188,7 @@ def test_all_three_run_through_a_batch(package: Path, clip: Path, tmp_path: Path
         assert len((tmp_path / "out" / f"{name}.txt").read_text().splitlines()) == FRAMES
         assert frames_of(tmp_path / "out" / f"{name}.mp4") == FRAMES
     record = json.loads((tmp_path / "out" / "manifest.jsonl").read_text().splitlines()[0])
-    assert {each["sink"] for each in record["outputs"]} == {"video", "tally"}
+    assert {item["sink"] for item in record["outputs"]} == {"video", "tally"}
     assert (record["model"], record["error"]) == (None, None)
 
 

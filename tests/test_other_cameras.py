@@ -127,17 +127,17 @@ def straight_and_mirrored(case: Case, model: DetectorModel) -> tuple[Comparison,
 
 def test_a_mirrored_clip_gives_mirrored_boxes(model: DetectorModel) -> None:
     both = straight_and_mirrored(CASES["fewer rows"], model)
-    straight, turned_back = (on_vehicles(each) for each in both)
+    straight, turned_back = (on_vehicles(item) for item in both)
     common = straight.keys() & turned_back.keys()
     offsets = [np.abs(straight[key] - turned_back[key]).max() for key in common]
     assert len(common) >= 28  # of 50; measured: 33
     assert median(offsets) < 8  # pixels; measured: 5
-    f1, f1_mirrored = (score_comparison(each).f1 for each in both)
+    f1, f1_mirrored = (score_comparison(item).f1 for item in both)
     assert f1_mirrored == pytest.approx(f1, abs=0.2)  # measured: 0.81 and 0.94
 
 
 def test_vehicles_on_the_left_are_found_as_well_as_on_the_right(model: DetectorModel) -> None:
     both = straight_and_mirrored(CASES["right lane"], model)
-    on_left, on_right = (len(on_vehicles(each)) for each in both)
+    on_left, on_right = (len(on_vehicles(item)) for item in both)
     assert min(on_left, on_right) >= 28  # of 40; measured: 33 and 32
     assert abs(on_left - on_right) <= 5

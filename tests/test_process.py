@@ -33,8 +33,8 @@ def running() -> Iterator[list[Running]]:
     """Programs that are ended after the test."""
     started: list[Running] = []
     yield started
-    for each in started:
-        each.stop()
+    for item in started:
+        item.stop()
 
 
 def test_nothing_in_the_current_folder_is_imported(

@@ -122,7 +122,7 @@ class Shares:
         picture: Picture | None = None,  # noqa: ARG002
     ) -> list[Track]:
         pairs = zip(self.own, rounded(detections), strict=False)
-        return [Track(number, box, 0.5, state="seen") for number, box in pairs]
+        return [Track(number, box, 0.5, state="detected") for number, box in pairs]
 
 
 class Forgets(Shares):

@@ -80,7 +80,9 @@ def load_settings(config: Paths = (), assignments: Sequence[str] = ()) -> Settin
     ConfigError
         A file or a value is wrong; the message has one line for each mistake.
     """
-    return load_layers([find_config(os.fspath(each)) for each in _listed(config)], assignments)
+    return load_layers(
+        [find_config(os.fspath(path_name)) for path_name in _listed(config)], assignments
+    )
 
 
 class Detector:
@@ -317,7 +319,7 @@ def _run(source: PathName | Run, **part: Any) -> Run:
     if not isinstance(source, Run):
         return Run(Path(source), **part)
     if any(value is not None for name, value in part.items() if name != "threads"):
-        raise ValueError("start, end, frames: a Run has its own; leave them out")
+        raise ValueError("start, end, frames: a Run has its own; remove them")
     return source
 
 
@@ -325,7 +327,7 @@ def _settings(source: PathName | Run, settings: Settings | None) -> Settings | N
     if not isinstance(source, Run):
         return settings
     if settings is not None:
-        raise ValueError("settings: a Run has its own; leave them out")
+        raise ValueError("settings: a Run has its own; remove them")
     return source.settings
 
 

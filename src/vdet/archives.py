@@ -25,7 +25,7 @@ def open_archive(file: Path | IO[bytes]) -> zipfile.ZipFile:
     try:
         return zipfile.ZipFile(file)
     except Exception as error:  # zipfile raises a dozen kinds on damaged data
-        raise ArchiveError("is neither a folder nor a readable zip file") from error
+        raise ArchiveError("is not a folder or a readable zip file") from error
 
 
 def store(archive: zipfile.ZipFile, name: str, data: str | bytes) -> None:

@@ -28,7 +28,7 @@ Image = npt.NDArray[np.uint8]
 _Rows = slice | Sequence[int] | npt.NDArray[Any]
 
 _NESTED = 0.8
-"""Share of a box from which on it lies in another one."""
+"""Fraction of a box from which on it lies in another one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,7 +144,7 @@ class Boxes:
         float64 `(n, 4)`: x1, y1, x2, y2 in pixels of the frame; x to the right, y down, `x2` and
         `y2` are exclusive.
     scores
-        float64 `(n,)`, 0 to 1: the share of boxes with such a score that are vehicles.
+        float64 `(n,)`, 0 to 1: the fraction of boxes with such a score that are vehicles.
     classes
         int32 `(n,)`: indices into `names`; None where classes are not known.
     names
@@ -195,7 +195,7 @@ class Boxes:
         put("data", {n: _column(data[n], np.float64, shape, n) for n, shape in shapes.items()})
         put("trace", trace)
         if (self.sides[:, 2:] <= self.sides[:, :2]).any():
-            raise ValueError("sides: a box has no area; give x1 < x2 and y1 < y2")
+            raise ValueError("sides: a box has no area; must be x1 < x2 and y1 < y2")
         if ((self.scores < 0) | (self.scores > 1)).any():
             raise ValueError("scores: a score is not in 0 to 1")
         if self.classes is not None and not np.isin(self.classes, range(len(names))).all():
@@ -377,7 +377,7 @@ def are_nested(boxes: Float64Array, scores: npt.ArrayLike) -> BoolArray:
 
 def visible(boxes: Float64Array, size: tuple[int, int]) -> Float64Array:
     """Return the parts of boxes `(n, 4)` in a frame of `size`; they may have no area."""
-    return np.minimum(np.maximum(boxes, 0), (*size, *size))  # np.clip takes thrice as long
+    return np.minimum(np.maximum(boxes, 0), (*size, *size))  # np.clip is three times slower
 
 
 def area(boxes: Float64Array) -> Float64Array:

@@ -50,7 +50,7 @@ traffic:
   lines:
     - {name: north, start: [0.2, 0.45], end: [0.9, 0.45], left: out, right: in}
     - {name: south, start: [0.02, 0.8], end: [0.98, 0.8], left: in, right: out}
-  drawn: true
+  draw: true
 """
 _BY_NETWORK = {"video": "found.mp4", "tracks": "found.csv"}
 _ON_POLE = {"video": "counted.mp4", "tracks": "pole.csv", "flows": "flows.csv", "page": "page"}
@@ -82,7 +82,7 @@ def run_demo(
     """
     make_folder(folder)
     if not overwrite and any(folder.iterdir()):
-        raise OutputError(f"{folder}: is not empty; give another folder, or --overwrite")
+        raise OutputError(f"{folder}: is not empty; choose another folder, or use --overwrite")
 
     def draw(scene: Scene, clip: Path, truth: Path) -> None:
         write_clip(clip, scene, overwrite=overwrite)

@@ -36,7 +36,7 @@ def check_positive(**numbers: int | None) -> None:
     """Raise a `ConfigError` that names the first number below 1; None counts as not given."""
     for name, number in numbers.items():
         if number is not None and number < 1:
-            raise ConfigError(f"{name}: is {number}; give 1 or more, or leave it out")
+            raise ConfigError(f"{name}: is {number}; must be at least 1")
 
 
 class DataError(VdetError, ValueError):
@@ -44,7 +44,7 @@ class DataError(VdetError, ValueError):
 
 
 class ModelError(VdetError, ValueError):
-    """A model file is damaged, is no model, or does not fit its use."""
+    """A model file is damaged, is not a model, or does not fit its use."""
 
 
 class ImageError(VdetError, ValueError):
@@ -79,13 +79,13 @@ _NO_ROOM = "failed to map segment"  # says the system, of a library for which me
 
 
 def in_one_line(error: Exception) -> str:
-    """Describe any error in one line; one that is no `VdetError` or `OSError` is called a bug."""
+    """Describe any error in one line; all but a `VdetError` and an `OSError` are called a bug."""
     if isinstance(error, VdetError):
         return str(error)
     if isinstance(error, OSError):
         return f"{error.filename or 'reading or writing'}: {error.strerror or error}"
     if isinstance(error, MemoryError) or _NO_ROOM in str(error):
-        return "there is too little memory; end other programs, or raise the limit (ulimit -v)"
+        return "out of memory; close other programs, or raise the limit (ulimit -v)"
     if fault := opencv_fault():
         return fault
     text = " ".join(f"{type(error).__name__}: {error}".split())

@@ -94,7 +94,7 @@ def check_output(path: Path, *, overwrite: bool, makes_folder: bool = False) -> 
         if not overwrite:
             raise OutputError(f"{path}: already exists; use --overwrite to replace it")
     if not folder.is_dir():
-        problem = "is not a folder" if folder.exists() else "does not exist; make it first"
+        problem = "is not a folder" if folder.exists() else "does not exist; create it first"
         raise OutputError(f"{path}: the folder {folder} {problem}")
     if not os.access(folder, os.W_OK):
         raise OutputError(f"{path}: the folder {folder} cannot be written to")
@@ -112,7 +112,7 @@ def make_folder(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise OutputError(f"{folder}: cannot be made a folder: {error.strerror}") from error
+        raise OutputError(f"{folder}: cannot be created: {error.strerror}") from error
 
 
 class OutputFiles:
@@ -127,7 +127,7 @@ class OutputFiles:
     ----------
     overwrite
         Replace files that have these names, but for inputs, and keep their permissions. A link is
-        replaced, and not what it leads to. Without it every file that is there is kept, also one
+        replaced, and not what it leads to. Without it every existing file is kept, also one
         that appears while the run writes.
 
     Raises
@@ -175,7 +175,7 @@ class OutputFiles:
 
     def _temporary_folder(self, path: Path) -> Path:
         if path not in self._folders:
-            missing = [each for each in (path, *path.parents) if not each.exists()]
+            missing = [item for item in (path, *path.parents) if not item.exists()]
             self._new_folders += reversed(missing)
             path.mkdir(parents=True, exist_ok=True)
             remove_stale(path)
@@ -205,7 +205,7 @@ class OutputFiles:
         for path, file in files.items():
             with output_errors(path), file.open("rb+") as written:
                 os.fsync(written.fileno())
-        # New files are no inputs, though one may have the number of an input that was deleted.
+        # New files are not inputs, though one may have the number of an input that was deleted.
         (_inputs.get() or set()).difference_update(map(_id, files.values()))
         # An interrupt may come at any time, so how to undo a step is noted before the step.
         with contextlib.ExitStack() as undo:
@@ -225,7 +225,7 @@ class OutputFiles:
             undo.pop_all()
 
     def _set_aside(self, path: Path, undo: contextlib.ExitStack) -> None:
-        """Move the file that is there into the temporary folder, which is removed at the end."""
+        """Move the existing file into the temporary folder, which is removed at the end."""
         aside = self._folders[path.parent] / _ASIDE / path.name
         aside.parent.mkdir(exist_ok=True)
         undo.callback(_put_back, aside, path)
@@ -282,7 +282,7 @@ def remove_stale(folder: Path) -> None:
 
 @contextlib.contextmanager
 def staged(path: Path, *, overwrite: bool = False) -> Iterator[Path]:
-    """Give a temporary file that becomes `path` when the block ends without an error.
+    """Yield a temporary file that becomes `path` when the block ends without an error.
 
     Raises
     ------
@@ -311,7 +311,7 @@ def output_errors(path: Path) -> Iterator[None]:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write UTF-8; what is no valid text, as a name of a file may be, is escaped."""
+    """Write UTF-8; what is not valid text, as a name of a file may be, is escaped."""
     path.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
 
 
@@ -359,5 +359,5 @@ def read_whole(path: Path, *, most: int, what: str, error: type[VdetError]) -> b
     except OSError as fault:
         raise error(f"{path}: cannot be read: {fault.strerror}") from fault
     if len(data) > most:
-        raise error(f"{path}: is larger than {most:,} bytes; that is no {what}")
+        raise error(f"{path}: is larger than {most:,} bytes, too large for a {what}")
     return bytes(data)

@@ -82,8 +82,8 @@ def load_plugin(group: str, name: str) -> Any:
             return point.load()
         except Exception as error:  # another package's code may raise anything
             raise ConfigError(
-                f"{name}: {point.value} fails to load ({type(error).__name__}: {error}); repair it"
+                f"{name}: {point.value} cannot be loaded ({type(error).__name__}: {error})"
             ) from error
     known = ", ".join(plugin_names(group)) or "none"
     noun = group.removeprefix("vdet.").removesuffix("s")
-    raise ConfigError(f"{printable(name)}: is no {noun}; known are {known}")
+    raise ConfigError(f"{printable(name)}: unknown {noun}; known: {known}")

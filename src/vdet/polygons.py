@@ -18,7 +18,7 @@ def side_of(start: Point, end: Point, point: Point) -> float:
 
 
 def meeting(path: Segment, segment: Segment) -> float | None:
-    """Return where a path meets a segment, as a share of its length from its start.
+    """Return where a path meets a segment, as a fraction of its length from its start.
 
     Both include their ends. The result is None where they do not meet, and where they overlap.
     """

@@ -41,17 +41,17 @@ class Regions:
         self.excluded: dict[str, list[Point]] = {}
         shape = height, width
         inside, outside = np.zeros(shape, np.uint8), np.zeros(shape, np.uint8)
-        for each in settings:
-            is_included = each.kind == "include"
+        for setting in settings:
+            is_included = setting.kind == "include"
             layer = inside if is_included else outside
-            if each.mask:
-                layer |= _read_mask(each.mask, width, height)
+            if setting.mask:
+                layer |= _read_mask(setting.mask, width, height)
             else:
-                corners = [(x * width, y * height) for x, y in each.points or ()]
-                (self.included if is_included else self.excluded)[each.name] = corners
+                corners = [(x * width, y * height) for x, y in setting.points or ()]
+                (self.included if is_included else self.excluded)[setting.name] = corners
                 # With the pixels of its sides.
                 cv2.fillPoly(layer, [np.floor(corners).astype(np.int32)], 1)
-        shows_all = not any(each.kind == "include" for each in settings)
+        shows_all = not any(setting.kind == "include" for setting in settings)
         self.pixels: BoolArray = (shows_all | (inside > 0)) & (outside == 0)
 
     def contains(self, point: Point) -> bool:
@@ -74,9 +74,9 @@ def lay_regions(settings: Sequence[RegionSettings], width: int, height: int) -> 
 
 def check_masks(settings: Sequence[RegionSettings]) -> None:
     """Refuse masks that cannot be read, before any work. Raises `ImageError`."""
-    for each in settings:
-        if each.mask:
-            read_header(Path(each.mask))
+    for setting in settings:
+        if setting.mask:
+            read_header(Path(setting.mask))
 
 
 def _read_mask(path: str, width: int, height: int) -> BoolArray:

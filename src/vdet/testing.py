@@ -68,7 +68,7 @@ def check_tracker(make: Callable[[int, int], VideoTracker]) -> None:
     """Check a tracker; `make` returns a new one for frames of a width and height.
 
     * Two vehicles that are always detected keep one id each. Boxes lie in the frame, ids are
-      positive and in order, scores are 0 to 1, and what is detected is "seen".
+      positive and in order, scores are 0 to 1, and what is detected is "detected".
     * The frame is not changed.
     * A second tracker shows the same: trackers share nothing.
     * Nothing is shown some seconds after the last detection.
@@ -85,13 +85,15 @@ def check_tracker(make: Callable[[int, int], VideoTracker]) -> None:
         assert (picture.image == _scene(index)).all(), "the tracker changed the frame"
         ids |= {track.id for track in tracks}
     assert len(tracks) == 2, f"{len(tracks)} of 2 vehicles are shown"
-    assert all(track.state == "seen" for track in tracks), "a detected vehicle is not called seen"
+    assert all(track.state == "detected" for track in tracks), (
+        "a detected vehicle is not called detected"
+    )
     assert len(ids) == 2, "a vehicle that is always detected changed its id"
     if isinstance(second, TimedTracker):
         later = second.at(3.0)
         _check_tracks(later)
         assert {track.id for track in later} == ids, "a vehicle is lost a moment later"
-        assert all(track.state == "between" for track in later), "not called between"
+        assert all(track.state == "interpolated" for track in later), "not called interpolated"
     for index in range(3 * RATE, 30 * RATE):
         tracks = first.update(NO_BOXES, index / RATE, Picture(_scene(0) // 2))
     assert not tracks, "vehicles are shown long after the last detection"
@@ -181,5 +183,5 @@ def _scene(index: int) -> Image:
 def _result(index: int) -> FrameResult:
     frame = Frame(index, Fraction(index, RATE), Picture(_scene(index)))
     left, right = _boxes(index)
-    tracks = (Track(1, left, 0.9, "seen"), Track(2, right, 0.9, "lost"))
+    tracks = (Track(1, left, 0.9, "detected"), Track(2, right, 0.9, "predicted"))
     return FrameResult(Path("check.mp4"), frame, _detections(index), tracks)

@@ -68,10 +68,10 @@ New memory takes longer than to decode a picture into it.
 """
 
 
-def return_freed_memory(least: int = 1_000_000, at_end: int = 16_000_000) -> None:
+def return_freed_memory(minimum: int = 1_000_000, at_end: int = 16_000_000) -> None:
     """Let glibc return freed memory to the system, with limits in bytes.
 
-    Blocks from `least` on, such as frames, are returned, and the end of the heap once `at_end` of
+    Blocks from `minimum` on, such as frames, are returned, and the end of the heap once `at_end` of
     it are free. glibc would raise its own limit to 32 MB, and keep frames in the gaps between
     others. With another C library nothing is done.
     """
@@ -79,7 +79,7 @@ def return_freed_memory(least: int = 1_000_000, at_end: int = 16_000_000) -> Non
 
     with contextlib.suppress(AttributeError, OSError, TypeError):
         set_limit = ctypes.CDLL(None).mallopt
-        set_limit(_M_MMAP_THRESHOLD, least)
+        set_limit(_M_MMAP_THRESHOLD, minimum)
         set_limit(_M_TRIM_THRESHOLD, at_end)
 
 

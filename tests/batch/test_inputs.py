@@ -150,5 +150,5 @@ def test_a_folder_that_cannot_be_read_is_named(
         return scan(path)
 
     monkeypatch.setattr("os.scandir", deny)
-    with pytest.raises(BatchError, match=r"day1: cannot be read: Permission denied; leave it out$"):
+    with pytest.raises(BatchError, match=r"day1: cannot be read: Permission denied; remove it$"):
         find_sources([folder / "clips"])

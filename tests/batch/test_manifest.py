@@ -1,4 +1,4 @@
-"""The manifest: whole lines, whatever is there already."""
+"""The manifest: whole lines, whatever already exists."""
 
 import json
 from pathlib import Path

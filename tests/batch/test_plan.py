@@ -58,7 +58,7 @@ def plan_outputs(
         [Path(path) for path in inputs],
         Path(folder),
         replace(COMMON, overwrite=overwrite),
-        [OutputSuffix(*each) for each in suffixes.items()],
+        [OutputSuffix(*suffix) for suffix in suffixes.items()],
         skip_existing=skip_existing,
     )
 
@@ -82,10 +82,10 @@ def note(source: str, *outputs: Output, made_by: str = "") -> None:
         "now",
         outputs=tuple(
             Written(
-                *(each.sink, str(each.path.absolute()), *(output_state(each) or (0, 0))),
+                *(output.sink, str(output.path.absolute()), *(output_state(output) or (0, 0))),
                 digest=made_by or digest(Run(Path(source))),
             )
-            for each in outputs
+            for output in outputs
         ),
     )
     with open_manifest(Path("out")) as add:

@@ -89,7 +89,7 @@ def test_what_was_made_before_the_program_was_killed_is_skipped(
     out, first = clips.parent / "out", plan().runs[0]
     assert process_file(first, folder=out).error is None
     again = plan(skip_existing=True)
-    assert [each.source for each in again.skipped] == [first.source]
+    assert [run.source for run in again.skipped] == [first.source]
     assert run(again) == [None]
     assert names(out) == MADE
     inputs = [

@@ -33,7 +33,7 @@ def test_the_record_says_what_was_done_and_folders_are_made(job: Run, tmp_path: 
     assert record.error is None
     assert record.input == str(job.source)
     paths = [tmp_path / "out" / "day" / name for name in ("a.mp4", "a.csv")]
-    assert [(each.sink, each.path) for each in record.outputs] == [
+    assert [(output.sink, output.path) for output in record.outputs] == [
         ("video", str(paths[0])),
         ("tracks", str(paths[1])),
     ]
@@ -46,8 +46,8 @@ def test_the_record_says_what_was_done_and_folders_are_made(job: Run, tmp_path: 
     note.unlink()
     assert names(tmp_path / "out") == ["day/a.csv", "day/a.mp4"]
     states = [(path.stat().st_size, path.stat().st_mtime_ns) for path in paths]
-    assert [each.state for each in record.outputs] == states
-    assert {each.digest for each in record.outputs} == {result_digest(job)}
+    assert [output.state for output in record.outputs] == states
+    assert {output.digest for output in record.outputs} == {result_digest(job)}
 
 
 def test_the_detector_is_loaded_once_for_all_files(

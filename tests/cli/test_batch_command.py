@@ -127,7 +127,7 @@ def test_after_other_settings_or_another_model_videos_are_made_again(
     assert run(*dry).out.count("up to date") == 2
     (tmp_path / "steps").write_text("steps: {names: [theirs]}")
     other_step = ("-c", tmp_path / "steps")
-    changes = (("--set", "tracker.needed=0.3"), ("--set", "output.crf=30"), ("-c", "svm"))
+    changes = (("--set", "tracker.confirm_seconds=0.3"), ("--set", "output.crf=30"), ("-c", "svm"))
     for change in (*changes, ("--frames", "3"), other_step):
         assert run(*dry, *change).out.count("→") == 2
     copy = shutil.copy(shipped, tmp_path / "copy.onnx")
@@ -140,7 +140,7 @@ def test_after_other_settings_or_another_model_videos_are_made_again(
     [
         (
             ("-d", "out", "--tracks", "all.txt"),
-            "tracks: with -d give only the ending of the names: .txt, .csv, .jso",
+            "tracks: with -d, pass only the ending of the names: .txt, .csv, .jso",
         ),
         (("-d", "out", "--no-video"), "nothing would be written"),
         (("-d", "out", "--stages", "x", "--at", "1"), "stages: cannot be written with -d"),

@@ -38,12 +38,12 @@ def test_all_mistakes_are_named_at_once(run: Run, tmp_path: Path) -> None:
     file = tmp_path / "my.yaml"
     windows = "  search:\n    windows:\n      - {size: 64, overlap: 1.2}\n"
     file.write_text(f"detector:\n  kind: svm\n  heat:\n    frmes: 3\n{windows}")
-    result = run("config", "-c", file, "--set", "tracker.needed=soon")
+    result = run("config", "-c", file, "--set", "tracker.confirm_seconds=soon")
     assert result.code == 1
     lines = result.err.splitlines()
-    assert f"vdet: {file}:4:5: detector.heat.frmes: is no setting; did you mean frames?" in lines
+    assert f"vdet: {file}:4:5: detector.heat.frmes: unknown setting; did you mean frames?" in lines
     assert any(f"{file}:7:20: detector.search.windows[0].overlap: " in line for line in lines)
-    assert any("--set: tracker.needed: should be a valid number" in line for line in lines)
+    assert any("--set: tracker.confirm_seconds: should be a valid number" in line for line in lines)
     assert all(line.startswith("vdet: ") for line in lines)
 
 

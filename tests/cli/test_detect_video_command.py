@@ -69,8 +69,10 @@ def test_stride_is_the_setting_of_the_detector(
         assert result.code == 0, result.err
     records = [json.loads(line) for line in (tmp_path / "a.jsonl").read_text().splitlines()]
     assert len(records) == 30
-    shown = {each["frame"] for each in records if each["tracks"]}
-    seen = {each["frame"] for each in records for t in each["tracks"] if t["state"] == "seen"}
+    shown = {record["frame"] for record in records if record["tracks"]}
+    seen = {
+        record["frame"] for record in records for t in record["tracks"] if t["state"] == "detected"
+    }
     assert seen
     assert seen < shown
     assert all(number % 5 == 0 for number in seen)

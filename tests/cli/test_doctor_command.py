@@ -18,7 +18,7 @@ def test_here_it_works(run: Run) -> None:
     assert all(line.startswith(("ok ", "absent ")) for line in lines)
     values = json.loads(result.out)
     assert values["works"]
-    names = {each["name"] for each in values["findings"]}
+    names = {value["name"] for value in values["findings"]}
     assert {"vdet", "numpy", "codec h264", "settings default"} <= names
 
 

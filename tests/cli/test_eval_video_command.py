@@ -41,10 +41,10 @@ def test_several_videos_and_a_sweep(
     assert result.code == 0, result.err
     runs = json.loads(target.read_text())["sweep"]
     heat, history = ("detector.heat.threshold=0.1", "detector.heat.threshold=5000"), (5, 10)
-    assert [each["settings"] for each in runs] == [
+    assert [run["settings"] for run in runs] == [
         [one, f"tracker.history={other}"] for one in heat for other in history
     ]
-    assert [len(each["videos"]) for each in runs] == [2] * 4
+    assert [len(run["videos"]) for run in runs] == [2] * 4
     assert runs[2]["total"]["track_boxes"] == 0, "nothing is as hot as that"
     assert "detector.heat.threshold=5000 tracker.history=10" in result.out
     assert "best F1: " in result.out

@@ -62,7 +62,7 @@ class TestNamesThatControlATerminal:
 
     def test_an_error(self, run: Run, tmp_path: Path) -> None:
         result = run("detect-video", tmp_path / FORGED, tmp_path / "out.mp4")
-        assert result.err == f"vdet: {tmp_path}/{SHOWN}: there is no such file; check the name\n"
+        assert result.err == f"vdet: {tmp_path}/{SHOWN}: not found; check the name\n"
 
     def test_each_mistake_in_settings_has_a_line(self, run: Run, tmp_path: Path) -> None:
         path = tmp_path / FORGED

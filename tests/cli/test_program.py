@@ -101,7 +101,7 @@ def test_another_package_adds_a_command_and_a_broken_one_breaks_only_itself(
     ]
 
     def entry_points(group: str, name: str | None = None) -> list[EntryPoint]:
-        return [each for each in points if each.group == group and name in (None, each.name)]
+        return [point for point in points if point.group == group and name in (None, point.name)]
 
     monkeypatch.setattr("vdet.plugins.entry_points", entry_points)
     monkeypatch.setitem(sys.modules, "their_package", SimpleNamespace(hello=hello))
@@ -111,5 +111,5 @@ def test_another_package_adds_a_command_and_a_broken_one_breaks_only_itself(
     assert run("hello").out == "hello from outside\n"
     broken = run("broken")
     assert (broken.code, broken.err.count("\n")) == (1, 1)
-    assert "broken: no_such_package:hello fails to load" in broken.err
+    assert "broken: no_such_package:hello cannot be loaded" in broken.err
     assert run("config").code == 0

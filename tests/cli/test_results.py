@@ -54,5 +54,5 @@ def test_numbers_and_page_appear_together_or_not_at_all(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
     with pytest.raises(OutputError, match="has appeared during the run"):
         results.print([], {}, write_meanwhile)
-    assert [each.name for each in tmp_path.iterdir()] == ["page"]
+    assert [item.name for item in tmp_path.iterdir()] == ["page"]
     assert (tmp_path / "page" / "page.html").read_text() == "of another"

@@ -55,7 +55,9 @@ class TestDetectVideo:
         with (out / "b.csv").open() as file:
             rows = [(int(row["frame"]), int(row["x"])) for row in csv.DictReader(file)]
         records = lines_of(out / "a.jsonl")
-        assert rows == [(each["frame"], track["x"]) for each in records for track in each["tracks"]]
+        assert rows == [
+            (record["frame"], track["x"]) for record in records for track in record["tracks"]
+        ]
         assert rows, "nothing was found: the test would say nothing"
 
     @pytest.mark.parametrize("text", ["tracks", "tracks=", "=a.csv", "=", ""])
@@ -72,7 +74,7 @@ class TestDetectVideo:
         [
             ("tallies=a.csv", f"tallies: is no sink; {KNOWN}"),
             ("tracks=a.json", "a.json: tracks are written as .txt, .csv, .jsonl, "),
-            ("tracks=none/a.csv", "none/a.csv: the folder none does not exist; make it first"),
+            ("tracks=none/a.csv", "none/a.csv: the folder none does not exist; create it first"),
             ("tracks=old.csv", "old.csv: already exists; use --overwrite to replace it"),
             ("picture=a.png", "a.png: the sink picture is for pictures"),
             ("tracks=t.txt", "t.txt: is used for two outputs; rename one"),
@@ -195,17 +197,17 @@ class TestBatch:
             (
                 ("--sink", "tracks=a.csv"),
                 2,
-                "with -d give only the ending of the names: .txt, .csv, .jsonl",
+                "with -d, pass only the ending of the names: .txt, .csv, .jsonl",
             ),
             (
                 ("--sink", "tracks=.json"),
                 2,
-                "with -d give only the ending of the names: .txt, .csv, .jsonl",
+                "with -d, pass only the ending of the names: .txt, .csv, .jsonl",
             ),
             (
                 ("--sink", "video=.avi"),
                 2,
-                "video: with -d give only the ending of the names: .mp4, .mov, .mkv",
+                "video: with -d, pass only the ending of the names: .mp4, .mov, .mkv",
             ),
             (("--sink", "json=.json"), 2, "json: cannot be written with -d"),
             (("--sink", "stages=.png", "--at", "1"), 2, "stages: cannot be written with -d"),

@@ -6,7 +6,7 @@ from pathlib import Path
 from conftest import Run
 
 # Cars are shown sooner: the clip is short.
-SOON = ("--set", "tracker.needed=0.04")
+SOON = ("--set", "tracker.confirm_seconds=0.04")
 
 
 def test_tracks_are_the_same_whatever_the_threads_and_at_every_run(

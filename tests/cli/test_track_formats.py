@@ -11,7 +11,7 @@ from vdet.labels.formats import track_suffixes
 from vdet.labels.reading import read_tracks
 
 ENDINGS = track_suffixes()
-RESULTS = [each for each in ENDINGS if each != ".txt"]
+RESULTS = [ending for ending in ENDINGS if ending != ".txt"]
 """Endings of tracks that are truth too; MOTChallenge has another form for it."""
 
 

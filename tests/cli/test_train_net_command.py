@@ -11,7 +11,7 @@ from conftest import Run
 def test_without_data_it_is_wrong_usage(run: Run, tmp_path: Path) -> None:
     result = run("train-net", "-o", tmp_path / "a.onnx")
     assert result.code == 2
-    assert "nothing to learn from; give DATA or --video" in result.err
+    assert "nothing to learn from; pass DATA or --video" in result.err
 
 
 def test_the_output_is_named_as_a_network(run: Run, tmp_path: Path) -> None:

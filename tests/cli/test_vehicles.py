@@ -62,7 +62,9 @@ def test_many_videos_have_their_own_and_a_table_and_a_page_over_all(
     with Path("found/all.cars.csv").open() as file:
         assert [row["video"] for row in csv.DictReader(file)] == [NASTY, "day/a"]
     for page in Path("found").rglob("*.html"):
-        addresses = [each for each in html_of(page).addresses() if not each.startswith("data:")]
+        addresses = [
+            address for address in html_of(page).addresses() if not address.startswith("data:")
+        ]
         assert addresses
         for address in addresses:
             assert (page.parent / unquote(address.partition("#")[0])).is_file(), address

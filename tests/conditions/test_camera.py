@@ -36,7 +36,7 @@ def watched(place: Callable[[float], Place], seconds: float = 20.0) -> CameraWat
 def codes(watch: CameraWatch) -> list[tuple[str, float]]:
     """Return the code and the start of each finding."""
     is_clear = np.ones(len(watch._times), bool)
-    return [(each.code, each.spans[0][0]) for each in watch.findings(is_clear)]
+    return [(finding.code, finding.spans[0][0]) for finding in watch.findings(is_clear)]
 
 
 def test_a_camera_that_stands_or_trembles_a_little_is_still() -> None:

@@ -29,7 +29,7 @@ def found(settings: Settings, width: int = 640, unknown: tuple[str, ...] = ()) -
     image = np.full((90, width, 3), 90, np.uint8)
     for number in range(10):
         conditions.add(number / 2, Picture(image), NO_BOXES, ())
-    return [each.code for each in conditions.findings()]
+    return [finding.code for finding in conditions.findings()]
 
 
 def test_what_the_settings_make_doubtful_is_said() -> None:

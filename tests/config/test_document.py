@@ -104,7 +104,9 @@ def test_all_keys_are_text() -> None:
 
 
 def test_a_key_given_twice_is_refused_where_it_stands_the_second_time() -> None:
-    assert refusal("a: 1\nb: {c: 1, c: 2}\na: 3\n") == ("my.yaml:2:11: c: is given twice; keep one")
+    assert refusal("a: 1\nb: {c: 1, c: 2}\na: 3\n") == (
+        "my.yaml:2:11: c: appears twice; remove one"
+    )
 
 
 @pytest.mark.parametrize("text", ["3", "words", "[1, 2]", "- a\n- b"])

@@ -43,8 +43,8 @@ class TestLayers:
 
     def test_another_kind_starts_from_its_own_defaults(self, path: Path) -> None:
         text = "tracker: {kind: rules, history: 12}\noutput: {crf: 30}"
-        settings = load(path, text, "tracker.kind=motion", "tracker.needed=0.5")
-        assert settings.tracker == MotionTrackerSettings(needed=0.5)
+        settings = load(path, text, "tracker.kind=motion", "tracker.confirm_seconds=0.5")
+        assert settings.tracker == MotionTrackerSettings(confirm_seconds=0.5)
         assert settings.output.crf == 30
 
     @pytest.mark.parametrize("printed", ["motion", "rules"])
@@ -82,7 +82,7 @@ class TestRefused:
         assert line == f"my.yaml:2:3: tracker.near: {words}"
         (line,) = refusal(path, "tracker: {kind: rules, needed: 0.3, history: 3}")
         words = "belongs to tracker.kind: motion, and has no effect with rules"
-        assert line == f"my.yaml:1:24: tracker.needed: {words}"
+        assert line == f"my.yaml:1:24: tracker.confirm_seconds: {words}"
 
     def test_a_key_of_another_kind_in_an_assignment_is_refused(self, path: Path) -> None:
         assert refusal(path, "tracker: {kind: motion}", "tracker.history=3") == [RULES]
@@ -175,9 +175,12 @@ class TestOtherPackages:
     @pytest.mark.parametrize(
         ("text", "words"),
         [
-            ("levl: 3", "detector.levl: is no setting; did you mean level?"),
-            ("parts: [{siz: 3}]", "detector.parts[0].siz: is no setting; did you mean size?"),
-            ("by_name: {a: {siz: 3}}", "detector.by_name.a.siz: is no setting; did you mean size?"),
+            ("levl: 3", "detector.levl: unknown setting; did you mean level?"),
+            ("parts: [{siz: 3}]", "detector.parts[0].siz: unknown setting; did you mean size?"),
+            (
+                "by_name: {a: {siz: 3}}",
+                "detector.by_name.a.siz: unknown setting; did you mean size?",
+            ),
             (
                 "heat: {frames: 3}",
                 "detector.heat: belongs to detector.kind: svm, and has no effect with fake",
@@ -212,8 +215,8 @@ class TestOtherPackages:
     @pytest.mark.parametrize(
         ("kind", "words"),
         [
-            ("broken", r"broken: fake_vdet:NOTHING fails to load \(AttributeError: .*rep"),
-            ("missing", r"missing: no_such.* fails to load \(ModuleNotFoundError: .*rep"),
+            ("broken", r"broken: fake_vdet:NOTHING cannot be loaded \(AttributeError: .*rep"),
+            ("missing", r"missing: no_such.* cannot be loaded \(ModuleNotFoundError: .*rep"),
             ("nameless", r'nameless: has no settings of kind = "nameless"; repair'),
             ("odd", r'odd: has no settings of kind = "odd"; repair'),
         ],

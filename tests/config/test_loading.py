@@ -75,15 +75,15 @@ def test_all_errors_are_given_at_once(path: Path) -> None:
         "my.yaml:1:19: detector.heat.frames: should be greater than or equal to 1 (got 0)",
         "my.yaml:1:30: detector.heat.blur: should be greater than or equal to 1 (got -1)",
         "my.yaml:3:9: train.svm.C: should be greater than 0 (got -1)",
-        "my.yaml:4:1: trakcer: is no setting; did you mean tracker?",
+        "my.yaml:4:1: trakcer: unknown setting; did you mean tracker?",
     ]
 
 
 @pytest.mark.parametrize(
     ("text", "column", "message"),
     [
-        ("heat: {x: 3}", 19, "heat.x: is no setting; known here: frames, blur, threshold, "),
-        ("features: {hog: {cel: 3}}", 29, "features.hog.cel: is no setting; did you mean cell?"),
+        ("heat: {x: 3}", 19, "heat.x: unknown setting; known settings: frames, blur, threshold, "),
+        ("features: {hog: {cel: 3}}", 29, "features.hog.cel: unknown setting; did you mean cell?"),
         ("heat: 3", 12, "heat: should be a section, key: value (got 3)"),
         ("heat: {frames: 2001-01-01}", 19, "heat.frames: should be a valid integer (got datetime"),
         ("heat: {threshold: 1e999}", 19, "heat.threshold: should be a finite number (got inf)"),
@@ -107,13 +107,16 @@ def test_a_mistake_in_the_detector_is_explained_in_one_line(
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("tracker: {neded: 3}", "1:11: tracker.neded: is no setting; did you mean needed?"),
+        ("tracker: {neded: 3}", "1:11: tracker.neded: unknown setting; did you mean needed?"),
         (
             "tracker: {kind: rules, histroy: 3}",
-            "1:24: tracker.histroy: is no setting; did you mean history?",
+            "1:24: tracker.histroy: unknown setting; did you mean history?",
         ),
-        ("heat: {frames: 3}", "1:1: heat: is no setting; known here: detector, tracker, camera, "),
-        ("'': 1", "1:1: : is no setting; known here: detector, tracker, "),
+        (
+            "heat: {frames: 3}",
+            "1:1: heat: unknown setting; known settings: detector, tracker, camera, ",
+        ),
+        ("'': 1", "1:1: : unknown setting; known settings: detector, tracker, "),
         ("draw: {label: score}", "1:8: draw.label: should be a list (got"),
         ("draw: {label: [speed]}", "1:16: draw.label[0]: should be 'id', 'class', 'score' or "),
         ("draw: {trails: 0}", "1:8: draw.trails: should be greater than 0 (got 0)"),
@@ -152,8 +155,8 @@ def test_a_mistake_in_an_assignment_to_the_detector_is_explained_in_one_line(
 @pytest.mark.parametrize(
     ("assignment", "message"),
     [
-        ("tracker.0=3", "tracker.0: is no setting; known here: kind, look_ahead, "),
-        ("0=3", "0: is no setting; known here: detector, tracker, "),
+        ("tracker.0=3", "tracker.0: unknown setting; known settings: kind, look_ahead, "),
+        ("0=3", "0: unknown setting; known settings: detector, tracker, "),
         ("9" * 5000 + "=3", "9999"),
     ],
 )
@@ -248,4 +251,4 @@ class TestFindConfig:
         with pytest.raises(ConfigError) as error:
             find_config(name)
         shipped = "default, project-camera, seed, svm"
-        assert str(error.value) == f"{name}: no such file; shipped configs are: {shipped}"
+        assert str(error.value) == f"{name}: not found; shipped settings files are: {shipped}"

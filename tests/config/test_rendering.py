@@ -146,7 +146,7 @@ def test_every_setting_is_printed(settings: Settings) -> None:
     given = settings.model_dump(mode="json")
     if isinstance(settings.detector, SvmSettings):  # windows are printed without what they lack
         windows = settings.detector.search.windows
-        dumped = [each.model_dump(mode="json", exclude_none=True) for each in windows]
+        dumped = [window.model_dump(mode="json", exclude_none=True) for window in windows]
         given["detector"]["search"]["windows"] = dumped
     assert printed == given
 

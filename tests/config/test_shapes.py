@@ -27,8 +27,8 @@ def line(**others: Any) -> TrafficSettings:
 @pytest.mark.parametrize(
     ("points", "message"),
     [
-        (SQUARE[:2], "has 2 corners; give three or more"),
-        ([*SQUARE[:2], SQUARE[0]], "has 2 corners; give three or more"),
+        (SQUARE[:2], "has 2 corners; a polygon needs at least 3"),
+        ([*SQUARE[:2], SQUARE[0]], "has 2 corners; a polygon needs at least 3"),
         ([SQUARE[0], SQUARE[2], SQUARE[1], SQUARE[3]], "crosses or touches itself"),
         ([[0.1, 0.1], [0.3, 0.3], [0.5, 0.5]], "crosses or touches itself"),
         ([[0.1, 0.1], [1.3, 0.1], [0.3, 0.3]], "a point lies outside the frame; points are pix"),
@@ -45,7 +45,7 @@ def test_polygons_that_make_no_sense_are_refused(points: Any, message: str) -> N
 
 @pytest.mark.parametrize("shape", [{"points": SQUARE, "mask": "a.png"}, {"points": None}])
 def test_a_region_has_a_polygon_or_a_mask(shape: dict[str, Any]) -> None:
-    with pytest.raises(ValidationError, match="road: needs points or mask, one of them"):
+    with pytest.raises(ValidationError, match="road: needs either points or mask"):
         region(**shape)
 
 
@@ -121,7 +121,7 @@ class TestFiles:
         assert settings.camera.ground[0].pixel == (0.25, 0.25)
         assert settings.regions[0].points == ((0, 0), (1, 0), (1, 1))
         assert settings.traffic.zones[0].points == ((0, 0), (0.5, 0), (0.5, 0.5))
-        assert [(each.name, each.end) for each in settings.traffic.lines] == [("b", (1, 1))]
+        assert [(line.name, line.end) for line in settings.traffic.lines] == [("b", (1, 1))]
 
     def test_paths_are_relative_to_their_file(self, tmp_path: Path) -> None:
         (tmp_path / "gate.yaml").write_text(
@@ -140,5 +140,5 @@ class TestFiles:
         with pytest.raises(ConfigError) as caught:
             load_settings([lines])
         assert str(caught.value) == (
-            f"{lines}:3:43: traffic.lines[0].lefft: is no setting; did you mean left?"
+            f"{lines}:3:43: traffic.lines[0].lefft: unknown setting; did you mean left?"
         )

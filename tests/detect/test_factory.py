@@ -156,5 +156,5 @@ class TestAnotherPackage:
         assert model_file(settings.detector) is None
 
     def test_a_detector_that_cannot_be_loaded_is_named(self) -> None:
-        with pytest.raises(ConfigError, match=r"^broken: corner_detector:NONE fails to load"):
+        with pytest.raises(ConfigError, match=r"^broken: corner_detector:NONE cannot be loaded"):
             load_detector(DetectorSettings(kind="broken"))

@@ -23,7 +23,7 @@ Mask = NDArray[np.bool_]
 WIDTH, HEIGHT = 320, 240
 RED: Color = (40, 30, 230)
 CODINGS = [Coding(matrix, full) for matrix in ("bt601", "bt709") for full in (False, True)]
-NAMES = [f"{each.matrix} {'full' if each.full_range else 'limited'}" for each in CODINGS]
+NAMES = [f"{coding.matrix} {'full' if coding.full_range else 'limited'}" for coding in CODINGS]
 each_coding = pytest.mark.parametrize("coding", CODINGS, ids=NAMES)
 
 

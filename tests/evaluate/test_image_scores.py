@@ -20,7 +20,7 @@ from vdet.evaluate.images import (
 from vdet.labels.label import Label
 from vdet.labels.pictures import LabelledPicture, LabelledPictures
 
-PLAIN = Counting(score=0.5, least_width=0)
+PLAIN = Counting(score=0.5, min_width=0)
 WIDTH = 1000
 
 
@@ -50,8 +50,8 @@ class Searched:
 
 
 def source(*pictures: Searched, counting: Counting = PLAIN) -> MeasuredSet:
-    measured = [each.measured(counting) for each in pictures]
-    labelled = LabelledPictures("set", tuple(each.picture for each in measured))
+    measured = [picture.measured(counting) for picture in pictures]
+    labelled = LabelledPictures("set", tuple(item.picture for item in measured))
     return score_source(labelled, measured)
 
 
@@ -80,7 +80,7 @@ def test_only_boxes_of_the_score_and_above_count() -> None:
 
 
 class TestLeastWidth:
-    COUNTING = Counting(score=0.5, least_width=0.05)
+    COUNTING = Counting(score=0.5, min_width=0.05)
 
     def test_a_narrower_vehicle_need_not_be_found(self) -> None:
         result = scores(Searched([at(0), at(300, 49)], []), counting=self.COUNTING)

@@ -19,8 +19,8 @@ def test_frames_in_a_row_are_one_mistake_and_the_longest_comes_first() -> None:
     assert alarm == Mistake("false alarm, track", 2, 2, 3, 4, 3, (300.0, 0.0, 400.0, 100.0), 0)
     assert late == Mistake("missed vehicle", 7, 1, 1, 2, 2, BOX, 0)
     assert gap == Mistake("missed vehicle", 7, 6, 6, 6, 1, BOX, 0)
-    assert [each.name for each in (alarm, late)] == ["false alarm, track 2", "missed vehicle 7"]
-    assert [each.span for each in (late, gap)] == ["1–2", "6"]
+    assert [item.name for item in (alarm, late)] == ["false alarm, track 2", "missed vehicle 7"]
+    assert [item.span for item in (late, gap)] == ["1–2", "6"]
 
 
 def test_a_box_that_fits_badly_is_lost_on_both_sides_with_its_overlap() -> None:

@@ -25,9 +25,11 @@ class TestVideo:
     def run(self, assignments: tuple[str, ...], *found: range) -> RunResult:
         """Return a run over as many clips; in each the vehicle is found in these of ten frames."""
         truth = video([label._replace(name="car") for label in drive(1, TEN)])
-        tracks = [[each._replace(name="bus") for each in drive(1, frames)] for frames in found]
+        tracks = [[item._replace(name="bus") for item in drive(1, frames)] for frames in found]
         comparisons = [compare(video(track), truth) for track in tracks]
-        clips = [ClipResult(f"clip {n}", each, 10) for n, each in enumerate(comparisons)]
+        clips = [
+            ClipResult(f"clip {n}", comparison, 10) for n, comparison in enumerate(comparisons)
+        ]
         return RunResult(clips, assignments)
 
     def test_several_clips_have_a_row_each_and_a_total_and_classes_a_table(self) -> None:
@@ -38,7 +40,7 @@ class TestVideo:
         assert lines[8].split() == ["car", "2", "2", "0", "0.000", "0.000", "0.000", "bus", "2"]
         assert any(line.startswith("largest mistakes in clip 1") for line in lines)
         assert not any(line.startswith("largest mistakes in clip 0") for line in lines)
-        assert [each["named"] for each in report.values["classes"]] == [{"bus": 2}]
+        assert [value["named"] for value in report.values["classes"]] == [{"bus": 2}]
         assert "missed vehicle 1" in Elements(report.page()).text
 
     def test_a_sweep_has_a_row_for_each_setting_and_names_the_best(self) -> None:
@@ -46,7 +48,7 @@ class TestVideo:
         report = video_report(runs, NAME)
         assert [line.split("  ")[0] for line in report.lines()[3:5]] == ["a=1 b=2", "a=2 b=2"]
         assert report.lines()[-1] == "best F1: a=2 b=2 (1.000)"
-        settings = [each["settings"] for each in report.values["sweep"]]
+        settings = [value["settings"] for value in report.values["sweep"]]
         assert settings == [("a=1", "b=2"), ("a=2", "b=2")]
         assert "a=1 b=2" in report.page()
 
@@ -103,7 +105,9 @@ class TestPictures:
         labelled = read_labelled_pictures(write_coco(folder, pictures))
         boxes = np.array([from_size(*box) for box in found], np.float64).reshape(-1, 4)
         shown = Boxes(boxes, np.full(len(found), 0.9))
-        images = [MeasuredImage.of(each, 100, shown, self.COUNTING) for each in labelled.pictures]
+        images = [
+            MeasuredImage.of(picture, 100, shown, self.COUNTING) for picture in labelled.pictures
+        ]
         return ImagesResult(self.COUNTING, (score_source(labelled, images),))
 
     def test_the_page_names_detector_source_and_labels_left_out(self, tmp_path: Path) -> None:

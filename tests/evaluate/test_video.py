@@ -78,13 +78,13 @@ def test_settings_side_by_side_give_what_each_gives_alone(
     for results, frame in zip(together, frames, strict=True):
         assert all(result.frame is frame for result in results)
         assert all(result.source == info.path for result in results)
-    alone = [follow_alone(frames, each, info) for each in variants]
-    for each, others in zip(zip(*together, strict=True), alone, strict=True):
-        assert [result.tracks for result in each] == [result.tracks for result in others]
-        for one, other in zip(each, others, strict=True):
+    alone = [follow_alone(frames, variant, info) for variant in variants]
+    for item, others in zip(zip(*together, strict=True), alone, strict=True):
+        assert [result.tracks for result in item] == [result.tracks for result in others]
+        for one, other in zip(item, others, strict=True):
             np.testing.assert_array_equal(one.detections.sides, other.detections.sides)
             np.testing.assert_array_equal(one.detections.scores, other.detections.scores)
-    found = {str([result.tracks for result in each]) for each in alone}
+    found = {str([result.tracks for result in item]) for item in alone}
     assert len(found) > 1, "the settings should differ in what they find"
 
 
@@ -123,7 +123,7 @@ def test_settings_that_search_alike_share_the_search(
     ]
     with VideoReader(clip_path, frames=FRAMES) as reader:
         results = list(follow_together(variants, reader, reader.info))
-    assert [len(each) for each in results] == [5] * FRAMES
+    assert [len(result) for result in results] == [5] * FRAMES
     twice = [index for index in range(FRAMES) for _ in range(2)]
     assert sorted(searched) == twice, "two searches a frame for five settings"
 
@@ -140,7 +140,7 @@ def test_settings_of_a_plug_in_may_hold_lists(clip_path: Path, variant: OfModel)
     listing = replace(variant(), settings=settings().model_copy(update={"detector": detector}))
     with VideoReader(clip_path, frames=3) as reader:
         results = list(follow_together([listing, listing], reader, reader.info))
-    assert [len(each) for each in results] == [2, 2, 2]
+    assert [len(result) for result in results] == [2, 2, 2]
 
 
 def test_only_the_frames_that_the_truth_covers_are_read(

@@ -56,7 +56,7 @@ def test_a_file_that_is_removed_while_it_is_read_is_read_to_its_end(job: Run) ->
 def test_a_file_that_is_removed_before_its_turn_is_recorded(job: Run, tmp_path: Path) -> None:
     job.source.unlink()
     record = process_file(replace(job, settings=red_settings(tmp_path)), folder=tmp_path / "out")
-    assert record.error == f"{job.source}: there is no such file; check the name"
+    assert record.error == f"{job.source}: not found; check the name"
     assert record.frames is None
 
 

@@ -48,7 +48,7 @@ JSONL = "".join(
             "frame": f,
             "time": f / 25,
             "tracks": [
-                {"id": i, "x": 90 * i, "y": 40, "width": 60, "height": 50, "state": "seen"}
+                {"id": i, "x": 90 * i, "y": 40, "width": 60, "height": 50, "state": "detected"}
                 for i in (1, 2)
             ],
         }

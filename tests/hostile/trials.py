@@ -20,7 +20,7 @@ from types import FrameType
 from typing import IO, NoReturn
 
 MEMORY = 1_000_000_000
-"""Most bytes that the process may have resident."""
+"""Maximum number of bytes that the process may have resident."""
 _ADDRESSES = 4_000_000_000  # bytes; protects the machine
 _OF_LIBTIFF = ("ZIPDecode: ", "PredictorSetup: ", "tempfile.tif: ")
 """Beginnings of lines that libtiff writes to standard error itself."""

@@ -51,7 +51,7 @@ def frame(index: int, *tracks: Track) -> FrameTracks:
 
 def car(number: int = 1, box: Box = PLACE, **known: object) -> Track:
     """Return a car that the detector sees."""
-    values: dict[str, object] = {"score": 0.75, "state": "seen", "class_name": "car"} | known
+    values: dict[str, object] = {"score": 0.75, "state": "detected", "class_name": "car"} | known
     return Track(number, box, **values)  # type: ignore[arg-type]
 
 
@@ -59,8 +59,8 @@ def written(form: Format, frames: Iterable[FrameTracks], video: SourceVideo = VI
     """Return the content of a file with these frames."""
     file = io.BytesIO()
     writer = TrackWriter(form, file, video)
-    for each in frames:
-        writer.write(each)
+    for frame in frames:
+        writer.write(frame)
     writer.end()
     return file.getvalue()
 

@@ -8,7 +8,7 @@ from labels.saving import car, frame, written
 from vdet.errors import TruthError
 from vdet.labels.coco import COCO, read_coco
 
-FRAMES = [frame(4, car(3)), frame(5), frame(6, car(3), car(5, class_name="bus", state="lost"))]
+FRAMES = [frame(4, car(3)), frame(5), frame(6, car(3), car(5, class_name="bus", state="predicted"))]
 
 
 def document() -> dict[str, Any]:
@@ -21,7 +21,7 @@ def test_images_name_their_frame_and_annotations_their_track() -> None:
     assert [image["frame_index"] for image in made["images"]] == [4, 5, 6]
     assert {image["video_id"] for image in made["images"]} == {made["videos"][0]["id"]}
     assert [(a["image_id"], a["track_id"]) for a in made["annotations"]] == [(1, 3), (3, 3), (3, 5)]
-    categories = {each["id"]: each["name"] for each in made["categories"]}
+    categories = {item["id"]: item["name"] for item in made["categories"]}
     assert {t["id"]: categories[t["category_id"]] for t in made["tracks"]} == {3: "car", 5: "bus"}
 
 

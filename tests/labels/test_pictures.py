@@ -58,7 +58,7 @@ def boxes(draw: st.DrawFn) -> Boxed:
 
 scenes = st.dictionaries(
     st.sampled_from(["0001", "0002", "some name", "ü"]),
-    st.lists(boxes(), max_size=5).map(lambda each: Labelled(WIDTH, HEIGHT, tuple(each))),
+    st.lists(boxes(), max_size=5).map(lambda item: Labelled(WIDTH, HEIGHT, tuple(item))),
     min_size=1,
     max_size=3,
 )
@@ -80,7 +80,7 @@ def test_what_is_written_is_read_back(
     WRITERS[form](folder, scene)
     found = read_labelled_pictures(folder)
     assert found.name == str(folder)
-    assert sorted(each.path.stem for each in found.pictures) == sorted(scene)
+    assert sorted(picture.path.stem for picture in found.pictures) == sorted(scene)
     for image in found.pictures:
         expected = [b for b in scene[image.path.stem].boxes if b.name != "cow"]
         written = np.array([from_size(*b.box) for b in expected]).reshape(-1, 4)
@@ -141,7 +141,7 @@ def test_hidden_files_are_passed_over(tmp_path: Path, form: str) -> None:
     for folder in (file.parent, next(tmp_path.rglob("a.png")).parent):
         for name in (f"._{file.name}", "._a.png", ".DS_Store", "Thumbs.db"):
             (folder / name).write_bytes(b"\0\5")
-    assert [each.path.name for each in read_labelled_pictures(tmp_path).pictures] == [
+    assert [picture.path.name for picture in read_labelled_pictures(tmp_path).pictures] == [
         *("a.png", "b.png")
     ]
 
@@ -215,7 +215,7 @@ class TestCoco:
         path = tmp_path / "set" / place
         path.parent.mkdir(exist_ok=True)
         written.rename(path)
-        found = {each.path.parent for each in read_labelled_pictures(path).pictures}
+        found = {picture.path.parent for picture in read_labelled_pictures(path).pictures}
         assert found == {tmp_path / "set" / folder}
         assert len(read_labelled_pictures(tmp_path / "set").pictures) == 2
 

@@ -14,9 +14,9 @@ JSONL = "".join(
     json.dumps({"frame": frame, "time": frame * 0.04, "tracks": tracks}) + "\n"
     for frame, tracks in enumerate(
         [
-            [{"id": 1, "x": 10, "y": 20, "width": 30, "height": 40, "state": "seen"}],
+            [{"id": 1, "x": 10, "y": 20, "width": 30, "height": 40, "state": "detected"}],
             [],
-            [{"id": 1, "x": 11, "y": 20, "width": 30, "height": 40, "state": "lost"}],
+            [{"id": 1, "x": 11, "y": 20, "width": 30, "height": 40, "state": "predicted"}],
             [],
         ]
     )
@@ -32,7 +32,7 @@ def read(folder: Path, suffix: str, content: str) -> LabelledVideo:
 SCORED_CSV = "frame,time,id,x,y,width,height,score,state\n0,0.0,1,10,20,30,40,{score},seen\n"
 SCORED_JSONL = (
     '{{"frame": 0, "time": 0.0, "tracks": [{{"id": 1, "x": 10, "y": 20, "width": 30, "height": 40, '
-    '"score": {score}, "state": "seen"}}]}}\n'
+    '"score": {score}, "state": "detected"}}]}}\n'
 )
 SCORED_TXT = "1,1,11,21,30,40,{score},-1,-1,-1\n"
 SCORED = {"txt": SCORED_TXT, "csv": SCORED_CSV, "jsonl": SCORED_JSONL}

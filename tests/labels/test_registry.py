@@ -16,7 +16,7 @@ from vdet.labels.yolo import YOLO
 
 def test_every_format_has_an_ending_of_its_own() -> None:
     suffixes = track_suffixes()
-    assert [format_for(Path(f"a.b{each.upper()}")) for each in suffixes] == track_formats()
+    assert [format_for(Path(f"a.b{suffix.upper()}")) for suffix in suffixes] == track_formats()
 
 
 @pytest.mark.parametrize(

@@ -27,7 +27,7 @@ def test_known_words_are_listed_in_one_order() -> None:
 
 def test_settings_give_words_another_role_and_add_new_ones() -> None:
     changes = ("motorbike=vehicle", "tram=other", "cow=ignored")
-    roles = Roles.from_settings(load_settings((), [f"labels.roles.{each}" for each in changes]))
+    roles = Roles.from_settings(load_settings((), [f"labels.roles.{change}" for change in changes]))
     names = ("motorcycle", "Tram", "cow", "misc", "car", "dont care")
     assert list(map(roles.role_of, names)) == [
         *("vehicle", "other", "ignored"),

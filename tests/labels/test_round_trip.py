@@ -83,10 +83,10 @@ def kept(form: Format, track: Track) -> Track:
         **dict.fromkeys(WHOLE, track.class_name),
     }
     whole = form in WHOLE
-    marks_lost = form in MARKING and track.state == "lost"
-    state: State = track.state if whole else "lost" if marks_lost else "seen"
-    if form is OTTRK and track.state != "seen":
-        state = "between"
+    marks_lost = form in MARKING and track.state == "predicted"
+    state: State = track.state if whole else "predicted" if marks_lost else "detected"
+    if form is OTTRK and track.state != "detected":
+        state = "interpolated"
     return replace(
         track,
         score=track.score if form in SCORED else 1.0,
@@ -107,16 +107,16 @@ def test_what_is_written_is_read_again(
     if form is JSON_LINES and not frames:
         return  # a file without a record is no such file
     saved = read_back(form, tmp_path_factory.getbasetemp(), written(form, frames))
-    found = {each.index: each.tracks for each in saved}
+    found = {item.index: item.tracks for item in saved}
     between = range(frames[-1].index if frames else 1) if form is CVAT else ()
     assert found == dict.fromkeys(between, ()) | {
-        each.index: tuple(kept(form, track) for track in each.tracks)
-        for each in frames
-        if each.tracks or form in LISTING or form is CVAT
+        frame.index: tuple(kept(form, track) for track in frame.tracks)
+        for frame in frames
+        if frame.tracks or form in LISTING or form is CVAT
     }
-    for each in saved:
-        seconds = each.index / 25 if form in TIMED else math.nan
-        assert each.time == pytest.approx(seconds, nan_ok=True)
+    for item in saved:
+        seconds = item.index / 25 if form in TIMED else math.nan
+        assert item.time == pytest.approx(seconds, nan_ok=True)
     if any(saved):
         assert saved.size == ((1280, 720) if form in SIZED else None)
 

@@ -23,7 +23,7 @@ def test_boxes_are_rounded_side_by_side_and_scores_are_cut() -> None:
 
 def test_words_for_a_class_become_ours_and_others_stay() -> None:
     labels = ("Van", "lorry", "tractor", None)
-    rows = [row(1, 1, number, 0, 0, 9, 9, name=each) for number, each in enumerate(labels)]
+    rows = [row(1, 1, number, 0, 0, 9, 9, name=label) for number, label in enumerate(labels)]
     names = [track.class_name for track in next(iter(SavedTracks(tuple(rows)))).tracks]
     assert names == ["car", "truck", "tractor", None]
 

@@ -78,7 +78,9 @@ def test_an_unknown_label_is_refused_with_its_line(tmp_path: Path, content: str)
         read_truth(write(tmp_path, content))
 
 
-@pytest.mark.parametrize("form", [each for each in track_formats() if each is not mot.MOT])
+@pytest.mark.parametrize(
+    "form", [track_format for track_format in track_formats() if track_format is not mot.MOT]
+)
 def test_tracks_of_every_format_can_be_truth(tmp_path: Path, form: Format) -> None:
     path = tmp_path / f"truth{form.suffix}"
     kinds = (None, "bus", "motorcycle")

@@ -82,7 +82,7 @@ class TestReading:
 @pytest.mark.parametrize(
     ("data", "message"),
     [
-        (b"PK nothing", ": is neither a folder nor a readable zip file"),
+        (b"PK nothing", ": is not a folder or a readable zip file"),
         (
             archive_of({"labels/f0": ""}),
             ": holds neither annotations.xml (CVAT) nor data.yaml (YOLO); unpack",

@@ -36,8 +36,8 @@ Pictures = Mapping[str, Labelled]
 
 def write_pictures(folder: Path, pictures: Pictures) -> None:
     folder.mkdir(parents=True, exist_ok=True)
-    for name, each in pictures.items():
-        show(folder / f"{name}.png", np.zeros((each.height, each.width, 3), np.uint8))
+    for name, picture in pictures.items():
+        show(folder / f"{name}.png", np.zeros((picture.height, picture.width, 3), np.uint8))
 
 
 def show(path: Path, image: Image) -> None:
@@ -48,8 +48,8 @@ def show(path: Path, image: Image) -> None:
 def write_coco(folder: Path, pictures: Pictures) -> Path:
     write_pictures(folder, pictures)
     images = [
-        {"id": number, "file_name": f"{name}.png", "width": each.width, "height": each.height}
-        for number, (name, each) in enumerate(pictures.items())
+        {"id": number, "file_name": f"{name}.png", "width": item.width, "height": item.height}
+        for number, (name, item) in enumerate(pictures.items())
     ]
     annotations = [
         {
@@ -60,8 +60,8 @@ def write_coco(folder: Path, pictures: Pictures) -> Path:
             "segmentation": [[1, 2, 3]],
             "iscrowd": int(boxed.name == "ignore"),
         }
-        for number, each in enumerate(pictures.values())
-        for boxed in each.boxes
+        for number, picture in enumerate(pictures.values())
+        for boxed in picture.boxes
     ]
     categories = [
         {"id": number, "name": "vehicle" if name == "ignore" else name}
@@ -77,10 +77,10 @@ def write_kitti(folder: Path, pictures: Pictures) -> Path:
     write_pictures(folder / "image_2", pictures)
     (folder / "label_2").mkdir(exist_ok=True)
     types = dict(zip(NAMES, ("Car", "Truck", "Bus", "DontCare", "Cow"), strict=True))
-    for name, each in pictures.items():
+    for name, picture in pictures.items():
         lines = [
             f"{types[boxed.name]} 0.00 0 -1.57 {x} {y} {x + w} {y + h} 1 1 4 2 1 20 -1.6\n"
-            for boxed in each.boxes
+            for boxed in picture.boxes
             for x, y, w, h in [boxed.box]
         ]
         (folder / "label_2" / f"{name}.txt").write_text("".join(lines), encoding="utf-8")
@@ -91,11 +91,12 @@ def write_yolo(folder: Path, pictures: Pictures) -> Path:
     write_pictures(folder / "images", pictures)
     (folder / "labels").mkdir(exist_ok=True)
     (folder / "data.yaml").write_text(f"train: images\nnames: [{', '.join(NAMES)}]\n", "utf-8")
-    for name, each in pictures.items():
+    for name, picture in pictures.items():
         lines = [
-            f"{NAMES.index(boxed.name)} {(x + w / 2) / each.width} {(y + h / 2) / each.height} "
-            f"{w / each.width} {h / each.height}\n"
-            for boxed in each.boxes
+            f"{NAMES.index(boxed.name)} {(x + w / 2) / picture.width} "
+            f"{(y + h / 2) / picture.height} "
+            f"{w / picture.width} {h / picture.height}\n"
+            for boxed in picture.boxes
             for x, y, w, h in [boxed.box]
         ]
         if lines:
@@ -106,15 +107,15 @@ def write_yolo(folder: Path, pictures: Pictures) -> Path:
 def write_voc(folder: Path, pictures: Pictures) -> Path:
     write_pictures(folder / "JPEGImages", pictures)
     (folder / "Annotations").mkdir(exist_ok=True)
-    for name, each in pictures.items():
+    for name, picture in pictures.items():
         objects = "".join(
             f"<object>\n<name>{'car' if boxed.name == 'ignore' else boxed.name}</name>\n"
             f"<difficult>{int(boxed.name == 'ignore')}</difficult><bndbox><xmin>{x + 1}</xmin>"
             f"<ymin>{y + 1}</ymin><xmax>{x + w}</xmax><ymax>{y + h}</ymax></bndbox></object>\n"
-            for boxed in each.boxes
+            for boxed in picture.boxes
             for x, y, w, h in [boxed.box]
         )
-        size = f"<size><width>{each.width}</width><height>{each.height}</height></size>\n"
+        size = f"<size><width>{picture.width}</width><height>{picture.height}</height></size>\n"
         text = f"<annotation>\n<filename>{name}.png</filename>{size}{objects}</annotation>\n"
         (folder / "Annotations" / f"{name}.xml").write_text(text, encoding="utf-8")
     return folder / "Annotations" / f"{min(pictures)}.xml"

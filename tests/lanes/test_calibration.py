@@ -48,7 +48,7 @@ def test_the_camera_is_recovered(photos: list[Path]) -> None:
     assert [photo.path for photo in calibration.photos] == photos
     assert calibration.skipped == {}
     pixels = np.mgrid[40:620:8j, 40:450:8j].reshape(2, -1).T
-    found, true = (Undistorter(each, 640, 480).points(pixels) for each in (camera, CAMERA))
+    found, true = (Undistorter(item, 640, 480).points(pixels) for item in (camera, CAMERA))
     assert np.abs(found - true).max() < 2.5
 
 

@@ -149,7 +149,7 @@ def test_every_camera_is_read_with_all_its_digits(
         ("matrix", [[560, 0, 322], [0, 558, 500], [0, 0, 1]], "the principal point in the frame"),
         ("distortion", [0, 0, 0, 0, float("nan")], "distortion[4]: should be a finite number"),
         ("rms", -1, "rms: should be greater than or equal to 0"),
-        ("colour", "red", "camera.lens.colour: is no setting"),
+        ("colour", "red", "camera.lens.colour: unknown setting"),
     ],
 )
 def test_each_mistake_is_named_with_its_place(

@@ -48,7 +48,7 @@ def test_with_the_lines_that_are_found_distances_are_right(
     samples: list[Sample] = []
     pitches = []
     for index in range(FRAMES):
-        vehicles = [each.box for each in true_boxes(scene, index)]
+        vehicles = [true_box.box for true_box in true_boxes(scene, index)]
         road = finder.update(finder.observe(Picture(renderer.image(index))), vehicles)
         pitches += [road.curves.pitch] if road.curves else []
         samples += [

@@ -67,7 +67,7 @@ def test_the_order_of_the_points_does_not_matter() -> None:
 @pytest.mark.parametrize(
     ("metres", "pixels", "message"),
     [
-        (CORNERS[:3], seen(CORNERS[:3]), "camera.ground: 3 are given; give four or more"),
+        (CORNERS[:3], seen(CORNERS[:3]), "camera.ground: 3 are given; at least four are needed"),
         (CORNERS * (0, 1), seen(CORNERS * (0, 1)), "lie on a line (pixel)"),
         (np.array([(0, 14), (0, 20), (0, 30), (5, 30)]), None, "or all but one, lie on a line"),
         (CORNERS * (0, 1), seen(CORNERS), "lie on a line (metres)"),

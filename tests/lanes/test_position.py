@@ -90,7 +90,7 @@ def test_where_a_row_is_worth_too_many_metres_the_distance_is_not_known() -> Non
     view = TopView(lane_view(small, near=6, far=FAR), small.width, small.height)
     feet = [(80, small.horizon + rows) for rows in (10.5, 9.5)]
     positions = [position_on_road(foot, STRAIGHT, view) for foot in feet]
-    assert [each is not None for each in positions] == [True, False]
+    assert [position is not None for position in positions] == [True, False]
 
 
 @pytest.fixture(scope="module")

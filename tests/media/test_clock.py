@@ -46,9 +46,9 @@ def copy(source: Path) -> tuple[list[int], list[Fraction], Path]:
 
 def sound(path: Path) -> list[tuple[Fraction, bytes]]:
     with av.open(str(path)) as container:
-        found = [each for each in container.demux(container.streams.audio) if each.size]
+        found = [item for item in container.demux(container.streams.audio) if item.size]
         header = 7 if path.suffix == ".ts" else 0  # of AAC packets
-    return [((each.pts or 0) * each.time_base, bytes(each)[header:]) for each in found]
+    return [((item.pts or 0) * item.time_base, bytes(item)[header:]) for item in found]
 
 
 def part(folder: Path, kind: str, begin: int = 0) -> Path:
@@ -78,7 +78,7 @@ def test_all_frames_and_all_sound_follow_one_another(
     assert all(PERIOD <= step <= PAUSE for step in steps)
 
     heard = sound(target)
-    expected = [data for each in parts for _, data in sound(each)]
+    expected = [data for part in parts for _, data in sound(part)]
     first = expected.index(heard[0][1])  # mkv holds none from before the first frame
     assert first <= 2
     assert [data for _, data in heard] == expected[first:]

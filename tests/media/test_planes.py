@@ -106,8 +106,8 @@ def exact_image(planes: Planes) -> npt.NDArray[np.float64]:
     height, width = planes.shape
     luma = (planes.luma - float(base)) / luma_steps
     blue, red = (
-        ((each - 128.0) / chroma_steps).repeat(2, axis=0).repeat(2, axis=1)[:height, :width]
-        for each in (planes.blue, planes.red)
+        ((item - 128.0) / chroma_steps).repeat(2, axis=0).repeat(2, axis=1)[:height, :width]
+        for item in (planes.blue, planes.red)
     )
     blue, red = luma + blue * (2 - 2 * of_blue), luma + red * (2 - 2 * of_red)
     green = (luma - of_red * red - of_blue * blue) / (1 - of_red - of_blue)
@@ -170,10 +170,10 @@ def middles(layers: Layers) -> Layers:
 def test_colours_become_those_of_opencv(coding: Coding) -> None:
     image = squares()
     luma, red, blue = cv2.split(cv2.cvtColor(image[8::16, 8::16], cv2.COLOR_BGR2YCrCb))
-    expected = tuple(np.asarray(each, np.uint8) for each in (luma, blue, red))
-    for each in apart(middles(common(image, coding)), (expected[0], expected[1], expected[2])):
-        assert each.max() <= 2
-        assert each.mean() < 1
+    expected = tuple(np.asarray(item, np.uint8) for item in (luma, blue, red))
+    for item in apart(middles(common(image, coding)), (expected[0], expected[1], expected[2])):
+        assert item.max() <= 2
+        assert item.mean() < 1
 
 
 @in_any_coding
@@ -183,9 +183,9 @@ def test_chroma_may_have_half_the_size_or_that_of_luma(
 ) -> None:
     whole_luma, *chroma = Planes.of_image(squares()[4:60, 4:76], coding).layers
     luma = whole_luma[:height, :width]
-    blue, red = (each[: -(-height // 2), : -(-width // 2)] for each in chroma)
+    blue, red = (item[: -(-height // 2), : -(-width // 2)] for item in chroma)
     half = coding.to_common((luma, blue, red))
-    blue, red = (each.repeat(2, 0).repeat(2, 1)[:height, :width] for each in (blue, red))
+    blue, red = (item.repeat(2, 0).repeat(2, 1)[:height, :width] for item in (blue, red))
     whole = coding.to_common((luma, blue, red))
     np.testing.assert_array_equal(half[0], whole[0])
     for ours, other in zip(half[1:], whole[1:], strict=True):

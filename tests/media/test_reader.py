@@ -159,7 +159,7 @@ def write_hdr(path: Path, transfer: int, lumas: list[int]) -> Path:
 
 
 def hdr_signal(transfer: int, share: float) -> float:
-    """Return the signal of a share of reference white, 203 cd/m² (BT.2100, BT.2408)."""
+    """Return the signal of a fraction of reference white, 203 cd/m² (BT.2100, BT.2408)."""
     if transfer == 16:
         power = (203 * share / 10_000) ** 0.1593017578125
         return float(((0.8359375 + 18.8515625 * power) / (1 + 18.6875 * power)) ** 78.84375)
@@ -301,7 +301,7 @@ class TestFaults:
         source, path = write_clip(tmp_path / "whole.mp4", **GOPS), tmp_path / "part.mp4"
         with av.open(str(source)) as whole, av.open(str(path), "w") as part:
             copy = part.add_stream_from_template(whole.streams.video[0])
-            for packet in [each for each in whole.demux(video=0) if each.size][4:]:
+            for packet in [item for item in whole.demux(video=0) if item.size][4:]:
                 packet.stream = copy
                 part.mux(packet)
         with VideoReader(path) as reader:

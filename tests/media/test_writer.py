@@ -148,7 +148,7 @@ class TestFile:
         with VideoReader(write(tmp_path / f"out{suffix}", frames, info)) as reader:
             found = reader.info.tags
         assert found.location is not None
-        location = [float(each) for each in re.findall(r"[+-][\d.]+", found.location)]
+        location = [float(item) for item in re.findall(r"[+-][\d.]+", found.location)]
         assert location == [48.1, -11.5]
         assert replace(found, location=None) == replace(self.TAGS, location=None)
 

@@ -54,7 +54,9 @@ def test_it_links_each_page_and_adds_up(tmp_path: Path) -> None:
     assert links == {"a.page/page.html", "day/b%20%231.page/page.html"}
     for words in ("4vehicles", "2 videos", "0:04", "104frames"):
         assert words in made.text
-    assert all(each.startswith("data:image/jpeg;") or each in links for each in made.addresses())
+    assert all(
+        address.startswith("data:image/jpeg;") or address in links for address in made.addresses()
+    )
 
 
 def test_its_table_has_every_vehicle(tmp_path: Path) -> None:

@@ -32,7 +32,7 @@ def test_axes_have_round_numbers() -> None:
     assert labels == ["0:00", "2:00", "4:00", "6:00", "8:00", "10:00"]
     assert time_axis(95, 105).ticks[0] == (96, "1:36")
     assert [text for _, text in number_axis(0, 17).ticks] == ["0", "5", "10", "15", "20"]
-    assert [text for _, text in number_axis(0, 1, least=1).ticks] == ["0", "1"]
+    assert [text for _, text in number_axis(0, 1, minimum=1).ticks] == ["0", "1"]
     fixed = number_axis(0.5, 0.95, fixed=True)
     assert (fixed.low, fixed.high, fixed.ticks[0]) == (0.5, 0.95, (0.5, "0.5"))
 
@@ -97,5 +97,5 @@ def test_no_two_spans_at_one_time_share_a_row_and_no_row_is_needless(
     rows = pack(spans)
     at_once = [[row for row, (a, b) in zip(rows, spans, strict=True) if a <= time <= b]
                for time in range(121)]  # fmt: skip
-    assert all(len(set(each)) == len(each) for each in at_once)
+    assert all(len(set(item)) == len(item) for item in at_once)
     assert len(set(rows)) == max(map(len, at_once))

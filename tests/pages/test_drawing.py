@@ -61,7 +61,7 @@ def wandering(seed: int, vehicles: int = 40) -> list[FrameTracks]:
             if rng.random() < 0.9:
                 foot = round(x + rng.gauss(0, 1), 2), round(y + rng.gauss(0, 1), 2)
                 box = Box.sized(round(x) - height // 2, round(y) - height, height, height)
-                row.append(Track(number, box, 0.9, "seen", rng.choice(("car", "truck")), foot))
+                row.append(Track(number, box, 0.9, "detected", rng.choice(("car", "truck")), foot))
     return [FrameTracks(index, index / 25, tuple(row)) for index, row in enumerate(rows)]
 
 
@@ -78,10 +78,10 @@ def test_the_page_counts_as_python_does(window: Browser, tmp_path: Path) -> None
         lines, zones = place(settings.traffic, WIDTH, HEIGHT)
         borders: tuple[Border, ...] = *lines, *zones
         expected = [
-            [path.vehicle, border.name, each.direction, each.row, round(each.time, 3)]
+            [path.vehicle, border.name, crossing.direction, crossing.row, round(crossing.time, 3)]
             for border in borders
             for path in made.paths
-            for each in crossings(path, border)
+            for crossing in crossings(path, border)
         ]
         assert len(expected) > 30
         window.open(written(tmp_path, made))
@@ -117,7 +117,7 @@ def test_a_line_is_drawn_dragged_named_saved_and_opened_again(
     [line] = settings.traffic.lines
     assert (line.name, line.left, line.right) == ("gate", "right", "left")
     totals = count_frames(video, settings, (WIDTH, HEIGHT)).totals
-    assert [(each.direction, each.count) for each in totals] == [("right", 0), ("left", 6)]
+    assert [(total.direction, total.count) for total in totals] == [("right", 0), ("left", 6)]
     window.type(CONTROL + "z", CONTROL + "z", CONTROL + "z")
     assert window.text("#list").startswith("line 1")
     window.choose_file("#open", saved)
@@ -162,13 +162,13 @@ def test_zones_regions_and_points_are_drawn_by_keys_and_undone(
             )
     assert window.run("return document.querySelectorAll('#marks polyline.grid').length") > 10
     values = parse_document(window.text("#text"), "text").values
-    assert [each["metres"] for each in values["camera"]["ground"]] == [
+    assert [value["metres"] for value in values["camera"]["ground"]] == [
         [0, 0],
         [10, 0],
         [10, 50],
         [0, 50],
     ]
-    assert [each["kind"] for each in values["regions"]] == ["exclude"]
+    assert [value["kind"] for value in values["regions"]] == ["exclude"]
     window.type(ESCAPE)
     window.click((320, 480))
     window.type(DELETE)
@@ -258,7 +258,7 @@ def test_drawn_scenes_have_the_same_counts_and_flows(window: Browser, tmp_path: 
     for row in expected.flows():
         wanted[row.origin, row.destination or "none"] += row.count
     assert +flows == +wanted
-    totals = {(each.name, each.direction): each.count for each in expected.totals}
+    totals = {(total.name, total.direction): total.count for total in expected.totals}
     for line in scene.settings.traffic.lines:
         left, right = totals[line.name, "left"], totals[line.name, "right"]
         assert f"{line.name}left {left} · right {right}" in window.text("#list")

@@ -30,7 +30,9 @@ def test_text_is_escaped_everywhere(html: str) -> None:
 
 
 def test_nothing_is_loaded_from_elsewhere(html: str) -> None:
-    assert [each.partition(";")[0] for each in Elements(html).addresses()] == ["data:image/jpeg"]
+    assert [address.partition(";")[0] for address in Elements(html).addresses()] == [
+        "data:image/jpeg"
+    ]
     assert "url(" not in html
     assert "@import" not in html
 

@@ -81,7 +81,9 @@ def seen(made: VideoPage) -> Elements:
 class TestVideoPage:
     def test_it_loads_nothing_but_the_video_and_its_own_data(self) -> None:
         addresses = seen(page()).addresses()
-        others = {each.partition("#")[0] for each in addresses if not each.startswith("data:")}
+        others = {
+            address.partition("#")[0] for address in addresses if not address.startswith("data:")
+        }
         assert others == {"../a.mp4"}
 
     def test_it_says_what_was_found(self) -> None:
@@ -118,7 +120,7 @@ class TestVideoPage:
         assert words in made.text
         assert len(made.all("video")) == (player is not None)
         if player is None:
-            assert all(each.startswith("data:") for each in made.addresses())
+            assert all(address.startswith("data:") for address in made.addresses())
 
     def test_counts_are_shown_by_interval_where_there_are_any(self) -> None:
         counts = counted(*(("north", "in", at) for at in (1, 2, 3)), (NASTY, "in", 1))
@@ -162,14 +164,14 @@ class TestVideoPage:
         made: list[int] = []
         monkeypatch.setattr(charts, "histogram", lambda values, *_: made.append(len(values)))
         slow = Speeds(np.arange(5.0), np.zeros((5, 2)), np.full(5, 10.0), np.full(5, 0.1), 0.01)
-        replace(page(), records=[replace(each, speeds=slow) for each in TWO]).html()
+        replace(page(), records=[replace(item, speeds=slow) for item in TWO]).html()
         assert made == [2]
 
     def test_a_vehicle_that_was_lost_has_a_gap_in_its_bar(self) -> None:
-        states = ("seen", "seen", "lost", "lost", "between", "seen")
+        states = ("detected", "detected", "predicted", "predicted", "interpolated", "detected")
         frames = [frame(n, track(1, BOX, state=state)) for n, state in enumerate(states)]
         made = seen(replace(page(end=0.2), records=records(*frames)))
-        spans = [(each["x"], each["width"]) for each in made.all("svg", **{"class": "span"})]
+        spans = [(item["x"], item["width"]) for item in made.all("svg", **{"class": "span"})]
         assert spans == [("0.0%", "20.0%"), ("80.0%", "20.0%")]
 
     def test_gaps_of_the_video_are_named(self) -> None:

@@ -87,8 +87,8 @@ def result_of(
     """
     frame = Frame(index, time, Picture(road(CAR) if image is None else image))
     tracks = tuple(
-        Track(number, each, 0.9, state="seen") if isinstance(each, Box) else each
-        for number, each in enumerate(vehicles, start=1)
+        Track(number, vehicle, 0.9, state="detected") if isinstance(vehicle, Box) else vehicle
+        for number, vehicle in enumerate(vehicles, start=1)
     )
     return FrameResult(source, frame, NO_BOXES, tracks, {"lane": found} if found else {})
 

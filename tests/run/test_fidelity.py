@@ -115,7 +115,7 @@ def written_with(settings: OutputSettings, **draw: Any) -> Settings:
 def planes_of(path: Path) -> list[Planes]:
     """Return what the decoder gives."""
     found = [frame.picture.planes for frame in read(path)]
-    planes = [each for each in found if each is not None]
+    planes = [item for item in found if item is not None]
     assert len(planes) == len(found) == FRAMES
     return planes
 

@@ -50,16 +50,16 @@ QUEUED = 24
 
 class TestFollowFrames:
     @pytest.mark.parametrize(
-        ("settings", "least"), [(SETTINGS, 0.3), (PERSPECTIVE, 0.5)], ids=["original", "default"]
+        ("settings", "minimum"), [(SETTINGS, 0.3), (PERSPECTIVE, 0.5)], ids=["original", "default"]
     )
-    def test_follows_a_car_by_one_id(self, settings: Settings, least: float) -> None:
+    def test_follows_a_car_by_one_id(self, settings: Settings, minimum: float) -> None:
         results = list(follow(drive(20), settings))
         shown = [result for result in results if result.tracks]
         assert len(shown) > 15
         for result in shown:
             (track,) = result.tracks
             assert track.id == 1
-            assert track.box.iou(car_at(result.frame.index)) > least
+            assert track.box.iou(car_at(result.frame.index)) > minimum
 
     @pytest.mark.parametrize("settings", [SETTINGS, PERSPECTIVE], ids=["original", "default"])
     @pytest.mark.parametrize("threads", [3, 5])
@@ -74,7 +74,7 @@ class TestFollowFrames:
                 np.testing.assert_array_equal(
                     getattr(first.detections, name), getattr(second.detections, name)
                 )
-            heat, same = (each.detections.trace.heat.values for each in (first, second))
+            heat, same = (item.detections.trace.heat.values for item in (first, second))
             np.testing.assert_array_equal(heat, same)
 
 

@@ -51,7 +51,7 @@ class TestFindingImages:
             find_images([tmp_path / "in"])
 
     def test_what_is_not_there_is_named(self, tmp_path: Path) -> None:
-        with pytest.raises(ImageError, match=r"none\.png: no such file or folder"):
+        with pytest.raises(ImageError, match=r"none\.png: not found"):
             find_images([tmp_path / "none.png"])
 
 
@@ -134,7 +134,7 @@ class Fails:
 class TestSeveral:
     @pytest.fixture
     def jobs(self, tmp_path: Path) -> list[PictureJob]:
-        """Two pictures of a car, and between them a file that is no picture."""
+        """Two pictures of a car, and between them a file that is not a picture."""
         jobs = []
         for name in ("a.png", "b.png", "c.png"):
             source = tmp_path / name

@@ -35,7 +35,7 @@ LENS = LensSettings(
 SETTINGS = Settings(
     camera=CameraSettings(lens=LENS),
     lanes=lane_view(CAMERA, near=6, far=42).model_copy(update={"enabled": True}),
-    tracker=MotionTrackerSettings(needed=0.05),
+    tracker=MotionTrackerSettings(confirm_seconds=0.05),
 )
 SCENE = Scene(
     camera=CAMERA,
@@ -57,7 +57,7 @@ class TrueDetector(NullDetector):
 
     def detect(self, candidates: None) -> Boxes:  # noqa: ARG002
         """Return the true boxes of the scene."""
-        boxes = [each.box for each in true_boxes(SCENE, 0)]
+        boxes = [true_box.box for true_box in true_boxes(SCENE, 0)]
         corners = [(box.x1, box.y1, box.x2, box.y2) for box in boxes]
         return Boxes(corners, np.full(len(corners), 0.95))
 
@@ -97,7 +97,7 @@ def road() -> Road:
 
 
 def track_at(box: Box) -> Track:
-    return Track(1, box, 0.9, state="seen")
+    return Track(1, box, 0.9, state="detected")
 
 
 @pytest.mark.parametrize(

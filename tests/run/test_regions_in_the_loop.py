@@ -32,7 +32,7 @@ def test_a_vehicle_is_shown_from_where_its_foot_is_in_the_region() -> None:
     whole = {r.frame.index: r.tracks for r in follow(drive(60))}
     results = list(follow(drive(60), within()))
     part = {r.frame.index: r.tracks for r in results}
-    assert all(each.box.foot[0] >= 100 for r in results for each in r.detections)
+    assert all(detection.box.foot[0] >= 100 for r in results for detection in r.detections)
     for index, tracks in whole.items():
         assert [t.box for t in part[index]] == [t.box for t in tracks if t.foot[0] >= 100]
     assert any(whole.values())

@@ -18,7 +18,7 @@ from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output
 
 PICTURE = Picture(road(CAR))
-OF_NETWORK, OF_SVM = NetworkSettings().searches, SvmSettings().searches
+OF_NETWORK, OF_SVM = NetworkSettings().searches_per_second, SvmSettings().searches_per_second
 
 
 def searched(rate: SearchRate, times: Iterable[float | Fraction]) -> list[int]:
@@ -79,7 +79,7 @@ class TestSearchesASecond:
         chosen = searched(SearchRate(OF_NETWORK), times)
         assert set(range(120, 141)) <= set(chosen)
         before, after = ([n for n in chosen if a <= n < b] for a, b in ((0, 120), (160, 260)))
-        assert {b - a for each in (before, after) for a, b in pairwise(each)} == {5}
+        assert {b - a for item in (before, after) for a, b in pairwise(item)} == {5}
 
 
 def test_the_frames_searched_do_not_depend_on_the_number_of_threads() -> None:
@@ -119,7 +119,7 @@ def test_frames_that_are_not_searched_have_no_detections_and_tracks_between() ->
     for result in results:
         if not result.searched:
             assert len(result.detections) == 0
-            assert all(track.state == "between" for track in result.tracks)
+            assert all(track.state == "interpolated" for track in result.tracks)
     assert any(result.tracks for result in results if not result.searched)
 
 
@@ -131,7 +131,7 @@ def test_between_searched_frames_the_boxes_of_the_rules_move_straight() -> None:
     for before, result, after in zip(results[20::2], results[21::2], results[22::2], strict=False):
         one, track, other = before.tracks[0], result.tracks[0], after.tracks[0]
         assert track.box.x1 == pytest.approx((one.box.x1 + other.box.x1) / 2)
-        assert track.state == "between"
+        assert track.state == "interpolated"
 
 
 def test_a_stage_sink_waits_for_a_searched_frame(tmp_path: Path) -> None:

@@ -40,9 +40,9 @@ def test_subtitles_are_ignored(tmp_path: Path, process: Process) -> None:
         av.open(str(texts)) as text,
         av.open(str(path), "w") as target,
     ):
-        copies = [target.add_stream_from_template(each.streams[0]) for each in (original, text)]
-        for each, copy in zip((original, text), copies, strict=True):
-            for packet in each.demux():
+        copies = [target.add_stream_from_template(item.streams[0]) for item in (original, text)]
+        for item, copy in zip((original, text), copies, strict=True):
+            for packet in item.demux():
                 if packet.size:
                     packet.stream = copy
                     target.mux(packet)
@@ -94,7 +94,7 @@ def test_frames_too_small_for_any_window_pass_with_a_warning(
 ) -> None:
     shown = process(_tiny(tmp_path / "tiny.mkv", size), "-c", "svm")
     assert_complete(shown, size)
-    (warning,) = [each for each in shown.warnings if "horizon" not in each]
+    (warning,) = [warning for warning in shown.warnings if "horizon" not in warning]
     width, height = size
     assert "tiny.mkv: gets no boxes: no search window fits into" in warning
     assert f"{width}×{height}" in warning

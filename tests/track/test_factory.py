@@ -42,14 +42,18 @@ class SeesOne:
         picture: Picture | None = None,  # noqa: ARG002
     ) -> list[Track]:
         self.times.append(time)
-        return [Track(1, moved_to(CAR, 100 + round(100 * time), 100), 0.9, state="seen")]
+        return [Track(1, moved_to(CAR, 100 + round(100 * time), 100), 0.9, state="detected")]
 
 
 def test_between_two_searched_frames_vehicles_move_straight() -> None:
     tracker = InterpolatingTracker(SeesOne())
     tracker.observe(NO_BOXES, 1.0)
     tracker.observe(NO_BOXES, 1.4)
-    for time, x, state in ((1.0, 200, "seen"), (1.1, 210, "between"), (1.4, 240, "seen")):
+    for time, x, state in (
+        (1.0, 200, "detected"),
+        (1.1, 210, "interpolated"),
+        (1.4, 240, "detected"),
+    ):
         (track,) = tracker.at(time)
         assert (track.box, track.state) == (moved_to(CAR, x, 100), state)
 
@@ -61,4 +65,4 @@ def test_after_the_latest_searched_frame_vehicles_stay_where_they_were() -> None
     for time in (1.1, 1.2):
         (held,) = tracker.at(time)
         assert (held.id, held.box, held.score) == (seen.id, seen.box, seen.score)
-        assert (seen.state, held.state) == ("seen", "between")
+        assert (seen.state, held.state) == ("detected", "interpolated")

@@ -41,8 +41,8 @@ def follow(seen: Iterable[Seen | None]) -> list[FrameTracks]:
     """Track a vehicle that is seen like this in each frame, or not at all."""
     tracker = MotionTracker(MotionTrackerSettings(), *SIZE)
     frames = []
-    for n, each in enumerate(seen):
-        found = detections(*each) if each else NO_BOXES
+    for n, path in enumerate(seen):
+        found = detections(*path) if path else NO_BOXES
         frames.append(FrameTracks(n, n / RATE, tuple(tracker.update(found, n / RATE))))
     return frames
 

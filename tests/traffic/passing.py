@@ -11,7 +11,7 @@ RATE = 25
 
 
 def track(number: int, box: Box, *, score: float = 0.9, **rest: object) -> Track:
-    return Track(number, box, score, **{"state": "seen", **rest})  # type: ignore[arg-type]
+    return Track(number, box, score, **{"state": "detected", **rest})  # type: ignore[arg-type]
 
 
 def frame(index: int, *tracks: Track, rate: float = RATE) -> FrameTracks:
@@ -27,6 +27,6 @@ def passing(count: int, number: int = 1, speed: int = 2) -> Iterator[FrameTracks
 def summarize(frames: Iterable[FrameTracks], width: int) -> tuple[VehicleRecord, ...]:
     """Return a record of each vehicle, by id; `width` is that of the frames in pixels."""
     records = VehicleRecords(width)
-    for each in frames:
-        records.add(each)
+    for frame in frames:
+        records.add(frame)
     return records.end()

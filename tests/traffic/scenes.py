@@ -28,7 +28,7 @@ def track(
     height: int = CAR_HEIGHT,
     score: float = 0.9,
     name: str | None = None,
-    state: State = "seen",
+    state: State = "detected",
 ) -> Track:
     """Return a track that stands at `foot`."""
     box = Box.sized(round(foot[0]) - height // 2, round(foot[1]) - height, height, height)
@@ -66,10 +66,10 @@ def frames(
 
 def joined(*videos: Iterable[FrameTracks]) -> list[FrameTracks]:
     """Put the tracks of several videos into the frames of one."""
-    every = sorted((frame for video in videos for frame in video), key=lambda each: each.index)
+    every = sorted((frame for video in videos for frame in video), key=lambda video: video.index)
     return [
-        FrameTracks(index, group[0].time, tuple(t for each in group for t in each.tracks))
-        for index, group in ((i, list(g)) for i, g in groupby(every, lambda each: each.index))
+        FrameTracks(index, group[0].time, tuple(t for item in group for t in item.tracks))
+        for index, group in ((i, list(g)) for i, g in groupby(every, lambda item: item.index))
     ]
 
 
@@ -84,7 +84,7 @@ def feet(*points: Point | None, rate: float = 25, **options: Any) -> list[FrameT
 def numbered(video: Iterable[FrameTracks], number: int) -> list[FrameTracks]:
     """Give the tracks another id."""
     return [
-        replace(each, tracks=tuple(replace(t, id=number) for t in each.tracks)) for each in video
+        replace(frame, tracks=tuple(replace(t, id=number) for t in frame.tracks)) for frame in video
     ]
 
 
@@ -110,14 +110,14 @@ def settings_for(*shapes: LineSettings | ZoneSettings, **rule: Any) -> Settings:
         return point[0] / WIDTH, point[1] / HEIGHT
 
     lines = tuple(
-        each.model_copy(update={"start": scaled(each.start), "end": scaled(each.end)})
-        for each in shapes
-        if isinstance(each, LineSettings)
+        shape.model_copy(update={"start": scaled(shape.start), "end": scaled(shape.end)})
+        for shape in shapes
+        if isinstance(shape, LineSettings)
     )
     zones = tuple(
-        each.model_copy(update={"points": tuple(map(scaled, each.points))})
-        for each in shapes
-        if isinstance(each, ZoneSettings)
+        shape.model_copy(update={"points": tuple(map(scaled, shape.points))})
+        for shape in shapes
+        if isinstance(shape, ZoneSettings)
     )
     traffic = TrafficSettings(lines=lines, zones=zones, **rule)
     return Settings(camera=CameraSettings(size=(WIDTH, HEIGHT)), traffic=traffic)

@@ -38,8 +38,8 @@ def at(counted: Counts, begin: datetime = BEGINS) -> Counts:
 
 def named(video: Iterable[FrameTracks], name: str) -> list[FrameTracks]:
     return [
-        replace(each, tracks=tuple(replace(t, class_name=name) for t in each.tracks))
-        for each in video
+        replace(frame, tracks=tuple(replace(t, class_name=name) for t in frame.tracks))
+        for frame in video
     ]
 
 
@@ -162,8 +162,8 @@ class TestIntervals:
 
     def test_a_jump_of_the_times_has_no_intervals(self) -> None:
         late = [
-            replace(each, index=each.index + 251, time=each.time + 1.77e9)
-            for each in frames(TURNS_BACK)
+            replace(frame, index=frame.index + 251, time=frame.time + 1.77e9)
+            for frame in frames(TURNS_BACK)
         ]
         counted = counts([*frames(GOES_EAST), *numbered(late, 2)], WEST, ZONE)
         assert [row.start for row in counted.zone_use(3600)] == [0, 1.77e9 // 3600 * 3600]
@@ -174,8 +174,8 @@ class TestIntervals:
     def test_frames_that_a_file_leaves_out_are_video(self) -> None:
         """A file of boxes has no frames of a quiet hour."""
         late = [
-            replace(each, index=each.index + 90_000, time=each.time + 3600)
-            for each in frames(TURNS_BACK)
+            replace(frame, index=frame.index + 90_000, time=frame.time + 3600)
+            for frame in frames(TURNS_BACK)
         ]
         rows = counts([*frames(GOES_EAST), *numbered(late, 2)], ZONE).zone_use(1200)
         assert [row.start for row in rows] == [0, 1200, 2400, 3600]

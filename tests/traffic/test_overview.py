@@ -15,7 +15,7 @@ PICTURE = Picture(ROAD)
 def crops(*shown: list[Track]) -> dict[int, Crop]:
     """Return the picture of each vehicle that was given back last."""
     best = BestCrops()
-    found = [crop for n, each in enumerate(shown) for crop in best.add(frame(n, *each), PICTURE)]
+    found = [crop for n, track in enumerate(shown) for crop in best.add(frame(n, *track), PICTURE)]
     return {crop.id: crop for crop in (*found, *best.end())}
 
 
@@ -44,7 +44,7 @@ def test_what_is_whole_in_the_frame_is_better_than_what_is_larger() -> None:
 
 
 def test_where_the_detector_did_not_see_it_there_is_no_picture() -> None:
-    assert crops([track(1, box(40), state="lost")]) == {}
+    assert crops([track(1, box(40), state="predicted")]) == {}
 
 
 def test_a_vehicle_that_is_gone_is_given_back_and_again_if_it_comes_back_better() -> None:

@@ -30,12 +30,12 @@ def counted(lines: Sequence[ProposedLine], *paths: Path) -> dict[tuple[str, str]
         )
     )
     totals = count_frames(frames(*paths, seconds=14), settings, (WIDTH, HEIGHT)).totals
-    return {(each.name, each.direction): each.count for each in totals if each.count}
+    return {(total.name, total.direction): total.count for total in totals if total.count}
 
 
 def test_each_stream_has_a_line_of_its_own_that_is_named_by_its_direction() -> None:
     lines = proposed(*DOWN, *UP)
-    assert [(each.name, each.left, each.right, each.vehicles) for each in lines] == [
+    assert [(line.name, line.left, line.right, line.vehicles) for line in lines] == [
         ("down", "down", "up", 6), ("up", "up", "down", 5),
     ]  # fmt: skip
     assert counted(lines, *DOWN, *UP) == {("down", "down"): 6, ("up", "up"): 5}
@@ -52,16 +52,16 @@ def test_with_the_camera_s_direction_lines_are_named_by_the_compass() -> None:
 
 def test_lines_lie_in_the_frame_and_do_not_cross_each_other() -> None:
     lines = proposed(*DOWN, *UP, *RIGHT)
-    assert sorted(each.name for each in lines) == ["down", "right", "up"]
-    ends = [(each.start, each.end) for each in lines]
+    assert sorted(line.name for line in lines) == ["down", "right", "up"]
+    ends = [(line.start, line.end) for line in lines]
     assert all(meeting(one, other) is None for one in ends for other in ends if one != other)
-    assert all(0 <= x <= WIDTH and 0 <= y <= HEIGHT for each in ends for x, y in each)
+    assert all(0 <= x <= WIDTH and 0 <= y <= HEIGHT for end in ends for x, y in end)
 
 
 def test_a_road_beside_another_has_its_own_line() -> None:
     beside = [through((n, 1000 + 10 * n, 80), (4 + n, 1040 + 20 * n, 700)) for n in range(5)]
     lines = proposed(*DOWN, *beside)
-    assert [(each.name, each.vehicles) for each in lines] == [("down", 6), ("down 2", 5)]
+    assert [(line.name, line.vehicles) for line in lines] == [("down", 6), ("down 2", 5)]
 
 
 @pytest.mark.parametrize(

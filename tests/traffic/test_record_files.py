@@ -29,7 +29,9 @@ def test_csv_has_a_heading_and_a_row_a_vehicle(tmp_path: Path) -> None:
 
 
 def test_json_is_a_list_of_vehicles(tmp_path: Path) -> None:
-    truck = frame(0, track(3, Box.sized(1, 2, 30, 40), class_name="truck", state="lost", score=1))
+    truck = frame(
+        0, track(3, Box.sized(1, 2, 30, 40), class_name="truck", state="predicted", score=1)
+    )
     (item,) = json.loads(written(tmp_path / "a.JSON", truck))
     assert item == {
         "id": 3,
@@ -38,9 +40,9 @@ def test_json_is_a_list_of_vehicles(tmp_path: Path) -> None:
         "first": 0,
         "last": 0,
         "seconds": 0,
-        "seen": 0,
-        "between": 0,
-        "lost": 1,
+        "detected": 0,
+        "interpolated": 0,
+        "predicted": 1,
         "mean_score": 1,
         "best_score": 1,
         "path": {"start": [16, 42], "end": [16, 42], "length": 0, "length_share": 0},

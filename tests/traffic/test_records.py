@@ -23,7 +23,7 @@ def test_a_vehicle_has_its_times_frames_and_path() -> None:
     found = record(*passing(51))
     assert (found.id, found.first, found.last) == (1, 0.0, 2.0)
     assert found.seconds == pytest.approx(51 / RATE), "the last frame is shown too"
-    assert found.states == {"seen": 51}
+    assert found.states == {"detected": 51}
     assert found.path[0] == (30, 130)
     assert found.path[-1] == (130, 130)
     assert found.length == pytest.approx(100)
@@ -33,7 +33,7 @@ def test_a_vehicle_has_its_times_frames_and_path() -> None:
 def test_scores_are_those_of_all_frames_and_the_largest_box_is_kept() -> None:
     boxes = [PLACE, Box.sized(90, 90, 60, 50), Box.sized(95, 95, 50, 40)]
     tracks = [track(1, box, score=0.5 + 0.2 * n) for n, box in enumerate(boxes)]
-    found = record(*(frame(n, each) for n, each in enumerate(tracks)))
+    found = record(*(frame(n, track) for n, track in enumerate(tracks)))
     assert found.mean_score == pytest.approx(0.7)
     assert found.best_score == pytest.approx(0.9)
     assert found.largest == boxes[1]
@@ -42,8 +42,8 @@ def test_scores_are_those_of_all_frames_and_the_largest_box_is_kept() -> None:
 def test_the_class_is_that_of_the_last_frame() -> None:
     names = (None, "car", "car", "truck")
     tracks = [track(1, PLACE, class_name=name) for name in names]
-    found = [record(*(frame(n, each) for n, each in enumerate(tracks[:n]))) for n in range(1, 5)]
-    assert tuple(each.class_name for each in found) == names
+    found = [record(*(frame(n, track) for n, track in enumerate(tracks[:n]))) for n in range(1, 5)]
+    assert tuple(item.class_name for item in found) == names
 
 
 class TestTime:
@@ -74,13 +74,13 @@ class TestPath:
 
     def test_frames_in_which_it_is_lost_add_nothing(self) -> None:
         frames = [
-            frame(0, track(1, Box.sized(0, 0, 40, 30), state="lost")),
+            frame(0, track(1, Box.sized(0, 0, 40, 30), state="predicted")),
             *(frame(n, track(1, Box.sized(100 + 10 * n, 100, 40, 30))) for n in (1, 2, 3)),
-            frame(4, track(1, Box.sized(280, 200, 40, 30), state="lost")),
+            frame(4, track(1, Box.sized(280, 200, 40, 30), state="predicted")),
         ]
         found = record(*frames)
         assert (found.path[0], found.path[-1]) == ((130, 130), (150, 130))
-        assert found.states == {"seen": 3, "lost": 2}
+        assert found.states == {"detected": 3, "predicted": 2}
 
 
 class TestMotion:
@@ -93,7 +93,7 @@ class TestMotion:
             if second < 30:
                 tracks.append(track(4, Box.sized(200, 180, 50, 40)))
             made.add(frame(second, *tracks, rate=1))
-        return {each.id: (each.motion, each.mean_score) for each in made.end(is_still=is_still)}
+        return {item.id: (item.motion, item.mean_score) for item in made.end(is_still=is_still)}
 
     def test_what_stands_is_told_apart_from_what_drives(self) -> None:
         found = self.records_before(is_still=True)

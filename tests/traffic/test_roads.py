@@ -39,7 +39,7 @@ def test_random_traffic(seed: int) -> None:
         for n, there in enumerate(clip)
     ]
     true = [
-        FrameTracks(n, n / RATE, tuple(_true_track(each) for each in there if each.counts))
+        FrameTracks(n, n / RATE, tuple(_true_track(item) for item in there if item.counts))
         for n, there in enumerate(clip)
     ]
     same, counted = _pairs(tracks, true), 0
@@ -53,7 +53,7 @@ def test_random_traffic(seed: int) -> None:
 
 
 def _true_track(vehicle: TrueVehicle) -> Track:
-    return Track(vehicle.id, Box(*vehicle.box.tolist()), 1.0, state="seen")
+    return Track(vehicle.id, Box(*vehicle.box.tolist()), 1.0, state="detected")
 
 
 def _unclear(true: Sequence[FrameTracks], row: float) -> set[int]:
@@ -65,7 +65,7 @@ def _unclear(true: Sequence[FrameTracks], row: float) -> set[int]:
             first.setdefault(track.id, track)
             last[track.id] = track
     ends = (*first.values(), *last.values())
-    return {each.id for each in ends if abs(each.foot[1] - row) < 0.2 * each.box.height}
+    return {end.id for end in ends if abs(end.foot[1] - row) < 0.2 * end.box.height}
 
 
 def _pairs(tracks: Sequence[FrameTracks], true: Sequence[FrameTracks]) -> dict[int, int]:

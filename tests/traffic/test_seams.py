@@ -48,7 +48,7 @@ def test_a_vehicle_at_the_seam_is_one_flow(tmp_path: File) -> None:
     videos = count(write_halves(tmp_path, FOLLOWING, GOES_EAST))
     (row,) = flow_table(videos)
     assert (row.origin, row.destination, row.count) == ("west", "east", 1)
-    assert [len(each.events) for each in videos] == [1, 1]
+    assert [len(video.events) for video in videos] == [1, 1]
     assert videos[1].events[0].time == pytest.approx(8, abs=0.05), "in the time of its own file"
 
 
@@ -79,7 +79,7 @@ def test_files_that_do_not_follow_have_vehicles_of_their_own(tmp_path: File, sec
     assert [(row.origin, row.destination) for row in flow_table(videos)] == [
         ("west", None), ("east", None),
     ]  # fmt: skip
-    numbers = [{event.vehicle for event in each.events} for each in videos]
+    numbers = [{event.vehicle for event in video.events} for video in videos]
     assert not numbers[0] & numbers[1]
 
 

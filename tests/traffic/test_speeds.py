@@ -20,7 +20,7 @@ def measured(
     rate: float = RATE,
     noise: float = 0.0,
     low: float = 0.0,
-    state: State = "seen",
+    state: State = "detected",
     seed: int = 1,
 ) -> Speeds | None:
     """Return the speeds of a vehicle whose foot is at `places`, one each frame.
@@ -116,7 +116,7 @@ def test_a_turning_vehicle_has_the_speed_of_its_middle() -> None:
         ])) + 0.5  # fmt: skip
         (x1, top), (x2, y2) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
         box = Box(x1, top - 30, x2, y2)
-        meter.add(FrameTracks(index, index / RATE, (Track(1, box, 0.9, "seen"),)))
+        meter.add(FrameTracks(index, index / RATE, (Track(1, box, 0.9, "detected"),)))
     true = 8 * np.pi / 2 / (49 / RATE)
     assert meter.speeds()[1].quantile(0.5) == pytest.approx(true, rel=0.05)
 
@@ -131,7 +131,7 @@ def test_what_is_not_known_has_no_speed(places: Float64Array) -> None:
 
 
 def test_a_lost_vehicle_has_no_speed() -> None:
-    assert measured(driving(10.0), state="lost") is None
+    assert measured(driving(10.0), state="predicted") is None
 
 
 def test_a_vehicle_that_comes_back_after_long_keeps_its_speed() -> None:
@@ -139,5 +139,5 @@ def test_a_vehicle_that_comes_back_after_long_keeps_its_speed() -> None:
     for time in (*np.arange(0, 2, 0.04), 60.0):
         ((x, y),) = seen(np.array([(0.0, 16 + 10 * min(time, 3.0))])).tolist()
         box = Box(x - 20, y - 40, x + 20, y)
-        meter.add(FrameTracks(round(25 * time), time, (Track(1, box, 0.9, "seen"),)))
+        meter.add(FrameTracks(round(25 * time), time, (Track(1, box, 0.9, "detected"),)))
     assert meter.speeds()[1].quantile(0.5) == pytest.approx(10.0, rel=0.02)

@@ -118,13 +118,13 @@ class TestClasses:
     def test_a_class_that_flips_on_the_line_does_not_split_the_history(self) -> None:
         video = [
             replace(
-                each,
+                frame,
                 tracks=tuple(
-                    replace(t, class_name="truck" if 1.8 < each.time < 2.2 else "car")
-                    for t in each.tracks
+                    replace(t, class_name="truck" if 1.8 < frame.time < 2.2 else "car")
+                    for t in frame.tracks
                 ),
             )
-            for each in frames(DOWN)
+            for frame in frames(DOWN)
         ]
         (event,) = events(video)
         assert event.class_name == "car"

@@ -56,7 +56,7 @@ def find_sources(clips: Sequence[Path]) -> list[InputVideo]:
     for clip in clips:
         sources = sorted(_videos_of(clip), key=lambda source: source.place)
         if not sources:
-            raise BatchError(f"{clip}: no video is found there; check the name")
+            raise BatchError(f"{clip}: no video found; check the name")
         for source in sources:
             found.setdefault((source.path.resolve(), source.place), source)
     return list(found.values())
@@ -115,4 +115,4 @@ def _is_video(path: Path) -> bool:
 
 
 def _refuse_unreadable(error: OSError) -> None:
-    raise BatchError(f"{error.filename}: cannot be read: {error.strerror}; leave it out") from error
+    raise BatchError(f"{error.filename}: cannot be read: {error.strerror}; remove it") from error

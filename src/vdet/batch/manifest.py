@@ -126,7 +126,7 @@ def read_records(*paths: Path) -> Iterator[Record]:
             for text in file:
                 with suppress(ValueError, TypeError, KeyError):
                     line = json.loads(text)
-                    outputs = tuple(Written(**each) for each in line["outputs"])
+                    outputs = tuple(Written(**item) for item in line["outputs"])
                     yield Record(**{**line, "outputs": outputs})
 
 
@@ -141,7 +141,7 @@ def _notes(folder: Path) -> list[Path]:
 
 @contextmanager
 def open_manifest(folder: Path) -> Iterator[Callable[[Record], None]]:
-    """Give a function that adds a record to the manifest; it returns when the disk has it.
+    """Yield a function that adds a record to the manifest; it returns when the disk has it.
 
     The manifest is locked: no other batch can write into the folder until the block ends. Notes
     that an earlier batch left move into it.

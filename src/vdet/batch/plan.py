@@ -90,16 +90,16 @@ def make_plan(
             settings=settings,
             source=source.path,
             outputs=tuple(
-                Output(each.sink, _path(folder / source.place, each)) for each in suffixes
+                Output(suffix.sink, _path(folder / source.place, suffix)) for suffix in suffixes
             ),
         )
         for source in sources
     ]
     totals = {
         number: (folder / f"{total.name}{total.suffix or ending}", total, ending)
-        for number, each in enumerate(suffixes)
-        for ending in (each.suffix or "",)
-        if (total := sink_kind(each.sink).total)
+        for number, suffix in enumerate(suffixes)
+        for ending in (suffix.suffix or "",)
+        if (total := sink_kind(suffix.sink).total)
     }
     _refuse_shared(runs, [path for path, *_ in totals.values()], folder)
     manifest, skipped = folder / MANIFEST, []

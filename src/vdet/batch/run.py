@@ -51,7 +51,7 @@ def run_batch(
 
 
 def _record_of_killed(run: Run) -> Record:
-    error = f"{run.source}: its process was killed, or crashed; there may be too little memory"
+    error = f"{run.source}: its process was killed, or crashed; it may have run out of memory"
     return replace(new_record(run), error=error)
 
 

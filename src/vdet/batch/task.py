@@ -34,7 +34,7 @@ def result_digest(run: Run) -> str:
     files in their folder.
     """
     settings = run.settings
-    files = model_file(settings.detector), *(each.mask for each in settings.regions)
+    files = model_file(settings.detector), *(region.mask for region in settings.regions)
     wanted = (
         *(f"vdet {__version__}", run.start, run.end, run.frames, time.timezone, time.tzname),
         *(_digest_of(file) for file in files),
@@ -97,7 +97,9 @@ def replacing_ours(run: Run, known: Known) -> Run:
     for output in run.outputs:
         state, ours = output_state(output), known.get(os.path.realpath(output.path), ())
         if state and state[0] and state not in {written.state for written in ours}:
-            raise BatchError(f"{output.path}: is not as vdet wrote it; remove it, or --overwrite")
+            raise BatchError(
+                f"{output.path}: was changed since vdet wrote it; remove it, or use --overwrite"
+            )
     return replace(run, overwrite=any(os.path.lexists(output.path) for output in run.outputs))
 
 
@@ -133,7 +135,7 @@ def _written(run: Run, record: Record, files: OutputFiles) -> Record:
     digest = result_digest(run)
     chosen = pickle.dumps(run.settings.detector)  # settings of other packages may be unhashable
     totals = write_outputs(run, _kept_detector(chosen, record.model_sha256), files)
-    states = [output_state(each, files.place_of(each.path)) or (0, 0) for each in run.outputs]
+    states = [output_state(output, files.place_of(output.path)) or (0, 0) for output in run.outputs]
     return replace(
         record,
         seconds=round(totals.seconds, 3),
@@ -142,9 +144,13 @@ def _written(run: Run, record: Record, files: OutputFiles) -> Record:
         facts={name: fact.record() for name, fact in totals.facts.items()},
         outputs=tuple(
             Written(
-                each.sink, str(each.path.absolute()), *state, digest, totals.summaries[each.path]
+                output.sink,
+                str(output.path.absolute()),
+                *state,
+                digest,
+                totals.summaries[output.path],
             )
-            for each, state in zip(run.outputs, states, strict=True)
+            for output, state in zip(run.outputs, states, strict=True)
         ),
     )
 
@@ -164,7 +170,7 @@ def new_record(run: Run) -> Record:
 
 @contextmanager
 def _collected_warnings() -> Iterator[list[str]]:
-    """Give a list of the warnings of the block; whoever gets the record prints them."""
+    """Yield a list of the warnings of the block; whoever gets the record prints them."""
     messages: list[str] = []
 
     def collect(record: logging.LogRecord) -> bool:

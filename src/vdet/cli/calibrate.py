@@ -37,7 +37,7 @@ def calibrate(
     from vdet.run.pictures import find_images
 
     if not (3 <= min(pattern) <= max(pattern) <= 999):
-        raise click.UsageError("--pattern: give 3 to 999 inner corners, as in 9x6")
+        raise click.UsageError("--pattern: must be 3 to 999 inner corners, such as 9x6")
     options.check_suffix(output, ".yaml", ".yml", what="cameras")
     found = find_images(photos)
     check_output(output, overwrite=overwrite)

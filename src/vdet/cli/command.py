@@ -11,7 +11,7 @@ from vdet.cli.messages import set_up_logs
 from vdet.errors import ConfigError
 from vdet.plugins import COMMANDS, built_in_names, load_plugin, plugin_names
 
-_OTHERS = "What is processed"
+_OTHERS = "Input"
 
 HEADINGS: Mapping[str, Sequence[str]] = {
     "Outputs": (
@@ -20,7 +20,7 @@ HEADINGS: Mapping[str, Sequence[str]] = {
         *("--stages", "--at", "--sink", "--overwrite"),
     ),
     _OTHERS: (),
-    "Several videos": ("--directory", "--skip-existing", "--dry-run"),
+    "Batch": ("--directory", "--skip-existing", "--dry-run"),
     "Lanes": ("--lanes",),
     "Model and settings": ("--model", "--base", "--config", "--set"),
     "Parallel work": ("--jobs", "--threads", "--scheduler"),
@@ -100,8 +100,8 @@ def verbosity_options() -> list[click.Parameter]:
     """Return `--quiet` and `--verbose`, which mean the same before and after the command."""
     make = partial(click.Option, is_flag=True, expose_value=False, callback=_apply_verbosity)
     return [
-        make(["-q", "--quiet"], help="Print no progress and no warnings, only errors."),
-        make(["-v", "--verbose"], help="Print more about what is done."),
+        make(["-q", "--quiet"], help="Print only errors, no progress and no warnings."),
+        make(["-v", "--verbose"], help="Print more detail."),
     ]
 
 

@@ -10,7 +10,7 @@ from vdet.cli.options import SettingsChoice, settings_options
 def config(choice: SettingsChoice) -> None:
     """Print the effective settings as commented YAML.
 
-    Save them, change what you like, and give the file to a command with -c.
+    Save them, change what you like, and pass the file to a command with -c.
     """
     from vdet.config.rendering import render
 

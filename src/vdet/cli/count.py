@@ -39,7 +39,7 @@ log = logging.getLogger("vdet")
     options.RATE,
     show_default="from the times in TRACKS",
 )
-@options.settings_options("traffic.confirmed=0.5")
+@options.settings_options("traffic.min_seen_seconds=0.5")
 @options.overwrite_option
 def count(
     tracks: tuple[Path, ...],
@@ -56,7 +56,7 @@ def count(
     """
     settings = choice.read()
     if not settings.traffic:
-        raise click.UsageError("there is nothing to count at; give lines or zones with -c FILE")
+        raise click.UsageError("no lines or zones to count at; add a settings file with -c FILE")
     check_counting(settings, several=len(tracks) > 1)
     from vdet.run.sinks.protocol import check_sinks
     from vdet.traffic.count_files import write_counts, write_flows
@@ -95,8 +95,8 @@ def _totals(videos: "Mapping[str, Counts]") -> list[str]:
     if len(videos) > 1:
         totals["all files"] = direction_totals(list(videos.values()))
     rows = []
-    for name, each in totals.items():
-        for total in each:
+    for name, item in totals.items():
+        for total in item:
             classes = ", ".join(counted(number, kind) for kind, number in total.classes.items())
             rows.append((name, total.name, total.direction, str(total.count), classes))
     return table(("file", "name", "direction", "count", "classes"), rows)

@@ -17,10 +17,12 @@ def check_counting(settings: "Settings", *, several: bool) -> None:
     wanted = {sink for sink, _ in options.wanted_outputs()}
     tables = wanted & {"counts", "flows"}
     if tables and not settings.traffic:
-        raise click.UsageError(f"--{min(tables)} needs lines or zones; give them with -c FILE")
+        raise click.UsageError(
+            f"--{min(tables)} needs lines or zones; add a settings file with -c FILE"
+        )
     if settings.input.begin and several:
         raise click.UsageError(
-            "input.begin is for one video; for several give a pattern of their names, "
+            "input.begin is for one video; for several set a pattern of their names, "
             "camera.clock.pattern"
         )
 

@@ -27,14 +27,14 @@ log = logging.getLogger("vdet")
 @click.argument("images", nargs=-1, required=True, type=options.PATH, metavar="IMAGE...")
 @options.option(
     "-o, --output PATH",
-    "Write the picture with its boxes. For several pictures, give a folder.",
+    "Write the picture with its boxes. For several pictures, a folder.",
     options.PATH,
 )
 @options.option("--stages DIR", "Write a picture of every stage into DIR.")
 @options.output_option("--json FILE", "Write the boxes to FILE, or with - to standard output.")
 @options.sink_option
 @options.lanes_option
-@options.settings_options("detector.still_score=0.5", options.model_option)
+@options.settings_options("detector.min_score_still=0.5", options.model_option)
 @options.overwrite_option
 def detect_image(
     images: tuple[Path, ...],

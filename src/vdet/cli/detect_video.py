@@ -49,7 +49,7 @@ class BatchOptions:
         if overwrite and self.skip_existing:
             raise click.UsageError("--overwrite and --skip-existing do not go together")
         if self.jobs and self.scheduler:
-            raise click.UsageError("--jobs is for this machine; leave it out, or --scheduler")
+            raise click.UsageError("--jobs is for this machine; remove it, or --scheduler")
 
 
 _batch_options = options.bundle(
@@ -78,19 +78,19 @@ _batch_options = options.bundle(
     "--tracks FILE",
     "Write the boxes of every frame: .txt (MOTChallenge), .csv, .jsonl, .coco.json, .xml "
     "(CVAT), .kitti.txt, .yolo.zip or .ottrk. With -, they go to standard output as .jsonl. With "
-    "-d, give only the ending. Can be repeated.",
+    "-d, only the ending of the names. Can be repeated.",
 )
 @options.output_option(
     "--vehicles FILE",
-    "Write a record of each vehicle: .csv or .json. With -d, give only the ending.",
+    "Write a record of each vehicle: .csv or .json. With -d, only the ending of the names.",
 )
 @options.output_option(
     "--crops DIR",
-    "Write the best picture of each vehicle into DIR. With -d, give an ending such as .crops.",
+    "Write the best picture of each vehicle into DIR. With -d, an ending such as .crops.",
 )
 @options.output_option(
     "--page DIR",
-    "Write page.html, a page about the vehicles, into DIR. With -d, give an ending such as .page.",
+    "Write page.html, a page about the vehicles, into DIR. With -d, an ending such as .page.",
 )
 @options.output_option(
     "--clips DIR",
@@ -101,7 +101,7 @@ _batch_options = options.bundle(
     "--margin SECONDS", "clips.margin", "Begin before and end after the vehicle.", float
 )
 @options.short_form("--exact", "clips.exact", "Encode clips, exact to the frame.")
-@counting_options(" With -d, give only the ending.")
+@counting_options(" With -d, only the ending of the names.")
 @options.sink_option
 @options.start_option
 @options.end_option
@@ -160,7 +160,7 @@ def detect_video(
         source, video = _in_and_out(videos, no_video=no_video)
         wanted = [*video, *wanted]
     if no_video and not wanted:
-        raise click.UsageError("nothing would be written; give an output, such as --tracks")
+        raise click.UsageError("no output; add one, such as --tracks")
     settings = choice.read()
     check_counting(settings, several=batch.folder is not None)
     from vdet.regions import check_masks
@@ -190,7 +190,7 @@ def _in_and_out(clips: tuple[Path, ...], *, no_video: bool) -> tuple[Path, list[
             f"videos name a folder: vdet detect-video {shown} -d found"
         )
     if no_video == bool(outputs):
-        raise click.UsageError("give one OUT, or --no-video; or -d DIR for several videos")
+        raise click.UsageError("pass one OUT, or --no-video; or -d DIR for several videos")
     return source, [("video", path) for path in outputs]
 
 
@@ -218,7 +218,7 @@ def _read_suffixes(wanted: Sequence[options.Wanted], *, no_video: bool) -> "list
     from vdet.batch.plan import OutputSuffix
 
     suffixes = [OutputSuffix(sink, _suffix(sink, path)) for sink, path in wanted]
-    if not no_video and not any(each.sink == "video" for each in suffixes):
+    if not no_video and not any(suffix.sink == "video" for suffix in suffixes):
         suffixes.insert(0, OutputSuffix("video"))
     return suffixes
 
@@ -229,10 +229,10 @@ def _suffix(sink: str, path: Path) -> str:
 
     kind, suffix = sink_kind(sink), str(path).lower()
     if kind.takes == "pictures" or kind.one_frame:
-        raise click.UsageError(f"{sink}: cannot be written with -d; leave one of them out")
+        raise click.UsageError(f"{sink}: cannot be written with -d; remove one of them")
     if not _SUFFIX.fullmatch(suffix) or not kind.takes_name(f"video{suffix}"):
         known = ", ".join(kind.endings) or f"as in .{sink if kind.marker else 'txt'}"
-        raise click.UsageError(f"{sink}: with -d give only the ending of the names: {known}")
+        raise click.UsageError(f"{sink}: with -d, pass only the ending of the names: {known}")
     return suffix
 
 

@@ -27,7 +27,7 @@ def doctor(results: Results) -> int:
 
     found = [("vdet", "ok", f"{__version__}, on {core_count()} cores"), *_packages(), _opencv()]
     checks = {f"settings {name}": partial(_check_config, name) for name in shipped_configs()}
-    found += [_checked(*each) for each in ({"codec h264": _check_codec} | checks).items()]
+    found += [_checked(*item) for item in ({"codec h264": _check_codec} | checks).items()]
     works = all(status != "broken" for _, status, _ in found)
     lines = [f"{status:6}  {name}: {text}" for name, status, text in found]
     lines.append("vdet works here" if works else "vdet does not work here: see what is broken")

@@ -17,18 +17,18 @@ from vdet.errors import ConfigError
 _data = click.argument("data", nargs=-1, required=True, type=options.INPUT, metavar="DATA...")
 
 
-@command("vdet eval images city/ motorway/ --model their.onnx --least-width 0.03")
+@command("vdet eval images city/ motorway/ --model their.onnx --min-width 0.03")
 @_data
 @options.option(
-    "--least-width SHARE",
+    "--min-width FRACTION",
     "Ignore vehicles narrower than this fraction of the picture's width, 0 to 1.",
     options.SHARE,
     default=0.0,
 )
-@options.settings_options("detector.still_score=0.5", options.model_option)
+@options.settings_options("detector.min_score_still=0.5", options.model_option)
 @results_options
 def images(
-    data: tuple[Path, ...], least_width: float, choice: options.SettingsChoice, results: Results
+    data: tuple[Path, ...], min_width: float, choice: options.SettingsChoice, results: Results
 ) -> None:
     """Measure detection in labelled pictures.
 
@@ -49,7 +49,7 @@ def images(
     model = load_detector(detector.showing_all())
     sets = [read_labelled_pictures(path, roles) for path in data]
     results.check()
-    counting = Counting(detector.shown_score, least_width)
+    counting = Counting(detector.shown_score, min_width)
     with progress_steps(" pictures") as steps:
         progress = partial(steps, "")
         result = evaluate_images(sets, model, counting, threads=core_count(), progress=progress)
@@ -120,17 +120,17 @@ def tracks(
     results.print(report.lines(), report.values, report.page)
 
 
-@command("vdet eval video in.mp4 --truth gt.txt --sweep tracker.needed=0.1,0.3")
+@command("vdet eval video in.mp4 --truth gt.txt --sweep tracker.confirm_seconds=0.1,0.3")
 @click.argument("videos", nargs=-1, required=True, type=options.INPUT, metavar="IN...")
 @options.truth_option
 @options.until_option
 @options.option(
     "--sweep KEY=VALUE,VALUE",
-    "Compare values of a setting, for example tracker.needed=0.1,0.3. Can be repeated.",
+    "Compare values of a setting, for example tracker.confirm_seconds=0.1,0.3. Can be repeated.",
     name="sweeps",
     multiple=True,
 )
-@options.settings_options("tracker.needed=0.3", options.model_option)
+@options.settings_options("tracker.confirm_seconds=0.3", options.model_option)
 @results_options
 def video(
     videos: tuple[Path, ...],

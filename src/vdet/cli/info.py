@@ -57,15 +57,15 @@ def _settings(choice: SettingsChoice) -> Facts:
     from vdet.traffic.speeds import KMH, WINDOW
 
     if not choice.configs:
-        raise click.UsageError("nothing to describe; give FILE or -c FILE")
+        raise click.UsageError("nothing to describe; pass FILE or -c FILE")
     settings = choice.read()
     size = settings.camera.size or _ANY_SIZE
     lines, zones = place(settings.traffic, *size)
     facts: Facts = {
         "file": choice.name,
         "kind": "settings of a camera",
-        "lines": [each.name for each in lines],
-        "zones": [each.name for each in zones],
+        "lines": [line.name for line in lines],
+        "zones": [zone.name for zone in zones],
         "ground": None,
     }
     if (ground := ground_of(settings.camera, *size)) is None:

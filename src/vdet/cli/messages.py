@@ -79,7 +79,7 @@ def _shows_bars() -> bool:
 
 @contextmanager
 def progress_steps(unit: str) -> Iterator[Steps]:
-    """Give a function that ends the bar of the step before and starts one.
+    """Yield a function that ends the bar of the step before and starts one.
 
     It takes the name of the step and its total. A step that has a name and no total shows how long
     it has taken, and disappears at its end. See `live_bar` for where there is no bar.
@@ -103,8 +103,8 @@ def progress_steps(unit: str) -> Iterator[Steps]:
 def live_bar(**options: Any) -> "Iterator[tqdm[Any]]":
     """Give a bar that is drawn at least every `REFRESH_INTERVAL`: the program is at work.
 
-    There is no bar with `--quiet`, and where standard error is no terminal: its `disable` is then
-    true.
+    There is no bar with `--quiet`, and where standard error is not a terminal: its `disable` is
+    then true.
     """
     from tqdm import tqdm
 

@@ -60,7 +60,7 @@ def mine(
     videos = [path for path in sources if not holds_labelled_pictures(path)]
     if len(videos) != len(truths):
         given = f"videos: {len(videos)}, truths: {len(truths)}"
-        raise click.UsageError(f"give one --truth for each video ({given})")
+        raise click.UsageError(f"pass one --truth for each video ({given})")
     labels = dict(zip(videos, truths, strict=True))
     labelled = [
         mining.VideoSource(path, labels[path], every, first, until)

@@ -54,7 +54,9 @@ _PAIR = re.compile(r"([1-9][0-9]{0,4})[x×]([1-9][0-9]{0,4})", re.ASCII | re.IGN
 def parse_time(text: str) -> Fraction:
     """Return a time in exact seconds: the type of an option. Raises `click.BadParameter`."""
     if not _TIME.fullmatch(text):
-        raise click.BadParameter(f"{text!r} is not a time; give seconds or HH:MM:SS, as in 1:23.5")
+        raise click.BadParameter(
+            f"{text!r} is not a time; expected seconds or HH:MM:SS, such as 1:23.5"
+        )
     seconds = Fraction(0)
     for part in text.split(":"):
         seconds = seconds * 60 + Fraction(part)
@@ -126,10 +128,11 @@ def option(
     return click.option(*names, help=text, type=kind, metavar=metavar or None, **more)
 
 
-overwrite_option = option("--overwrite", "Replace outputs that are there already.")
+overwrite_option = option("--overwrite", "Replace existing outputs.")
 scheduler_option = option(
     "--scheduler ADDRESS",
-    "Work on this Dask cluster, as tcp://host:8786. Its workers must see the files by their names.",
+    "Address of a Dask scheduler, such as tcp://host:8786. Workers must see the files at the same "
+    "paths.",
 )
 until_option = option(
     "--until FRAME",
@@ -162,7 +165,7 @@ def output_file_option(text: str) -> Callable[[F], F]:
 def check_suffix(output: Path, *suffixes: str, what: str) -> None:
     """Refuse an output with another suffix. Raises `OutputError`."""
     if output.suffix.lower() not in suffixes:
-        raise OutputError(f"{output}: {what} are written as {suffixes[0]}; name it so")
+        raise OutputError(f"{output}: {what} must end in {suffixes[0]}")
 
 
 Short = tuple[str, Any]
@@ -236,7 +239,7 @@ class SettingsChoice:
         """Read them for a command that looks at whole frames; refuse regions as a `ConfigError`."""
         settings = self.read(detector=detector)
         if settings.regions:
-            raise ConfigError("regions: this command looks at whole frames; leave the regions out")
+            raise ConfigError("regions: this command uses whole frames; remove the regions")
         return settings
 
 
@@ -304,7 +307,7 @@ def output_option(shown: str, text: str) -> Callable[[F], F]:
 
 
 def _want(context: click.Context, option: click.Parameter, given: tuple[Any, ...]) -> None:
-    wanted = [each if isinstance(each, tuple) else (option.name, each) for each in given]
+    wanted = [item if isinstance(item, tuple) else (option.name, item) for item in given]
     context.meta.setdefault(_WANTED, []).extend(wanted)
 
 

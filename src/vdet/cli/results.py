@@ -26,7 +26,7 @@ class Results:
         Raises
         ------
         OutputError
-            A file is there already (and not `overwrite`), is an input, or cannot be written; or
+            A file already exists (and not `overwrite`), is an input, or cannot be written; or
             both outputs are one file.
         """
         paths = [path for path in (self._json_file, self._page_file) if path]

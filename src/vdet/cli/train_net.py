@@ -44,7 +44,7 @@ def train_net(
     Needs torch and onnx: pip install torch onnx
     """
     if not data and not clips:
-        raise click.UsageError("nothing to learn from; give DATA or --video")
+        raise click.UsageError("nothing to learn from; pass DATA or --video")
     options.check_suffix(output, ".onnx", what="networks")
     settings = choice.read()
     try:

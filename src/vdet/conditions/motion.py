@@ -1,4 +1,4 @@
-"""What moves before a still camera, and is no vehicle that was found.
+"""What moves before a still camera, and is not a vehicle that was found.
 
 The background follows the planes as a running median (McFarlane and Schofield 1995). What differs
 from it, outside the boxes, is linked from plane to plane. Only what travels counts: leaves, flags
@@ -64,8 +64,8 @@ class Mover:
     @property
     def has_travelled(self) -> bool:
         """Whether it moved on."""
-        least = max(_TRAVEL * self.width, self.size, _STRAIGHT * self.way)
-        return self.planes >= _PLANES and math.dist(self.start, self.place) >= least
+        minimum = max(_TRAVEL * self.width, self.size, _STRAIGHT * self.way)
+        return self.planes >= _PLANES and math.dist(self.start, self.place) >= minimum
 
 
 @dataclass(slots=True)
@@ -108,15 +108,15 @@ class MotionWatch:
         self._link(time, differs.astype(np.uint8), before)
 
     def findings(self) -> list[Finding]:
-        """Return how much of what travelled is no vehicle that was found, and when."""
-        every = self._ended + [each for each in self._movers if each.has_travelled]
-        left = [each for each in every if not each.is_found]
+        """Return how much of what travelled is not a vehicle that was found, and when."""
+        every = self._ended + [mover for mover in self._movers if mover.has_travelled]
+        left = [item for item in every if not item.is_found]
         fraction = len(left) / max(1, len(left) + len(self._driven))
         if len(left) < _FEWEST or fraction < _FRACTION:
             return []
-        spans = joined(sorted(time for each in left for time in (each.first, each.last)), _GAP)
+        spans = joined(sorted(time for item in left for time in (item.first, item.last)), _GAP)
         text = (
-            f"{fraction:.0%} of what moved is no vehicle that was found, most of it {when(spans)}: "
+            f"{fraction:.0%} of what moved is not a vehicle that was found, most {when(spans)}: "
             "it is hard to see, or of a kind that the detector does not look for"
         )
         return [Finding("unexplained-motion", text, tuple(spans), value=fraction)]
@@ -125,7 +125,7 @@ class MotionWatch:
         """Continue the movers; `before` is where boxes were in the plane before."""
         left, going = list(self._movers), []
         for center, size in self._things(differs):
-            mover = min(left, key=lambda each: math.dist(each.place, center), default=None)
+            mover = min(left, key=lambda item: math.dist(item.place, center), default=None)
             if mover and math.dist(mover.place, center) < _REACH * size:
                 left.remove(mover)
             else:
@@ -134,7 +134,7 @@ class MotionWatch:
             going.append(mover)
         for mover in left:
             mover.is_found |= _is_in(mover.place, self._covered)
-        self._ended += [each for each in left if each.has_travelled]
+        self._ended += [item for item in left if item.has_travelled]
         self._movers = going
 
     def _things(self, differs: Image) -> list[tuple[Point, float]]:

@@ -57,7 +57,7 @@ class Conditions:
         if not self._camera.add(time, plane, boxes.values()):
             self._motion.reset()
         self._motion.add(time, plane, boxes)
-        scores = np.array([each.score for each in found], np.float64)
+        scores = np.array([item.score for item in found], np.float64)
         self._sights.append(visibility.Sight.of(plane, scores))
 
     def findings(self) -> tuple[Finding, ...]:
@@ -71,7 +71,7 @@ class Conditions:
         detector = settings.detector
         is_shipped = detector.kind == "net" and detector.model is None
         found += visibility.findings(self._times, self._sights, is_shipped=is_shipped)
-        return tuple(each for each in found if each.code not in settings.conditions.ignore)
+        return tuple(item for item in found if item.code not in settings.conditions.ignore)
 
     def _of_settings(self) -> list[Finding]:
         """Return what the settings and the size of the frames make doubtful."""

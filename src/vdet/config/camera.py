@@ -57,7 +57,7 @@ class LensSettings(Section):
             in_frame = 0 <= x < width and 0 <= y < height
             if not (is_real and in_frame and (skew, zero, last) == (0, 0, (0, 0, 1))):
                 raise ValueError(
-                    "should be [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], with focal lengths of 0.1 to "
+                    "must be [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], with focal lengths of 0.1 to "
                     "100 times the width, and the principal point in the frame"
                 )
         return matrix
@@ -107,7 +107,7 @@ def moment(text: str) -> datetime:
     except ValueError:
         found = datetime.min
     if not _EARLIEST <= found.year <= _LATEST:
-        raise ValueError(f"{text!r} is not a time; give one as in '2026-05-01 07:00+02:00'")
+        raise ValueError(f"{text!r} is not a time; expected one such as '2026-05-01 07:00+02:00'")
     return found
 
 
@@ -187,5 +187,5 @@ class CameraSettings(Section):
         if abs(aspect - 1) > _ASPECT_TOLERANCE:
             raise ConfigError(
                 f"camera.size: places are given for frames of {given_width}×{given_height}, "
-                f"which have another shape than {width}×{height}; give places for such frames"
+                f"whose shape is not that of {width}×{height}; describe the camera for these"
             )

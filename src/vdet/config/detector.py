@@ -22,14 +22,14 @@ class DetectorSettings(Section):
     kind: str
     model: str | None = Field(None, min_length=1, max_length=4096)
     """Model file: .npz from `vdet train`, or .onnx. null: the shipped one that fits."""
-    searches: Searches = None
+    searches_per_second: Searches = None
     """Search at least this many frames in a second of video. The tracker predicts where the
     vehicles are in the others. null: search all frames.
     """
     stride: int | None = Field(None, ge=1, le=100)
-    """Search every N-th frame. Overrides searches."""
+    """Search every N-th frame. Overrides searches_per_second."""
     foot: Foot = 0.0
-    """Distance from the tyres down to the lower edge of a box, as a share of its height. It
+    """Distance from the tyres down to the lower edge of a box, as a fraction of its height. It
     corrects the distances of vehicles.
     """
 
@@ -49,7 +49,7 @@ class DetectorSettings(Section):
 
     @property
     def shown_score(self) -> float:
-        """Least score of a detection that is shown in a still picture."""
+        """Minimum score of a detection that is shown in a still picture."""
         return 0.0
 
     def showing_all(self) -> Self:
@@ -64,26 +64,26 @@ class NetworkSettings(DetectorSettings):
 
     kind: Literal["net"] = "net"
     """net: a network."""
-    searches: Searches = 12.0
-    least: float = Field(0.1, gt=0, lt=1)
+    searches_per_second: Searches = 12.0
+    min_score: float = Field(0.1, gt=0, lt=1)
     """Ignore boxes with a lower score."""
-    overlap: Share = 0.55
+    nms_iou: Share = 0.55
     """Remove a box if its intersection over union with a better one is higher."""
-    still_score: Share = 0.45
-    """Least score of a vehicle in a still picture. In video, the tracker decides."""
+    min_score_still: Share = 0.45
+    """Minimum score of a vehicle in a still picture. In video, the tracker decides."""
     classes: tuple[str, ...] = Field(
         ("car", "truck", "bus", "vehicle"), min_length=1, max_length=100
     )
     """Classes that count: car, truck, bus, motorcycle, vehicle (of unknown kind), or any other that
     the network knows.
     """
-    names: tuple[str, ...] | None = Field(None, max_length=10_000)
+    class_names: tuple[str, ...] | None = Field(None, max_length=10_000)
     """Names of the classes in the network's order. null: those in its file."""
 
     @property
     def search_key(self) -> object:
         """What the search of a frame depends on."""
-        return self.kind, self.model, self.least, self.classes, self.names
+        return self.kind, self.model, self.min_score, self.classes, self.class_names
 
     @property
     def vehicle_classes(self) -> tuple[str, ...]:
@@ -92,9 +92,9 @@ class NetworkSettings(DetectorSettings):
 
     @property
     def shown_score(self) -> float:
-        """Least score of a detection that is shown in a still picture."""
-        return self.still_score
+        """Minimum score of a detection that is shown in a still picture."""
+        return self.min_score_still
 
     def showing_all(self) -> "NetworkSettings":
-        """Return settings without `still_score`; `least` stays."""
-        return self.model_copy(update={"still_score": 0.0})
+        """Return settings without `min_score_still`; `min_score` stays."""
+        return self.model_copy(update={"min_score_still": 0.0})

@@ -18,7 +18,7 @@ MAX_BYTES = 100_000
 """Ten times the size of all settings with all their comments."""
 MAX_INTEGER_BITS = 64
 MAX_MISTAKES = 20
-"""Most mistakes of one file that are shown; the others are counted."""
+"""Maximum number of mistakes of one file that are shown; the others are counted."""
 
 T = TypeVar("T")
 
@@ -98,7 +98,7 @@ def read_document(path: Path) -> Document:
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise ConfigError(f"{path}: is not UTF-8 text; that is no settings file") from error
+        raise ConfigError(f"{path}: is not UTF-8 text; that unknown settings file") from error
     return parse_document(text, str(path))
 
 
@@ -193,7 +193,7 @@ class _Reader:
                 raise ConfigError(f"{place}: expected a key, got a {name_node.id}")
             name = name_node.value
             if name in values:
-                raise ConfigError(f"{place}: {printable(name)}: is given twice; keep one")
+                raise ConfigError(f"{place}: {printable(name)}: appears twice; remove one")
             self.places[(*key, name)] = place
             values[name] = self.value(value_node, (*key, name))
         return values

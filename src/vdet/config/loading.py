@@ -86,7 +86,7 @@ def find_config(name: str) -> Path:
         return shipped[known]
     if Path(name).is_file():
         return Path(name)
-    raise ConfigError(f"{name}: no such file; shipped configs are: {', '.join(shipped)}")
+    raise ConfigError(f"{name}: not found; shipped settings files are: {', '.join(shipped)}")
 
 
 def shipped_configs() -> dict[str, Path]:
@@ -198,7 +198,7 @@ def _merge(layers: Sequence[Document]) -> tuple[Document, dict[str, type[Section
     return merged, chosen
 
 
-_EXPECTED = {"model_type": "should be a section, key: value", "tuple_type": "should be a list"}
+_EXPECTED = {"model_type": "must be a section, key: value", "tuple_type": "must be a list"}
 
 
 def _describe(detail: ErrorDetails, merged: Document, model: type[Settings]) -> str:
@@ -210,15 +210,16 @@ def _describe(detail: ErrorDetails, merged: Document, model: type[Settings]) -> 
 def _expected(detail: ErrorDetails, key: Key, model: type[Settings]) -> str:
     match detail["type"]:
         case "extra_forbidden" | "invalid_key":
-            return _other_kind(key, model) or f"is no setting{_suggestion(key, model)}"
+            return _other_kind(key, model) or f"unknown setting{_suggestion(key, model)}"
         case "missing":
-            return "is missing"
+            return "is required"
         case "value_error":
             return str(detail["ctx"]["error"])
         case "literal_error" if key[1:] == ("kind",) and key[0] in GROUPS:
-            message = f"should be {' or '.join(kind_names(str(key[0])))}"
+            message = f"must be {' or '.join(kind_names(str(key[0])))}"
         case _:
             message = _EXPECTED.get(detail["type"]) or detail["msg"].removeprefix("Input ")
+            message = message.replace("should be", "must be", 1)
     return f"{message} (got {reprlib.repr(detail['input'])})"
 
 
@@ -248,7 +249,7 @@ def _suggestion(key: Key, model: type[Settings]) -> str:
     names = list(within.model_fields) if _is_section(within) else []
     if close := difflib.get_close_matches(str(key[-1]), names, n=1):
         return f"; did you mean {close[0]}?"
-    return f"; known here: {', '.join(names)}" if names else ""
+    return f"; known settings: {', '.join(names)}" if names else ""
 
 
 def _is_section(annotation: Any) -> bool:

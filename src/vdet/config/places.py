@@ -27,7 +27,7 @@ def check_shapes(shapes: Iterable[tuple[str, Iterable[Point]]]) -> None:
     seen: set[str] = set()
     for name, points in shapes:
         if name in seen:
-            raise ValueError(f"{name}: this name is given twice; give each its own")
+            raise ValueError(f"{name}: the name is used twice; names must be unique")
         seen.add(name)
         if any(not (0 <= x <= 1 and 0 <= y <= 1) for x, y in points):
             raise ValueError(
@@ -40,9 +40,9 @@ def _check_polygon(points: tuple[Point, ...]) -> tuple[Point, ...]:
     is_closed = len(points) > 1 and points[0] == points[-1]
     corners = points[:-1] if is_closed else points
     if len(corners) < 3:
-        raise ValueError(f"has {len(corners)} corners; give three or more")
+        raise ValueError(f"has {len(corners)} corners; a polygon needs at least 3")
     if crosses_itself(corners):
-        raise ValueError("crosses or touches itself; give the corners in order around it")
+        raise ValueError("crosses or touches itself; list the corners in order")
     return corners
 
 
@@ -66,12 +66,12 @@ class RegionSettings(Section):
     @model_validator(mode="after")
     def _has_a_shape(self) -> "RegionSettings":
         if (self.points is None) == (self.mask is None):
-            raise ValueError(f"{self.name}: needs points or mask, one of them")
+            raise ValueError(f"{self.name}: needs either points or mask")
         return self
 
 
 def _check_regions(regions: tuple[RegionSettings, ...]) -> tuple[RegionSettings, ...]:
-    check_shapes((each.name, each.points or ()) for each in regions)
+    check_shapes((region.name, region.points or ()) for region in regions)
     return regions
 
 
@@ -97,9 +97,9 @@ class LineSettings(Section):
     @model_validator(mode="after")
     def _has_a_length_and_two_directions(self) -> "LineSettings":
         if self.start == self.end:
-            raise ValueError("start and end are one point; give two")
+            raise ValueError("start and end must differ")
         if self.left == self.right:
-            raise ValueError("left and right have one name; give each its own")
+            raise ValueError("left and right must have different names")
         return self
 
 
@@ -128,9 +128,9 @@ class TrafficSettings(Section):
     """Interval of tables and of the bars of a page, as in 5min, 15min or 1h. null: the whole video;
     on a page 1min.
     """
-    drawn: bool = False
+    draw: bool = False
     """Draw the lines and zones with their running counts into the video."""
-    confirmed: float = Field(0.2, ge=0, le=10)
+    min_seen_seconds: float = Field(0.2, ge=0, le=10)
     """Ignore vehicles that are detected for fewer seconds than this."""
 
     def __bool__(self) -> bool:

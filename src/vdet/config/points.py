@@ -45,7 +45,7 @@ def _change(values: Mapping[str, Any], change: Any) -> None:
             case [int() | float() as x, int() | float() as y]:
                 return change(x, y)
             case [*points]:
-                return [changed(each) for each in points]
+                return [changed(point) for point in points]
         return value
 
     for places, keys in _POINTS.items():
@@ -64,4 +64,4 @@ def inside(values: Any, *keys: str) -> Any:
 def items(values: Any, *keys: str) -> Iterator[dict[str, Any]]:
     """Yield those items of a list in nested sections that are sections."""
     found = inside(values, *keys)
-    yield from (each for each in found or () if isinstance(each, dict) and isinstance(found, list))
+    yield from (item for item in found or () if isinstance(item, dict) and isinstance(found, list))

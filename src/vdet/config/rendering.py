@@ -37,11 +37,11 @@ def explanations(section: type[Section]) -> Mapping[str, str]:
     here, and not by pydantic: parsing all sections would take a third of the start of a command.
     """
     found: dict[str, str] = {}
-    for each in reversed(section.__mro__):
-        if not issubclass(each, Section):
+    for item in reversed(section.__mro__):
+        if not issubclass(item, Section):
             continue
         with contextlib.suppress(OSError):  # its source is not there
-            (kind,) = ast.parse(textwrap.dedent(inspect.getsource(each))).body
+            (kind,) = ast.parse(textwrap.dedent(inspect.getsource(item))).body
             for field, text in pairwise(kind.body if isinstance(kind, ast.ClassDef) else ()):
                 match field, text:
                     case ast.AnnAssign(ast.Name(name)), ast.Expr(ast.Constant(str(words))):

@@ -38,11 +38,11 @@ class LaneSettings(Section):
     enabled: bool = False
     """Find the lane, and draw it."""
     top: Share = 0.63
-    """Farther row, as a share of the frame's height."""
+    """Farther row, as a fraction of the frame's height."""
     bottom: Share = 0.93
-    """Nearer row, as a share of the frame's height."""
+    """Nearer row, as a fraction of the frame's height."""
     top_left: float = Field(0.46, ge=-2, le=3)
-    """Column of the left line in the farther row, as a share of the frame's width."""
+    """Column of the left line in the farther row, as a fraction of the frame's width."""
     top_right: float = Field(0.54, ge=-2, le=3)
     """Column of the right line in the farther row."""
     bottom_left: float = Field(0.21, ge=-2, le=3)
@@ -60,7 +60,7 @@ class LaneSettings(Section):
     @model_validator(mode="after")
     def _is_a_trapezoid(self) -> "LaneSettings":
         if self.bottom <= self.top:
-            raise ValueError("bottom must be below top, a larger share of the height")
+            raise ValueError("bottom must be below top, a larger fraction of the height")
         far, near = self.top_right - self.top_left, self.bottom_right - self.bottom_left
         if not 0 < far < 0.9 * near:
             raise ValueError("the lines must be closer together at top than at bottom")
@@ -89,7 +89,7 @@ class InputSettings(Section):
     """The video that is read."""
 
     max_damaged: Share = 0.05
-    """Largest accepted share of damaged or lost frames."""
+    """Maximum fraction of damaged or lost frames."""
     begin: str | None = Field(None, max_length=100)
     """When the video begins, as in '2026-05-01 07:00+02:00'. null: as camera.clock says."""
     frame_rate: float | None = Field(None, ge=0.01, le=1000)
@@ -128,8 +128,9 @@ class DrawSettings(Section):
 
     boxes: bool = True
     """Draw a box around each vehicle."""
-    lost: Literal["dashed", "plain", "hidden"] = "dashed"
-    """How to draw vehicles that are lost: with dashed boxes, with plain boxes, or not at all."""
+    predicted: Literal["dashed", "plain", "hidden"] = "dashed"
+    """How to draw vehicles whose place is predicted: with dashed boxes, plain boxes, or not at all.
+    """
     label: tuple[LabelPart, ...] | None = Field(None, max_length=4)
     """Parts of the label in order: id, class, score, distance. Unknown ones are left out. []: no
     labels. null: the id in a video, the score in a picture.
@@ -170,8 +171,8 @@ class Settings(Section):
     def with_paths(self, change: Callable[[str], str]) -> "Settings":
         """Return the settings with the paths of the model file and of masks changed."""
         regions = tuple(
-            each.model_copy(update={"mask": change(each.mask)}) if each.mask else each
-            for each in self.regions
+            region.model_copy(update={"mask": change(region.mask)}) if region.mask else region
+            for region in self.regions
         )
         model = self.detector.model
         detector = self.detector.model_copy(update={"model": change(model) if model else None})

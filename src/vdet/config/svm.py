@@ -75,7 +75,7 @@ class WindowSettings(Section):
     size: Annotated[int, Field(ge=8, le=100_000), FRAME_LENGTH]
     """Side of a window, in pixels."""
     overlap: float = Field(ge=0, lt=1)
-    """Share of a window that the next one covers too."""
+    """Fraction of a window that the next one covers too."""
     top: Pixels
     """First row of the band."""
     bottom: Pixels
@@ -94,12 +94,12 @@ class PerspectiveSettings(Section):
     sizes: tuple[Annotated[float, Field(gt=0, le=1)], ...] = Field(
         (0.05, 0.0625, 0.0875, 0.125, 0.175, 0.25, 0.3), max_length=32
     )
-    """Side of the windows of each set, as a share of the frame's width. In frames wider than 16:9,
-    as a share of 16/9 of the height.
+    """Side of the windows of each set, as a fraction of the frame's width. In frames wider than
+    16:9, as a fraction of 16/9 of the height.
     """
     horizon: float | None = Field(None, ge=-1, le=1)
-    """Row of the horizon, as a share of the frame's height. null: where the lines of the road meet
-    in the first frames.
+    """Row of the horizon, as a fraction of the frame's height. null: where the lines of the road
+    meet in the first frames.
     """
 
 
@@ -107,7 +107,7 @@ class SearchSettings(Section):
     """Which windows of a frame are searched."""
 
     probability: Share = 0.3
-    """Least probability of a hit: a window that counts as evidence."""
+    """Minimum probability of a hit: a window that counts as evidence."""
     windows: tuple[WindowSettings, ...] = Field((), max_length=32)
     """Window sets over fixed rows."""
     perspective: PerspectiveSettings = PerspectiveSettings()
@@ -134,7 +134,8 @@ class HeatSettings(Section):
 class ScoreSettings(Section):
     """Score of a box: 1 / (1 + (middle / evidence) ** slope).
 
-    It is the share of such boxes that show a vehicle. Fitted on frames that the model has not seen.
+    It is the fraction of such boxes that show a vehicle. Fitted on frames that the model has not
+    seen.
     """
 
     middle: float = Field(0.5, gt=0, le=1e6)
@@ -154,11 +155,11 @@ class StillSettings(Section):
     """Which detections are shown in a still picture; in video, the tracker decides."""
 
     strength: float = Field(0.84, ge=0)
-    """Least evidence: heat, or with votes the weight of the hits."""
+    """Minimum evidence: heat, or with votes the weight of the hits."""
     width: Share = 0.028
-    """Least width of a box, as a share of the picture's width."""
+    """Minimum width of a box, as a fraction of the picture's width."""
     height: Share = 0.0
-    """Least height of a box, as a share of the picture's height."""
+    """Minimum height of a box, as a fraction of the picture's height."""
 
 
 class SvmSettings(DetectorSettings):
@@ -168,7 +169,7 @@ class SvmSettings(DetectorSettings):
 
     kind: Literal["svm"] = "svm"
     """svm: a linear SVM on HOG and colour features."""
-    searches: Searches = 8.0
+    searches_per_second: Searches = 8.0
     foot: Foot = 0.04
     features: FeatureSettings = FeatureSettings()
     search: SearchSettings = SearchSettings()
@@ -183,9 +184,9 @@ class SvmSettings(DetectorSettings):
 
     @property
     def shown_score(self) -> float:
-        """Least score of a detection that is shown in a still picture."""
+        """Minimum score of a detection that is shown in a still picture."""
         return self.score.of(self.stills.strength)
 
     def showing_all(self) -> "SvmSettings":
-        """Return settings without `stills.strength`; the least size stays."""
+        """Return settings without `stills.strength`; the minimum size stays."""
         return self.model_copy(update={"stills": self.stills.model_copy(update={"strength": 0.0})})

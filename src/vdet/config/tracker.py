@@ -28,19 +28,19 @@ class MotionTrackerSettings(TrackerSettings):
     of the original system, which count frames.
     """
     look_ahead: LookAhead = 0.6
-    smallest: Share = 0.02
-    """Least width of a vehicle that is shown, as a share of the frame's."""
-    least_score: Share = 0.4
-    """Least mean score of the latest detections of a vehicle that is shown."""
-    needed: Seconds = 0.1
+    min_size: Share = 0.02
+    """Minimum width of a vehicle that is shown, as a fraction of the frame's."""
+    min_score: Share = 0.4
+    """Minimum mean score of the latest detections of a vehicle that is shown."""
+    confirm_seconds: Seconds = 0.1
     """Evidence before a vehicle is shown: seconds of detections with score 1."""
-    leak: Share = 0.2
+    decay: Share = 0.2
     """Evidence that a vehicle loses in a second. Detections with lower scores never add up."""
-    carried: Seconds = 0.35
+    coast_seconds: Seconds = 0.35
     """Show a vehicle that is not detected for this long, by prediction."""
-    remembered: Seconds = 1.0
+    keep_id_seconds: Seconds = 1.0
     """Keep the id of a vehicle that is not detected for this long."""
-    remembered_hidden: Seconds = 5.0
+    keep_hidden_id_seconds: Seconds = 5.0
     """Keep the id of a vehicle hidden behind another one for this long."""
 
 
@@ -64,17 +64,17 @@ class RulesTrackerSettings(TrackerSettings):
     wide: Pixels = 200
     """A wider detection is always good enough for its car."""
     good_fraction: Share = 2 / 3
-    """A detection wider than this share of its car is good enough too."""
+    """A detection wider than this fraction of its car is good enough too."""
     max_combined: Pixels = 250
     """Two detections of one car, combined, must be narrower than this."""
     combined_tolerance: Share = 1 / 3
-    """The width of the two may differ from the car's by this share of it."""
+    """The width of the two may differ from the car's by this fraction of it."""
     merge_overlap: Pixels = 40
     """Cars in one detection that overlap by more, across and down, become one."""
     match_distance: Pixels = 50
     """Largest distance from its last place at which a car's image is searched."""
     match_score: Share = 0.5
-    """Least score of a match; 1 is perfect."""
+    """Minimum score of a match; 1 is perfect."""
     young: int = Field(7, ge=0)
     """A car with fewer detections is deleted at its first miss."""
     max_matches: int = Field(12, ge=1)

@@ -21,7 +21,7 @@ class SvmTrainingSettings(Section):
 class NetworkScoreSettings(Section):
     """Score of a box: sigmoid(slope · x + offset), where x is the output of the network.
 
-    It is the share of boxes with such an output that show a vehicle, fitted on cameras that were
+    It is the fraction of boxes with such an output that show a vehicle, fitted on cameras that were
     left out of the training; written into the network's header.
     """
 
@@ -42,14 +42,15 @@ class NetworkTrainingSettings(Section):
     """Width of the pictures."""
     height: int = Field(352, ge=64, le=4096, multiple_of=32)
     """Height of the pictures."""
-    rate: float = Field(1e-3, gt=0, le=1)
+    learning_rate: float = Field(1e-3, gt=0, le=1)
     """Highest learning rate of AdamW."""
     classes: tuple[str, ...] = Field(
         ("car", "truck", "bus", "motorcycle", "bicycle", "person"), min_length=1, max_length=100
     )
     """Classes to learn, in the order of the network's outputs."""
-    repeat: Share = 0.4
-    """Draw pictures with a class that is in a smaller share of the pictures more often. 0: do not.
+    repeat_threshold: Share = 0.4
+    """Draw pictures with a class that is in a smaller fraction of the pictures more often. 0: do
+    not.
     """
     weights: dict[str, Annotated[float, Field(gt=0, le=1000)]] = Field({})
     """How often to draw pictures of a set, by its name, relative to others."""

@@ -52,7 +52,7 @@ def load_detector(settings: DetectorSettings) -> DetectorModel:
         kind = kind_of_model(model)
     if kind and settings.model_suffix and kind != settings.kind:
         raise ConfigError(
-            f"{model}: is for detector.kind: {kind}, not {settings.kind}; leave one of them out"
+            f"{model}: is for detector.kind: {kind}, not {settings.kind}; remove one of them"
         )
     return _kind(settings).load(settings, model)
 

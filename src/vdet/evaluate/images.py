@@ -28,13 +28,13 @@ class Counting:
     ----------
     score
         Detections with at least this score count.
-    least_width
-        Vehicles narrower than this share of the picture's width are ignore regions, and narrower
+    min_width
+        Vehicles narrower than this fraction of the picture's width are ignore regions, and narrower
         detections count only if they find a vehicle.
     """
 
     score: float
-    least_width: float
+    min_width: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,13 +54,13 @@ class MeasuredImage:
     @classmethod
     def of(cls, picture: LabelledPicture, width: int, found: Boxes, counting: Counting) -> Self:
         """Compare the detections with the labels of a picture that is `width` pixels wide."""
-        least = counting.least_width * width
-        regions = picture.ignored | (_widths(picture.boxes) < least)
+        minimum = counting.min_width * width
+        regions = picture.ignored | (_widths(picture.boxes) < minimum)
         truth = _one_frame(picture.boxes, np.ones(len(regions)), regions, picture.classes)
         labelled = [name not in picture.unlabelled for name in found.class_names]
         found = found[np.flatnonzero(labelled)]
         found = found[np.argsort(-found.scores, kind="stable")[:MAX_IN_FRAME]]
-        narrow = _widths(found.sides) < least
+        narrow = _widths(found.sides) < minimum
         detected = _one_frame(found.sides, found.scores, narrow, found.class_names)
         shown = detected.where(found.scores >= counting.score)
         return cls(picture, compare(detected, truth), compare(shown, truth))
@@ -123,12 +123,12 @@ class ImagesResult:
     def mean(self) -> ImageScores:
         """The mean over the sources."""
         scores = [source.scores for source in self.sources]
-        known = [each for each in scores if each.vehicles] or scores
+        known = [score for score in scores if score.vehicles] or scores
         means: dict[str, Any] = {}
         for name in (field.name for field in fields(ImageScores)):
-            total = sum(getattr(each, name) for each in scores)
+            total = sum(getattr(score, name) for score in scores)
             is_count = isinstance(total, int)
-            means[name] = total if is_count else fmean(getattr(each, name) for each in known)
+            means[name] = total if is_count else fmean(getattr(item, name) for item in known)
         best_f1, best_score = _best([source.ranked for source in self.sources])
         return ImageScores(**means | {"best_f1": best_f1, "best_score": best_score})
 
@@ -160,7 +160,7 @@ def evaluate_images(
     ImageError
         A picture cannot be read or searched; the message names it.
     """
-    advance = progress(sum(len(each.pictures) for each in sets))
+    advance = progress(sum(len(set_.pictures) for set_ in sets))
     whole = PictureSearch(model, Settings())  # the whole picture, and no step
 
     def search(labelled: LabelledPicture) -> MeasuredImage:

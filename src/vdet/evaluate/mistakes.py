@@ -72,7 +72,7 @@ class Mistake:
 def mistakes(comparison: Comparison) -> tuple[Mistake, ...]:
     """Return all mistakes, the longest first.
 
-    Frames in which a vehicle or a track does not count are no mistake, and split one.
+    Frames in which a vehicle or a track does not count are not mistakes, and split one.
     """
     seen: dict[tuple[str, int], list[_Seen]] = defaultdict(list)
     for frame in comparison.frames:
@@ -91,14 +91,14 @@ def mistakes(comparison: Comparison) -> tuple[Mistake, ...]:
     for (what, id_), frames in seen.items():
         # Numbers of frames that follow one another are at one distance from their places.
         runs = groupby(enumerate(frames), lambda placed: placed[1][0] - comparison.step * placed[0])
-        found += [_mistake(what, id_, [each for _, each in run]) for _, run in runs]
+        found += [_mistake(what, id_, [item for _, item in run]) for _, run in runs]
     return tuple(sorted(found, key=lambda one: (-one.boxes, one.first, one.what, one.id)))
 
 
 def _mistake(what: str, id_: int, frames: Sequence[_Seen]) -> Mistake:
     (first, *_), (last, *_) = frames[0], frames[-1]
     middle, box, _ = frames[(len(frames) - 1) // 2]
-    overlap = sum(each[2] for each in frames) / len(frames)
+    overlap = sum(frame[2] for frame in frames) / len(frames)
     return Mistake(what, id_, first, middle, last, len(frames), tuple(box.tolist()), overlap)
 
 
@@ -147,7 +147,7 @@ def _middle_frames(video: Path, chosen: Sequence[Mistake]) -> list[tuple[Mistake
     tolerant = InputSettings(max_damaged=1)  # it was accepted when it was scored
     with VideoReader(video, frames=max(wanted, default=1), settings=tolerant) as reader:
         images = {frame.index + 1: frame.image for frame in reader if frame.index + 1 in wanted}
-    return [(each, images[each.middle]) for each in chosen if each.middle in images]
+    return [(mistake, images[mistake.middle]) for mistake in chosen if mistake.middle in images]
 
 
 def _with_boxes(image: Image, frame: ComparedFrame) -> Image:

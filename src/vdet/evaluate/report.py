@@ -56,7 +56,7 @@ class Report:
 
     def lines(self) -> list[str]:
         """Return all but the pictures as text, with an empty line between two parts."""
-        tables = (table(*each) for each in self.tables if each[1])
+        tables = (table(*item) for item in self.tables if item[1])
         parts = filter(None, (self.head, *tables, self.notes))
         return [line for part in parts for line in ("", *part)][1:]
 
@@ -79,8 +79,8 @@ def images_report(result: ImagesResult, name: RunName) -> Report:
     if len(rows) > 1:
         known = sum(scores.vehicles > 0 for _, scores in rows)
         rows.append((f"mean of {known}", mean))
-    width = f"; vehicles from {counting.least_width:.1%} of the width"
-    what = f"boxes from score {counting.score:.2f}{width if counting.least_width else ''}"
+    width = f"; vehicles from {counting.min_width:.1%} of the width"
+    what = f"boxes from score {counting.score:.2f}{width if counting.min_width else ''}"
     values = {"mean": asdict(mean), "sources": sources, "classes": list(map(asdict, classes))}
     return Report(
         [name.line, what],
@@ -141,7 +141,7 @@ def _score_table(
     first: str, columns: Sequence[tuple[str, str]], named: Iterable[tuple[str, object]]
 ) -> Table:
     """Return a table of scores and their names; `first` is the heading of the names."""
-    rows = [[name, *(figure(getattr(each, key)) for _, key in columns)] for name, each in named]
+    rows = [[name, *(figure(getattr(item, key)) for _, key in columns)] for name, item in named]
     return (first, *(heading for heading, _ in columns)), rows
 
 
@@ -149,18 +149,25 @@ def _class_table(classes: Iterable[ClassResult]) -> Table:
     """Return a row for each class."""
     headings = "class", "vehicles", "found", "named right", "precision", "recall", "F1"
     rows = []
-    for each in classes:
-        counts = each.vehicles, each.found, each.right, each.precision, each.recall, each.f1
-        wrong = (f"{name} {count}" for name, count in each.named.items() if name != each.name)
-        rows.append([each.name, *map(figure, counts), ", ".join(wrong)])
+    for class_ in classes:
+        counts = (
+            class_.vehicles,
+            class_.found,
+            class_.right,
+            class_.precision,
+            class_.recall,
+            class_.f1,
+        )
+        wrong = (f"{name} {count}" for name, count in class_.named.items() if name != class_.name)
+        rows.append([class_.name, *map(figure, counts), ", ".join(wrong)])
     return (*headings, "confused with"), rows
 
 
 def _mistake_table(clip: ClipResult) -> Table:
     """Return the largest mistakes."""
     return (f"largest mistakes in {clip.name}", "frames", "boxes", "best IoU"), [
-        [each.name, each.span, str(each.boxes), share(each.overlap, 2)]
-        for each in mistakes(clip.comparison)[:_MOST_MISTAKES]
+        [mistake.name, mistake.span, str(mistake.boxes), share(mistake.overlap, 2)]
+        for mistake in mistakes(clip.comparison)[:_MOST_MISTAKES]
     ]
 
 

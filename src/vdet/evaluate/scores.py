@@ -169,7 +169,7 @@ class RankedPredictions:
     def average_precisions(self) -> tuple[float, float]:
         """Return the average precision at IoU 0.5, and its mean over `IOU_THRESHOLDS`, 0 to 1.
 
-        It is the mean of the precision at the 101 recalls 0, 0.01 … 1; 0 if there are no vehicles.
+        It is the mean of the precision at the 101 recalls 0, 0.01 … 1; 0 if there are not vehicles.
         """
         if not self.vehicles or not len(self.scores):
             return 0.0, 0.0

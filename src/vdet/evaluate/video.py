@@ -203,11 +203,11 @@ def follow_together(
     Errors as of `vdet.run.loop.build`.
     """
     images, read = peek(frames)
-    pipelines = [build(each.model, each.settings, video, images) for each in variants]
+    pipelines = [build(variant.model, variant.settings, video, images) for variant in variants]
     del images  # else they stay in memory for the whole run
     keys = [  # what a search depends on
-        (each.settings.detector.search_key, each.settings.regions, own.rate)
-        for each, own in zip(variants, pipelines, strict=True)
+        (variant.settings.detector.search_key, variant.settings.regions, own.rate)
+        for variant, own in zip(variants, pipelines, strict=True)
     ]
     searches = [
         _shared(own.detector.search, keys.count(key))

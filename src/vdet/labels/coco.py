@@ -62,7 +62,7 @@ def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) ->
                 "area": width * height,
                 "iscrowd": 0,
                 "score": round(track.score, 4),
-                "attributes": {"occluded": track.state == "lost"},
+                "attributes": {"occluded": track.state == "predicted"},
             }
             lists["annotations"].append(json.dumps(annotation))
     for id_, name in classes.items():
@@ -156,7 +156,7 @@ def _read(path: Path, file: BinaryIO) -> _Document:
             what = f"image {entry.image_id} or category {entry.category_id} not found"
             raise line_error(path, place, what)
         image, box = by_id[entry.image_id], from_size(*entry.bbox)
-        state: State = "lost" if (entry.attributes or {}).get("occluded") else "seen"
+        state: State = "predicted" if (entry.attributes or {}).get("occluded") else "detected"
         id_, frame = NO_ID if entry.track_id is None else entry.track_id, image.frame_index or 0
         known = frame + 1, id_, entry.score, entry.iscrowd, state
         image.labels.append(Label(place, box, names[entry.category_id], *known))

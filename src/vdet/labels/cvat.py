@@ -61,7 +61,7 @@ def _box_lines(boxes: Sequence[tuple[int, Track]], count: int) -> Iterator[str]:
     for (frame, track), after in zip(boxes, [*following, None], strict=True):
         x1, y1, x2, y2 = track.box.pixels
         corners = f'xtl="{x1:.2f}" ytl="{y1:.2f}" xbr="{x2:.2f}" ybr="{y2:.2f}"'
-        text = f'occluded="{int(track.state == "lost")}" keyframe="1" {corners} z_order="0"'
+        text = f'occluded="{int(track.state == "predicted")}" keyframe="1" {corners} z_order="0"'
         yield f'    <box frame="{frame}" outside="0" {text}></box>\n'
         if after != frame + 1 and frame + 1 < count:
             yield f'    <box frame="{frame + 1}" outside="1" {text}></box>\n'
@@ -142,8 +142,8 @@ def _key(track: ET.Element, box: ET.Element) -> _Key:
     if parse_number(box.get("rotation", "0")):
         raise ValueError("the box is rotated; only upright boxes can be scored")
     name, id_ = attribute(track, "label"), parse_whole(attribute(track, "id"))
-    frame, sides = parse_whole(attribute(box, "frame")), [attribute(box, each) for each in _SIDES]
-    state: State = "lost" if box.get("occluded") == "1" else "seen"
+    frame, sides = parse_whole(attribute(box, "frame")), [attribute(box, side) for side in _SIDES]
+    state: State = "predicted" if box.get("occluded") == "1" else "detected"
     label = Label(f"track {id_}", parse_corners(sides), name, frame + 1, id_, state=state)
     return _Key(label, attribute(box, "outside") == "1")
 

@@ -111,14 +111,16 @@ def track_formats() -> list[Format]:
 
 def track_suffixes() -> list[str]:
     """Return the endings of files of tracks."""
-    return [each.suffix for each in track_formats()]
+    return [track_format.suffix for track_format in track_formats()]
 
 
 def format_for(path: Path) -> Format | None:
     """Return the format that the ending of a name stands for; None if it is not known."""
     name = path.name.lower()
-    fitting = [each for each in track_formats() if name.endswith(each.suffix)]
-    return max(fitting, key=lambda each: len(each.suffix), default=None)
+    fitting = [
+        track_format for track_format in track_formats() if name.endswith(track_format.suffix)
+    ]
+    return max(fitting, key=lambda item: len(item.suffix), default=None)
 
 
 _UNCLEAR = (".txt", ".csv")

@@ -54,7 +54,7 @@ class Label(NamedTuple):
     id: int = NO_ID
     score: float = 1.0
     ignored: bool = False
-    state: State = "seen"
+    state: State = "detected"
     foot: tuple[float, float] | None = None
     distance: float | None = None
     lane: int | None = None

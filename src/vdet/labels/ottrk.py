@@ -45,7 +45,7 @@ def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) ->
             ends = track.id not in begun, last[track.id] == frame.index
             begun.add(track.id)
             known = classes[track.id], round(track.score, 4), *track.box.xywh
-            place = frame.index + 1, moment, video.name, track.state != "seen"
+            place = frame.index + 1, moment, video.name, track.state != "detected"
             rows.append(dict(zip(_COLUMNS, (*known, *place, *ends, track.id), strict=True)))
     metadata = _metadata(video, frames, zero, sorted(set(classes.values())))
     text = json.dumps({"metadata": metadata, "data": {"detections": rows}}, allow_nan=False)
@@ -117,7 +117,7 @@ def read_ottrk(path: Path, data: bytes) -> SavedTracks:
 
 
 def _row(number: int, box: Mapping[str, Any]) -> Row:
-    state = "between" if box.get("interpolated-detection") else "seen"
+    state = "interpolated" if box.get("interpolated-detection") else "detected"
     known = *map(box.get, _BEFORE_STATE), state, box.get("class")
     return f"data.detections.{number}", (*known, None, None, None)
 

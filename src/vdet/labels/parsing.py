@@ -206,7 +206,7 @@ def row_labels(
             index, score = frame - first_frame, 1.0 if score is None else score
             times[index] = place, time
             box, number = from_size(x, y, width, height), index + 1
-            yield Label(place, box, name, number, id_, score, False, state or "seen", *known)
+            yield Label(place, box, name, number, id_, score, False, state or "detected", *known)
 
 
 def archive_members(

@@ -109,7 +109,7 @@ def checked_pictures(
     Raises
     ------
     TruthError
-        There is no picture, a picture is missing or appears twice, a box has no area, most boxes
+        There is not a picture, a picture is missing or appears twice, a box has no area, most boxes
         cannot be pixels of their pictures, or there are more than `MAX_PICTURES`, `MAX_BOXES` in
         all or `MAX_IN_FRAME` in one picture.
     """

@@ -88,13 +88,13 @@ def read_true_labels(path: Path, roles: Roles) -> SavedTracks:
     """
     data = read_bytes(path)
     if not data.strip():
-        names = ", ".join(each.name for each in track_formats())
+        names = ", ".join(track_format.name for track_format in track_formats())
         raise TruthError(f"{path}: is empty; truth is a file of {names}")
     form = recognise(path, data)
     saved = form.read(path, data)
     labels: Iterable[Label] = saved.labels
     if form is MOT:  # in the older form, the column of the score is the flag
-        labels = (each._replace(ignored=each.score == 0 or each.ignored) for each in labels)
+        labels = (label._replace(ignored=label.score == 0 or label.ignored) for label in labels)
     return replace(saved, labels=checked_labels(path, _with_roles(path, labels, roles)))
 
 
@@ -103,7 +103,7 @@ def _with_roles(path: Path, labels: Iterable[Label], roles: Roles) -> Iterator[L
     for label in labels:
         role = "vehicle" if label.name is None else roles.role_of(label.name)
         if role is None:
-            what = f"label {label.name!r:.40} is unknown; give it a role in labels.roles, or use "
+            what = f"label {label.name!r:.40} is unknown; set its role in labels.roles, or use "
             raise line_error(path, label.place, f"{what}one of: {roles.known}")
         if role != "other":
             name = label.name and (roles.class_of(label.name) or "vehicle")

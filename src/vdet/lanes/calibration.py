@@ -130,7 +130,7 @@ def _without(
         raise ImageError(
             f"only {len(kept)} of {len(kept) + len(skipped)} photographs can be used, at least "
             f"{MIN_PHOTOS} are needed; take more of the whole board from different sides, or "
-            f"give another --pattern than {_text(pattern)}"
+            f"use another --pattern than {_text(pattern)}"
         )
     return kept
 
@@ -149,7 +149,7 @@ def _fit(
     rms, matrix, distortion, rotations, *_, errors = cv2.calibrateCameraExtended(
         [board] * len(photos), corners, size, np.eye(3), np.zeros(5)
     )
-    normals = np.array([cv2.Rodrigues(np.asarray(each))[0][:, 2] for each in rotations])
+    normals = np.array([cv2.Rodrigues(np.asarray(rotation))[0][:, 2] for rotation in rotations])
     camera = None
     if np.clip(normals @ normals.T, -1, 1).min() <= math.cos(math.radians(MIN_ANGLE)):
         k1, k2, p1, p2, k3 = np.ravel(distortion).tolist()

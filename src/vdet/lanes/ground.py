@@ -15,9 +15,9 @@ from vdet.errors import ConfigError
 from vdet.lanes.camera import Undistorter
 
 _THIN = 0.01
-"""Width of points that count as one line, as a share of their length."""
+"""Width of points that count as one line, as a fraction of their length."""
 _MOST_ERROR = 0.03
-"""Largest error of the fit, as a share of the length of the area."""
+"""Largest error of the fit, as a fraction of the length of the area."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,8 +82,8 @@ def ground_of(camera: CameraSettings, width: int, height: int) -> "Ground | None
     """
     if not camera.ground:
         return None
-    pixels = np.array([each.pixel for each in camera.ground], np.float64) * (width, height)
-    metres = np.array([each.metres for each in camera.ground], np.float64)
+    pixels = np.array([point.pixel for point in camera.ground], np.float64) * (width, height)
+    metres = np.array([point.metres for point in camera.ground], np.float64)
     return fit_ground(pixels, metres, Undistorter(camera.lens, width, height))
 
 
@@ -97,12 +97,12 @@ def fit_ground(pixels: Float64Array, metres: Float64Array, undistorter: Undistor
         them, or they do not fit together.
     """
     if len(pixels) < 4:
-        raise ConfigError(f"camera.ground: {len(pixels)} are given; give four or more")
+        raise ConfigError(f"camera.ground: {len(pixels)} are given; at least four are needed")
     straight = undistorter.points(pixels)
     for points, unit in ((straight, "pixel"), (metres, "metres")):
         if any(_is_thin(np.delete(points, row, axis=0)) for row in range(len(points))):
             raise ConfigError(
-                f"camera.ground: all, or all but one, lie on a line ({unit}); give corners"
+                f"camera.ground: all, or all but one, lie on a line ({unit}); add corners"
             )
     to_pixels, _ = cv2.findHomography(metres, straight)
     inverse = np.linalg.inv(to_pixels) if to_pixels is not None else np.zeros((3, 3))
@@ -114,7 +114,7 @@ def fit_ground(pixels: Float64Array, metres: Float64Array, undistorter: Undistor
     back = np.asarray(np.linalg.inv(to_metres), np.float64)
     pixel_off = np.hypot(*(_mapped(back, metres) - straight).T)
     area = cv2.convexHull(metres.astype(np.float32))[:, 0].astype(np.float64)
-    error, pixel_error = (float(np.sqrt(np.mean(each**2))) for each in (off, pixel_off))
+    error, pixel_error = (float(np.sqrt(np.mean(item**2))) for item in (off, pixel_off))
     if error > _MOST_ERROR * _length(area):
         worst = int(np.argmax(pixel_off))
         raise ConfigError(

@@ -26,7 +26,7 @@ class LinePaint:
     z: Float64Array
     x: Float64Array
     visible: float = 1.0
-    """Share of all rows in which no vehicle hides the line."""
+    """Fraction of all rows in which no vehicle hides the line."""
 
 
 PAINT, HIDDEN = 255, 128
@@ -44,11 +44,11 @@ _LINE_WIDTH = 0.15
 _REACH = 0.35
 """Distance to the road on the left and right with which a pixel is compared, metres."""
 _RISE, _LEAST_RISE = 0.10, 10.0
-"""Least rise in lightness from the road to paint: share of the road's, and of 0 to 255."""
+"""Minimum rise in lightness from the road to paint: fraction of the road's, and of 0 to 255."""
 _LEAST_RISES = np.maximum(np.arange(256) * np.float32(_RISE), _LEAST_RISE).astype(np.uint8)
-"""The least rise in whole values, by the lightness of the road."""
+"""The minimum rise in whole values, by the lightness of the road."""
 _YELLOW = 9.0
-"""Least fall in blue chroma from the road to yellow paint, of 0 to 255."""
+"""Minimum fall in blue chroma from the road to yellow paint, of 0 to 255."""
 _BASE = 15.0
 """Length of the nearest part of the road, which the histogram covers, metres."""
 _WINDOW = 3.0
@@ -64,7 +64,7 @@ def paint_mask(luma: Image, blue: Image) -> Image:
     width = round(_LINE_WIDTH * ACROSS) | 1  # odd, so that the blur does not shift lines
     reach = round(_REACH * ACROSS)
     lightness, yellow = (
-        np.asarray(cv2.blur(each, (width, 3)), np.uint8) for each in (luma, cv2.bitwise_not(blue))
+        np.asarray(cv2.blur(item, (width, 3)), np.uint8) for item in (luma, cv2.bitwise_not(blue))
     )
     road = _larger_side(lightness, reach)
     rise = cv2.subtract(lightness, road)  # saturates at 0
@@ -135,9 +135,11 @@ def find_base(mask: Image, top_view: TopView) -> tuple[float, float] | None:
     spread = round(FINE_MARGIN * ACROSS) | 1
     histogram = np.asarray(cv2.blur(counts[None], (spread, 1)), np.float64).ravel()
     expected = top_view.lane_width
-    least, most = (round((expected + off) * ACROSS) for off in (-WIDTH_TOLERANCE, WIDTH_TOLERANCE))
+    minimum, most = (
+        round((expected + off) * ACROSS) for off in (-WIDTH_TOLERANCE, WIDTH_TOLERANCE)
+    )
     best, base = 0.0, None
-    for gap in range(max(1, least), most + 1):
+    for gap in range(max(1, minimum), most + 1):
         left, right = top_view.laterals[:-gap], top_view.laterals[gap:]
         score = histogram[:-gap] * histogram[gap:] * ((left < 0) & (right > 0))
         peak = int(score.argmax())

@@ -27,11 +27,11 @@ CARRY = 12
 _MEMORY = 0.6
 """Weight of the frames before, where the newest frame has weight 1."""
 _CURVE_MEMORY = 0.95
-"""Share of the frames before in the radius that is shown."""
+"""Fraction of the frames before in the radius that is shown."""
 _STRAIGHT = 5000.0
 """Radius from which the road counts as straight, metres."""
 _EDGE = 0.005
-"""A box that ends this near to the frame's edge is cut off: share of the width or height."""
+"""A box that ends this near to the frame's edge is cut off: fraction of the width or height."""
 _LINE_POINTS = 24  # of each line of a `Lane`
 _REACH = 1.25
 """Farthest reported vehicle, as a multiple of the distance up to which the lane is fitted."""

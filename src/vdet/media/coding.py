@@ -62,7 +62,7 @@ class Coding:
     def to_bgr(self, layers: Layers) -> Image:
         """Convert values of this coding to BGR, uint8 `(H, W, 3)`, of the size of luma."""
         luma, *chroma = self.to_common(layers)
-        blue, red = (_as_large(each, luma) for each in chroma)
+        blue, red = (_as_large(item, luma) for item in chroma)
         return np.asarray(cv2.cvtColor(cv2.merge([luma, red, blue]), cv2.COLOR_YCrCb2BGR), np.uint8)
 
     def from_common(self, layers: Layers) -> Layers:
@@ -74,7 +74,7 @@ class Coding:
 def _looked_up(layers: Layers, for_luma: Image, for_chroma: Image) -> Layers:
     tables = for_luma, for_chroma, for_chroma
     luma, blue, red = (
-        np.asarray(cv2.LUT(*each), np.uint8) for each in zip(layers, tables, strict=True)
+        np.asarray(cv2.LUT(*item), np.uint8) for item in zip(layers, tables, strict=True)
     )
     return luma, blue, red
 
@@ -93,7 +93,7 @@ _TO_BT709 = np.linalg.inv(_FROM_BT709)
 
 
 def _recoded(layers: Layers, matrix: Float64Array) -> Layers:
-    """Convert full-range values to another matrix; luma changes only by a share of chroma."""
+    """Convert full-range values to another matrix; luma changes only by a fraction of chroma."""
     luma, *chroma = layers
     (_, *added), *mixed = matrix.tolist()
     change = _mixture(chroma, added, -128 * sum(added), cv2.CV_16S)

@@ -63,7 +63,7 @@ def open_input(path: Path, frame_rate: float | None = None) -> InputContainer:
         rate, _ = sequence.timing(frame_rate)
         options = {"framerate": f"{rate.numerator}/{rate.denominator}", "pattern_type": "none"}
     elif not os.path.exists(path):  # noqa: PTH110  # False, too, where it cannot be looked at
-        raise VideoError(f"{path}: there is no such file; check the name")
+        raise VideoError(f"{path}: not found; check the name")
     record_input(path)
     try:
         return av.open(name, "r", kind, options, metadata_errors="replace")  # tags: any encoding
@@ -126,7 +126,7 @@ def picture_stream(container: InputContainer, path: Path) -> VideoStream:
         if stream.codec_context is None:
             raise VideoError(f"{path}: its codec is not known here; convert it to H.264 first")
         return stream
-    raise VideoError(f"{path}: has no moving pictures; give a video file")
+    raise VideoError(f"{path}: has no moving pictures; use a video file")
 
 
 def moving_streams(container: InputContainer) -> list[VideoStream]:

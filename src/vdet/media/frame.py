@@ -50,8 +50,8 @@ class Planes:
         luma, *chroma = coding.from_common((luma, blue, red))
         half = width // 2, height // 2
         blue, red = (
-            np.asarray(cv2.resize(each, half, interpolation=cv2.INTER_AREA), np.uint8)
-            for each in chroma
+            np.asarray(cv2.resize(item, half, interpolation=cv2.INTER_AREA), np.uint8)
+            for item in chroma
         )
         return cls.blank(width, height, coding)._filled((luma, blue, red))
 

@@ -147,7 +147,7 @@ def encode_image(image: Image, path: Path) -> bytes:
     except cv2.error:
         written = False
     if not written:
-        raise ImageError(f"{path}: pictures are written as {', '.join(sorted(PICTURE_SUFFIXES))}")
+        raise ImageError(f"{path}: pictures must end in {', '.join(sorted(PICTURE_SUFFIXES))}")
     return data.tobytes()
 
 

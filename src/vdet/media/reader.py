@@ -28,7 +28,7 @@ from vdet.media.numbered import ASSUMED_RATE
 _log = logging.getLogger("vdet")
 _DEFAULTS = InputSettings()
 _MAX_SIDE = 16_384  # pixels; H.264 cannot be written larger
-_TOLERANCE = Fraction(1, 100)  # share of its duration, or frames, that a whole file may lack
+_TOLERANCE = Fraction(1, 100)  # fraction of its duration, or frames, that a whole file may lack
 
 
 class VideoReader:
@@ -54,7 +54,7 @@ class VideoReader:
     start, end
         Seconds after the file's first frame; None for no limit.
     frames
-        Most frames to give; None for no limit.
+        Maximum number of frames; None for no limit.
     settings
         How much damage is tolerated, and the rate of numbered pictures.
 

@@ -123,7 +123,7 @@ _MATRICES = {"bt601": 6, "bt709": 1}  # codes of ITU-T H.273
 
 
 def may_replace_video(path: Path) -> bool:
-    """Return whether a video may replace this file: vdet wrote it, or it is no video.
+    """Return whether a video may replace this file: vdet wrote it, or it is not a video.
 
     `VideoWriter` marks what it writes in the comment of the file. What cannot be opened but begins
     like an MP4 file is kept: it may be a recording that was cut off, and could be repaired.

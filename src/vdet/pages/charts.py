@@ -120,7 +120,7 @@ def hex_color(bgr: Color) -> str:
 
 
 def clock(seconds: float) -> str:
-    """Write a time as `m:ss` or `h:mm:ss`, with tenths where it is no whole second."""
+    """Write a time as `m:ss` or `h:mm:ss`, with tenths where it is not a whole second."""
     tenths = round(abs(seconds) * 10)
     whole, tenth = divmod(tenths, 10)
     hours, rest = divmod(whole, 3600)
@@ -148,20 +148,20 @@ def _time_text(seconds: float, zero: float | None) -> str:
 
 
 def number_axis(
-    low: float, high: float, title: str = "", *, least: float = 0, fixed: bool = False
+    low: float, high: float, title: str = "", *, minimum: float = 0, fixed: bool = False
 ) -> Axis:
-    """Return an axis with even parts, each at least `least` long.
+    """Return an axis with even parts, each at least `minimum` long.
 
     Its ends are round numbers, or those given if they are `fixed`.
     """
-    length = max(high - low, least, _NOTHING)
+    length = max(high - low, minimum, _NOTHING)
     power = 10.0 ** math.floor(math.log10(length / _TICKS))
-    step = next(power * each for each in (1, 2, 5, 10) if length / (power * each) <= _TICKS)
-    step = max(step, least)
+    step = next(power * item for item in (1, 2, 5, 10) if length / (power * item) <= _TICKS)
+    step = max(step, minimum)
     first, last = math.floor(low / step + _NOTHING), math.ceil(high / step - _NOTHING)
     ticks = [(n * step, f"{n * step:g}") for n in range(first, max(first + 1, last) + 1)]
     if fixed:
-        return Axis(low, high, [each for each in ticks if low <= each[0] <= high], title)
+        return Axis(low, high, [tick for tick in ticks if low <= tick[0] <= high], title)
     return Axis(ticks[0][0], ticks[-1][0], ticks, title)
 
 
@@ -225,7 +225,7 @@ def histogram(values: Sequence[float], step: float, title: str, unit: str) -> Pl
 
 
 def _counts(most: float) -> Axis:
-    return number_axis(0, max(1, most), least=1)
+    return number_axis(0, max(1, most), minimum=1)
 
 
 def pack(spans: Iterable[tuple[float, float]]) -> list[int]:

@@ -63,8 +63,8 @@ class Drawing:
         height, width = image.shape[:2]
         self._image, self._frames, self._size = image, frames, (width, height)
         self._settings, self._values = settings, values
-        confirmed, every = settings.traffic.confirmed, link_tracks(frames, width, height)
-        self.paths: list[VehiclePath] = [each for each in every if each.seconds >= confirmed]
+        confirmed, every = settings.traffic.min_seen_seconds, link_tracks(frames, width, height)
+        self.paths: list[VehiclePath] = [item for item in every if item.seconds >= confirmed]
         self.proposals: tuple[ProposedLine, ...] = propose_lines(self.paths, width, height, facing)
 
     def output(self, path: Path, name: str) -> bytes:
@@ -95,7 +95,7 @@ class Drawing:
             "paths": pack(self.paths),
             "places": places,
             "rest": rest,
-            "proposals": [asdict(each) for each in self.proposals],
+            "proposals": [asdict(proposal) for proposal in self.proposals],
         }
         script = Markup((TEMPLATES / "draw.js").read_text("utf-8"))
         return render("draw.html", data=data, name=name, script=script)
@@ -103,7 +103,7 @@ class Drawing:
     def _proposed_settings(self) -> str:
         values = in_pixels(self._values, self._size)
         traffic = values["traffic"] = values.get("traffic") or {}
-        lines = [asdict(each) for each in self.proposals]
+        lines = [asdict(proposal) for proposal in self.proposals]
         for line in lines:
             del line["vehicles"]
         traffic["lines"] = [*(traffic.get("lines") or []), *lines]
@@ -158,7 +158,7 @@ class _Dumper(yaml.SafeDumper):
     """Writes lists on one line, apart from those of sections."""
 
     def represent_sequence(self, tag: str, sequence: Any, flow_style: Any = None) -> Any:
-        is_flat = not any(isinstance(each, dict) for each in sequence)
+        is_flat = not any(isinstance(item, dict) for item in sequence)
         return super().represent_sequence(tag, sequence, is_flat or flow_style)
 
 

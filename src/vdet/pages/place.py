@@ -68,7 +68,7 @@ def place_marks(
     `ways` are the paths of tracks by their ids, pixels.
     """
     width, height = size
-    totals = {(each.name, each.direction): each.count for each in counts.totals}
+    totals = {(total.name, total.direction): total.count for total in counts.totals}
     marks = [mark for border in borders for mark in border_marks(border, totals)]
     flows = flows_of(counts)
     most = max(map(len, flows.values()), default=1)
@@ -108,7 +108,7 @@ def _scale(ground: Ground, columns: int) -> Iterator[Mark]:
     x, y = ground.pixels(ground.area.mean(axis=0, keepdims=True))[0].tolist()
     metres = math.dist(*ground.place(np.array([(x, y), (x + 1, y)])))
     if metres > 0:
-        lengths = [each for each in _SCALES if each <= _SCALE * columns * metres]
+        lengths = [scale for scale in _SCALES if scale <= _SCALE * columns * metres]
         length = max(lengths, default=_SCALES[0])
         half = length / metres / 2
         yield Mark(((x - half, y), (x + half, y)), WHITE, 3, f"{length} m", (x - half, y))

@@ -43,7 +43,7 @@ def traffic_part(
 ) -> TrafficPart:
     """Return the part of a page; `frame` is drawn over, with its lines and zones."""
     flows = flows_of(counts)
-    classes = sorted({first.class_name or UNKNOWN for each in flows.values() for first, _ in each})
+    classes = sorted({first.class_name or UNKNOWN for flow in flows.values() for first, _ in flow})
     several = classes if len(classes) > 1 else []
     rows = []
     for way, trips in flows.items():

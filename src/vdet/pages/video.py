@@ -115,8 +115,12 @@ class VideoPage:
             vehicles=sum(record.has_driven for record in self.records),
             most=1 + max(charts.pack(self._spans), default=-1),
             still=NO_STILL if self.poster is None else jpeg_uri(self.poster, _SMALL),
-            counts={f"{each.name}: {each.direction}": each.count for each in totals if each.count},
-            conditions=tuple(each.text for each in self.findings if each.severity == "warning"),
+            counts={
+                f"{total.name}: {total.direction}": total.count for total in totals if total.count
+            },
+            conditions=tuple(
+                finding.text for finding in self.findings if finding.severity == "warning"
+            ),
             rows=self._rows(),
         )
 
@@ -146,7 +150,7 @@ class VideoPage:
         longest = sorted(self.records, key=lambda record: -record.seconds)[:_MOST_VEHICLES]
         shown = sorted(longest, key=lambda record: (record.first, record.id))
         x = charts.time_axis(self.start, self.end, self.zero)
-        speeds = [KMH * each.speeds.quantile(0.5) for each in self.records if each.speeds]
+        speeds = [KMH * record.speeds.quantile(0.5) for record in self.records if record.speeds]
         title = "Vehicles by their median speed"
         return render(
             "video.html",
@@ -181,9 +185,9 @@ class VideoPage:
         """Return the key figures."""
         facts = self.facts
         shown = sum(record.seconds for record in self.records) / max(1, len(self.records))
-        stood = Counter(each.motion for each in self.records if not each.has_driven)
+        stood = Counter(record.motion for record in self.records if not record.has_driven)
         classes = Counter(
-            each.class_name for each in self.records if each.class_name and each.has_driven
+            record.class_name for record in self.records if record.class_name and record.has_driven
         )
         return [
             (named(facts.vehicles, "vehicle"), str(facts.vehicles)),
@@ -208,9 +212,9 @@ class VideoPage:
             return []
         came = Counter(first[intervals.number(0, record.first)] for record in self.records)
         counted: dict[str, Counter[float]] = {}
-        for each in self.counts.events if self.counts else ():
-            found = counted.setdefault(f"{each.name}: {each.direction}", Counter())
-            found[first[intervals.number(0, each.time)]] += 1
+        for event in self.counts.events if self.counts else ():
+            found = counted.setdefault(f"{event.name}: {event.direction}", Counter())
+            found[first[intervals.number(0, event.time)]] += 1
         series = {"First seen": {"vehicles": came}, "At lines and zones": counted}
         x = charts.time_axis(min(first.values()), max(first.values()) + step, self.zero)
         return [

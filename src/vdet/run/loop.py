@@ -174,7 +174,7 @@ def build(
     if video is None:
         return Pipeline(detector, timed(StillTracker()), made, is_still=True)
     followed_by = timed(tracker) if tracker else make_tracker(settings, width, height)
-    rate = SearchRate(settings.detector.searches, settings.detector.stride)
+    rate = SearchRate(settings.detector.searches_per_second, settings.detector.stride)
     return Pipeline(detector, followed_by, made, rate, Fraction(settings.tracker.look_ahead))
 
 
@@ -201,6 +201,8 @@ class StillTracker:
     def update(self, detections: Boxes, *_: object) -> list[Track]:
         """Return a track for each detection, with ids from 1."""
         return [
-            Track(number, each.box, each.score, "seen", class_name=each.class_name)
-            for number, each in enumerate(detections, start=1)
+            Track(
+                number, detection.box, detection.score, "detected", class_name=detection.class_name
+            )
+            for number, detection in enumerate(detections, start=1)
         ]

@@ -49,7 +49,7 @@ def find_images(paths: Sequence[Path]) -> list[Path]:
         elif path.exists():
             found.append(path)
         else:
-            raise ImageError(f"{path}: no such file or folder")
+            raise ImageError(f"{path}: not found")
     record_input(*found)
     return list(dict.fromkeys(found))
 
@@ -125,7 +125,7 @@ class PictureSearch:
 
     @contextmanager
     def open_sinks(self, outputs: Sequence[Output], *, overwrite: bool) -> Iterator[Sinks]:
-        """Give the sinks of outputs that appear together at the end of the block."""
+        """Yield the sinks of outputs that appear together at the end of the block."""
 
         def stage_pictures(image: Image, detections: Boxes) -> dict[str, Image]:
             detector = build(self.model, self.settings, None, [image]).detector

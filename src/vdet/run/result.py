@@ -81,5 +81,5 @@ class FrameResult:
         image = self.frame.image.copy()
         for track in self.tracks:
             label = f"#{track.id} {track.class_name or ''}".rstrip()
-            draw_box(image, track.box, color_of(track.id), label, dashed=track.state == "lost")
+            draw_box(image, track.box, color_of(track.id), label, dashed=track.state == "predicted")
         return cv2.imencode(".png", image)[1].tobytes()

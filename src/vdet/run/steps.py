@@ -127,7 +127,7 @@ def with_positions(tracks: Sequence[Track], road: "Road", foot: float) -> tuple[
     Both are None without a lane, for a vehicle whose lower edge the frame cuts off, and where
     `Road.position` does not know them.
 
-    `foot` is how far boxes end below the tyres, as a share of their height.
+    `foot` is how far boxes end below the tyres, as a fraction of their height.
     """
 
     def placed(track: Track) -> Track:
@@ -150,7 +150,7 @@ class RegionStep:
     def apply(self, result: FrameResult) -> FrameResult:
         """Keep the detections and the vehicles whose foot is in the regions."""
         contains, found = self._regions.contains, result.detections
-        detections = found[[n for n, each in enumerate(found) if contains(each.box.foot)]]
+        detections = found[[n for n, item in enumerate(found) if contains(item.box.foot)]]
         tracks = tuple(track for track in result.tracks if contains(track.foot))
         return replace(result, detections=detections, tracks=tracks)
 

@@ -69,7 +69,7 @@ def prefetch(items: Iterable[T]) -> Iterator[Iterator[T]]:
 def write_async(
     take: Callable[[T], object], *, within: AbstractContextManager[object]
 ) -> Iterator[Callable[[T], None]]:
-    """Give a function that passes items to `take` in a thread; at most `DEPTH` items wait.
+    """Yield a function that passes items to `take` in a thread; at most `DEPTH` items wait.
 
     The thread enters and leaves the context manager `within`, with an error if the block ends with
     one. An error in the thread is raised by a later call, or when the block ends.

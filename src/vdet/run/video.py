@@ -49,7 +49,7 @@ class Run:
         Time of the stage pictures, seconds from the first frame. If no output needs more, only the
         frames from 2 s before it to 2 s after it are processed.
     overwrite
-        Replace outputs that already exist.
+        Replace existing outputs.
     threads
         Number of threads that search; None for one per core.
     """

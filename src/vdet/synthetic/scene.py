@@ -117,8 +117,8 @@ class SceneVehicle:
         times = [point.time for point in self.path]
         if not times[0] <= time <= times[-1]:
             return None
-        places = zip(*((each.ahead, each.lateral, each.heading) for each in self.path), strict=True)
-        return Waypoint(time, *(float(np.interp(time, times, each)) for each in places))
+        places = zip(*((item.ahead, item.lateral, item.heading) for item in self.path), strict=True)
+        return Waypoint(time, *(float(np.interp(time, times, place)) for place in places))
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from vdet.synthetic.scene import Scene
 from vdet.synthetic.vehicle import outlines
 
 SMALLEST = (40, 24)
-"""Least width and height, in pixels of a 720-row frame, of a vehicle that must be found."""
+"""Minimum width and height, in pixels of a 720-row frame, of a vehicle that must be found."""
 
 _CAR = 3  # class number in MOTChallenge
 _WHITE = 255, 255, 255
@@ -24,7 +24,7 @@ class TrueBox:
     """The place of a vehicle in a frame, without its shadow on the ground.
 
     `box` bounds the part inside the frame, also where nearer vehicles hide it. `hidden` is the
-    share of this part that they hide, 0 to 1.
+    fraction of this part that they hide, 0 to 1.
     """
 
     id: int

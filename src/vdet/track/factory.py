@@ -86,10 +86,10 @@ class InterpolatingTracker:
 
 
 def _moved(track: Track, end: Track, share: float) -> Track:
-    """Return a track that has done this share of its way to `end`."""
-    first, last = (np.array([*each.foot, *astuple(each.box)]) for each in (track, end))
+    """Return a track that has done this fraction of its way to `end`."""
+    first, last = (np.array([*item.foot, *astuple(item.box)]) for item in (track, end))
     x, y, *sides = (first + (last - first) * share).tolist()
-    state: State = "lost" if track.state == "lost" else "between"
+    state: State = "predicted" if track.state == "predicted" else "interpolated"
     return replace(track, box=Box(*sides), whole_foot=(x, y), state=state)
 
 

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import supervision
 
-State = Literal["seen", "between", "lost"]
+State = Literal["detected", "interpolated", "predicted"]
 """How a vehicle is known in a frame: see `Track`."""
 
 
@@ -29,12 +29,12 @@ class Track:
         the part inside the frame. From the rules: the average of the car's last rectangles
         (`tracker.history` of them), in whole pixels, which lie in the frame.
     score
-        0 to 1: the share of shown boxes with such a score that are vehicles.
+        0 to 1: the fraction of shown boxes with such a score that are vehicles.
     state
-        "seen": the detector saw the vehicle in this frame. "between": it saw it before and after,
-        or the frame was not searched; the box lies between its detections. "lost": it did not see
-        the vehicle again; the box is where its motion leads or, by the rules, where its image was
-        found again.
+        "detected": the detector found the vehicle in this frame. "interpolated": it found it before
+        and after, or the frame was not searched; the box lies between its detections. "predicted":
+        it did not find the vehicle again; the box is where its motion leads or, by the rules, where
+        its image was found again.
     class_name
         Its class, one of `Boxes.names`; None where the detector does not know classes.
     whole_foot
@@ -65,7 +65,7 @@ class Track:
     def written_foot(self) -> tuple[float, float]:
         """The foot as exactly as files have it, to a hundredth of a pixel."""
         x, y = self.whole_foot or self.box.foot
-        return round(100 * x) / 100, round(100 * y) / 100  # round(x, 2) takes thrice as long
+        return round(100 * x) / 100, round(100 * y) / 100  # round(x, 2) is three times slower
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +115,7 @@ class FrameTracks:
 
         when = {"frame": self.index, "time": self.time}
         rows = [when | asdict(track.box) | asdict(track) for track in self.tracks]
-        names = [*when, *("x1", "y1", "x2", "y2"), *(each.name for each in fields(Track))]
+        names = [*when, *("x1", "y1", "x2", "y2"), *(field.name for field in fields(Track))]
         return pd.DataFrame(rows, columns=[name for name in names if name != "box"])
 
 

@@ -13,7 +13,7 @@ The counts of a video follow from its tracks alone (`FrameTracks`), live or from
    line.
 5. A way back counts only one height of the box away from the line, or where it meets the line one
    height or more from where the vehicle crossed before.
-6. Vehicles that are seen for less than `counts.confirmed` do not count. Once a vehicle is
+6. Vehicles that are seen for less than `traffic.min_seen_seconds` do not count. Once a vehicle is
    confirmed, its earlier events count too.
 7. The class of a vehicle is that of the last frame of its track; of several tracks, of the one
    that shows it largest.

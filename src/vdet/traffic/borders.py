@@ -14,7 +14,8 @@ ENTER, EXIT, APPEAR, VANISH = "enter", "exit", "appear", "vanish"
 """Directions of a zone: over its border, or first and last seen inside."""
 
 _AT_EDGE = 0.002
-"""A point within this share of the frame's side (or one pixel) of the frame's edge lies on it."""
+"""A point within this fraction of the frame's side (or one pixel) of the frame's edge lies on it.
+"""
 _MOST_AT_EDGE = 0.005
 """Limit of that one pixel in small frames, as a share; lines are longer (`SHORTEST_LINE`)."""
 _INSIDE = 0.01
@@ -53,7 +54,7 @@ class PlacedLine:
         return np.asarray(side_of(self.end, self.start, (x, y)))
 
     def meeting(self, path: Segment) -> float | None:
-        """Return the share of the way along `path` at which it meets the line, if it does."""
+        """Return the fraction of the way along `path` at which it meets the line, if it does."""
         return meeting(path, self.reach)
 
 
@@ -85,7 +86,7 @@ class Zone:
         return np.asarray(np.where(inside, distances, -distances))
 
     def meeting(self, path: Segment) -> float:
-        """Return the share of the way along `path`, over the border, at which it last meets it."""
+        """Return how far along `path` it last meets the border, 0 to 1."""
         start, end = self._in_frame(np.array(path)).tolist()
         shares = (meeting(((start[0], start[1]), (end[0], end[1])), side) for side in self.sides)
         return max((share for share in shares if share is not None), default=1.0)
@@ -128,14 +129,14 @@ def place(
         return _snapped(point[0] * width, width), _snapped(point[1] * height, height)
 
     lines = tuple(
-        PlacedLine(each.name, (each.left, each.right), start, end, _reach(start, end, size), size)
-        for each in settings.lines
-        for start, end in [(placed(each.start), placed(each.end))]
+        PlacedLine(line.name, (line.left, line.right), start, end, _reach(start, end, size), size)
+        for line in settings.lines
+        for start, end in [(placed(line.start), placed(line.end))]
     )
     zones = tuple(
-        Zone(each.name, corners, _inner_sides(corners, size), size)
-        for each in settings.zones
-        for corners in [tuple(map(placed, each.points))]
+        Zone(zone.name, corners, _inner_sides(corners, size), size)
+        for zone in settings.zones
+        for corners in [tuple(map(placed, zone.points))]
     )
     return lines, zones
 

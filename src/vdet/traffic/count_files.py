@@ -65,7 +65,7 @@ def counts_content(path: Path, videos: Videos, interval: int | None = None) -> A
     if _is_table(path, ".zones"):
         return [_ZONES, *map(_cells, zone_table(every, interval))]
     alone = len(videos) == 1  # then the name is left out
-    rows = [(name, *_event(each, e)) for name, each in videos.items() for e in each.events]
+    rows = [(name, *_event(video, e)) for name, video in videos.items() for e in video.events]
     return [(VIDEO, *_EVENTS)[alone:], *(row[alone:] for row in rows)]
 
 
@@ -100,7 +100,7 @@ def flow_matrix(videos: Sequence[Counts], rows: Iterable[FlowRow]) -> dict[str, 
 
 
 def _matrix_columns(videos: Iterable[Counts]) -> tuple[str, ...]:
-    return ("from", *dict.fromkeys(name for each in videos for name, _ in each.ways), NOWHERE)
+    return ("from", *dict.fromkeys(name for video in videos for name, _ in video.ways), NOWHERE)
 
 
 def join_counts(videos: Mapping[str, Any], path: Path) -> None:
@@ -124,7 +124,7 @@ def _join(videos: Mapping[str, Any], path: Path, table: str, columns: Sequence[s
 def _joined(table: str, keys: Sequence[str], videos: Mapping[str, Any]) -> dict[str, Any]:
     """Return the JSON of many videos, with the sum of the rows of a table over all of them."""
     counts: Counter[tuple[str, ...]] = Counter()
-    for row in (row for each in videos.values() for row in each[table]):
+    for row in (row for video in videos.values() for row in video[table]):
         counts[tuple(row[key] for key in keys)] += row["count"]
     rows = [dict(zip(keys, key, strict=True)) | {"count": n} for key, n in counts.items()]
     return {table: rows, "videos": videos}
@@ -134,12 +134,12 @@ def _json(
     videos: Videos, interval: int | None, tables: Mapping[str, Any], *, events: bool
 ) -> dict[str, Any]:
     facts: dict[str, Any] = {}
-    for name, each in videos.items():
-        begin = plain_moment(each.clock and each.clock.at(each.spans[0][0]))
-        facts[name] = {"begin": begin, "warnings": list(each.warnings)}
+    for name, video in videos.items():
+        begin = plain_moment(video.clock and video.clock.at(video.spans[0][0]))
+        facts[name] = {"begin": begin, "warnings": list(video.warnings)}
         if events:
             facts[name]["events"] = [
-                dict(zip(_EVENTS, _event(each, event), strict=True)) for event in each.events
+                dict(zip(_EVENTS, _event(video, event), strict=True)) for event in video.events
             ]
     alone = facts.popitem()[1] if len(facts) == 1 else {"videos": facts}
     return {"interval": interval, **tables, **alone}

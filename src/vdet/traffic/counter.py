@@ -19,7 +19,7 @@ _OLDEST = 0.2
 _NEAR = 0.5
 """Distance in heights of its box within which a track that begins or ends is at a line."""
 _FEW = 0.05
-"""Share of the crossings of a line up to which tracks that go wrong there are no warning."""
+"""Fraction of the crossings of a line up to which tracks that go wrong there are no warning."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +56,7 @@ class VehicleCounter:
         self.lines, self.zones = place(settings, width, height)
         self.spans: list[Span] = []
         self._borders: tuple[Border, ...] = (*self.lines, *self.zones)
-        self._confirmed = settings.confirmed
+        self._confirmed = settings.min_seen_seconds
         self.linker = TrackLinker(width, height, begun)
         self._ended: list[_Passage] = []
         self._tally: Counter[Way] = Counter()  # of those
@@ -70,7 +70,7 @@ class VehicleCounter:
         self._latest = frame
         ended = self._passages(self.linker.add(frame))
         self._ended += ended
-        self._tally.update((each.name, each.direction) for some in ended for each in some.events)
+        self._tally.update((event.name, event.direction) for some in ended for event in some.events)
 
     def start_video(self) -> None:
         """Take the ids of the next frames for those of other tracks: they are of another video."""
@@ -80,8 +80,8 @@ class VehicleCounter:
     def counts(self) -> Counts:
         """Return all results, as if the video ended now."""
         passages = self._ended + self._passages(self.linker.open_paths())
-        events = [event for each in passages for event in each.events]
-        events.sort(key=lambda each: (each.time, each.frame, each.id, each.name))
+        events = [event for passage in passages for event in passage.events]
+        events.sort(key=lambda item: (item.time, item.frame, item.id, item.name))
         return Counts(
             tuple(events),
             tuple((border.name, way) for border in self._borders for way in border.directions),
@@ -100,10 +100,10 @@ class VehicleCounter:
             self._counted = now
             still = self._passages(self.linker.open_paths())
             self._so_far = self._tally + Counter(
-                (each.name, each.direction)
+                (event.name, event.direction)
                 for some in still
-                for each in some.events
-                if each.direction != VANISH or now - each.time > GAP
+                for event in some.events
+                if event.direction != VANISH or now - event.time > GAP
             )
         return self._so_far
 
@@ -118,9 +118,9 @@ class VehicleCounter:
         rows = [row for row in (0, last) if start < path.times[row] < now]
         points, reach = path.points[rows], _NEAR * path.heights[rows]
         return _Passage(
-            [_event(path, name, each) for name, some in found.items() for each in some],
+            [_event(path, name, window) for name, some in found.items() for window in some],
             {
-                name: path.heights[[each.row for each in some]].tolist()
+                name: path.heights[[window.row for window in some]].tolist()
                 for name, some in found.items()
             },
             [
@@ -150,9 +150,9 @@ def _event(path: VehiclePath, name: str, crossing: Crossing) -> Event:
 def _line_warnings(lines: Sequence[PlacedLine], passages: Sequence[_Passage]) -> Iterator[str]:
     """Yield a sentence for each thing that is wrong with a line, as the tracks of a run show."""
     for line in lines if passages else ():
-        found = [heights for each in passages if (heights := each.heights[line.name])]
+        found = [heights for passage in passages if (heights := passage.heights[line.name])]
         few = _FEW * len(found)
-        missed = sum(line.name in each.missed for each in passages)
+        missed = sum(line.name in passage.missed for passage in passages)
         again = sum(len(heights) > 1 for heights in found)
         if not found:
             yield f"{line.name}: no path crosses this line; move it"

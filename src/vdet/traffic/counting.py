@@ -64,7 +64,7 @@ def count_files(
     for path in paths:
         saved = read_tracks(path, rate)
         if not saved.has_times:
-            raise TruthError(f"{path}: has no times; give the frames per second, as in --rate 25")
+            raise TruthError(f"{path}: has no times; pass the frames per second, as in --rate 25")
         clock = find_clock(path, settings, None, saved.times.get(0, 0.0), saved.begin)
         place = _size(settings, size or saved.size)
         first = min(saved.times.values(), default=None)
@@ -90,10 +90,10 @@ def count_frames(
 
 def _size(settings: Settings, size: tuple[int, int] | None) -> tuple[int, int]:
     if not settings.traffic:
-        raise ConfigError("there is nothing to count at; give lines or zones")
+        raise ConfigError("no lines or zones to count at; add them to the settings")
     if size := size or settings.camera.size:
         return size
-    raise ConfigError("the lines are fractions of the frame; give --size, as in 1280x720")
+    raise ConfigError("the lines are fractions of the frame; pass --size, as in 1280x720")
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,8 +177,8 @@ class _Group:
         found: dict[str, Counts] = {}
         for video, first, end in zip(self._videos, [0, *ends], [*ends, None], strict=True):
             events = tuple(
-                replace(each, time=round(each.time - video.shift, 3))
-                for each in whole.events[first:end]
+                replace(event, time=round(event.time - video.shift, 3))
+                for event in whole.events[first:end]
             )
             warnings = () if found else whole.warnings
             counts = replace(

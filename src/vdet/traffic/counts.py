@@ -178,8 +178,8 @@ class Counts:
 
 def direction_totals(videos: Sequence[Counts]) -> tuple[DirectionTotal, ...]:
     """Return the totals of each direction over the whole of all videos."""
-    classes: dict[Way, Counter[str]] = {way: Counter() for each in videos for way in each.ways}
-    for event in (event for each in videos for event in each.events):
+    classes: dict[Way, Counter[str]] = {way: Counter() for video in videos for way in video.ways}
+    for event in (event for video in videos for event in video.events):
         classes[event.name, event.direction][event.class_name or ""] += 1
     return tuple(
         DirectionTotal(*way, found.total(), {name: found[name] for name in sorted(found) if name})
@@ -202,11 +202,11 @@ def count_table(videos: Sequence[Counts], interval: int | None = None) -> list[C
     """
     intervals = _intervals(videos, interval)
     found: _Found = Counter(
-        (intervals.number(which, each.time), (each.name, each.direction), _class_of(each))
+        (intervals.number(which, event.time), (event.name, event.direction), _class_of(event))
         for which, video in enumerate(videos)
-        for each in video.events
+        for event in video.events
     )
-    ways = dict.fromkeys(way for each in videos for way in each.ways)
+    ways = dict.fromkeys(way for video in videos for way in video.ways)
     return _rows(CountRow, intervals, found, ways)
 
 
@@ -221,12 +221,12 @@ def flow_table(videos: Sequence[Counts], interval: int | None = None) -> list[Fl
     visits: dict[int, list[tuple[int, Event]]] = {}
     for which, video in enumerate(videos):
         for trip in vehicle_trips(video):
-            visits.setdefault(trip[0].vehicle, []).extend((which, each) for each in trip)
+            visits.setdefault(trip[0].vehicle, []).extend((which, item) for item in trip)
     found: _Found = Counter()
     for (which, first), *others in visits.values():
         flow = first.name, others[-1][-1].name if others else None
         found[intervals.number(which, first.time), flow, _class_of(first)] += 1
-    names = dict.fromkeys(name for each in videos for name, _ in each.ways)
+    names = dict.fromkeys(name for video in videos for name, _ in video.ways)
     order = {name: number for number, name in enumerate((*names, None))}
     flows = sorted({way for _, way, _ in found}, key=lambda way: [order[name] for name in way])
     return _rows(FlowRow, intervals, found, flows)
@@ -235,9 +235,9 @@ def flow_table(videos: Sequence[Counts], interval: int | None = None) -> list[Fl
 def vehicle_trips(video: Counts) -> list[list[Event]]:
     """Return the crossings of lines and the entries into zones of each vehicle, in order."""
     trips: dict[int, list[Event]] = {}
-    for each in video.events:
-        if each.name not in video.zones or each.direction in _IN:
-            trips.setdefault(each.vehicle, []).append(each)
+    for event in video.events:
+        if event.name not in video.zones or event.direction in _IN:
+            trips.setdefault(event.vehicle, []).append(event)
     return list(trips.values())
 
 
@@ -245,10 +245,10 @@ def zone_table(videos: Sequence[Counts], interval: int | None = None) -> list[Zo
     """Return the use of each zone in each interval; parameters and errors as of `count_table`."""
     intervals = _intervals(videos, interval)
     rows = []
-    for name in dict.fromkeys(name for each in videos for name in each.zones):
+    for name in dict.fromkeys(name for video in videos for name in video.zones):
         visits: dict[int, list[_Visit]] = {number: [] for number in intervals.numbers}
         for which, video in enumerate(videos):
-            for event in (each for each in video.events if each.name == name):
+            for event in (event for event in video.events if event.name == name):
                 time, change = (
                     intervals.seconds(which, event.time),
                     1 if event.direction in _IN else -1,
@@ -289,7 +289,7 @@ def _zone_row(
 
 
 def _intervals(videos: Sequence[Counts], interval: int | None) -> Intervals:
-    return Intervals([(each.clock, each.spans) for each in videos], interval)
+    return Intervals([(video.clock, video.spans) for video in videos], interval)
 
 
 def _class_of(event: Event) -> str:

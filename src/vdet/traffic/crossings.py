@@ -17,7 +17,7 @@ _SETTLED = 0.1
 _BAND = 0.05
 """Distance from a border within which a vehicle is on neither side, in heights of its box."""
 _LEAST_BAND = 0.003
-"""Smallest such distance, as a share of the frame's height."""
+"""Smallest such distance, as a fraction of the frame's height."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,9 +48,9 @@ def crossings(path: VehiclePath, border: Border) -> list[Crossing]:
     if not isinstance(border, Zone) or not found:
         return found
     visits = found[:1]
-    for before, each in pairwise(found):
-        stay = each.time - before.time if each.direction == EXIT else None
-        visits.append(replace(each, seconds=stay))
+    for before, item in pairwise(found):
+        stay = item.time - before.time if item.direction == EXIT else None
+        visits.append(replace(item, seconds=stay))
     last = path.seen - 1
     if found[-1].direction != EXIT:
         end = max(float(path.times[last]), found[-1].time)  # it may enter where it drives on

@@ -68,7 +68,7 @@ class Intervals:
         elif len(videos) > 1:
             if length is not None:
                 raise ConfigError(
-                    "intervals over several videos need the time at which each begins; give --begin"
+                    "intervals over several videos need the time at which each begins; pass --begin"
                 )
             self._is_timed = False
             ends = accumulate(spans[-1][1] - spans[0][0] for _, spans in videos)
@@ -88,7 +88,7 @@ class Intervals:
         The time of an event may be a little before or after the frames: it is that of the nearest.
         """
         seconds, spans = self._zeros[which] + time, self._spans[which]
-        first, last = next((each for each in reversed(spans) if each[0] <= seconds), spans[0])
+        first, last = next((span for span in reversed(spans) if span[0] <= seconds), spans[0])
         return min(max(seconds, first), last)
 
     def number(self, which: int, time: float) -> int:
@@ -121,7 +121,7 @@ class Intervals:
         """Return the start and the end of an interval."""
         start, end = self._first, self._last
         if self._length is not None:
-            start, end = (float(each * self._length) for each in (number, number + 1))
+            start, end = (float(item * self._length) for item in (number, number + 1))
         return self._moment(start), self._moment(end)
 
     def _moment(self, seconds: float) -> Moment:

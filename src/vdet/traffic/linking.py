@@ -28,7 +28,8 @@ _OUT_OF_SIGHT = 0.5
 _JUDGED = 1.0
 """Seconds after which that is clear."""
 _TURNED, _OPPOSITE = 0.15, 0.6
-"""Way back after which it is another one: in heights of its box, and as a share of all its way."""
+"""Way back after which it is another one: in heights of its box, and as a fraction of all its way.
+"""
 _REACH = 0.5
 """Farthest that the next track begins from where the last one ended or would be, in heights."""
 _MOST_GROWTH = 2.0
@@ -43,7 +44,7 @@ number of the frame.
 """
 _STAY, _STANDS = 250, 0.05
 """Number of places of which only the first and the last are kept where a vehicle stands: where all
-lie within this share of the height of its box. So memory does not grow with parked vehicles.
+lie within this fraction of the height of its box. So memory does not grow with parked vehicles.
 """
 
 
@@ -120,7 +121,7 @@ class TrackLinker:
         """Add the next frame; return the paths that have ended."""
         self._now = round(frame.time, 6)  # as files hold it
         oldest = self._now - REMEMBERED
-        ended = [key for key, each in self._vehicles.items() if each.shown < oldest]
+        ended = [key for key, vehicle in self._vehicles.items() if vehicle.shown < oldest]
         paths = [self._vehicles.pop(key).path(self._now) for key in ended]
         shown = {track.id for track in frame.tracks}
         lost = (
@@ -138,11 +139,11 @@ class TrackLinker:
 
     def start_video(self) -> None:
         """Take the ids of the next frames for those of other tracks: they are of another video."""
-        self._vehicles = {-each.number: each for each in self._vehicles.values()}
+        self._vehicles = {-vehicle.number: vehicle for vehicle in self._vehicles.values()}
 
     def open_paths(self) -> list[VehiclePath]:
         """Return the paths so far of the vehicles that may still be shown again."""
-        return [each.path(self._now) for each in self._vehicles.values()]
+        return [vehicle.path(self._now) for vehicle in self._vehicles.values()]
 
     def _begin(self, track: Track, lost: "_Lost | None") -> "_Vehicle":
         """Remember a new vehicle, or one that goes on under a new id."""
@@ -286,9 +287,9 @@ class _Lost:
     ) -> None:
         rows = [
             (*row[1:4], key)
-            for key, each in vehicles.items()
-            if key not in shown and now - each.shown <= GAP and not each.is_leaving(*size)
-            for places in [each.onward(now).tolist()]
+            for key, vehicle in vehicles.items()
+            if key not in shown and now - vehicle.shown <= GAP and not vehicle.is_leaving(*size)
+            for places in [vehicle.onward(now).tolist()]
             if 0 <= places[1][1] <= size[0] and 0 <= places[1][2] <= size[1]
             for row in places
         ]
@@ -304,5 +305,5 @@ class _Lost:
         if not fits.any():
             return None
         key = self._keys[int(np.argmin(np.where(fits, distances, np.inf)))]
-        self._heights[[each == key for each in self._keys]] = np.inf  # it is taken
+        self._heights[[item == key for item in self._keys]] = np.inf  # it is taken
         return key

@@ -6,8 +6,8 @@ from vdet.boxes import Box, Image
 from vdet.media import Picture
 from vdet.track.track import FrameTracks, Track
 
-_PADDING = 0.1  # margin around a vehicle, as a share of the width and the height of its box
-_LEAST = 24  # shortest side of a box that gets a picture, pixels
+_PADDING = 0.1  # margin around a vehicle, as a fraction of the width and the height of its box
+_MINIMUM = 24  # shortest side of a box that gets a picture, pixels
 
 _Merit = tuple[bool, float]
 """Whether the vehicle is whole in the frame; its area in pixels times its score."""
@@ -61,7 +61,7 @@ class BestCrops:
 def _merit(track: Track, picture: Picture) -> _Merit | None:
     """Return None where the vehicle was not seen, or is too small."""
     box = track.box.rounded
-    if track.state != "seen" or min(box.width, box.height) < _LEAST:
+    if track.state != "detected" or min(box.width, box.height) < _MINIMUM:
         return None
     inside = box.x2 < picture.width and box.y2 < picture.height
     is_whole = inside and min(box.x1, box.y1) > 0

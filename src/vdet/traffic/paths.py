@@ -10,10 +10,10 @@ from vdet.draw.paint import Color, draw_arrow, draw_lines
 from vdet.polygons import Point
 from vdet.traffic.records import VehicleRecord
 
-_LEAST = 0.03
-"""Length of the shortest path that is drawn, as a share of the frame's width."""
+_MINIMUM = 0.03
+"""Length of the shortest path that is drawn, as a fraction of the frame's width."""
 _TIP = 0.02
-"""Length of the tip of a path, as a share of the frame's width."""
+"""Length of the tip of a path, as a fraction of the frame's width."""
 
 
 def draw_paths(image: Image, records: Iterable[VehicleRecord]) -> None:
@@ -25,7 +25,7 @@ def draw_paths(image: Image, records: Iterable[VehicleRecord]) -> None:
     thin = max(1, line_width(image) // 2)
     for record in records:
         path = _inside(record.path, image)
-        if record.share < _LEAST or len(path) < 2:
+        if record.share < _MINIMUM or len(path) < 2:
             continue
         color = direction_color(path[0], path[-1])
         draw_lines(image, path, color, thin)

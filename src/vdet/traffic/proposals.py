@@ -99,24 +99,28 @@ def propose_lines(
         Where the camera looks, one of `COMPASS`; None where that is not known.
     """
     moving = [
-        each
-        for each in paths
-        if math.dist(each.points[0], each.points[each.seen - 1]) >= _MIN_LENGTH * each.heights.max()
+        path
+        for path in paths
+        if math.dist(path.points[0], path.points[path.seen - 1]) >= _MIN_LENGTH * path.heights.max()
     ]
     if len(moving) < _MIN_VEHICLES:
         return ()
     candidates = list(_Streams(moving, width, height).candidates())
     left, lines, names = np.ones(len(moving), np.bool_), [], Counter[str]()
-    while gains := [(gain, each) for each in candidates if (gain := each.gain(left))]:
+    while gains := [
+        (gain, candidate) for candidate in candidates if (gain := candidate.gain(left))
+    ]:
         best = max(gain for gain, _ in gains)
-        good = (each for gain, each in gains if gain >= _NEAR_BEST * best)
-        line = min(good, key=lambda each: each.place)
+        good = (item for gain, item in gains if gain >= _NEAR_BEST * best)
+        line = min(good, key=lambda item: item.place)
         ahead, back = _directions(line.way, facing)
         names[ahead] += 1
         name = f"{ahead} {names[ahead]}" if names[ahead] > 1 else ahead
         lines.append(ProposedLine(name, *line.ends, ahead, back, int(left[line.own].sum())))
         left[line.own] = False
-        candidates = [each for each in candidates if meeting(each.ends, line.ends) is None]
+        candidates = [
+            candidate for candidate in candidates if meeting(candidate.ends, line.ends) is None
+        ]
     return tuple(lines)
 
 
@@ -135,7 +139,7 @@ class _Streams:
     def __init__(self, paths: Sequence[VehiclePath], width: int, height: int) -> None:
         rows = [_spaced(path, _SPACING * width) for path in paths]
         self._size = width, height
-        self._numbers = np.repeat(np.arange(len(paths)), [len(each) for each in rows])
+        self._numbers = np.repeat(np.arange(len(paths)), [len(row) for row in rows])
         joined = np.concatenate(rows)
         self._points, self._ways = joined[:, :2], joined[:, 2:4]
         self._heights, self._gone = joined[:, 4:].T
@@ -197,7 +201,7 @@ def _groups(rows: Sequence[Float64Array]) -> Int64Array:
     """Return the number of the group of each path: where it heads first and last."""
     from scipy.cluster.hierarchy import fcluster, linkage
 
-    quarters = [each[[0, len(each) // 4, 3 * len(each) // 4, -1], :2] for each in rows]
+    quarters = [row[[0, len(row) // 4, 3 * len(row) // 4, -1], :2] for row in rows]
     headings = np.diff(quarters, axis=1)[:, [0, 2]]
     headings /= np.maximum(np.linalg.norm(headings, axis=2, keepdims=True), 1e-9)
     tree = linkage(headings.reshape(-1, 4), "average")

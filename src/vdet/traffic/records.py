@@ -15,13 +15,13 @@ from vdet.traffic.speeds import KMH, SpeedMeter, Speeds
 from vdet.traffic.tables import VIDEO, is_json, join_tables, plain_moment, write_content
 
 PATH_STEP = 0.01
-"""Distance after which a path gets its next point, as a share of the frame's width.
+"""Distance after which a path gets its next point, as a fraction of the frame's width.
 
 Shorter moves are jitter of the boxes.
 """
 
 _COLUMNS = (
-    *("id", "class", "clock", "first", "last", "seconds", "seen", "between", "lost"),
+    *("id", "class", "clock", "first", "last", "seconds", "detected", "interpolated", "predicted"),
     *("mean_score", "best_score"),
     *("start_x", "start_y", "end_x", "end_y", "length", "length_share"),
     *("x", "y", "width", "height"),
@@ -108,7 +108,7 @@ class VehicleRecord:
 
     @property
     def share(self) -> float:
-        """Length of the path as a share of the frame's width."""
+        """Length of the path as a fraction of the frame's width."""
         return self.length / self.frame_width
 
     def add(self, track: Track, time: float, before: float | None = None) -> None:
@@ -118,11 +118,11 @@ class VehicleRecord:
         self.best_score = max(self.best_score, track.score)
         self.class_name = track.class_name
         self.largest = max(self.largest, track.box, key=lambda box: box.area)
-        only_lost = self.states.total() == self.states["lost"]
-        if track.state != "lost" and only_lost:
+        only_lost = self.states.total() == self.states["predicted"]
+        if track.state != "predicted" and only_lost:
             self.path.clear()
             self.followed.clear()
-        if track.state != "lost" or only_lost:
+        if track.state != "predicted" or only_lost:
             self._go_to(track.foot)
             goes_on = bool(self.followed) and self.followed[-1][1] == before
             first = self.followed.pop()[0] if goes_on else time
@@ -213,7 +213,7 @@ def records_content(
     records: Iterable[VehicleRecord], path: Path, clock: Clock | None = None
 ) -> list[Any]:
     """Return what the file `path` says of the records, as `write_content` takes it."""
-    rows = [_row(each, clock) for each in records]
+    rows = [_row(record, clock) for record in records]
     if is_json(path):
         return [_item(row) for row in rows]
     return [_COLUMNS, *(list(row.values()) for row in rows)]
@@ -239,7 +239,7 @@ def _row(record: VehicleRecord, clock: Clock | None) -> dict[str, Any]:
     speeds: list[float | None] = [None] * 4
     if known := record.speeds:
         in_kmh = [
-            KMH * each for each in (known.quantile(0.5), known.quantile(0.85), known.deviation)
+            KMH * item for item in (known.quantile(0.5), known.quantile(0.85), known.deviation)
         ]
         speeds = [round(value, 1) for value in (known.metres, *in_kmh)]
     who = record.id, record.class_name, begin

@@ -25,31 +25,31 @@ from vdet.traffic.counts import Counts
 WINDOW = 1.0
 """Seconds of a path that give one velocity."""
 LEAST = 0.5
-"""Least seconds of a path that give a speed."""
+"""Minimum seconds of a path that give a speed."""
 KMH = 3.6
 """km/h in 1 m/s."""
 
 _EDGE = 0.005
-"""A box that ends this near to the frame's edge is cut off, as a share of the frame's side."""
+"""A box that ends this near to the frame's edge is cut off, as a fraction of the frame's side."""
 _SLIMNESS = 0.4
-"""Width of a vehicle as a share of its length."""
+"""Width of a vehicle as a fraction of its length."""
 _LENGTHS = 1.5, 20.0
 """Lengths of vehicles, metres."""
 _OUTLIERS = 0.1, 4.0
 """Distances of a place from the line up to which it is kept: in heights of the box, and in median
 distances; the larger one counts."""
 _FOOT_ERROR = 0.03
-"""Standard deviation of the height at which a box ends, as a share of its height."""
+"""Standard deviation of the height at which a box ends, as a fraction of its height."""
 _MOST_ALIKE = 0.9
 """Largest correlation of neighbouring places that is believed."""
 _MOVES = 1.0
-"""Least speed of a vehicle that heads somewhere, m/s."""
+"""Minimum speed of a vehicle that heads somewhere, m/s."""
 _LEAST_WAY = 1.0
 """Shortest way that a relative error is taken of, metres."""
 _GONE = 10.0
 """Seconds after which a vehicle that is not shown has ended."""
 _SPACING = 0.2
-"""Least seconds between the speeds that are kept."""
+"""Minimum seconds between the speeds that are kept."""
 _AROUND = np.array([(0, 0), (0, 1), (1, 0)])
 """Offsets to a pixel, the one above it and the one to its left."""
 _COLUMNS = 5  # of what is known of a vehicle in a frame
@@ -82,7 +82,7 @@ class Speeds:
         return float(self._ways.sum())
 
     def quantile(self, share: float) -> float:
-        """Return the speed below which the vehicle covers this share of its way, m/s."""
+        """Return the speed below which the vehicle covers this fraction of its way, m/s."""
         order = np.argsort(self.speeds)
         gone = np.cumsum(self._ways[order])
         if not gone[-1]:
@@ -101,7 +101,7 @@ class Speeds:
         if not self.times[0] <= time <= self.times[-1]:
             return None
         speed, scatter = (
-            float(np.interp(time, self.times, each)) for each in (self.speeds, self.deviations)
+            float(np.interp(time, self.times, item)) for item in (self.speeds, self.deviations)
         )
         return speed, float(np.hypot(scatter, self.common * speed))
 
@@ -112,7 +112,7 @@ class Speeds:
         """
         if not self.times[0] <= first < last <= self.times[-1]:
             return None
-        ends = [np.interp((first, last), self.times, each) for each in self.places.T]
+        ends = [np.interp((first, last), self.times, item) for item in self.places.T]
         return float(np.hypot(*np.diff(ends)[:, 0])) / (last - first)
 
     @property
@@ -144,7 +144,7 @@ class SpeedMeter:
         left, right, bottom = self._sides
         for track in frame.tracks:
             box = track.box
-            if track.state != "lost" and left < box.x1 and box.x2 < right and box.y2 < bottom:
+            if track.state != "predicted" and left < box.x1 and box.x2 < right and box.y2 < bottom:
                 row = frame.time, *track.foot, box.width, box.height
                 self._rows.setdefault(track.id, array("d")).extend(row)
         for number, rows in list(self._rows.items()):

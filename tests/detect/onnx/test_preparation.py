@@ -26,7 +26,7 @@ def road(coding: Coding) -> Picture:
 def inputs(form: InputForm, picture: Picture) -> tuple[Float64Array, ...]:
     """Return what a network sees of planes, and of the same picture as BGR."""
     (ours, place), (expected, place_of_bgr) = (
-        form.prepare(each) for each in (picture, Picture(picture.image))
+        form.prepare(item) for item in (picture, Picture(picture.image))
     )
     assert place == place_of_bgr
     assert ours.shape == expected.shape

@@ -39,7 +39,7 @@ class EngineResults:
 
     @property
     def same(self) -> float:
-        """The share of windows that both engines put on the same side of probability 0.5."""
+        """The fraction of windows that both engines put on the same side of probability 0.5."""
         return float(np.mean((self.dense >= 0) == (self.patch >= 0)))
 
 
@@ -72,7 +72,7 @@ def fitted(features: FeatureSettings, members: int = 1) -> LinearModel:
     vectors = extractor.describe_all(to_patch(patch, features.patch) for patch in patches)
     parts = [np.arange(len(labels)) % (members + 1) != i for i in range(members)]
     fits = [_ridge(vectors[part].astype(np.float64), labels[part]) for part in parts]
-    weights, biases = (np.array(each, np.float32) for each in zip(*fits, strict=True))
+    weights, biases = (np.array(item, np.float32) for item in zip(*fits, strict=True))
     slopes = np.full(members, -4, np.float32)
     return LinearModel(features, weights, biases, slopes, np.zeros(members, np.float32))
 
@@ -82,7 +82,7 @@ def with_boxes(model: LinearModel) -> LinearModel:
     rng = np.random.default_rng(2)
     patches = _patches()[0][:_EACH] * 2
     zooms = rng.uniform(0.6, 1, len(patches))
-    crops = [_crop(*each, rng) for each in zip(patches, zooms, strict=True)]
+    crops = [_crop(*item, rng) for item in zip(patches, zooms, strict=True)]
     extractor = FeatureExtractor(model.features)
     vectors = extractor.describe_all(to_patch(crop, model.features.patch) for crop, _ in crops)
     hogs = vectors[:, : model.features.hog_length].astype(np.float64)
@@ -99,7 +99,7 @@ def _crop(patch: Image, zoom: float, rng: np.random.Generator) -> tuple[Image, l
     side = round(zoom * whole)
     x, y = rng.integers(0, whole - side + 1, 2).tolist()
     sides = [(0 - x) / side, (0 - y) / side, (whole - x) / side, (whole - y) / side]
-    return patch[y : y + side, x : x + side], [each - 0.5 for each in sides]
+    return patch[y : y + side, x : x + side], [side - 0.5 for side in sides]
 
 
 def _ridge(vectors: Exact, targets: Exact) -> tuple[Exact, Exact]:

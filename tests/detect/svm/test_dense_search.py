@@ -98,9 +98,9 @@ def test_the_sides_in_a_hit_are_those_of_its_hog_features(size: int, step: int) 
     regression = BoxRegression(weights, np.repeat(model.biases, 4))
     search = DenseSearch(replace(model, box_regression=regression), grid)
     frame = FramePyramid(Picture(texture(400)), FEATURES)
-    least = float(np.median(search.search(frame, 1).probabilities))
-    found = search.search(frame, least)
-    hits = found.probabilities >= least
+    minimum = float(np.median(search.search(frame, 1).probabilities))
+    found = search.search(frame, minimum)
+    hits = found.probabilities >= minimum
     assert found.sides.shape == (35, 4)
     assert found.sides.dtype == np.float32
     for side in found.sides[hits].T:
@@ -145,8 +145,8 @@ def test_a_window_has_the_hog_of_its_patch_and_its_weighted_sum(
         # inside a window, gradients do not depend on what is around it
         patch = FeatureExtractor(features).describe(NOISE[y : y + 64, x : x + 64])
         ours, expected = (
-            each[: features.hog_length].reshape(3, 7, 7, -1)[:, 1:-1, 1:-1]
-            for each in (vector, patch)
+            item[: features.hog_length].reshape(3, 7, 7, -1)[:, 1:-1, 1:-1]
+            for item in (vector, patch)
         )
         np.testing.assert_allclose(ours, expected, atol=1e-5)
     weights = np.random.default_rng(1).normal(size=(2, features.hog_length)).astype(np.float32)

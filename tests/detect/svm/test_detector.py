@@ -61,7 +61,7 @@ def test_a_car_in_consecutive_frames_is_detected_by_a_box_around_it() -> None:
 
 
 def test_the_first_frame_alone_is_half_as_hot_as_two() -> None:
-    first, second = (trace_of(each).heat for each in detect_video(road(CAR), road(CAR)))
+    first, second = (trace_of(item).heat for item in detect_video(road(CAR), road(CAR)))
     np.testing.assert_allclose(second.values, 2 * first.values, rtol=1e-5)
 
 
@@ -180,12 +180,12 @@ class TestStillPictures:
         whole = detect_still(road(CAR), everything)
         (box,), (strength,) = rounded(whole), whole.data["strength"].tolist()
         width, height = box.width / WIDTH, box.height / HEIGHT
-        least = StillSettings(strength=strength - 1e-4, width=width, height=height)
+        minimum = StillSettings(strength=strength - 1e-4, width=width, height=height)
         for stills, shown in (
-            (least, True),
-            (least.model_copy(update={"strength": strength + 0.01}), False),
-            (least.model_copy(update={"width": width + 1 / WIDTH}), False),
-            (least.model_copy(update={"height": height + 1 / HEIGHT}), False),
+            (minimum, True),
+            (minimum.model_copy(update={"strength": strength + 0.01}), False),
+            (minimum.model_copy(update={"width": width + 1 / WIDTH}), False),
+            (minimum.model_copy(update={"height": height + 1 / HEIGHT}), False),
         ):
             found = detect_still(road(CAR), settings.model_copy(update={"stills": stills}))
             assert rounded(found) == ([box] if shown else [])
@@ -204,7 +204,7 @@ class TestHorizon:
         """Return the line of the log that is about the horizon, with its level."""
         with caplog.at_level("INFO", "vdet"):
             SvmModel(MODEL, settings).for_video(WIDTH, HEIGHT, [road()] * count)
-        return "".join(f"{each.levelname} {each.message}" for each in caplog.records)
+        return "".join(f"{record.levelname} {record.message}" for record in caplog.records)
 
     def test_one_in_the_settings_is_not_searched_for(
         self, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture

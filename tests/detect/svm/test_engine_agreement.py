@@ -57,10 +57,10 @@ HORIZON = 0.57
 """Row of the horizon of the drawn road."""
 
 PROBABILITY = 0.5
-"""Least probability of a hit."""
+"""Minimum probability of a hit."""
 
 FEW = 0.92
-"""Least share of equal decisions in a small grid, where a few near 0.5 are some percent."""
+"""Minimum fraction of equal decisions in a small grid, where a few near 0.5 are some percent."""
 
 
 def assert_agree(results: EngineResults, correlation: float = 0.99, same: float = 0.97) -> None:

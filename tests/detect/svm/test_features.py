@@ -56,7 +56,7 @@ def test_a_halved_channel_is_described_at_half_its_size() -> None:
     descriptor = cv2.HOGDescriptor((32, 32), (8, 8), (4, 4), (4, 4), 8)
     hogs = [np.ravel(descriptor.compute(halve(channel))) for channel in (red, blue)]
     counts = [histogram(halve(channel), 32) for channel in (red, blue)]
-    whole, vector = (FeatureExtractor(each).describe(PATCH) for each in (FEATURES, features))
+    whole, vector = (FeatureExtractor(item).describe(PATCH) for item in (FEATURES, features))
     np.testing.assert_array_equal(vector[:1568], whole[:1568])
     np.testing.assert_array_equal(vector[1568:4704], np.concatenate(hogs))
     np.testing.assert_array_equal(vector[4704:], [*whole[4704:4736], *np.concatenate(counts)])

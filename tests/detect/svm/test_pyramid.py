@@ -119,7 +119,7 @@ def channels_of(planes: Planes) -> npt.NDArray[np.uint8]:
     elif not planes.coding.full_range:
         luma = full_range(luma, 16, 219)
         blue, red = full_range(blue, 128, 224), full_range(red, 128, 224)
-    whole = (each.repeat(2, 0).repeat(2, 1)[:height, :width] for each in (red, blue))
+    whole = (item.repeat(2, 0).repeat(2, 1)[:height, :width] for item in (red, blue))
     return np.array([luma, *whole])
 
 

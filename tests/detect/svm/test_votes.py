@@ -41,10 +41,10 @@ def exactly(box: Box, weight: float) -> Vote:
     return box.x1, box.y1, box.width, box.height, weight
 
 
-def split(votes: Sequence[Vote], *regions: Box, least: float = 0.12) -> list[HotRegion]:
+def split(votes: Sequence[Vote], *regions: Box, minimum: float = 0.12) -> list[HotRegion]:
     """Return the vehicles in regions; by default in one region that covers all votes."""
     hot = [HotRegion(box, box.center, 1.0) for box in regions or [EVERYWHERE]]
-    return split_regions(hot, votes_of(*votes), least)
+    return split_regions(hot, votes_of(*votes), minimum)
 
 
 def boxes(regions: list[HotRegion]) -> list[Box]:
@@ -81,9 +81,9 @@ class TestWeights:
         (vehicle,) = split([exactly(LEFT, 0.5), exactly(other, 0.25)])
         assert vehicle.strength == pytest.approx(0.5 + 0.25 * LEFT.iou(other))
 
-    @pytest.mark.parametrize(("least", "count"), [(0, 1), (0.299, 1), (0.301, 0)])
-    def test_a_vehicle_needs_a_least_weight(self, least: float, count: int) -> None:
-        assert len(split([exactly(LEFT, 0.1)] * 3, least=least)) == count
+    @pytest.mark.parametrize(("minimum", "count"), [(0, 1), (0.299, 1), (0.301, 0)])
+    def test_a_vehicle_needs_a_least_weight(self, minimum: float, count: int) -> None:
+        assert len(split([exactly(LEFT, 0.1)] * 3, minimum=minimum)) == count
 
     def test_many_weak_votes_are_a_vehicle_but_one_is_not(self) -> None:
         assert len(split(around(LEFT, 0.02, count=20))) == 1
@@ -214,7 +214,7 @@ some_votes = st.lists(  # no two of equal weight, because their order would matt
 def test_boxes_lie_within_the_hull_of_the_votes(votes: list[Vote]) -> None:
     table = np.array(votes)
     (left, top), (right, bottom) = table[:, :2].min(axis=0), (table[:, :2] + table[:, 2:4]).max(0)
-    found = split(votes, least=0)
+    found = split(votes, minimum=0)
     for box in boxes(found):
         assert left - 1 <= box.x1 < box.x2 <= right + 1
         assert top - 1 <= box.y1 < box.y2 <= bottom + 1
@@ -225,7 +225,7 @@ def test_boxes_lie_within_the_hull_of_the_votes(votes: list[Vote]) -> None:
 def test_the_order_of_the_votes_does_not_matter(votes: list[Vote], random: Random) -> None:
     shuffled = list(votes)
     random.shuffle(shuffled)
-    one, other = (sorted(boxes(split(each)), key=str) for each in (votes, shuffled))
+    one, other = (sorted(boxes(split(item)), key=str) for item in (votes, shuffled))
     assert len(one) == len(other)
     for a, b in zip(one, other, strict=True):
         np.testing.assert_allclose(

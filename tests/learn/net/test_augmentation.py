@@ -104,7 +104,7 @@ def test_a_weight_makes_a_source_come_more_often() -> None:
 
 def test_pictures_with_rare_classes_come_more_often() -> None:
     cars, (bus,) = block_source(9).samples, black_on_white().samples
-    cars = [replace(each, classes=np.zeros_like(each.classes)) for each in cars]
+    cars = [replace(car, classes=np.zeros_like(car.classes)) for car in cars]
     bus = replace(bus, classes=np.array([1]))
     # The bus is in a tenth of the pictures: √(0.4 / 0.1) = 2 times.
     factors = repeat_factors([*cars, bus], np.full(10, 0.1), 0.4)
@@ -121,7 +121,7 @@ def test_objects_of_rare_classes_are_pasted_with_their_boxes() -> None:
         np.zeros((0, 4), np.float32), np.zeros(0, np.int64), np.zeros(0, np.bool_),
     )  # fmt: skip
     drawn = [paster.paste(np.random.default_rng(seed), plain) for seed in range(40)]
-    pasted = [each for each in drawn if len(each.boxes)]
+    pasted = [item for item in drawn if len(item.boxes)]
     assert 4 <= len(pasted) <= 24
     assert plain.image.min() == 255, "the picture itself is not changed"
     for sample in pasted:

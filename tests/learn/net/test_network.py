@@ -34,7 +34,7 @@ from vdet.testing import check_detector  # noqa: E402
 
 CLASSES = ("car", "truck", "bus")
 QUICK = NetworkTrainingSettings(
-    steps=120, batch=4, width=256, height=128, rate=3e-3, classes=CLASSES
+    steps=120, batch=4, width=256, height=128, learning_rate=3e-3, classes=CLASSES
 )
 
 
@@ -193,14 +193,14 @@ def test_what_was_learnt_is_found_again(
     network, _ = trained
     path = tmp_path / "net.onnx"
     export_network(network, Header(classes=CLASSES, pixels=256 * 128), path)
-    model = NetworkModel(path, NetworkSettings(least=0.05, still_score=0.2))
+    model = NetworkModel(path, NetworkSettings(min_score=0.05, min_score_still=0.2))
     found = wanted = right_class = 0
     for seed in range(100, 120):
         sample = block_picture(seed)
         detector = model.for_video(256, 128, [sample.image])
         detections = detector.detect(detector.search(Picture(sample.image), None))
         assert detections.classes is not None
-        names = [detections.names[each] for each in detections.classes.tolist()]
+        names = [detections.names[class_] for class_ in detections.classes.tolist()]
         boxes = torch.tensor(detections.sides)
         wanted += len(sample.boxes)
         for truth, kind in zip(sample.boxes, sample.classes, strict=True):
@@ -251,7 +251,7 @@ def test_a_checkpoint_of_another_training_is_refused(tmp_path: Path) -> None:
     with pytest.raises(DataError, match=r"net\.ckpt: belongs to a training with .* pictures"):
         train_network([block_source(5)], settings, path)
     path.write_bytes(b"junk")
-    with pytest.raises(DataError, match=r"net\.ckpt: is no checkpoint of this training"):
+    with pytest.raises(DataError, match=r"net\.ckpt: is not a checkpoint of this training"):
         train_network(source, settings, path)
 
 

@@ -84,8 +84,8 @@ def test_a_window_with_a_low_probability_is_no_false_alarm() -> None:
 def test_nothing_is_taken_from_ignore_regions() -> None:
     region = Box.sized(40, 280, 120, 120)
     inside, touching = about(100), about(185)
-    for each, expected in ((inside, {}), (touching, {touching: "false alarm"})):
-        assert kinds(chosen(windows(each), truth(ignored=(region,)))) == expected
+    for item, expected in ((inside, {}), (touching, {touching: "false alarm"})):
+        assert kinds(chosen(windows(item), truth(ignored=(region,)))) == expected
 
 
 def test_a_window_far_too_large_for_its_vehicle_is_a_false_alarm() -> None:

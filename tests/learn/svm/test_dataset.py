@@ -102,7 +102,7 @@ def test_a_missing_class_is_named(tmp_path: Path, present: str, missing: str) ->
 def test_a_file_that_is_no_zip_file_is_named(tmp_path: Path, data: bytes) -> None:
     path = tmp_path / "set.zip"
     path.write_bytes(data)
-    with pytest.raises(DataError, match=r"set\.zip: is neither a folder nor a readable zip file"):
+    with pytest.raises(DataError, match=r"set\.zip: is not a folder or a readable zip file"):
         find_patches([path])
 
 

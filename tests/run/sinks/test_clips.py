@@ -34,7 +34,7 @@ def results() -> list[FrameResult]:
     found = []
     for index in range(COUNT):
         shown = [
-            Track(number, CAR, 0.9, "seen", kind)
+            Track(number, CAR, 0.9, "detected", kind)
             for number, (kind, frames) in SHOWN.items()
             if index in frames
         ]

@@ -73,7 +73,7 @@ def test_a_run_counts_the_red_car(red_clip: Path, tmp_path: Path) -> None:
 
 
 def test_running_counts_are_drawn_if_asked_for(red_clip: Path, tmp_path: Path) -> None:
-    drawn = COUNTS_AT.model_copy(update={"drawn": True})
+    drawn = COUNTS_AT.model_copy(update={"draw": True})
     for name, counts in (("plain.mp4", COUNTS_AT), ("drawn.mp4", drawn)):
         run_red(Run(red_clip, outputs(video=tmp_path / name)), with_counts(counts))
     plain, shown = read(tmp_path / "plain.mp4"), read(tmp_path / "drawn.mp4")

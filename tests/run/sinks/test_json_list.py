@@ -32,7 +32,7 @@ ITEMS = (
 
 RESULTS = (
     result_of(
-        Track(1, Box.sized(1, 2, 3, 4), 0.567891, "seen", "car"),
+        Track(1, Box.sized(1, 2, 3, 4), 0.567891, "detected", "car"),
         source=Path("a.png"),
         image=road(),
     ),
@@ -55,7 +55,7 @@ def test_with_lanes_boxes_have_their_distance_and_lane(tmp_path: Path) -> None:
     path = tmp_path / "boxes.json"
     finder = RoadFinder(None, LaneSettings(), 320, 240)
     bare = finder.update(finder.observe(Picture(road())))
-    near = Track(1, Box.sized(1, 2, 3, 4), 0.5, state="seen", distance=23.4567, lane=-1)
+    near = Track(1, Box.sized(1, 2, 3, 4), 0.5, state="detected", distance=23.4567, lane=-1)
     vehicles = (near, replace(near, distance=None, lane=None))
     write(Output("json", path), [result_of(*vehicles, found=bare)], video=None)
     [item] = read(path.read_text(encoding="utf-8"))

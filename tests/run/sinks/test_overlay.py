@@ -67,7 +67,7 @@ def test_without_lanes_vehicles_are_drawn_where_they_are() -> None:
 
 
 def test_lost_vehicles_are_drawn_dashed() -> None:
-    seen, lost = (Track(1, CAR, 0.9, state) for state in ("seen", "lost"))
+    seen, lost = (Track(1, CAR, 0.9, state) for state in ("detected", "predicted"))
     expected = road(CAR)
     draw_box(expected, CAR, color_of(1), "#1", dashed=True)
     dashed = drawn_on(result_of(lost))
@@ -119,7 +119,7 @@ def white(width: int, height: int) -> Image:
     ],
 )
 def test_a_label_shows_what_is_asked_for_in_this_order(label: tuple[str, ...], text: str) -> None:
-    track = Track(3, CAR, 0.9, state="seen", class_name="car", distance=23.6)
+    track = Track(3, CAR, 0.9, state="detected", class_name="car", distance=23.6)
     expected = road(CAR)
     draw_box(expected, CAR, color_of(3), text)
     np.testing.assert_array_equal(drawn_on(result_of(track), label=label), expected)
@@ -140,8 +140,8 @@ def test_boxes_can_be_hidden_and_labels_stay() -> None:
     np.testing.assert_array_equal(drawn_on(result_of(CAR), boxes=False), expected)
 
 
-LOST = Track(1, CAR, 0.9, state="lost")
-SEEN = replace(LOST, state="seen")
+LOST = Track(1, CAR, 0.9, state="predicted")
+SEEN = replace(LOST, state="detected")
 
 
 def test_lost_boxes_can_be_as_the_others_or_hidden() -> None:
@@ -155,7 +155,7 @@ def test_colors_can_be_those_of_the_classes() -> None:
     boxes = [Box.sized(10 + 60 * n, 100, 50, 50) for n in range(5)]
     names = ["car", "car", "truck", "tram", None]
     tracks = [
-        Track(n, box, 0.9, state="seen", class_name=name)
+        Track(n, box, 0.9, state="detected", class_name=name)
         for n, (box, name) in enumerate(zip(boxes, names, strict=True), start=1)
     ]
     image = drawn_on(result_of(*tracks, image=white(320, 240) // 2), colors="class")

@@ -42,7 +42,7 @@ def test_a_run_writes_a_page_that_shows_the_video_of_the_run(
     facts = totals.summaries[tmp_path / "page"]
     assert (facts["frames"], facts["vehicles"], facts["most"]) == (COUNT, 1, 1)
     assert facts["seconds"] == pytest.approx(COUNT / 25)
-    (thumbnail,) = (each for each in made.all("img") if each.get("alt") == "vehicle 1")
+    (thumbnail,) = (item for item in made.all("img") if item.get("alt") == "vehicle 1")
     blue, _, red = picture(thumbnail["src"]).reshape(-1, 3).mean(axis=0)
     assert red > blue + 50
 

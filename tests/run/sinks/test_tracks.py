@@ -22,12 +22,14 @@ from vdet.track.track import Track
 
 RESULTS = (
     result_of(
-        Track(1, Box.sized(10, 20, 30, 40), 0.98765, "seen", "car"), index=4, time=Fraction(4, 25)
+        Track(1, Box.sized(10, 20, 30, 40), 0.98765, "detected", "car"),
+        index=4,
+        time=Fraction(4, 25),
     ),
     result_of(index=5, time=Fraction(1, 3)),
     result_of(
-        Track(1, Box.sized(11, 21, 31, 41), 0.5, "lost", "car", (27.25, 63.504), 18.249, -1),
-        Track(2, Box.sized(0, -3, 5, 6), 1.0, state="seen"),
+        Track(1, Box.sized(11, 21, 31, 41), 0.5, "predicted", "car", (27.25, 63.504), 18.249, -1),
+        Track(2, Box.sized(0, -3, 5, 6), 1.0, state="detected"),
         index=6,
         time=Fraction(6, 25),
     ),
@@ -68,13 +70,13 @@ def test_csv_has_a_heading_and_counts_from_0(tmp_path: Path) -> None:
 def test_json_lines_have_a_record_for_every_frame(tmp_path: Path) -> None:
     assert written(tmp_path / "tracks.jsonl") == (
         '{"frame": 4, "time": 0.16, "tracks": [{"id": 1, "x": 10, "y": 20, "width": 30, '
-        '"height": 40, "score": 0.9877, "state": "seen", "class": "car", "foot": [25.0, 60.0], '
+        '"height": 40, "score": 0.9877, "state": "detected", "class": "car", "foot": [25.0, 60.0], '
         '"distance": null, "lane": null}]}\n'
         '{"frame": 5, "time": 0.333333, "tracks": []}\n'
         '{"frame": 6, "time": 0.24, "tracks": [{"id": 1, "x": 11, "y": 21, "width": 31, '
-        '"height": 41, "score": 0.5, "state": "lost", "class": "car", "foot": [27.25, 63.5], '
+        '"height": 41, "score": 0.5, "state": "predicted", "class": "car", "foot": [27.25, 63.5], '
         '"distance": 18.25, "lane": -1}, {"id": 2, "x": 0, "y": -3, "width": 5, '
-        '"height": 6, "score": 1.0, "state": "seen", "class": null, "foot": [2.5, 3.0], '
+        '"height": 6, "score": 1.0, "state": "detected", "class": null, "foot": [2.5, 3.0], '
         '"distance": null, "lane": null}]}\n'
     )
 
@@ -120,7 +122,7 @@ def test_json_lines_tell_the_lane_where_it_was_looked_for(tmp_path: Path) -> Non
 
 def test_formats_that_describe_the_video_are_not_for_pictures(tmp_path: Path) -> None:
     for ending in (".coco.json", ".xml", ".yolo.zip"):
-        with pytest.raises(OutputError, match=r"is for videos; give another format"):
+        with pytest.raises(OutputError, match=r"is for videos; choose another format"):
             write(Output("tracks", tmp_path / f"a{ending}"), RESULTS, video=None)
     assert list(tmp_path.iterdir()) == []
 

@@ -28,13 +28,15 @@ def test_a_run_writes_the_record_and_the_picture_of_its_car(red_clip: Path, tmp_
     assert (row["id"], row["class"]) == ("1", "")
     assert float(row["first"]) == float(tracks[0]["time"])
     assert float(row["last"]) == float(tracks[-1]["time"])
-    assert sum(int(row[state]) for state in ("seen", "between", "lost")) == len(tracks)
+    assert sum(int(row[state]) for state in ("detected", "interpolated", "predicted")) == len(
+        tracks
+    )
     assert float(row["length_share"]) == pytest.approx(float(row["length"]) / WIDTH, abs=1e-3)
     assert float(row["length"]) == pytest.approx(COUNT, abs=COUNT / 4), "a pixel a frame"
     (name,) = names(tmp_path / "crops")
     assert name.startswith("vehicle-0001-at-")
     time = float(name.removeprefix("vehicle-0001-at-").removesuffix("s.jpg"))
-    assert time in {round(float(each["time"]), 3) for each in tracks}
+    assert time in {round(float(track["time"]), 3) for track in tracks}
     blue, _, red = read_image(tmp_path / "crops" / name).reshape(-1, 3).mean(axis=0)
     assert red > blue + 50
 

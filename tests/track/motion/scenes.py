@@ -32,7 +32,7 @@ def inside(box: Box) -> Box:
 
 def detections(found: Sequence[Scored | Box]) -> Boxes:
     """Give the detections at these places; a box without a score is seen clearly."""
-    scored = [(each, CLEAR) if isinstance(each, Box) else each for each in found]
+    scored = [(item, CLEAR) if isinstance(item, Box) else item for item in found]
     scored = [(box, score) for box, score in scored if box.area]
     if not scored:
         return NO_BOXES

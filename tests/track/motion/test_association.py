@@ -82,11 +82,11 @@ def test_of_two_lost_vehicles_the_nearest_is_taken_and_only_by_one() -> None:
     lost = [vehicle(moved(-30), number=7, unseen=0.4), vehicle(moved(20), number=8, unseen=0.4)]
     new = [vehicle(), vehicle(moved(0, 40))]
     assert take_over_ids([*lost, *new]) == new
-    assert [each.id for each in new] == [8, 7]
+    assert [item.id for item in new] == [8, 7]
 
 
 def without(*vehicles: Vehicle) -> list[Vehicle]:
-    return without_duplicates(vehicles, np.array([each.state.box for each in vehicles]))
+    return without_duplicates(vehicles, np.array([vehicle.state.box for vehicle in vehicles]))
 
 
 @pytest.mark.parametrize(("first", "second", "kept"), [(1, 2, 1), (2, 1, 1), (3, None, 3)])

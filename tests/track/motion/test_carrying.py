@@ -46,7 +46,7 @@ def test_a_vehicle_moves_on_between_the_searched_frames() -> None:
 
 
 def test_what_is_not_looked_for_is_not_missed() -> None:
-    long_gaps = 2 * round(DEFAULTS.carried * RATE)
+    long_gaps = 2 * round(DEFAULTS.coast_seconds * RATE)
     places: list[Box | None] = [CAR] * (6 * long_gaps)
     missed = follow_strided(places, long_gaps, carry=False)
     carried = follow_strided(places, long_gaps)
@@ -60,7 +60,9 @@ def test_what_is_not_looked_for_is_not_missed() -> None:
 def test_a_lost_vehicle_is_shown_for_about_the_same_time(stride: int) -> None:
     shown = follow_strided([*[CAR] * 50, *[None] * 50], stride)
     seconds = sum(bool(tracks) for tracks in shown[50:]) / RATE
-    assert DEFAULTS.carried - stride / RATE <= seconds <= DEFAULTS.carried + stride / RATE
+    assert (
+        DEFAULTS.coast_seconds - stride / RATE <= seconds <= DEFAULTS.coast_seconds + stride / RATE
+    )
 
 
 @pytest.mark.parametrize("stride", [2, 5])

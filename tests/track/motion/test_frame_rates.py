@@ -40,8 +40,8 @@ def test_a_clearly_seen_vehicle_is_shown_from_its_second_to_its_eighth_frame_on(
 @every_rate
 def test_a_lost_vehicle_is_shown_for_the_same_time(rate: int) -> None:
     shown = follow([*[[CAR]] * rate, *[[]] * rate], rate)
-    lost = sum(track.state == "lost" for tracks in shown for track in tracks)
-    assert DEFAULTS.carried - 1 / rate < lost / rate <= DEFAULTS.carried
+    lost = sum(track.state == "predicted" for tracks in shown for track in tracks)
+    assert DEFAULTS.coast_seconds - 1 / rate < lost / rate <= DEFAULTS.coast_seconds
 
 
 @every_rate

@@ -72,7 +72,7 @@ def ids_of(vehicles: Sequence[Painted]) -> list[set[int]]:
     for number in range(SECONDS * RATE + ahead):
         time = number / RATE
         if number < SECONDS * RATE and number % STRIDE == 0:
-            found = [each.visible(time) for each in vehicles if each.is_seen(time)]
+            found = [vehicle.visible(time) for vehicle in vehicles if vehicle.is_seen(time)]
             tracker.observe(detections(found), time, picture(vehicles, time))
         if number >= ahead:
             add_shown(tracker, (number - ahead) / RATE, vehicles, ids)
@@ -83,7 +83,9 @@ def add_shown(
     tracker: MotionTracker, time: float, vehicles: Sequence[Painted], ids: list[set[int]]
 ) -> None:
     for track in tracker.at(time):
-        overlaps = [each.is_seen(time) * track.box.iou(each.visible(time)) for each in vehicles]
+        overlaps = [
+            vehicle.is_seen(time) * track.box.iou(vehicle.visible(time)) for vehicle in vehicles
+        ]
         if max(overlaps) > 0.5:
             ids[int(np.argmax(overlaps))].add(track.id)
 
@@ -124,7 +126,7 @@ SCENES = {
 @pytest.mark.parametrize("vehicles", SCENES.values(), ids=SCENES.keys())
 def test_each_vehicle_has_one_id_of_its_own(vehicles: tuple[Painted, ...]) -> None:
     ids = ids_of(vehicles)
-    assert [len(each) for each in ids] == [1] * len(vehicles)
+    assert [len(item) for item in ids] == [1] * len(vehicles)
     assert len(set.union(*ids)) == len(vehicles)
 
 

@@ -35,7 +35,7 @@ def test_boxes_lie_in_the_frame_and_have_an_area(clip: Clip) -> None:
 @few
 @given(clips)
 def test_ids_are_unique_and_ordered_in_a_frame_and_given_without_gaps(clip: Clip) -> None:
-    shown = follow(clip, needed=0.04)
+    shown = follow(clip, confirm_seconds=0.04)
     for tracks in shown:
         numbers = [track.id for track in tracks]
         assert numbers == sorted(set(numbers))

@@ -43,7 +43,7 @@ def states(shown: Sequence[Sequence[Track]], number: int = 1) -> list[str]:
 def test_a_vehicle_is_shown_from_its_first_weak_detection_to_its_last() -> None:
     seen: list[list[Scored]] = [[(CAR, 0.35)]] * 3 + [[(CAR, 0.9)]] * 30
     shown = shown_later([*[[]] * 5, *seen, *[[]] * 30])
-    assert states(shown) == [""] * 5 + ["seen"] * 33 + [""] * 30
+    assert states(shown) == [""] * 5 + ["detected"] * 33 + [""] * 30
 
 
 def test_what_is_never_sure_is_not_shown() -> None:
@@ -54,17 +54,17 @@ def test_between_two_searches_a_vehicle_is_on_its_way_from_one_to_the_other() ->
     """It brakes: what came before does not tell where it is."""
     places = [moved_to(CAR, round(100 + 12 * n - 0.1 * n * n), 400) for n in range(40)]
     shown = shown_later([[place] for place in places], stride=3)
-    assert states(shown[:37]) == [("between", "seen")[n % 3 == 0] for n in range(37)]
+    assert states(shown[:37]) == [("interpolated", "detected")[n % 3 == 0] for n in range(37)]
     for place, (track,) in zip(places[6:37], shown[6:37], strict=True):
         assert track.box.iou(place) > 0.92
 
 
-@pytest.mark.parametrize(("missed", "state"), [(AHEAD - 4, "between"), (AHEAD + 3, "")])
+@pytest.mark.parametrize(("missed", "state"), [(AHEAD - 4, "interpolated"), (AHEAD + 3, "")])
 def test_a_gap_is_bridged_if_the_look_ahead_shows_that_it_ends(missed: int, state: str) -> None:
     places = moving(CAR, dx=4, frames=80)
     clip = [[] if 30 <= n < 30 + missed else [place] for n, place in enumerate(places)]
     shown = shown_later(clip)
-    assert states(shown) == ["seen"] * 30 + [state] * missed + ["seen"] * (50 - missed)
+    assert states(shown) == ["detected"] * 30 + [state] * missed + ["detected"] * (50 - missed)
     assert all(t.box.iou(p) > 0.9 for p, tracks in zip(places, shown, strict=True) for t in tracks)
 
 
@@ -72,21 +72,21 @@ def test_a_vehicle_that_comes_in_at_the_side_is_shown_before_its_first_detection
     places = moving(Box.sized(WIDTH - 40, 400, 200, 140), dx=-8, frames=60)
     clip = [[inside(place)] if n >= 6 else [] for n, place in enumerate(places)]
     shown = shown_later(clip)
-    assert states(shown)[1:7] == ["between"] * 5 + ["seen"]
+    assert states(shown)[1:7] == ["interpolated"] * 5 + ["detected"]
     for place, tracks in list(zip(places, shown, strict=True))[2:]:
         assert tracks[0].box.iou(inside(place)) > 0.7
 
 
 def test_a_vehicle_that_appears_inside_the_frame_is_not_shown_before() -> None:
     shown = shown_later([*[[]] * 6, *[[place] for place in moving(CAR, dx=-8, frames=40)]])
-    assert states(shown)[:7] == [""] * 6 + ["seen"]
+    assert states(shown)[:7] == [""] * 6 + ["detected"]
 
 
 def test_one_that_has_left_the_frame_is_shown_where_it_was() -> None:
     places = moving(moved_to(CAR, WIDTH - 200, 400), dx=10, frames=40)
     clip = [[inside(place)] if place.x1 < WIDTH - 10 else [] for place in places]
     shown = shown_later(clip)
-    assert states(shown)[:15] == ["seen"] * 15
+    assert states(shown)[:15] == ["detected"] * 15
     assert ids(shown) == {1}
     assert shown[-1] == []
 
@@ -107,4 +107,4 @@ def test_without_looking_ahead_the_same_tracker_shows_what_it_knows_now() -> Non
     for number in range(20):
         now = tracker.update(detections([CAR] if number < 18 else []), number / RATE)
         assert now == tracker.at(number / RATE)
-    assert [track.state for track in now] == ["lost"]
+    assert [track.state for track in now] == ["predicted"]

@@ -26,13 +26,13 @@ from vdet.track.motion.tracker import MotionTracker
 
 CAR = Box.sized(400, 400, 100, 70)
 DEFAULTS = MotionTrackerSettings()
-CARRIED = frames(DEFAULTS.carried)
+CARRIED = frames(DEFAULTS.coast_seconds)
 
 # Showing
 
 
 def test_evidence_weaker_than_the_leak_never_adds_up() -> None:
-    faint = (CAR, DEFAULTS.leak)
+    faint = (CAR, DEFAULTS.decay)
     assert ids(follow([[faint]] * 300)) == set()
 
 
@@ -43,19 +43,19 @@ def test_flicker_is_never_shown() -> None:
 
 
 def test_a_vehicle_that_is_hardly_likely_is_not_shown() -> None:
-    doubtful = (CAR, DEFAULTS.least_score - 0.01)
+    doubtful = (CAR, DEFAULTS.min_score - 0.01)
     assert ids(follow([[doubtful]] * 100)) == set()
-    assert ids(follow([[doubtful]] * 100, least_score=0)) == {1}
-    assert ids(follow([[(CAR, DEFAULTS.least_score)]] * 100)) == {1}
+    assert ids(follow([[doubtful]] * 100, min_score=0)) == {1}
+    assert ids(follow([[(CAR, DEFAULTS.min_score)]] * 100)) == {1}
 
 
 def test_a_vehicle_is_shown_once_it_is_wide_enough() -> None:
-    least = DEFAULTS.smallest * WIDTH
+    minimum = DEFAULTS.min_size * WIDTH
     places = [Box.sized(600 - n // 2, 400, 8 + n, 6 + n) for n in range(60)]
     shown = follow([place] for place in places)
     assert ids(shown) == {1}
-    assert all(track.box.width >= least - 1 for tracks in shown for track in tracks)
-    assert places[first_shown(shown)].width == pytest.approx(least, abs=2)
+    assert all(track.box.width >= minimum - 1 for tracks in shown for track in tracks)
+    assert places[first_shown(shown)].width == pytest.approx(minimum, abs=2)
 
 
 # Place
@@ -78,7 +78,7 @@ def test_through_missed_frames_a_vehicle_is_shown_where_its_motion_leads() -> No
     clip = [[] if 30 <= n < 36 else [place] for n, place in enumerate(places)]
     shown = follow(clip)
     assert [track.state for tracks in shown[28:38] for track in tracks] == (
-        ["seen"] * 2 + ["lost"] * 6 + ["seen"] * 2
+        ["detected"] * 2 + ["predicted"] * 6 + ["detected"] * 2
     )
     for place, tracks in list(zip(places, shown, strict=True))[30:]:
         assert id_at(tracks, place) == 1
@@ -173,8 +173,8 @@ def test_a_hidden_vehicle_is_forgotten_after_some_seconds() -> None:
     van = moved_to(VAN, 370, 390)
     clip = [
         *[[CAR]] * 10,
-        *[[CAR, each] for each in moving(moved_to(VAN, 200, 390), dx=10, frames=10)],
-        *[[van]] * (frames(DEFAULTS.remembered_hidden) + 30),
+        *[[CAR, item] for item in moving(moved_to(VAN, 200, 390), dx=10, frames=10)],
+        *[[van]] * (frames(DEFAULTS.keep_hidden_id_seconds) + 30),
         *[[moved_to(VAN, 800, 390), CAR]] * 8,
     ]
     shown = follow(clip)

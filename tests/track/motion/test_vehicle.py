@@ -6,7 +6,11 @@ from vdet.track.motion.history import SCORE_TIME
 from vdet.track.motion.vehicle import LONGEST_LOOK, Look, Observation, Vehicle
 
 SETTINGS = MotionTrackerSettings(
-    leak=0.2, needed=0.12, carried=0.22, remembered=0.42, remembered_hidden=2.02
+    decay=0.2,
+    confirm_seconds=0.12,
+    coast_seconds=0.22,
+    keep_id_seconds=0.42,
+    keep_hidden_id_seconds=2.02,
 )
 SIZE = (1000, 500)
 FRAME = 0.04
@@ -40,7 +44,7 @@ def missed(vehicle: Vehicle, frames: int, seconds: float = FRAME) -> Vehicle:
 
 def test_a_single_frame_does_not_confirm_a_vehicle_however_long_it_lasts() -> None:
     assert [seen(frames, seconds=0.5).confirmed for frames in (1, 2)] == [False, True]
-    assert SETTINGS.needed > LONGEST_LOOK
+    assert SETTINGS.confirm_seconds > LONGEST_LOOK
 
 
 # Time without a detection

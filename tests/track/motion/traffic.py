@@ -83,13 +83,13 @@ def random_traffic(seed: int, seconds: float, fastest: float) -> list[RoadVehicl
 def truth_at(vehicles: Sequence[RoadVehicle], time: float) -> list[TrueVehicle]:
     """Return the vehicles in the picture, nearest first; ids count from 1 in the order given."""
     numbered = sorted(
-        enumerate(vehicles, start=1), key=lambda each: each[1].ahead + each[1].speed * time
+        enumerate(vehicles, start=1), key=lambda vehicle: vehicle[1].ahead + vehicle[1].speed * time
     )
     found: list[TrueVehicle] = []
     for number, vehicle in numbered:
         box = vehicle.box_at(time)
         if box is not None:
-            nearer = np.reshape([each.box for each in found], (-1, 4))
+            nearer = np.reshape([item.box for item in found], (-1, 4))
             hidden = float(coverage(box[np.newaxis], nearer).max(initial=0))
             found.append(TrueVehicle(number, box, hidden))
     return found
@@ -99,8 +99,8 @@ def truth_at(vehicles: Sequence[RoadVehicle], time: float) -> list[TrueVehicle]:
 class Noise:
     """What a detector does wrong.
 
-    `sides` is the standard deviation of the sides of a box, share of its size. `missed` is the
-    share of vehicles that it does not see. `false` is the mean number of false detections in a
+    `sides` is the standard deviation of the sides of a box, fraction of its size. `missed` is the
+    fraction of vehicles that it does not see. `false` is the mean number of false detections in a
     frame; their scores go up to `surest`.
     """
 

@@ -112,8 +112,8 @@ def test_a_shown_car_without_a_region_is_found_by_its_image() -> None:
     cars = RulesTracker(tracker_but(history=1))
     show(cars, SEDAN)
     moved = moved_to(SEDAN, 130, 240)
-    assert update(cars, road(moved)) == [Track(1, moved, 1.0, state="lost")]
-    assert update(cars, road(moved), moved) == [Track(1, moved, 1.0, state="seen")]
+    assert update(cars, road(moved)) == [Track(1, moved, 1.0, state="predicted")]
+    assert update(cars, road(moved), moved) == [Track(1, moved, 1.0, state="detected")]
 
 
 def test_a_car_that_was_never_shown_is_not_searched() -> None:

@@ -24,7 +24,7 @@ from vdet.media import Picture
 _MOST_BOXES = 10_000  # before suppression, those of the highest scores
 
 Candidates = tuple[RawBoxes, InputForm, float]
-"""The boxes before suppression, the input that they were found in, and the least score."""
+"""The boxes before suppression, the input that they were found in, and the minimum score."""
 
 SHIPPED = Path(__file__).parents[2] / "models" / "net.onnx"
 
@@ -40,7 +40,7 @@ class NetworkModel:
 
     def __init__(self, path: Path, settings: NetworkSettings) -> None:
         self._settings = settings
-        self._recognized = recognize(Session(path), settings.names or ())
+        self._recognized = recognize(Session(path), settings.class_names or ())
         names, wanted = self._recognized.names, settings.classes
         self._numbers = np.array([*our_classes(names, wanted), -1], np.int32)
         if (self._numbers < 0).all():
@@ -77,7 +77,7 @@ class NetworkDetector:
     def search(self, picture: Picture, index: int | None) -> Candidates:
         """Return the vehicles, in pixels of the frame."""
         network = self.for_stills if index is None else self.network
-        raw = network.find(picture, self.settings.least)
+        raw = network.find(picture, self.settings.min_score)
         boxes = visible(raw.boxes.astype(np.float64), (picture.width, picture.height))
         is_known = (raw.classes >= 0) & (raw.classes < len(self.numbers))
         numbers = self.numbers[np.where(is_known, raw.classes, -1)]
@@ -85,13 +85,13 @@ class NetworkDetector:
         wanted = self.numbers[:-1, np.newaxis] == np.arange(len(self.settings.classes))
         likely = None if raw.class_scores is None else raw.class_scores[keep] @ wanted
         found = RawBoxes(boxes[keep].astype(np.float32), raw.scores[keep], numbers[keep], likely)
-        return found, network.form, self.settings.still_score if index is None else 0.0
+        return found, network.form, self.settings.min_score_still if index is None else 0.0
 
     def detect(self, candidates: Candidates) -> Boxes:
         """Return one box for each vehicle."""
-        raw, form, least = candidates
-        rows = suppress(raw.boxes, raw.scores, self.settings.overlap)
-        rows = rows[raw.scores[rows] >= least]
+        raw, form, minimum = candidates
+        rows = suppress(raw.boxes, raw.scores, self.settings.nms_iou)
+        rows = rows[raw.scores[rows] >= minimum]
         return Boxes(
             raw.boxes[rows],
             raw.scores[rows],

@@ -38,7 +38,7 @@ OutputLayout = Callable[[Sequence[Array], float], RawBoxes]
 
 
 def our_cells(
-    outputs: Sequence[Array], least: float, *, cells: Cells, score: NetworkScoreSettings
+    outputs: Sequence[Array], minimum: float, *, cells: Cells, score: NetworkScoreSettings
 ) -> RawBoxes:
     """Read our own networks: `(1, cells, 5 + classes)`; see `vdet.learn.net.architecture`.
 
@@ -48,7 +48,7 @@ def our_cells(
     if len(table) != len(cells[1]):
         raise ValueError("not one row for each cell")
     logits = score.slope * table[:, 0] + score.offset
-    rows = np.flatnonzero(logits >= math.log(least / (1 - least)))
+    rows = np.flatnonzero(logits >= math.log(minimum / (1 - minimum)))
     centers, strides = cells
     lengths = np.logaddexp(0, table[rows, 1:5] + 1) * strides[rows, np.newaxis]
     middle = centers[rows]
@@ -57,22 +57,24 @@ def our_cells(
     return _raw(boxes, 1 / (1 + np.exp(-logits[rows])), classes.argmax(axis=1), classes)
 
 
-def center_columns(outputs: Sequence[Array], least: float) -> RawBoxes:
+def center_columns(outputs: Sequence[Array], minimum: float) -> RawBoxes:
     """Read Ultralytics v8 and v11: `(1, 4 + nc, n)`, columns of middle, size and class scores."""
     table = outputs[0][0].T
-    return _of_best_classes(table[:, :2], table[:, 2:4], table[:, 4:], least)
+    return _of_best_classes(table[:, :2], table[:, 2:4], table[:, 4:], minimum)
 
 
-def center_fractions(outputs: Sequence[Array], least: float, *, size: tuple[int, int]) -> RawBoxes:
+def center_fractions(
+    outputs: Sequence[Array], minimum: float, *, size: tuple[int, int]
+) -> RawBoxes:
     """Read RT-DETR of Ultralytics: rows of middle and size, as fractions, and class scores.
 
     `size` is width and height of the input, pixels.
     """
     table = outputs[0][0]
-    return _of_best_classes(table[:, :2] * size, table[:, 2:4] * size, table[:, 4:], least)
+    return _of_best_classes(table[:, :2] * size, table[:, 2:4] * size, table[:, 4:], minimum)
 
 
-def center_rows(outputs: Sequence[Array], least: float, *, grid: Cells | None = None) -> RawBoxes:
+def center_rows(outputs: Sequence[Array], minimum: float, *, grid: Cells | None = None) -> RawBoxes:
     """Read YOLOX: rows of middle, size, objectness and class scores.
 
     `grid` are the cells of the input where middles and sizes are relative to those.
@@ -83,20 +85,22 @@ def center_rows(outputs: Sequence[Array], least: float, *, grid: Cells | None = 
         centers, strides = grid
         middle = centers + (middle - 0.5) * strides[:, np.newaxis]  # offsets from the cell's corner
         size = np.exp(np.minimum(size, 20)) * strides[:, np.newaxis]
-    return _of_best_classes(middle, size, table[:, 4:5] * table[:, 5:], least)
+    return _of_best_classes(middle, size, table[:, 4:5] * table[:, 5:], minimum)
 
 
-def final_rows(outputs: Sequence[Array], least: float) -> RawBoxes:
+def final_rows(outputs: Sequence[Array], minimum: float) -> RawBoxes:
     """Read rows of x1, y1, x2, y2, score, class after suppression; empty rows have score 0."""
     table = outputs[0][0]
-    table = table[table[:, 4] >= least]
+    table = table[table[:, 4] >= minimum]
     return _raw(table[:, :4], table[:, 4], table[:, 5])
 
 
-def named_columns(outputs: Sequence[Array], least: float, order: tuple[int, int, int]) -> RawBoxes:
+def named_columns(
+    outputs: Sequence[Array], minimum: float, order: tuple[int, int, int]
+) -> RawBoxes:
     """Read RT-DETR; `order` has the places of the outputs labels, boxes and scores."""
     labels, boxes, scores = (outputs[place][0] for place in order)
-    rows = np.flatnonzero(scores >= least)
+    rows = np.flatnonzero(scores >= minimum)
     return _raw(boxes[rows], scores[rows], labels[rows])
 
 
@@ -110,11 +114,11 @@ def cell_centers(width: int, height: int) -> Cells:
     return np.concatenate(centers).astype(np.float32), np.concatenate(strides).astype(np.float32)
 
 
-def _of_best_classes(middle: Array, size: Array, scores: Array, least: float) -> RawBoxes:
+def _of_best_classes(middle: Array, size: Array, scores: Array, minimum: float) -> RawBoxes:
     """Return a box of its best class for each row of `scores`, `(n, classes)`."""
     classes = scores.argmax(axis=1)
     best = scores[np.arange(len(scores)), classes]
-    rows = np.flatnonzero(best >= least)
+    rows = np.flatnonzero(best >= minimum)
     half = size[rows] / 2
     boxes = np.concatenate([middle[rows] - half, middle[rows] + half], axis=1)
     return _raw(boxes, best[rows], classes[rows], scores[rows])

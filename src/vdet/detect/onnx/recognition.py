@@ -86,8 +86,8 @@ class Recognized:
         pixels = min(_MAX_PIXELS, self.header.pixels * (_STILL_PIXELS if are_stills else 1))
         return _ours(self.session, self.header, size_of_area(width, height, pixels))
 
-    def find(self, picture: Picture, least: float) -> RawBoxes:
-        """Return the boxes in pixels of the picture, with scores of at least `least`.
+    def find(self, picture: Picture, minimum: float) -> RawBoxes:
+        """Return the boxes in pixels of the picture, with scores of at least `minimum`.
 
         Several threads may call this at once.
 
@@ -100,7 +100,7 @@ class Recognized:
         outputs = _outputs(self.session, self.form, values)
         try:
             with np.errstate(all="ignore"):  # numbers of any size
-                raw = self.layout(outputs, least)
+                raw = self.layout(outputs, minimum)
                 found = replace(raw, boxes=place.to_frame(raw.boxes))
         except (ValueError, TypeError, IndexError) as error:
             raise _unknown(self.session, f"it gives {_shapes(outputs)}") from error
@@ -120,7 +120,7 @@ def recognize(session: Session, names: Sequence[str] = ()) -> Recognized:
     Raises
     ------
     ModelError
-        The network is of no known form; the message says how it differs.
+        The network has an unknown form; the message says how it differs.
     """
     header = read_header(session)
     if header is not None:
@@ -215,7 +215,9 @@ def _names(session: Session, names: tuple[str, ...], count: int | None) -> tuple
         raise ModelError(f"{session.path}: has {count} classes, not {len(names)}; name them all")
     usual = {len(COCO): COCO, 1: ("vehicle",)}
     if not names and count not in usual:
-        raise ModelError(f"{session.path}: does not name its {count} classes; give detector.names")
+        raise ModelError(
+            f"{session.path}: does not name its {count} classes; set detector.class_names"
+        )
     return names or usual[count]
 
 
@@ -235,7 +237,7 @@ def _ultralytics_metadata(session: Session) -> _Metadata:
             ast.literal_eval(metadata.get(key, "None")) for key in ("names", "imgsz", "args")
         )
         listed = names.values() if isinstance(names, dict) else names or ()
-        known = tuple(str(each) for each in listed)
+        known = tuple(str(item) for item in listed)
         size = (int(side[1]), int(side[0])) if side else None
         has_nms = bool((args or {}).get("nms"))
     except Exception as error:  # of many kinds: the text is any
@@ -251,7 +253,7 @@ def _ultralytics_metadata(session: Session) -> _Metadata:
 
 def _form(session: Session, size: tuple[int, int] | None) -> InputForm:
     """Return the usual input, of fixed size, or of the `size` in the metadata, or of 640×640."""
-    slot = next(each for each in session.inputs if each.name != _SIZES)
+    slot = next(input_ for input_ in session.inputs if input_.name != _SIZES)
     shape = [side if isinstance(side, int) and side > 0 else None for side in slot.shape]
     if len(shape) != 4 or shape[0] not in (1, None) or shape[1] not in (3, None):
         seen = str(slot.shape).replace("None", "any")
@@ -276,8 +278,8 @@ def _outputs(session: Session, form: InputForm, values: Array) -> list[Array]:
 
 
 def _shapes(outputs: Sequence[Array]) -> str:
-    return " and ".join(str(each.shape) for each in outputs)
+    return " and ".join(str(output.shape) for output in outputs)
 
 
 def _unknown(session: Session, seen: str) -> ModelError:
-    return ModelError(f"{session.path}: is of no known form: {seen}; see docs/networks.md")
+    return ModelError(f"{session.path}: has an unknown form: {seen}; see docs/networks.md")

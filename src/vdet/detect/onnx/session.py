@@ -71,13 +71,15 @@ class Session:
             self.metadata: Mapping[str, str] = self._session.get_modelmeta().custom_metadata_map
             self.inputs = self._session.get_inputs()
             outputs = self._session.get_outputs()
-            self.output_names = [each.name for each in outputs]
-            self.output_shapes = [each.shape for each in outputs]
+            self.output_names = [output.name for output in outputs]
+            self.output_shapes = [output.shape for output in outputs]
         except Exception as error:  # onnxruntime raises kinds of its own, and plain ones
             raise ModelError(f"{path}: onnxruntime cannot load it: {_in_words(error)}") from error
-        for each in self.inputs:
-            if each.type not in TYPES:
-                raise ModelError(f"{path}: its input {each.name:.40} is a {each.type}, no picture")
+        for input_ in self.inputs:
+            if input_.type not in TYPES:
+                raise ModelError(
+                    f"{path}: its input {input_.name:.40} is a {input_.type}, no picture"
+                )
         if any(len(value) > _MAX_METADATA for value in self.metadata.values()):
             raise ModelError(f"{path}: has metadata of more than {_MAX_METADATA:,} characters")
 
@@ -97,7 +99,7 @@ class Session:
     def _run(self, inputs: Mapping[str, Array], options: Any, outputs: Future[list[Array]]) -> None:
         try:
             found = self._session.run(None, dict(inputs), options)
-            outputs.set_result([np.asarray(each) for each in found])
+            outputs.set_result([np.asarray(item) for item in found])
         except Exception as error:  # onnxruntime raises kinds of its own
             outputs.set_exception(self._failed(_in_words(error)))
 

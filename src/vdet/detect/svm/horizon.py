@@ -12,11 +12,11 @@ import numpy as np
 from vdet.boxes import Float64Array, Image
 
 DEFAULT_HORIZON = 0.58
-"""Where dashboard cameras usually have it, share of the height; used where none is found."""
+"""Where dashboard cameras usually have it, fraction of the height; used where none is found."""
 
 _MAX_ASPECT = 4  # height over width of a picture that can show a road
 _WIDTH = 640  # pixels, of the picture in which segments are detected
-_MIN_LENGTH = 0.02  # of a segment, share of the width
+_MIN_LENGTH = 0.02  # of a segment, fraction of the width
 _SLOPES = (12.0, 75.0)  # degrees from the horizontal; vehicles are flatter, poles are steeper
 _MAX_SINE = 0.05  # of the angle between a segment and the direction to the point it votes for
 _MIN_SEGMENTS = 8  # on each side
@@ -25,7 +25,7 @@ _COLUMNS = np.arange(0.25, 0.76, 0.02)
 
 
 def find_horizon(images: Sequence[Image]) -> float | None:
-    """Return the row of the horizon, share of the frame's height.
+    """Return the row of the horizon, fraction of the frame's height.
 
     Parameters
     ----------

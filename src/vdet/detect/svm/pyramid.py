@@ -94,7 +94,7 @@ def _levels(picture: Picture, rows: slice, margin: int) -> list[_Levels]:
     luma, blue, red = planes.coding.to_common(
         (planes.luma[rows], planes.blue[blue_red], planes.red[blue_red])
     )
-    chroma = [_Levels(_widened(each, margin // 2), level=1) for each in (red, blue)]
+    chroma = [_Levels(_widened(item, margin // 2), level=1) for item in (red, blue)]
     return [_Levels(_widened(luma, margin)), *chroma]
 
 

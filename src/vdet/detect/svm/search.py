@@ -16,7 +16,7 @@ from vdet.errors import FrameSizeError, ImageError
 from vdet.media import Picture
 
 MAX_WINDOWS = 100_000
-"""Most windows in a frame; more take minutes. The shipped settings lay about 2,700."""
+"""Maximum number of windows in a frame; more take minutes. The shipped settings lay about 2,700."""
 
 _ALIGNMENT = 16
 """The searched part begins at a multiple of this many pixels of the frame, so that it can be halved
@@ -44,7 +44,8 @@ class FrameSearch:
     width, height
         Size of the frames, pixels.
     horizon
-        Row of the horizon, share of the frames' height, for the sets that follow the perspective.
+        Row of the horizon, fraction of the frames' height, for the sets that follow the
+        perspective.
 
     Attributes
     ----------
@@ -74,7 +75,7 @@ class FrameSearch:
             raise FrameSizeError(f"no search window fits into {width}×{height} pixels")
         if (count := sum(map(len, self.grids))) > MAX_WINDOWS:
             raise ImageError(
-                f"{count:,} windows in {width}×{height} pixels are too many; give larger steps"
+                f"{count:,} windows in {width}×{height} pixels are too many; use larger steps"
             )
         self._searches = [engine(model, grid) for grid in self.grids]
         self._boxes = np.concatenate([grid.boxes for grid in self.grids])
@@ -91,7 +92,7 @@ class FrameSearch:
     def search(self, picture: Picture) -> Windows:
         """Search a frame; return the windows of all sets, in the order of `grids`."""
         frame = FramePyramid(picture, self._features, self._top, self._bottom, self._margin)
-        results = [each.search(frame, self._probability) for each in self._searches]
+        results = [search.search(frame, self._probability) for search in self._searches]
         probabilities = np.concatenate([result.probabilities for result in results])
         sides = np.concatenate([result.sides for result in results])
         vehicles = _vehicle_boxes(self._boxes.astype(np.float32), sides)

@@ -19,13 +19,13 @@ from vdet.detect.svm.heat import HotRegion
 from vdet.detect.svm.windows import Windows
 
 MAX_VOTES = 400
-"""Most votes in a group of regions: the time grows with the square of their number."""
+"""Maximum number of votes in a group of regions: the time grows with the square of their number."""
 
 _MAX_PROBABILITY = 1 - 2**-24
 """Higher ones are lowered to it, because the position weight of 1 is infinite."""
 
 _AGREEMENT = 0.35
-"""Least intersection over union of two boxes that agree."""
+"""Minimum intersection over union of two boxes that agree."""
 
 _INSIDE = 0.7
 """A box with more than this share inside a larger vehicle is a part of it."""
@@ -34,7 +34,7 @@ _SHARPNESS = 4.0
 """Power of -log(1 - probability) that is a hit's `position` weight: the best fit counts most."""
 
 _FAR_STRONGER = 4
-"""How many times the weight of the box around it a box needs, so that it is no part of it."""
+"""How many times the weight of the box around it a box needs, so that it is not a part of it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,8 +63,8 @@ class Votes:
         can only guess how far a vehicle reaches beyond, so their guesses need not agree.
         """
         boxes = from_sizes(np.concatenate([some.vehicles for some in hits]))
-        shares = np.concatenate([each.shares for each in hits], dtype=np.float64)
-        probabilities = np.concatenate([each.probabilities for each in hits], dtype=np.float64)
+        shares = np.concatenate([hit.shares for hit in hits], dtype=np.float64)
+        probabilities = np.concatenate([hit.probabilities for hit in hits], dtype=np.float64)
         bounded = np.clip(probabilities, 1 - _MAX_PROBABILITY, _MAX_PROBABILITY)
         position = (-np.log1p(-bounded)) ** _SHARPNESS
         inside = visible(boxes, size)
@@ -86,15 +86,15 @@ class Votes:
         return Votes(self.boxes[indices], self.presence[indices], self.position[indices])
 
 
-def split_regions(regions: Sequence[HotRegion], votes: Votes, least: float) -> list[HotRegion]:
+def split_regions(regions: Sequence[HotRegion], votes: Votes, minimum: float) -> list[HotRegion]:
     """Return the vehicles that the votes in the regions agree on, strongest first in each region.
 
     Regions whose boxes overlap are split as one, so that no vote counts twice. A box inside a
     larger one is kept only if it is far stronger; the tracker, or `SvmDetector` in a still picture,
-    shows one of the two. `least` is the least weight of the votes that agree on a vehicle.
+    shows one of the two. `minimum` is the minimum weight of the votes that agree on a vehicle.
     """
     groups = _overlapping([region.box for region in regions])
-    found = [vehicle for group in groups for vehicle in _vehicles(votes.within(group), least)]
+    found = [vehicle for group in groups for vehicle in _vehicles(votes.within(group), minimum)]
     boxes = np.reshape([box for box, _, _ in found], (-1, 4))
     position = np.array([weight for _, weight, _ in found])
     parts: BoolArray = coverage(boxes, boxes) > _INSIDE
@@ -119,12 +119,12 @@ def _overlapping(boxes: Iterable[Box]) -> list[list[Box]]:
     return groups
 
 
-def _vehicles(votes: Votes, least: float) -> Iterator[tuple[Float64Array, float, float]]:
+def _vehicles(votes: Votes, minimum: float) -> Iterator[tuple[Float64Array, float, float]]:
     """Yield boxes `(4,)` that votes agree on, and their weights of position and presence."""
     overlaps = iou_matrix(votes.boxes, votes.boxes)
     presence, position = votes.presence.copy(), votes.position.copy()
     # Presence only falls: once no box has enough, none will be found any more.
-    while position.any() and (overlaps @ presence).max() >= least:
+    while position.any() and (overlaps @ presence).max() >= minimum:
         agreed = np.where(position > 0, overlaps @ position, 0)
         mode = int(agreed.argmax())
         box = _average(votes.boxes, position, overlaps[mode])
@@ -133,7 +133,7 @@ def _vehicles(votes: Votes, least: float) -> Iterator[tuple[Float64Array, float,
         weight = float(overlaps[mode] @ presence)
         used = np.maximum(around, overlaps[mode]) > _AGREEMENT
         used[mode] = True
-        if weight >= least:
+        if weight >= minimum:
             yield box, float(agreed[mode]), weight
             used |= coverage(votes.boxes, box[np.newaxis])[:, 0] > _INSIDE
         presence[used] = position[used] = 0

@@ -75,7 +75,7 @@ class GridResult:
     """What the search of a grid gives, window by window in the order of `WindowGrid.boxes`.
 
     `probabilities` is float32 `(n,)`. `sides` is float32 `(n, 4)`: left, top, right and bottom of
-    the vehicle, from the centre of the window in its sides; of windows that are no hits, and by a
+    the vehicle, from the centre of the window in its sides; of windows that are not hits, and by a
     model without box regression, `WINDOW_SIDES`.
     """
 
@@ -144,11 +144,11 @@ def lay_grids(
 ) -> list[WindowGrid]:
     """Lay the window sets over a frame of `width` × `height` pixels.
 
-    `horizon` is its row, as a share of the frame's height. Sets of which no window fits are left
+    `horizon` is its row, as a fraction of the frame's height. Sets of which no window fits are left
     out.
     """
     search = scale_lengths(settings.search, height / REFERENCE_HEIGHT)
-    grids = [lay_grid(each, width, height) for each in search.windows]
+    grids = [lay_grid(window, width, height) for window in search.windows]
     grids += lay_perspective(search.perspective, features, width, height, horizon=horizon)
     return [grid for grid in grids if len(grid)]
 
@@ -194,7 +194,7 @@ def lay_perspective(
     Parameters
     ----------
     horizon
-        Row of the horizon, share of the frame's height.
+        Row of the horizon, fraction of the frame's height.
 
     Returns
     -------

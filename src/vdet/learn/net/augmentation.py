@@ -15,14 +15,14 @@ from vdet.learn.net.sources import NetSample, NetSource, join
 from vdet.learn.net.weather import with_weather
 
 LEAST_SIDE = 8.0
-"""Least longer side of a vehicle, pixels; smaller vehicles are ignored."""
+"""Minimum longer side of a vehicle, pixels; smaller vehicles are ignored."""
 _SCALES = 0.5, 2.0
-"""Least and largest scale of a picture; at 1 its width fits."""
+"""Minimum and largest scale of a picture; at 1 its width fits."""
 _MOSAIC_SCALES = 0.5, 1.5
-"""Least and largest scale of the four pictures of a mosaic."""
-_LEAST_VISIBLE = 0.25  # share of a vehicle that is left after cropping, else it is ignored
+"""Minimum and largest scale of the four pictures of a mosaic."""
+_LEAST_VISIBLE = 0.25  # fraction of a vehicle that is left after cropping, else it is ignored
 _ASPECT = 0.1  # most change of the width relative to the height
-_TILTED = 0.25  # share of pictures that are turned
+_TILTED = 0.25  # fraction of pictures that are turned
 _TILT = 3.0  # deviation of their angles, degrees
 
 
@@ -56,13 +56,13 @@ class SampleDrawer:
         shares = np.concatenate(
             [
                 np.full(
-                    len(each.samples),
-                    settings.weights.get(each.name, 1.0) / len(each.samples) ** 0.5,
+                    len(source.samples),
+                    settings.weights.get(source.name, 1.0) / len(source.samples) ** 0.5,
                 )
-                for each in sources
+                for source in sources
             ]
         )
-        factors = repeat_factors(self._samples, shares / shares.sum(), settings.repeat)
+        factors = repeat_factors(self._samples, shares / shares.sum(), settings.repeat_threshold)
         self._shares = shares * factors / (shares * factors).sum()
         self._paster = Paster(self._samples)
 
@@ -120,11 +120,11 @@ def repeat_factors(
     shares
         Float64 `(n,)`: the probability of each picture before; the sum is 1.
     """
-    present = [np.unique(each.classes[~each.ignored]) for each in samples]
-    count = 1 + max((int(each.max()) for each in present if len(each)), default=0)
+    present = [np.unique(sample.classes[~sample.ignored]) for sample in samples]
+    count = 1 + max((int(item.max()) for item in present if len(item)), default=0)
     has = np.zeros((len(samples), count + 1), np.bool_)  # the last column: unknown kinds
-    for row, each in zip(has, present, strict=True):
-        row[each] = True
+    for row, item in zip(has, present, strict=True):
+        row[item] = True
     fractions = np.maximum(shares @ has[:, :count], 1e-9)
     factors = np.maximum(1.0, np.sqrt(threshold / fractions))
     return np.asarray(np.where(has[:, :count], factors, 1.0).max(axis=1), np.float64)

@@ -110,7 +110,9 @@ def start_from(network: Network, path: Path, pictures: Tensor, classes: Sequence
         elif isinstance(layer, nn.BatchNorm2d):
             _undo(layer, inputs[0], biases[-1])
 
-    layers = [each for each in network.modules() if isinstance(each, nn.Conv2d | nn.BatchNorm2d)]
+    layers = [
+        module for module in network.modules() if isinstance(module, nn.Conv2d | nn.BatchNorm2d)
+    ]
     hooks = [layer.register_forward_pre_hook(load) for layer in layers]
     try:
         header = read_header(Session(path))
@@ -131,7 +133,7 @@ def start_from(network: Network, path: Path, pictures: Tensor, classes: Sequence
 def _convolutions(path: Path) -> list[tuple[Tensor, Tensor]]:
     """Return weight and bias of all convolutions of a file, in the order of the graph."""
     graph = onnx.load(str(path)).graph
-    constants = {each.name: numpy_helper.to_array(each) for each in graph.initializer}
+    constants = {item.name: numpy_helper.to_array(item) for item in graph.initializer}
     for node in graph.node:
         if node.op_type == "Identity" and node.input[0] in constants:  # equal ones are written once
             constants[node.output[0]] = constants[node.input[0]]

@@ -17,7 +17,10 @@ _MOST = 3  # objects in a picture
 _RARE = 0.5  # a class with fewer objects than this fraction of the mean is rare
 _MARGIN = 0.2  # surroundings on each side, fraction of the box
 _LEAST_SIDE = 24.0  # longer side of an object to paste, pixels
-_SIDES = 16.0, 0.4  # least longer side when pasted, pixels; the longest as a fraction of the height
+_SIDES = (
+    16.0,
+    0.4,
+)  # minimum longer side when pasted, pixels; the longest as a fraction of the height
 _MOST_COVERED = 0.2  # of another object by the pasted one
 
 
@@ -30,8 +33,8 @@ class Paster:
         for number, sample in enumerate(samples):
             for row in _whole(sample):
                 objects.setdefault(int(sample.classes[row]), []).append((number, row))
-        limit = _RARE * np.mean([len(each) for each in objects.values()]) if objects else 0.0
-        self._rare = [each for _, each in sorted(objects.items()) if len(each) < limit]
+        limit = _RARE * np.mean([len(object_) for object_ in objects.values()]) if objects else 0.0
+        self._rare = [item for _, item in sorted(objects.items()) if len(item) < limit]
 
     def paste(self, rng: np.random.Generator, sample: NetSample) -> NetSample:
         """Return the sample, sometimes with objects of rare classes pasted into it."""
@@ -64,8 +67,8 @@ def _paste(rng: np.random.Generator, sample: NetSample, donor: NetSample, row: i
     height, width = sample.image.shape[:2]
     box = donor.boxes[row]
     longer = float((box[2:] - box[:2]).max())
-    least, most = _SIDES[0], min(_SIDES[1] * height, 1.5 * longer)
-    scale = float(np.exp(rng.uniform(np.log(least), np.log(max(least, most))))) / longer
+    minimum, most = _SIDES[0], min(_SIDES[1] * height, 1.5 * longer)
+    scale = float(np.exp(rng.uniform(np.log(minimum), np.log(max(minimum, most))))) / longer
     patch, inner = _patch(donor.image, box, scale)
     rows, columns = patch.shape[:2]
     if rows >= height or columns >= width:

@@ -83,16 +83,16 @@ def read_sources(job: NetworkJob, settings: Settings) -> list[Source]:
 
 def source_lines(reports: Sequence[SourceReport]) -> Iterator[str]:
     """Yield as lines of text what a training learns of its sources, and what not."""
-    for each in reports:
-        learnt = _counted(each.vehicles) or "nothing to learn"
-        plural = "" if each.pictures == 1 else "s"
-        yield f"{each.name}: {each.pictures:,} picture{plural}; {learnt}"
-        if each.unlabelled:
-            yield f"  not labelled, so not background: {', '.join(each.unlabelled)}"
-        if each.ignored:
-            yield f"  ignored: {_counted(each.ignored)}"
-        if each.background:
-            yield f"  background, as their label is unknown: {_counted(each.background)}"
+    for report in reports:
+        learnt = _counted(report.vehicles) or "nothing to learn"
+        plural = "" if report.pictures == 1 else "s"
+        yield f"{report.name}: {report.pictures:,} picture{plural}; {learnt}"
+        if report.unlabelled:
+            yield f"  not labelled, so not background: {', '.join(report.unlabelled)}"
+        if report.ignored:
+            yield f"  ignored: {_counted(report.ignored)}"
+        if report.background:
+            yield f"  background, as their label is unknown: {_counted(report.background)}"
 
 
 def _counted(counts: Counts) -> str:
@@ -114,8 +114,8 @@ def train_to_file(
     ModelError
         The base cannot be read.
     DataError
-        There is no vehicle to learn, the base is not such a network, or the checkpoint is that of
-        another training.
+        There is not a vehicle to learn, the base is not such a network, or the checkpoint is that
+        of another training.
     OutputError
         A file cannot be written.
     """
@@ -130,12 +130,12 @@ def train_to_file(
         progress(step, loss)
 
     network = train_network(
-        [each for each, _ in sources], learning, checkpoint, base=job.base, progress=advance
+        [item for item, _ in sources], learning, checkpoint, base=job.base, progress=advance
     )
     report = NetworkMetrics(
         sources=tuple(report for _, report in sources),
         steps=learning.steps,
-        parameters=sum(each.numel() for each in network.parameters()),
+        parameters=sum(parameter.numel() for parameter in network.parameters()),
         seconds=round(time.monotonic() - began, 1),
         loss=round(sum(losses) / len(losses), 4) if losses else None,
     )

@@ -123,7 +123,7 @@ def image_source(path: Path, settings: Settings) -> Source:
     """
     labelled = read_labelled_pictures(path, Roles.for_training(settings))
     classes = settings.train.net.classes
-    samples = [_sample(each.read(), each, classes) for each in labelled.pictures]
+    samples = [_sample(picture.read(), picture, classes) for picture in labelled.pictures]
     source = NetSource(Path(labelled.name).resolve().name, samples)
     return source, _report(source, classes, labelled)
 
@@ -165,8 +165,8 @@ def _report(source: NetSource, classes: Sequence[str], labelled: LabelledPicture
     for sample in source.samples:
         for part in (sample.image, sample.boxes, sample.classes, sample.ignored):
             digest.update(part.tobytes())
-        vehicles.update(names[each] for each in sample.classes[~sample.ignored].tolist())
-    unlabelled = {name for each in labelled.pictures for name in each.unlabelled}
+        vehicles.update(names[class_] for class_ in sample.classes[~sample.ignored].tolist())
+    unlabelled = {name for picture in labelled.pictures for name in picture.unlabelled}
     return SourceReport(
         source.name,
         len(source.samples),

@@ -29,15 +29,15 @@ CHECKPOINT = 500
 _SEED = 0
 """Seed of the weights and the pictures."""
 _SMALL = 0.35
-"""Share of the steps, at the start, with pictures of half the size."""
+"""Fraction of the steps, at the start, with pictures of half the size."""
 _PLAIN = 0.12
-"""Share of the steps, at the end, without mosaics."""
+"""Fraction of the steps, at the end, without mosaics."""
 _MOSAICS = 0.35
-"""Share of pictures put together of four."""
+"""Fraction of pictures put together of four."""
 _WARM_UP = 200
 """Steps in which the learning rate rises, or a tenth of all if that is less."""
 _LAST_RATE = 0.02
-"""Last learning rate, as a share of the highest."""
+"""Last learning rate, as a fraction of the highest."""
 _WEIGHT_DECAY = 0.02
 _LONGEST_GRADIENT = 10.0
 _BALANCE = 0.5
@@ -115,7 +115,7 @@ def train_network(
     """
     _check(sources, settings)
     learnt_with = {
-        "sources": [(each.name, len(each.samples)) for each in sources],
+        "sources": [(source.name, len(source.samples)) for source in sources],
         "base": str(base),
         **settings.model_dump(exclude={"score"}),  # it changes no weight
     }
@@ -135,9 +135,9 @@ def train_network(
 
 
 def _check(sources: Sequence[NetSource], settings: NetworkTrainingSettings) -> None:
-    if not any((~sample.ignored).any() for each in sources for sample in each.samples):
-        raise DataError("no picture has a vehicle; give labelled pictures")
-    names = {each.name for each in sources}
+    if not any((~sample.ignored).any() for source in sources for sample in source.samples):
+        raise DataError("no picture has a vehicle; pass labelled pictures")
+    names = {source.name for source in sources}
     if unknown := sorted(settings.weights.keys() - names):
         known = ", ".join(sorted(names))
         raise DataError(
@@ -173,10 +173,12 @@ class _Run:
         self._class_weights = class_weights
         self._network = Network(len(settings.classes)).to(memory_format=torch.channels_last).train()
         self.averaged = copy.deepcopy(self._network)
-        weights = [each for each in self._network.parameters() if each.ndim > 1]
-        others = [each for each in self._network.parameters() if each.ndim <= 1]
+        weights = [parameter for parameter in self._network.parameters() if parameter.ndim > 1]
+        others = [parameter for parameter in self._network.parameters() if parameter.ndim <= 1]
         groups = [{"params": weights}, {"params": others, "weight_decay": 0.0}]
-        self._optimizer = torch.optim.AdamW(groups, settings.rate, weight_decay=_WEIGHT_DECAY)
+        self._optimizer = torch.optim.AdamW(
+            groups, settings.learning_rate, weight_decay=_WEIGHT_DECAY
+        )
         self._parts = {
             "network": self._network,
             "averaged": self.averaged,
@@ -195,10 +197,10 @@ class _Run:
         settings, step = self._settings, self.step
         warm_up = min(_WARM_UP, settings.steps // 10)
         if step < warm_up:
-            return settings.rate * (step + 1) / warm_up
+            return settings.learning_rate * (step + 1) / warm_up
         share = max(0.0, 2 * step / settings.steps - 1)  # of the second half
         low = _LAST_RATE
-        return settings.rate * (low + (1 - low) * (1 + math.cos(math.pi * share)) / 2)
+        return settings.learning_rate * (low + (1 - low) * (1 + math.cos(math.pi * share)) / 2)
 
     def learn(self, batch: Batch) -> float:
         """Do one step and return its loss."""
@@ -236,7 +238,7 @@ class _Run:
                 part.load_state_dict(state[name])
             self.step = state["step"]
         except Exception as error:  # torch raises many kinds for a file of another form
-            raise DataError(f"{path}: is no checkpoint of this training; remove it") from error
+            raise DataError(f"{path}: is not a checkpoint of this training; remove it") from error
         if not same:
             others = "with other settings, other pictures or another base"
             raise DataError(f"{path}: belongs to a training {others}; remove it")

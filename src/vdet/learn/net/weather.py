@@ -9,8 +9,8 @@ _NIGHT = 0.14  # fraction of pictures
 _DARK = 70.0  # mean of a picture that is not darkened further
 _FOG = 0.06
 _RAIN = 0.1
-_LAMP = (0.03, 0.09)  # radius of a lamp, fraction of the vehicle's width; least and most
-_TWO_LAMPS = 0.75  # least width of a vehicle with two lamps, fraction of its height
+_LAMP = (0.03, 0.09)  # radius of a lamp, fraction of the vehicle's width; minimum and most
+_TWO_LAMPS = 0.75  # minimum width of a vehicle with two lamps, fraction of its height
 _WIPED = 0.15  # fraction of pictures in rain with a wiper
 _DROPS = 40  # most drops on the glass
 

@@ -23,7 +23,7 @@ shows only a part of one."""
 
 @dataclass(frozen=True, slots=True)
 class Most:
-    """Most windows that are chosen in a frame.
+    """Maximum number of windows that are chosen in a frame.
 
     For each vehicle, at most `per_vehicle` windows that fit it, and as many others that show it. In
     the whole frame, at most `false_alarms` windows where no vehicle is, and `parts` that show only
@@ -40,7 +40,7 @@ class Most:
 MOST = Most()
 
 _MAX_COVERED = 0.3
-"""Largest share of a false alarm that a vehicle or an ignore region may cover."""
+"""Largest fraction of a false alarm that a vehicle or an ignore region may cover."""
 
 _EDGE = 0.002  # of the frame's width: a box this close to a side of the frame is cut off by it
 
@@ -80,7 +80,9 @@ def choose_windows(
     is_hit = windows.probabilities[first] >= most.probability
     comparisons = [compare_windows(boxes, vehicle, frame_width) for vehicle in vehicles]
     distances = [np.full(len(boxes), np.inf)]  # of no vehicle
-    distances += [np.where(each.near, each.distances, np.inf) for each in comparisons]
+    distances += [
+        np.where(comparison.near, comparison.distances, np.inf) for comparison in comparisons
+    ]
     nearest = np.argmin(distances, axis=0) - 1
     is_covered = coverage(boxes, np.concatenate([vehicles, labelled[ignored]])) > _MAX_COVERED
     is_alarm = is_hit & (nearest < 0) & ~is_covered.any(axis=1)
@@ -93,11 +95,11 @@ def choose_windows(
             seen = None if sides is None else cast("Sides", tuple(sides[row].tolist()))
             yield ChosenWindow(kind, Box(*boxes[row].tolist()), seen)
 
-    for number, each in enumerate(comparisons):
+    for number, comparison in enumerate(comparisons):
         own = nearest == number
-        is_part |= is_hit & each.part & ~np.delete(is_covered, number, axis=1).any(axis=1)
-        yield from some("vehicle", each.fits & own, most.per_vehicle, each.sides)
-        yield from some("box", each.shows & own, most.per_vehicle, each.sides)
+        is_part |= is_hit & comparison.part & ~np.delete(is_covered, number, axis=1).any(axis=1)
+        yield from some("vehicle", comparison.fits & own, most.per_vehicle, comparison.sides)
+        yield from some("box", comparison.shows & own, most.per_vehicle, comparison.sides)
     yield from some("false alarm", is_alarm, most.false_alarms)
     yield from some("part", is_part, most.parts)
 

@@ -89,7 +89,7 @@ def _find_in(source: Path) -> list[PatchFile]:
         except ArchiveError as error:
             raise DataError(f"{source}: {error}") from error
     else:
-        raise DataError(f"{source}: no such folder or zip file")
+        raise DataError(f"{source}: folder or zip file not found")
     boxes = _read_table(source) if TABLE in names else {}
     files = [file for name in names if (file := _patch_file(source, name, boxes))]
     if not files:
@@ -100,7 +100,7 @@ def _find_in(source: Path) -> list[PatchFile]:
 
 
 def _patch_file(source: Path, name: str, boxes: Mapping[str, Sides]) -> PatchFile | None:
-    """Return the patch of a file name in a source; None if it is no patch."""
+    """Return the patch of a file name in a source; None if it is not a patch."""
     path = PurePosixPath(name)
     hidden = any(part.startswith((".", "__MACOSX")) for part in path.parts)
     if hidden or path.suffix.lower() not in PICTURE_SUFFIXES:

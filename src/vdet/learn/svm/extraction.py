@@ -106,14 +106,16 @@ def extract(
             yield [whole, *(augment(whole, rng) if augmented else ())]
 
     def describe(same: Sequence[PatchSample]) -> Float32Array:
-        return extractor.describe_all(to_patch(each.image, features.patch) for each in same)
+        return extractor.describe_all(
+            to_patch(patch_sample.image, features.patch) for patch_sample in same
+        )
 
     vectors = [describe([])]
     labels: list[tuple[bool, Float32Array, int]] = []
     with map_ordered(describe, samples(), jobs or core_count()) as results:
         for number, (same, described) in enumerate(results):
             vectors.append(described)
-            labels += [(each.vehicle, each.sides, number) for each in same]
+            labels += [(patch_sample.vehicle, patch_sample.sides, number) for patch_sample in same]
             progress(1)
     vehicle, sides, origins = zip(*labels, strict=True) if labels else ((), (), ())
     return LabelledVectors(

@@ -160,7 +160,7 @@ def mine(
     Parameters
     ----------
     output
-        The zip file to write; `overwrite` replaces one that is there.
+        The zip file to write; `overwrite` replaces an existing one.
     model
         The model whose false alarms are searched for.
     most

@@ -47,9 +47,9 @@ function filtered() {
     if (values[name]) tests.push(i => column[i] === Number(values[name]));
   };
   const limits = (name, column) => {
-    const [least, most] = [values[`${name}-min`], values[`${name}-max`]];
-    if (least) tests.push(i => column[i] !== null && column[i] >= Number(least));
-    if (most) tests.push(i => column[i] !== null && column[i] <= Number(most));
+    const [low, high] = [values[`${name}-min`], values[`${name}-max`]];
+    if (low) tests.push(i => column[i] !== null && column[i] >= Number(low));
+    if (high) tests.push(i => column[i] !== null && column[i] <= Number(high));
   };
   choice("class", data.class);
   choice("way", data.way);

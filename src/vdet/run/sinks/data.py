@@ -45,7 +45,7 @@ class TrackSink(BaseSink):
         assert form is not None  # the suffixes of the kind say so
         video = self.context.video
         if form.whole and video is None:
-            raise OutputError(f"{self.path}: {form.name} is for videos; give another format")
+            raise OutputError(f"{self.path}: {form.name} is for videos; choose another format")
         source = None
         if video is not None:  # a whole video has the frames that are read
             frames = video.frames if self.context.is_part else None

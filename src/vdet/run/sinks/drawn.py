@@ -45,7 +45,7 @@ class Overlay:
     ) -> None:
         self._settings, self._draw = settings, settings.draw
         self._start = video.start if video else None
-        self._counter = counter if settings.traffic.drawn else None
+        self._counter = counter if settings.traffic.draw else None
         automatic = ("id",) if video else PICTURE_LABEL
         self._label = automatic if self._draw.label is None else self._draw.label
         self._trails: dict[int, list[tuple[float, Point]]] = {}  # with the time in seconds
@@ -72,8 +72,8 @@ class Overlay:
 
     def _shown(self, result: FrameResult) -> list[Track]:
         """Return the vehicles to draw, with the boxes to draw, the farthest first."""
-        hides = self._draw.lost == "hidden"
-        tracks = [track for track in result.tracks if not (hides and track.state == "lost")]
+        hides = self._draw.predicted == "hidden"
+        tracks = [track for track in result.tracks if not (hides and track.state == "predicted")]
         return sorted(tracks, key=lambda track: track.box.y2)
 
     def _draw_trails(self, surface: Surface, shown: Sequence[Track], now: float) -> None:
@@ -93,7 +93,7 @@ class Overlay:
 
     def _draw_vehicles(self, surface: Surface, shown: Sequence[Track]) -> None:
         for track in shown if self._draw.boxes else ():
-            dashed = self._draw.lost == "dashed" and track.state == "lost"
+            dashed = self._draw.predicted == "dashed" and track.state == "predicted"
             color, thickness = self._color(track), self._draw.thickness
             boxes.draw_box(surface, track.box, color, dashed=dashed, thickness=thickness)
         for track in shown:

@@ -25,7 +25,7 @@ from vdet.traffic.records import VehicleRecords
 
 _BOXES = "boxes"
 _CROP_NAME = re.compile(r"vehicle-\d{4,}-at--?\d+\.\d{3}s\.(jpg|png)")
-_GAP = 1.0  # least seconds between two frames that the page calls a gap
+_GAP = 1.0  # minimum seconds between two frames that the page calls a gap
 _THUMBNAIL = 200  # longer side of the picture of a vehicle, pixels
 
 
@@ -66,12 +66,12 @@ def _with_boxes(result: FrameResult) -> Image:
     """Draw the detections in white with their scores, and the shown vehicles over them."""
     picture = result.frame.image.copy()
     detections = result.detections
-    for each in detections:
-        draw_box(picture, each.box, WHITE)
-        draw_label(picture, f"{each.score:.2f}", (each.box.x1, each.box.y2), WHITE)
+    for detection in detections:
+        draw_box(picture, detection.box, WHITE)
+        draw_label(picture, f"{detection.score:.2f}", (detection.box.x1, detection.box.y2), WHITE)
     for track in result.tracks:
         text = label_text(track, PICTURE_LABEL)
-        draw_box(picture, track.box, color_of(track.id), text, dashed=track.state == "lost")
+        draw_box(picture, track.box, color_of(track.id), text, dashed=track.state == "predicted")
     return picture
 
 
@@ -178,7 +178,9 @@ class PageSink(BaseSink):
 
     def _pictures(self) -> dict[int, str]:
         """Return the addresses of the pictures of `crops`, where this run writes them."""
-        folder = next((each.path for each in self.context.outputs if each.sink == "crops"), None)
+        folder = next(
+            (output.path for output in self.context.outputs if output.sink == "crops"), None
+        )
         if folder is None:
             return {}
         times = {number: time for number, (time, _) in self._thumbnails.items()}
@@ -190,7 +192,7 @@ class PageSink(BaseSink):
     def _player(self) -> Player | None:
         """Return the video that this run writes; else the source, if it is a video file."""
         source = self.video.path
-        drawn = [each.path for each in self.context.outputs if each.sink == "video"]
+        drawn = [output.path for output in self.context.outputs if output.sink == "video"]
         if not drawn and (not source.is_file() or is_picture_name(source)):
             return None
         path, start = (drawn[0], self._start) if drawn else (source, float(self.video.start))

@@ -180,7 +180,7 @@ class SinkKind:
         """Return whether an output may have this name, without its folder."""
         if self.writes_standard_output and name == STANDARD_OUTPUT.name:
             return True
-        ends = [len(each) for each in self.endings if name.lower().endswith(each)]
+        ends = [len(ending) for ending in self.endings if name.lower().endswith(ending)]
         return not self.endings or 0 < max(ends, default=0) < len(name)
 
 
@@ -277,7 +277,9 @@ class Sinks:
 def open_sinks(outputs: Iterable[Output], context: SinkContext) -> Iterator[Sinks]:
     """Open the sinks of several outputs; errors as of `open_sink`."""
     with ExitStack() as stack:
-        yield Sinks({each.path: stack.enter_context(open_sink(each, context)) for each in outputs})
+        yield Sinks(
+            {output.path: stack.enter_context(open_sink(output, context)) for output in outputs}
+        )
 
 
 def _kind_for(output: Output) -> SinkKind:
@@ -285,5 +287,5 @@ def _kind_for(output: Output) -> SinkKind:
     kind, path = sink_kind(output.sink), output.path
     if not kind.takes_name(path.name):
         names = ", ".join(kind.endings)
-        raise OutputError(f"{path}: {kind.what} are written as {names}; name it so")
+        raise OutputError(f"{path}: {kind.what} must end in {names}")
     return kind

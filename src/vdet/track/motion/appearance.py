@@ -7,12 +7,13 @@ from vdet.boxes import Float64Array, Image
 from vdet.media import Picture
 
 _MARGIN = 0.15
-"""Share of a box's width and height at each side that is left out: much of it is background."""
+"""Fraction of a box's width and height at each side that is left out: much of it is background."""
 
 _UNITS = 20.0, 6.0, 6.0
 """Differences of luma, blue and red chroma, in levels, that count as one.
 
-Most vehicles differ by more from each other, and by less from themselves a second before.
+Maximum number of vehicles differ by more from each other, and by less from themselves a second
+before.
 """
 
 

@@ -51,13 +51,13 @@ PART = 0.6
 """A detection with more than this share inside a shown vehicle is a part of it."""
 
 HIDDEN = 0.5
-"""A vehicle is hidden where a nearer one covers more than this share of it."""
+"""A vehicle is hidden where a nearer one covers more than this fraction of it."""
 
 _LEVEL = 0.15
-"""Bottoms that differ by less than this share of the lesser height are level."""
+"""Bottoms that differ by less than this fraction of the lesser height are level."""
 
 _LEVEL_OVERLAP = 0.3
-"""Share of the smaller of two level boxes that lies in the other, where they are one vehicle."""
+"""Fraction of the smaller of two level boxes that lies in the other, where they are one vehicle."""
 
 _ALIKE = 0.5
 """Intersection over union from which on two boxes are of one vehicle, level or not."""
@@ -67,7 +67,8 @@ _APART = 0.5
 """
 
 CLEAR = 0.8
-"""A detection on a nearer vehicle that scores less than this share of its score is a part of it."""
+"""A detection on a nearer vehicle that scores less than this fraction of its score is a part of it.
+"""
 
 
 def are_hidden(boxes: Float64Array, present: Sequence[bool]) -> BoolArray:
@@ -90,7 +91,7 @@ def are_hidden(boxes: Float64Array, present: Sequence[bool]) -> BoolArray:
 def are_parts(boxes: Float64Array, scores: Float64Array) -> BoolArray:
     """Return for each box, `(n, 4)`, whether most of it lies in one that scores higher.
 
-    A vehicle that comes out from behind another one has nearly the same score, and is no part.
+    A vehicle that comes out from behind another one has nearly the same score, and is not a part.
 
     Returns
     -------
@@ -141,8 +142,8 @@ class Case(Enum):
 class _Overlap:
     """How the box of a track lies to that of another one.
 
-    `inside` is the share of it in the other box. `one` is how much the two show one vehicle: the
-    share of the smaller one in the other if they are level, 1 if they are `alike`, or else 0.
+    `inside` is the fraction of it in the other box. `one` is how much the two show one vehicle: the
+    fraction of the smaller one in the other if they are level, 1 if they are `alike`, or else 0.
     """
 
     inside: float
@@ -216,7 +217,7 @@ def _comes_out(vehicle: Vehicle, nearer: Vehicle, hidden: Sequence[Vehicle]) -> 
     """Return whether a `hidden` vehicle was near, and this one is as clear as the nearer."""
     is_clear = vehicle.detection_scores.value > CLEAR * nearer.detection_scores.value
     here = vehicle.state.mean[:, 0]
-    return is_clear and any(_distance(each.state.mean[:, 0], here) < _NEAR for each in hidden)
+    return is_clear and any(_distance(vehicle.state.mean[:, 0], here) < _NEAR for vehicle in hidden)
 
 
 def _may_be(lost: Vehicle, new: Vehicle) -> bool:

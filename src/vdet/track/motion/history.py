@@ -21,7 +21,7 @@ _ENTRY = 0.4
 """Seconds before the first detection in which a vehicle is shown that comes into the frame."""
 
 _ENTERING = 0.1
-"""Least speed of a vehicle that comes into the frame, in its sizes a second."""
+"""Minimum speed of a vehicle that comes into the frame, in its sizes a second."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,7 +72,7 @@ class History:
     @property
     def last_seen(self) -> Moment:
         """The latest moment with a detection."""
-        return next(each for each in reversed(self.moments) if each.score is not None)
+        return next(moment for moment in reversed(self.moments) if moment.score is not None)
 
     def add(self, moment: Moment) -> None:
         """Add the next moment."""
@@ -89,16 +89,16 @@ class History:
     def join(self, earlier: "History") -> None:
         """Put the moments of the same vehicle's earlier track before its own."""
         begin = self.moments[0].time
-        self.moments[:0] = [each for each in earlier.moments if each.time < begin]
+        self.moments[:0] = [moment for moment in earlier.moments if moment.time < begin]
         self._smoothed = None
 
     def scores(self, time: float) -> tuple[float, float]:
         """Return the mean score of the detections around a time, and with 0 for each miss."""
         until = max(self.last_seen.time, time)
         kept = [
-            (math.exp(-abs(each.time - time) / SCORE_TIME), each.score)
-            for each in self.moments
-            if each.time <= until
+            (math.exp(-abs(moment.time - time) / SCORE_TIME), moment.score)
+            for moment in self.moments
+            if moment.time <= until
         ]
         total = sum(weight * score for weight, score in kept if score is not None)
         seen = sum(weight for weight, score in kept if score is not None)
@@ -113,10 +113,10 @@ class History:
             Seconds between two detections over which misses are bridged.
         """
         moments = self.moments
-        seen = [number for number, each in enumerate(moments) if each.score is not None]
+        seen = [number for number, moment in enumerate(moments) if moment.score is not None]
         split = bisect_right(seen, time, key=lambda number: moments[number].time)
         if split and moments[seen[split - 1]].time == time:
-            return Place(self.means()[seen[split - 1]][:, 0], "seen")
+            return Place(self.means()[seen[split - 1]][:, 0], "detected")
         if split == len(seen):
             return None
         if not split:
@@ -125,14 +125,14 @@ class History:
         bridges = after - before > 1
         if bridges and moments[after].time - moments[before].time > longest_gap:
             return None
-        return Place(self._between(time, before, after), "between", bridges)
+        return Place(self._between(time, before, after), "interpolated", bridges)
 
     def _between(self, time: float, before: int, after: int) -> Float64Array:
         """Return the mean at a time between the moments of two consecutive detections."""
         moments, means = self.moments, self.means()
-        if all(each.state.gain is not None for each in moments[before + 1 : after + 1]):
+        if all(moment.state.gain is not None for moment in moments[before + 1 : after + 1]):
             # The misses between are of the same track.
-            after = bisect_right(moments, time, key=lambda each: each.time)
+            after = bisect_right(moments, time, key=lambda moment: moment.time)
             before = after - 1
         share = (time - moments[before].time) / (moments[after].time - moments[before].time)
         return np.asarray(means[before][:, 0] * (1 - share) + means[after][:, 0] * share)
@@ -146,12 +146,12 @@ class History:
         if moment.time - time > _ENTRY or speed < _ENTERING * math.exp(mean[axis + 2, 0]):
             return None
         # Its size hardly shows where it is cut off.
-        return Place(carried(mean, time - moment.time), "between")
+        return Place(carried(mean, time - moment.time), "interpolated")
 
     def means(self) -> list[Float64Array]:
         """Return the smoothed means of all moments, each `(4, 2)`."""
         if self._smoothed is None:
-            means = [each.state.mean for each in self.moments]
+            means = [moment.state.mean for moment in self.moments]
             for number in range(len(means) - 1, 0, -1):
                 state = self.moments[number].state
                 if state.expected is not None and state.gain is not None:

@@ -17,7 +17,7 @@ import numpy as np
 from vdet.boxes import Float64Array
 
 _MOST_NEARER = 0.3
-"""Largest change of the distance in a step that is believed, as a share of it."""
+"""Largest change of the distance in a step that is believed, as a fraction of it."""
 
 _MOST_NEARER_RATE = 0.75
 """The same of a second: what comes out from behind another vehicle seems to come nearer faster."""
@@ -29,7 +29,7 @@ _VELOCITY = 2.5
 """Standard deviation of a new vehicle's velocity, sizes of the vehicle a second."""
 
 _BORDER = 0.005
-"""A box that ends this near to the frame's side, as a share of the frame, touches it."""
+"""A box that ends this near to the frame's side, as a fraction of the frame, touches it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

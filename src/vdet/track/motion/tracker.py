@@ -20,10 +20,10 @@ FIRST_STEP = 0.04
 """Seconds that the first frame counts for."""
 
 _STAYS = 0.75
-"""Share of the least score from which on a vehicle that was shown before is shown again."""
+"""Fraction of the minimum score from which on a vehicle that was shown before is shown again."""
 
 _OVERLAP = 0.3
-"""Least intersection over union of a detection with the expected box of its vehicle."""
+"""Minimum intersection over union of a detection with the expected box of its vehicle."""
 
 _UNSURE = 0.2
 """Share by which a vehicle that scores 0 has less claim to a detection than one that scores 1.
@@ -64,7 +64,7 @@ class MotionTracker:
         observations = self._observations(detections, picture)
         seconds = FIRST_STEP if self._time is None else time - self._time
         self._time, look = time, Look(time, seconds, self._size)
-        longest = self._settings.remembered + self._settings.remembered_hidden
+        longest = self._settings.keep_id_seconds + self._settings.keep_hidden_id_seconds
         self._keep([v for v in self._vehicles if v.unseen + seconds <= longest])
         for vehicle in self._vehicles:
             vehicle.predict(seconds)
@@ -78,11 +78,11 @@ class MotionTracker:
         self._keep(self._staying())
         left = [o for number, o in enumerate(observations) if number not in pairs.values()]
         # One whose score is below the leak would never make a vehicle, however often it is seen.
-        new = [Vehicle(o, look, self._settings) for o in left if o.score > self._settings.leak]
+        new = [Vehicle(o, look, self._settings) for o in left if o.score > self._settings.decay]
         vehicles = take_over_ids(self._vehicles + new)
         self._vehicles = without_duplicates(vehicles, self._boxes(vehicles))
         before = time - 2 * self._settings.look_ahead
-        self._gone = [each for each in self._gone if each.history.last_seen.time >= before]
+        self._gone = [vehicle for vehicle in self._gone if vehicle.history.last_seen.time >= before]
         for vehicle, hidden in zip(self._vehicles, self._hidden(), strict=True):
             vehicle.hidden += seconds * (bool(hidden) and vehicle.unseen > 0)
             vehicle.history.forget(before)
@@ -94,11 +94,11 @@ class MotionTracker:
         every_box = self._visible([place.mean for _, place in placed])
         rows = np.flatnonzero(_are_large(every_box))
         placed, boxes = [placed[row] for row in rows], every_box[rows]
-        hidden = are_hidden(boxes, [place.state != "lost" for _, place in placed])
+        hidden = are_hidden(boxes, [place.state != "predicted" for _, place in placed])
         shown: list[tuple[Vehicle, Place, Float64Array, float]] = []
         for (vehicle, place), box, is_hidden in zip(placed, boxes, hidden, strict=True):
             seen_score, score = vehicle.history.scores(time)
-            is_guess = place.bridges or place.state == "lost"
+            is_guess = place.bridges or place.state == "predicted"
             if self._is_clear(vehicle, box, seen_score) and not (is_hidden and is_guess):
                 shown.append((vehicle, place, box, score))
         shown_boxes = np.reshape([box for _, _, box, _ in shown], (-1, 4))
@@ -117,7 +117,7 @@ class MotionTracker:
         if not vehicle.is_present:
             return None
         mean = vehicle.state.moved(time - self._time)
-        return Place(mean[:, 0], "lost" if vehicle.unseen else "between")
+        return Place(mean[:, 0], "predicted" if vehicle.unseen else "interpolated")
 
     def _keep(self, vehicles: list[Vehicle]) -> None:
         """Follow only these vehicles; those that are confirmed can be shown at earlier times."""
@@ -147,7 +147,7 @@ class MotionTracker:
 
     def _hidden(self) -> BoolArray:
         """Return for each vehicle whether one that is present hides it."""
-        present = [each.is_present for each in self._vehicles]
+        present = [vehicle.is_present for vehicle in self._vehicles]
         return are_hidden(self._boxes(self._vehicles), present)
 
     def _pair(self, observations: Sequence[Observation]) -> dict[int, int]:
@@ -159,8 +159,8 @@ class MotionTracker:
         if not (self._vehicles and observations):
             return {}
         vehicles = self._vehicles
-        present = [row for row, each in enumerate(vehicles) if each.is_present]
-        new = [row for row, each in enumerate(vehicles) if not each.confirmed]
+        present = [row for row, vehicle in enumerate(vehicles) if vehicle.is_present]
+        new = [row for row, vehicle in enumerate(vehicles) if not vehicle.confirmed]
         found = np.array([observation.box for observation in observations])
         buffers = np.array([vehicle.state.deviation for vehicle in vehicles])
         values = buffered_iou(self._boxes(vehicles), buffers, found)
@@ -179,9 +179,9 @@ class MotionTracker:
 
         One that was shown before may be a little less likely.
         """
-        is_wide = bool(box[2] - box[0] >= self._settings.smallest * self._size[0])
-        least = self._settings.least_score * (1.0 if vehicle.id is None else _STAYS)
-        return is_wide and score >= least
+        is_wide = bool(box[2] - box[0] >= self._settings.min_size * self._size[0])
+        minimum = self._settings.min_score * (1.0 if vehicle.id is None else _STAYS)
+        return is_wide and score >= minimum
 
     def _track(self, vehicle: Vehicle, place: Place, box: Float64Array, score: float) -> Track:
         vehicle.id = next(self._ids) if vehicle.id is None else vehicle.id

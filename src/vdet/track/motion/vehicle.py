@@ -30,7 +30,8 @@ _APPEARANCE_TIME = 0.3
 """Seconds over which the appearance of the detections is averaged."""
 
 _NOISE = 0.12
-"""Standard deviation of the sides of a detection with score 1, as a share of the vehicle's size."""
+"""Standard deviation of the sides of a detection with score 1, as a fraction of the vehicle's size.
+"""
 
 _LEAST_SCORE = 0.05
 """Below this score the box of a detection is not taken to be any less exact."""
@@ -141,7 +142,7 @@ class Vehicle:
     @property
     def is_present(self) -> bool:
         """Whether it is known and was seen lately."""
-        return self.confirmed and self.evidence > 0 and self.unseen <= self._settings.carried
+        return self.confirmed and self.evidence > 0 and self.unseen <= self._settings.coast_seconds
 
     @property
     def age(self) -> float:
@@ -154,8 +155,8 @@ class Vehicle:
         if not self.confirmed:
             return self.evidence <= 0
         in_the_open = self.unseen - self.hidden
-        longest = self._settings.remembered_hidden
-        return in_the_open > self._settings.remembered or self.hidden > longest
+        longest = self._settings.keep_hidden_id_seconds
+        return in_the_open > self._settings.keep_id_seconds or self.hidden > longest
 
     def predict(self, seconds: float) -> None:
         """Move on to the next frame, `seconds` later."""
@@ -175,7 +176,7 @@ class Vehicle:
     def miss(self, look: Look) -> None:
         """Note a frame without a detection of it."""
         self.unseen += look.seconds
-        lost = self.unseen > self._settings.carried
+        lost = self.unseen > self._settings.coast_seconds
         motion = math.exp(-look.seconds / _SLOWING_TIME) if lost else 1.0
         self.state = self.state.slowed(motion, math.exp(-look.seconds / _SETTLING_TIME))
         self.history.add(Moment(look.time, self.state))
@@ -184,7 +185,7 @@ class Vehicle:
     def lose(self) -> None:
         """Take it for lost: the latest detection shows another vehicle."""
         self.evidence = 0.0
-        self.unseen = max(self.unseen, self._settings.carried)
+        self.unseen = max(self.unseen, self._settings.coast_seconds)
 
     def take_over(self, other: "Vehicle") -> None:
         """Go on with the id, the history and the votes of another track of the same vehicle."""
@@ -198,7 +199,7 @@ class Vehicle:
 
         The id is that of the track that was not lost for longer.
         """
-        ids = [(each.since, each.id) for each in (self, other) if each.id is not None]
+        ids = [(item.since, item.id) for item in (self, other) if item.id is not None]
         self.take_over(other)
         self.id = min(ids)[1] if ids else None
         self.since = min(self.since, other.since)
@@ -210,7 +211,7 @@ class Vehicle:
         self.votes.add(observation.classes, weight * min(look.seconds, LONGEST_LOOK))
 
     def _weigh(self, score: float, seconds: float) -> None:
-        gained = (score - self._settings.leak) * min(seconds, LONGEST_LOOK)
-        self.evidence = min(max(self.evidence + gained, 0.0), self._settings.needed)
-        self.confirmed |= self.evidence >= self._settings.needed
+        gained = (score - self._settings.decay) * min(seconds, LONGEST_LOOK)
+        self.evidence = min(max(self.evidence + gained, 0.0), self._settings.confirm_seconds)
+        self.confirmed |= self.evidence >= self._settings.confirm_seconds
         self.scores.add(score, seconds)

@@ -85,7 +85,7 @@ class Association:
         if len(matches) > 1:
             self._merge_or_separate(region, matches)
         elif inside:
-            car = min(matches or inside, key=lambda each: _distance(each, region))
+            car = min(matches or inside, key=lambda match: _distance(match, region))
             car.trust(region.peak)
             if car.is_filled_by(region):
                 self._place(car, region)
@@ -132,7 +132,7 @@ class Association:
             self._place(car, combined, region, other)
             return True
         self._forget(car)
-        closer, farther = sorted((region, other), key=lambda each: _distance(car, each))
+        closer, farther = sorted((region, other), key=lambda item: _distance(car, item))
         self._create(closer, car.id).vouch()
         self._create(farther).vouch()
         return True
@@ -151,7 +151,7 @@ class Association:
     def _place(self, car: Car, place: Region, *parts: Region) -> None:
         """Give the car a place, made of these regions; without them it is a region itself."""
         self.places[car] = place
-        self._unused = [each for each in self._unused if each not in (parts or (place,))]
+        self._unused = [item for item in self._unused if item not in (parts or (place,))]
 
 
 def _distance(car: Car, region: Region) -> float:

@@ -91,8 +91,8 @@ class Car:
 
     def is_filled_by(self, region: Region) -> bool:
         """Return whether a region is wide enough to be all of the car (rules 7 and 8)."""
-        least = min(self._settings.wide, self._settings.good_fraction * self.box.width)
-        return region.box.width > least
+        minimum = min(self._settings.wide, self._settings.good_fraction * self.box.width)
+        return region.box.width > minimum
 
     def is_as_wide_as(self, region: Region) -> bool:
         """Return whether two combined regions are about as wide as the car (rules 9 and 10)."""
@@ -107,9 +107,9 @@ class Car:
             weight = vote_weight(np.array(astuple(region.box)), region.score, size)
             self.votes.add(region.classes, weight)
         self._seen.append(region)
-        sides = zip(*(each.box.xywh for each in self._seen), strict=True)
+        sides = zip(*(region.box.xywh for region in self._seen), strict=True)
         self.box = Box.sized(*(round(fmean(values)) for values in sides))
-        xs, ys = zip(*(each.centroid for each in self._seen), strict=True)
+        xs, ys = zip(*(region.centroid for region in self._seen), strict=True)
         self.centroid = fmean(xs), fmean(ys)
         self.matches = self.matches + 1 if by_match else 0
         self.in_a_row += 1

@@ -45,7 +45,7 @@ class RulesTracker:
     ) -> list[Track]:
         """Follow the cars into the next frame as `VideoTracker.update`; `picture` is needed."""
         if picture is None:
-            raise ValueError("the rules tracker needs the frame; give its image")
+            raise ValueError("the rules tracker needs the frame; pass its image")
         regions = large_enough(detections, picture.width, picture.height, self._settings)
         association = Association(self._cars, regions, picture.image, self._settings)
         self._cars, placed = association.cars, association.places
@@ -81,7 +81,7 @@ class RulesTracker:
     def _track(self, car: Car) -> Track:
         """Return what is shown of a car; it gets its id when it is first shown."""
         car.id = next(self._ids) if car.id is None else car.id
-        state: State = "lost" if car.matches else "seen"
+        state: State = "predicted" if car.matches else "detected"
         return Track(car.id, car.box, car.score, state, car.votes.winner)
 
 
@@ -92,11 +92,11 @@ def large_enough(
 
     Rule 1. The part of a region outside the frame does not count.
     """
-    least = max(1, settings.min_region)
-    boxes = [each.box.rounded.clipped(frame_width, frame_height) for each in detections]
+    minimum = max(1, settings.min_region)
+    boxes = [detection.box.rounded.clipped(frame_width, frame_height) for detection in detections]
     centers = (detections.sides[:, :2] + detections.sides[:, 2:]) / 2
     centroids = map(tuple, detections.data.get("centroid", centers).tolist())
     strengths = detections.data.get("strength", detections.scores).tolist()
     scores, classes = detections.scores.tolist(), detections.likely_classes
     regions = map(Region, boxes, centroids, strengths, scores, classes)
-    return [r for r in regions if r.box.width >= least and r.box.height >= least]
+    return [r for r in regions if r.box.width >= minimum and r.box.height >= minimum]
