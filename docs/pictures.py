@@ -79,8 +79,8 @@ def main() -> None:
         write_clip(road, motorway())
         label: tuple[str, ...] = ("--lanes", *_settings("draw.label=[id, score]"))
         counts = (
-            "--lines",
-            str(demo / "lines.yaml"),
+            "-c",
+            str(demo / "gate.yaml"),
             *_settings("draw.trails=3", "draw.time=true"),
         )
         pictures = {

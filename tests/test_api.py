@@ -166,7 +166,7 @@ def test_follow_gives_the_same_for_any_number_of_threads(clip_path: Path) -> Non
 @pytest.mark.parametrize("number", [{"frames": -1}, {"threads": 0}])
 def test_numbers_below_one_are_refused_by_name(clip_path: Path, number: dict[str, Any]) -> None:
     (name,) = number
-    with pytest.raises(vdet.VdetError, match=f"^{name}: is -?[01]; give 1 or more"):
+    with pytest.raises(vdet.VdetError, match=f"^{name}: is -?[01]; must be at least 1"):
         vdet.Run(clip_path, **number)
 
 
@@ -334,7 +334,7 @@ def test_live_counts_are_those_of_the_file_and_of_the_frames(
 ) -> None:
     lines = tmp_path / "lines.yaml"
     lines.write_text(
-        f"camera: {{size: [{WIDTH}, {HEIGHT}]}}\ntraffic:\n  confirmed: 0\n  lines:\n"
+        f"camera: {{size: [{WIDTH}, {HEIGHT}]}}\ntraffic:\n  min_seen_seconds: 0\n  lines:\n"
         "  - {name: gate, start: [100, 0], end: [100, 240]}\n"
     )
     settings = vdet.load_settings([lines], ["detector.stride=1"])

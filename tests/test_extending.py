@@ -152,7 +152,7 @@ def test_the_step_changes_what_all_outputs_get(package: Path, clip: Path, tmp_pa
     assert len(tracks.read_text().splitlines()) == 1, "the heading alone"
     again = (*options, "--overwrite", "--set", "steps.names=[none]")
     unknown = vdet(package, "detect-video", clip, *again)
-    assert "none: is no step; known are wide" in unknown.stderr
+    assert "none: unknown step; known: wide" in unknown.stderr
 
 
 def test_the_command_runs_and_is_listed(package: Path, clip: Path) -> None:
@@ -201,7 +201,7 @@ def test_its_settings_are_printed_and_checked(package: Path) -> None:
     other = vdet(package, "config", "--set", "detector.level=7")
     assert "detector.level: belongs to detector.kind: red" in other.stderr
     unknown = vdet(package, "config", "--set", "tracker.kind=none")
-    assert "known are motion, rules, nearest" in unknown.stderr
+    assert "known: motion, rules, nearest" in unknown.stderr
 
 
 @pytest.fixture(scope="session")

@@ -277,7 +277,9 @@ def read_all(path: Path) -> bytes:
 def test_a_larger_file_is_refused_with_the_error_of_the_caller(tmp_path: Path) -> None:
     path = tmp_path / "file"
     path.write_bytes(b"x" * 1001)
-    with pytest.raises(ConfigError, match=r"file: is larger than 1,000 bytes; that is no letter"):
+    with pytest.raises(
+        ConfigError, match=r"file: is larger than 1,000 bytes, too large for a letter"
+    ):
         read(path, 1000)
 
 

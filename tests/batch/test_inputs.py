@@ -128,10 +128,10 @@ def test_an_address_is_refused() -> None:
 @pytest.mark.parametrize(
     ("clip", "words"),
     [
-        ("none.mp4", "none.mp4: no video is found there"),
-        ("none/", "none: no video is found there"),
-        ("empty", "empty: no video is found there"),
-        ("*.mkv", r"\*.mkv: no video is found there"),
+        ("none.mp4", "none.mp4: no video found"),
+        ("none/", "none: no video found"),
+        ("empty", "empty: no video found"),
+        ("*.mkv", r"\*.mkv: no video found"),
     ],
 )
 def test_a_clip_that_gives_no_video_is_named(clip: str, words: str) -> None:

@@ -163,7 +163,7 @@ class TestJobs:
         record("clips/a.mp4", "out/a.csv")
         change()
         os.utime("clips/a.mp4", (0, 0))
-        with pytest.raises(BatchError, match=r"^out/a\.csv: is not as vdet wrote it"):
+        with pytest.raises(BatchError, match=r"^out/a\.csv: was changed since vdet wrote it"):
             self.tracks_alone()
 
     def tracks_alone(self) -> Plan:
@@ -189,7 +189,7 @@ class TestRefused:
             plan("clips/a.mp4", "clips/day/a.mp4")
 
     def test_a_suffix_that_the_sink_cannot_write(self) -> None:
-        with pytest.raises(OutputError, match=r"out/a\.json: tracks are written as \.txt, \.csv"):
+        with pytest.raises(OutputError, match=r"out/a\.json: tracks must end in \.txt, \.csv"):
             plan("clips/a.mp4", tracks=".json")
 
     def test_tracks_that_would_be_the_manifest(self) -> None:
@@ -291,7 +291,7 @@ class TestFolders:
     def test_one_that_is_gone_is_made_again_and_one_that_was_changed_is_kept(self) -> None:
         self.record()
         Path("out/a.stages/3-boxes.png").write_bytes(b"picture")
-        with pytest.raises(BatchError, match=r"out/a\.stages: is not as vdet wrote it"):
+        with pytest.raises(BatchError, match=r"out/a\.stages: was changed since vdet wrote it"):
             self.plan(skip_existing=True)
         Path("out/a.stages").rename("elsewhere")
         assert not self.plan(skip_existing=True).runs[0].overwrite

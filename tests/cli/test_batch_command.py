@@ -142,7 +142,7 @@ def test_after_other_settings_or_another_model_videos_are_made_again(
             ("-d", "out", "--tracks", "all.txt"),
             "tracks: with -d, pass only the ending of the names: .txt, .csv, .jso",
         ),
-        (("-d", "out", "--no-video"), "nothing would be written"),
+        (("-d", "out", "--no-video"), "no output; add one"),
         (("-d", "out", "--stages", "x", "--at", "1"), "stages: cannot be written with -d"),
         (("-d", "out", "--overwrite", "--skip-existing"), "do not go together"),
         (("-d", "out", "--jobs", "2", "--scheduler", "tcp://x:1"), "--jobs is for this machine"),

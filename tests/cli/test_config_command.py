@@ -43,7 +43,7 @@ def test_all_mistakes_are_named_at_once(run: Run, tmp_path: Path) -> None:
     lines = result.err.splitlines()
     assert f"vdet: {file}:4:5: detector.heat.frmes: unknown setting; did you mean frames?" in lines
     assert any(f"{file}:7:20: detector.search.windows[0].overlap: " in line for line in lines)
-    assert any("--set: tracker.confirm_seconds: should be a valid number" in line for line in lines)
+    assert any("--set: tracker.confirm_seconds: must be a valid number" in line for line in lines)
     assert all(line.startswith("vdet: ") for line in lines)
 
 

@@ -90,7 +90,7 @@ def test_flows_have_clock_times_live_and_from_tracks(
 
 def write_tracks(path: Path, *, shift: int = 0) -> Path:
     """Write the tracks of a car that goes to the right, 4 pixels a frame."""
-    rows = [f"{n},{n / 25:.6f},1,{shift + 4 * n},100,40,40,0.9,seen" for n in range(50)]
+    rows = [f"{n},{n / 25:.6f},1,{shift + 4 * n},100,40,40,0.9,detected" for n in range(50)]
     path.write_text("\n".join(["frame,time,id,x,y,width,height,score,state", *rows]) + "\n")
     return path
 
@@ -139,7 +139,7 @@ def test_shares_need_the_size_of_the_frames(run: Run, tmp_path: Path) -> None:
     lines.write_text("traffic: {lines: [{name: gate, start: [0.5, 0], end: [0.5, 1]}]}")
     result = run("count", tracks, "-c", lines)
     assert result.code == 1
-    assert "give --size, as in 1280x720" in result.err
+    assert "pass --size, as in 1280x720" in result.err
     result = run("count", tracks, "-c", lines, "--size", "320x240")
     assert result.code == 0, result.err
     assert result.out.split()[6:9] == ["gate", "left", "1"]
@@ -148,17 +148,17 @@ def test_shares_need_the_size_of_the_frames(run: Run, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "code", "message"),
     [
-        (["t.csv"], 2, "nothing to count at; give lines or zones with -c FILE"),
-        (["t.csv", "-c", "none.yaml"], 1, "none.yaml: no such file"),
+        (["t.csv"], 2, "no lines or zones to count at; add a settings file with -c FILE"),
+        (["t.csv", "-c", "none.yaml"], 1, "none.yaml: not found"),
         (["t.csv", "-c", "l.yaml", "--size", "320x200"], 1, "given for frames of 320×240"),
         (
             ["t.csv", "-c", "l.yaml", "--size", "big"],
             2,
             "'big' is not two numbers",
         ),
-        (["t.csv", "-c", "l.yaml", "--counts", "c.txt"], 1, "written as .csv, .json"),
+        (["t.csv", "-c", "l.yaml", "--counts", "c.txt"], 1, "must end in .csv, .json"),
         (["t.csv", "-c", "l.yaml", "--counts", "t.csv"], 1, "is the input itself"),
-        (["t.txt", "-c", "l.yaml"], 1, "has no times; give the frames per second"),
+        (["t.txt", "-c", "l.yaml"], 1, "has no times; pass the frames per second"),
         (["none.csv", "-c", "l.yaml"], 1, "none.csv"),
         (
             ["t.csv", "-c", "short.yaml"],
@@ -175,7 +175,7 @@ def test_shares_need_the_size_of_the_frames(run: Run, tmp_path: Path) -> None:
         (
             ["t.csv", "t.csv", "-c", "l.yaml", "--begin", "2026-05-01 07:00"],
             2,
-            "for several give a pattern of their names",
+            "for several set a pattern of their names",
         ),
         (["back.csv", "-c", "l.yaml"], 1, "back.csv:3: frame 1 is at 0.04 s; times must be"),
     ],
@@ -262,4 +262,4 @@ class TestRegions:
         outline = "points: [[0, 0], [1, 0], [1, 1]]"
         result = run(*command, "--set", f"regions=[{{name: a, {outline}}}]")
         assert result.code == 1
-        assert "regions: this command looks at whole frames" in result.err
+        assert "regions: this command uses whole frames" in result.err

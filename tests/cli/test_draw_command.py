@@ -105,10 +105,10 @@ def test_the_picture_for_a_report_has_lines_flows_and_numbers(run: Run) -> None:
     ("arguments", "message"),
     [
         ((), "there is nothing to write"),
-        (("-o", "a.txt"), "pages are written as .html"),
-        (("--propose", "a.txt"), "settings are written as .yaml"),
+        (("-o", "a.txt"), "pages must end in .html"),
+        (("--propose", "a.txt"), "settings must end in .yaml"),
         (("-o", "a.jpg"), "a.jpg: has nothing to show"),
-        (("-o", "lines.html", "-c", "wide.yaml"), "another shape"),
+        (("-o", "lines.html", "-c", "wide.yaml"), "whose shape"),
         (("--propose", "a.yaml", "--tracks-from", "few.csv"), "no stream has enough vehicles"),
         (("-o", "frame.png", "-c", "lines.yaml", "--overwrite"), "frame.png"),
         (("-o", "a.html", "--tracks-from", "t.txt"), "t.txt: has no times"),

@@ -97,7 +97,7 @@ def test_several_sets_a_table_and_a_page(
         (("none",), 1, "none: labelled pictures not found"),
         (("set", "--min-width", "2"), 2, "2.0 is not in the range"),
         (("set", "--page", "set/a.png"), 1, "the folder set/a.png is not a folder"),
-        (("set", "--set", "detector.kind=sonar"), 1, "sonar: is no detector"),
+        (("set", "--set", "detector.kind=sonar"), 1, "sonar: unknown detector"),
     ],
 )
 def test_what_cannot_be_is_said_before_any_work(

@@ -136,7 +136,7 @@ def test_one_option_means_the_same_in_every_command() -> None:
     ("words", "incomplete", "found"),
     [
         (["config", "-c"], "se", {"seed", "se"}),  # the second stands for files
-        (["detect-video", "--set"], "tracker.need", {"tracker.confirm_seconds="}),
+        (["detect-video", "--set"], "tracker.conf", {"tracker.confirm_seconds="}),
         (["train", "--set"], "train.svm.a", {"train.svm.augmentation="}),
         (["eval", "video", "--model"], "mod", {"mod"}),
     ],

@@ -79,7 +79,7 @@ def test_numbered_pictures_are_a_video_and_one_picture_is_not(run: Run, tmp_path
     ("name", "words"),
     [
         ("notes.txt", "is not a video"),
-        ("none.mp4", "there is no such file"),
+        ("none.mp4", "not found"),
         ("none.onnx", "none.onnx: cannot be"),
     ],
 )

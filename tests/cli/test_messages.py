@@ -66,7 +66,7 @@ class TestNamesThatControlATerminal:
 
     def test_each_mistake_in_settings_has_a_line(self, run: Run, tmp_path: Path) -> None:
         path = tmp_path / FORGED
-        path.write_text("tracker: {neded: 3}\noutput: {crf: 99}\n")
+        path.write_text("tracker: {confirm_second: 3}\noutput: {crf: 99}\n")
         result = run("config", "-c", path)
         lines = result.err.splitlines()
         assert len(lines) == 2
@@ -87,7 +87,7 @@ class TestNamesThatControlATerminal:
 
     def test_a_name_that_is_no_utf_8(self, run: Run, tmp_path: Path) -> None:
         result = run("detect-video", tmp_path / "\udcff.mp4", tmp_path / "out.mp4")
-        assert f"{tmp_path}/\\udcff.mp4: there is no such file" in result.err
+        assert f"{tmp_path}/\\udcff.mp4: not found" in result.err
 
 
 def test_there_is_no_bar_with_quiet(terminal: Terminal) -> None:

@@ -151,7 +151,7 @@ def _patches(path: Path) -> dict[str, bytes]:
         (("--until", "3", "--from", "4"), 2, "--until must not be before --from"),
         (("--every", "0"), 2, "--every"),
         (("--from", "10"), 1, "gt.txt: ends at frame 9; begin earlier"),
-        (("-o", "mined.npz"), 1, "mined.npz: patches are written as .zip; name it so"),
+        (("-o", "mined.npz"), 1, "mined.npz: patches must end in .zip"),
         (("--truth", "none.txt"), 1, "none.txt: cannot be read"),
         (("--truth", "a.txt", "--truth", "b.txt"), 2, "(videos: 1, truths: 2)"),
         (("--set", BELOW), 1, "road.mp4: no search window fits into 320×180 pixels"),

@@ -16,7 +16,7 @@ from vdet.run.sinks.data import TrackSink
 from vdet.run.sinks.drawn import VideoSink
 
 FRAMES = 15
-KNOWN = "known are video, tracks, stages, picture, json, vehicles, crops, clips, page, counts"
+KNOWN = "known: video, tracks, stages, picture, json, vehicles, crops, clips, page, counts"
 
 
 @pytest.fixture
@@ -72,8 +72,8 @@ class TestDetectVideo:
     @pytest.mark.parametrize(
         ("sink", "words"),
         [
-            ("tallies=a.csv", f"tallies: is no sink; {KNOWN}"),
-            ("tracks=a.json", "a.json: tracks are written as .txt, .csv, .jsonl, "),
+            ("tallies=a.csv", f"tallies: unknown sink; {KNOWN}"),
+            ("tracks=a.json", "a.json: tracks must end in .txt, .csv, .jsonl, "),
             ("tracks=none/a.csv", "none/a.csv: the folder none does not exist; create it first"),
             ("tracks=old.csv", "old.csv: already exists; use --overwrite to replace it"),
             ("picture=a.png", "a.png: the sink picture is for pictures"),
@@ -211,7 +211,7 @@ class TestBatch:
             ),
             (("--sink", "json=.json"), 2, "json: cannot be written with -d"),
             (("--sink", "stages=.png", "--at", "1"), 2, "stages: cannot be written with -d"),
-            (("--sink", "tallies=.csv"), 1, f"tallies: is no sink; {KNOWN}"),
+            (("--sink", "tallies=.csv"), 1, f"tallies: unknown sink; {KNOWN}"),
             (("--tracks", ".csv", "--sink", "tracks=.csv"), 1, "both would become"),
         ],
     )

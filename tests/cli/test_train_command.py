@@ -61,4 +61,4 @@ def test_model_and_metrics_appear_together_or_not_at_all(
 def test_a_model_is_named_npz(run: Run, patches_path: Path, tmp_path: Path) -> None:
     result = run("train", patches_path, "-o", tmp_path / "m.json")
     assert result.code == 1
-    assert "models are written as .npz" in result.err
+    assert "models must end in .npz" in result.err

@@ -18,7 +18,7 @@ def test_the_output_is_named_as_a_network(run: Run, tmp_path: Path) -> None:
     output = tmp_path / "a.pt"
     result = run("train-net", tmp_path, "-o", output)
     assert result.code == 1
-    assert result.err == f"vdet: {output}: networks are written as .onnx; name it so\n"
+    assert result.err == f"vdet: {output}: networks must end in .onnx\n"
 
 
 def test_without_torch_the_message_says_how_to_install_it(

@@ -174,7 +174,7 @@ def test_an_assignment_without_a_whole_key_or_value_says_what_is_expected(text: 
         ("heat=[", "--set:1:2: is not YAML"),
         ("heat=*x", "--set:1:1: is not YAML: aliases"),
         ("heat=!!int 3", "--set:1:1: is not YAML: tags"),
-        ("heat={a: 1, a: 2}", "--set:1:8: a: is given twice"),
+        ("heat={a: 1, a: 2}", "--set:1:8: a: appears twice"),
         ("heat=2001-99-99", "--set:1:1: cannot be understood"),
         ("heat=\ud800", "--set: is not YAML: unacceptable character"),
     ],

@@ -80,7 +80,7 @@ class TestRefused:
         (line,) = refusal(path, "tracker:\n  near: 3\n")
         words = "belongs to tracker.kind: rules, and has no effect with motion"
         assert line == f"my.yaml:2:3: tracker.near: {words}"
-        (line,) = refusal(path, "tracker: {kind: rules, needed: 0.3, history: 3}")
+        (line,) = refusal(path, "tracker: {kind: rules, confirm_seconds: 0.3, history: 3}")
         words = "belongs to tracker.kind: motion, and has no effect with rules"
         assert line == f"my.yaml:1:24: tracker.confirm_seconds: {words}"
 
@@ -92,17 +92,17 @@ class TestRefused:
     @pytest.mark.parametrize(
         ("text", "message"),
         [
-            ("tracker: {kind: best}", "my.yaml:1:11: tracker.kind: best: is no tracker; "),
-            ("detector:\n  kind: yolo", "my.yaml:2:3: detector.kind: yolo: is no detector; "),
+            ("tracker: {kind: best}", "my.yaml:1:11: tracker.kind: best: unknown tracker; "),
+            ("detector:\n  kind: yolo", "my.yaml:2:3: detector.kind: yolo: unknown detector; "),
             (
                 "tracker: {kind: [1]}",
-                "my.yaml:1:11: tracker.kind: should be motion or rules (got [1])",
+                "my.yaml:1:11: tracker.kind: must be motion or rules (got [1])",
             ),
             (
                 "tracker: {kind: }",
-                "my.yaml:1:11: tracker.kind: should be motion or rules (got None)",
+                "my.yaml:1:11: tracker.kind: must be motion or rules (got None)",
             ),
-            ("tracker: rules", "my.yaml:1:1: tracker: should be a section, key: value (got 'rule"),
+            ("tracker: rules", "my.yaml:1:1: tracker: must be a section, key: value (got 'rule"),
         ],
     )
     def test_a_kind_that_is_not_known(self, path: Path, text: str, message: str) -> None:
@@ -161,7 +161,7 @@ class TestOtherPackages:
         assert detector.detector.model_dump() == {
             "kind": "fake",
             "model": None,
-            "searches": None,
+            "searches_per_second": None,
             "stride": None,
             "foot": 0.0,
             "level": 9,
@@ -169,7 +169,7 @@ class TestOtherPackages:
             "by_name": {},
         }
         assert refusal(path, "detector: {kind: fake, level: 300}") == [
-            "my.yaml:1:24: detector.level: should be less than or equal to 255 (got 300)"
+            "my.yaml:1:24: detector.level: must be less than or equal to 255 (got 300)"
         ]
 
     @pytest.mark.parametrize(
@@ -208,15 +208,15 @@ class TestOtherPackages:
 
     def test_all_names_are_known_those_of_vdet_first(self) -> None:
         with pytest.raises(
-            ConfigError, match=r"known are svm, net, broken, fake, missing, nameless, odd$"
+            ConfigError, match=r"known: svm, net, broken, fake, missing, nameless, odd$"
         ):
             load_settings((), ["detector.kind=best"])
 
     @pytest.mark.parametrize(
         ("kind", "words"),
         [
-            ("broken", r"broken: fake_vdet:NOTHING cannot be loaded \(AttributeError: .*rep"),
-            ("missing", r"missing: no_such.* cannot be loaded \(ModuleNotFoundError: .*rep"),
+            ("broken", r"broken: fake_vdet:NOTHING cannot be loaded \(AttributeError: .*"),
+            ("missing", r"missing: no_such.* cannot be loaded \(ModuleNotFoundError: .*"),
             ("nameless", r'nameless: has no settings of kind = "nameless"; repair'),
             ("odd", r'odd: has no settings of kind = "odd"; repair'),
         ],

@@ -71,10 +71,10 @@ def test_a_list_in_a_file_replaces_the_whole_default_list(path: Path) -> None:
 def test_all_errors_are_given_at_once(path: Path) -> None:
     text = "detector: {heat: {frames: 0, blur: -1}}\ntrain:\n  svm: {C: -1}\ntrakcer: {}\n"
     assert sorted(refusal(path, text, "output.crf=99")) == [
-        "--set: output.crf: should be less than or equal to 51 (got 99)",
-        "my.yaml:1:19: detector.heat.frames: should be greater than or equal to 1 (got 0)",
-        "my.yaml:1:30: detector.heat.blur: should be greater than or equal to 1 (got -1)",
-        "my.yaml:3:9: train.svm.C: should be greater than 0 (got -1)",
+        "--set: output.crf: must be less than or equal to 51 (got 99)",
+        "my.yaml:1:19: detector.heat.frames: must be greater than or equal to 1 (got 0)",
+        "my.yaml:1:30: detector.heat.blur: must be greater than or equal to 1 (got -1)",
+        "my.yaml:3:9: train.svm.C: must be greater than 0 (got -1)",
         "my.yaml:4:1: trakcer: unknown setting; did you mean tracker?",
     ]
 
@@ -84,17 +84,17 @@ def test_all_errors_are_given_at_once(path: Path) -> None:
     [
         ("heat: {x: 3}", 19, "heat.x: unknown setting; known settings: frames, blur, threshold, "),
         ("features: {hog: {cel: 3}}", 29, "features.hog.cel: unknown setting; did you mean cell?"),
-        ("heat: 3", 12, "heat: should be a section, key: value (got 3)"),
-        ("heat: {frames: 2001-01-01}", 19, "heat.frames: should be a valid integer (got datetime"),
-        ("heat: {threshold: 1e999}", 19, "heat.threshold: should be a finite number (got inf)"),
+        ("heat: 3", 12, "heat: must be a section, key: value (got 3)"),
+        ("heat: {frames: 2001-01-01}", 19, "heat.frames: must be a valid integer (got datetime"),
+        ("heat: {threshold: 1e999}", 19, "heat.threshold: must be a finite number (got inf)"),
         ("features: {patch: 62}", 12, "features: patch must be a multiple of hog.cell (4)"),
-        ("search: {windows: [5]}", 31, "search.windows[0]: should be a section, key: value"),
+        ("search: {windows: [5]}", 31, "search.windows[0]: must be a section, key: value"),
         (
             "search: {windows: [{size: 64, overlap: 0.8, top: 0, bottom: 63}]}",
             31,
             "search.windows[0]: bottom must be at least top + size",
         ),
-        ("heat: {regions: some}", 19, "heat.regions: should be 'outline' or 'votes' (got 'some')"),
+        ("heat: {regions: some}", 19, "heat.regions: must be 'outline' or 'votes' (got 'some')"),
     ],
 )
 def test_a_mistake_in_the_detector_is_explained_in_one_line(
@@ -107,7 +107,10 @@ def test_a_mistake_in_the_detector_is_explained_in_one_line(
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("tracker: {neded: 3}", "1:11: tracker.neded: unknown setting; did you mean needed?"),
+        (
+            "tracker: {confirm_second: 3}",
+            "1:11: tracker.confirm_second: unknown setting; did you mean confirm_seconds?",
+        ),
         (
             "tracker: {kind: rules, histroy: 3}",
             "1:24: tracker.histroy: unknown setting; did you mean history?",
@@ -117,9 +120,9 @@ def test_a_mistake_in_the_detector_is_explained_in_one_line(
             "1:1: heat: unknown setting; known settings: detector, tracker, camera, ",
         ),
         ("'': 1", "1:1: : unknown setting; known settings: detector, tracker, "),
-        ("draw: {label: score}", "1:8: draw.label: should be a list (got"),
-        ("draw: {label: [speed]}", "1:16: draw.label[0]: should be 'id', 'class', 'score' or "),
-        ("draw: {trails: 0}", "1:8: draw.trails: should be greater than 0 (got 0)"),
+        ("draw: {label: score}", "1:8: draw.label: must be a list (got"),
+        ("draw: {label: [speed]}", "1:16: draw.label[0]: must be 'id', 'class', 'score' or "),
+        ("draw: {trails: 0}", "1:8: draw.trails: must be greater than 0 (got 0)"),
     ],
 )
 def test_a_mistake_is_explained_in_one_line(path: Path, text: str, message: str) -> None:
@@ -129,18 +132,18 @@ def test_a_mistake_is_explained_in_one_line(path: Path, text: str, message: str)
 
 def test_each_missing_key_of_an_item_is_named(path: Path) -> None:
     assert refusal(path, "detector: {search: {windows: [{size: 64, overlap: 0.5}]}}") == [
-        "my.yaml:1:31: detector.search.windows[0].top: is missing",
-        "my.yaml:1:31: detector.search.windows[0].bottom: is missing",
+        "my.yaml:1:31: detector.search.windows[0].top: is required",
+        "my.yaml:1:31: detector.search.windows[0].bottom: is required",
     ]
 
 
 @pytest.mark.parametrize(
     ("assignment", "message"),
     [
-        ("heat.frames=x", "heat.frames: should be a valid integer"),
-        ("heat.frames.0=5", "heat.frames: should be a valid integer"),
-        ("heat.frames" + ".a" * 5000 + "=3", "heat.frames: should be a valid integer"),
-        ("search.windows.0.size=64", "search.windows: should be a list (got"),
+        ("heat.frames=x", "heat.frames: must be a valid integer"),
+        ("heat.frames.0=5", "heat.frames: must be a valid integer"),
+        ("heat.frames" + ".a" * 5000 + "=3", "heat.frames: must be a valid integer"),
+        ("search.windows.0.size=64", "search.windows: must be a list (got"),
     ],
 )
 def test_a_mistake_in_an_assignment_to_the_detector_is_explained_in_one_line(

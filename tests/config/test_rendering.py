@@ -92,7 +92,7 @@ some_settings = st.builds(
     Settings,
     detector=detectors,
     tracker=st.builds(RulesTrackerSettings, good_fraction=st.floats(0, 1))
-    | st.builds(MotionTrackerSettings, leak=st.floats(0, 1)),
+    | st.builds(MotionTrackerSettings, decay=st.floats(0, 1)),
     train=st.builds(
         TrainSettings,
         svm=st.builds(

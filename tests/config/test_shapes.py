@@ -52,8 +52,8 @@ def test_a_region_has_a_polygon_or_a_mask(shape: dict[str, Any]) -> None:
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"start": [1, 0.5]}, "start and end are one point"),
-        ({"left": "up", "right": "up"}, "left and right have one name"),
+        ({"start": [1, 0.5]}, "start and end must differ"),
+        ({"left": "up", "right": "up"}, "left and right must have different names"),
         ({"end": [1, 1.01]}, "lies outside"),
         ({"end": [0.009, 0.509]}, "line: is shorter than 1 % of the frame"),
         ({"name": ""}, "at least 1 character"),
@@ -67,7 +67,7 @@ def test_lines_that_make_no_sense_are_refused(values: dict[str, Any], message: s
 def test_a_name_can_be_given_once() -> None:
     twice = [{"name": "a", "points": SQUARE}] * 2
     for section in ({"regions": twice}, {"traffic": {"zones": twice}}):
-        with pytest.raises(ValidationError, match="a: this name is given twice"):
+        with pytest.raises(ValidationError, match="a: the name is used twice"):
             Settings.model_validate(section)
 
 
@@ -95,7 +95,7 @@ def test_frames_of_another_shape_than_the_camera_are_refused() -> None:
     camera = CameraSettings(size=(1280, 720))
     for size in ((640, 360), (1920, 1088)):
         camera.check_frames(*size)
-    with pytest.raises(ConfigError, match="given for frames of 1280×720, which have another shape"):
+    with pytest.raises(ConfigError, match="given for frames of 1280×720, whose shape is not"):
         camera.check_frames(640, 480)
     CameraSettings().check_frames(640, 480)
 

@@ -57,7 +57,7 @@ class TestLinearModel:
     def test_features_that_no_shipped_model_has_are_refused_with_advice(self) -> None:
         settings = SvmSettings(features=OTHER)
         for load in (load_detector, model_file):
-            with pytest.raises(ModelError, match=r"no shipped model .* give --model, or train one"):
+            with pytest.raises(ModelError, match=r"no shipped model .* pass --model, or train one"):
                 load(settings)
 
     def test_a_model_file_is_taken_instead_of_the_shipped_one(self) -> None:
@@ -93,7 +93,7 @@ class TestLinearModel:
 
 def test_an_unknown_kind_is_refused_and_the_known_ones_are_named() -> None:
     for load in (load_detector, model_file):
-        with pytest.raises(ConfigError, match=r"^sonar: is no detector; known are svm"):
+        with pytest.raises(ConfigError, match=r"^sonar: unknown detector; known: svm"):
             load(DetectorSettings(kind="sonar"))
 
 

@@ -103,11 +103,11 @@ NETWORKS: Mapping[str, tuple[Write, str]] = {
     "4 GB while it runs": (zeros_of(10**9), "takes too much memory"),
     "scores without boxes": (
         rt_detr((1, 5), (1, 0, 4), (1, 5)),
-        r"of no known form: .* \(1, 0, 4\)",
+        r"has an unknown form: .* \(1, 0, 4\)",
     ),
     "boxes of eight sides": (
         rt_detr((1, 5), (1, 5, 8), (1, 5)),
-        r"of no known form: .* \(1, 5, 8\)",
+        r"has an unknown form: .* \(1, 5, 8\)",
     ),
     "scores for each class": (rt_detr((1, 5), (1, 5, 4), (1, 5, 80)), "has an unknown form"),
     "numbers alone": (rt_detr((), (), ()), "has an unknown form"),

@@ -136,21 +136,21 @@ HOSTILE = {
     ),
     "half a character as kind": (
         r'detector: {kind: "\ud800"}',
-        r"detector\.kind: .*\\ud800.*: is no detector",
+        r"detector\.kind: .*\\ud800.*: unknown detector",
     ),
-    "not a number": ("input: {max_damaged: .nan}", "input.max_damaged: should be a finite number"),
+    "not a number": ("input: {max_damaged: .nan}", "input.max_damaged: must be a finite number"),
     "NUL": ("input: {x: \0}", "is not YAML: unacceptable character #x0000"),
-    "one key 12,000 times": ("heat: 1\n" * 12_000, "is given twice"),
+    "one key 12,000 times": ("heat: 1\n" * 12_000, "appears twice"),
     "9,000 unknown keys": ("".join(f"k{i}: 1\n" for i in range(9000)), "k0: unknown setting"),
     "15,000 wrong items": (
         "detector:\n search:\n  windows:\n" + "  - 1\n" * 15_000,
-        "should be a section",
+        "must be a section",
     ),
     "control characters": (r'"a\n\e[2J": 1', r"a\\n\\x1b\[2J: unknown setting"),
     "a long quoted key": ('? "' + "k" * 90_000 + '"\n: 1', "k…: unknown setting"),
     "too large": (
         "#" * (MAX_BYTES + 1),
-        "is larger than 100,000 bytes; that unknown settings file",
+        "is larger than 100,000 bytes; too large for a settings file",
     ),
 }
 

@@ -40,7 +40,7 @@ CVAT = (
     + "</annotations>\n"
 )
 CSV = "frame,time,id,x,y,width,height,state\n" + "".join(
-    f"{f},{f / 25:.2f},{i},{90 * i},40,60,50,seen\n" for f, i in BOXES
+    f"{f},{f / 25:.2f},{i},{90 * i},40,60,50,detected\n" for f, i in BOXES
 )
 JSONL = "".join(
     json.dumps(
@@ -175,21 +175,21 @@ WICKED_TRACKS |= {
     "deep COCO": (
         "t.coco.json",
         '{"images": ' + "[" * DEEP,
-        "is not JSON: maximum recursion depth",
+        "is not JSON: nested too deeply",
     ),
     "no numbers in COCO": (
         "t.coco.json",
         '{"images": [], "categories": [], "annotations": [{"bbox": [1e999, NaN, 1, 1]}]}',
-        "is not COCO: annotations.0",
+        "is not JSON: parse error",
     ),
     "a huge id in COCO": ("t.coco.json", '{"images": [{"id": ' + "9" * DEEP, "is not JSON"),
     "an entity in CVAT": ("t.xml", ENTITY_BOMB, ": the XML declares a document type"),
     "a long class": (
         "t.csv",
-        CSV.replace("state\n", "class\n").replace(",seen\n", "," + "x" * 1000 + "\n"),
+        CSV.replace("state\n", "class\n").replace(",detected\n", "," + "x" * 1000 + "\n"),
         ":2: the label must have at most 100 characters",
     ),
-    "no zip file": ("t.yolo.zip", "PK" + "x" * DEEP, "neither a folder nor a readable zip"),
+    "no zip file": ("t.yolo.zip", "PK" + "x" * DEEP, "is not a folder or a readable zip"),
 }
 
 

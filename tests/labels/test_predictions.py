@@ -9,7 +9,7 @@ from vdet.labels.video import LabelledVideo
 
 HEADER = "frame,time,id,x,y,width,height,state\n"
 TXT = "1,1,11,21,30,40,1,-1,-1,-1\n3,1,12,21,30,40,1,-1,-1,-1\n"
-CSV = f"{HEADER}0,0.0,1,10,20,30,40,seen\n2,0.08,1,11,20,30,40,lost\n"
+CSV = f"{HEADER}0,0.0,1,10,20,30,40,detected\n2,0.08,1,11,20,30,40,predicted\n"
 JSONL = "".join(
     json.dumps({"frame": frame, "time": frame * 0.04, "tracks": tracks}) + "\n"
     for frame, tracks in enumerate(
@@ -29,7 +29,7 @@ def read(folder: Path, suffix: str, content: str) -> LabelledVideo:
     return read_predictions(path)
 
 
-SCORED_CSV = "frame,time,id,x,y,width,height,score,state\n0,0.0,1,10,20,30,40,{score},seen\n"
+SCORED_CSV = "frame,time,id,x,y,width,height,score,state\n0,0.0,1,10,20,30,40,{score},detected\n"
 SCORED_JSONL = (
     '{{"frame": 0, "time": 0.0, "tracks": [{{"id": 1, "x": 10, "y": 20, "width": 30, "height": 40, '
     '"score": {score}, "state": "detected"}}]}}\n'
@@ -63,7 +63,7 @@ def test_an_empty_file_is_a_video_without_boxes(tmp_path: Path, suffix: str, con
 
 
 def test_times_may_be_those_of_a_wall_clock(tmp_path: Path) -> None:
-    rows = "".join(f"{n},{1.7e9 + n / 25:.6f},1,1,1,9,9,seen\n" for n in range(3))
+    rows = "".join(f"{n},{1.7e9 + n / 25:.6f},1,1,1,9,9,detected\n" for n in range(3))
     assert read(tmp_path, "csv", HEADER + rows).rate == pytest.approx(25, abs=1e-3)
 
 
@@ -81,8 +81,12 @@ def record(**changes: object) -> str:
         ("csv", "", ":1: the header must name each of these columns once: frame, time"),
         ("csv", "frame,time,id,x,y,width\n", ":1: the header must name each of these columns"),
         ("csv", CSV + "3,0.12,1,11,20,30\n", ":4: this line has 6 cells, but the header has 8"),
-        ("csv", CSV + "3,soon,1,11,20,30,40,seen\n", ":4: time: Input should be a valid number"),
-        ("csv", CSV + "3,0.12,1,11,20,0,40,seen\n", ":4: the box has no area"),
+        (
+            "csv",
+            CSV + "3,soon,1,11,20,30,40,detected\n",
+            ":4: time: Input should be a valid number",
+        ),
+        ("csv", CSV + "3,0.12,1,11,20,0,40,detected\n", ":4: the box has no area"),
         ("csv", CSV + '3,"0.12\n', ":4: unexpected end of data"),
         ("jsonl", "", ": is empty; it should have a record for every frame"),
         ("jsonl", JSONL + "{\n", ":5: Invalid JSON"),
@@ -100,7 +104,7 @@ def record(**changes: object) -> str:
             ":5: frame 4 is at 0.11 s; times must",
         ),
         ("jsonl", JSONL + record(time=1e12), ":5: frame 4 is at 1e+12 s; times must"),
-        ("csv", CSV + "1,0.09,2,1,1,9,9,seen\n", ":3: frame 2 is at 0.08 s; times must"),
+        ("csv", CSV + "1,0.09,2,1,1,9,9,detected\n", ":3: frame 2 is at 0.08 s; times must"),
         ("jsonl", JSONL + record(tracks=[{}]), ":5: id: Input should be a valid integer"),
         ("jsonl", JSONL + record(tracks=None), ":5: tracks: Input should be a valid"),
     ],

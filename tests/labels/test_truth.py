@@ -73,7 +73,7 @@ def cvat(label: str, occluded: int = 0) -> str:
 def test_an_unknown_label_is_refused_with_its_line(tmp_path: Path, content: str) -> None:
     with pytest.raises(
         TruthError,
-        match=r"truth:(2|track 3): label '(Spaceship|cow)' is unknown; give it .* car, van, ",
+        match=r"truth:(2|track 3): label '(Spaceship|cow)' is unknown; set its .* car, van, ",
     ):
         read_truth(write(tmp_path, content))
 

@@ -135,20 +135,20 @@ def test_every_camera_is_read_with_all_its_digits(
 @pytest.mark.parametrize(
     ("key", "value", "message"),
     [
-        ("width", "wide", "camera.yaml:3:5: camera.lens.width: should be a valid integer"),
-        ("height", 0, "camera.yaml:4:5: camera.lens.height: should be greater than or equal to 16"),
-        ("matrix", [[1, 2], [3, 4]], "camera.yaml:6:7: camera.lens.matrix[0][2]: is missing"),
-        ("matrix", 7, "camera.yaml:5:5: camera.lens.matrix: should be a list"),
+        ("width", "wide", "camera.yaml:3:5: camera.lens.width: must be a valid integer"),
+        ("height", 0, "camera.yaml:4:5: camera.lens.height: must be greater than or equal to 16"),
+        ("matrix", [[1, 2], [3, 4]], "camera.yaml:6:7: camera.lens.matrix[0][2]: is required"),
+        ("matrix", 7, "camera.yaml:5:5: camera.lens.matrix: must be a list"),
         (
             "matrix",
             [[560, 3, 322], [0, 558, 236], [0, 0, 1]],
-            "5:5: camera.lens.matrix: should be [[fx, 0, c",
+            "5:5: camera.lens.matrix: must be [[fx, 0, c",
         ),
         ("matrix", [[1, 0, 322], [0, 558, 236], [0, 0, 1]], "with focal lengths of 0.1 to 100 t"),
         ("matrix", [[560, 0, 322], [0, 1e6, 236], [0, 0, 1]], "with focal lengths of 0.1 to 100"),
         ("matrix", [[560, 0, 322], [0, 558, 500], [0, 0, 1]], "the principal point in the frame"),
-        ("distortion", [0, 0, 0, 0, float("nan")], "distortion[4]: should be a finite number"),
-        ("rms", -1, "rms: should be greater than or equal to 0"),
+        ("distortion", [0, 0, 0, 0, float("nan")], "distortion[4]: must be a finite number"),
+        ("rms", -1, "rms: must be greater than or equal to 0"),
         ("colour", "red", "camera.lens.colour: unknown setting"),
     ],
 )
@@ -160,4 +160,4 @@ def test_each_mistake_is_named_with_its_place(
 
 def test_all_mistakes_are_named_at_once(path: Path) -> None:
     assert len(refusal(path, GOOD | {"width": "wide", "rms": -1}).split("\n")) == 2
-    assert "camera.lens.matrix: is missing" in refusal(path, {"width": 640})
+    assert "camera.lens.matrix: is required" in refusal(path, {"width": 640})

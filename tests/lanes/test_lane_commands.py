@@ -286,5 +286,5 @@ def test_wrong_cameras_are_refused(run: Run, files: Files, tmp_path: Path, comma
     path.write_text("camera: {lens: {width: 640, height: 480}}")
     result = run(command, source, *outputs, "--lanes", "-c", path)
     assert result.code == 1
-    assert "camera.lens.matrix: is missing" in result.err
+    assert "camera.lens.matrix: is required" in result.err
     assert list(tmp_path.iterdir()) == [path]

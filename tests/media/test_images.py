@@ -169,7 +169,7 @@ def test_a_pipe_is_refused_at_once(tmp_path: Path, read: Callable[[Path], object
 
 @pytest.mark.parametrize("name", ["picture.xyz", "picture", "picture.txt"])
 def test_the_error_for_an_unknown_suffix_lists_the_known_ones(tmp_path: Path, name: str) -> None:
-    with pytest.raises(ImageError, match=r"written as .*\.jpg, .*\.png"):
+    with pytest.raises(ImageError, match=r"must end in .*\.jpg, .*\.png"):
         write_image(tmp_path / name, PICTURE)
     assert list(tmp_path.iterdir()) == []
 

@@ -83,7 +83,7 @@ class TestSearchesASecond:
 
 
 def test_the_frames_searched_do_not_depend_on_the_number_of_threads() -> None:
-    detector = PERSPECTIVE.detector.model_copy(update={"stride": None, "searches": 9})
+    detector = PERSPECTIVE.detector.model_copy(update={"stride": None, "searches_per_second": 9})
     settings = PERSPECTIVE.model_copy(update={"detector": detector})
     one, many = (list(follow(drive(30), settings, threads=threads)) for threads in (1, 4))
     assert [result.searched for result in one] == [n % 2 == 0 for n in range(30)]

@@ -10,7 +10,7 @@ from vdet.track.track import FrameTracks
 from vdet.traffic.records import join_records, records_content, write_records
 
 HEADING = (
-    "id,class,clock,first,last,seconds,seen,between,lost,mean_score,best_score,"
+    "id,class,clock,first,last,seconds,detected,interpolated,predicted,mean_score,best_score,"
     "start_x,start_y,end_x,end_y,length,length_share,x,y,width,height,metres,speed,speed_85,speed_sd,"
     "motion\n"
 )

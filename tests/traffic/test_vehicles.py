@@ -18,7 +18,7 @@ DOWN = through((0, 600, 300), (4, 600, 500))
 def test_a_vehicle_that_is_seen_for_a_moment_does_not_count() -> None:
     moment = feet((600, 300), (600, 350), (600, 450), (600, 500))
     assert events(moment) == ()
-    assert ways(events(moment, confirmed=0.1)) == ["here"]
+    assert ways(events(moment, min_seen_seconds=0.1)) == ["here"]
 
 
 def test_once_it_is_confirmed_what_it_did_before_counts() -> None:

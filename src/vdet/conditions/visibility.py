@@ -26,7 +26,7 @@ _DOUBTED = 0.5, 1.2
 """Recall below which these limits are wider, by this factor: the scores say the same."""
 _PLAIN = 1.0
 """Local contrast of a plane that shows nothing to be seen, grey levels."""
-_MINIMUM = 3.0
+_SHORTEST = 3.0
 """Seconds of bad sight that are reported, or half of a shorter video; an underpass is shorter."""
 _GAP = 2.0
 """Seconds of good sight that end a span."""
@@ -97,12 +97,11 @@ def findings(times: Sequence[float], sights: Sequence[Sight], *, is_shipped: boo
 
     `is_shipped` says whether the shipped network was used: what it finds is known.
     """
-    minimum = min(_MINIMUM, (times[-1] - times[0]) / 2) if times else _MINIMUM
     codes = [_usual(sights[max(0, n - _AROUND) : n + _AROUND + 1]) for n in range(len(sights))]
     found = []
     for code, words in _WORDS.items():
         bad = dict.fromkeys(time for time, item in zip(times, codes, strict=True) if item == code)
-        spans = [span for span in joined(bad, _GAP) if span[1] - span[0] >= minimum]
+        spans = [span for span in joined(bad, _GAP) if span[1] - span[0] >= _SHORTEST]
         if not spans:
             continue
         tells, recall = "fewer vehicles are found in such pictures", None

@@ -78,6 +78,8 @@ def json_entries(path: Path, file: BinaryIO, *lists: str) -> Iterator[tuple[str,
                 entries.clear()
         for reader in readers:
             reader.close()
+    except TruthError:
+        raise
     except (ijson.JSONError, ValueError) as error:
         what = printable(str(error).partition("\n")[0].strip())
         raise TruthError(f"{path}: is not JSON: {what}") from error

@@ -162,7 +162,7 @@ def test_how_likely_each_class_is_goes_to_the_tracker(tmp_path: Path) -> None:
     form = ultralytics(SIZE, RedBox(64, 32, 16, 8, 2), 4)
     form.table[4:, 7] = 0.4, 0.2, 0.0, 0.4
     path = write_network(tmp_path / "net.onnx", form, SIZE, (64, 32))
-    found = detect(path, frame_with_red(128, 128), names=names, classes=["truck", "car"])
+    found = detect(path, frame_with_red(128, 128), class_names=names, classes=["truck", "car"])
     assert class_names(found) == ["truck"]
     assert found.data["class_scores"] == pytest.approx(np.array([[0.5, 0.3]]), abs=0.01)
     bare = detect(
@@ -198,12 +198,12 @@ def test_a_network_of_one_class_without_a_name_finds_vehicles(tmp_path: Path) ->
 def test_names_can_be_given(tmp_path: Path) -> None:
     form = ultralytics(SIZE, RedBox(64, 32, 16, 8, 1), 2)
     path = write_network(tmp_path / "net.onnx", form, SIZE, (64, 32))
-    with pytest.raises(ModelError, match=r"does not name its 2 classes; give detector\.names"):
+    with pytest.raises(ModelError, match=r"does not name its 2 classes; set detector\.class_names"):
         detect(path, frame_with_red(128, 128))
-    found = detect(path, frame_with_red(128, 128), names=["tree", "bus"])
+    found = detect(path, frame_with_red(128, 128), class_names=["tree", "bus"])
     assert class_names(found) == ["bus"]
     with pytest.raises(ModelError, match=r"has 2 classes, not 1"):
-        detect(path, frame_with_red(128, 128), names=["bus"])
+        detect(path, frame_with_red(128, 128), class_names=["bus"])
 
 
 def test_a_network_without_a_wanted_class_is_refused(tmp_path: Path) -> None:

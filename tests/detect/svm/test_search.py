@@ -214,4 +214,4 @@ def test_a_frame_with_too_many_windows_is_refused() -> None:
     with pytest.raises(ImageError, match=r"^907,649 windows in 1280×720") as error:
         FrameSearch(model_of(COLOUR), settings, 1280, 720)
     assert not isinstance(error.value, FrameSizeError)
-    assert "give larger steps" in str(error.value)
+    assert "use larger steps" in str(error.value)

@@ -123,7 +123,7 @@ def test_a_training_goes_on_from_the_weights_of_an_exported_network(
 ) -> None:
     path = tmp_path / "base.onnx"
     export_network(trained[0], Header(classes=CLASSES), path)
-    settings = QUICK.model_copy(update={"steps": 3, "rate": 1e-6})
+    settings = QUICK.model_copy(update={"steps": 3, "learning_rate": 1e-6})
     losses: list[float] = []
     train_network(
         [block_source()], settings, tmp_path / "a.ckpt", base=path,
@@ -243,7 +243,7 @@ def test_a_checkpoint_of_another_training_is_refused(tmp_path: Path) -> None:
     settings = QUICK.model_copy(update={"steps": 2})
     source, path = [block_source(4)], tmp_path / "net.ckpt"
     train_network(source, settings, path)
-    other = settings.model_copy(update={"rate": 1e-4})
+    other = settings.model_copy(update={"learning_rate": 1e-4})
     with pytest.raises(DataError, match=r"net\.ckpt: belongs to a training with other settings"):
         train_network(source, other, path)
     with pytest.raises(DataError, match=r"net\.ckpt: belongs to a training with .* another base"):

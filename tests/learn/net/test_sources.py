@@ -25,7 +25,11 @@ def test_a_damaged_video_is_learnt_from_as_far_as_the_settings_tolerate(tmp_path
 
 def test_vehicles_of_a_labelled_video_keep_their_classes(tmp_path: Path) -> None:
     clip, truth = write_pictures(tmp_path / "%d.png", range(4)), tmp_path / "gt.csv"
-    rows = ["1,5,5,20,20,1,seen,lorry", "2,30,5,20,20,1,seen,vehicle", "3,5,30,20,20,1,seen,"]
+    rows = [
+        "1,5,5,20,20,1,detected,lorry",
+        "2,30,5,20,20,1,detected,vehicle",
+        "3,5,30,20,20,1,detected,",
+    ]
     header = "frame,time,id,x,y,width,height,score,state,class"
     truth.write_text("\n".join([header, *(f"3,0.1,{row}" for row in rows)]))
     settings = Settings()

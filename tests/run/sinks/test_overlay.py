@@ -145,9 +145,9 @@ SEEN = replace(LOST, state="detected")
 
 
 def test_lost_boxes_can_be_as_the_others_or_hidden() -> None:
-    plain = drawn_on(result_of(LOST), lost="plain")
+    plain = drawn_on(result_of(LOST), predicted="plain")
     np.testing.assert_array_equal(plain, drawn_on(result_of(SEEN)))
-    hidden = drawn_on(result_of(LOST), lost="hidden")
+    hidden = drawn_on(result_of(LOST), predicted="hidden")
     np.testing.assert_array_equal(hidden, road(CAR))
 
 
