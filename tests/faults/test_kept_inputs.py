@@ -42,7 +42,6 @@ def contents(folder: Path) -> dict[Path, bytes]:
         "eval images set --json set/a.png",
         "eval images yset --json yset/data.yaml",
         "eval images yset --json yset/labels/a.txt",
-        "draw frames -o frames/img_0001.png",
         "info frames/img_%04d.png --json frames/img_0001.png",
         "info frames --json frames/img_0003.png",
         "detect-image frames --json frames/img_0002.png",

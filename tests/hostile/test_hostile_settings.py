@@ -150,7 +150,7 @@ HOSTILE = {
     "a long quoted key": ('? "' + "k" * 90_000 + '"\n: 1', "k…: unknown setting"),
     "too large": (
         "#" * (MAX_BYTES + 1),
-        "is larger than 100,000 bytes; too large for a settings file",
+        "is larger than 100,000 bytes, too large for a settings file",
     ),
 }
 
