@@ -1,6 +1,6 @@
 """How well one sees in the parts of a video, and what the shipped network finds in such pictures.
 
-`benchmarks/visibility.py` measures what it finds in pictures of many roads. The recall is fitted
+`benchmarks/conditions.py` measures what it finds in pictures of many roads. The recall is fitted
 to how bright, contrasty and sharp they are, and to how sure the network is of what it finds.
 """
 
@@ -39,7 +39,7 @@ _NOTED = 0.6
 _WEIGHTS = np.array([-0.18, 0.56, 2.31, -4.58, 3.02])
 _BIAS = 0.71
 """Of the logarithms of brightness, contrast and sharpness, the weak fraction of all scores, and the
-mean of the others: fitted by `benchmarks/visibility.py`."""
+mean of the others: fitted by `benchmarks/conditions.py`."""
 
 _WORDS: dict[Code, str] = {
     "dark": "it is dark",
