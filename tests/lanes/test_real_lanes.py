@@ -57,8 +57,7 @@ def test_a_lane_of_the_right_width_is_found_in_every_test_picture(
     for number in range(1, 7):
         lane = lane_in(calibration, real_data / "lane_images" / f"test{number}.jpg")
         assert lane.width == pytest.approx(3.7, abs=0.4)
-        assert lane.offset is not None
-        assert abs(lane.offset) < 0.6
+        assert lane.offset == pytest.approx(0, abs=0.6)
         assert lane.radius is None or lane.radius > 400
 
 
