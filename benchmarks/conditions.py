@@ -55,7 +55,7 @@ _SEEDS = 12
 _SMALLEST = 0.025
 """Width of vehicles that are counted in pictures, as a fraction of the picture's."""
 _FOUND = 0.45
-"""Minimum intersection over union of a vehicle that was found."""
+"""Least intersection over union of a vehicle that was found."""
 _MOST = 150
 """Pictures of a set that are searched."""
 
@@ -126,8 +126,8 @@ def _change(kind: str, rng: np.random.Generator) -> Callable[[Image, float], Ima
     changes: dict[str, Callable[[Image, float], Image]] = {
         "shaken": shaken,
         "bumped": bumped,
-        "night": lambda image, _: ((image / 255) ** gamma * gain * 255).astype(np.uint8),
-        "fog": lambda image, _: (image * (1 - veil) + grey * veil).astype(np.uint8),
+        "night": lambda image, _: np.asarray((image / 255) ** gamma * gain * 255, np.uint8),
+        "fog": lambda image, _: np.asarray(image * (1 - veil) + grey * veil, np.uint8),
         "blur": lambda image, _: np.asarray(cv2.GaussianBlur(image, (0, 0), sigma)),
     }
     return changes.get(kind, lambda image, _: image)
@@ -145,29 +145,38 @@ def compare_drawn() -> None:
 
 
 def measure_pictures(roads: Path) -> None:
-    """Print the recall by sight in sets that the network has not seen, and the weights."""
-    settings = load_settings(assignments=["detector.min_score_still=0.1"])
+    """Print the recall by sight in sets that the network has not seen, and the weights.
+
+    Each of these sets is predicted from all others, and from the sets that the network has seen:
+    as they are, and in the dark, in fog and blurred. What it has seen has an offset of its own.
+    """
+    settings = load_settings(assignments=["detector.still_score=0.1"])
     search = PictureSearch(load_detector(settings.detector), settings)
     seen = trained_on(settings.detector)
     rows = []
-    for path in sorted(item for item in roads.iterdir() if item.name not in seen and item.is_dir()):
-        rows += [(path.name, *row) for row in _measured(path, search)]
+    for path in sorted(item for item in roads.iterdir() if item.is_dir()):
+        rows += [(path.name, *row) for row in _measured(path, search, altered=path.name in seen)]
     names = np.array([row[0] for row in rows])
-    sights = [row[1] for row in rows]
+    is_seen = np.isin(names, seen)
     counts = np.array([row[2:] for row in rows], np.float64)
-    features = np.array([_features(sight) for sight in sights])
+    features = np.array([_features(row[1]) for row in rows])
+    features = np.column_stack([features, is_seen])
     predicted = np.zeros(len(rows))
-    for name in set(names):
+    for name in set(names[~is_seen]):
         model = _fit(features[names != name], counts[names != name])
         predicted[names == name] = model.predict_proba(features[names == name])[:, 1]
-    codes = np.array([sight.code or "clear" for sight in sights])
+    codes = np.array([row[1].code or "clear" for row in rows])
     for code in sorted(set(codes)):
-        rows_of = codes == code
-        every, found = counts[rows_of].sum(axis=0)
-        reported = predicted[rows_of].mean()
-        print(f"{code}: {every:.0f} vehicles, recall {found / every:.2f}, reported {reported:.2f}")
+        rows_of = (codes == code) & ~is_seen
+        every, found = counts[rows_of].T
+        reported = predicted[rows_of]
+        print(
+            f"{code}: {len(every)} pictures, {every.sum():.0f} vehicles; by picture: reported "
+            f"{reported.mean():.2f}, true {np.mean(found / every):.2f}; by vehicle: reported "
+            f"{(reported * every).sum() / every.sum():.2f}, true {found.sum() / every.sum():.2f}"
+        )
     whole = _fit(features, counts)
-    print("weights", whole.coef_[0].round(2).tolist(), "bias", whole.intercept_.round(2).tolist())
+    print("weights", whole.coef_[0][:-1].round(2).tolist(), "bias", whole.intercept_.round(2))
 
 
 def _features(sight: Sight) -> Float64Array:
@@ -186,10 +195,15 @@ def _fit(features: Float64Array, counts: Float64Array) -> LogisticRegression:
     return model.fit(np.vstack([features, features]), labels, sample_weight=weights)
 
 
-def _measured(path: Path, search: PictureSearch) -> Iterator[tuple[Sight, int, int]]:
-    """Yield the sight of each picture of a set with vehicles, their number, and how many found."""
+def _measured(
+    path: Path, search: PictureSearch, *, altered: bool
+) -> Iterator[tuple[Sight, int, int]]:
+    """Yield the sight of each picture of a set with vehicles, their number, and how many found.
+
+    With `altered`, each is measured a second time, changed: dark, foggy and blurred in turn.
+    """
     pictures = read_labelled_pictures(path).pictures
-    for labelled in pictures[:: max(1, len(pictures) // _MOST)]:
+    for number, labelled in enumerate(pictures[:: max(1, len(pictures) // _MOST)]):
         image = read_image(labelled.path)
         truth = [
             Box(*label.box)
@@ -198,12 +212,16 @@ def _measured(path: Path, search: PictureSearch) -> Iterator[tuple[Sight, int, i
             and not label.ignored
             and label.box[2] - label.box[0] >= _SMALLEST * image.shape[1]
         ]
-        if truth:
-            found = search.detect(labelled.path, image).detections
+        if not truth:
+            continue
+        kind = ("night", "fog", "blur")[number % 3]
+        change = _change(kind, np.random.default_rng(number))
+        for shown in (image, change(image, 0.0))[: 1 + altered]:
+            found = search.detect(labelled.path, shown).detections
             scores = np.array([item.score for item in found], np.float64)
             sure = [item.box for item in found if item.score >= 0.4]
             hits = sum(any(_iou(box, other) >= _FOUND for other in sure) for box in truth)
-            yield Sight.of(small_luma(Picture(image)), scores), len(truth), hits
+            yield Sight.of(small_luma(Picture(shown)), scores), len(truth), hits
 
 
 def _iou(box: Box, other: Box) -> float:
