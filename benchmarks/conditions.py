@@ -150,7 +150,7 @@ def measure_pictures(roads: Path) -> None:
     Each of these sets is predicted from all others, and from the sets that the network has seen:
     as they are, and in the dark, in fog and blurred. What it has seen has an offset of its own.
     """
-    settings = load_settings(assignments=["detector.still_score=0.1"])
+    settings = load_settings(assignments=["detector.min_score_still=0.1"])
     search = PictureSearch(load_detector(settings.detector), settings)
     seen = trained_on(settings.detector)
     rows = []
