@@ -1,16 +1,15 @@
 """The page over the videos of a batch: totals, a link to each page, and a table of all vehicles."""
 
 import json
-import os
 from collections import Counter
 from collections.abc import Hashable, Iterable, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import Any
-from urllib.parse import quote
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from vdet.detect.classes import UNKNOWN
 from vdet.files import write_text
 from vdet.pages.render import link_to, render
 
@@ -88,8 +87,8 @@ def write_index(videos: Sequence[tuple[str, Path, VideoFacts]], target: Path) ->
 def _table(videos: Sequence[tuple[str, Path, VideoFacts]]) -> dict[str, Any]:
     """Return the columns of the table, as `index.js` reads them; texts are numbers of lists."""
     rows = [(number, row) for number, (_, _, facts) in enumerate(videos) for row in facts.rows]
-    folders = [page.parent for _, page, _ in videos]
-    classes, kinds = _numbered(row.class_name or "vehicle" for _, row in rows)
+    folders = [link_to(page.parent, Path()) for _, page, _ in videos]
+    classes, kinds = _numbered(row.class_name or UNKNOWN for _, row in rows)
     ways, ways_of = _numbered(row.way for _, row in rows)
     states, states_of = _numbered(row.motion for _, row in rows)
     return {
@@ -106,7 +105,7 @@ def _table(videos: Sequence[tuple[str, Path, VideoFacts]]) -> dict[str, Any]:
         "seconds": [row.seconds for _, row in rows],
         "clock": [_plain_seconds(row.clock) for _, row in rows],
         "speed": [row.speed for _, row in rows],
-        "picture": [_below(folders[number], row.picture) for number, row in rows],
+        "picture": [row.picture and f"{folders[number]}/{row.picture}" for number, row in rows],
     }
 
 
@@ -123,9 +122,3 @@ def _plain_seconds(clock: str | None) -> int | None:
         return None
     plain = datetime.fromisoformat(clock).replace(tzinfo=None)
     return round((plain - datetime(1970, 1, 1)).total_seconds())
-
-
-def _below(folder: Path, address: str) -> str:
-    if not address:
-        return ""
-    return quote(os.fsencode(folder).decode("utf-8", "surrogateescape")) + "/" + address

@@ -108,21 +108,34 @@ class VideoPage:
     @property
     def facts(self) -> VideoFacts:
         """The video in numbers."""
-        totals = self.counts.totals if self.counts else ()
         return VideoFacts(
             seconds=max(0.0, self.seconds),
             frames=self.frames,
-            vehicles=sum(record.has_driven for record in self.records),
-            most=1 + max(charts.pack(self._spans), default=-1),
+            vehicles=self._vehicles,
+            most=self._most,
             still=NO_STILL if self.poster is None else jpeg_uri(self.poster, _SMALL),
-            counts={
-                f"{total.name}: {total.direction}": total.count for total in totals if total.count
-            },
+            counts=self._totals,
             conditions=tuple(
                 finding.text for finding in self.findings if finding.severity == "warning"
             ),
             rows=self._rows(),
         )
+
+    @property
+    def _vehicles(self) -> int:
+        """The number of vehicles that drove."""
+        return sum(record.has_driven for record in self.records)
+
+    @property
+    def _most(self) -> int:
+        """The most vehicles at once."""
+        return 1 + max(charts.pack(self._spans), default=-1)
+
+    @property
+    def _totals(self) -> dict[str, int]:
+        """The number of vehicles in each direction of a line or zone that has some."""
+        totals = self.counts.totals if self.counts else ()
+        return {f"{total.name}: {total.direction}": total.count for total in totals if total.count}
 
     def _rows(self) -> tuple[VehicleRow, ...]:
         ways: dict[int, dict[str, None]] = {}
@@ -183,19 +196,18 @@ class VideoPage:
 
     def _figures(self) -> list[tuple[str, str]]:
         """Return the key figures."""
-        facts = self.facts
         shown = sum(record.seconds for record in self.records) / max(1, len(self.records))
         stood = Counter(record.motion for record in self.records if not record.has_driven)
         classes = Counter(
             record.class_name for record in self.records if record.class_name and record.has_driven
         )
         return [
-            (named(facts.vehicles, "vehicle"), str(facts.vehicles)),
+            (named(self._vehicles, "vehicle"), str(self._vehicles)),
             *((named(n, name), str(n)) for name, n in classes.most_common(4)),
             *((_STOOD[motion], str(n)) for motion, n in stood.items() if motion in _STOOD),
-            ("most at once", str(facts.most)),
+            ("most at once", str(self._most)),
             ("mean seconds shown", f"{shown:.1f}"),
-            *((name, str(count)) for name, count in facts.counts.items()),
+            *((name, str(count)) for name, count in self._totals.items()),
         ]
 
     def _interval_plots(self) -> list[Plot]:

@@ -12,9 +12,8 @@ const columns = [
   { name: "seconds", text: i => data.seconds[i].toFixed(1), key: i => data.seconds[i] },
   { name: "km/h", text: i => number(data.speed[i]), key: i => data.speed[i], used: "speed" },
   { name: "lines", text: i => data.ways[data.way[i]], key: i => data.ways[data.way[i]], used: "way" },
-  { name: "distance, m", text: i => number(data.distance[i]), key: i => data.distance[i], used: "distance" },
   { name: "moves", text: i => data.states[data.state[i]], key: i => data.state[i], used: "state" },
-].filter(column => !column.used || data[column.used]?.some(value => value !== null && value !== 0));
+].filter(column => !column.used || data[column.used].some(value => value !== null && value !== 0));
 
 const form = document.getElementById("filters");
 const body = document.querySelector("#found tbody");
@@ -157,7 +156,7 @@ if (data.picture.some(Boolean)) head.append(document.createElement("th"));
 head.append(...columns.map(heading));
 fill("class", data.classes);
 fill("way", data.ways);
-fill("state", data.states ?? []);
+fill("state", data.states);
 for (const name of ["speed", "clock"]) {
   if (!data[name].some(value => value !== null)) {
     for (const element of form.querySelectorAll(`[data-needs="${name}"]`)) element.hidden = true;

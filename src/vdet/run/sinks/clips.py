@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
+from vdet.detect.classes import UNKNOWN
 from vdet.media.cutting import can_copy, copied_suffix, copy_part, encode_part
 from vdet.run.result import FrameResult, findings_in
 from vdet.run.sinks.protocol import BaseSink, SinkContext, SinkKind
@@ -85,7 +86,7 @@ class ClipSink(BaseSink):
         moment = f"{seconds // 3600:02}-{seconds // 60 % 60:02}-{seconds % 60:02}"
         if clock:
             moment = clock.at(first.first).strftime("%Y-%m-%dT%H-%M-%S")
-        kind = re.sub(r"[^\w-]+", "-", first.class_name or "vehicle")
+        kind = re.sub(r"[^\w-]+", "-", first.class_name or UNKNOWN)
         others = f"+{len(scene.vehicles) - 1}" if len(scene.vehicles) > 1 else ""
         return f"clip-{moment}-{kind}-{first.id}{others}"
 
