@@ -105,6 +105,13 @@ def test_it_prints_the_totals(run: Run, folder: Path, tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["t.csv"]
 
 
+def test_of_a_video_it_says_what_to_run_first(run: Run, folder: Path) -> None:
+    result = run("count", folder / "red.mp4", "-c", folder / "lines.yaml")
+    assert result.code == 2
+    first = f"vdet detect-video {folder / 'red.mp4'} --no-video --tracks red.jsonl"
+    assert result.err.endswith(f"red.mp4: is a video; run first: {first}\n")
+
+
 def test_a_line_in_the_wrong_place_is_reported(run: Run, folder: Path, tmp_path: Path) -> None:
     lines = tmp_path / "lines.yaml"
     lines.write_text(LINES.replace("[100, 0], end: [100, 240]", "[0, 50], end: [320, 50]"))

@@ -31,6 +31,21 @@ def test_writes_a_video_of_the_same_frames(
     assert [path.name for path in tmp_path.iterdir()] == ["out.mp4"]
 
 
+def test_without_an_output_the_video_is_written_beside_its_source(
+    run: Run, clip_path: Path, model_path: Path, tmp_path: Path
+) -> None:
+    source = tmp_path / "gate.mp4"
+    shutil.copy(clip_path, source)
+    options = (source, "--frames", "3", "--model", model_path, *QUICK_OPTIONS)
+    result = run("detect-video", *options)
+    assert result.code == 0, result.err
+    assert f"{tmp_path / 'gate.vdet.mp4'}: written" in result.err
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["gate.mp4", "gate.vdet.mp4"]
+    again = run("detect-video", *options)
+    assert (again.code, "gate.vdet.mp4: already exists; use --overwrite" in again.err) == (1, True)
+    assert run("detect-video", *options, "--overwrite").code == 0
+
+
 def test_tracks_agree_in_every_format(
     run: Run, clip_path: Path, model_path: Path, tmp_path: Path
 ) -> None:
@@ -100,7 +115,7 @@ def test_a_picture_of_every_stage_of_one_moment(
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ((), "pass one OUT, or --no-video"),
+        (("--tracks", "t.csv"), "pass one OUT, or --no-video"),
         (("out.mp4", "--no-video"), "pass one OUT, or --no-video"),
         (("--no-video",), "no output; add one"),
         (("out.mp4", "--stages", "x"), "--stages and --at go together"),

@@ -2,6 +2,7 @@
 
 import gc
 import logging
+import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -54,6 +55,12 @@ def count(
     the same as those of detect-video --counts. Where the clocks of TRACKS say that one follows
     another, a vehicle that both of them show counts once.
     """
+    from vdet.batch.inputs import VIDEO_INPUT_SUFFIXES
+
+    for path in tracks:
+        if path.suffix.lower() in VIDEO_INPUT_SUFFIXES:
+            saved = shlex.join(map(str, (path, "--no-video", "--tracks", f"{path.stem}.jsonl")))
+            raise click.UsageError(f"{path}: is a video; run first: vdet detect-video {saved}")
     settings = choice.read()
     if not settings.traffic:
         raise click.UsageError("no lines or zones to count at; add a settings file with -c FILE")

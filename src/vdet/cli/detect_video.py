@@ -66,6 +66,7 @@ _batch_options = options.bundle(
 
 
 @command(
+    "vdet detect-video in.mp4",
     "vdet detect-video in.mp4 out.mp4 --tracks out.csv",
     "vdet detect-video in.mp4 --no-video --tracks - --start 1:30 --end 2:00",
     "vdet detect-video in.mp4 --no-video --stages stages --at 12.5",
@@ -143,7 +144,8 @@ def detect_video(
 ) -> int:
     """Find and follow vehicles in one video, or in many.
 
-    IN is a video. OUT is written: the same video with a box around each vehicle.
+    IN is a video. OUT is written: the same video with a box around each vehicle. Without OUT and
+    other outputs, it is written beside IN, as in.vdet.mp4.
 
     With -d DIR, every CLIP is processed. A CLIP is a video, a folder with videos in it or below it,
     or a quoted pattern such as 'day*/*.mp4'. The outputs of each video are written into DIR, and a
@@ -157,7 +159,7 @@ def detect_video(
         raise click.UsageError("--stages and --at go together")
     source = Path()
     if batch.folder is None:
-        source, video = _in_and_out(videos, no_video=no_video)
+        source, video = _in_and_out(videos, no_video=no_video, is_alone=not wanted)
         wanted = [*video, *wanted]
     if no_video and not wanted:
         raise click.UsageError("no output; add one, such as --tracks")
@@ -176,8 +178,13 @@ def detect_video(
     return _process_batch(videos, run, suffixes, batch, strict=strict)
 
 
-def _in_and_out(clips: tuple[Path, ...], *, no_video: bool) -> tuple[Path, list[options.Wanted]]:
+def _in_and_out(
+    clips: tuple[Path, ...], *, no_video: bool, is_alone: bool
+) -> tuple[Path, list[options.Wanted]]:
+    """Return the source, and the video to write; `is_alone`: there are no other outputs."""
     source, *outputs = clips
+    if is_alone and not (outputs or no_video or source.is_dir() or "%" in source.name):
+        outputs = [_beside(source)]
     is_kept = False
     if outputs and outputs[0].is_file():
         from vdet.media.writer import may_replace_video
@@ -194,6 +201,13 @@ def _in_and_out(clips: tuple[Path, ...], *, no_video: bool) -> tuple[Path, list[
     return source, [("video", path) for path in outputs]
 
 
+def _beside(source: Path) -> Path:
+    from vdet.media.writer import VIDEO_SUFFIXES
+
+    suffix = source.suffix if source.suffix.lower() in VIDEO_SUFFIXES else VIDEO_SUFFIXES[0]
+    return source.with_name(f"{source.stem}.vdet{suffix}")
+
+
 def _process_one(run: "Run") -> bool:
     """Process a video, and return whether the result is doubtful."""
     from vdet.detect.factory import load_detector
@@ -208,6 +222,9 @@ def _process_one(run: "Run") -> bool:
         rate = totals.frames / totals.seconds
         found = f"{counted(totals.frames, 'frame')}, {counted(totals.tracks, 'track')}"
         print_message(f"{run.source}: {found}, {totals.seconds:.1f} s, {rate:.1f} frames/s")
+        for output in run.outputs:
+            if output.sink == "video":
+                print_message(f"{output.path}: written")
         if totals.clock and run.settings.traffic:
             print_message(f"{run.source}: begins {totals.clock}")
     return findings_in(totals.facts).is_doubtful
