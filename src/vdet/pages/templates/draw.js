@@ -1,7 +1,6 @@
 "use strict";
-// The page of `vdet draw`. First the counting rule, which is pure; then numbers for the panel, the
-// file, and at last what is drawn and edited. Points are [x, y] in pixels of the frame. A path has
-// times, xs, ys and heights; rows from `seen` on are where the vehicle would have driven on.
+// The page of `vdet draw`: the counting rule, numbers for the panel, the file, then drawing and editing. Points are
+// [x, y] in pixels of the frame. Rows of a path from `seen` on are where the vehicle would have driven on.
 
 // ---------------------------------------------------------------- the rule, as vdet.traffic has it
 const SETTLED = 0.1; // seconds after which a vehicle off the band has changed the side
@@ -77,8 +76,7 @@ function placeZone(zone, size) {
   const right = size[0] - INSIDE, bottom = size[1] - INSIDE;
   const inFrame = ([x, y]) => [clamp(x, INSIDE, right), clamp(y, INSIDE, bottom)];
   return {
-    isZone: true, name: zone.name, directions: ["enter", "exit", "appear", "vanish"], corners, size,
-    bounds,
+    isZone: true, name: zone.name, directions: ["enter", "exit", "appear", "vanish"], corners, size, bounds,
     distance(x, y, height) {
       x = clamp(x, INSIDE, right);
       y = clamp(y, INSIDE, bottom);
@@ -167,8 +165,7 @@ function settle({ times, heights }, border, distances) {
     const far = wasFar && isSame, seconds = Math.round(1e4 * (times[row] - since)) / 1e4;
     settles[row] = far || (isOff && seconds >= SETTLED) || (row === count - 1 && isFar);
     isClear[row] = isFar || far;
-    wasOff = isOff;
-    wasFar = isFar;
+    [wasOff, wasFar] = [isOff, isFar];
   }
   return { settles, isClear };
 }
@@ -195,9 +192,8 @@ function warningsOf(line, visits, paths, span) {
 }
 
 function quantile(values, share) {
-  const sorted = [...values].sort((a, b) => a - b), at = share * (sorted.length - 1);
-  const low = Math.floor(at), high = Math.ceil(at);
-  return sorted[low] + (at - low) * (sorted[high] - sorted[low]);
+  const sorted = [...values].sort((a, b) => a - b), at = share * (sorted.length - 1), low = Math.floor(at);
+  return sorted[low] + (at - low) * (sorted[Math.ceil(at)] - sorted[low]);
 }
 
 /** Return how many vehicles go from one place to another, by "from\nto"; to nothing for a single place. */
@@ -221,9 +217,8 @@ function flowsOf(found) {
 function solve(rows, values) {
   const size = rows.length, table = rows.map((row, i) => [...row, values[i]]);
   for (let column = 0; column < size; column++) {
-    let best = column;
-    for (let row = column; row < size; row++)
-      if (Math.abs(table[row][column]) > Math.abs(table[best][column])) best = row;
+    const best = table.reduce((best, row, at) =>
+      at > column && Math.abs(row[column]) > Math.abs(table[best][column]) ? at : best, column);
     [table[column], table[best]] = [table[best], table[column]];
     if (Math.abs(table[column][column]) < 1e-12) return null;
     for (let row = 0; row < size; row++) {
@@ -274,6 +269,24 @@ function oriented(h, points) {
   const signs = new Set(points.map(([x, y]) => Math.sign(h[6] * x + h[7] * y + h[8])));
   const [sign] = signs;
   return signs.size === 1 && sign ? h.map(value => sign * value) : null;
+}
+
+/** Return points of the plane from two lengths along a straight lane, each from near to far; null where they do not
+ * fit. The camera is level; its focal length is the frame's width: lengths along the lane do not depend on it. */
+function levelGround(pixels, lengths, size) {
+  const [y1, y2, y3, y4] = pixels.map(pixel => pixel[1]);
+  const ratio = lengths[0] * (y3 - y4) / (lengths[1] * (y1 - y2)); // (y3 - h)(y4 - h) / (y1 - h)(y2 - h), h the horizon
+  const [a, b, c] = [1 - ratio, ratio * (y1 + y2) - y3 - y4, y3 * y4 - ratio * y1 * y2];
+  const horizon = (-b - Math.sqrt(b * b - 4 * a * c)) / (2 * a);
+  if (!(y1 > y2 && y2 >= y3 && y3 > y4 && ratio > 0 && horizon < y4)) return null;
+  const [near, , , far] = pixels, middle = size[0] / 2;
+  const vanishing = near[0] + (far[0] - near[0]) * (horizon - near[1]) / (far[1] - near[1]);
+  const focal = Math.hypot(size[0], horizon - size[1] / 2), turn = Math.atan2(vanishing - middle, focal);
+  const scale = Math.cos(turn) * lengths[0] / (1 / (y2 - horizon) - 1 / (y1 - horizon));
+  const place = ([x, y]) => [(x - middle) / focal, 1].map(value => value * scale / (y - horizon));
+  const aside = (near[0] < middle ? size[0] : -size[0]) / 4 / (y1 - horizon);
+  const corners = [near, far].flatMap(([x, y]) => [[x, y], [x + aside * (y - horizon), y]]);
+  return corners.map(pixel => ({ pixel, metres: place(pixel) }));
 }
 
 /** Return the speed of a vehicle at a moment in km/h, from the places of one second; or null. */
@@ -424,6 +437,9 @@ async function openPage(data) {
   const buttons = [...document.querySelectorAll("[data-tool]")];
   const hint = () => buttons.find(button => button.dataset.tool === tool).dataset.hint;
   const say = text => { get("hint").textContent = text; };
+  const inside = point => point.map((value, i) => Math.round(10 * clamp(value, 0, size[i])) / 10);
+  const add = (kind, made) => change(() => { selected = { kind, index: places[kind].push(made) - 1, point: null }; });
+  const swap = () => item()?.start && change(() => Object.assign(item(), { left: item().right, right: item().left }));
 
   const segment = ([[x1, y1], [x2, y2]]) => ["grip", "drawn"].map(name => el("line", { x1, y1, x2, y2, class: name }));
   const dot = ([cx, cy], r, name, more = {}) => el("circle", { cx, cy, r: r * unit(), class: name, ...more });
@@ -448,20 +464,11 @@ async function openPage(data) {
     for (let number = 1; ; number++) if (!names.includes(`${stem} ${number}`)) return `${stem} ${number}`;
   }
 
-  function add(kind, made) {
-    change(() => { selected = { kind, index: places[kind].push(made) - 1, point: null }; });
-  }
-
   /** Delete the selected corner of a polygon, else the whole. */
   function remove() {
     const points = item()?.points, { kind, index, point } = selected ?? {};
     if (points?.length > 3 && point !== null) change(() => { points.splice(point, 1); selected.point = null; });
     else if (selected) change(() => { places[kind].splice(index, 1); selected = null; });
-  }
-
-  function swap() {
-    const line = item();
-    if (line?.start) change(() => { [line.left, line.right] = [line.right, line.left]; });
   }
 
   /** Return the points of an item as they are shown; those of the ground are middles of pixels. */
@@ -479,10 +486,6 @@ async function openPage(data) {
       else if (kind === "ground") each.pixel = moved.map(value => value - 0.5);
       else each.points[number] = moved;
     });
-  }
-
-  function inside(point) {
-    return point.map((value, i) => Math.round(10 * clamp(value, 0, size[i])) / 10);
   }
 
   // ------------------------------------------------ counts
@@ -650,17 +653,19 @@ async function openPage(data) {
       text => { each.metres[i] = Number(text) || 0; }, "number"));
     box.replaceChildren(el("h3", {}, `Selected ${KINDS[selected.kind]}`), ...names, ...metres,
       each.start ? button("Swap sides (S)", swap, "swap") : "", button("Delete (Del)", remove, "delete"),
-      ...(each.metres && places.ground.length === 4 ? stretch(button) : []));
+      ...(each.metres && places.ground.length === 4 ? fieldsOfLengths(button) : []));
   }
 
-  /** Return fields that set the metres of four points at once. */
-  function stretch(button) {
-    const [wide, long] = [3.5, 20].map(value => el("input", { type: "number", step: "any", value }));
-    const set = () => change(() => [[0, 0], [1, 0], [1, 1], [0, 1]].forEach(([x, y], i) => {
-      places.ground[i].metres = [x * (Number(wide.value) || 1), y * (Number(long.value) || 1)];
-    }));
-    return [el("p", {}, "Are the four points near left, near right, far right and far left of a straight lane?"),
-      el("label", {}, "Its width, m", wide), el("label", {}, "its length, m", long), button("Set the metres", set, "stretch")];
+  /** Return fields that replace four points by a plane in metres. */
+  function fieldsOfLengths(button) {
+    const inputs = [1, 3].map(first => el("input", { type: "number", step: "any", id: `length-${first}` }));
+    const set = () => {
+      const made = levelGround(places.ground.map(each => each.pixel), inputs.map(input => Number(input.value)), size);
+      if (made) change(() => { [places.ground, selected] = [made, null]; });
+      else say("These lengths do not fit the points: 1 and 2, then 3 and 4, run from near to far.");
+    };
+    return [el("p", {}, "Are these the ends of two known lengths along one straight lane, from near to far? The camera is taken as level."),
+      ...inputs.map((input, i) => el("label", {}, `Points ${2 * i + 1} to ${2 * i + 2}, m`, input)), button("Set the metres", set, "lengths")];
   }
 
   function showList() {
@@ -843,10 +848,9 @@ async function openPage(data) {
     else putPoint(pointer ?? [width / 2, height / 2]);
   }
 
-  function step([dx, dy]) {
-    if (tool === "select") return selected ? change(() => move(dx, dy)) : undefined;
-    const [x, y] = pointer ?? [width / 2, height / 2];
-    pointer = inside([x + dx, y + dy]);
+  function step(by) {
+    if (tool === "select") return selected ? change(() => move(...by)) : undefined;
+    pointer = inside((pointer ?? [width / 2, height / 2]).map((value, i) => value + by[i]));
     drawMarks();
     showLens();
   }
@@ -877,7 +881,6 @@ async function openPage(data) {
   const actions = { undo: () => travel(past, future), redo: () => travel(future, past), save };
   for (const [id, action] of Object.entries(actions)) get(id).addEventListener("click", action);
   for (const button of buttons) button.addEventListener("click", () => setTool(button.dataset.tool));
-  get("ways").append(...Array.from("→↘↓↙←↖↑↗", (arrow, i) => el("span", { style: `color: hsl(${45 * i} 90% 45%)` }, arrow)));
   get("open").addEventListener("change", open);
   get("paths").addEventListener("change", paintPaths);
   const leave = () => { [pointer, hovered] = [null, null]; drawMarks(); showLens(); };
@@ -886,9 +889,6 @@ async function openPage(data) {
   for (const [name, handler] of Object.entries(handlers)) stage.addEventListener(name, handler);
   addEventListener("keydown", type);
   addEventListener("beforeunload", event => { if (JSON.stringify(places) !== saved) event.preventDefault(); });
-  stage.style.aspectRatio = `${width} / ${height}`;
-  stage.style.setProperty("--ratio", width / height);
-  marks.setAttribute("viewBox", `0 0 ${width} ${height}`);
   refresh();
   setTool("select");
   new ResizeObserver(() => { paintPaths(); drawMarks(); }).observe(stage);
