@@ -28,6 +28,7 @@ from vdet.media.images import write_image
 from vdet.media.reader import VideoReader
 from vdet.synthetic.render import render
 from vdet.synthetic.scene import Scene
+from vdet.traffic.records import records_content
 
 
 @pytest.fixture(scope="module")
@@ -329,7 +330,7 @@ def test_a_model_file_decides_the_kind_of_its_detector(tmp_path: Path) -> None:
         vdet.Detector(detector="none.npz")
 
 
-def test_live_counts_are_those_of_the_file_and_of_the_frames(
+def test_follow_and_files_have_the_same_counts_vehicles_and_findings(
     red_clip: Path, tmp_path: Path
 ) -> None:
     lines = tmp_path / "lines.yaml"
@@ -337,24 +338,31 @@ def test_live_counts_are_those_of_the_file_and_of_the_frames(
         f"camera: {{size: [{WIDTH}, {HEIGHT}]}}\ntraffic:\n  min_seen_seconds: 0\n  lines:\n"
         "  - {name: gate, start: [100, 0], end: [100, 240]}\n"
     )
-    settings = vdet.load_settings([lines], ["detector.stride=1"])
-    results = list(vdet.follow(red_clip, detector=red_boxes, tracker=Latest(), settings=settings))
+    settings = vdet.load_settings([lines], ["detector.stride=1", "lanes.enabled=true"])
+    results = vdet.follow(red_clip, detector=red_boxes, tracker=Latest(), settings=settings)
+    assert (results.counts, results.vehicles, results.findings) == (None, (), ())
+    frames = list(results)
     tracks = tmp_path / "t.jsonl"
+    outputs = {name: tmp_path / f"{name}.json" for name in ("counts", "vehicles", "conditions")}
     vdet.detect_video(
         red_clip,
         tracks=tracks,
-        outputs={"counts": tmp_path / "c.json"},
+        outputs=outputs,
         detector=red_boxes,
         tracker=Latest(),
         settings=settings,
     )
-    from_file = vdet.count_tracks(tracks, settings)
+    from_file = vdet.count(tracks, settings)
     assert sum(total.count for total in from_file.totals) == 1
-    live = json.loads((tmp_path / "c.json").read_text())
-    assert [item["count"] for item in live["totals"]] == [total.count for total in from_file.totals]
-    frames = [result.frame_tracks for result in results]
-    size = WIDTH, HEIGHT
-    assert from_file == vdet.count_tracks(frames, settings, size=size)
+    assert from_file == results.counts == vdet.count(frames, settings)
+    in_files = {name: json.loads(path.read_text()) for name, path in outputs.items()}
+    totals = [total.count for total in from_file.totals]
+    assert [item["count"] for item in in_files["counts"]["totals"]] == totals
+    assert records_content(results.vehicles, outputs["vehicles"]) == in_files["vehicles"]
+    assert results.findings
+    assert [finding.record() for finding in results.findings] == in_files["conditions"]
+    known = vdet.vehicles(red_clip, detector=red_boxes, tracker=Latest(), settings=settings)
+    assert known == results.vehicles
 
 
 def test_tracks_are_compared_with_the_truth(red_clip: Path, tmp_path: Path) -> None:

@@ -31,7 +31,7 @@ assert len(results) == 8 and results[-1].tracks
 for overwrite in (False, True):
     run = vdet.Run(clip, frames=8, overwrite=overwrite)
     vdet.detect_video(run, "out.mp4", tracks=["t.csv", "t.jsonl"])
-visits = vdet.count_tracks("t.csv", vdet.load_settings(lines)).totals
+visits = vdet.count("t.csv", vdet.load_settings(lines)).totals
 assert max(total.count for total in visits) == len(results[-1].tracks)
 vdet.evaluate_tracks("t.csv", "t.csv")
 """

@@ -17,9 +17,10 @@ A name is that of a kind of detector or tracker, also of another package, or tha
 
 import math
 import os
-from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
+from itertools import chain
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,7 @@ from typing import Any
 import numpy as np
 
 from vdet.boxes import Box, Boxes, Image
+from vdet.conditions.finding import Finding
 from vdet.config.loading import find_config, kind_of_model
 from vdet.config.loading import load_settings as load_layers
 from vdet.config.schema import DetectorSettings, Settings, TrackerSettings
@@ -44,18 +46,20 @@ from vdet.run.pictures import PictureJob, PictureSearch, run_picture
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output, SinkContext, SinkKind, check_sinks
 from vdet.run.steps import Step, StepContext
-from vdet.run.video import Run, RunTotals, open_video, run_video
+from vdet.run.video import Results, Run, RunTotals, run_video
 from vdet.track.factory import TrackerKind, make_tracker
 from vdet.track.track import FrameTracks, Track, VideoTracker
 from vdet.traffic.counting import count_files, count_frames
 from vdet.traffic.counts import Counts, Event
+from vdet.traffic.records import VehicleRecord
 
 __all__ = (
     "Box", "Boxes", "Counts", "Detector", "DetectorKind", "DetectorModel", "DetectorSettings",
-    "Event", "Frame", "FrameResult", "FrameTracks", "Output", "Picture", "Run", "RunTotals",
-    "Scores", "Settings", "SinkContext", "SinkKind", "Step", "StepContext", "Track", "Tracker",
-    "TrackerKind", "TrackerSettings", "VdetError", "VideoDetector", "VideoTracker", "count_tracks",
-    "detect_image", "detect_video", "evaluate_tracks", "follow", "load_settings",
+    "Event", "Finding", "Frame", "FrameResult", "FrameTracks", "Output", "Picture", "Results",
+    "Run", "RunTotals", "Scores", "Settings", "SinkContext", "SinkKind", "Step", "StepContext",
+    "Track", "Tracker", "TrackerKind", "TrackerSettings", "VdetError", "VehicleRecord",
+    "VideoDetector", "VideoTracker", "count", "detect_image", "detect_video", "evaluate_tracks",
+    "follow", "load_settings", "vehicles",
 )  # fmt: skip
 
 PathName = str | PathLike[str]
@@ -181,8 +185,8 @@ def follow(
     start: Seconds | None = None,
     end: Seconds | None = None,
     frames: int | None = None,
-) -> Generator[FrameResult]:
-    """Yield a result for each frame of a video: the frame, its detections and its tracks.
+) -> Results:
+    """Return an iterator over the frames of a video: each with its detections and its tracks.
 
     Parameters
     ----------
@@ -198,12 +202,23 @@ def follow(
     frames
         Maximum number of frames to take.
 
-    Raises `VideoError` if the video cannot be read or searched.
+    The video is opened for the first frame; `VideoError` is raised then if it cannot be read or
+    searched.
     """
     run = _run(source, start=_exact(start), end=_exact(end), frames=frames, threads=1)
     chosen, loaded, tracker = _resolved(_settings(source, settings), detector, tracker)
-    with open_video(replace(run, settings=chosen), loaded, tracker=tracker, steps=steps) as video:
-        yield from video.results
+    return Results(replace(run, settings=chosen), loaded, tracker, steps)
+
+
+def vehicles(source: PathName | Run, **options: Any) -> tuple[VehicleRecord, ...]:
+    """Return a record of each vehicle of a video, by id: when it is shown, its class, its path.
+
+    Parameters and errors are those of `follow`.
+    """
+    results = follow(source, **options)
+    for _ in results:
+        pass
+    return results.vehicles
 
 
 @recorded_inputs()
@@ -278,8 +293,8 @@ def detect_image(
     return run_picture(job, PictureSearch(loaded, settings), overwrite=overwrite).detections
 
 
-def count_tracks(
-    tracks: PathName | Iterable[FrameTracks],
+def count(
+    tracks: PathName | Iterable[FrameTracks | FrameResult],
     settings: Settings,
     *,
     size: tuple[int, int] | None = None,
@@ -290,7 +305,7 @@ def count_tracks(
     Parameters
     ----------
     tracks
-        A file that `detect_video` wrote, or the tracks of each frame: `FrameResult.frame_tracks`.
+        A file that `detect_video` wrote; or the results of `follow`, or their `frame_tracks`.
     size
         Width and height of the frames, pixels; None: as the tracks or `camera.size` say.
     rate
@@ -298,7 +313,13 @@ def count_tracks(
     """
     if isinstance(tracks, str | PathLike):
         return count_files([Path(tracks)], settings, size, rate)[str(Path(tracks))]
-    return count_frames(tracks, settings, size)
+    frames = iter(tracks)
+    first = next(frames, None)
+    if isinstance(first, FrameResult):
+        size = size or (first.frame.picture.width, first.frame.picture.height)
+    every = frames if first is None else chain([first], frames)
+    shown = (item.frame_tracks if isinstance(item, FrameResult) else item for item in every)
+    return count_frames(shown, settings, size)
 
 
 def evaluate_tracks(tracks: PathName, truth: PathName, *, until: int | None = None) -> Scores:

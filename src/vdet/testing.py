@@ -150,6 +150,7 @@ def _write(kind: SinkKind, path: Path, settings: Settings, *, still: bool, fails
                 traffic.add(result.frame_tracks)
                 sink.write(result)
                 assert (result.frame.image == _scene(index)).all(), "the sink changed the frame"
+            traffic.end()
             assert not _content(path), "the output is there before the run has ended"
             if fails:
                 raise KeyboardInterrupt

@@ -125,6 +125,8 @@ def write(
                 if traffic:
                     traffic.add(result.frame_tracks)
                 sink.write(result)
+            if traffic:
+                traffic.end()
 
 
 def read(path: Path) -> list[Frame]:

@@ -72,7 +72,7 @@ def test_what_is_made_at_the_end_has_the_last_class_of_the_track(tmp_path: Path)
         records.add(frame)
     line = LineSettings(name="gate", start=(0.35, 0.0), end=(0.35, 1.0))  # crossed as a car
     settings = Settings(traffic=TrafficSettings(lines=(line,)))
-    live = vdet.count_tracks(frames, settings, size=SIZE)
+    live = vdet.count(frames, settings, size=SIZE)
     assert [record.class_name for record in records.end()] == ["truck"]
     assert [event.class_name for event in live.events] == ["truck"]
     assert last_classes(frames) == {1: "truck"}
@@ -85,7 +85,7 @@ def test_what_is_made_at_the_end_has_the_last_class_of_the_track(tmp_path: Path)
             for frame in frames:
                 writer.write(frame)
             writer.end()
-        saved = vdet.count_tracks(path, settings, size=SIZE, rate=RATE)
+        saved = vdet.count(path, settings, size=SIZE, rate=RATE)
         assert [(e.name, e.class_name) for e in saved.events] == [("gate", "truck")], form.name
 
 

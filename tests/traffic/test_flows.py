@@ -2,10 +2,14 @@
 
 import csv
 import json
+import sys
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import asdict, astuple, replace
 from datetime import datetime, timedelta
 from pathlib import Path
+from types import ModuleType
+from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
@@ -15,7 +19,7 @@ from vdet.errors import ConfigError
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Clock
 from vdet.traffic.count_files import write_counts, write_flows
-from vdet.traffic.counts import Counts, flow_table, zone_table
+from vdet.traffic.counts import Counts, count_table, flow_table, zone_table
 
 WEST = LineSettings(name="west", start=(200, 200), end=(200, 600))
 EAST = LineSettings(name="east", start=(1000, 200), end=(1000, 600))
@@ -97,6 +101,38 @@ def test_there_is_a_row_for_each_interval_direction_and_class() -> None:
         (5, "left", "car", 0), (5, "left", "truck", 0),
         (5, "right", "car", 0), (5, "right", "truck", 1),
     ]  # fmt: skip
+
+
+def test_counts_are_a_table_of_pandas_and_bars_of_matplotlib(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    car, bus = named(frames(GOES_EAST), "car"), named(numbered(frames(TURNS_BACK), 2), "bus")
+    found = counts(joined(car, bus), WEST)
+    pandas: Any = ModuleType("pandas")
+    pandas.DataFrame = lambda rows, columns: [dict(zip(columns, r, strict=True)) for r in rows]
+    monkeypatch.setitem(sys.modules, "pandas", pandas)
+    with monkeypatch.context() as patch:
+        patch.setattr(Counts, "table", lambda *_: map(astuple, count_table([found], 5)))
+        table: Any = found.to_pandas(5)
+    assert table == [asdict(row) for row in found.table(5)]
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(ConfigError, match=r"^plot: matplotlib is not installed; pip install mat"):
+        found.plot()
+    monkeypatch.setitem(sys.modules, "matplotlib", Mock())
+    ways, moments = ["west left", "west right"], ["0.0", "5.0", "10.0"]
+    for interval, bars in (
+        (None, [
+            (ways, [1, 1], {"bottom": [0, 0], "label": "bus"}),
+            (ways, [1, 0], {"bottom": [1, 1], "label": "car"}),
+        ]),
+        (5, [
+            (moments, [2, 0, 0], {"bottom": [0, 0, 0], "label": "west left"}),
+            (moments, [0, 1, 0], {"bottom": [2, 0, 0], "label": "west right"}),
+        ]),
+    ):  # fmt: skip
+        axes = Mock()
+        assert found.plot(interval, axes) is axes
+        assert [(*call.args, call.kwargs) for call in axes.bar.call_args_list] == bars
 
 
 def test_zones_have_entries_exits_and_occupancy_by_interval() -> None:

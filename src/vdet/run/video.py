@@ -7,18 +7,19 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from vdet.boxes import NO_BOXES
+from vdet.conditions.finding import Finding
 from vdet.config.schema import Settings
 from vdet.detect.factory import as_model
-from vdet.detect.protocol import DetectorModel, stage_pictures_of
+from vdet.detect.protocol import DetectorModel, VideoDetector, stage_pictures_of
 from vdet.errors import FrameSizeError, VideoError, check_positive
 from vdet.files import OutputFiles, record_input, recorded_inputs
 from vdet.media.reader import VideoReader
 from vdet.progress import Progress, no_progress
-from vdet.run.loop import Pipeline, build, named_errors, peek
-from vdet.run.result import Facts, FrameResult
+from vdet.run.loop import build, named_errors, peek
+from vdet.run.result import Fact, Facts, FrameResult, findings_in
 from vdet.run.sinks.protocol import Output, SinkContext, check_sinks, open_sinks, sink_kind
 from vdet.run.steps import Step
 from vdet.run.threads import prefetch
@@ -26,6 +27,10 @@ from vdet.track.track import VideoTracker
 from vdet.traffic.clock import Clock, find_clock
 from vdet.traffic.live import LiveTraffic
 from vdet.workers import core_count, return_freed_memory
+
+if TYPE_CHECKING:  # most runs count nothing
+    from vdet.traffic.counts import Counts
+    from vdet.traffic.records import VehicleRecord
 
 log = logging.getLogger("vdet")
 
@@ -105,12 +110,23 @@ class RunTotals:
 
 @dataclass(frozen=True, slots=True)
 class OpenVideo:
-    """A video that is being read, the results of its frames, and what reads all its tracks."""
+    """A video that is being read.
+
+    Attributes
+    ----------
+    results
+        Those of its frames, in order.
+    traffic
+        It has read the tracks of the results so far.
+    facts
+        What the steps found out about the whole video; empty before the last result.
+    """
 
     reader: VideoReader
-    pipeline: Pipeline
+    detector: VideoDetector
     results: Generator[FrameResult]
     traffic: LiveTraffic
+    facts: dict[str, Fact]
 
 
 @contextmanager
@@ -139,9 +155,20 @@ def open_video(
             pipeline = build(as_model(lambda _: NO_BOXES), settings, info, images)
         del images  # otherwise they stay in memory for the whole run
         threads = run.threads or core_count()
-        with closing(pipeline.follow(frames, run.source, threads=threads)) as results:
-            traffic = LiveTraffic(settings, info.width, info.height)
-            yield OpenVideo(reader, pipeline, results, traffic)
+        clock = find_clock(run.source, settings, info.tags.creation_time, float(info.start))
+        traffic = LiveTraffic(settings, info.width, info.height, clock)
+        facts: dict[str, Fact] = {}
+
+        def results() -> Generator[FrameResult]:
+            with closing(pipeline.follow(frames, run.source, threads=threads)) as found:
+                for result in found:
+                    traffic.add(result.frame_tracks)
+                    yield result
+            facts.update(pipeline.facts())
+            traffic.end(is_still=findings_in(facts).is_still)
+
+        with closing(results()) as found:
+            yield OpenVideo(reader, pipeline.detector, found, traffic, facts)
 
 
 def _reader_and_frames(run: Run) -> Generator[Any]:
@@ -151,6 +178,58 @@ def _reader_and_frames(run: Run) -> Generator[Any]:
     ) as reader:
         yield reader
         yield from reader
+
+
+class Results(Iterator[FrameResult]):
+    """The results of a video, frame by frame, and what they come to.
+
+    The video is opened for the first one; parameters and errors are those of `open_video`.
+    """
+
+    _video: OpenVideo | None = None
+
+    def __init__(
+        self,
+        run: Run,
+        model: DetectorModel,
+        tracker: VideoTracker | None = None,
+        steps: Sequence[Step] = (),
+    ) -> None:
+        self._frames = _video_and_results(run, model, tracker, steps)
+
+    def __next__(self) -> FrameResult:
+        if self._video is None:
+            self._video = next(self._frames)
+        result: FrameResult = next(self._frames)
+        return result
+
+    def close(self) -> None:
+        """Close the video before its last frame."""
+        self._frames.close()
+
+    @property
+    def counts(self) -> "Counts | None":
+        """The counts so far at the lines and in the zones of the settings; None without these."""
+        return self._video.traffic.counts() if self._video else None
+
+    @property
+    def vehicles(self) -> "tuple[VehicleRecord, ...]":
+        """A record of each vehicle, by id; none before the last frame."""
+        return self._video.traffic.vehicles if self._video else ()
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What makes the results doubtful; known after the last frame."""
+        return findings_in(self._video.facts).found if self._video else ()
+
+
+def _video_and_results(
+    run: Run, model: DetectorModel, tracker: VideoTracker | None, steps: Sequence[Step]
+) -> Generator[Any]:
+    """Yield the open video, and then its results."""
+    with open_video(run, model, tracker=tracker, steps=steps) as video:
+        yield video
+        yield from video.results
 
 
 @recorded_inputs()
@@ -210,27 +289,25 @@ def write_outputs(
         run = replace(run, start=start, end=run.end or run.at + LEAD)
     with (
         open_video(run, model, tracker=tracker, steps=steps) as video,
-        open_sinks(run.outputs, context := _context(run, files, video)) as sinks,
+        open_sinks(run.outputs, _context(run, files, video)) as sinks,
     ):
         info = video.reader.info
         advance = progress(video.reader.expected)
         frames, ids = 0, set[int]()
         for result in video.results:
-            video.traffic.add(result.frame_tracks)
             sinks.write(result)
             ids.update(track.id for track in result.tracks)
             frames += 1
             advance(1)
         if not frames:
             raise _no_frame(run, "there is no frame at these times", video.reader)
-        context.facts.update(video.pipeline.facts())
         counts = video.traffic.counts()
-        found = [line for fact in context.facts.values() for line in str(fact).splitlines()]
+        found = [line for fact in video.facts.values() for line in str(fact).splitlines()]
         for warning in (*(counts.warnings if counts else ()), *found):
             log.warning("%s: %s", run.source, warning)
     seconds = time.perf_counter() - began
     totals = info.width, info.height, frames, len(ids), seconds
-    return RunTotals(*totals, context.clock, context.facts, sinks.summaries)
+    return RunTotals(*totals, video.traffic.clock, video.facts, sinks.summaries)
 
 
 def _context(run: Run, files: OutputFiles, video: OpenVideo) -> SinkContext:
@@ -242,10 +319,10 @@ def _context(run: Run, files: OutputFiles, video: OpenVideo) -> SinkContext:
         is_part=run.is_part,
         at=run.at,
         threads=core_count(),  # more or fewer would write other bytes
-        clock=find_clock(run.source, run.settings, info.tags.creation_time, float(info.start)),
         outputs=run.outputs,
         traffic=video.traffic,
-        stage_pictures=stage_pictures_of(video.pipeline.detector),
+        facts=video.facts,
+        stage_pictures=stage_pictures_of(video.detector),
     )
 
 

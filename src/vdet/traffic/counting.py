@@ -83,8 +83,7 @@ def count_frames(
 ) -> Counts:
     """Count the vehicles in the tracks of each frame; arguments and errors as of `count_files`."""
     group = _Group(settings, _size(settings, size))
-    every = tuple(frames)
-    group.add("", None, every[0].time if every else 0.0, every)
+    group.add("", None, 0.0, frames)
     return group.counts()[""]
 
 

@@ -5,14 +5,19 @@ Tables cover the whole video, or intervals of it. Several videos have one table.
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from itertools import accumulate, pairwise
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from vdet.detect.classes import UNKNOWN
+from vdet.errors import ConfigError
 from vdet.traffic.borders import APPEAR, ENTER, EXIT, VANISH
 from vdet.traffic.clock import Clock
 from vdet.traffic.intervals import Intervals, Moment, Span
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
 
 Way = tuple[str, str]
 """Name of a line or zone, and a direction."""
@@ -174,6 +179,49 @@ class Counts:
     def zone_use(self, interval: int | None = None) -> list[ZoneRow]:
         """Return the use of zones by interval (seconds), as `zone_table` does."""
         return zone_table([self], interval)
+
+    def to_pandas(self, interval: int | None = None) -> "pd.DataFrame":
+        """Return `table` with a column for each field; needs the package pandas."""
+        import pandas as pd
+
+        names = [field.name for field in fields(CountRow)]
+        return pd.DataFrame(self.table(interval), columns=names)
+
+    def plot(self, interval: int | None = None, axes: "Axes | None" = None) -> "Axes":
+        """Draw the counts as bars; needs the package matplotlib.
+
+        There is a bar for each direction, in parts by class; or, with an interval in seconds, a bar
+        for each interval, in parts by direction.
+
+        Parameters
+        ----------
+        axes
+            Where to draw; None for the current axes of pyplot.
+
+        Raises
+        ------
+        ConfigError
+            matplotlib is not installed.
+        """
+        try:
+            from matplotlib import pyplot as plt
+        except ImportError as error:
+            what = "plot: matplotlib is not installed; pip install matplotlib"
+            raise ConfigError(what) from error
+        parts: dict[str, Counter[str]] = {}
+        for row in self.table(interval):
+            way = f"{row.name} {row.direction}"
+            part, bar = (way, str(row.start)[:16]) if interval else (row.class_name, way)
+            parts.setdefault(part, Counter())[bar] += row.count
+        axes = axes or plt.gca()
+        heights = Counter[str]()
+        for part, found in parts.items():
+            bottom = [heights[bar] for bar in found]
+            axes.bar(list(found), list(found.values()), bottom=bottom, label=part)
+            heights.update(found)
+        axes.set_ylabel("vehicles")
+        axes.legend()
+        return axes
 
 
 def direction_totals(videos: Sequence[Counts]) -> tuple[DirectionTotal, ...]:

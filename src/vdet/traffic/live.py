@@ -1,9 +1,12 @@
-"""What counts vehicles and measures their speeds while a video is processed."""
+"""What reads the tracks of a video while it is processed: records, counts and speeds."""
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from vdet.config.schema import Settings
 from vdet.track.track import FrameTracks
+from vdet.traffic.clock import Clock
+from vdet.traffic.records import VehicleRecord, VehicleRecords
 
 if TYPE_CHECKING:  # most runs need neither
     from vdet.traffic.counter import VehicleCounter
@@ -16,10 +19,14 @@ class LiveTraffic:
 
     Attributes
     ----------
+    clock
+        When the video begins; None where it is not known.
     counter
         None without lines and zones.
     speeds
         None without points of the ground.
+    vehicles
+        A record of each vehicle, by id; none before `end`.
 
     Raises
     ------
@@ -29,8 +36,13 @@ class LiveTraffic:
 
     counter: "VehicleCounter | None" = None
     speeds: "SpeedMeter | None" = None
+    vehicles: tuple[VehicleRecord, ...] = ()
 
-    def __init__(self, settings: Settings, width: int, height: int) -> None:
+    def __init__(
+        self, settings: Settings, width: int, height: int, clock: Clock | None = None
+    ) -> None:
+        self.clock = clock
+        self._records = VehicleRecords(width)
         if settings.traffic:
             from vdet.traffic.counter import VehicleCounter
 
@@ -44,6 +56,7 @@ class LiveTraffic:
 
     def add(self, frame: FrameTracks) -> None:
         """Add the tracks of the next frame."""
+        self._records.add(frame)
         if self.counter:
             self.counter.update(frame)
         if self.speeds:
@@ -55,4 +68,8 @@ class LiveTraffic:
             return None
         from vdet.traffic.speeds import with_speeds
 
-        return with_speeds(self.counter.counts(), self.speeds)
+        return with_speeds(replace(self.counter.counts(), clock=self.clock), self.speeds)
+
+    def end(self, *, is_still: bool = False) -> None:
+        """Make the records, after the last frame; `is_still` as of `VehicleRecords.end`."""
+        self.vehicles = self._records.end(self.speeds, is_still=is_still)

@@ -5,14 +5,16 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from vdet.boxes import Box
 from vdet.polygons import Point
 from vdet.track.track import FrameTracks, State, Track
 from vdet.traffic.clock import Clock
-from vdet.traffic.speeds import KMH, SpeedMeter, Speeds
 from vdet.traffic.tables import VIDEO, is_json, join_tables, plain_moment, write_content
+
+if TYPE_CHECKING:  # most runs measure no speed
+    from vdet.traffic.speeds import SpeedMeter, Speeds
 
 PATH_STEP = 0.01
 """Distance after which a path gets its next point, as a fraction of the frame's width.
@@ -88,7 +90,7 @@ class VehicleRecord:
     class_name: str | None = None
     path: list[Point] = field(default_factory=list)
     followed: list[tuple[float, float]] = field(default_factory=list)
-    speeds: Speeds | None = None
+    speeds: "Speeds | None" = None
     motion: Motion | None = None
 
     @property
@@ -175,7 +177,7 @@ class VehicleRecords:
         self._latest = frame
 
     def end(
-        self, meter: SpeedMeter | None = None, *, is_still: bool = False
+        self, meter: "SpeedMeter | None" = None, *, is_still: bool = False
     ) -> tuple[VehicleRecord, ...]:
         """Return the records by id, with the speeds of a meter; call it once, at the end.
 
@@ -238,6 +240,8 @@ def _row(record: VehicleRecord, clock: Clock | None) -> dict[str, Any]:
     lengths = round(record.length, 1), round(record.share, 4)
     speeds: list[float | None] = [None] * 4
     if known := record.speeds:
+        from vdet.traffic.speeds import KMH
+
         in_kmh = [
             KMH * item for item in (known.quantile(0.5), known.quantile(0.85), known.deviation)
         ]

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from vdet.detect.classes import UNKNOWN
 from vdet.media.cutting import can_copy, copied_suffix, copy_part, encode_part
-from vdet.run.result import FrameResult, findings_in
+from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import BaseSink, SinkContext, SinkKind
-from vdet.traffic.records import VehicleRecord, VehicleRecords
+from vdet.traffic.records import VehicleRecord
 
 _NAME = re.compile(r"clip-[\dT-]+-\S+-\d+(\+\d+)?\.(mp4|mov|mkv)")
 _PRECISION = 1_000_000  # parts of a second
@@ -45,11 +45,9 @@ class ClipSink(BaseSink):
     def __init__(self, path: Path, context: SinkContext) -> None:
         super().__init__(path, context)
         self._folder = context.files.stage_folder(path, _NAME)
-        self._records = VehicleRecords(self.video.width)
 
     def write(self, result: FrameResult) -> None:
-        """Add the vehicles of a frame."""
-        self._records.add(result.frame_tracks)
+        """Do nothing: the run keeps the records."""
 
     def finish(self) -> None:
         """Write the clips."""
@@ -73,8 +71,8 @@ class ClipSink(BaseSink):
                 )
 
     def _chosen(self) -> Sequence[VehicleRecord]:
-        records = self._records.end(is_still=findings_in(self.context.facts).is_still)
-        counts = self.context.traffic.counts() if self.context.traffic else None
+        records = self.traffic.vehicles
+        counts = self.traffic.counts()
         if counts is None:
             return records
         counted = {event.id for event in counts.events}

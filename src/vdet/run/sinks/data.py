@@ -6,7 +6,6 @@ Times are in seconds and those of the input. Pixels are those of the input frame
 import json
 import sys
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, BinaryIO, Self
@@ -18,7 +17,7 @@ from vdet.labels.records import JSON_LINES, track_record
 from vdet.run.result import FrameResult, findings_in
 from vdet.run.sinks.protocol import STANDARD_OUTPUT, BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.traffic import count_files
-from vdet.traffic.records import VehicleRecords, join_records, records_content
+from vdet.traffic.records import join_records, records_content
 from vdet.traffic.tables import SUFFIXES, write_content
 
 MakeContent = Callable[[Path, count_files.Videos, int | None], Any]
@@ -110,7 +109,7 @@ JSON = SinkKind(JsonSink, what="lists of boxes", writes_standard_output=True, ta
 
 
 class _TableSink(BaseSink):
-    """Writes a table or JSON at the end; `make_content` is what `write_content` takes."""
+    """Writes a table or JSON of the traffic at the end; `write_content` takes `make_content`."""
 
     make_content: Callable[[], Any]
 
@@ -119,24 +118,16 @@ class _TableSink(BaseSink):
         self.summary = self.make_content()
         write_content(self.context.files.stage(self.path), self.summary)
 
+    def write(self, result: FrameResult) -> None:
+        """Do nothing: the run reads the tracks."""
+
 
 class VehicleSink(_TableSink):
-    """Keeps a record of each vehicle, and writes all at the end, as `.csv` or `.json`."""
-
-    def __init__(self, path: Path, context: SinkContext) -> None:
-        super().__init__(path, context)
-        self._records = VehicleRecords(self.video.width)
+    """Writes a record of each vehicle, at the end, as `.csv` or `.json`."""
 
     def make_content(self) -> Any:
         """Return the records."""
-        traffic = self.context.traffic
-        is_still = findings_in(self.context.facts).is_still
-        records = self._records.end(traffic.speeds if traffic else None, is_still=is_still)
-        return records_content(records, self.path, self.context.clock)
-
-    def write(self, result: FrameResult) -> None:
-        """Add a frame."""
-        self._records.add(result.frame_tracks)
+        return records_content(self.traffic.vehicles, self.path, self.traffic.clock)
 
 
 class ConditionSink(BaseSink):
@@ -175,13 +166,10 @@ class CountsSink(_TableSink):
 
     def make_content(self) -> Any:
         """Return the table."""
-        counts = self.context.traffic.counts() if self.context.traffic else None
+        counts = self.traffic.counts()
         assert counts  # the settings have lines or zones
-        videos = {self.video.path.name: replace(counts, clock=self.context.clock)}
+        videos = {self.video.path.name: counts}
         return self._make(self.path, videos, self.context.settings.traffic.seconds)
-
-    def write(self, result: FrameResult) -> None:
-        """Do nothing: the run counts the vehicles."""
 
 
 COUNTS, FLOWS = (

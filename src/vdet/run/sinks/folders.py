@@ -21,7 +21,6 @@ from vdet.run.result import FrameResult, findings_in
 from vdet.run.sinks.drawn import PICTURE_LABEL, label_text
 from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.traffic.overview import BestCrops, Crop
-from vdet.traffic.records import VehicleRecords
 
 _BOXES = "boxes"
 _CROP_NAME = re.compile(r"vehicle-\d{4,}-at--?\d+\.\d{3}s\.(jpg|png)")
@@ -118,7 +117,6 @@ class PageSink(BaseSink):
         super().__init__(path, context)
         self._file = context.files.stage_folder(path) / PAGE_NAME
         video = self.video
-        self._records = VehicleRecords(video.width)
         self._crops = BestCrops()
         self._thumbnails: dict[int, tuple[float, str]] = {}
         self._gaps: list[tuple[float, float]] = []
@@ -145,7 +143,6 @@ class PageSink(BaseSink):
         self._last = frame.time
         if self._fullest is None or len(frame.tracks) > self._most:
             self._fullest, self._most = picture, len(frame.tracks)
-        self._records.add(frame)
         self._keep(self._crops.add(frame, picture))
 
     def _keep(self, crops: list[Crop]) -> None:
@@ -153,27 +150,26 @@ class PageSink(BaseSink):
             self._thumbnails[crop.id] = crop.time, jpeg_uri(crop.image, _THUMBNAIL)
 
     def _page(self) -> VideoPage:
-        settings, traffic = self.context.settings, self.context.traffic
-        counter, speeds = (traffic.counter, traffic.speeds) if traffic else (None, None)
-        findings = findings_in(self.context.facts)
+        settings, traffic = self.context.settings, self.traffic
+        counter, speeds = traffic.counter, traffic.speeds
         return VideoPage(
             video=self.video,
             frames=self._frames,
             start=self._start,
             end=self._last + float(1 / self.video.rate),
-            records=self._records.end(speeds, is_still=findings.is_still),
+            records=traffic.vehicles,
             thumbnails=self._thumbnails,
             poster=self._fullest.image if self._fullest else None,
             player=self._player(),
             settings=render(settings.with_paths(lambda path: Path(path).name)),
-            counts=traffic.counts() if traffic else None,
+            counts=traffic.counts(),
             interval=settings.traffic.seconds or 60,
             gaps=self._gaps,
-            clock=self.context.clock,
+            clock=traffic.clock,
             pictures=self._pictures(),
             borders=(*counter.lines, *counter.zones) if counter else (),
             ground=speeds.ground if speeds else None,
-            findings=findings.found,
+            findings=findings_in(self.context.facts).found,
         )
 
     def _pictures(self) -> dict[int, str]:

@@ -57,12 +57,11 @@ class SinkContext:
         The option `--at`: seconds from the first frame.
     threads
         Number of threads of an encoder; None lets it choose.
-    clock
-        When the video begins; None where it is not known.
     outputs
         All outputs of the run, for a sink that refers to another.
     traffic
-        The counts and the speeds of a video, up to the latest result; None for still pictures.
+        The counts and the speeds of a video, up to the latest result, and the records of its
+        vehicles, which are known when sinks finish; None for still pictures.
     facts
         What the steps found out about the whole video; empty before sinks finish.
     stage_pictures
@@ -76,11 +75,15 @@ class SinkContext:
     is_part: bool = False
     at: Fraction = Fraction(0)
     threads: int | None = None
-    clock: Clock | None = None
     outputs: tuple[Output, ...] = ()
     traffic: LiveTraffic | None = None
     facts: dict[str, Fact] = field(default_factory=dict)
     stage_pictures: StagePictures = lambda *_: {}
+
+    @property
+    def clock(self) -> Clock | None:
+        """When the video begins; None where it is not known."""
+        return self.traffic.clock if self.traffic else None
 
 
 class BaseSink:
@@ -100,6 +103,12 @@ class BaseSink:
         """The video, for sinks that take no pictures."""
         assert self.context.video is not None  # `SinkKind.takes` says so
         return self.context.video
+
+    @property
+    def traffic(self) -> LiveTraffic:
+        """What has read the tracks of the video, for sinks that take no pictures."""
+        assert self.context.traffic is not None  # as for `video`
+        return self.context.traffic
 
     def __enter__(self) -> Self:
         return self
