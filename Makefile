@@ -7,13 +7,17 @@ TOOLS := $(VENV)/.tools
 DATA ?= $(or $(VDET_DATA),data)
 ROADS ?= $(DATA)/roads
 TRUTH ?= $(DATA)/project_video_0001-0880.txt
-WEIGHTS := {"traffic_cams":3, "overpass":2.2, "bdd100k_dashcam":2.5, "vietnam_street":1.5, \
+SHARES := {"traffic_cams":3, "overpass":2.2, "bdd100k_dashcam":2.5, "vietnam_street":1.5, \
 	"bangladesh_roads":1.5, "manaus_misc":1.5, "dawn_fog":1.3, "topview_roads":1.2, \
 	"toll_km39":1.2, "lake_county_cctv":1.2}
+WEIGHTS ?= build/net/net.onnx
+FOLDS ?= 6
+STEPS ?= 4000
+UNSEEN ?= build/unseen_$(FOLDS)x$(STEPS)
 PATCHES = $(DATA)/vehicles.zip $(DATA)/non-vehicles.zip
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint types tests nettest dist bench net unseen soak folds data model picture \
+.PHONY: help demo test lint types tests nettest dist bench net unseen ship soak folds data model picture \
 	commands clean
 
 help:  ## print this list
@@ -76,13 +80,15 @@ net: $(TOOLS)  ## train the shipped network on (hours): sets of pictures in ROAD
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check torch --constraint constraints.txt
 	$(BIN)/vdet train-net $(sort $(wildcard $(ROADS)/*/)) -o build/net/net.onnx --overwrite \
 		--video $(DATA)/project_video.mp4 $(TRUTH) --base src/vdet/models/net.onnx \
-		--set train.net.steps=14000 --set 'train.net.weights=$(WEIGHTS)'
-	cp build/net/net.onnx src/vdet/models/
+		--set train.net.steps=14000 --set 'train.net.weights=$(SHARES)'
 
-unseen: $(TOOLS)  ## measure on cameras left out of trainings, also the networks in MODELS (six hours)
+unseen: $(TOOLS)  ## measure on cameras left out of FOLDS trainings of STEPS steps, also MODELS (hours)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check torch --constraint constraints.txt
-	$(BIN)/python -m benchmarks.leave_one_out $(ROADS) $(DATA)/project_video.mp4 $(TRUTH) \
-		$(addprefix --model ,$(MODELS))
+	$(BIN)/python -m benchmarks.unseen $(ROADS) $(DATA)/project_video.mp4 $(TRUTH) --folds $(FOLDS) \
+		--steps $(STEPS) --work $(UNSEEN) $(addprefix --model ,$(MODELS))
+
+ship: $(TOOLS)  ## make WEIGHTS, calibrated by the results of make unseen, the shipped network
+	$(BIN)/python -m benchmarks.ship $(WEIGHTS) $(addprefix --results ,$(wildcard $(UNSEEN)/results.json))
 
 picture: $(TOOLS)  ## draw the pictures of the README
 	$(BIN)/python -m docs.pictures

@@ -278,7 +278,7 @@ class TestKitti:
         path.write_text("".join(f"{kind} {rest}" for kind in kinds), encoding="utf-8")
         image = read_labelled_pictures(tmp_path).pictures[0]
         assert image.classes == ("car", "car", "truck", *["vehicle"] * 3, "person", "bicycle")
-        assert image.ignored.tolist() == [False] * 3 + [True] * 5
+        assert image.ignored.tolist() == [*[False] * 3, *[True] * 4, False]
         assert image.boxes[0].tolist() == [1, 2, 11, 22]
 
     @pytest.mark.parametrize(

@@ -83,7 +83,7 @@ def test_an_unknown_label_is_refused_with_its_line(tmp_path: Path, content: str)
 )
 def test_tracks_of_every_format_can_be_truth(tmp_path: Path, form: Format) -> None:
     path = tmp_path / f"truth{form.suffix}"
-    kinds = (None, "bus", "motorcycle")
+    kinds = (None, "bus", "person")
     tracks = [car(number, class_name=name) for number, name in enumerate(kinds, start=1)]
     path.write_bytes(written(form, [frame(2, *tracks)]))
     video = read_truth(path)

@@ -95,7 +95,7 @@ def patches(data: tuple[Path, ...], choice: options.SettingsChoice, results: Res
 @click.argument("prediction", type=options.INPUT, metavar="PRED")
 @click.argument("truth", type=options.INPUT, metavar="TRUTH")
 @options.until_option
-@options.settings_options("labels.roles.motorcycle=vehicle")
+@options.settings_options("labels.roles.tram=vehicle")
 @results_options
 def tracks(
     prediction: Path,

@@ -39,8 +39,7 @@ def train_net(
     """Train a network on labelled pictures.
 
     Each DATA is a set of labelled pictures: COCO, KITTI, YOLO or Pascal VOC. The training saves its
-    state beside the network, as .ckpt; if it is stopped, the same command resumes it. The metrics
-    are written beside the network, as JSON.
+    state beside the network, as .ckpt; if it is stopped, the same command resumes it.
     Needs torch and onnx: pip install torch onnx
     """
     if not data and not clips:
@@ -48,24 +47,28 @@ def train_net(
     options.check_suffix(output, ".onnx", what="networks")
     settings = choice.read()
     try:
-        from vdet.learn.net.run import NetworkJob, read_sources, source_lines, train_to_file
+        from vdet.learn.net.sources import clip_source, picture_source
+        from vdet.learn.net.training import train_to_file
     except ImportError as error:
         raise DataError(f"{error.name} is not installed; pip install torch onnx") from error
+    from vdet.labels.reading import read_labelled_pictures
+    from vdet.labels.roles import Roles
     from vdet.workers import limit_library_threads
 
     limit_library_threads()
-    job = NetworkJob(data, clips, output, base, overwrite)
-    for path in (job.output, job.metrics):
-        check_output(path, overwrite=overwrite)
-    sources = read_sources(job, settings)
-    for path in (job.output, job.metrics):  # one may be among the files that were read now
-        check_output(path, overwrite=overwrite)
-    print_lines(*source_lines([report for _, report in sources]), "")
+    check_output(output, overwrite=overwrite)
+    roles = Roles.for_training(settings)
+    sources = [picture_source(read_labelled_pictures(path, roles), settings) for path in data]
+    sources += [clip_source(clip, truth, settings) for clip, truth in clips]
+    check_output(output, overwrite=overwrite)  # it may be among the files that were read now
+    print_lines(*(line for _, report in sources for line in report.lines()), "")
     with live_bar(total=settings.train.net.steps, unit=" steps") as bar:
 
         def advance(step: int, loss: float) -> None:
             bar.set_postfix_str(f"loss {loss:.3f}", refresh=False)
             bar.update(step - bar.n)
 
-        metrics = train_to_file(job, sources, settings, progress=advance)
-    print_lines(*metrics.lines(), f"{output}: the network; {job.metrics}: the metrics")
+        done = train_to_file(
+            sources, settings.train.net, output, base=base, overwrite=overwrite, progress=advance
+        )
+    print_lines(done, f"{output}: the network")

@@ -72,10 +72,10 @@ class NetworkSettings(DetectorSettings):
     min_score_still: Share = 0.45
     """Minimum score of a vehicle in a still picture. In video, the tracker decides."""
     classes: tuple[str, ...] = Field(
-        ("car", "truck", "bus", "vehicle"), min_length=1, max_length=100
+        ("car", "truck", "bus", "motorcycle", "bicycle", "vehicle"), min_length=1, max_length=100
     )
-    """Classes that count: car, truck, bus, motorcycle, vehicle (of unknown kind), or any other that
-    the network knows.
+    """Classes that count: car, truck, bus, motorcycle, bicycle, person, vehicle (of unknown kind),
+    or any other that the network knows.
     """
     class_names: tuple[str, ...] | None = Field(None, max_length=10_000)
     """Names of the classes in the network's order. null: those in its file."""

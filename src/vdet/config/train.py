@@ -18,19 +18,6 @@ class SvmTrainingSettings(Section):
     """
 
 
-class NetworkScoreSettings(Section):
-    """Score of a box: sigmoid(slope · x + offset), where x is the output of the network.
-
-    It is the fraction of boxes with such an output that show a vehicle, fitted on cameras that were
-    left out of the training; written into the network's header.
-    """
-
-    slope: float = Field(2.675, gt=0, le=100)
-    """Steepness of the score as x grows."""
-    offset: float = Field(0.61, ge=-100, le=100)
-    """Added to x times slope."""
-
-
 class NetworkTrainingSettings(Section):
     """How `vdet train-net` trains the network."""
 
@@ -54,7 +41,6 @@ class NetworkTrainingSettings(Section):
     """
     weights: dict[str, Annotated[float, Field(gt=0, le=1000)]] = Field({})
     """How often to draw pictures of a set, by its name, relative to others."""
-    score: NetworkScoreSettings = NetworkScoreSettings()
 
 
 class TrainSettings(Section):

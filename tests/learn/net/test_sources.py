@@ -9,7 +9,9 @@ from labels.writers import Boxed, Labelled, write_coco
 from strange.test_numbered_pictures import write_pictures
 from vdet.config.schema import InputSettings, Settings
 from vdet.errors import VideoError
-from vdet.learn.net.sources import UNKNOWN, clip_source, image_source
+from vdet.labels.reading import read_labelled_pictures
+from vdet.labels.roles import Roles
+from vdet.learn.net.sources import UNKNOWN, clip_source, picture_source
 
 
 def test_a_damaged_video_is_learnt_from_as_far_as_the_settings_tolerate(tmp_path: Path) -> None:
@@ -33,7 +35,8 @@ def test_vehicles_of_a_labelled_video_keep_their_classes(tmp_path: Path) -> None
     header = "frame,time,id,x,y,width,height,score,state,class"
     truth.write_text("\n".join([header, *(f"3,0.1,{row}" for row in rows)]))
     settings = Settings()
-    (sample,) = clip_source(clip, truth, settings)[0].samples
+    source, _ = clip_source(clip, truth, settings)
+    (sample,) = source.samples
     classes = settings.train.net.classes
     assert sample.classes.tolist() == [classes.index("truck"), UNKNOWN, classes.index("car")]
 
@@ -47,7 +50,9 @@ def test_a_class_without_labels_makes_the_picture_an_ignore_region_for_it(tmp_pa
     document["info"]["unlabelled_classes"] = ["pedestrian"]
     labels.write_text(json.dumps(document), encoding="utf-8")
     settings = Settings()
-    (sample,) = image_source(tmp_path, settings)[0].samples
+    labelled = read_labelled_pictures(tmp_path, Roles.for_training(settings))
+    source, _ = picture_source(labelled, settings)
+    (sample,) = source.samples
     person = settings.train.net.classes.index("person")
     assert sample.boxes.tolist() == [[20, 30, 80, 70], [0, 0, 9, 9], [0, 0, 160, 96]]
     assert sample.classes.tolist() == [0, UNKNOWN, person]

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from vdet.boxes import Float32Array, Int32Array
-from vdet.config.train import NetworkScoreSettings
 from vdet.detect.onnx.session import Array
 
 STRIDES = (8, 16, 32)
@@ -38,16 +37,18 @@ OutputLayout = Callable[[Sequence[Array], float], RawBoxes]
 
 
 def our_cells(
-    outputs: Sequence[Array], minimum: float, *, cells: Cells, score: NetworkScoreSettings
+    outputs: Sequence[Array], minimum: float, *, cells: Cells, calibration: Float32Array
 ) -> RawBoxes:
     """Read our own networks: `(1, cells, 5 + classes)`; see `vdet.learn.net.architecture`.
 
-    `cells` are those of the input, from `cell_centers`.
+    `cells` are those of the input, from `cell_centers`; `calibration` `(classes, 2)` has slope and
+    offset of each class.
     """
     table = outputs[0][0]
     if len(table) != len(cells[1]):
         raise ValueError("not one row for each cell")
-    logits = score.slope * table[:, 0] + score.offset
+    slopes, offsets = calibration[table[:, 5:].argmax(axis=1)].T
+    logits = slopes * table[:, 0] + offsets
     rows = np.flatnonzero(logits >= math.log(minimum / (1 - minimum)))
     centers, strides = cells
     lengths = np.logaddexp(0, table[rows, 1:5] + 1) * strides[rows, np.newaxis]

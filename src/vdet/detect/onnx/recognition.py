@@ -12,7 +12,6 @@ import numpy as np
 from pydantic import Field, ValidationError
 
 from vdet.config.section import Section
-from vdet.config.train import NetworkScoreSettings
 from vdet.detect.onnx import layouts
 from vdet.detect.onnx.layouts import OutputLayout, RawBoxes, cell_centers
 from vdet.detect.onnx.preparation import InputForm, size_of_area
@@ -36,6 +35,17 @@ HEADER_KEY = "vdet"
 """Key of the metadata that holds the header."""
 
 
+class Calibration(Section):
+    """Score of a box: sigmoid(slope · x + offset), where x is the output of the network.
+
+    It is the fraction of boxes with such an output that show a vehicle, fitted on cameras that were
+    left out of trainings (Platt, 1999).
+    """
+
+    slope: float = Field(2.675, gt=0, le=100)
+    offset: float = Field(0.61, ge=-100, le=100)
+
+
 class Header(Section):
     """The header of our networks, JSON in the metadata of the ONNX file."""
 
@@ -43,7 +53,9 @@ class Header(Section):
     classes: tuple[str, ...] = Field(min_length=1, max_length=1000)
     pixels: int = Field(147_456, ge=1024, le=_MAX_PIXELS)
     """Of the scaled frame of a video; a still picture has `_STILL_PIXELS` times as many."""
-    calibration: NetworkScoreSettings = NetworkScoreSettings()
+    calibration: Calibration = Calibration()
+    by_class: dict[str, Calibration] = Field({}, max_length=1000)
+    """The calibration of boxes that the network names so; of other classes, `calibration`."""
     provenance: dict[str, Any] = Field({})
     """What it was trained on and how, and its metrics."""
 
@@ -147,7 +159,9 @@ def read_header(session: Session) -> Header | None:
 def _ours(session: Session, header: Header, size: tuple[int, int]) -> Recognized:
     """Return a network of ours with an input of one size, width and height in pixels."""
     form = InputForm(*size, rows_first=True, dtype=np.uint8)
-    layout = partial(layouts.our_cells, cells=cell_centers(*size), score=header.calibration)
+    scores = [header.by_class.get(name, header.calibration) for name in header.classes]
+    lines = np.array([(score.slope, score.offset) for score in scores], np.float32)
+    layout = partial(layouts.our_cells, cells=cell_centers(*size), calibration=lines)
     return Recognized(session, "vdet", header.classes, form, layout, header)
 
 

@@ -1,4 +1,4 @@
-"""Training pictures for the network: places, scales, mosaics and colours changed at random."""
+"""Training pictures for the network: places, scales, mosaics, colours and pasted objects."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -7,23 +7,30 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from vdet.boxes import BoolArray, Float32Array, Float64Array, Image
+from vdet.boxes import Float32Array, Float64Array, Image, area, coverage, iou_matrix
 from vdet.config.train import NetworkTrainingSettings
 from vdet.detect.onnx.preparation import GREY
-from vdet.learn.net.pasting import Paster
 from vdet.learn.net.sources import NetSample, NetSource, join
 from vdet.learn.net.weather import with_weather
 
-LEAST_SIDE = 8.0
+MIN_SIDE = 8.0
 """Minimum longer side of a vehicle, pixels; smaller vehicles are ignored."""
 _SCALES = 0.5, 2.0
-"""Minimum and largest scale of a picture; at 1 its width fits."""
+"""Smallest and largest scale of a picture; at 1 its width fits."""
 _MOSAIC_SCALES = 0.5, 1.5
-"""Minimum and largest scale of the four pictures of a mosaic."""
-_LEAST_VISIBLE = 0.25  # fraction of a vehicle that is left after cropping, else it is ignored
+"""Smallest and largest scale of the four pictures of a mosaic."""
+_MIN_VISIBLE = 0.25  # fraction of a vehicle that is left after cropping, else it is ignored
 _ASPECT = 0.1  # most change of the width relative to the height
 _TILTED = 0.25  # fraction of pictures that are turned
 _TILT = 3.0  # deviation of their angles, degrees
+
+_PASTED = 0.3  # fraction of pictures that get pasted objects
+_MAX_PASTED = 3  # objects in a picture
+_RARE = 0.5  # a class with fewer objects than this fraction of the mean is rare
+_MARGIN = 0.2  # surroundings of a pasted object on each side, fraction of the box
+_MIN_DONOR = 24.0  # longer side of an object to paste, pixels
+_PASTED_SIDES = 16.0, 0.4  # of the longer side: minimum in pixels, maximum of the picture's height
+_MAX_COVERED = 0.2  # of another object by a pasted one
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,17 +60,12 @@ class SampleDrawer:
 
     def __init__(self, sources: Sequence[NetSource], settings: NetworkTrainingSettings) -> None:
         self._samples = [sample for source in sources for sample in source.samples]
-        shares = np.concatenate(
-            [
-                np.full(
-                    len(source.samples),
-                    settings.weights.get(source.name, 1.0) / len(source.samples) ** 0.5,
-                )
-                for source in sources
-            ]
-        )
-        factors = repeat_factors(self._samples, shares / shares.sum(), settings.repeat_threshold)
-        self._shares = shares * factors / (shares * factors).sum()
+        sizes = [len(source.samples) for source in sources]
+        weights = [settings.weights.get(source.name, 1.0) for source in sources]
+        chances = np.repeat(np.array(weights) / np.sqrt(np.maximum(sizes, 1)), sizes)
+        chances /= chances.sum()
+        chances *= repeat_factors(self._samples, chances, settings.repeat_threshold)
+        self._chances = chances / chances.sum()
         self._paster = Paster(self._samples)
 
     def draw(self, rng: np.random.Generator, drawing: Drawing) -> NetSample:
@@ -76,12 +78,15 @@ class SampleDrawer:
         if rng.random() < 0.5:
             sample = _mirrored(sample)
         sample = self._paster.paste(rng, sample)
-        visible = sample.boxes[~sample.ignored & _may_have_lamps(sample.boxes)]
-        image = with_weather(rng, _recolored(rng, sample.image), visible)
-        return _without_small(replace(sample, image=_with_noise(rng, image)))
+        sides = sample.boxes[:, 2:] - sample.boxes[:, :2]
+        may_have_lamps = ~sample.ignored & (sides[:, 0] > 0.45 * sides[:, 1])  # people have none
+        image = _recolored(rng, sample.image)
+        image = with_weather(rng, image, sample.boxes[may_have_lamps])
+        small = (sides.max(axis=1) < MIN_SIDE) | (sides.min(axis=1) < MIN_SIDE / 2)
+        return replace(sample.ignoring(small), image=_with_noise(rng, image))
 
     def _pick(self, rng: np.random.Generator) -> NetSample:
-        return self._samples[int(rng.choice(len(self._samples), p=self._shares))]
+        return self._samples[int(rng.choice(len(self._samples), p=self._chances))]
 
     def _mosaic(self, rng: np.random.Generator, drawing: Drawing) -> NetSample:
         """Return four pictures that meet in a random point."""
@@ -101,12 +106,6 @@ class SampleDrawer:
         return join(parts, image)
 
 
-def _may_have_lamps(boxes: Float32Array) -> BoolArray:
-    """Return which boxes are no narrower than vehicles; people are."""
-    sides = boxes[:, 2:] - boxes[:, :2]
-    return np.asarray(sides[:, 0] > 0.45 * sides[:, 1], np.bool_)
-
-
 def repeat_factors(
     samples: Sequence[NetSample], shares: Float64Array, threshold: float
 ) -> Float64Array:
@@ -120,14 +119,88 @@ def repeat_factors(
     shares
         Float64 `(n,)`: the probability of each picture before; the sum is 1.
     """
-    present = [np.unique(sample.classes[~sample.ignored]) for sample in samples]
-    count = 1 + max((int(item.max()) for item in present if len(item)), default=0)
-    has = np.zeros((len(samples), count + 1), np.bool_)  # the last column: unknown kinds
-    for row, item in zip(has, present, strict=True):
-        row[item] = True
-    fractions = np.maximum(shares @ has[:, :count], 1e-9)
-    factors = np.maximum(1.0, np.sqrt(threshold / fractions))
-    return np.asarray(np.where(has[:, :count], factors, 1.0).max(axis=1), np.float64)
+    count = 1 + max(int(sample.classes.max(initial=0)) for sample in samples)
+    has = [np.isin(np.arange(count), sample.classes[~sample.ignored]) for sample in samples]
+    fractions = np.maximum(shares @ np.array(has), 1e-9)
+    factors = np.where(has, np.sqrt(threshold / fractions), 1.0)
+    return np.asarray(factors.max(axis=1).clip(1.0), np.float64)
+
+
+class Paster:
+    """Pastes objects of the rare classes in `samples` into pictures, with their surroundings.
+
+    Source: Ghiasi et al., "Simple Copy-Paste is a Strong Data Augmentation Method", 2021.
+    """
+
+    def __init__(self, samples: Sequence[NetSample]) -> None:
+        objects: dict[int, list[tuple[NetSample, int]]] = {}
+        for sample in samples:
+            for row in _whole(sample):
+                objects.setdefault(int(sample.classes[row]), []).append((sample, row))
+        limit = _RARE * sum(map(len, objects.values())) / max(1, len(objects))
+        self._rare = [item for _, item in sorted(objects.items()) if len(item) < limit]
+
+    def paste(self, rng: np.random.Generator, sample: NetSample) -> NetSample:
+        """Return the sample, sometimes with objects of rare classes pasted into it."""
+        if not self._rare or rng.random() >= _PASTED:
+            return sample
+        sample = replace(sample, image=sample.image.copy())
+        for _ in range(int(rng.integers(1, _MAX_PASTED + 1))):
+            rare = self._rare[int(rng.integers(len(self._rare)))]
+            sample = _paste(rng, sample, *rare[int(rng.integers(len(rare)))])
+        return sample
+
+
+def _whole(sample: NetSample) -> list[int]:
+    """Return the rows of the objects that are large, inside the picture, and not hidden."""
+    height, width = sample.image.shape[:2]
+    boxes, known = sample.boxes.astype(np.float64), sample.classes >= 0
+    overlaps = iou_matrix(boxes, boxes) - np.eye(len(boxes))
+    overlaps[:, sample.ignored & known] = 0  # the whole picture
+    large = (boxes[:, 2:] - boxes[:, :2]).max(1, initial=0) >= _MIN_DONOR
+    inside = (boxes > 1).all(1) & (boxes[:, 2:] < np.array([width, height]) - 1).all(1)
+    apart = overlaps.max(1, initial=0) < 0.1
+    return [int(row) for row in np.flatnonzero(large & inside & apart & known & ~sample.ignored)]
+
+
+def _paste(rng: np.random.Generator, sample: NetSample, donor: NetSample, row: int) -> NetSample:
+    """Paste one object into the image of a sample, unless it would cover others."""
+    height, width = sample.image.shape[:2]
+    box, limits = donor.boxes[row], np.array(donor.image.shape[1::-1] * 2)
+    longer = float((box[2:] - box[:2]).max())
+    largest = max(_PASTED_SIDES[0], min(_PASTED_SIDES[1] * height, 1.5 * longer))
+    factor = _scale(rng, (_PASTED_SIDES[0], largest)) / longer
+    margin = _MARGIN * np.tile(box[2:] - box[:2], 2) * (-1, -1, 1, 1)
+    left, top, right, bottom = np.clip(box + margin, 0, limits).round().astype(int).tolist()
+    method = cv2.INTER_AREA if factor < 1 else cv2.INTER_LINEAR
+    patch = cv2.resize(
+        donor.image[top:bottom, left:right], None, fx=factor, fy=factor, interpolation=method
+    )
+    rows, columns = patch.shape[:2]
+    free = height - rows - height // 4  # never near the top, where the sky is
+    if free <= 0 or columns >= width:
+        return sample
+    x, y = int(rng.integers(width - columns)), height // 4 + int(rng.integers(free))
+    inner = (box - np.array([left, top] * 2)) * factor
+    place = (inner + np.array([x, y] * 2)).astype(np.float32)
+    others = sample.boxes[~sample.ignored].astype(np.float64)
+    if coverage(others, place[np.newaxis].astype(np.float64)).max(initial=0) > _MAX_COVERED:
+        return sample
+    part = sample.image[y : y + rows, x : x + columns]
+    opacity = _feather(columns, inner[0], inner[2]) * _feather(rows, inner[1], inner[3])[:, None]
+    part[:] = part + opacity[..., None] * (patch.astype(np.float32) - part)
+    return replace(
+        sample,
+        boxes=np.concatenate([sample.boxes, place[np.newaxis]]),
+        classes=np.append(sample.classes, donor.classes[row]),
+        ignored=np.append(sample.ignored, False),
+    )
+
+
+def _feather(count: int, near: float, far: float) -> Float64Array:
+    """Return an opacity `(count,)`: 1 from `near` to `far`, falling to 0 at both ends."""
+    places = (0, max(near, 0.5), min(far, count - 0.5), count)
+    return np.asarray(np.interp(np.arange(count) + 0.5, places, (0, 1, 1, 0)))
 
 
 def _scale(rng: np.random.Generator, limits: tuple[float, float]) -> float:
@@ -139,62 +212,44 @@ def _place(
 ) -> NetSample:
     """Return a part of a picture of `size`; at scale 1 its width fits."""
     width, height = size
-    rows, columns = sample.image.shape[:2]
+    whole = np.array(sample.image.shape[1::-1])
     stretch = np.exp(rng.uniform(-_ASPECT, _ASPECT) / 2)
-    factor = scale * width / columns
-    x_factor, y_factor = factor * stretch, factor / stretch
-    left = rng.uniform(*sorted((0.0, width - columns * x_factor)))
-    top = rng.uniform(*sorted((0.0, height - rows * y_factor)))
-    image = sample.image
-    step = 1
-    while min(x_factor, y_factor) * step < 0.5:  # the warp below reads four pixels only
-        image = _image(cv2.resize(image, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA))
-        step *= 2
-    kept_x, kept_y = columns / image.shape[1], rows / image.shape[0]
-    a, b = x_factor * kept_x, y_factor * kept_y
-    shift_x, shift_y = left + a / 2 - 0.5, top + b / 2 - 0.5  # middles of pixels
+    factors = scale * width / whole[0] * np.array([stretch, 1 / stretch])
+    room = np.array(size) - whole * factors
+    corner = rng.uniform(np.minimum(room, 0), np.maximum(room, 0))
     angle = rng.normal(0, _TILT) if rng.random() < _TILTED else 0.0
-    turn = cv2.getRotationMatrix2D((width / 2, height / 2), angle, 1.0)
-    placing = np.array([[a, 0, shift_x], [0, b, shift_y], [0, 0, 1]])
-    warped = cv2.warpAffine(image, turn @ placing, size, borderValue=(GREY,) * 3)
-    factors = np.array([x_factor, y_factor] * 2, np.float32)
-    offset = np.array([left, top] * 2, np.float32)
-    boxes = _turned(sample.boxes * factors + offset, turn)
-    return _cropped(NetSample(_image(warped), boxes, sample.classes, sample.ignored))
+    turn = np.asarray(cv2.getRotationMatrix2D((width / 2, height / 2), angle, 1.0))
+    placing = turn @ np.vstack([np.column_stack([np.diag(factors), corner]), [0, 0, 1]])
+    image = sample.image
+    while (factors * whole < 0.5 * np.array(image.shape[1::-1])).all():  # warping skips pixels
+        image = _image(cv2.resize(image, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA))
+    warping = placing.copy()  # from middle to middle of pixels
+    warping[:, :2] *= whole / image.shape[1::-1]
+    warping[:, 2] += warping[:, :2].sum(axis=1) / 2 - 0.5
+    warped = _image(cv2.warpAffine(image, warping, size, borderValue=(GREY,) * 3))
+    placed = NetSample(warped, _moved(sample.boxes, placing), sample.classes, sample.ignored)
+    return _cropped(placed)
 
 
-def _turned(boxes: Float32Array, turn: npt.ArrayLike) -> Float32Array:
-    """Return boxes around the ellipses in boxes, `(n, 4)`, of a picture that was turned."""
-    matrix = np.asarray(turn)
-    middles = (boxes[:, :2] + boxes[:, 2:]) / 2 @ matrix[:, :2].T + matrix[:, 2]
-    halves = np.sqrt(((boxes[:, 2:] - boxes[:, :2]) / 2) ** 2 @ (matrix[:, :2] ** 2).T)
+def _moved(boxes: Float32Array, placing: Float64Array) -> Float32Array:
+    """Return boxes around the ellipses in boxes, `(n, 4)`, after an affine map, `(2, 3)`."""
+    middles = (boxes[:, :2] + boxes[:, 2:]) / 2 @ placing[:, :2].T + placing[:, 2]
+    halves = np.sqrt(((boxes[:, 2:] - boxes[:, :2]) / 2) ** 2 @ (placing[:, :2] ** 2).T)
     return np.concatenate([middles - halves, middles + halves], axis=1).astype(np.float32)
 
 
 def _cropped(sample: NetSample) -> NetSample:
     """Cut boxes at the sides of the picture; vehicles of which little is left are ignored."""
-    height, width = sample.image.shape[:2]
-    limits = np.array([width, height, width, height], np.float32)
+    limits = np.array(sample.image.shape[1::-1] * 2, np.float32)
     cut = np.clip(sample.boxes, 0, limits)
-    left = _areas(cut) / np.maximum(_areas(sample.boxes), 1e-6)
-    keep = _areas(cut) > 0
-    cropped = replace(sample, boxes=cut).ignoring(left < _LEAST_VISIBLE)
-    return NetSample(
-        sample.image, cropped.boxes[keep], cropped.classes[keep], cropped.ignored[keep]
-    )
-
-
-def _without_small(sample: NetSample) -> NetSample:
-    """Ignore vehicles that are too small to be found."""
-    sides = sample.boxes[:, 2:] - sample.boxes[:, :2]
-    small = (sides.max(1, initial=0) < LEAST_SIDE) | (sides.min(1, initial=1e9) < LEAST_SIDE / 2)
-    return sample.ignoring(small)
+    areas, left = area(sample.boxes.astype(np.float64)), area(cut.astype(np.float64))
+    cropped = replace(sample, boxes=cut).ignoring(left < _MIN_VISIBLE * areas)
+    return cropped.of(left > 0)
 
 
 def _mirrored(sample: NetSample) -> NetSample:
-    width = sample.image.shape[1]
     boxes = sample.boxes.copy()
-    boxes[:, [0, 2]] = width - sample.boxes[:, [2, 0]]
+    boxes[:, [0, 2]] = sample.image.shape[1] - sample.boxes[:, [2, 0]]
     return replace(sample, image=sample.image[:, ::-1], boxes=boxes)
 
 
@@ -203,11 +258,10 @@ def _recolored(rng: np.random.Generator, image: Image) -> Image:
     gain = np.full(3, rng.uniform(0.6, 1.4))
     if rng.random() < 0.5:
         gain *= rng.uniform(0.85, 1.15, 3)
-    offset = rng.uniform(-25, 25)
-    table = np.arange(256)[:, np.newaxis] * gain + offset
+    table = np.clip(np.arange(256)[:, np.newaxis] * gain + rng.uniform(-25, 25), 0, 255)
     if rng.random() < 0.3:
-        table = 255 * (np.clip(table, 0, 255) / 255) ** np.exp(rng.uniform(-0.4, 0.4))
-    image = _image(cv2.LUT(image, np.clip(table, 0, 255).astype(np.uint8)[np.newaxis]))
+        table = 255 * (table / 255) ** np.exp(rng.uniform(-0.4, 0.4))
+    image = _image(cv2.LUT(image, table.astype(np.uint8)[np.newaxis]))
     if rng.random() < 0.3:
         saturation = rng.uniform(0, 1.6)
         grey = cv2.cvtColor(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), cv2.COLOR_GRAY2BGR)
@@ -224,15 +278,10 @@ def _with_noise(rng: np.random.Generator, image: Image) -> Image:
         coded = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
         image = _image(np.asarray(cv2.imdecode(coded, cv2.IMREAD_COLOR)))
     if rng.random() < 0.15:
-        noise = rng.normal(0, rng.uniform(2, 12), image.shape[:2]).astype(np.int16)
-        image = np.clip(image + noise[..., np.newaxis], 0, 255).astype(np.uint8)
+        noise = rng.normal(0, rng.uniform(2, 12), image.shape[:2])
+        image = _image(np.clip(image + noise[..., np.newaxis], 0, 255))
     return image
 
 
 def _image(values: npt.ArrayLike) -> Image:
     return np.asarray(values, np.uint8)
-
-
-def _areas(boxes: Float32Array) -> Float32Array:
-    sides = np.maximum(boxes[:, 2:] - boxes[:, :2], 0)
-    return np.asarray(sides[:, 0] * sides[:, 1], np.float32)

@@ -8,7 +8,7 @@ import copy
 import io
 import json
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +24,7 @@ from vdet.files import staged
 from vdet.learn.net.architecture import Network
 
 _OPSET = 17
-_LEAST_WEIGHT = 1e-12  # smaller ones lead to denormal numbers, which are slow
+_MIN_WEIGHT = 1e-12  # smaller ones lead to denormal numbers, which are slow
 
 
 class _FromFrames(nn.Module):
@@ -64,9 +64,17 @@ def export_network(
     for constant in model.graph.initializer:
         values = numpy_helper.to_array(constant)
         if values.dtype == np.float32:
-            flushed = np.where(np.abs(values) < _LEAST_WEIGHT, np.float32(0), values)
+            flushed = np.where(np.abs(values) < _MIN_WEIGHT, np.float32(0), values)
             constant.CopyFrom(numpy_helper.from_array(flushed, constant.name))
-    onnx.helper.set_model_props(model, {HEADER_KEY: json.dumps(header.model_dump(mode="json"))})
+    write_model(model, header, path, overwrite=overwrite)
+
+
+def write_model(
+    model: onnx.ModelProto, header: Header, path: Path, *, overwrite: bool = False
+) -> None:
+    """Write the graph of a network of ours with a header. Raises `OutputError`."""
+    text = json.dumps(header.model_dump(mode="json"))
+    onnx.helper.set_model_props(model, {HEADER_KEY: text})
     onnx.checker.check_model(model)
     with staged(path, overwrite=overwrite) as temporary:
         temporary.write_bytes(model.SerializeToString())
@@ -77,9 +85,8 @@ def start_from(network: Network, path: Path, pictures: Tensor, classes: Sequence
     """Give a network the weights of a file that `export_network` has written.
 
     Normalisation is part of the convolutions there. Each normalisation of the network gets the
-    mean and deviation of what it sees in some pictures, and undoes itself at first. Layers may be
-    wider than those of the file: further channels have random weights and change no output yet.
-    So have classes that the file does not know.
+    mean and deviation of what it sees in some pictures, and undoes itself at first. Classes that
+    the file does not know have random weights, and change no other output.
 
     Parameters
     ----------
@@ -93,22 +100,22 @@ def start_from(network: Network, path: Path, pictures: Tensor, classes: Sequence
     DataError
         The file is not a network of this form.
     """
-    biases: list[Tensor] = []
+    bias = torch.empty(0)
 
     def load(layer: nn.Module, inputs: tuple[Tensor]) -> None:
         """Set a layer before it computes: a convolution, or the normalisation behind it."""
-        if isinstance(layer, nn.Conv2d):
-            weight, bias = next(folded)
-            factor = 1 / 255 if layer is network.stem else 1.0
-            if layer.bias is None:
-                rows = list(range(len(weight)))
-            else:  # a head: its classes may be others, or in another order
-                rows, weight, bias = list(places), weight[list(columns)], bias[list(columns)]
-                layer.bias[rows] = bias
-            _fill(layer.weight, rows, weight / factor)
-            biases.append(bias)
-        elif isinstance(layer, nn.BatchNorm2d):
-            _undo(layer, inputs[0], biases[-1])
+        nonlocal bias
+        if isinstance(layer, nn.BatchNorm2d):
+            variance, mean = torch.var_mean(inputs[0], (0, 2, 3))
+            layer.weight.copy_(torch.sqrt(variance + layer.eps))
+            layer.bias.copy_(bias + mean)
+            layer.load_state_dict({"running_mean": mean, "running_var": variance}, strict=False)
+            return
+        weight, bias = next(folded)
+        if layer.bias is not None:  # a head: its classes may be others, or in another order
+            layer.weight[places], layer.bias[places] = weight[columns], bias[columns]
+        else:
+            layer.weight.copy_(255 * weight if layer is network.stem else weight)
 
     layers = [
         module for module in network.modules() if isinstance(module, nn.Conv2d | nn.BatchNorm2d)
@@ -117,9 +124,10 @@ def start_from(network: Network, path: Path, pictures: Tensor, classes: Sequence
     try:
         header = read_header(Session(path))
         theirs = header.classes if header else ()
-        pairs = [(5 + n, 5 + classes.index(c)) for n, c in enumerate(theirs) if c in classes]
-        columns, places = zip(*((n, n) for n in range(5)), *pairs, strict=True)
-        folded = iter(_convolutions(path))
+        shared = [name for name in classes if name in theirs]
+        places = [*range(5), *(5 + classes.index(name) for name in shared)]
+        columns = [*range(5), *(5 + theirs.index(name) for name in shared)]
+        folded = _convolutions(onnx.load(str(path)).graph)
         network(pictures)
         if next(folded, None) is not None:
             raise ValueError("more convolutions than the network has")
@@ -130,30 +138,12 @@ def start_from(network: Network, path: Path, pictures: Tensor, classes: Sequence
             hook.remove()
 
 
-def _convolutions(path: Path) -> list[tuple[Tensor, Tensor]]:
-    """Return weight and bias of all convolutions of a file, in the order of the graph."""
-    graph = onnx.load(str(path)).graph
+def _convolutions(graph: onnx.GraphProto) -> Iterator[tuple[Tensor, Tensor]]:
+    """Yield weight and bias of all convolutions, in the order of the graph."""
     constants = {item.name: numpy_helper.to_array(item) for item in graph.initializer}
     for node in graph.node:
         if node.op_type == "Identity" and node.input[0] in constants:  # equal ones are written once
             constants[node.output[0]] = constants[node.input[0]]
-    return [
-        (torch.tensor(constants[node.input[1]]), torch.tensor(constants[node.input[2]]))
-        for node in graph.node
-        if node.op_type == "Conv"
-    ]
-
-
-def _fill(weight: Tensor, rows: Sequence[int], known: Tensor) -> None:
-    """Set the weights of the channels `rows`; these do not depend on further inputs."""
-    weight[rows] = 0
-    weight[rows, : known.shape[1]] = known
-
-
-def _undo(norm: nn.BatchNorm2d, inputs: Tensor, bias: Tensor) -> None:
-    """Set a normalisation so that it changes nothing in the first channels but adds their bias."""
-    variance, mean = torch.var_mean(inputs, (0, 2, 3))
-    known = len(bias)
-    norm.weight[:known] = torch.sqrt(variance + norm.eps)[:known]
-    norm.bias[:known] = bias + mean[:known]
-    norm.load_state_dict({"running_mean": mean, "running_var": variance}, strict=False)
+        elif node.op_type == "Conv":
+            weight, bias = (torch.tensor(constants[name]) for name in node.input[1:3])
+            yield weight, bias

@@ -1,8 +1,7 @@
 """Labelled pictures and videos in memory, from which the training draws."""
 
-import hashlib
 from collections import Counter, defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,9 +10,10 @@ import numpy as np
 
 from vdet.boxes import BoolArray, Float32Array, Image, Int64Array
 from vdet.config.schema import Settings
+from vdet.errors import printable
 from vdet.labels.label import Label
 from vdet.labels.pictures import LabelledPicture, LabelledPictures
-from vdet.labels.reading import read_labelled_pictures, read_true_labels
+from vdet.labels.reading import read_true_labels
 from vdet.labels.roles import Roles
 from vdet.labels.video import spread_frames
 from vdet.media.reader import VideoReader
@@ -60,12 +60,34 @@ class NetSample:
         size = round(width * factor), round(height * factor)
         image = np.asarray(cv2.resize(self.image, size, interpolation=cv2.INTER_AREA), np.uint8)
         scale = np.array([size[0] / width, size[1] / height] * 2, np.float32)
-        return NetSample(image, self.boxes * scale, self.classes, self.ignored)
+        return replace(self, image=image, boxes=self.boxes * scale)
+
+    def of(self, rows: BoolArray) -> "NetSample":
+        """Return the sample with only some of the boxes."""
+        return NetSample(self.image, self.boxes[rows], self.classes[rows], self.ignored[rows])
 
     def ignoring(self, rows: BoolArray) -> "NetSample":
         """Return the sample with further boxes as ignore regions for all classes."""
         classes = np.where(rows & ~self.ignored, UNKNOWN, self.classes)
         return replace(self, classes=classes, ignored=self.ignored | rows)
+
+
+def join(samples: Sequence[NetSample], image: Image) -> NetSample:
+    """Return a sample that shows `image` with the boxes of all `samples`."""
+    return NetSample(
+        image,
+        np.concatenate([sample.boxes for sample in samples]),
+        np.concatenate([sample.classes for sample in samples]),
+        np.concatenate([sample.ignored for sample in samples]),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class NetSource:
+    """The samples of one camera or collection; settings use its `name`."""
+
+    name: str
+    samples: Sequence[NetSample]
 
 
 Counts = dict[str, int]
@@ -84,8 +106,6 @@ class SourceReport:
         The labels that are not learnt: neither object nor background, or background.
     unlabelled
         The classes that the source does not label; what looks like them is not background.
-    sha256
-        Of pictures and labels.
     """
 
     name: str
@@ -94,41 +114,38 @@ class SourceReport:
     ignored: Counts
     background: Counts
     unlabelled: tuple[str, ...]
-    sha256: str
+
+    def lines(self) -> Iterator[str]:
+        """Yield as lines of text what is learnt, and what not."""
+        learnt = _counted(self.vehicles) or "nothing to learn"
+        plural = "" if self.pictures == 1 else "s"
+        yield f"{self.name}: {self.pictures:,} picture{plural}; {learnt}"
+        if self.unlabelled:
+            yield f"  not labelled, so not background: {', '.join(self.unlabelled)}"
+        if self.ignored:
+            yield f"  ignored: {_counted(self.ignored)}"
+        if self.background:
+            yield f"  background, as their label is unknown: {_counted(self.background)}"
 
 
-@dataclass(frozen=True, slots=True)
-class NetSource:
-    """The samples of one camera or collection; metrics and settings use its `name`."""
-
-    name: str
-    samples: Sequence[NetSample]
+def _counted(counts: Counts) -> str:
+    return ", ".join(f"{count:,} {printable(name)}" for name, count in counts.items())
 
 
 Source = tuple[NetSource, SourceReport]
 """A source, and what a training makes of it."""
 
 
-def image_source(path: Path, settings: Settings) -> Source:
-    """Read a set of labelled pictures into memory.
+def picture_source(labelled: LabelledPictures, settings: Settings) -> Source:
+    """Read a set of labelled pictures into memory; `settings` has the classes to learn.
 
-    `settings` has the classes to learn and the roles of labels.
-
-    Raises
-    ------
-    TruthError
-        The labels cannot be read.
-    ImageError
-        A picture cannot be read.
+    Raises `ImageError` where a picture cannot be read.
     """
-    labelled = read_labelled_pictures(path, Roles.for_training(settings))
-    classes = settings.train.net.classes
-    samples = [_sample(picture.read(), picture, classes) for picture in labelled.pictures]
-    source = NetSource(Path(labelled.name).resolve().name, samples)
-    return source, _report(source, classes, labelled)
+    pictures = ((picture.read(), picture) for picture in labelled.pictures)
+    return _source(Path(labelled.name).resolve().name, pictures, labelled, settings)
 
 
-def clip_source(video: Path, truth_file: Path, settings: Settings) -> Source:
+def clip_source(video: Path, truth: Path, settings: Settings) -> Source:
     """Read every `EVERY`-th frame of a labelled video into memory; vehicles without label are cars.
 
     `settings` has the classes to learn, the roles of labels, and how much damage is tolerated.
@@ -140,69 +157,61 @@ def clip_source(video: Path, truth_file: Path, settings: Settings) -> Source:
     VideoError
         The video cannot be read, or is too damaged.
     """
-    frames: dict[int, list[Label]] = defaultdict(list)
-    roles = Roles.for_training(settings)
+    frames = _clip_frames(video, truth, Roles.for_training(settings), settings)
+    return _source(video.name, frames, LabelledPictures(video.name, ()), settings)
+
+
+_Frames = Iterator[tuple[Image, LabelledPicture]]
+"""Pictures, each with its labels."""
+
+
+def _clip_frames(video: Path, truth_file: Path, roles: Roles, settings: Settings) -> _Frames:
+    labels: dict[int, list[Label]] = defaultdict(list)
     truth = read_true_labels(truth_file, roles)
     for label in truth.labels:
         name = roles.class_of(label.name or "car") or "vehicle"
-        frames[label.frame].append(label._replace(name=name))
-    samples, last = [], max(frames, default=0)
+        labels[label.frame].append(label._replace(name=name))
+    last = max(labels, default=0)
     known = None if truth.known is None else (index + 1 for index in truth.known)
     used = spread_frames(known, EVERY, EVERY, last)
     with VideoReader(video, frames=last, settings=settings.input) as reader:
         for number, frame in enumerate(reader, start=1):
             if number in used:
-                labelled = LabelledPicture(video, truth_file, tuple(frames[number]))
-                samples.append(_sample(frame.image, labelled, settings.train.net.classes))
-    source, classes = NetSource(video.name, samples), settings.train.net.classes
-    return source, _report(source, classes, LabelledPictures(video.name, ()))
+                yield frame.image, LabelledPicture(video, truth_file, tuple(labels[number]))
 
 
-def _report(source: NetSource, classes: Sequence[str], labelled: LabelledPictures) -> SourceReport:
-    """Count what is learnt and what is not, and compute the SHA-256."""
-    digest = hashlib.sha256()
+def _source(name: str, frames: _Frames, labelled: LabelledPictures, settings: Settings) -> Source:
+    """Read the samples of a source, and count what is learnt and what is not."""
+    classes = settings.train.net.classes
+    samples = [_sample(image, labels, classes) for image, labels in frames]
     names, vehicles = (*classes, "vehicle"), Counter[str]()
-    for sample in source.samples:
-        for part in (sample.image, sample.boxes, sample.classes, sample.ignored):
-            digest.update(part.tobytes())
+    for sample in samples:
         vehicles.update(names[class_] for class_ in sample.classes[~sample.ignored].tolist())
     unlabelled = {name for picture in labelled.pictures for name in picture.unlabelled}
-    return SourceReport(
-        source.name,
-        len(source.samples),
+    report = SourceReport(
+        name,
+        len(samples),
         {name: vehicles[name] for name in names if vehicles[name]},
         dict(labelled.ignored),
         dict(labelled.others),
         tuple(name for name in classes if name in unlabelled),
-        digest.hexdigest(),
     )
+    return NetSource(name, samples), report
 
 
 def _sample(image: Image, labelled: LabelledPicture, classes: Sequence[str]) -> NetSample:
     """Return a sample; the whole picture is an ignore region for each class without labels."""
-    whole = np.array([[0, 0, image.shape[1], image.shape[0]]] * len(classes), np.float32)
-    unlabelled = [classes.index(name) for name in labelled.unlabelled if name in classes]
-    named = [classes.index(name) if name in classes else UNKNOWN for name in labelled.classes]
-    objects = NetSample(
+    height, width = image.shape[:2]
+    number = {name: index for index, name in enumerate(classes)}
+    unlabelled = [number[name] for name in labelled.unlabelled if name in number]
+    named = [number.get(name, UNKNOWN) for name in labelled.classes]
+    boxes = [*labelled.boxes.tolist(), *[(0, 0, width, height)] * len(unlabelled)]
+    is_whole = np.repeat([False, True], [len(named), len(unlabelled)])
+    sample = NetSample(
         image,
-        labelled.boxes.astype(np.float32),
-        np.array(named, np.int64),
-        np.zeros(len(named), np.bool_),
-    ).ignoring(labelled.ignored)
-    regions = NetSample(
-        image,
-        whole[: len(unlabelled)],
-        np.array(unlabelled, np.int64),
-        np.ones(len(unlabelled), np.bool_),
+        np.array(boxes, np.float32).reshape(-1, 4),
+        np.array([*named, *unlabelled], np.int64),
+        is_whole,
     )
-    return join([objects, regions], image).shrunk()
-
-
-def join(samples: Sequence[NetSample], image: Image) -> NetSample:
-    """Return a sample that shows `image` with the boxes of all `samples`."""
-    return NetSample(
-        image,
-        np.concatenate([sample.boxes for sample in samples]),
-        np.concatenate([sample.classes for sample in samples]),
-        np.concatenate([sample.ignored for sample in samples]),
-    )
+    ignored = np.append(labelled.ignored, np.zeros(len(unlabelled), np.bool_))
+    return sample.ignoring(ignored).shrunk()

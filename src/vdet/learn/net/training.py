@@ -2,27 +2,28 @@
 
 import copy
 import math
+import time
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
-from torch import Tensor
-from torch.nn import functional
 
 from vdet.config.train import NetworkTrainingSettings
+from vdet.detect.onnx.recognition import Header, read_header
+from vdet.detect.onnx.session import Session
 from vdet.errors import DataError
 from vdet.files import staged
-from vdet.learn.net.architecture import Network, cell_centers, decode, flatten
-from vdet.learn.net.assignment import Vehicles, assign
+from vdet.learn.net.architecture import Network
 from vdet.learn.net.augmentation import Drawing, SampleDrawer
-from vdet.learn.net.export import start_from
-from vdet.learn.net.losses import BOX_WEIGHT, CLASS_WEIGHT, giou, quality_focal_loss
-from vdet.learn.net.sources import UNKNOWN, NetSample, NetSource, join
+from vdet.learn.net.export import export_network, start_from
+from vdet.learn.net.loss import Batch, Vehicles, class_weights, loss_of
+from vdet.learn.net.sources import NetSample, NetSource, Source, join
 from vdet.run.threads import prefetch
+from vdet.version import __version__
 
 CHECKPOINT = 500
 """Steps between two checkpoints."""
@@ -40,49 +41,71 @@ _LAST_RATE = 0.02
 """Last learning rate, as a fraction of the highest."""
 _WEIGHT_DECAY = 0.02
 _LONGEST_GRADIENT = 10.0
-_BALANCE = 0.5
-"""Exponent of the frequency of a class, relative to the most frequent one, in its weight."""
-_MOST_WEIGHT = 6.0
-"""Largest weight of a class."""
 _AVERAGE = 0.998
-"""Share that the moving average of the weights keeps at each step."""
+"""Fraction that the moving average of the weights keeps at each step."""
 _MAGNIFIED = 1.4  # scale of the small pictures, whose vehicles would be too small
-
+_REPORTED = 100  # last steps whose mean loss is reported
 
 StepProgress = Callable[[int, float], object]
 """Called after each step, with the number of steps so far and the loss."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Batch:
-    """Training pictures of one step.
+def train_to_file(
+    sources: Sequence[Source],
+    settings: NetworkTrainingSettings,
+    output: Path,
+    *,
+    base: Path | None = None,
+    overwrite: bool = False,
+    progress: StepProgress = lambda *_: None,
+) -> str:
+    """Train a network, write it, and remove the checkpoint, a file beside it that ends in .ckpt.
 
-    `pictures` are the inputs of the network; `ignored` are the ignore regions, as `Vehicles`.
+    Parameters
+    ----------
+    sources, settings, base, progress
+        See `train_network`.
+    overwrite
+        Replace an earlier network.
+
+    Returns
+    -------
+    The size of the network, the duration since the last start, and the last loss, as a line.
+
+    Raises
+    ------
+    ModelError
+        The base cannot be read.
+    DataError
+        See `train_network`.
+    OutputError
+        A file cannot be written.
     """
+    began, losses = time.monotonic(), deque[float](maxlen=_REPORTED)
+    checkpoint = output.with_suffix(".ckpt")
+    before = read_header(Session(base)) if base else None
 
-    pictures: Tensor
-    vehicles: Vehicles
-    ignored: Vehicles
+    def advance(step: int, loss: float) -> None:
+        losses.append(loss)
+        progress(step, loss)
 
-
-def _batches(
-    sources: Sequence[NetSource], settings: NetworkTrainingSettings, first: int
-) -> Iterator[Batch]:
-    """Yield the batches from step `first` on; each depends on the step and the seed alone."""
-    drawer = SampleDrawer(sources, settings)
-    for step in range(first, settings.steps):
-        rng = np.random.default_rng((_SEED, step))
-        drawing = _drawing(settings, step)
-        yield _to_batch([drawer.draw(rng, drawing) for _ in range(settings.batch)])
-
-
-def _drawing(settings: NetworkTrainingSettings, step: int) -> Drawing:
-    is_small = step < _SMALL * settings.steps
-    is_plain = step >= (1 - _PLAIN) * settings.steps
-    mosaics = 0.0 if is_plain else _MOSAICS
-    if is_small:
-        return Drawing(settings.width // 2, settings.height // 64 * 32, _MAGNIFIED, mosaics)
-    return Drawing(settings.width, settings.height, 1.0, mosaics)
+    network = train_network(
+        [source for source, _ in sources], settings, checkpoint, base=base, progress=advance
+    )
+    provenance = {
+        "program": f"vdet {__version__}",
+        "training": settings.model_dump(mode="json"),
+        "report": {"sources": [asdict(report) for _, report in sources]},
+        **({"base": before.provenance} if before else {}),
+    }
+    pixels = settings.width * settings.height
+    header = Header(classes=settings.classes, pixels=pixels, provenance=provenance)
+    export_network(network, header, output, overwrite=overwrite)
+    checkpoint.unlink(missing_ok=True)
+    size = sum(parameter.numel() for parameter in network.parameters())
+    minutes = (time.monotonic() - began) / 60
+    loss = f"; loss at the end {sum(losses) / len(losses):.3f}" if losses else ""
+    return f"{size:,} parameters after {settings.steps:,} steps, {minutes:.1f} minutes{loss}"
 
 
 def train_network(
@@ -96,7 +119,7 @@ def train_network(
     """Train a network and return it with the moving average of its weights.
 
     The same sources and settings give the same network on the same machine. A training that was
-    stopped resumes from its last checkpoint.
+    stopped resumes from its last checkpoint. Torch uses one thread in this process from then on.
 
     Parameters
     ----------
@@ -113,71 +136,86 @@ def train_network(
         No source has a vehicle, a weight is given to a source that is not there, the base is not
         such a network, or the checkpoint belongs to another training.
     """
-    _check(sources, settings)
+    if not any((~sample.ignored).any() for source in sources for sample in source.samples):
+        raise DataError("no picture has a vehicle; pass labelled pictures")
+    names = sorted(source.name for source in sources)
+    if unknown := sorted(settings.weights.keys() - names):
+        raise DataError(
+            f"train.net.weights: no set of pictures is named {unknown[0]}; "
+            f"there are {', '.join(names)}"
+        )
     learnt_with = {
         "sources": [(source.name, len(source.samples)) for source in sources],
         "base": str(base),
-        **settings.model_dump(exclude={"score"}),  # it changes no weight
+        **settings.model_dump(),
     }
-    with _fast_torch():
-        run = _Run(settings, learnt_with, class_weights(sources, len(settings.classes)))
-        if checkpoint.exists():
-            run.restore(checkpoint)
-        elif base is not None:
-            run.start_from(base, next(_batches(sources, settings, run.step)))
-        with prefetch(_batches(sources, settings, run.step)) as batches:
-            for batch in batches:
-                loss = run.learn(batch)
-                progress(run.step, loss)
-                if run.step % CHECKPOINT == 0 or run.step == settings.steps:
-                    run.save(checkpoint)
-    return run.averaged.eval()
-
-
-def _check(sources: Sequence[NetSource], settings: NetworkTrainingSettings) -> None:
-    if not any((~sample.ignored).any() for source in sources for sample in source.samples):
-        raise DataError("no picture has a vehicle; pass labelled pictures")
-    names = {source.name for source in sources}
-    if unknown := sorted(settings.weights.keys() - names):
-        known = ", ".join(sorted(names))
-        raise DataError(
-            f"train.net.weights: no set of pictures is named {unknown[0]}; there are {known}"
-        )
-
-
-@contextmanager
-def _fast_torch() -> Iterator[None]:
-    """Use one thread and round the smallest numbers to 0, and undo both at the end."""
-    threads = torch.get_num_threads()
     torch.set_num_threads(1)  # two threads that wait for each other are slower than one
     torch.set_flush_denormal(True)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(threads)
-        torch.set_flush_denormal(False)
+    training = _Training(sources, settings, learnt_with)
+    if checkpoint.exists():
+        training.restore(checkpoint)
+    elif base is not None:
+        training.start_from(base, next(_batches(sources, settings, 0)))
+    with prefetch(_batches(sources, settings, training.step)) as batches:
+        for batch in batches:
+            loss = training.learn(batch)
+            progress(training.step, loss)
+            if training.step % CHECKPOINT == 0 or training.step == settings.steps:
+                training.save(checkpoint)
+    return training.averaged.eval()
 
 
-class _Run:
+def _batches(
+    sources: Sequence[NetSource], settings: NetworkTrainingSettings, first: int
+) -> Iterator[Batch]:
+    """Yield the batches from step `first` on; each depends on the step and the seed alone."""
+    drawer = SampleDrawer(sources, settings)
+    for step in range(first, settings.steps):
+        rng = np.random.default_rng((_SEED, step))
+        drawing = _drawing(settings, step)
+        yield _to_batch([drawer.draw(rng, drawing) for _ in range(settings.batch)])
+
+
+def _drawing(settings: NetworkTrainingSettings, step: int) -> Drawing:
+    mosaics = 0.0 if step >= (1 - _PLAIN) * settings.steps else _MOSAICS
+    if step < _SMALL * settings.steps:
+        return Drawing(settings.width // 2, settings.height // 64 * 32, _MAGNIFIED, mosaics)
+    return Drawing(settings.width, settings.height, 1.0, mosaics)
+
+
+def _to_batch(samples: Sequence[NetSample]) -> Batch:
+    joined = join(samples, samples[0].image)
+    picture = np.repeat(np.arange(len(samples)), [len(sample.boxes) for sample in samples])
+    columns = [torch.from_numpy(item) for item in (picture, joined.boxes, joined.classes)]
+    vehicles, ignored = (
+        Vehicles(*(column[rows] for column in columns))
+        for rows in map(torch.from_numpy, (~joined.ignored, joined.ignored))
+    )
+    pictures = torch.from_numpy(np.stack([sample.image for sample in samples]))
+    return Batch(pictures.permute(0, 3, 1, 2).float(), vehicles, ignored)
+
+
+class _Training:
     """The state of a training between two steps."""
 
     def __init__(
         self,
+        sources: Sequence[NetSource],
         settings: NetworkTrainingSettings,
         learnt_with: dict[str, Any],
-        class_weights: Tensor,
     ) -> None:
         torch.manual_seed(_SEED)
         self._settings = settings
         self._learnt_with = learnt_with
-        self._class_weights = class_weights
+        self._class_weights = class_weights(sources, len(settings.classes))
         self._network = Network(len(settings.classes)).to(memory_format=torch.channels_last).train()
         self.averaged = copy.deepcopy(self._network)
         weights = [parameter for parameter in self._network.parameters() if parameter.ndim > 1]
         others = [parameter for parameter in self._network.parameters() if parameter.ndim <= 1]
-        groups = [{"params": weights}, {"params": others, "weight_decay": 0.0}]
         self._optimizer = torch.optim.AdamW(
-            groups, settings.learning_rate, weight_decay=_WEIGHT_DECAY
+            [{"params": weights}, {"params": others, "weight_decay": 0.0}],
+            settings.learning_rate,
+            weight_decay=_WEIGHT_DECAY,
         )
         self._parts = {
             "network": self._network,
@@ -198,15 +236,15 @@ class _Run:
         warm_up = min(_WARM_UP, settings.steps // 10)
         if step < warm_up:
             return settings.learning_rate * (step + 1) / warm_up
-        share = max(0.0, 2 * step / settings.steps - 1)  # of the second half
-        low = _LAST_RATE
-        return settings.learning_rate * (low + (1 - low) * (1 + math.cos(math.pi * share)) / 2)
+        fraction = max(0.0, 2 * step / settings.steps - 1)  # of the second half
+        fall = (1 + math.cos(math.pi * fraction)) / 2
+        return settings.learning_rate * (_LAST_RATE + (1 - _LAST_RATE) * fall)
 
     def learn(self, batch: Batch) -> float:
         """Do one step and return its loss."""
         for group in self._optimizer.param_groups:
             group["lr"] = self.rate
-        loss = _loss(self._network, batch, self._class_weights)
+        loss = loss_of(self._network, batch, self._class_weights)
         self._optimizer.zero_grad()
         loss.backward()  # type: ignore[no-untyped-call]
         torch.nn.utils.clip_grad_norm_(self._network.parameters(), _LONGEST_GRADIENT)
@@ -242,63 +280,3 @@ class _Run:
         if not same:
             others = "with other settings, other pictures or another base"
             raise DataError(f"{path}: belongs to a training {others}; remove it")
-
-
-def class_weights(sources: Sequence[NetSource], count: int) -> Tensor:
-    """Return the weight of each class in the loss, float32 `(count + 1,)`; rare ones have more.
-
-    The last one is that of vehicles of unknown kind, 1. The most frequent class has 1 too.
-    """
-    found = np.zeros(count + 1)
-    for sample in (sample for source in sources for sample in source.samples):
-        found += np.bincount(sample.classes[~sample.ignored] % (count + 1), minlength=count + 1)
-    weights = (found[:count].max() / np.maximum(found, 1)) ** _BALANCE
-    return torch.tensor([*np.minimum(weights[:count], _MOST_WEIGHT), 1.0], dtype=torch.float32)
-
-
-def _loss(network: Network, batch: Batch, weights: Tensor) -> Tensor:
-    height, width = batch.pictures.shape[2:]
-    centers, strides = cell_centers(height, width)
-    raw = flatten(network(batch.pictures))
-    scores, boxes = raw[..., 0], decode(raw[..., 1:5], centers, strides)
-    row, cell, iou = assign(scores, boxes, batch.vehicles, centers, strides)
-    cells = batch.vehicles.picture[row], cell
-    targets = torch.zeros_like(scores)
-    targets[cells] = iou
-    classes = batch.vehicles.classes[row]
-    counted = torch.ones_like(scores)
-    counted[_uncounted(batch.ignored, centers, raw[..., 5:].detach().argmax(-1))] = 0
-    counted[cells] = weights[classes].sqrt()
-    whole = iou.sum().clamp(min=1)
-    score_loss = (quality_focal_loss(scores, targets) * counted).sum() / whole
-    box_loss = ((1 - giou(boxes[cells], batch.vehicles.boxes[row])) * iou).sum() / whole
-    class_loss = functional.cross_entropy(
-        raw[..., 5:][cells], classes, weights[:-1], ignore_index=UNKNOWN, reduction="sum"
-    )
-    return score_loss + BOX_WEIGHT * box_loss + CLASS_WEIGHT * class_loss / max(len(iou), 1)
-
-
-def _uncounted(ignored: Vehicles, centers: Tensor, seen: Tensor) -> tuple[Tensor, Tensor]:
-    """Return the picture and the cell of all cells whose middle lies in an ignore region.
-
-    Of a region with a class, only the cells that see it: `seen` is the best class `(B, cells)`.
-    """
-    boxes = ignored.boxes[:, None]
-    inside = ((centers > boxes[..., :2]) & (centers < boxes[..., 2:])).all(-1)
-    classes = ignored.classes[:, None]
-    inside &= (classes == UNKNOWN) | (classes == seen[ignored.picture])
-    row, cell = torch.nonzero(inside, as_tuple=True)
-    return ignored.picture[row], cell
-
-
-def _to_batch(samples: Sequence[NetSample]) -> Batch:
-    joined = join(samples, samples[0].image)
-    counts = [len(sample.boxes) for sample in samples]
-    picture = torch.repeat_interleave(torch.arange(len(samples)), torch.tensor(counts))
-    boxes, classes = torch.from_numpy(joined.boxes).float(), torch.from_numpy(joined.classes)
-    vehicles, ignored = (
-        Vehicles(picture[rows], boxes[rows], classes[rows])
-        for rows in map(torch.from_numpy, (~joined.ignored, joined.ignored))
-    )
-    pictures = torch.from_numpy(np.stack([sample.image for sample in samples]))
-    return Batch(pictures.permute(0, 3, 1, 2).float(), vehicles, ignored)

@@ -1,16 +1,22 @@
 """Night, fog, rain and drops on the glass, drawn into pictures of clear days."""
 
+from typing import Any
+
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from vdet.boxes import Float32Array, Image
+
+_Values = npt.NDArray[Any]
 
 _NIGHT = 0.14  # fraction of pictures
 _DARK = 70.0  # mean of a picture that is not darkened further
 _FOG = 0.06
 _RAIN = 0.1
-_LAMP = (0.03, 0.09)  # radius of a lamp, fraction of the vehicle's width; minimum and most
+_LAMP = (0.03, 0.09)  # radius of a lamp, fraction of the vehicle's width: smallest and largest
 _TWO_LAMPS = 0.75  # minimum width of a vehicle with two lamps, fraction of its height
+_STREET_LAMP = (0.6, 0.85, 1.0)  # BGR
 _WIPED = 0.15  # fraction of pictures in rain with a wiper
 _DROPS = 40  # most drops on the glass
 
@@ -30,9 +36,7 @@ def with_weather(rng: np.random.Generator, image: Image, boxes: Float32Array) ->
         return _with_drops(rng, image) if rng.random() < 0.2 else image
     if chance < _NIGHT + _FOG:
         return _in_fog(rng, image)
-    if chance < _NIGHT + _FOG + _RAIN:
-        return _in_rain(rng, image)
-    return image
+    return _in_rain(rng, image) if chance < _NIGHT + _FOG + _RAIN else image
 
 
 def _at_night(rng: np.random.Generator, image: Image, boxes: Float32Array) -> Image:
@@ -40,43 +44,39 @@ def _at_night(rng: np.random.Generator, image: Image, boxes: Float32Array) -> Im
 
     The lamps of some pictures glare, and a wet road reflects them.
     """
+    height, width = image.shape[:2]
     dark = (image / 255.0) ** rng.uniform(1.1, 2.0) * rng.uniform(0.2, 0.8)
     dark *= rng.uniform(0.75, 1.15, 3)
     light = np.zeros(image.shape, np.float32)
-    for x1, y1, x2, y2 in boxes[rng.random(len(boxes)) < 0.8]:
-        color = _lamp_color(rng)
-        radius = max(1.0, (x2 - x1) * rng.uniform(*_LAMP))
-        y = y1 + (y2 - y1) * rng.uniform(0.5, 0.75)
-        inset = (x2 - x1) * rng.uniform(0.08, 0.25)
+
+    def lamp(x: float, y: float, radius: float, color: tuple[float, float, float]) -> None:
+        cv2.circle(light, (round(x), round(y)), max(1, round(radius)), color, -1)
+
+    for x1, y1, x2, y2 in boxes[rng.random(len(boxes)) < 0.8].tolist():
+        white, red = (0.9, rng.uniform(0.9, 1.0), 1.0), (0.1, 0.1, rng.uniform(0.6, 1.0))
+        color = white if rng.random() < 0.6 else red
+        y, inset = y1 + (y2 - y1) * rng.uniform(0.5, 0.75), (x2 - x1) * rng.uniform(0.08, 0.25)
+        radius = (x2 - x1) * rng.uniform(*_LAMP)
         is_wide = x2 - x1 > _TWO_LAMPS * (y2 - y1)
         for x in (x1 + inset, x2 - inset) if is_wide else ((x1 + x2) / 2,):
-            cv2.circle(light, (round(float(x)), round(float(y))), round(float(radius)), color, -1)
-    height, width = image.shape[:2]
-    for _ in range(int(rng.integers(0, 5))):  # lamps of the street
-        place = int(rng.integers(width)), int(rng.integers(height // 2 + 1))
-        cv2.circle(light, place, int(rng.integers(1, 4)), (0.6, 0.85, 1.0), -1)
+            lamp(x, y, radius, color)
+    for _ in range(int(rng.integers(0, 5))):
+        place = rng.uniform(0, width), rng.uniform(0, height / 2)
+        lamp(*place, rng.uniform(0.5, 3.5), _STREET_LAMP)
     bloom = cv2.GaussianBlur(light, (0, 0), width * rng.uniform(0.004, 0.02))
     lit = dark + light + bloom * rng.uniform(0.5, 2.5)
     if rng.random() < 0.3:  # a wet road
         length = int(height * rng.uniform(0.1, 0.25))
         mirrored = cv2.blur(light, (3, 2 * length + 1), anchor=(1, 2 * length))
         lit += mirrored * rng.uniform(1, 4)
-    return np.asarray(np.clip(lit * 255, 0, 255), np.uint8)
-
-
-def _lamp_color(rng: np.random.Generator) -> tuple[float, float, float]:
-    """Return the white of head lamps or the red of tail lamps, BGR."""
-    if rng.random() < 0.6:
-        return 0.9, float(rng.uniform(0.9, 1.0)), 1.0
-    return 0.1, 0.1, float(rng.uniform(0.6, 1.0))
+    return _image(lit * 255)
 
 
 def _in_fog(rng: np.random.Generator, image: Image) -> Image:
     """Blend the picture with grey, more so at the top."""
     top = rng.uniform(0.3, 0.85)
-    share = np.linspace(top, top * rng.uniform(0.2, 0.8), len(image))[:, np.newaxis, np.newaxis]
-    fogged = image * (1 - share) + rng.uniform(120, 220) * share
-    return np.asarray(fogged, np.uint8)
+    veil = np.linspace(top, top * rng.uniform(0.2, 0.8), len(image))[:, np.newaxis, np.newaxis]
+    return _image(image * (1 - veil) + rng.uniform(120, 220) * veil)
 
 
 def _in_rain(rng: np.random.Generator, image: Image) -> Image:
@@ -91,13 +91,11 @@ def _in_rain(rng: np.random.Generator, image: Image) -> Image:
         cv2.line(rain, (x, y), end, int(rng.integers(60, 200)), 1)
     streaks = cv2.GaussianBlur(rain, (0, 0), 0.7)[..., np.newaxis] / 255.0
     grey, veil = rng.uniform(90, 190), rng.uniform(0, 0.6)  # low contrast, as behind spray
-    wet = (image * (1 - veil) + grey * veil) * rng.uniform(0.6, 1.0) * (1 - streaks) + 200 * streaks
-    result = np.asarray(np.clip(wet, 0, 255), np.uint8)
+    dull = (image * (1 - veil) + grey * veil) * rng.uniform(0.6, 1.0)
+    wet = _image(dull * (1 - streaks) + 200 * streaks)
     if rng.random() < 0.7:
-        result = _with_drops(rng, result)
-    if rng.random() < _WIPED:
-        result = _with_wiper(rng, result)
-    return result
+        wet = _with_drops(rng, wet)
+    return _with_wiper(rng, wet) if rng.random() < _WIPED else wet
 
 
 def _with_drops(rng: np.random.Generator, image: Image) -> Image:
@@ -111,15 +109,11 @@ def _with_drops(rng: np.random.Generator, image: Image) -> Image:
         left, top = max(0, x - 2 * radius), max(0, y - 2 * radius)
         around = blurred[top : y + 2 * radius, left : x + 2 * radius][::-1, ::-1]
         part = shown[top : y + radius, left : x + radius]
-        if min(part.shape[:2]) < 2:
-            continue
-        size = part.shape[1], part.shape[0]
-        bright = cv2.resize(around, size, interpolation=cv2.INTER_AREA) * rng.uniform(0.7, 1.3)
-        part[:] = np.clip(bright, 0, 255)
+        small = cv2.resize(around, part.shape[1::-1], interpolation=cv2.INTER_AREA)
+        part[:] = _image(small * rng.uniform(0.7, 1.3))
         axes = radius, max(2, int(radius * rng.uniform(0.8, 1.6)))
         cv2.ellipse(mask, (x, y), axes, 0, 0, 360, 255, -1)
-    alpha = cv2.GaussianBlur(mask, (0, 0), 1.5)[..., np.newaxis] / 255.0
-    return np.asarray(image * (1 - alpha) + shown * alpha, np.uint8)
+    return _blended(image, shown, cv2.GaussianBlur(mask, (0, 0), 1.5) / 255.0)
 
 
 def _with_wiper(rng: np.random.Generator, image: Image) -> Image:
@@ -129,6 +123,15 @@ def _with_wiper(rng: np.random.Generator, image: Image) -> Image:
     foot = int(rng.integers(width)), height
     tip = int(foot[0] + rng.uniform(-0.6, 0.6) * width), int(height * rng.uniform(0, 0.5))
     cv2.line(mask, foot, tip, 255, max(2, int(width * rng.uniform(0.005, 0.025))))
-    alpha = cv2.GaussianBlur(mask, (0, 0), 0.006 * width)[..., np.newaxis] / 255.0
     smeared = cv2.blur(image, (1 + 2 * int(0.01 * width), 1))
-    return np.asarray(smeared * (1 - alpha) + 25 * alpha, np.uint8)
+    dark = np.full_like(image, 25)
+    return _blended(smeared, dark, cv2.GaussianBlur(mask, (0, 0), 0.006 * width) / 255.0)
+
+
+def _blended(image: _Values, other: _Values, opacity: _Values) -> Image:
+    """Return the image with another one over it, of an opacity `(H, W)` from 0 to 1."""
+    return _image(image + opacity[..., np.newaxis] * (other.astype(np.float32) - image))
+
+
+def _image(values: _Values) -> Image:
+    return np.asarray(np.clip(values, 0, 255), np.uint8)

@@ -1,0 +1,356 @@
+"""How well the network finds and names vehicles of cameras it has not seen: `make unseen`.
+
+The cameras of all sets are dealt into folds. Each training leaves one fold out, and its network
+searches the pictures of that fold; the last training leaves the video out too, and its network
+follows the vehicles in it. All detections together give the calibration of the shipped network
+(`make ship`), for all boxes and by class. Networks given by `--model` search the same pictures.
+
+Checkpoints, networks and findings are kept in the folder `--work`: a stopped run resumes there.
+"""
+
+import argparse
+import json
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from sklearn.linear_model import LogisticRegression
+
+from vdet.boxes import BoolArray, Float64Array, Int64Array
+from vdet.config.loading import load_settings
+from vdet.config.schema import NetworkSettings, Settings
+from vdet.detect.factory import load_detector, trained_on
+from vdet.detect.onnx.recognition import Calibration, read_header
+from vdet.detect.onnx.session import Session
+from vdet.evaluate.comparison import MATCH_IOU, UNKNOWN, ComparedFrame
+from vdet.evaluate.images import Counting, MeasuredImage, evaluate_images
+from vdet.evaluate.output import RunName, figure, table
+from vdet.evaluate.report import video_report
+from vdet.evaluate.scores import RankedPredictions
+from vdet.evaluate.video import Variant, evaluate_clips, open_clip
+from vdet.files import write_json
+from vdet.labels.pictures import LabelledPicture, LabelledPictures
+from vdet.labels.reading import read_labelled_pictures
+from vdet.labels.roles import Roles
+
+OURS = "trained without them"
+"""The name of our networks in `results.json`."""
+
+_SAME_CAMERA = {
+    **dict.fromkeys(("c048", "c064"), "c001"),
+    **dict.fromkeys(("c013", "cp000", "cp001"), "c012"),
+    **dict.fromkeys(("cp003", "cp004"), "c018"),
+    **dict.fromkeys(("cityscapes_more", "cityscapes_negatives"), "cityscapes"),
+    "us_dusk": "us_dashcams",
+}
+"""Clips and sets from one camera, or one city."""
+
+_HIGH = {
+    *("traffic_cams", "overpass", "vietnam_street", "lake_county_cctv"),
+    *("topview_roads", "toll_km39", "manaus_misc"),
+}
+"""Sets from poles and bridges."""
+_MIN_WIDTHS = {False: 0.03, True: 0.02}
+"""Narrower objects are ignore regions, fraction of the picture's width; True: for `_HIGH`."""
+
+_MIN_SCORE = 5e-5  # of a calibrated network; its output is about 0.02 there
+_ENOUGH = 100  # right boxes of a class that has a calibration of its own
+_FROM_RANDOM = "train.net.learning_rate=0.002"  # the default rate is for a training from a base
+
+
+def camera_of(set_: str, picture: Path) -> str:
+    """Return the camera of a picture, as far as names tell it; that of many sets is the set."""
+    words = picture.stem.split("_")
+    if set_ == "traffic_cams":
+        return _SAME_CAMERA.get(words[0], words[0])
+    if set_ == "overpass":
+        return words[0]
+    if len(words) > 1 and words[0].isdecimal():  # 0001_camera.webp
+        return words[1]
+    return _SAME_CAMERA.get(set_, set_)
+
+
+def deal(sets: Sequence[LabelledPictures], folds: int) -> list[Int64Array]:
+    """Return the fold of every picture of all sets: in turn, camera by camera of a set.
+
+    The sets that are one camera each are dealt like the cameras of one set.
+    """
+    cameras: dict[str, dict[str, int]] = defaultdict(dict)
+    dealt = []
+    for labelled in sets:
+        name, numbers = Path(labelled.name).name, []
+        for picture in labelled.pictures:
+            camera = camera_of(name, picture.path)
+            known = cameras["" if camera == _SAME_CAMERA.get(name, name) else name]
+            numbers.append(known.setdefault(camera, len(known)) % folds)
+        dealt.append(np.array(numbers, np.int64))
+    return dealt
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """A detection: its set, its class, its score, and the class of what it finds, if anything."""
+
+    set: str
+    named: str
+    score: float
+    found: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class Findings:
+    """All detections of a network in some pictures, and the number of objects by set and class."""
+
+    rows: tuple[Finding, ...]
+    objects: dict[str, dict[str, int]]
+
+    @classmethod
+    def joined(cls, parts: Sequence["Findings"]) -> "Findings":
+        """Return the findings of all folds."""
+        objects: dict[str, Counter[str]] = defaultdict(Counter)
+        for part in parts:
+            for name, counts in part.objects.items():
+                objects[name].update(counts)
+        return cls(tuple(row for part in parts for row in part.rows), dict(objects))
+
+    def save(self, path: Path) -> None:
+        """Write the findings as JSON."""
+        rows = [[row.set, row.named, row.score, row.found] for row in self.rows]
+        write_json({"objects": self.objects, "rows": rows}, str(path), overwrite=True)
+
+    @classmethod
+    def load(cls, path: Path) -> "Findings":
+        """Read findings that `save` has written."""
+        values = json.loads(path.read_text(encoding="utf-8"))
+        return cls(tuple(Finding(*row) for row in values["rows"]), values["objects"])
+
+
+def measure(sets: Sequence[LabelledPictures], network: Path, classes: Sequence[str]) -> Findings:
+    """Search pictures and compare every detection with the labels."""
+    settings = NetworkSettings(
+        model=str(network), min_score=_MIN_SCORE, classes=(*classes, UNKNOWN)
+    ).showing_all()
+    model, rows, objects = load_detector(settings), [], {}
+    for labelled in sets:
+        name = Path(labelled.name).name
+        counting = Counting(0.0, _MIN_WIDTHS[name in _HIGH])
+        [measured] = evaluate_images([labelled], model, counting).sources
+        counts = Counter[str]()
+        for image in measured.images:
+            rows += [Finding(name, *item) for item in _findings(image)]
+            counts.update(image.every.vehicle_names)
+        objects[name] = dict(counts)
+    return Findings(tuple(rows), objects)
+
+
+def _findings(image: MeasuredImage) -> Iterator[tuple[str, float, str | None]]:
+    """Yield class, score and what it finds of each detection."""
+    every = image.every
+    for frame in every.frames:
+        named = [every.track_names[track] for track in frame.tracks.tolist()]
+        found = [None if row < 0 else every.vehicle_names[row] for row in _found(frame).tolist()]
+        yield from zip(named, frame.scores.tolist(), found, strict=True)
+
+
+def _found(frame: ComparedFrame) -> Int64Array:
+    """Return the vehicle that each detection finds, the best score first; -1 for none, `(m,)`."""
+    found, free = np.full(len(frame.tracks), -1), frame.iou.copy()
+    for column in np.argsort(-frame.scores, kind="stable").tolist():
+        if free[:, column].max(initial=0) >= MATCH_IOU:
+            row = int(np.argmax(free[:, column]))
+            found[column], free[row] = frame.vehicles[row], -1
+    return found
+
+
+def ranked(rows: Sequence[Finding], right: Sequence[bool], objects: int) -> RankedPredictions:
+    """Return detections by descending score."""
+    scores = np.array([row.score for row in rows], np.float64)
+    order = np.argsort(-scores, kind="stable")
+    return RankedPredictions(scores[order], np.array([right], np.bool_)[:, order], objects)
+
+
+def fit(rows: Sequence[Finding], given: Calibration) -> Calibration:
+    """Fit slope and offset anew, so that the score is the fraction of boxes that are right.
+
+    `given` is the calibration of the network that gave the scores.
+    Source: Platt, "Probabilistic outputs for support vector machines", 1999.
+    """
+    scores = np.array([row.score for row in rows]).clip(1e-6, 1 - 1e-6)
+    logits: Float64Array = np.log(scores / (1 - scores))
+    right: BoolArray = np.array([row.found is not None for row in rows])
+    model = LogisticRegression(C=1e6).fit(logits[:, np.newaxis], right)
+    slope, offset = float(model.coef_[0, 0]), float(model.intercept_[0])
+    return Calibration(
+        slope=round(slope * given.slope, 4), offset=round(slope * given.offset + offset, 4)
+    )
+
+
+def summarize(findings: Findings, given: Calibration) -> dict[str, Any]:
+    """Return the best F1 of every set and class, and the calibrations, as JSON values."""
+    by_set, by_class = defaultdict(list), defaultdict(list)
+    for row in findings.rows:
+        by_set[row.set].append(row)
+        by_class[row.named].append(row)
+    totals = sum(map(Counter, findings.objects.values()), Counter[str]())
+    sets = {
+        name: _scores(by_set[name], None, sum(counts.values()))
+        for name, counts in findings.objects.items()
+        if counts
+    }
+    classes = {
+        name: _scores([row for row in rows if row.found != UNKNOWN], name, totals[name])
+        for name, rows in by_class.items()
+    }
+    calibrations = {
+        name: fit(rows, given).model_dump()
+        for name, rows in sorted(by_class.items())
+        if sum(row.found is not None for row in rows) >= _ENOUGH
+    }
+    common = fit(findings.rows, given).model_dump()
+    return {"sets": sets, "classes": classes, "calibration": common, "by_class": calibrations}
+
+
+def _scores(rows: Sequence[Finding], name: str | None, objects: int) -> dict[str, float]:
+    """Return the scores of detections; with a name, those are right that find its class."""
+    right = [row.found is not None if name is None else row.found == name for row in rows]
+    result = ranked(rows, right, objects)
+    values = result.f1_at(result.scores) if len(rows) else np.zeros(1)
+    at = float(result.scores[np.argmax(values)]) if len(rows) else 0.0
+    return {
+        "objects": objects,
+        "best_f1": float(values.max()),
+        "at_score": at,
+        "ap50": result.average_precisions()[0],
+    }
+
+
+def summary_lines(name: str, summary: dict[str, Any]) -> Iterator[str]:
+    """Yield tables of the sets and the classes, and the calibrations, as lines of text."""
+    yield f"{name}:"
+    for part in ("sets", "classes"):
+        rows = [
+            [one, str(values["objects"]), *map(figure, list(values.values())[1:])]
+            for one, values in summary[part].items()
+        ]
+        yield from table((part, "objects", "best F1", "at score", "AP50"), rows)
+    for one, values in {"all": summary["calibration"], **summary["by_class"]}.items():
+        yield f"calibration of {one}: slope {values['slope']}, offset {values['offset']}"
+    yield ""
+
+
+def video_lines(clip: tuple[Path, Path], network: Path, settings: Settings) -> list[str]:
+    """Return how well a network finds and follows the vehicles of a video."""
+    model = load_detector(NetworkSettings(model=str(network)))
+    runs = evaluate_clips([open_clip(*clip)], [Variant(settings, model)])
+    return video_report(runs, RunName("net", network, None)).lines()
+
+
+class Unseen:
+    """The trainings and measurements of all folds, kept in a folder."""
+
+    def __init__(self, arguments: argparse.Namespace) -> None:
+        self._work, self._folds = arguments.work, arguments.folds
+        rate = [] if arguments.base else [_FROM_RANDOM]
+        steps = [f"train.net.steps={arguments.steps}"] if arguments.steps else []
+        self.settings = load_settings((), [*steps, *rate, *arguments.set])
+        self._base, self.clip = arguments.base, (arguments.video, arguments.truth)
+        self._paths = sorted(path for path in arguments.roads.iterdir() if path.is_dir())
+        classes = self.settings.train.net.classes
+        labels = Roles.of({}, (*classes, UNKNOWN))
+        self._sets = [read_labelled_pictures(path, labels) for path in self._paths]
+        self._dealt = deal(self._sets, self._folds)
+        self._sources: list[Any] = []
+
+    def network(self, fold: int) -> Path:
+        """Train a network without a fold, unless it is there, and return its file."""
+        output: Path = self._work / f"without_{fold}.onnx"
+        if output.exists():
+            return output
+        from vdet.learn.net.sources import NetSource, clip_source, picture_source
+        from vdet.learn.net.training import train_to_file
+
+        if not self._sources:
+            roles = Roles.for_training(self.settings)
+            sets = [read_labelled_pictures(path, roles) for path in self._paths]
+            self._sources = [picture_source(labelled, self.settings) for labelled in sets]
+        sources = []
+        for (source, report), folds in zip(self._sources, self._dealt, strict=True):
+            kept = np.flatnonzero(folds != fold).tolist()
+            part = NetSource(source.name, [source.samples[number] for number in kept])
+            if kept:
+                sources.append((part, replace(report, pictures=len(kept))))
+        if fold < self._folds - 1:
+            sources.append(clip_source(*self.clip, self.settings))
+
+        def progress(step: int, loss: float) -> None:
+            if step % 100 == 0:
+                print(f"{output.stem}: step {step}, loss {loss:.3f}", flush=True)
+
+        train_to_file(sources, self.settings.train.net, output, base=self._base, progress=progress)
+        return output
+
+    def findings(self, network: Path, fold: int) -> Findings:
+        """Search the pictures of a fold, unless that is done, and return the findings."""
+        path = self._work / f"found_{network.stem}_{fold}.json"
+        if not path.exists():
+            sets = [
+                replace(labelled, pictures=_those(labelled.pictures, folds == fold))
+                for labelled, folds in zip(self._sets, self._dealt, strict=True)
+            ]
+            sets = [labelled for labelled in sets if labelled.pictures]
+            measure(sets, network, self.settings.train.net.classes).save(path)
+            print(f"{path}: searched", flush=True)
+        return Findings.load(path)
+
+
+def _those(pictures: Sequence[LabelledPicture], flags: BoolArray) -> tuple[LabelledPicture, ...]:
+    return tuple(pictures[number] for number in np.flatnonzero(flags).tolist())
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("roads", type=Path, help="folder of sets of labelled pictures")
+    parser.add_argument("video", type=Path, help="labelled video, in every training but the last")
+    parser.add_argument("truth", type=Path, help="its true boxes")
+    parser.add_argument("--folds", type=int, default=6, help="number of trainings")
+    steps = "steps of each training; 0: none, only the networks of --model are measured"
+    parser.add_argument("--steps", type=int, default=4000, help=steps)
+    work = "networks and findings; other steps, folds and settings need another folder"
+    parser.add_argument("--work", type=Path, default=Path("build/unseen"), help=work)
+    parser.add_argument("--base", type=Path, help="network that has seen no fold: the start")
+    parser.add_argument("--model", type=Path, action="append", default=[], help="measured too")
+    parser.add_argument(
+        "--set", action="append", default=[], help="setting, as train.net.width=320"
+    )
+    arguments = parser.parse_args()
+    arguments.work.mkdir(parents=True, exist_ok=True)
+    unseen = Unseen(arguments)
+    found: dict[str, list[Findings]] = defaultdict(list)
+    networks = {str(model): model for model in arguments.model}
+    for fold in range(arguments.folds):
+        if arguments.steps:
+            networks = {OURS: unseen.network(fold)} | networks
+        for name, network in networks.items():
+            found[name].append(unseen.findings(network, fold))
+    results = {}
+    for name, parts in found.items():
+        header = read_header(Session(networks[name]))
+        if header and header.by_class:
+            print(f"{name}: has a calibration by class, so none is fitted to its scores\n")
+            continue
+        given = header.calibration if header else Calibration(slope=1, offset=0)
+        results[name] = summarize(Findings.joined(parts), given)
+        print("\n".join(summary_lines(name, results[name])))
+    for model in arguments.model:
+        seen = trained_on(NetworkSettings(model=str(model)))
+        print(f"{model} has seen: {', '.join(seen) or 'not known'}")
+    write_json(results, str(arguments.work / "results.json"), overwrite=True)
+    if arguments.steps:
+        print("\n".join(video_lines(unseen.clip, networks[OURS], unseen.settings)))
+
+
+if __name__ == "__main__":
+    main()
