@@ -6,8 +6,6 @@ import av
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from vdet.boxes import Box
@@ -108,30 +106,6 @@ def test_planes_look_like_the_same_drawing_in_an_image(name: str, coding: Coding
     changed = (after.blue != before.blue) | (after.red != before.red)
     assert changed.any()
     assert not (changed & ~grown(halved(drawn))).any()
-
-
-class TestFill:
-    @given(
-        box=st.builds(
-            Box, st.integers(-30, 50), st.integers(-30, 40), st.integers(0, 60), st.integers(0, 60)
-        ),
-        width=st.integers(1, 40),
-        height=st.integers(1, 30),
-        coding=st.sampled_from(CODINGS),
-    )
-    def test_of_any_box_changes_its_pixels_and_all_chroma_that_stands_for_one_of_them(
-        self, box: Box, width: int, height: int, coding: Coding
-    ) -> None:
-        before, after = ground(coding, width, height), ground(coding, width, height)
-        fill(after, box, (0, 0, 0))
-        inside = np.zeros((height, width), bool)
-        part = box.clipped(width, height)
-        part.cut(inside)[:] = True
-        np.testing.assert_array_equal(
-            after.luma, np.where(inside, 0 if coding.full_range else 16, before.luma)
-        )
-        for layer, old in ((after.blue, before.blue), (after.red, before.red)):
-            np.testing.assert_array_equal(layer, np.where(halved(inside), 128, old))
 
 
 def test_points_of_a_line_may_lie_far_outside_the_picture() -> None:

@@ -25,11 +25,6 @@ def test_images_name_their_frame_and_annotations_their_track() -> None:
     assert {t["id"]: categories[t["category_id"]] for t in made["tracks"]} == {3: "car", 5: "bus"}
 
 
-def test_a_video_without_boxes_is_read(tmp_path: Path) -> None:
-    saved = read_coco(tmp_path, written(COCO, [frame(0), frame(1)]))
-    assert (saved.labels, saved.known, saved.size) == ((), (0, 1), (1280, 720))
-
-
 def changed(name: str, number: int, **values: object) -> bytes:
     made = document()
     made[name][number] |= values

@@ -5,7 +5,7 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
-from labels.saving import VIDEO, car, frame, read_back, row, written
+from labels.saving import VIDEO, car, frame, read_back, written
 from vdet.errors import TruthError
 from vdet.labels import cvat
 from vdet.labels.cvat import CVAT, read_cvat
@@ -40,9 +40,6 @@ def rows(text: str) -> tuple[Label, ...]:
 
 
 class TestReading:
-    def test_frames_count_from_0_and_boxes_are_corners(self) -> None:
-        assert rows(track(BOX)) == (row("track 3", 1, 3, 10, 20, 30.5, 40, name="car"),)
-
     def test_too_many_boxes_between_key_frames_are_refused(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
@@ -55,14 +52,6 @@ class TestReading:
         for name in ("latin-1", "utf-7", "hex"):
             text = track(BOX, "Überlandbus").replace('"utf-8"', f'"{name}"')
             assert rows(text)[0].name == "Überlandbus"
-
-    def test_an_occluded_box_is_lost(self) -> None:
-        (row,) = rows(track(BOX.replace('occluded="0"', 'occluded="1"')))
-        assert row.state == "predicted"
-
-    def test_the_size_of_the_frames_is_read(self) -> None:
-        assert read_cvat(FILE, document("").encode()).size == (640, 360)
-        assert read_cvat(FILE, b"<annotations/>").size is None
 
     def test_a_box_moves_to_the_next_one_until_one_is_outside(self) -> None:
         keys = "".join(
@@ -99,20 +88,10 @@ class TestWriting:
         (track,) = self.tracks([frame(index, car()) for index in (0, 1, 2)])
         assert self.frames_of(track, keyframe="1") == self.frames_of(track) == [0, 1, 2]
 
-    def test_a_gap_begins_with_a_box_outside(self) -> None:
-        (track,) = self.tracks([frame(0, car()), frame(1), frame(2), frame(3, car())])
-        assert self.frames_of(track, outside="0") == [0, 3]
-        assert self.frames_of(track, outside="1") == [1]
-
     def test_a_part_of_a_video_ends_with_a_box_outside(self) -> None:
         part = SourceVideo("in.mp4", 1280, 720, frames=100)
         (track,) = self.tracks([frame(0, car()), frame(1, car())], part)
         assert self.frames_of(track, outside="1") == [2]
-
-    def test_the_label_is_the_last_class(self) -> None:
-        frames = [frame(0, car(score=0.9)), frame(1, car(score=0.3, class_name="truck"))]
-        (track,) = self.tracks(frames)
-        assert track.attrib["label"] == "truck"
 
     def test_the_task_is_described_as_cvat_exports_it(self) -> None:
         text = written(CVAT, [frame(0, car(), car(2, class_name="bus")), frame(1)])

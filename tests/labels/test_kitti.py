@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from labels.saving import car, frame, row, written
+from labels.saving import car, frame, written
 from vdet.errors import TruthError
 from vdet.labels.kitti import KITTI, read_kitti
 from vdet.labels.label import Label
@@ -18,10 +18,6 @@ def kitti_line(frame: int, track: int, name: str, box: str = "10.5 20 40.5 60") 
 
 def rows(text: str) -> tuple[Label, ...]:
     return read_kitti(FILE, text.encode()).labels
-
-
-def test_frames_count_from_0_and_boxes_are_corners() -> None:
-    assert rows(kitti_line(0, 3, "Car")) == (row(1, 1, 3, 10.5, 20, 30, 40, name="Car"),)
 
 
 def test_what_is_not_known_is_written_as_the_format_says() -> None:

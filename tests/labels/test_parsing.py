@@ -11,13 +11,6 @@ def test_blank_lines_count() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "value"), [("3", 3), (" -2.5 ", -2.5), (".5", 0.5), ("1e3", 1000), ("+7.", 7)]
-)
-def test_a_decimal_number_is_read(text: str, value: float) -> None:
-    assert parse_number(text) == value
-
-
-@pytest.mark.parametrize(
     "text", ["", "nan", "inf", "-inf", "0x1", "1,5", "car", "1 2", "10000001", "-1e300", "9" * 5000]
 )
 def test_what_is_not_a_number_or_beyond_the_limit_is_refused(text: str) -> None:

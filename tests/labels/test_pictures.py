@@ -101,14 +101,6 @@ def test_a_missing_picture_is_named(tmp_path: Path, form: str) -> None:
         read_labelled_pictures(tmp_path)
 
 
-@pytest.mark.parametrize("form", FORMS)
-def test_a_box_without_an_area_is_refused_with_its_place(tmp_path: Path, form: str) -> None:
-    flat = {"a": Labelled(WIDTH, HEIGHT, (Boxed("car", (1, 2, 20, 0)),))}
-    WRITERS[form](tmp_path, flat)
-    with pytest.raises(TruthError, match=r":(\d+|annotations\.0|object 1): the box has no area"):
-        read_labelled_pictures(tmp_path)
-
-
 @pytest.mark.parametrize("form", ["COCO", "YOLO", "VOC"])
 def test_a_picture_of_another_size_than_its_labels_say_is_refused(
     tmp_path: Path, form: str
@@ -228,18 +220,8 @@ class TestCoco:
     @pytest.mark.parametrize(
         ("key", "index", "values", "words"),
         [
-            ("annotations", 1, {"image_id": 7}, "annotations.1: image 7 or category 2 not found"),
-            (
-                "annotations",
-                1,
-                {"category_id": 70},
-                "annotations.1: image 0 or category 70 not found",
-            ),
-            ("annotations", 1, {"bbox": [1, 2, 3]}, "annotations.1.bbox.3: Field required"),
-            ("annotations", 1, {"bbox": [1, 2, 3, "x"]}, "annotations.1.bbox.3: Input should be"),
             ("annotations", 1, {"bbox": [1, 2, 3, 1e9]}, "annotations.1.bbox.3: Input should be"),
             ("annotations", 1, {"iscrowd": 2}, "annotations.1.iscrowd: Input should be"),
-            ("images", 1, {"id": 0}, "an id of images or categories occurs twice"),
             ("images", 1, {"file_name": "a.png"}, "has the picture a.png twice"),
             (
                 "images",
@@ -256,8 +238,6 @@ class TestCoco:
             ("images", 1, {"file_name": "x" * 300}, "xx…: not found, but "),
             ("images", 1, {"file_name": "a\u202eb"}, "a\\u202"),
             ("images", 1, {"width": -3}, "images.1.width: Input should be greater"),
-            ("categories", 1, {"id": 1}, "an id of images or categories occurs twice"),
-            ("categories", 1, {"name": None}, "categories.1.name: Input should be a valid string"),
         ],
     )
     def test_a_wrong_entry_is_refused_by_its_number(
@@ -286,7 +266,6 @@ class TestKitti:
         [
             ("Car 0 0 0 1 2 11 22 1 1 4 2 1 20 -1.6 0.9", "KITTI has 15 columns .* has 16"),
             ("Car 0 0 0 1 2 11", "KITTI has 15 columns .* has 7"),
-            ("Car 0 0 0 1 2 nan 22 1 1 4 2 1 20 -1.6", "'nan' is not a number"),
         ],
     )
     def test_a_wrong_line_is_refused_with_its_number(
@@ -311,12 +290,8 @@ class TestYolo:
         ("line", "words"),
         [
             ("0 0.5 0.5 0.1", "YOLO has 5 columns, .* has 4"),
-            ("0 0.1 0.1 0.2 0.1 0.2 0.2 0.3", "YOLO has 5 columns, .* has 8"),
-            ("5 0.5 0.5 0.1 0.1", r"class 5 has no name; data\.yaml has 5 names"),
-            ("-1 0.5 0.5 0.1 0.1", "class -1 has no name"),
             ("0.5 0.5 0.5 0.1 0.1", "'0.5' is not a whole number"),
             ("0 320 200 40 30", "a number is not between 0 and 1"),
-            ("0 0.5 inf 0.1 0.1", "'inf' is not a number"),
         ],
     )
     def test_a_wrong_line_is_refused_with_its_number(
@@ -326,12 +301,6 @@ class TestYolo:
         path.write_text(f"0 0.5 0.5 0.1 0.1\n{line}\n", encoding="utf-8")
         with pytest.raises(TruthError, match=rf"a\.txt:2: {words}"):
             read_labelled_pictures(tmp_path)
-
-    def test_what_lies_within_a_pixel_outside_is_moved_to_the_side(self, tmp_path: Path) -> None:
-        path = write_yolo(tmp_path, SCENE)
-        path.write_text("0 0.5 0.5 1.000001 1\n0 0 0 1.000001 -0.01 1 1\n", encoding="utf-8")
-        image = read_labelled_pictures(tmp_path).pictures[0]
-        assert image.boxes.tolist() == [[0, 0, WIDTH, HEIGHT]]
 
     def test_a_polygon_is_taken_as_its_box(self, tmp_path: Path) -> None:
         path = write_yolo(tmp_path, SCENE)
@@ -345,10 +314,7 @@ class TestYolo:
         [
             (None, r"needs data\.yaml with the names of the classes"),
             ("names: 3\n", r"data\.yaml: names must be a list"),
-            ("nc: 3\n", r"data\.yaml: names must be a list"),
             ("names: {0: car, 2: bus}\n", r"data\.yaml: names must be a list"),
-            ("names: [car, 1]\n", r"data\.yaml: names must be a list"),
-            ("names: [car\n", r"data\.yaml:\d+:\d+: is not YAML"),
             ("a: &a [x]\nnames: *a\n", "aliases .* are not accepted"),
         ],
     )
@@ -382,14 +348,6 @@ class TestVoc:
         assert image.boxes.tolist() == [[0, 0, 9, 9]]
         assert image.size is None
 
-    def test_parts_of_an_object_are_not_objects(self, tmp_path: Path) -> None:
-        path = write_voc(tmp_path, SCENE)
-        part = f"<part><name>wheel</name>{self.BOX.replace('9', '5')}</part>"
-        text = f"<object><name>bus</name>{part}{self.BOX}{part}</object>"
-        path.write_text(f"<annotation>{text}</annotation>", encoding="utf-8")
-        image = read_labelled_pictures(tmp_path).pictures[0]
-        assert (image.classes, image.boxes.tolist()) == (("bus",), [[0, 0, 9, 9]])
-
     @pytest.mark.parametrize(
         ("text", "words"),
         [
@@ -398,14 +356,6 @@ class TestVoc:
             (
                 "<annotation>\n<object><name>car</name></object></annotation>",
                 "object 1: <object> without its <bndbox/xmin>",
-            ),
-            (
-                f"<annotation>\n<object>{BOX}</object></annotation>",
-                "object 1: <object> without its <name>",
-            ),
-            (
-                f"<annotation><object><name>a</name>{BOX.replace('9', 'x')}</object></annotation>",
-                "object 1: 'x' is not a number",
             ),
             ("<annotation><size><width>3</width></size></annotation>", "without its <height>"),
         ],

@@ -8,6 +8,7 @@ from vdet.labels.reading import read_predictions
 from vdet.labels.video import LabelledVideo
 
 HEADER = "frame,time,id,x,y,width,height,state\n"
+SCORED = "frame,time,id,x,y,width,height,score\n0,0.0,1,10,20,30,40,{}\n"
 TXT = "1,1,11,21,30,40,1,-1,-1,-1\n3,1,12,21,30,40,1,-1,-1,-1\n"
 CSV = f"{HEADER}0,0.0,1,10,20,30,40,detected\n2,0.08,1,11,20,30,40,predicted\n"
 JSONL = "".join(
@@ -27,34 +28,6 @@ def read(folder: Path, suffix: str, content: str) -> LabelledVideo:
     path = folder / f"tracks.{suffix}"
     path.write_text(content, encoding="utf-8", newline="")
     return read_predictions(path)
-
-
-SCORED_CSV = "frame,time,id,x,y,width,height,score,state\n0,0.0,1,10,20,30,40,{score},detected\n"
-SCORED_JSONL = (
-    '{{"frame": 0, "time": 0.0, "tracks": [{{"id": 1, "x": 10, "y": 20, "width": 30, "height": 40, '
-    '"score": {score}, "state": "detected"}}]}}\n'
-)
-SCORED_TXT = "1,1,11,21,30,40,{score},-1,-1,-1\n"
-SCORED = {"txt": SCORED_TXT, "csv": SCORED_CSV, "jsonl": SCORED_JSONL}
-
-
-@pytest.mark.parametrize(
-    ("suffix", "value", "message"),
-    [
-        ("csv", "1.5", ":2: score: Input should be less than or equal to 1"),
-        ("csv", "-0.1", ":2: score: Input should be greater than or equal to 0"),
-        ("csv", "nan", ":2: score: Input should be a finite number"),
-        ("jsonl", "1.5", ":1: score: Input should be less than or equal to 1"),
-        ("jsonl", "-0.1", ":1: score: Input should be greater than or equal to 0"),
-        ("jsonl", "NaN", ":1: score: Input should be a finite number"),
-    ],
-)
-def test_a_score_outside_0_to_1_is_refused_with_its_line(
-    tmp_path: Path, suffix: str, value: str, message: str
-) -> None:
-    with pytest.raises(TruthError) as caught:
-        read(tmp_path, suffix, SCORED[suffix].format(score=value))
-    assert f"tracks.{suffix}{message}" in str(caught.value)
 
 
 @pytest.mark.parametrize(("suffix", "content"), [("txt", ""), ("csv", HEADER)])
@@ -79,7 +52,6 @@ def record(**changes: object) -> str:
         ("txt", TXT + "3,1,50,21,30,40,1,-1,-1,-1\n", ":3: id 1 occurs twice in the same frame"),
         ("txt", "0,1,12,21,30,40,1,-1,-1,-1\n", ":1: the frame comes before the video's first"),
         ("csv", "", ":1: the header must name each of these columns once: frame, time"),
-        ("csv", "frame,time,id,x,y,width\n", ":1: the header must name each of these columns"),
         ("csv", CSV + "3,0.12,1,11,20,30\n", ":4: this line has 6 cells, but the header has 8"),
         (
             "csv",
@@ -88,6 +60,8 @@ def record(**changes: object) -> str:
         ),
         ("csv", CSV + "3,0.12,1,11,20,0,40,detected\n", ":4: the box has no area"),
         ("csv", CSV + '3,"0.12\n', ":4: unexpected end of data"),
+        ("csv", SCORED.format("1.5"), ":2: score: Input should be less than or equal to 1"),
+        ("csv", SCORED.format("nan"), ":2: score: Input should be a finite number"),
         ("jsonl", "", ": is empty; it should have a record for every frame"),
         ("jsonl", JSONL + "{\n", ":5: Invalid JSON"),
         ("jsonl", JSONL + "[" * 100_000 + "\n", ":5: Invalid JSON"),
@@ -95,17 +69,10 @@ def record(**changes: object) -> str:
         ("jsonl", JSONL + record(frame="x"), ":5: frame: Input should be a valid integer"),
         (
             "jsonl",
-            JSONL + record(time=float("nan")),
-            ":5: frame 4 is at nan s; times must",
-        ),
-        (
-            "jsonl",
             JSONL + record(time=0.11),
             ":5: frame 4 is at 0.11 s; times must",
         ),
-        ("jsonl", JSONL + record(time=1e12), ":5: frame 4 is at 1e+12 s; times must"),
         ("csv", CSV + "1,0.09,2,1,1,9,9,detected\n", ":3: frame 2 is at 0.08 s; times must"),
-        ("jsonl", JSONL + record(tracks=[{}]), ":5: id: Input should be a valid integer"),
         ("jsonl", JSONL + record(tracks=None), ":5: tracks: Input should be a valid"),
     ],
 )

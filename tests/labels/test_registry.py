@@ -1,4 +1,3 @@
-import zipfile
 from pathlib import Path
 
 import pytest
@@ -54,14 +53,6 @@ def test_what_other_tools_write_is_refused_in_words_that_fit(
     (tmp_path / name).write_text(content)
     with pytest.raises(TruthError, match=message):
         read_tracks(tmp_path / name)
-
-
-def test_a_zip_file_of_another_format_says_what_to_do(tmp_path: Path) -> None:
-    path = tmp_path / "mot.zip"
-    with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("gt/gt.txt", "1,1,1,1,9,9,1,1,1")
-    with pytest.raises(TruthError, match=r"holds neither .* \(YOLO\); unpack it, and use the file"):
-        read_tracks(path)
 
 
 def test_an_empty_file_of_another_name_is_refused(tmp_path: Path) -> None:

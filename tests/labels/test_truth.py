@@ -40,12 +40,6 @@ def test_a_frame_beyond_the_video_is_refused(tmp_path: Path) -> None:
         truth.check_end(path, 1)
 
 
-@pytest.mark.parametrize("content", ["", " \n\n"])
-def test_an_empty_file_is_refused(tmp_path: Path, content: str) -> None:
-    with pytest.raises(TruthError, match="truth: is empty; truth is a file of MOTChallenge"):
-        read_truth(write(tmp_path, content))
-
-
 @pytest.mark.parametrize("content", [MOT + KITTI, KITTI + MOT, MOT + CVAT])
 def test_mixed_formats_are_refused_where_the_second_begins(tmp_path: Path, content: str) -> None:
     with pytest.raises(TruthError, match=r"truth:3: \w+( tracking)? has .* columns"):

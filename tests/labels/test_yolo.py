@@ -67,11 +67,6 @@ class TestReading:
         (row,) = read_yolo(FILE, archive(labels__f0="1 0.5 0.5 0.1 0.2 0.75 4")).labels
         assert (row.score, row.id) == (0.75, 4)
 
-    def test_hidden_members_are_passed_over(self) -> None:
-        hidden = ("labels/._f0", "__MACOSX/labels/f3", ".trash/labels/f7")
-        data = archive_of({"data.yaml": DATA, "labels/f0": ""} | dict.fromkeys(hidden, "\0"))
-        assert read_yolo(FILE, data).known == [0]
-
     def test_names_from_1_are_warned_of(self, caplog: pytest.LogCaptureFixture) -> None:
         assert read_yolo(FILE, archive(labels__f1="", labels__f2="")).known == [1, 2]
         assert caplog.messages == [

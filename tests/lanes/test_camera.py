@@ -6,8 +6,6 @@ import cv2
 import numpy as np
 import pytest
 import yaml
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 
 from lanes.chessboards import CAMERA
 from vdet.boxes import Box
@@ -63,25 +61,6 @@ def test_lines_bent_by_the_lens_become_straight(undistorter: Undistorter) -> Non
         assert np.abs(rows - row).max() < 1
 
 
-@given(
-    x=st.integers(0, 600),
-    y=st.integers(0, 440),
-    width=st.integers(1, 40),
-    height=st.integers(1, 40),
-)
-def test_an_undistorted_box_holds_all_points_of_the_box(
-    x: int, y: int, width: int, height: int
-) -> None:
-    undistorter = Undistorter(CAMERA, 640, 480)
-    box = undistorter.box(Box.sized(x, y, width, height))
-    columns, rows = np.meshgrid(np.arange(x, x + width), np.arange(y, y + height))
-    points = undistorter.points(np.column_stack([columns.ravel(), rows.ravel()]).astype(float))
-    inside = ((points >= 0) & (points <= (639, 479))).all(axis=1)
-    assert (
-        (points[inside] >= (box.x1 - 1, box.y1 - 1)) & (points[inside] <= (box.x2, box.y2))
-    ).all()
-
-
 def test_a_box_is_clipped_to_the_frame(undistorter: Undistorter) -> None:
     assert undistorter.box(Box.sized(0, 0, 640, 480)) == Box.sized(0, 0, 640, 480)
     assert undistorter.box(Box.sized(0, 0, 12, 12)).area == 0
@@ -109,26 +88,9 @@ def refusal(path: Path, values: object) -> str:
     return str(error.value).replace(str(path), "camera.yaml")
 
 
-small = st.floats(-10, 10)
-
-
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=50)
-@given(
-    focal=st.tuples(st.floats(64, 64000), st.floats(64, 64000)),
-    center=st.tuples(st.floats(0, 639), st.floats(0, 479)),
-    distortion=st.tuples(small, small, small, small, small),
-    rms=st.floats(0, 100),
-)
-def test_every_camera_is_read_with_all_its_digits(
-    path: Path,
-    focal: tuple[float, float],
-    center: tuple[float, float],
-    distortion: tuple[float, float, float, float, float],
-    rms: float,
-) -> None:
-    matrix = ((focal[0], 0.0, center[0]), (0.0, focal[1], center[1]), (0.0, 0.0, 1.0))
-    camera = LensSettings(width=640, height=480, matrix=matrix, distortion=distortion, rms=rms)
-    save_camera(camera, path, overwrite=True)
+def test_a_camera_is_read_with_all_its_digits(path: Path) -> None:
+    camera = CAMERA.model_copy(update={"distortion": (-1 / 3, 0.1, 1e-9, -7 / 11, 0.0)})
+    save_camera(camera, path)
     assert load_settings([path]).camera.lens == camera
 
 
@@ -156,8 +118,3 @@ def test_each_mistake_is_named_with_its_place(
     path: Path, key: str, value: object, message: str
 ) -> None:
     assert message in refusal(path, GOOD | {key: value})
-
-
-def test_all_mistakes_are_named_at_once(path: Path) -> None:
-    assert len(refusal(path, GOOD | {"width": "wide", "rms": -1}).split("\n")) == 2
-    assert "camera.lens.matrix: is required" in refusal(path, {"width": 640})

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from pages.html import Elements
-from vdet.errors import counted
 from vdet.evaluate.mistakes import Tile
 from vdet.evaluate.report import Report
 from vdet.files import write_text
@@ -35,11 +34,6 @@ def test_nothing_is_loaded_from_elsewhere(html: str) -> None:
     ]
     assert "url(" not in html
     assert "@import" not in html
-
-
-def test_one_is_singular() -> None:
-    assert [counted(n, "car") for n in (0, 1, 6000)] == ["0 cars", "1 car", "6,000 cars"]
-    assert counted(2, "bus") == "2 buses"
 
 
 def test_addresses_are_relative_and_quoted() -> None:

@@ -86,11 +86,6 @@ def test_intervals_begin_at_round_times_of_the_clock_and_of_the_video_without_on
     ]  # fmt: skip
 
 
-def test_a_flow_counts_in_the_interval_of_its_first_line() -> None:
-    rows = at(crossing(WEST, EAST)).flows(300)
-    assert [row.count for row in rows if row.destination == "east"] == [1, 0]
-
-
 def test_there_is_a_row_for_each_interval_direction_and_class() -> None:
     cars = named(frames(GOES_EAST), "car")
     truck = named(numbered(frames(TURNS_BACK), 2), "truck")

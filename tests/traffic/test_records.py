@@ -39,13 +39,6 @@ def test_scores_are_those_of_all_frames_and_the_largest_box_is_kept() -> None:
     assert found.largest == boxes[1]
 
 
-def test_the_class_is_that_of_the_last_frame() -> None:
-    names = (None, "car", "car", "truck")
-    tracks = [track(1, PLACE, class_name=name) for name in names]
-    found = [record(*(frame(n, track) for n, track in enumerate(tracks[:n]))) for n in range(1, 5)]
-    assert tuple(item.class_name for item in found) == names
-
-
 class TestTime:
     def test_a_vehicle_that_is_hidden_for_a_while_is_shown_for_less_than_its_span(self) -> None:
         found = record(frame(0, track(1, PLACE)), *map(frame, range(1, 10)), *(
@@ -53,16 +46,6 @@ class TestTime:
         ))  # fmt: skip
         assert (found.first, found.last) == (0, 11 / RATE)
         assert found.seconds == pytest.approx(3 / RATE)
-
-    @pytest.mark.parametrize("rate", [10, 25, 30, 60])
-    def test_seconds_and_length_do_not_depend_on_the_rate(self, rate: int) -> None:
-        frames = [
-            frame(n, track(1, Box.sized(10 + round(40 * n / rate), 100, 40, 30)), rate=rate)
-            for n in range(4 * rate)
-        ]
-        found = record(*frames)
-        assert found.seconds == pytest.approx(4)
-        assert found.length == pytest.approx(160, abs=5)
 
 
 class TestPath:

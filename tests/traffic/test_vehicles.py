@@ -6,11 +6,9 @@ from dataclasses import replace
 import pytest
 
 from traffic.scenes import counts, events, feet, frames, joined, numbered, through, track, ways
-from vdet.boxes import Float64Array
 from vdet.config.places import LineSettings
 from vdet.errors import TruthError
 from vdet.track.track import FrameTracks
-from vdet.traffic import linking
 
 DOWN = through((0, 600, 300), (4, 600, 500))
 
@@ -85,26 +83,6 @@ class TestNewIds:
             y = 320 + 2 * index if index < 38 else rocks if index < 420 else 403 + 3 * (index - 420)
             video += [FrameTracks(index, index / 25, (track((600, y), 1 + index // 25),))]
         assert ways(events(video)) == ["here"]
-
-    def test_each_goes_on_where_it_was_without_a_comparison_of_all_with_all(
-        self, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        asked: list[float] = []
-        onward = linking._Vehicle.onward
-
-        def ask(vehicle: linking._Vehicle, now: float) -> Float64Array:
-            asked.append(now)
-            return onward(vehicle, now)
-
-        monkeypatch.setattr(linking._Vehicle, "onward", ask)
-        there = [(number, 30.0 + 40 * number) for number in range(30)]
-        video = [
-            FrameTracks(n, n / 25, tuple(track((x, y), first + number) for number, x in there))
-            for n, (y, first) in enumerate([(395.0, 0)] * 5 + [(425.0, 100)] * 5)
-        ]
-        line = LineSettings(name="line", start=(0, 418), end=(1280, 418))
-        assert [event.id for event in events(video, line)] == [100 + n for n, _ in there]
-        assert len(asked) == len(there)
 
 
 @pytest.mark.parametrize("times", [(0.0, math.nan), (0.0, math.inf), (1.0, 0.5)])

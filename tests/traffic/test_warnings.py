@@ -16,10 +16,6 @@ def test_a_line_across_the_way_is_fine() -> None:
     assert warnings(DOWN) == ()
 
 
-def test_without_vehicles_there_is_nothing_to_say() -> None:
-    assert warnings() == ()
-
-
 def test_a_line_that_no_path_crosses() -> None:
     assert warnings(through((1, 600, 300), (5, 600, 340))) == (
         "line: no path crosses this line; move it",

@@ -29,12 +29,6 @@ def moved(dx: float, dy: float = 0) -> Float64Array:
     return np.asarray(BOX + np.array([dx, dy, dx, dy]))
 
 
-def test_a_newly_confirmed_vehicle_near_a_lost_one_takes_its_id() -> None:
-    lost, new = vehicle(number=7, unseen=1.2), vehicle(moved(70))
-    assert take_over_ids([lost, new]) == [new]
-    assert new.id == 7
-
-
 def test_one_of_which_only_a_part_was_seen_first_is_found_where_it_is_now() -> None:
     lost, new = vehicle(number=7, unseen=0.4), vehicle(np.array([470.0, 230.0, 500.0, 260.0]))
     take_over_ids([lost, new])
@@ -43,23 +37,6 @@ def test_one_of_which_only_a_part_was_seen_first_is_found_where_it_is_now() -> N
     new.see(Observation(BOX, 1.0), Look(0.04, 0.04, SIZE))
     take_over_ids([lost, new])
     assert new.id == 7
-
-
-def driving(made: Vehicle, down: float) -> Vehicle:
-    """Let a vehicle be seen once more, so far lower."""
-    made.predict(0.04)
-    made.see(
-        Observation(made.state.box + np.array((0, down, 0, down)), 1.0), Look(0.04, 0.04, SIZE)
-    )
-    return made
-
-
-@pytest.mark.parametrize(("down", "number"), [(9, 7), (-9, None)])
-def test_one_that_drives_the_other_way_takes_no_id(down: float, number: int | None) -> None:
-    lost, new = driving(vehicle(number=7), 9), driving(vehicle(moved(60)), down)
-    lost.unseen, new.begin = 0.4, 0.5
-    take_over_ids([lost, new])
-    assert new.id == number
 
 
 @pytest.mark.parametrize(
@@ -123,17 +100,3 @@ def test_an_unconfirmed_track_with_a_higher_score_waits_beside_the_confirmed_one
     unconfirmed.confirmed = True
     assert without(weaker, unconfirmed) == [unconfirmed]
     assert unconfirmed.id == 1
-
-
-def test_an_unconfirmed_track_with_a_lower_score_is_dropped() -> None:
-    stronger, unconfirmed = vehicle(number=1), vehicle(AROUND, score=0.6, confirmed=False)
-    assert without(unconfirmed, stronger) == [stronger]
-
-
-PART = np.array([420.0, 205.0, 470.0, 235.0])
-
-
-def test_a_new_track_inside_a_vehicle_is_a_part_of_it_and_a_shown_one_is_not() -> None:
-    whole = vehicle(number=1)
-    assert without(whole, vehicle(PART, confirmed=False)) == [whole]
-    assert len(without(whole, vehicle(PART, number=2))) == 2

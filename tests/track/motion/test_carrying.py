@@ -5,8 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from boxing import moved_to
-from track.motion.scenes import HEIGHT, WIDTH, detections, ids, inside
+from track.motion.scenes import HEIGHT, WIDTH, detections
 from track.motion.traffic import Noise, random_traffic, track_scores, truth_at
 from vdet.boxes import Box
 from vdet.config.schema import MotionTrackerSettings
@@ -37,14 +36,6 @@ def follow_strided(
     return shown
 
 
-def test_a_vehicle_moves_on_between_the_searched_frames() -> None:
-    places = [inside(moved_to(CAR, 100 + 6 * n, 400)) for n in range(60)]
-    shown = follow_strided(places, 5)
-    for tracks, place in zip(shown[20:], places[20:], strict=True):
-        (track,) = tracks
-        assert (track.id, track.box.iou(place) > 0.9) == (1, True)
-
-
 def test_what_is_not_looked_for_is_not_missed() -> None:
     long_gaps = 2 * round(DEFAULTS.coast_seconds * RATE)
     places: list[Box | None] = [CAR] * (6 * long_gaps)
@@ -54,23 +45,6 @@ def test_what_is_not_looked_for_is_not_missed() -> None:
     assert all(carried[2 * long_gaps :])
     scores = [[tracks[0].score for tracks in shown[-2:] if tracks] for shown in (missed, carried)]
     assert min(scores[1]) > max(scores[0], default=0)
-
-
-@pytest.mark.parametrize("stride", [2, 5])
-def test_a_lost_vehicle_is_shown_for_about_the_same_time(stride: int) -> None:
-    shown = follow_strided([*[CAR] * 50, *[None] * 50], stride)
-    seconds = sum(bool(tracks) for tracks in shown[50:]) / RATE
-    assert (
-        DEFAULTS.coast_seconds - stride / RATE <= seconds <= DEFAULTS.coast_seconds + stride / RATE
-    )
-
-
-@pytest.mark.parametrize("stride", [2, 5])
-def test_a_lost_vehicle_keeps_its_id_for_about_the_same_time(stride: int) -> None:
-    for missed, expected in ((0.6, {1}), (1.6, {2})):
-        gap: list[Box | None] = [None] * round(missed * RATE)
-        shown = follow_strided([*[CAR] * 50, *gap, *[CAR] * 50], stride)
-        assert ids(shown[-1:]) == expected
 
 
 def scores_at(stride: int, seed: int) -> Scores:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from boxing import moved_to
-from track.motion.scenes import WIDTH, detections, follow, id_at, ids, inside
+from track.motion.scenes import WIDTH, detections, follow, ids, inside
 from track.motion.traffic import (
     PERFECT,
     Noise,
@@ -53,16 +53,6 @@ def test_a_lost_vehicle_keeps_its_id_for_the_same_time(rate: int) -> None:
 
 
 # Steps
-
-
-@pytest.mark.parametrize("dx", [-80, 80])
-def test_a_new_vehicle_that_moves_most_of_its_width_between_frames_is_one(dx: int) -> None:
-    places = [moved_to(CAR, 640 + n * dx, 400) for n in range(-7, 7)]
-    shown = follow(([place] for place in places), rate=5)
-    assert ids(shown) == {1}
-    assert [id_at(tracks, place) for tracks, place in zip(shown[3:], places[3:], strict=True)] == [
-        1
-    ] * 11
 
 
 def test_frames_may_come_at_any_times() -> None:

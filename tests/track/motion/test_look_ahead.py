@@ -46,10 +46,6 @@ def test_a_vehicle_is_shown_from_its_first_weak_detection_to_its_last() -> None:
     assert states(shown) == [""] * 5 + ["detected"] * 33 + [""] * 30
 
 
-def test_what_is_never_sure_is_not_shown() -> None:
-    assert ids(shown_later([*[[]] * 5, [(CAR, 0.9)], *[[]] * 40])) == set()
-
-
 def test_between_two_searches_a_vehicle_is_on_its_way_from_one_to_the_other() -> None:
     """It brakes: what came before does not tell where it is."""
     places = [moved_to(CAR, round(100 + 12 * n - 0.1 * n * n), 400) for n in range(40)]
@@ -77,11 +73,6 @@ def test_a_vehicle_that_comes_in_at_the_side_is_shown_before_its_first_detection
         assert tracks[0].box.iou(inside(place)) > 0.7
 
 
-def test_a_vehicle_that_appears_inside_the_frame_is_not_shown_before() -> None:
-    shown = shown_later([*[[]] * 6, *[[place] for place in moving(CAR, dx=-8, frames=40)]])
-    assert states(shown)[:7] == [""] * 6 + ["detected"]
-
-
 def test_one_that_has_left_the_frame_is_shown_where_it_was() -> None:
     places = moving(moved_to(CAR, WIDTH - 200, 400), dx=10, frames=40)
     clip = [[inside(place)] if place.x1 < WIDTH - 10 else [] for place in places]
@@ -100,11 +91,3 @@ def test_boxes_tremble_less_than_detections() -> None:
     change = [np.abs(np.diff(sides, 2)).mean() for sides in (drawn, lefts(noisy))]
     assert change[0] < 0.15 * change[1]
     assert np.abs(np.subtract(drawn, lefts(places))).mean() < 2.5
-
-
-def test_without_looking_ahead_the_same_tracker_shows_what_it_knows_now() -> None:
-    tracker = MotionTracker(DEFAULTS, WIDTH, HEIGHT)
-    for number in range(20):
-        now = tracker.update(detections([CAR] if number < 18 else []), number / RATE)
-        assert now == tracker.at(number / RATE)
-    assert [track.state for track in now] == ["predicted"]

@@ -1,7 +1,5 @@
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from vdet.boxes import Float64Array
 from vdet.track.motion.state import MotionState
@@ -35,21 +33,6 @@ def after(boxes: list[Float64Array], noise: float = 0.1) -> MotionState:
 def test_a_steady_motion_is_predicted_without_lag() -> None:
     state = after([offset(3 * n, n, 0, 0) for n in range(60)])
     assert state.box == pytest.approx(offset(180, 60, 0, 0), abs=0.1)
-
-
-@pytest.mark.parametrize(("noise", "taken"), [(1e-6, 1.0), (0.1, 0.5), (1e3, 0.0)])
-def test_a_measurement_counts_as_much_as_it_is_surer_than_the_state(
-    noise: float, taken: float
-) -> None:
-    state = still(noise=0.1).corrected(offset(8, 0, 0, 0), noise, LARGE)
-    assert state.box[0] == pytest.approx(BOX[0] + 8 * taken, abs=1e-4)
-
-
-@given(scale=st.floats(0.1, 10), x=st.floats(50, 500), y=st.floats(50, 500))
-def test_near_and_far_vehicles_are_followed_alike(scale: float, x: float, y: float) -> None:
-    boxes = [offset(4 * n + n % 3, n % 2, n, n % 4) for n in range(8)]
-    moved = [box * scale + [x, y, x, y] for box in boxes]
-    assert after(moved).box == pytest.approx(after(boxes).box * scale + [x, y, x, y], abs=1e-6)
 
 
 # Boxes that the frame's sides cut off
@@ -87,15 +70,6 @@ def test_an_entering_vehicle_is_as_wide_as_what_is_seen_of_it() -> None:
     assert box == pytest.approx(sized(940, 200, 60, 50), abs=0.01)
 
 
-def test_entering_gives_the_velocity_of_the_inner_edge_and_no_growth() -> None:
-    state = expecting(960, 200, 40, 50)
-    for left in range(955, 900, -5):
-        box = sized(left, 200, 1000 - left, 50)
-        state = state.predicted(FRAME).corrected(box, 0.1, SIZE)
-    assert state.mean[0, 1] == pytest.approx(-5 / FRAME, abs=0.5 / FRAME)
-    assert state.mean[2, 1] == 0
-
-
 @pytest.mark.parametrize("speed", [-1.0, 1.0])
 def test_a_vehicle_that_drives_evenly_along_the_road_is_predicted_without_lag(speed: float) -> None:
     """Its place and size change by 1 / distance: in the picture it slows down, or speeds up."""
@@ -107,13 +81,6 @@ def test_a_vehicle_that_drives_evenly_along_the_road_is_predicted_without_lag(sp
 
     state = after([seen(number) for number in range(38)])
     assert state.box == pytest.approx(seen(38), abs=0.05 * (state.box[2] - state.box[0]))
-
-
-def test_what_comes_out_from_behind_another_vehicle_does_not_run_ahead_of_its_box() -> None:
-    """Its box grows faster than it comes nearer, and moves evenly."""
-    seen = [sized(400 - 5 * n, 300 - 0.6 * n, 30 * 1.08**n, 22 * 1.06**n) for n in range(16)]
-    state = after(seen[:-1])
-    assert state.box == pytest.approx(seen[-1], abs=0.12 * (state.box[2] - state.box[0]))
 
 
 @pytest.mark.parametrize("seconds", [-0.3, 0.3])

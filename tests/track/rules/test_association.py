@@ -7,7 +7,7 @@ from seed import SEED_TRACKER
 from textured_road import textured_road
 from vdet.boxes import Box, Image
 from vdet.config.tracker import RulesTrackerSettings
-from vdet.track.rules.association import Association, combine
+from vdet.track.rules.association import Association
 from vdet.track.rules.car import Car, Region
 
 SETTINGS = SEED_TRACKER
@@ -52,12 +52,6 @@ def test_a_region_belongs_to_the_car_whose_centroid_it_contains() -> None:
     result = associate(cars, [over_right, over_left])
     assert boxes_of(result) == {cars[1]: over_right, cars[0]: over_left}
     assert result.cars == cars
-
-
-def test_a_region_that_contains_a_car_is_not_lost_to_a_neighbour() -> None:
-    inside, beside = a_car(RIGHT, road()), a_car(LEFT, road())
-    result = associate([beside, inside], [Box.sized(205, 200, 80, 80), RIGHT])
-    assert boxes_of(result) == {inside: RIGHT, beside: Box.sized(205, 200, 80, 80)}
 
 
 # Rule 3
@@ -237,12 +231,6 @@ def test_regions_of_a_cars_size_but_too_wide_make_two_cars_shown_at_once(
         assert new.is_shown
 
 
-def test_of_the_two_cars_the_nearer_one_keeps_the_id() -> None:
-    car = a_car(HIDING, road(), shown_as=4)
-    result = associate([car], [ONE, OTHER])
-    assert {place.box: new.id for new, place in result.places.items()} == {OTHER: 4, ONE: None}
-
-
 # Rule 11
 
 
@@ -263,13 +251,3 @@ def test_a_region_beside_a_car_that_has_its_own_is_a_new_car() -> None:
     result = associate([car], [LEFT, beside])
     assert result.places[car].box == LEFT
     assert [boxes_of(result)[new] for new in result.cars if new is not car] == [beside]
-
-
-# Sizes of rules 4 and 7 to 10
-
-
-def test_combined_regions_have_one_box_the_common_centroid_and_the_higher_peak() -> None:
-    both = combine(
-        region(Box.sized(0, 0, 60, 60), peak=2), region(Box.sized(100, 0, 20, 60), peak=5)
-    )
-    assert both == Region(Box.sized(0, 0, 120, 60), (50, 30), 5)

@@ -13,15 +13,6 @@ FRAME = np.random.default_rng(0).integers(0, 256, (240, 320, 3), dtype=np.uint8)
 SEEN = Region(BOX, (140, 90), 2.0)
 
 
-def test_box_and_centroid_are_averages_over_the_last_ten_detections() -> None:
-    car = Car(SEED_TRACKER)
-    car.see(SEEN, FRAME)
-    for i in range(10):
-        car.see(Region(Box.sized(10 * i, 20 + i, 60 + 2 * i, 51), (10.0 * i, 5.0), 2.0), FRAME)
-    assert car.box == Box.sized(45, 24, 69, 51)
-    assert car.centroid == (45.0, 5.0)
-
-
 def test_matches_in_a_row_are_ended_by_a_region_and_not_by_a_miss() -> None:
     car = Car(SEED_TRACKER)
     car.see(SEEN, FRAME, by_match=True)
@@ -84,11 +75,6 @@ def test_the_distance_is_the_longest_way_and_a_straight_line(
 ) -> None:
     found = search(frame_with(texture(), x, 120), match_distance=distance)
     assert found == (Box.sized(x, 120, 60, 40) if is_found else None)
-
-
-def test_near_the_border_only_the_frame_is_searched() -> None:
-    found = search(frame_with(texture(), 0, 0), near=moved_to(PLACE, 20, 10))
-    assert found == Box.sized(0, 0, 60, 40)
 
 
 @pytest.mark.parametrize("color", [(0, 0, 0), (90, 90, 90), (10, 200, 90)])

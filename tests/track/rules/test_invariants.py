@@ -74,18 +74,6 @@ def test_ids_are_given_without_gaps_from_1_on(clip: Clip) -> None:
 
 @settings(deadline=None)
 @given(clips)
-def test_the_id_of_a_deleted_car_never_comes_back(clip: Clip) -> None:
-    # Every detection is shown, so a car that was not shown for this long has been deleted.
-    tracker = EAGER.model_copy(update={"detections_needed": 1, "max_misses": 2})
-    last_shown: dict[int, int] = {}
-    for index, tracks in enumerate(run(clip, tracker)):
-        for track in tracks:
-            assert index - last_shown.get(track.id, index) <= tracker.max_misses
-            last_shown[track.id] = index
-
-
-@settings(deadline=None)
-@given(clips)
 def test_boxes_lie_in_the_frame_and_are_not_too_small(clip: Clip) -> None:
     for tracks in run(clip, EAGER):
         for track in tracks:

@@ -52,14 +52,6 @@ def test_regions_that_are_too_small_are_ignored() -> None:
     assert len(see(RulesTracker(settings), Box.sized(100, 200, 50, 50))[0]) == 1
 
 
-def kept(*boxes: Box, **changes: object) -> list[Box]:
-    return [r.box for r in large_enough(detections(boxes), 640, 360, tracker_but(**changes))]
-
-
-def test_a_region_outside_the_frame_is_ignored_whatever_the_setting() -> None:
-    assert kept(Box.sized(700, 10, 60, 60), min_region=0) == []
-
-
 def test_a_region_has_the_strength_of_its_detection_as_its_peak() -> None:
     found = Boxes([[10, 20, 90.4, 99.6]], [0.5], data={"centroid": [[44, 55]], "strength": [3.5]})
     (region,) = large_enough(found, 640, 360, SEED_TRACKER)
@@ -89,20 +81,6 @@ def test_a_shown_car_left_inside_another_is_absorbed_which_is_shown_at_once() ->
     see_side_by_side(cars, frames=2)
     (track,) = hide_sedan_behind_bus(cars)
     assert track.box == BOTH
-
-
-def test_the_absorbing_car_keeps_its_own_id_if_it_was_shown_and_the_other_ends() -> None:
-    cars = RulesTracker(tracker_but(history=1, detections_needed=1))
-    see_side_by_side(cars, frames=8)
-    assert ids(hide_sedan_behind_bus(cars)) == [2]
-    assert update(cars, road(SEDAN)) == []  # its image is not searched either
-
-
-def test_a_car_beside_the_other_ones_rectangle_is_not_absorbed() -> None:
-    cars = RulesTracker(ONE_PLACE)
-    show(cars, SEDAN)
-    see_side_by_side(cars, frames=2)
-    assert update(cars, road(None, BUS), BUS) == []
 
 
 # Rule 13
@@ -202,16 +180,6 @@ def test_the_score_of_a_track_is_the_average_of_its_last_ten_detections() -> Non
         cars.update(detections([SEDAN], score=0.05 * n), 0.0, Picture(GREY)) for n in range(12)
     ]
     assert [track.score for track in shown[-1]] == pytest.approx([0.05 * 6.5])
-
-
-def test_a_track_has_the_most_frequent_class_of_its_detections() -> None:
-    cars = RulesTracker(tracker_but(detections_needed=1))
-    corners = [[SEDAN.x1, SEDAN.y1, SEDAN.x2, SEDAN.y2]]
-    for class_id in (0, 1, 1):
-        found = Boxes(corners, [0.9], classes=[class_id], names=("car", "van"))
-        (track,) = cars.update(found, 0.0, Picture(GREY))
-    assert track.class_name == "van"
-    assert see(RulesTracker(tracker_but(detections_needed=1)), SEDAN)[0][0].class_name is None
 
 
 def test_without_the_frame_it_says_that_it_needs_it() -> None:
