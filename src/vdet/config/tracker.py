@@ -28,8 +28,10 @@ class MotionTrackerSettings(TrackerSettings):
     of the original system, which count frames.
     """
     look_ahead: LookAhead = 0.6
-    min_size: Share = 0.02
-    """Minimum width of a vehicle that is shown, as a fraction of the frame's."""
+    min_size: Share = 0.018
+    """Minimum size of a vehicle that is shown: √(width × height), as a fraction of the frame's
+    width. A car seen from behind is then 2 % of the frame wide.
+    """
     min_score: Share = 0.4
     """Minimum mean score of the latest detections of a vehicle that is shown."""
     confirm_seconds: Seconds = 0.1

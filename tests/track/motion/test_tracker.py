@@ -32,8 +32,7 @@ CARRIED = frames(DEFAULTS.coast_seconds)
 
 
 def test_evidence_weaker_than_the_leak_never_adds_up() -> None:
-    faint = (CAR, DEFAULTS.decay)
-    assert ids(follow([[faint]] * 300)) == set()
+    assert ids(follow([[(CAR, DEFAULTS.decay)]] * 300)) == set()
 
 
 def test_flicker_is_never_shown() -> None:
@@ -49,13 +48,14 @@ def test_a_vehicle_that_is_hardly_likely_is_not_shown() -> None:
     assert ids(follow([[(CAR, DEFAULTS.min_score)]] * 100)) == {1}
 
 
-def test_a_vehicle_is_shown_once_it_is_wide_enough() -> None:
+@pytest.mark.parametrize(("width", "height"), [(12, 6), (5, 14)], ids=["car", "motorcycle"])
+def test_a_vehicle_is_shown_once_it_is_large_enough(width: int, height: int) -> None:
     minimum = DEFAULTS.min_size * WIDTH
-    places = [Box.sized(600 - n // 2, 400, 8 + n, 6 + n) for n in range(60)]
+    places = [Box.sized(600, 400, width * n / 20, height * n / 20) for n in range(20, 120)]
     shown = follow([place] for place in places)
     assert ids(shown) == {1}
-    assert all(track.box.width >= minimum - 1 for tracks in shown for track in tracks)
-    assert places[first_shown(shown)].width == pytest.approx(minimum, abs=2)
+    assert all(track.box.area**0.5 >= minimum for tracks in shown for track in tracks)
+    assert places[first_shown(shown)].area ** 0.5 == pytest.approx(minimum, abs=2)
 
 
 # Place
@@ -99,12 +99,6 @@ def test_weak_detections_do_not_re_identify_a_lost_vehicle() -> None:
     assert [id_at(tracks, CAR) for tracks in shown[-5:]] == [1] * 5
 
 
-def test_a_vehicle_with_only_faint_detections_is_not_shown_for_ever() -> None:
-    shown = follow([*[[CAR]] * 200, *[[(CAR, FAINT)]] * 100])
-    assert len(shown[205]) == 1
-    assert shown[-1] == []
-
-
 # One vehicle behind another
 
 VAN = Box.sized(100, 390, 180, 130)
@@ -125,19 +119,6 @@ def test_a_vehicle_hidden_by_a_nearer_one_is_not_shown_and_keeps_its_id() -> Non
         assert id_at(tracks, vans[n]) == van_id
         assert any(hidden[n - 3 : n + 1]) or id_at(tracks, CAR) == car  # it must be sure again
         assert not hidden[n] or [track.id for track in tracks] == [van_id]
-
-
-def test_a_vehicle_that_comes_out_displaced_is_the_same_one() -> None:
-    hiding = moved_to(VAN, 370, 390)
-    beside = Box.sized(530, 400, 110, 75)  # it went on behind the van
-    clip = [
-        *[[CAR, van] for van in moving(VAN, dx=6, frames=46)],
-        *[[hiding]] * 40,
-        *[[hiding, beside]] * 12,
-    ]
-    shown = follow(clip)
-    assert id_at(shown[-1], beside) == id_at(shown[10], CAR)
-    assert len(ids(shown)) == 2
 
 
 def test_weak_detections_on_the_nearer_vehicle_do_not_move_the_hidden_one() -> None:
@@ -179,18 +160,6 @@ def test_a_hidden_vehicle_is_forgotten_after_some_seconds() -> None:
     ]
     shown = follow(clip)
     assert id_at(shown[-1], CAR) not in ids(shown[:20])
-
-
-# The frame's sides
-
-
-def test_a_vehicle_that_comes_in_at_the_side_is_shown_as_far_as_it_is_seen() -> None:
-    places = moving(Box.sized(WIDTH - 40, 400, 260, 160), dx=-6, frames=70)
-    shown = follow([inside(place)] for place in places)
-    assert ids(shown) == {1}
-    assert first_shown(shown) < 5
-    for place, tracks in list(zip(places, shown, strict=True))[5:]:
-        assert tracks[0].box.iou(inside(place)) > 0.9
 
 
 # One vehicle, one track

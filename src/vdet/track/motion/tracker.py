@@ -22,6 +22,9 @@ FIRST_STEP = 0.04
 _STAYS = 0.75
 """Fraction of the minimum score from which on a vehicle that was shown before is shown again."""
 
+_CAR_HEIGHT = 0.8
+"""Height of a car from behind as a fraction of its width."""
+
 _OVERLAP = 0.3
 """Minimum intersection over union of a detection with the expected box of its vehicle."""
 
@@ -99,7 +102,7 @@ class MotionTracker:
         for (vehicle, place), box, is_hidden in zip(placed, boxes, hidden, strict=True):
             seen_score, score = vehicle.history.scores(time)
             is_guess = place.bridges or place.state == "predicted"
-            if self._is_clear(vehicle, box, seen_score) and not (is_hidden and is_guess):
+            if self._is_clear(vehicle, place, box, seen_score) and not (is_hidden and is_guess):
                 shown.append((vehicle, place, box, score))
         shown_boxes = np.reshape([box for _, _, box, _ in shown], (-1, 4))
         nested = are_nested(shown_boxes, [score for *_, score in shown])
@@ -174,14 +177,19 @@ class MotionTracker:
         values[np.ix_(self._hidden(), parts)] = 0  # parts of the vehicle that hides it
         return pair(values**2, [present, new])
 
-    def _is_clear(self, vehicle: Vehicle, box: Float64Array, score: float) -> bool:
-        """Return whether a vehicle is wide enough and likely enough to be shown.
+    def _is_clear(self, vehicle: Vehicle, place: Place, box: Float64Array, score: float) -> bool:
+        """Return whether a vehicle is large enough and likely enough to be shown.
 
-        One that was shown before may be a little less likely.
+        One that was shown before may be a little less likely. Of one that the left or right side of
+        the frame cuts off, the visible part is taken for a car as wide: a strip is not large.
         """
-        is_wide = bool(box[2] - box[0] >= self._settings.min_size * self._size[0])
+        left, _, right, _ = whole_box(place.mean)
+        width, height = box[2:] - box[:2]
+        if left < 0 or right > self._size[0]:
+            height = min(height, _CAR_HEIGHT * width)
+        is_large = width * height >= (self._settings.min_size * self._size[0]) ** 2
         minimum = self._settings.min_score * (1.0 if vehicle.id is None else _STAYS)
-        return is_wide and score >= minimum
+        return bool(is_large) and score >= minimum
 
     def _track(self, vehicle: Vehicle, place: Place, box: Float64Array, score: float) -> Track:
         vehicle.id = next(self._ids) if vehicle.id is None else vehicle.id
