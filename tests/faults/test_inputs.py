@@ -84,6 +84,13 @@ def test_a_fifo_in_a_set_of_labelled_pictures_is_not_waited_for(tmp_path: Path) 
         list(read_labelled_pictures(tmp_path).pictures)
 
 
+def test_a_fifo_where_a_coco_file_may_be_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "labels.json")
+    for path in (tmp_path, tmp_path / "labels.json"):
+        with pytest.raises(VdetError, match="labelled pictures not found"):
+            read_labelled_pictures(path)
+
+
 class Pipe:
     """A named pipe through which `content` comes, and then neither more data nor an end."""
 

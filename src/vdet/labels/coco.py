@@ -20,7 +20,7 @@ from pydantic.dataclasses import dataclass
 
 from vdet.errors import TruthError, printable
 from vdet.files import record_input
-from vdet.labels.documents import json_entries
+from vdet.labels.documents import json_values
 from vdet.labels.formats import Format, SourceVideo, last_classes
 from vdet.labels.label import MAX_LABELS, NO_ID, Label, Size, from_size, line_error
 from vdet.labels.parsing import Index, Number, Times, checked_times, first_mistake
@@ -136,7 +136,8 @@ class _Document:
 def _read(path: Path, file: BinaryIO) -> _Document:
     """Return the images of a document with their labels. Raises `TruthError`."""
     found: dict[str, list[Any]] = {name: [] for name in (*_LISTS, _UNLABELLED)}
-    for name, values in json_entries(path, file, *found):
+    for place, values in json_values(path, file, *(f"{name}.item" for name in found)):
+        name = place.removesuffix(".item")
         entries = found[name]
         if len(entries) == MAX_LABELS:
             raise TruthError(f"{path}: has more than {MAX_LABELS:,} {name}; cut it into parts")

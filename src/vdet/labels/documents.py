@@ -1,10 +1,11 @@
-"""JSON and XML documents: read as a whole if they take little memory, or lists entry by entry."""
+"""JSON and XML documents: JSON is read value by value, XML as a whole if it takes little memory."""
 
-import json
+import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import IO, Any
 from xml.etree import ElementTree as ET
 from xml.parsers import expat
 
@@ -15,81 +16,73 @@ from vdet.labels.label import Size, line_error
 from vdet.labels.parsing import parse_whole
 
 MAX_MEMORY = 700_000_000
-"""Bytes that the values of a document may take, estimated, beside its text."""
+"""Bytes that the elements of an XML document may take, estimated, beside its text."""
+
+MAX_NAMES = 1000
+"""Largest number of different names in it, each of which takes ten times its text."""
 
 MAX_ENTRY = 16_000_000
-"""Largest number of bytes of an entry of a list that is read entry by entry."""
+"""Largest number of bytes between two values that are read from a JSON document."""
 
 _CHUNK = 8192  # bytes
 _NESTING = {b"[": 1, b"{": 1, b"]": -1, b"}": -1}
 _MAX_DEPTH = 1000
 
-MAX_NAMES = 1000
-"""Largest number of different names in a document, each of which takes ten times its text."""
-
-_JSON_SIZES = {b"{": 240, b"[": 64, b",": 64, b'\\"': 250}
-"""Bytes that an object, a list, or a value in one take; a quote in a key would hide it."""
-_JSON_NAME = re.compile(rb'"([^"]{0,1000}+)"\s*+:')
-_XML_SIZES = {b"<": 100, b"=": 130}
+_SIZES = {b"<": 100, b"=": 130}
 """Bytes that an element takes, half of them at its end, and an attribute."""
-_XML_NAME = re.compile(rb"<([^\s/<>]{1,1000}+)|(?<=\s)([^\s\"'=<>]{1,1000}+)\s*+=")
+_NAME = re.compile(rb"<([^\s/<>]{1,1000}+)|(?<=\s)([^\s\"'=<>]{1,1000}+)\s*+=")
 
 
-def read_json(path: Path, data: bytes) -> Any:
-    """Return the values of a JSON document.
+def json_values(
+    path: Path, file: IO[bytes], *places: str, most: float = math.inf
+) -> Iterator[tuple[str, Any]]:
+    """Yield the values at some places of a JSON document, each with its place.
 
-    Raises
-    ------
-    TruthError
-        It is not JSON, takes more than `MAX_MEMORY`, or has more than `MAX_NAMES` different keys.
-    """
-    _check_memory(path, data, _JSON_SIZES, _JSON_NAME)
-    try:
-        return json.loads(data.decode("utf-8-sig"))
-    except (ValueError, RecursionError) as error:
-        raise TruthError(f"{path}: is not JSON: {error}") from error
-
-
-def json_entries(path: Path, file: BinaryIO, *lists: str) -> Iterator[tuple[str, Any]]:
-    """Yield the entries of some lists in the object that a JSON document is, with their list.
-
-    The lists are named as in `info.names`. Memory holds a few entries at a time.
+    Places are those of ijson: `metadata.video` is one value, `images.item` each entry of a list.
+    Memory holds a few values at a time.
 
     Raises
     ------
     TruthError
-        It is not JSON, is nested too deeply, or has an entry of more than `MAX_ENTRY` bytes.
+        It is not JSON, is nested too deeply, has more than `MAX_ENTRY` bytes without such a value,
+        or more than `most` in all.
     """
-    found = {name: ijson.sendable_list() for name in lists}
-    readers = [
-        ijson.items_coro(entries, f"{name}.item", use_float=True) for name, entries in found.items()
-    ]
-    size = depth = 0
-    try:
-        while chunk := file.read(_CHUNK):
-            size += len(chunk)
-            depth += sum(chunk.count(part) * step for part, step in _NESTING.items())
-            _check_entry(path, size, depth)
-            for reader in readers:
+    found = {place: ijson.sendable_list() for place in places}
+    readers = {
+        place: ijson.items_coro(values, place, use_float=True) for place, values in found.items()
+    }
+    total = size = depth = 0
+    while chunk := file.read(_CHUNK):
+        total += len(chunk)
+        size += len(chunk)
+        depth += sum(chunk.count(part) * step for part, step in _NESTING.items())
+        if total > most:
+            raise TruthError(f"{path}: is larger than {most:,} bytes; cut it into parts")
+        if depth > _MAX_DEPTH:  # each level takes the memory of all above it
+            raise TruthError(f"{path}: is not JSON: nested too deeply")
+        if size > MAX_ENTRY:
+            raise TruthError(f"{path}: has an entry of more than {MAX_ENTRY:,} bytes")
+        with _json_errors(path):
+            for reader in readers.values():
                 reader.send(chunk)
-            for name, entries in found.items():
-                size = 0 if entries else size
-                yield from ((name, entry) for entry in entries)
-                entries.clear()
-        for reader in readers:
+        for place, values in found.items():
+            size = 0 if values else size
+            yield from ((place, value) for value in values)
+            if values and not place.endswith(".item"):
+                del readers[place]  # each takes the time of a whole one
+            values.clear()
+    with _json_errors(path):
+        for reader in readers.values():
             reader.close()
-    except TruthError:
-        raise
+
+
+@contextmanager
+def _json_errors(path: Path) -> Iterator[None]:
+    try:
+        yield
     except (ijson.JSONError, ValueError) as error:
         what = printable(str(error).partition("\n")[0].strip())
         raise TruthError(f"{path}: is not JSON: {what}") from error
-
-
-def _check_entry(path: Path, size: int, depth: int) -> None:
-    if depth > _MAX_DEPTH:  # each level takes the memory of all above it
-        raise TruthError(f"{path}: is not JSON: nested too deeply")
-    if size > MAX_ENTRY:
-        raise TruthError(f"{path}: has an entry of more than {MAX_ENTRY:,} bytes")
 
 
 def read_xml(path: Path, data: bytes, root: str) -> ET.Element:
@@ -106,7 +99,7 @@ def read_xml(path: Path, data: bytes, root: str) -> ET.Element:
     if b"<!DOCTYPE" in data:
         what = "the XML declares a document type, which labels do not need; remove it"
         raise TruthError(f"{path}: {what}")
-    _check_memory(path, data, _XML_SIZES, _XML_NAME)
+    _check_memory(path, data)
     try:
         document = ET.fromstring(data, ET.XMLParser(encoding="utf-8"))
     except ET.ParseError as error:
@@ -117,15 +110,13 @@ def read_xml(path: Path, data: bytes, root: str) -> ET.Element:
     return document
 
 
-def _check_memory(
-    path: Path, data: bytes, sizes: Mapping[bytes, int], name: re.Pattern[bytes]
-) -> None:
-    """Refuse a document whose values would take too much memory, before it is parsed."""
+def _check_memory(path: Path, data: bytes) -> None:
+    """Refuse a document whose elements would take too much memory, before it is parsed."""
     text = 0 if data.isascii() else 4 * len(data)  # one wide character makes all of them wide
-    if text + sum(data.count(part) * size for part, size in sizes.items()) > MAX_MEMORY:
+    if text + sum(data.count(part) * size for part, size in _SIZES.items()) > MAX_MEMORY:
         raise TruthError(f"{path}: would take more than 1 GB of memory; cut it into parts")
     names: set[bytes] = set()
-    for found in name.finditer(data):
+    for found in _NAME.finditer(data):
         names.add(found[found.lastindex or 0])
         if len(names) > MAX_NAMES:
             raise TruthError(f"{path}: has more than {MAX_NAMES:,} different names of values")

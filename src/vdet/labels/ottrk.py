@@ -6,17 +6,17 @@ Frames count from 1, pixels from 0. Times are seconds since 1970.
 import bz2
 import io
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime, timedelta
 from itertools import count
 from pathlib import Path, PurePath
 from typing import Any, BinaryIO
 
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, Field, ValidationError
 
 from vdet.errors import TruthError
 from vdet.labels import parsing
-from vdet.labels.documents import read_json
+from vdet.labels.documents import json_values
 from vdet.labels.formats import Format, SourceVideo, last_classes
 from vdet.labels.label import limited
 from vdet.labels.parsing import Index, Row, Times, checked_times, first_mistake
@@ -86,6 +86,7 @@ class _Video(BaseModel):
 
 
 _BEFORE_STATE = ("frame", "occurrence", "track-id", "x", "y", "w", "h", "confidence")
+_PLACES = _HEAD, _BOX = "metadata.video", "data.detections.item"
 
 
 def read_ottrk(path: Path, data: bytes) -> SavedTracks:
@@ -96,30 +97,34 @@ def read_ottrk(path: Path, data: bytes) -> SavedTracks:
     TruthError
         The file is damaged, of another form or version, or expands to more than `MAX_BYTES`.
     """
+    what = f"{path}: is not OTVision's tracks with detections of version {_DETECTIONS}"
+    videos: list[_Video] = []
     moments: Times = {}
+
+    def rows() -> Iterator[Row]:
+        file, number = bz2.BZ2File(io.BytesIO(data)), count()
+        for place, value in json_values(path, file, *_PLACES, most=parsing.MAX_BYTES):
+            if place == _HEAD:
+                videos.append(_Video.model_validate(value))
+            else:
+                yield f"{_BOX.removesuffix('item')}{next(number)}", _row(value)
+
     try:
-        text = bz2.BZ2File(io.BytesIO(data)).read(parsing.MAX_BYTES + 1)
-        if len(text) > parsing.MAX_BYTES:
-            raise ValueError(f"it is larger than {parsing.MAX_BYTES:,} bytes")
-        document = read_json(path, text)
-        video = _Video.model_validate(document["metadata"]["video"])
-        rows = map(_row, count(), document["data"]["detections"])
-        labels = limited(path, parsing.row_labels(path, rows, moments, first_frame=1))
-    except TruthError:
-        raise
-    except (EOFError, OSError, LookupError, TypeError, AttributeError, ValueError) as error:
-        what = f"is not OTVision's tracks with detections of version {_DETECTIONS}, or is damaged"
-        raise TruthError(f"{path}: {what}: {first_mistake(error)}") from error
+        labels = limited(path, parsing.row_labels(path, rows(), moments, first_frame=1))
+    except (EOFError, OSError, AttributeError, ValidationError) as error:
+        raise TruthError(f"{what}, or is damaged: {first_mistake(error)}") from error
+    if not videos:
+        raise TruthError(f"{what}: has no {_HEAD}")
+    [video, *_] = videos
     times = {frame: (place, moment - video.begin) for frame, (place, moment) in moments.items()}
     size = (video.width, video.height) if video.width and video.height else None
     begin = datetime.fromtimestamp(video.begin, UTC)
     return SavedTracks(labels, None, checked_times(path, times), size, begin)
 
 
-def _row(number: int, box: Mapping[str, Any]) -> Row:
+def _row(box: Mapping[str, Any]) -> tuple[Any, ...]:
     state = "interpolated" if box.get("interpolated-detection") else "detected"
-    known = *map(box.get, _BEFORE_STATE), state, box.get("class")
-    return f"data.detections.{number}", (*known, None, None, None)
+    return (*map(box.get, _BEFORE_STATE), state, box.get("class"), None, None, None)
 
 
 OTTRK = Format("OTVision tracks", ".ottrk", read_ottrk, whole=_write)

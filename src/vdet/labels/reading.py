@@ -135,10 +135,11 @@ def holds_labelled_pictures(path: Path) -> bool:
 
 
 def _coco_files(path: Path) -> list[Path]:
+    """Return what may be a COCO file, without what is not a regular file: a FIFO may never end."""
     if not path.is_dir():
-        return [path] if path.suffix.lower() == ".json" else []
+        return [path] if path.suffix.lower() == ".json" and path.is_file() else []
     files = sorted([*path.glob("*.json"), *path.glob("annotations/*.json")])
-    return [file for file in files if not is_hidden(file.relative_to(path))]
+    return [file for file in files if file.is_file() and not is_hidden(file.relative_to(path))]
 
 
 def _pictures(path: Path) -> Iterable[LabelledPicture]:
