@@ -15,7 +15,7 @@ from vdet.draw.paint import Color, Surface, draw_arrow, draw_lines, fill, shade,
 from vdet.media.coding import Coding
 from vdet.media.frame import Planes
 from vdet.pages.place import border_marks, draw_marks
-from vdet.traffic.borders import place
+from vdet.traffic.crossings import place
 
 Mask = NDArray[np.bool_]
 WIDTH, HEIGHT = 320, 240

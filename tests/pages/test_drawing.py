@@ -22,9 +22,8 @@ from vdet.lanes.camera import Undistorter
 from vdet.lanes.ground import fit_ground
 from vdet.pages.drawing import Drawing
 from vdet.track.track import FrameTracks, Track
-from vdet.traffic.borders import Border, place
 from vdet.traffic.counting import count_frames
-from vdet.traffic.crossings import crossings
+from vdet.traffic.crossings import Border, crossings, place
 
 DOWN = [through((n, 380 + 60 * n, 60), (4 + n, 360 + 80 * n, 700)) for n in range(6)]
 RIGHT = [through((n, 20, 330 + 10 * n), (5 + n, 1260, 350 + 10 * n)) for n in range(5)]

@@ -17,9 +17,8 @@ from traffic.scenes import (
     through,
 )
 from vdet.track.track import FrameTracks
-from vdet.traffic.borders import Border, place
 from vdet.traffic.counter import VehicleCounter
-from vdet.traffic.crossings import crossings
+from vdet.traffic.crossings import Border, crossings, place
 from vdet.traffic.linking import VehiclePath, link_tracks
 
 SETTINGS = settings_for(LINE, ZONE).traffic

@@ -53,7 +53,7 @@ def _settings(choice: SettingsChoice) -> Facts:
     import numpy as np
 
     from vdet.lanes.ground import ground_of
-    from vdet.traffic.borders import place
+    from vdet.traffic.crossings import place
     from vdet.traffic.speeds import KMH, WINDOW
 
     if not choice.configs:

@@ -144,8 +144,8 @@ def _read(path: Path, file: BinaryIO) -> _Document:
         try:
             entries.append(_LISTS[name].validate_python(values) if name in _LISTS else str(values))
         except ValidationError as error:
-            place = f"{name}.{len(entries)}" + (": ", ".")[bool(error.errors()[0]["loc"])]
-            raise TruthError(f"{path}: is not COCO: {place}{first_mistake(error)}") from error
+            entry = f"{name}.{len(entries)}" + (": ", ".")[bool(error.errors()[0]["loc"])]
+            raise TruthError(f"{path}: is not COCO: {entry}{first_mistake(error)}") from error
     images, categories, annotations, unlabelled = found.values()
     by_id = {image.id: image for image in images}
     names = {category.id: category.name for category in categories}

@@ -51,15 +51,9 @@ def json_values(
     readers = {
         place: ijson.items_coro(values, place, use_float=True) for place, values in found.items()
     }
-    total = size = depth = 0
-    while chunk := file.read(_CHUNK):
-        total += len(chunk)
+    size = 0
+    for chunk in _chunks(path, file, most):
         size += len(chunk)
-        depth += sum(chunk.count(part) * step for part, step in _NESTING.items())
-        if total > most:
-            raise TruthError(f"{path}: is larger than {most:,} bytes; cut it into parts")
-        if depth > _MAX_DEPTH:  # each level takes the memory of all above it
-            raise TruthError(f"{path}: is not JSON: nested too deeply")
         if size > MAX_ENTRY:
             raise TruthError(f"{path}: has an entry of more than {MAX_ENTRY:,} bytes")
         with _json_errors(path):
@@ -74,6 +68,18 @@ def json_values(
     with _json_errors(path):
         for reader in readers.values():
             reader.close()
+
+
+def _chunks(path: Path, file: IO[bytes], most: float) -> Iterator[bytes]:
+    total = depth = 0
+    while chunk := file.read(_CHUNK):
+        total += len(chunk)
+        depth += sum(chunk.count(part) * step for part, step in _NESTING.items())
+        if total > most:
+            raise TruthError(f"{path}: is larger than {most:,} bytes; cut it into parts")
+        if depth > _MAX_DEPTH:  # each level takes the memory of all above it
+            raise TruthError(f"{path}: is not JSON: nested too deeply")
+        yield chunk
 
 
 @contextmanager

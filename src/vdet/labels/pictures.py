@@ -14,8 +14,7 @@ from vdet.archives import is_hidden
 from vdet.boxes import BoolArray, Float64Array, Image
 from vdet.errors import ImageError, TruthError, counted, printable
 from vdet.labels.label import MAX_IN_FRAME, Corners, Label, Size, line_error, mistake_in_box
-from vdet.labels.riders import merge_riders
-from vdet.labels.roles import DEFAULT_ROLES, Roles
+from vdet.labels.roles import DEFAULT_ROLES, Roles, merge_riders
 from vdet.media.images import is_picture_name, read_image
 
 MAX_PICTURES = 200_000

@@ -1,15 +1,22 @@
-"""The role of a labelled box in evaluation and training: vehicle, ignore region, or neither."""
+"""The role of a labelled box in evaluation and training: vehicle, ignore region, or neither.
+
+Riders and what they ride are one object, as most sets of traffic pictures label them.
+"""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import Self
 
+from vdet.boxes import Box
 from vdet.config.schema import Role, Settings
 from vdet.detect.classes import OUR_NAMES, WORDS, letters, our_name
+from vdet.labels.label import Label
 
 RIDER = "rider"
 """A person on a motorcycle or a bicycle, labelled apart from what is ridden."""
 
+_MACHINES = ("motorcycle", "bicycle")
+_MIN_COVERED = 0.1  # fraction of a rider's box that the box of what is ridden covers
 _IGNORED = ("tram", "train", "misc", "trailer", "caravan", RIDER)
 _REGIONS = ("ignore", "ignored", "ignore region", "ignored region", "ignored regions", "dont care")
 _REGION_LETTERS = tuple(dict.fromkeys(map(letters, _REGIONS)))
@@ -92,3 +99,26 @@ DEFAULT_ROLES = Roles.from_settings(Settings())
 def is_region(label: str | None) -> bool:
     """Return whether a label marks a region, not a single object."""
     return label is not None and letters(label) in _REGION_LETTERS
+
+
+def merge_riders(labels: Sequence[Label]) -> list[Label]:
+    """Return labels in which a rider is part of the motorcycle or bicycle below.
+
+    A rider belongs to the one that covers most of the rider's box. One without remains.
+    """
+    machines = [row for row, label in enumerate(labels) if our_name(label.name or "") in _MACHINES]
+    merged = dict(enumerate(labels))
+    for row, rider in enumerate(labels):
+        if machines and letters(rider.name or "") == RIDER:
+            covered, machine = max((_covered(rider, labels[n]), n) for n in machines)
+            if covered >= _MIN_COVERED:
+                around = Box(*merged[machine].box).union(Box(*rider.box))
+                merged[machine] = merged[machine]._replace(box=astuple(around))
+                del merged[row]
+    return list(merged.values())
+
+
+def _covered(rider: Label, machine: Label) -> float:
+    """Return the fraction of a rider's box that the box of a machine covers."""
+    box = Box(*rider.box)
+    return box.intersection(Box(*machine.box)).area / box.area if box.area else 0.0

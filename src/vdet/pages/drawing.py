@@ -21,8 +21,8 @@ from vdet.media.images import encode_image
 from vdet.pages.place import Mark, draw_marks, place_marks, svg
 from vdet.pages.render import TEMPLATES, jpeg_uri, render
 from vdet.track.track import FrameTracks
-from vdet.traffic.borders import place
 from vdet.traffic.counting import count_frames
+from vdet.traffic.crossings import place
 from vdet.traffic.linking import VehiclePath, link_tracks
 from vdet.traffic.proposals import ProposedLine, propose_lines
 

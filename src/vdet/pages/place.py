@@ -1,8 +1,9 @@
-"""The picture of a place for reports: lines, zones and flows with their counts, and a scale.
+"""The picture of a place for reports: lines, zones, paths and flows with counts, and a scale.
 
 It is made of marks, which are painted into an image or written as SVG.
 """
 
+import colorsys
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,8 +17,9 @@ from vdet.draw.paint import Color, Surface
 from vdet.lanes.ground import Ground
 from vdet.pages.render import render
 from vdet.polygons import Point
-from vdet.traffic.borders import Border, PlacedLine
 from vdet.traffic.counts import Counts, Event, Way, vehicle_trips
+from vdet.traffic.crossings import Border, PlacedLine
+from vdet.traffic.records import VehicleRecord
 
 NOWHERE = "–"
 """The end of a flow that was at one line or zone only."""
@@ -26,6 +28,10 @@ _WIDEST = 0.012
 """Width of the arrow of the largest flow, as a fraction of the frame's width."""
 _SIDE = 0.04
 """Length of the arrows to the sides of a line, as a fraction of the frame's height."""
+_SHORTEST = 0.03
+"""Length of the shortest path that is drawn, as a fraction of the frame's width."""
+_TIP = 0.012
+"""Minimum length of the tip of an arrow, as a fraction of the frame's width."""
 _SHADE = 0.18
 """Opacity of the colour over a zone."""
 _SCALES = (1, 2, 5, 10, 20, 50, 100)
@@ -36,13 +42,13 @@ _SCALE = 0.2
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """A line through `points`, closed or an arrow; its label lies at `at`, in pixels."""
+    """A line through `points`, closed or an arrow; its label, if any, lies at `at`, in pixels."""
 
     points: Sequence[Point]
     color: Color
     width: int
-    label: str
-    at: Point
+    label: str = ""
+    at: Point = (0, 0)
     is_closed: bool = False
     is_arrow: bool = False
 
@@ -67,7 +73,7 @@ def place_marks(
 
     `ways` are the paths of tracks by their ids, pixels.
     """
-    width, height = size
+    width, _ = size
     totals = {(total.name, total.direction): total.count for total in counts.totals}
     marks = [mark for border in borders for mark in border_marks(border, totals)]
     flows = flows_of(counts)
@@ -75,12 +81,33 @@ def place_marks(
     for number, trips in enumerate(flows.values()):
         paths = sorted((ways[last.id] for _, last in trips if last.id in ways), key=len)
         middle = paths[len(paths) // 2] if paths else ()
-        path = [(x, y) for x, y in middle if 0 <= x < width and 0 <= y < height]
+        path = _inside(middle, size)
         if len(path) > 1:
             wide = max(2, round(_WIDEST * width * len(trips) / most))
             label, at = str(len(trips)), path[len(path) // 2]
             marks.insert(0, Mark(path, color_of(number), wide, label, at, is_arrow=True))
     return [*marks, *(_scale(ground, width) if ground else ())]
+
+
+def path_marks(records: Iterable[VehicleRecord], size: tuple[int, int]) -> Iterator[Mark]:
+    """Yield the path of each vehicle that moved, in the colour of its direction."""
+    width = max(1, size[1] // 720)
+    for record in records:
+        path = _inside(record.path, size)
+        if record.share >= _SHORTEST and len(path) > 1:
+            yield Mark(path, direction_color(path[0], path[-1]), width, is_arrow=True)
+
+
+def _inside(path: Sequence[Point], size: tuple[int, int]) -> list[Point]:
+    """Return the points of a path that lie in the frame."""
+    return [(x, y) for x, y in path if 0 <= x < size[0] and 0 <= y < size[1]]
+
+
+def direction_color(start: Point, end: Point) -> Color:
+    """Return the colour of the direction from one point to another."""
+    angle = math.atan2(end[1] - start[1], end[0] - start[0])
+    red, green, blue = colorsys.hsv_to_rgb(angle / (2 * math.pi) % 1, 0.8, 1)
+    return round(255 * blue), round(255 * green), round(255 * red)
 
 
 def border_marks(border: Border, totals: Mapping[Way, int], text: str = "") -> Iterator[Mark]:
@@ -122,13 +149,14 @@ def draw_marks(surface: Surface, marks: Iterable[Mark]) -> None:
             paint.shade(surface, mark.points, mark.color, _SHADE)
         paint.draw_lines(surface, mark.points, mark.color, mark.width, closed=mark.is_closed)
         if mark.is_arrow:
-            end, length = mark.points[-1], 3 * mark.width
+            end, length = mark.points[-1], max(3 * mark.width, _TIP * surface.shape[1])
             back = (point for point in reversed(mark.points) if math.dist(point, end) >= length)
             start = next(back, mark.points[0])
             tip = length / max(length, math.dist(start, end))
             paint.draw_arrow(surface, start, end, mark.color, mark.width, tip=tip)
     for mark in drawn:
-        draw_label(surface, mark.label, mark.at, mark.color)
+        if mark.label:
+            draw_label(surface, mark.label, mark.at, mark.color)
 
 
 def svg(image: Image, marks: Sequence[Mark]) -> str:

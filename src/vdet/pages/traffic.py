@@ -12,8 +12,8 @@ from vdet.draw.boxes import color_of
 from vdet.lanes.ground import Ground
 from vdet.pages.charts import hex_color
 from vdet.pages.place import draw_marks, flows_of, place_marks
-from vdet.traffic.borders import Border
 from vdet.traffic.counts import Counts
+from vdet.traffic.crossings import Border
 from vdet.traffic.records import VehicleRecord
 
 Table = tuple[Sequence[str], Sequence[Sequence[str]]]

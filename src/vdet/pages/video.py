@@ -12,13 +12,13 @@ from vdet.media import VideoInfo
 from vdet.pages import charts
 from vdet.pages.batch import NO_STILL, VehicleRow, VideoFacts
 from vdet.pages.charts import Axis, Plot, Span, Timeline
+from vdet.pages.place import draw_marks, path_marks
 from vdet.pages.render import jpeg_uri, render
 from vdet.pages.traffic import traffic_part
-from vdet.traffic.borders import Border
 from vdet.traffic.clock import Clock
 from vdet.traffic.counts import Counts
+from vdet.traffic.crossings import Border
 from vdet.traffic.intervals import Intervals
-from vdet.traffic.paths import draw_paths
 from vdet.traffic.records import VehicleRecord
 from vdet.traffic.speeds import KMH
 
@@ -240,7 +240,8 @@ class VideoPage:
         if self.poster is None:
             return None
         drawn = self.poster.copy()
-        draw_paths(drawn, self.records)
+        height, width = drawn.shape[:2]
+        draw_marks(drawn, path_marks(self.records, (width, height)))
         return drawn
 
 

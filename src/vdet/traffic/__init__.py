@@ -24,8 +24,9 @@ The counts of a video follow from its tracks alone (`FrameTracks`), live or from
    has moved, is lost and has no successor drives on for 0.3 seconds.
 9. Only events are stored. All totals, flows and stays follow from them.
 
-`linking` makes a path of the tracks of each vehicle, and `crossings` is a pure function of one path
-and one line or zone, which `borders` places in the frame. `counter` puts the events together,
-`intervals` has the parts of time of all tables and pages, `counts` the events and the tables that
-follow from them, `clock` the moment at which a video begins, `count_files` writes all of it.
+`linking` makes a path of the tracks of each vehicle. `crossings` places lines and zones in the
+frame; what it finds is a pure function of one path and one of them. `counter` puts the events
+together, `intervals` has the parts of time of all tables and pages, `counts` the events and the
+tables that follow from them, `clock` the moment at which a video begins, `count_files` writes all
+of it.
 """

@@ -8,9 +8,16 @@ from statistics import median
 
 from vdet.config.places import TrafficSettings
 from vdet.track.track import FrameTracks
-from vdet.traffic.borders import VANISH, Border, PlacedLine, distances_to, place
 from vdet.traffic.counts import Counts, Event, Way
-from vdet.traffic.crossings import Crossing, crossings
+from vdet.traffic.crossings import (
+    VANISH,
+    Border,
+    Crossing,
+    PlacedLine,
+    crossings,
+    distances_to,
+    place,
+)
 from vdet.traffic.intervals import Span, add_frame
 from vdet.traffic.linking import GAP, TrackLinker, VehiclePath
 

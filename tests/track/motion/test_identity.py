@@ -14,7 +14,7 @@ from vdet.draw.paint import Color
 from vdet.media import Picture
 from vdet.media.coding import Coding
 from vdet.media.frame import Planes
-from vdet.track.motion.appearance import appearances, differences
+from vdet.track.motion.pairing import appearances, differences
 from vdet.track.motion.tracker import MotionTracker
 
 RED, WHITE, SILVER, GREY, BLUE = (

@@ -4,7 +4,7 @@ For each vehicle a Kalman filter (`state`) estimates where it is in the next fra
 
 1.  a detection belongs to the vehicle whose expected box it overlaps most, all pairs taken
     together (`pairing`). The less certain the expected box is, the farther off its detection
-    may be. The less they look alike (`appearance`), the less an overlap is worth. Present vehicles
+    may be. The less they look alike, the less an overlap is worth. Present vehicles
     choose first, then those not yet sure;
 2.  a box that is cut off by the frame's side is measured by its inner edge only (`state`);
 3.  a detection that belongs to no vehicle may be a new one, unless it is a part of one

@@ -13,8 +13,8 @@ from enum import Enum, auto
 import numpy as np
 
 from vdet.boxes import BoolArray, Float64Array, coverage, iou_matrix
-from vdet.track.motion.appearance import differences
 from vdet.track.motion.history import carried
+from vdet.track.motion.pairing import differences
 from vdet.track.motion.vehicle import Vehicle
 
 _REACH = 0.75

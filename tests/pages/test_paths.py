@@ -1,12 +1,12 @@
-"""The picture in which lines are placed."""
+"""The picture of the paths of vehicles."""
 
 import numpy as np
 import pytest
 
 from traffic.scenes import HEIGHT, WIDTH, Path, frames, through
 from vdet.boxes import Image
+from vdet.pages.place import direction_color, draw_marks, path_marks
 from vdet.polygons import Point
-from vdet.traffic.paths import direction_color, draw_paths
 from vdet.traffic.records import VehicleRecords
 
 GREY = 90
@@ -21,7 +21,7 @@ def paths_drawn(image: Image, *paths: Path) -> None:
     records = VehicleRecords(WIDTH)
     for frame in frames(*paths):
         records.add(frame)
-    draw_paths(image, records.end())
+    draw_marks(image, path_marks(records.end(), (WIDTH, HEIGHT)))
 
 
 def has_color(image: Image, point: Point, color: tuple[int, int, int]) -> bool:
