@@ -18,7 +18,7 @@ from vdet.config.places import LineSettings
 from vdet.errors import ConfigError
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Clock
-from vdet.traffic.count_files import write_counts, write_flows
+from vdet.traffic.count_files import counts_content, join_counts, write_counts, write_flows
 from vdet.traffic.counts import Counts, count_table, flow_table, zone_table
 
 WEST = LineSettings(name="west", start=(200, 200), end=(200, 600))
@@ -235,6 +235,44 @@ class TestFiles:
             "east,0,0,0,0\n"
             "'=south,0,0,0,0\n"
         )  # fmt: skip
+
+    def test_the_wide_table_has_a_row_for_each_interval_and_sums(self, tmp_path: Path) -> None:
+        cars = named(frames(GOES_EAST), "car")
+        truck = named(numbered(frames(TURNS_BACK), 2), "truck")
+        counted = {"v": counts(joined(cars, truck), WEST)}
+        write_flows(tmp_path / "f.wide.csv", counted, 5)
+        assert (tmp_path / "f.wide.csv").read_text() == (
+            'start,end,"west to west, car","west to west, truck","west to west, all",'
+            '"west to (none), car","west to (none), truck","west to (none), all",all\n'
+            "0.0,5.0,0,1,1,1,0,1,2\n"
+            "5.0,10.0,0,0,0,0,0,0,0\n"
+            "10.0,15.0,0,0,0,0,0,0,0\n"
+            "all,,0,1,1,1,0,1,2\n"
+        )
+        write_counts(tmp_path / "c.wide.csv", counted)
+        assert (tmp_path / "c.wide.csv").read_text() == (
+            'start,end,"west: left, car","west: left, truck","west: left, all",'
+            '"west: right, car","west: right, truck","west: right, all",all\n'
+            "0.0,10.0,1,1,2,0,1,1,3\n"
+            "all,,1,1,2,0,1,1,3\n"
+        )
+
+    def test_wide_tables_of_many_videos_have_the_classes_of_all(self, tmp_path: Path) -> None:
+        content = {
+            name: counts_content(
+                Path("c.wide.csv"), {"v": counts(named(frames(GOES_EAST), name), WEST)}
+            )
+            for name in ("car", "truck")
+        }
+        join_counts(content, tmp_path / "all.wide.csv")
+        assert (tmp_path / "all.wide.csv").read_text() == (
+            'video,start,end,"west: left, car","west: left, all",'
+            '"west: right, car","west: right, all",all,"west: left, truck","west: right, truck"\n'
+            "car,0.0,10.0,1,1,0,0,1,,\n"
+            "car,all,,1,1,0,0,1,,\n"
+            "truck,0.0,10.0,,1,,0,1,1,0\n"
+            "truck,all,,,1,,0,1,1,0\n"
+        )
 
     def test_json_has_flows_matrix_and_the_beginning(self, tmp_path: Path) -> None:
         write_flows(tmp_path / "f.json", {"v": at(crossing(EAST))})

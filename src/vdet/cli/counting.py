@@ -34,14 +34,15 @@ def counting_options(more: str = "") -> Callable[[F], F]:
     """
     counts = options.output_option(
         "--counts FILE",
-        "Write which vehicles cross lines and visit zones: .csv has the events, .totals.csv and "
-        ".zones.csv have tables by interval, .json has it all. Can be repeated." + more,
+        "Write which vehicles cross lines and visit zones: .csv has the events, .totals.csv, "
+        ".wide.csv and .zones.csv have tables by interval, .json has it all. Can be repeated."
+        + more,
     )
     flows = options.output_option(
         "--flows FILE",
         "Write how many vehicles go from which line or zone to which: .csv has a row for each "
-        "interval, flow and class, .matrix.csv is a matrix, .json has both. Can be repeated."
-        + more,
+        "interval, flow and class, .wide.csv a row for each interval, with sums, .matrix.csv is a "
+        "matrix, .json has all but the wide one. Can be repeated." + more,
     )
     interval = short_form(
         "--interval TIME",

@@ -118,7 +118,7 @@ def read_ottrk(path: Path, data: bytes) -> SavedTracks:
     [video, *_] = videos
     times = {frame: (place, moment - video.begin) for frame, (place, moment) in moments.items()}
     size = (video.width, video.height) if video.width and video.height else None
-    begin = datetime.fromtimestamp(video.begin, UTC)
+    begin = datetime.fromtimestamp(video.begin, UTC).astimezone()
     return SavedTracks(labels, None, checked_times(path, times), size, begin)
 
 

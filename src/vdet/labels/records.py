@@ -7,13 +7,16 @@ import csv
 import io
 import json
 from collections.abc import Iterator
+from datetime import datetime, timedelta
+from itertools import islice
 from operator import itemgetter
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NotRequired
 
 from pydantic import FailFast, TypeAdapter, ValidationError
 from typing_extensions import TypedDict
 
+from vdet.config.camera import moment
 from vdet.errors import TruthError
 from vdet.labels.formats import Format
 from vdet.labels.label import limited, line_error
@@ -34,6 +37,9 @@ _NEEDED = ("frame", "time", "id", "x", "y", "width", "height")
 _COLUMNS = (*_NEEDED, "score", "state", "class", "foot_x", "foot_y", "distance", "lane")
 _FOOT = slice(10, 12)  # columns
 
+CLOCK = "clock"
+"""Name of the fact and of the column that has the moment of a frame, in ISO 8601."""
+
 _OF_TRACK = tuple(KINDS)[2:]
 
 
@@ -41,6 +47,7 @@ class _Record(TypedDict):
     frame: Index
     time: float
     tracks: Annotated[list[dict[str, Any]], FailFast()]
+    clock: NotRequired[str]
 
 
 _RECORD = TypeAdapter(_Record)
@@ -74,8 +81,8 @@ def _csv_lines(frame: FrameTracks) -> Iterator[str]:
         place, score = track.box.xywh, f"{track.score:.4f}"
         cells = (frame.index, f"{frame.time:.6f}", track.id, *place, score, track.state)
         others = (track.class_name, *known["foot"], known["distance"], known["lane"])
-        row = io.StringIO()
-        csv.writer(row, lineterminator="\n").writerow((*cells, *others))
+        row, clock = io.StringIO(), frame.facts.get(CLOCK)
+        csv.writer(row, lineterminator="\n").writerow((*cells, *others, clock))
         yield row.getvalue()
 
 
@@ -91,7 +98,9 @@ def read_json_lines(path: Path, data: bytes) -> SavedTracks:
     labels = limited(path, row_labels(path, _json_rows(path, data, times), times))
     if not times:
         raise TruthError(f"{path}: is empty; it should have a record for every frame")
-    return SavedTracks(labels, known=tuple(times), times=checked_times(path, times))
+    line, first = next(numbered_lines(path, data))
+    begin = _begin(path, line, _RECORD.validate_json(first).get("clock"), times)
+    return SavedTracks(labels, tuple(times), checked_times(path, times), begin=begin)
 
 
 def read_csv(path: Path, data: bytes) -> SavedTracks:
@@ -107,7 +116,23 @@ def read_csv(path: Path, data: bytes) -> SavedTracks:
     """
     times: Times = {}
     labels = limited(path, row_labels(path, _csv_rows(path, data), times))
-    return SavedTracks(labels, times=checked_times(path, times))
+    (_, heading), *rows = islice(numbered_lines(path, data), 2)
+    known = checked_times(path, times)
+    begin = None
+    for line, row in rows:
+        cells = dict(zip(_cells(path, 1, heading), _cells(path, line, row), strict=True))
+        begin = _begin(path, line, cells.get(CLOCK), times)
+    return SavedTracks(labels, times=known, begin=begin)
+
+
+def _begin(path: Path, line: int, clock: str | None, times: Times) -> datetime | None:
+    """Return the moment of time 0 from that of the first row."""
+    if not clock:
+        return None
+    try:
+        return moment(clock) - timedelta(seconds=next(iter(times.values()))[1])
+    except (ValueError, OverflowError) as error:
+        raise line_error(path, line, f"clock: {error}") from error
 
 
 def _json_rows(path: Path, data: bytes, times: Times) -> Iterator[Row]:
@@ -155,4 +180,4 @@ def _cells(path: Path, line: int, content: str) -> list[str]:
 
 
 JSON_LINES = Format("JSON lines", ".jsonl", read_json_lines, _json_lines)
-CSV = Format("CSV", ".csv", read_csv, _csv_lines, ",".join(_COLUMNS) + "\n")
+CSV = Format("CSV", ".csv", read_csv, _csv_lines, ",".join((*_COLUMNS, CLOCK)) + "\n")

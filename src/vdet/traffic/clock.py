@@ -84,7 +84,7 @@ def find_clock(
     clock = settings.camera.clock
     zone: tzinfo | None = clock.time_zone
     if zero and not (settings.input.begin or clock.pattern):
-        return Clock(zero.astimezone(UTC), "from the file", zone, start)
+        return Clock(_utc(zero, zone), "from the file", zone or zero.tzinfo, start)
     if settings.input.begin:
         begin, source = moment(settings.input.begin), "as given"
         zone = zone or begin.tzinfo

@@ -10,7 +10,15 @@ from dataclasses import astuple
 from pathlib import Path
 from typing import Any
 
-from vdet.traffic.counts import Counts, Event, FlowRow, count_table, flow_table, zone_table
+from vdet.traffic.counts import (
+    CountRow,
+    Counts,
+    Event,
+    FlowRow,
+    count_table,
+    flow_table,
+    zone_table,
+)
 from vdet.traffic.tables import VIDEO, is_json, join_tables, plain_moment, write_content
 
 _EVENTS = (
@@ -28,15 +36,18 @@ _FLOWS = ("start", "end", "from", "to", "class", "count")
 NOWHERE = "(none)"
 """In tables, where a flow leads that ends at its first line or zone."""
 
-COUNT_SUFFIXES = (".csv", ".json", ".totals.csv", ".zones.csv")
-FLOW_SUFFIXES = (".csv", ".json", ".matrix.csv")
+ALL = "all"
+"""In wide tables, the column of a sum."""
+
+COUNT_SUFFIXES = (".csv", ".json", ".totals.csv", ".zones.csv", ".wide.csv")
+FLOW_SUFFIXES = (".csv", ".json", ".matrix.csv", ".wide.csv")
 
 Videos = Mapping[str, Counts]
 """The counts of videos by their names."""
 
 
 def write_counts(path: Path, videos: Videos, interval: int | None = None) -> None:
-    """Write the events, or what the ending of `path` says: totals, zones, or all as JSON.
+    """Write the events, or what the ending of `path` says: totals (also wide), zones, all as JSON.
 
     Parameters
     ----------
@@ -62,6 +73,8 @@ def counts_content(path: Path, videos: Videos, interval: int | None = None) -> A
         return _json(videos, interval, tables, events=True)
     if _is_table(path, ".totals"):
         return [_TOTALS, *map(_cells, count_table(every, interval))]
+    if _is_table(path, ".wide"):
+        return wide_table(count_table(every, interval), ": ")
     if _is_table(path, ".zones"):
         return [_ZONES, *map(_cells, zone_table(every, interval))]
     alone = len(videos) == 1  # then the name is left out
@@ -70,7 +83,7 @@ def counts_content(path: Path, videos: Videos, interval: int | None = None) -> A
 
 
 def write_flows(path: Path, videos: Videos, interval: int | None = None) -> None:
-    """Write the flows, or what the ending of `path` says: their matrix, or both as JSON.
+    """Write the flows, or what the ending of `path` says: wide, their matrix, or all as JSON.
 
     Parameters and errors as of `write_counts`.
     """
@@ -84,10 +97,34 @@ def flows_content(path: Path, videos: Videos, interval: int | None = None) -> An
     if is_json(path):
         tables = {"flows": _items(_FLOWS, rows), "matrix": flow_matrix(every, rows)}
         return _json(videos, interval, tables, events=False)
+    if _is_table(path, ".wide"):
+        return wide_table(rows, " to ")
     if _is_table(path, ".matrix"):
         matrix = flow_matrix(every, rows)
         return [_matrix_columns(every), *((name, *row.values()) for name, row in matrix.items())]
     return [_FLOWS, *map(_cells, rows)]
+
+
+def wide_table(rows: Sequence[CountRow | FlowRow], between: str) -> list[Sequence[Any]]:
+    """Return a table with a row for each interval, and a column for each way and class, and sums.
+
+    `between` is the text between the two names of a way.
+    """
+    found: Counter[tuple[Any, ...]] = Counter()
+    for start, end, *way, name, count in map(_cells, rows):
+        for interval in ((start, end), (ALL, "")):
+            for column in ((*way, name), (*way, ALL), (ALL,)):
+                found[*interval, *column] += count
+    intervals = {tuple(_cells(row)[:2]): None for row in rows}
+    classes = {row.class_name: None for row in rows}
+    ways = {tuple(_cells(row)[2:4]): None for row in rows}
+    columns = [*((*way, name) for way in ways for name in (*classes, ALL)), (ALL,)]
+    heading = (*(f"{between.join(way)}, {name}" for *way, name in columns[:-1]), ALL)
+    body = (
+        (*interval, *(found[*interval, *column] for column in columns))
+        for interval in (*intervals, (ALL, ""))
+    )
+    return [("start", "end", *heading), *body]
 
 
 def flow_matrix(videos: Sequence[Counts], rows: Iterable[FlowRow]) -> dict[str, dict[str, int]]:

@@ -64,7 +64,14 @@ def write_content(path: Path, content: Any) -> None:
 
 
 def join_tables(tables: Mapping[str, Sequence[Sequence[Any]]]) -> list[Sequence[Any]]:
-    """Return one table over those of many videos, by their names, with the name in each row."""
-    heading = next((table[0] for table in tables.values()), ())
-    rows = ([name, *row] for name, table in tables.items() for row in table[1:])
-    return [[VIDEO, *heading], *rows]
+    """Return one table over those of many videos, by their names, with the name in each row.
+
+    It has the columns of all of them; a cell of a column that its table lacks is empty.
+    """
+    columns = dict.fromkeys(column for table in tables.values() for column in table[0])
+    rows = (
+        [name, *map(dict(zip(table[0], row, strict=True)).get, columns)]
+        for name, table in tables.items()
+        for row in table[1:]
+    )
+    return [[VIDEO, *columns], *rows]

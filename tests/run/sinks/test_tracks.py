@@ -34,7 +34,7 @@ RESULTS = (
         time=Fraction(6, 25),
     ),
 )
-HEADING = "frame,time,id,x,y,width,height,score,state,class,foot_x,foot_y,distance,lane\n"
+HEADING = "frame,time,id,x,y,width,height,score,state,class,foot_x,foot_y,distance,lane,clock\n"
 LANE = Lane(
     curvature=-0.001,
     radius=1000.0,
@@ -61,9 +61,9 @@ def test_motchallenge_text_counts_frames_and_pixels_from_1(tmp_path: Path) -> No
 def test_csv_has_a_heading_and_counts_from_0(tmp_path: Path) -> None:
     assert written(tmp_path / "tracks.csv") == (
         f"{HEADING}"
-        "4,0.160000,1,10,20,30,40,0.9877,detected,car,25.0,60.0,,\n"
-        "6,0.240000,1,11,21,31,41,0.5000,predicted,car,27.25,63.5,18.25,-1\n"
-        "6,0.240000,2,0,-3,5,6,1.0000,detected,,2.5,3.0,,\n"
+        "4,0.160000,1,10,20,30,40,0.9877,detected,car,25.0,60.0,,,\n"
+        "6,0.240000,1,11,21,31,41,0.5000,predicted,car,27.25,63.5,18.25,-1,\n"
+        "6,0.240000,2,0,-3,5,6,1.0000,detected,,2.5,3.0,,,\n"
     )
 
 

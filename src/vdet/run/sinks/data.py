@@ -6,6 +6,7 @@ Times are in seconds and those of the input. Pixels are those of the input frame
 import json
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, BinaryIO, Self
@@ -13,7 +14,7 @@ from typing import Any, BinaryIO, Self
 from vdet.errors import OutputError
 from vdet.files import print_now
 from vdet.labels.formats import SourceVideo, TrackWriter, format_for, track_suffixes
-from vdet.labels.records import JSON_LINES, track_record
+from vdet.labels.records import CLOCK, JSON_LINES, track_record
 from vdet.run.result import FrameResult, findings_in
 from vdet.run.sinks.protocol import STANDARD_OUTPUT, BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.traffic import count_files
@@ -27,7 +28,8 @@ class TrackSink(BaseSink):
     """Writes the shown tracks of each frame; the end of the name chooses the format.
 
     The formats are those of `vdet.labels.formats`. The path `-` stands for standard output, as
-    `.jsonl`, frame by frame. In `.jsonl` a frame has `lane` if the lane is looked for: null if none
+    `.jsonl`, frame by frame. In `.jsonl` and `.csv` a frame has `clock`, its moment, where that is
+    known. In `.jsonl` it has `lane` if the lane is looked for: null if none
     is shown, else an object with `radius` (metres, null on a straight road), `offset` (of the
     camera from the middle of the lane, metres, positive to the right), `width` (metres), `left` and
     `right`: each line as `[[x, y], …]`, pixels of the frame, the nearest point first.
@@ -63,7 +65,11 @@ class TrackSink(BaseSink):
 
     def write(self, result: FrameResult) -> None:
         """Add the tracks of a frame."""
-        self._writer.write(result.frame_tracks)
+        frame, clock = result.frame_tracks, self.context.clock
+        if clock:
+            moment = clock.at(frame.time).isoformat(" ", "microseconds")
+            frame = replace(frame, facts={CLOCK: moment, **frame.facts})
+        self._writer.write(frame)
         if self._file is None:
             sys.stdout.flush()
 
