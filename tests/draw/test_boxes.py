@@ -8,10 +8,12 @@ from vdet.boxes import Box, Image
 from vdet.draw.boxes import (
     BLACK,
     GREEN,
+    RED,
     WHITE,
     color_of,
     draw_box,
     draw_label,
+    draw_labels,
     line_width,
     text_color,
 )
@@ -56,6 +58,27 @@ class TestBox:
         assert (columns.min(), rows.min()) == (box.x1, box.y1)
         assert (columns.max() + 1, rows.max() + 1) == (box.x2, box.y2)
         assert not (touched(image) & covered(shrunk(box, line_width(image) + 2), image)).any()
+
+
+class TestLabels:
+    def test_a_label_moves_where_it_would_hide_another_box(self) -> None:
+        image = blank()
+        far, near = Box.sized(100, 60, 60, 40), Box.sized(100, 105, 80, 60)
+        draw_labels(image, [far, near], [["#1"], ["#2"]], [GREEN, RED])
+        drawn = touched(image)
+        assert not (drawn & (covered(far, image) | covered(near, image))).any()
+        rows = np.flatnonzero((image == GREEN).all(axis=2).any(axis=1))
+        assert rows.max() == far.y1 - 1, "the first is above its box"
+        rows = np.flatnonzero((image == RED).all(axis=2).any(axis=1))
+        assert rows.min() == near.y2, "the second is below"
+
+    def test_the_longest_text_is_taken_that_is_no_wider_than_the_box(self) -> None:
+        wide, narrow = Box.sized(10, 100, 200, 40), Box.sized(220, 100, 40, 40)
+        chosen, expected = blank(), blank()
+        draw_labels(chosen, [wide, narrow], [["#1 car", "#1"]] * 2, [GREEN] * 2)
+        draw_label(expected, "#1 car", (wide.x1, wide.y1), GREEN)
+        draw_label(expected, "#1", (narrow.x1, narrow.y1), GREEN)
+        np.testing.assert_array_equal(chosen, expected)
 
 
 CORNERS = [(x, y) for x in (-50, 0, 160, 319, 400) for y in (-50, 0, 120, 239, 300)]

@@ -133,7 +133,7 @@ class DrawSettings(Section):
     """
     label: tuple[LabelPart, ...] | None = Field(None, max_length=4)
     """Parts of the label in order: id, class, score, distance. Unknown ones are left out. []: no
-    labels. null: the id in a video, the score in a picture.
+    labels. null: the id in a video, the score in a picture, and the class where it fits.
     """
     colors: Literal["id", "class", "one"] = "id"
     """Use one colour for each id, for each class, or for all vehicles (one)."""

@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 
-from vdet.boxes import Box, Image
+from vdet.boxes import Box, Float64Array, Image, coverage
 from vdet.draw import paint
 from vdet.draw.paint import Color, Surface
 from vdet.polygons import Point
@@ -26,6 +26,10 @@ _DASH = 4
 """Length of a dash and of the gap after it, in line widths."""
 _DARK = 0.3
 """Brightness outside the regions."""
+
+
+_BETTER = 0.1
+"""Fraction of a label that may be hidden, or hide, before it moves."""
 
 
 def color_of(number: int) -> Color:
@@ -85,6 +89,37 @@ def draw_label(surface: Surface, text: str, corner: Point, color: Color) -> Box:
     return tag
 
 
+def draw_labels(
+    surface: Surface, boxes: Sequence[Box], texts: Sequence[Sequence[str]], color: Sequence[Color]
+) -> None:
+    """Write a label at each box: above it, or where it hides less of the boxes and labels.
+
+    A box may have several texts, the longest first; one is taken that is no wider than the box,
+    else the last.
+    """
+    taken = np.array([(box.x1, box.y1, box.x2, box.y2) for box in boxes]).reshape(-1, 4)
+    for box, options, tint in zip(boxes, texts, color, strict=True):
+        tags = ((text, label_tag(surface, text, (0, 0))) for text in options)
+        text, tag = next(
+            item for item in tags if item[1].width <= box.width or item[0] == options[-1]
+        )
+        if text:
+            places = _places(surface, box, tag)
+            hidden = (coverage(places, taken).sum(axis=1) / _BETTER).astype(int)
+            x1, _, _, y2 = place = places[hidden.argmin()]
+            taken = np.vstack([taken, place])
+            draw_label(surface, text, (x1, y2), tint)
+
+
+def _places(surface: Surface, box: Box, tag: Box) -> Float64Array:
+    """Return a tag above and below a box, at its left and its right side, in the surface."""
+    rows, columns = surface.shape[:2]
+    x = np.array([box.x1, box.x1, box.x2 - tag.width, box.x2 - tag.width])
+    y = np.array([box.y1 - tag.height, box.y2, box.y1 - tag.height, box.y2])
+    x, y = x.clip(0, max(0, columns - tag.width)), y.clip(0, max(0, rows - tag.height))
+    return np.stack([x, y, x + tag.width, y + tag.height], axis=1)
+
+
 def label_tag(surface: Surface, text: str, corner: Point) -> Box:
     """Return the tag that `draw_label` would draw."""
     return _lay_out(surface, text, corner)[0]
@@ -94,7 +129,7 @@ def _lay_out(surface: Surface, text: str, corner: Point) -> tuple[Box, Point, fl
     """Return the tag of a label, the lower left corner of its text, and the scale of its font."""
     rows, columns = surface.shape[:2]
     scale = max(_SMALLEST_TEXT, min(rows / 1200, columns / (paint.text_size(text, 1)[0] + 20)))
-    margin = max(3, round(6 * scale))
+    margin = max(2, round(6 * scale))
     width, height, baseline = paint.text_size(text, scale)
     tag_width, tag_height = width + 2 * margin, height + baseline + margin + (margin + 1) // 2
     left, bottom = (math.floor(value + 0.5) for value in corner)

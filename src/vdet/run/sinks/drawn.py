@@ -23,7 +23,9 @@ from vdet.track.track import Track
 if TYPE_CHECKING:
     from vdet.traffic.counter import VehicleCounter
 
-PICTURE_LABEL = ("score",)
+VIDEO_LABELS = ("id", "class"), ("id",)
+PICTURE_LABELS = ("class", "score"), ("score",)
+"""Parts of the label of a vehicle where there is room, and where there is not."""
 
 
 class Overlay:
@@ -46,8 +48,8 @@ class Overlay:
         self._settings, self._draw = settings, settings.draw
         self._start = video.start if video else None
         self._counter = counter if settings.traffic.draw else None
-        automatic = ("id",) if video else PICTURE_LABEL
-        self._label = automatic if self._draw.label is None else self._draw.label
+        automatic = VIDEO_LABELS if video else PICTURE_LABELS
+        self._labels = automatic if self._draw.label is None else (self._draw.label,)
         self._trails: dict[int, list[tuple[float, Point]]] = {}  # with the time in seconds
 
     def draw(self, result: FrameResult, used: Planes | None = None) -> Surface:
@@ -96,9 +98,9 @@ class Overlay:
             dashed = self._draw.predicted == "dashed" and track.state == "predicted"
             color, thickness = self._color(track), self._draw.thickness
             boxes.draw_box(surface, track.box, color, dashed=dashed, thickness=thickness)
-        for track in shown:
-            if text := label_text(track, self._label):
-                boxes.draw_label(surface, text, (track.box.x1, track.box.y1), self._color(track))
+        texts = [[label_text(track, parts) for parts in self._labels] for track in shown]
+        colors = [self._color(track) for track in shown]
+        boxes.draw_labels(surface, [track.box for track in shown], texts, colors)
 
     def _color(self, track: Track) -> Color:
         match self._draw.colors:

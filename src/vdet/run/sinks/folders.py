@@ -18,7 +18,7 @@ from vdet.pages.render import PAGE_NAME, jpeg_uri, link_to
 from vdet.pages.video import Player, VideoPage
 from vdet.regions import lay_regions
 from vdet.run.result import FrameResult, findings_in
-from vdet.run.sinks.drawn import PICTURE_LABEL, label_text
+from vdet.run.sinks.drawn import PICTURE_LABELS, label_text
 from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.traffic.overview import BestCrops, Crop
 
@@ -69,7 +69,7 @@ def _with_boxes(result: FrameResult) -> Image:
         draw_box(picture, detection.box, WHITE)
         draw_label(picture, f"{detection.score:.2f}", (detection.box.x1, detection.box.y2), WHITE)
     for track in result.tracks:
-        text = label_text(track, PICTURE_LABEL)
+        text = label_text(track, PICTURE_LABELS[-1])
         draw_box(picture, track.box, color_of(track.id), text, dashed=track.state == "predicted")
     return picture
 
