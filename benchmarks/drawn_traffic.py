@@ -10,8 +10,7 @@ import numpy as np
 from vdet.boxes import Box
 from vdet.config.schema import LaneSettings, Settings
 from vdet.detect.protocol import DetectorModel
-from vdet.labels.label import Label
-from vdet.labels.video import LabelledVideo
+from vdet.labels.label import Label, LabelledVideo
 from vdet.media import Frame, Picture, Planes, VideoInfo
 from vdet.media.coding import Coding
 from vdet.run.loop import build, peek

@@ -24,9 +24,8 @@ from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.search import FrameSearch
 from vdet.detect.svm.windows import Windows
 from vdet.evaluate.scores import score
-from vdet.labels.label import Label
+from vdet.labels.label import Label, LabelledVideo
 from vdet.labels.reading import read_truth
-from vdet.labels.video import LabelledVideo
 from vdet.learn.svm.dataset import PatchFile, find_patches
 from vdet.learn.svm.extraction import LabelledVectors, extract
 from vdet.learn.svm.fitting import fit, fit_boxes

@@ -26,7 +26,7 @@ from vdet.detect.protocol import DetectorModel
 from vdet.detect.svm.horizon import find_horizon
 from vdet.evaluate.comparison import Comparison, compare
 from vdet.evaluate.scores import score, score_comparison
-from vdet.labels.video import LabelledVideo
+from vdet.labels.label import LabelledVideo
 from vdet.media import Frame, Picture
 from vdet.run.loop import peek
 from vdet.synthetic.camera import PinholeCamera

@@ -1,8 +1,7 @@
 """Small scenes of boxes for the tests of the metrics."""
 
 from labels.saving import checked_video, row
-from vdet.labels.label import Label
-from vdet.labels.video import LabelledVideo
+from vdet.labels.label import Label, LabelledVideo
 
 TEN = range(1, 11)
 

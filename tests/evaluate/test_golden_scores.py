@@ -10,7 +10,7 @@ import pytest
 from labels.saving import checked_video, row
 from vdet.evaluate.comparison import compare, pool
 from vdet.evaluate.scores import score, score_comparison
-from vdet.labels.video import LabelledVideo
+from vdet.labels.label import LabelledVideo
 
 CASES = sorted(Path(__file__).parent.glob("golden/*.json"))
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from evaluate.scenes import TEN, drive, video
 from vdet.evaluate.scores import score
-from vdet.labels.video import LabelledVideo
+from vdet.labels.label import LabelledVideo
 
 
 def test_a_loose_box_lowers_the_overlap_of_the_matches_only() -> None:

@@ -7,9 +7,8 @@ from typing import Any
 
 from vdet.boxes import Box
 from vdet.labels.formats import Format, SourceVideo, TrackWriter
-from vdet.labels.label import Label, checked_labels, from_size
+from vdet.labels.label import Label, LabelledVideo, SavedTracks, checked_labels, from_size
 from vdet.labels.reading import read_tracks
-from vdet.labels.video import LabelledVideo, SavedTracks
 from vdet.track.track import FrameTracks, Track
 
 VIDEO = SourceVideo("road & rail.mp4", 1280, 720)

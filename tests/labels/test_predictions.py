@@ -4,8 +4,8 @@ from pathlib import Path
 import pytest
 
 from vdet.errors import TruthError
+from vdet.labels.label import LabelledVideo
 from vdet.labels.reading import read_predictions
-from vdet.labels.video import LabelledVideo
 
 HEADER = "frame,time,id,x,y,width,height,state\n"
 SCORED = "frame,time,id,x,y,width,height,score\n0,0.0,1,10,20,30,40,{}\n"

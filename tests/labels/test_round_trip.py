@@ -17,10 +17,10 @@ from vdet.labels.coco import COCO
 from vdet.labels.cvat import CVAT
 from vdet.labels.formats import Format, track_formats
 from vdet.labels.kitti import KITTI
+from vdet.labels.label import SavedTracks
 from vdet.labels.mot import MOT
 from vdet.labels.ottrk import OTTRK
 from vdet.labels.records import CSV, JSON_LINES
-from vdet.labels.video import SavedTracks
 from vdet.labels.yolo import YOLO
 from vdet.track.track import FrameTracks, State, Track
 

@@ -1,7 +1,7 @@
 import math
 
 from labels.saving import row
-from vdet.labels.video import SavedTracks
+from vdet.labels.label import SavedTracks
 
 
 def test_words_for_a_class_become_ours_and_others_stay() -> None:

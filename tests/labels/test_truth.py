@@ -9,8 +9,8 @@ from vdet.evaluate.comparison import compare
 from vdet.evaluate.mistakes import mistakes
 from vdet.labels import mot
 from vdet.labels.formats import Format, track_formats
+from vdet.labels.label import spread_frames
 from vdet.labels.reading import read_truth
-from vdet.labels.video import spread_frames
 
 MOT = "1,7,11,21,30,40,1,3,1\n2,7,11,21,30,40,1,3,1\n"
 KITTI = "".join(

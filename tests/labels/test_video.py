@@ -4,8 +4,7 @@ import pytest
 
 from labels.saving import checked_video, row
 from vdet.errors import TruthError
-from vdet.labels.label import NO_ID, Label
-from vdet.labels.video import LabelledVideo
+from vdet.labels.label import NO_ID, Label, LabelledVideo
 
 
 def scene(frame_count: int | None = None) -> LabelledVideo:

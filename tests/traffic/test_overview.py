@@ -6,7 +6,7 @@ from traffic.passing import HEIGHT, WIDTH, frame, track
 from vdet.boxes import Box, Image
 from vdet.media import Picture
 from vdet.track.track import Track
-from vdet.traffic.overview import BestCrops, Crop
+from vdet.traffic.records import BestCrops, Crop
 
 ROAD = np.arange(HEIGHT * WIDTH * 3, dtype=np.uint64).reshape(HEIGHT, WIDTH, 3).astype(np.uint8)
 PICTURE = Picture(ROAD)

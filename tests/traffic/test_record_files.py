@@ -7,7 +7,8 @@ from pathlib import Path
 from traffic.passing import WIDTH, frame, passing, summarize, track
 from vdet.boxes import Box
 from vdet.track.track import FrameTracks
-from vdet.traffic.records import join_records, records_content, write_records
+from vdet.traffic.records import join_records, records_content
+from vdet.traffic.tables import write_content
 
 HEADING = (
     "id,class,clock,first,last,seconds,detected,interpolated,predicted,mean_score,best_score,"
@@ -19,7 +20,7 @@ FIRST = "1,,,0.0,1.0,1.04,26,0,0,0.9,0.9,30.0,130.0,80.0,130.0,50.0,0.1562,10,10
 
 
 def written(path: Path, *frames: FrameTracks) -> str:
-    write_records(summarize(frames, WIDTH), path)
+    write_content(path, records_content(summarize(frames, WIDTH), path))
     return path.read_bytes().decode()
 
 

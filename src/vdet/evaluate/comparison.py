@@ -17,8 +17,7 @@ import numpy.typing as npt
 
 from vdet.boxes import BoolArray, Float64Array, Int64Array, coverage, iou_matrix
 from vdet.errors import TruthError
-from vdet.labels.label import MAX_IN_FRAME
-from vdet.labels.video import LabelledVideo
+from vdet.labels.label import MAX_IN_FRAME, LabelledVideo
 
 MATCH_IOU = 0.5
 """A prediction with at least this overlap finds a vehicle."""

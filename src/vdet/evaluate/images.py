@@ -12,9 +12,8 @@ from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel
 from vdet.evaluate.comparison import UNKNOWN, Comparison, compare, pool
 from vdet.evaluate.scores import DetectionScores, RankedPredictions, rank_predictions, score_boxes
-from vdet.labels.label import MAX_IN_FRAME
+from vdet.labels.label import MAX_IN_FRAME, LabelledVideo
 from vdet.labels.pictures import LabelledPicture, LabelledPictures
-from vdet.labels.video import LabelledVideo
 from vdet.progress import Progress, no_progress
 from vdet.run.pictures import PictureSearch
 from vdet.run.threads import map_ordered

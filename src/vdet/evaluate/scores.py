@@ -8,7 +8,7 @@ import numpy as np
 from vdet.boxes import BoolArray, Float64Array
 from vdet.evaluate import tracking_metrics as tracking
 from vdet.evaluate.comparison import ComparedFrame, Comparison, compare, counts
-from vdet.labels.video import LabelledVideo
+from vdet.labels.label import LabelledVideo
 
 IOU_THRESHOLDS = np.linspace(0.5, 0.95, 10)
 

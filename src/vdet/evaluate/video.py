@@ -20,10 +20,9 @@ from vdet.detect.protocol import DetectorModel
 from vdet.errors import VideoError
 from vdet.evaluate.comparison import Comparison, compare, pool
 from vdet.evaluate.scores import Scores, score_comparison
-from vdet.labels.label import Label
+from vdet.labels.label import Label, LabelledVideo
 from vdet.labels.reading import read_predictions, read_truth
 from vdet.labels.roles import Roles
-from vdet.labels.video import LabelledVideo
 from vdet.media import Frame, Picture, VideoInfo
 from vdet.media.reader import VideoReader
 from vdet.progress import Progress, no_progress

@@ -22,10 +22,9 @@ from vdet.errors import TruthError, printable
 from vdet.files import record_input
 from vdet.labels.documents import json_values
 from vdet.labels.formats import Format, SourceVideo, last_classes
-from vdet.labels.label import MAX_LABELS, NO_ID, Label, Size, from_size, line_error
+from vdet.labels.label import MAX_LABELS, NO_ID, Label, SavedTracks, Size, from_size, line_error
 from vdet.labels.parsing import Index, Number, Times, checked_times, first_mistake
 from vdet.labels.pictures import LabelledPicture, is_file
-from vdet.labels.video import SavedTracks
 from vdet.track.track import FrameTracks, State
 
 _VIDEO = 1

@@ -17,9 +17,8 @@ from xml.sax.saxutils import escape, quoteattr
 from vdet.errors import TruthError, escaped
 from vdet.labels.documents import attribute, read_xml, size_of, text_of
 from vdet.labels.formats import Format, SourceVideo, last_classes
-from vdet.labels.label import Corners, Label, limited, line_error
+from vdet.labels.label import Corners, Label, SavedTracks, limited, line_error
 from vdet.labels.parsing import archive_members, parse_corners, parse_number, parse_whole
-from vdet.labels.video import SavedTracks
 from vdet.track.track import FrameTracks, State, Track
 
 _MEMBER = "annotations.xml"  # in the zip file that CVAT exports

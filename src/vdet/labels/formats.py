@@ -11,8 +11,8 @@ from typing import BinaryIO
 
 from vdet.detect.classes import UNKNOWN
 from vdet.errors import TruthError
+from vdet.labels.label import SavedTracks
 from vdet.labels.parsing import numbered_lines
-from vdet.labels.video import SavedTracks
 from vdet.plugins import FORMATS, load_plugin, plugin_names
 from vdet.track.track import FrameTracks
 

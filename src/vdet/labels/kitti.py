@@ -8,10 +8,9 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from vdet.labels.formats import Format
-from vdet.labels.label import Label, limited
+from vdet.labels.label import Label, SavedTracks, limited
 from vdet.labels.parsing import label_lines, parse_corners, parse_number, parse_whole, read_bytes
 from vdet.labels.pictures import PictureFormat
-from vdet.labels.video import SavedTracks
 from vdet.track.track import FrameTracks
 
 _TRACK_COLUMNS = 17  # frame and id, then those of an object

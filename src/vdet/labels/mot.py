@@ -7,9 +7,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from vdet.labels.formats import Format
-from vdet.labels.label import Label, from_size, limited
+from vdet.labels.label import Label, SavedTracks, from_size, limited
 from vdet.labels.parsing import label_lines, parse_number, parse_whole
-from vdet.labels.video import SavedTracks
 from vdet.track.track import FrameTracks
 
 _TRUTH_COLUMNS, _RESULT_COLUMNS = 9, 10

@@ -18,9 +18,8 @@ from vdet.errors import TruthError
 from vdet.labels import parsing
 from vdet.labels.documents import json_values
 from vdet.labels.formats import Format, SourceVideo, last_classes
-from vdet.labels.label import limited
+from vdet.labels.label import SavedTracks, limited
 from vdet.labels.parsing import Index, Row, Times, checked_times, first_mistake
-from vdet.labels.video import SavedTracks
 from vdet.track.track import FrameTracks
 from vdet.version import __version__
 

@@ -10,12 +10,11 @@ from vdet.errors import TruthError
 from vdet.labels.coco import read_coco_pictures
 from vdet.labels.formats import recognise, track_formats
 from vdet.labels.kitti import KITTI_PICTURES
-from vdet.labels.label import Label, checked_labels, line_error
+from vdet.labels.label import Label, LabelledVideo, SavedTracks, checked_labels, line_error
 from vdet.labels.mot import MOT
 from vdet.labels.parsing import read_bytes
 from vdet.labels.pictures import LabelledPicture, LabelledPictures, checked_pictures
 from vdet.labels.roles import DEFAULT_ROLES, Roles, is_region
-from vdet.labels.video import LabelledVideo, SavedTracks
 from vdet.labels.voc import VOC_PICTURES
 from vdet.labels.yolo import YOLO_PICTURES
 

@@ -19,7 +19,7 @@ from typing_extensions import TypedDict
 from vdet.config.camera import moment
 from vdet.errors import TruthError
 from vdet.labels.formats import Format
-from vdet.labels.label import limited, line_error
+from vdet.labels.label import SavedTracks, limited, line_error
 from vdet.labels.parsing import (
     KINDS,
     Index,
@@ -30,7 +30,6 @@ from vdet.labels.parsing import (
     numbered_lines,
     row_labels,
 )
-from vdet.labels.video import SavedTracks
 from vdet.track.track import FrameTracks, Track
 
 _NEEDED = ("frame", "time", "id", "x", "y", "width", "height")

@@ -24,7 +24,7 @@ from vdet.config.document import MAX_BYTES, parse_document
 from vdet.detect.classes import UNKNOWN
 from vdet.errors import ConfigError, ImageError, TruthError, escaped, printable
 from vdet.labels.formats import Format, SourceVideo
-from vdet.labels.label import Label, Size, limited
+from vdet.labels.label import Label, SavedTracks, Size, limited
 from vdet.labels.parsing import (
     LIMIT,
     archive_members,
@@ -34,7 +34,6 @@ from vdet.labels.parsing import (
     read_bytes,
 )
 from vdet.labels.pictures import Parse, PictureFormat
-from vdet.labels.video import SavedTracks
 from vdet.media.images import read_header
 from vdet.track.track import FrameTracks, Track
 

@@ -12,9 +12,8 @@ from vdet.media import VideoInfo
 from vdet.pages import charts
 from vdet.pages.batch import NO_STILL, VehicleRow, VideoFacts
 from vdet.pages.charts import Axis, Plot, Span, Timeline
-from vdet.pages.place import draw_marks, path_marks
+from vdet.pages.place import draw_marks, path_marks, traffic_part
 from vdet.pages.render import jpeg_uri, render
-from vdet.pages.traffic import traffic_part
 from vdet.traffic.clock import Clock
 from vdet.traffic.counts import Counts
 from vdet.traffic.crossings import Border

@@ -13,8 +13,7 @@ from track.motion.scenes import HEIGHT, WIDTH
 from vdet.boxes import Boxes, Float64Array, coverage
 from vdet.config.schema import MotionTrackerSettings
 from vdet.evaluate.scores import Scores, score
-from vdet.labels.label import NO_ID, Label
-from vdet.labels.video import LabelledVideo
+from vdet.labels.label import NO_ID, Label, LabelledVideo
 from vdet.track.motion.tracker import MotionTracker
 
 _FOCAL = 1150.0

@@ -7,8 +7,7 @@ from seed import SEED_TRACKER
 from textured_road import textured_road
 from vdet.boxes import Box, Image
 from vdet.config.tracker import RulesTrackerSettings
-from vdet.track.rules.association import Association
-from vdet.track.rules.car import Car, Region
+from vdet.track.rules.association import Association, Car, Region
 
 SETTINGS = SEED_TRACKER
 LEFT, RIGHT = Box.sized(100, 200, 100, 80), Box.sized(320, 200, 100, 80)

@@ -11,11 +11,10 @@ import numpy as np
 from vdet.boxes import BoolArray, Float32Array, Image, Int64Array
 from vdet.config.schema import Settings
 from vdet.errors import printable
-from vdet.labels.label import Label
+from vdet.labels.label import Label, spread_frames
 from vdet.labels.pictures import LabelledPicture, LabelledPictures
 from vdet.labels.reading import read_true_labels
 from vdet.labels.roles import Roles
-from vdet.labels.video import spread_frames
 from vdet.media.reader import VideoReader
 
 MAX_PIXELS = 640_000

@@ -21,10 +21,10 @@ from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.features import cut_window, to_patch
 from vdet.detect.svm.windows import Windows
 from vdet.errors import DataError, ImageError, TruthError, VideoError
+from vdet.labels.label import LabelledVideo, spread_frames
 from vdet.labels.pictures import LabelledPicture
 from vdet.labels.reading import read_labelled_pictures, read_truth
 from vdet.labels.roles import Roles
-from vdet.labels.video import LabelledVideo, spread_frames
 from vdet.learn.svm.choosing import MOST, Most, PatchKind, choose_windows, cut_sides
 from vdet.learn.svm.dataset import patch_archive
 from vdet.media import Picture

@@ -20,7 +20,7 @@ from vdet.regions import lay_regions
 from vdet.run.result import FrameResult, findings_in
 from vdet.run.sinks.drawn import PICTURE_LABELS, label_text
 from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
-from vdet.traffic.overview import BestCrops, Crop
+from vdet.traffic.records import BestCrops, Crop
 
 _BOXES = "boxes"
 _CROP_NAME = re.compile(r"vehicle-\d{4,}-at--?\d+\.\d{3}s\.(jpg|png)")

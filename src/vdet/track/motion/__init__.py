@@ -17,7 +17,7 @@ For each vehicle a Kalman filter (`state`) estimates where it is in the next fra
     that were apart for half a second and now show one vehicle, the one that was lost later is
     lost (`association`);
 7.  what a frame shows is known when the frames after it were searched: each vehicle from its first
-    detection to its last, where both what came before and what came after put it (`history`). A
+    detection to its last, where both what came before and what came after put it (`vehicle`). A
     gap between two detections is bridged if it is short, and if no other vehicle covers most of
     this one meanwhile. Where nothing came after a frame yet, a vehicle is shown by prediction.
 

@@ -13,9 +13,8 @@ from enum import Enum, auto
 import numpy as np
 
 from vdet.boxes import BoolArray, Float64Array, coverage, iou_matrix
-from vdet.track.motion.history import carried
 from vdet.track.motion.pairing import differences
-from vdet.track.motion.vehicle import Vehicle
+from vdet.track.motion.vehicle import Vehicle, carried
 
 _REACH = 0.75
 _REACH_GROWTH = 0.35

@@ -9,10 +9,9 @@ from vdet.boxes import BoolArray, Box, Boxes, Float64Array, are_nested, visible
 from vdet.config.schema import MotionTrackerSettings
 from vdet.media import Picture
 from vdet.track.motion.association import are_hidden, are_parts, take_over_ids, without_duplicates
-from vdet.track.motion.history import Place
 from vdet.track.motion.pairing import appearances, buffered_iou, differences, pair
 from vdet.track.motion.state import whole_box
-from vdet.track.motion.vehicle import Look, Observation, Vehicle
+from vdet.track.motion.vehicle import Look, Observation, Place, Vehicle
 from vdet.track.track import Track
 
 FIRST_STEP = 0.04

@@ -18,8 +18,7 @@ from itertools import count
 from vdet.boxes import Boxes, Image
 from vdet.config.tracker import RulesTrackerSettings
 from vdet.media import Picture
-from vdet.track.rules.association import Association
-from vdet.track.rules.car import Car, Region
+from vdet.track.rules.association import Association, Car, Region
 from vdet.track.track import State, Track
 
 
