@@ -11,7 +11,8 @@ from typing import Any
 import pytest
 
 from pages.html import Elements
-from vdet.pages.batch import NO_STILL, VehicleRow, VideoFacts, write_index
+from vdet.pages.batch import NO_STILL, VideoFacts, write_index
+from vdet.pages.vehicles import VehicleRow
 
 NASTY = "</script><b>"
 
@@ -22,22 +23,25 @@ def facts(*rows: VehicleRow) -> VideoFacts:
     )
 
 
-def row(kind: str | None, first: float, **more: Any) -> VehicleRow:
-    return VehicleRow(class_name=kind, first=first, moment=f"{first:.3f}", seconds=1.5, **more)
+def row(number: int, kind: str | None, first: float, **more: Any) -> VehicleRow:
+    moment = f"{first:.3f}"
+    return VehicleRow(id=number, class_name=kind, first=first, moment=moment, seconds=1.5, **more)
 
 
 VIDEOS = {
     "a": facts(
         row(
-            *("car", 0.0),
+            *(1, "car", 0.0),
             clock="2026-05-01T07:00:02+02:00",
             way="north → south",
             speed=51.5,
             motion="drove",
+            distance=18.2,
+            lane=-1,
         ),
-        row(None, 1.0, picture="../a.crops/vehicle-0002.jpg"),
+        row(2, None, 1.0, picture="../a.crops/vehicle-0002.jpg"),
     ),
-    "day/b #1": facts(row(NASTY, 3.5), row("car", 2.0)),
+    "day/b #1": facts(row(1, NASTY, 3.5), row(2, "car", 2.0)),
 }
 
 
@@ -74,11 +78,14 @@ def test_its_table_has_every_vehicle(tmp_path: Path) -> None:
         "way": [1, 0, 0, 0],
         "states": ["", "drove"],
         "state": [1, 0, 0, 0],
+        "id": [1, 2, 1, 2],
         "first": [0.0, 1.0, 3.5, 2.0],
         "moment": ["0.000", "1.000", "3.500", "2.000"],
         "seconds": [1.5] * 4,
         "clock": [1777618802, None, None, None],
         "speed": [51.5, None, None, None],
+        "distance": [18.2, None, None, None],
+        "lane": [-1, None, None, None],
         "picture": ["", "a.page/../a.crops/vehicle-0002.jpg", "", ""],
     }
 
@@ -99,14 +106,19 @@ const change = (name, value) => {
 };
 const seen = { all: shownRows() };
 [...document.querySelectorAll("#found th button")].find(b => b.textContent === "class").click();
-seen.sorted = shownRows().map(row => row[1]);
+seen.sorted = shownRows().map(row => row[2]);
 change("class", "1");
-seen.cars = shownRows().map(row => row[2]);
+seen.cars = shownRows().map(row => row[3]);
 change("video", "B #");
-seen.both = shownRows().map(row => row[2]);
+seen.both = shownRows().map(row => row[3]);
 form.reset();
 change("from", "2026-05-01T07:00");
-seen.since = shownRows().map(row => row[3]);
+seen.since = shownRows().map(row => row[4]);
+form.reset();
+change("lane", "-1");
+seen.left = shownRows().map(row => row[1]);
+change("distance-max", "18");
+seen.near = shownRows();
 document.title = JSON.stringify(seen);
 </script></body>"""
     html = index(tmp_path, VIDEOS).replace("</body>", acts)
@@ -118,13 +130,16 @@ document.title = JSON.stringify(seen);
     (title,) = re.findall("<title>(.*?)</title>", done.stdout.decode())
     assert json.loads(unescape(title)) == {
         "all": [
-            ["", "car", "a", "page.html#t=0.000", "1.5", "52", "north → south", "drove"],
-            ["", "vehicle", "a", "page.html#t=1.000", "1.5", "–", "", ""],
-            ["", NASTY, "day/b #1", "page.html#t=3.500", "1.5", "–", "", ""],
-            ["", "car", "day/b #1", "page.html#t=2.000", "1.5", "–", "", ""],
+            ["", "#1", "car", "a", "page.html#t=0.000", "1.5", "52", "north → south", "-1", "18",
+             "drove"],
+            ["", "#2", "vehicle", "a", "page.html#t=1.000", "1.5", "–", "", "–", "–", ""],
+            ["", "#1", NASTY, "day/b #1", "page.html#t=3.500", "1.5", "–", "", "–", "–", ""],
+            ["", "#2", "car", "day/b #1", "page.html#t=2.000", "1.5", "–", "", "–", "–", ""],
         ],
         "sorted": [NASTY, "car", "car", "vehicle"],
         "cars": ["a", "day/b #1"],
         "both": ["day/b #1"],
         "since": ["page.html#t=0.000"],
-    }
+        "left": ["#1"],
+        "near": [],
+    }  # fmt: skip

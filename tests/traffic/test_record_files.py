@@ -13,10 +13,10 @@ from vdet.traffic.tables import write_content
 HEADING = (
     "id,class,clock,first,last,seconds,detected,interpolated,predicted,mean_score,best_score,"
     "start_x,start_y,end_x,end_y,length,length_share,x,y,width,height,metres,speed,speed_85,speed_sd,"
-    "motion\n"
+    "motion,distance,lane\n"
 )
 BOX = Box.sized(-30, 5, 30, 30)
-FIRST = "1,,,0.0,1.0,1.04,26,0,0,0.9,0.9,30.0,130.0,80.0,130.0,50.0,0.1562,10,100,40,30,,,,,\n"
+FIRST = "1,,,0.0,1.0,1.04,26,0,0,0.9,0.9,30.0,130.0,80.0,130.0,50.0,0.1562,10,100,40,30,,,,,,,\n"
 
 
 def written(path: Path, *frames: FrameTracks) -> str:
@@ -53,6 +53,8 @@ def test_json_is_a_list_of_vehicles(tmp_path: Path) -> None:
         "speed_85": None,
         "speed_sd": None,
         "motion": None,
+        "distance": None,
+        "lane": None,
     }
     assert json.loads(written(tmp_path / "none.json")) == []
 

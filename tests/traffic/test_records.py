@@ -39,6 +39,18 @@ def test_scores_are_those_of_all_frames_and_the_largest_box_is_kept() -> None:
     assert found.largest == boxes[1]
 
 
+def test_the_smallest_distance_and_the_usual_lane_are_kept() -> None:
+    places = [(30.0, -1), (24.5, 0), (25.0, 0), (None, None)]
+    frames = (
+        frame(n, track(1, PLACE, distance=metres, lane=lane))
+        for n, (metres, lane) in enumerate(places)
+    )
+    found = record(*frames)
+    assert (found.distance, found.lane) == (24.5, 0)
+    unknown = record(frame(0, track(1, PLACE)))
+    assert (unknown.distance, unknown.lane) == (None, None)
+
+
 class TestTime:
     def test_a_vehicle_that_is_hidden_for_a_while_is_shown_for_less_than_its_span(self) -> None:
         found = record(frame(0, track(1, PLACE)), *map(frame, range(1, 10)), *(

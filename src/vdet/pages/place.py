@@ -176,14 +176,14 @@ Table = tuple[Sequence[str], Sequence[Sequence[str]]]
 class TrafficPart:
     """What a page shows of the counts of a video.
 
-    `flows` has a row for each flow, the largest first, with its colour in `colors`, and `picture`
-    an arrow for each. `speeds` has a row for each direction in which speeds are known.
+    `totals` has a row for each direction, with speeds where they are known. `flows` has a row for
+    each flow, the largest first, with its colour in `colors`, and `picture` an arrow for each.
     """
 
+    totals: Table
     flows: Table
     colors: Sequence[str]
     picture: Image | None
-    speeds: Table
 
 
 def traffic_part(
@@ -194,11 +194,10 @@ def traffic_part(
     ground: Ground | None = None,
 ) -> TrafficPart:
     """Return the part of a page; `frame` is drawn over, with its lines and zones."""
-    flows = flows_of(counts)
-    classes = sorted({first.class_name or UNKNOWN for flow in flows.values() for first, _ in flow})
+    classes = sorted({event.class_name or UNKNOWN for event in counts.events})
     several = classes if len(classes) > 1 else []
     rows = []
-    for way, trips in flows.items():
+    for way, trips in flows_of(counts).items():
         found = Counter(first.class_name or UNKNOWN for first, _ in trips)
         rows.append((*way, *(str(found[name]) for name in several), str(len(trips))))
     if frame is not None:
@@ -206,20 +205,21 @@ def traffic_part(
         ways = {record.id: record.path for record in records}
         size = frame.shape[1], frame.shape[0]
         draw_marks(frame, place_marks(size, borders, counts, ways, ground))
-    headings = ("from", "to", *several, "vehicles")
     colors = [hex_color(color_of(number)) for number, _ in enumerate(rows)]
-    return TrafficPart((headings, rows), colors, frame, _speeds(counts))
+    flows = ("from", "to", *several, "vehicles"), rows
+    return TrafficPart(_totals(counts, several), flows, colors, frame)
 
 
-def _speeds(counts: Counts) -> Table:
+def _totals(counts: Counts, classes: Sequence[str]) -> Table:
+    has_speeds = any(event.speed is not None for event in counts.events)
     rows = []
     for way in counts.ways:
-        speeds = [
-            event.speed
-            for event in counts.events
-            if (event.name, event.direction) == way and event.speed is not None
-        ]
-        if speeds:
-            numbers = np.quantile(speeds, [0.5, 0.85]).tolist()
-            rows.append((*way, str(len(speeds)), *(f"{number:.0f}" for number in numbers)))
-    return ("line or zone", "direction", "vehicles", "median km/h", "85 % km/h"), rows
+        events = [event for event in counts.events if (event.name, event.direction) == way]
+        found = Counter(event.class_name or UNKNOWN for event in events)
+        speeds = [event.speed for event in events if event.speed is not None]
+        numbers = np.quantile(speeds, [0.5, 0.85]).tolist() if speeds else []
+        shown = [f"{number:.0f}" for number in numbers] or ["–", "–"]
+        numbered = (*(str(found[name]) for name in classes), str(len(events)))
+        rows.append((*way, *numbered, *(shown if has_speeds else ())))
+    more = ("median km/h", "85 % km/h") if has_speeds else ()
+    return ("line or zone", "direction", *classes, "vehicles", *more), rows

@@ -6,14 +6,16 @@ from dataclasses import dataclass, field
 
 from vdet.boxes import Image
 from vdet.conditions.finding import Finding
+from vdet.detect.classes import UNKNOWN
 from vdet.errors import named
 from vdet.lanes.ground import Ground
 from vdet.media import VideoInfo
 from vdet.pages import charts
-from vdet.pages.batch import NO_STILL, VehicleRow, VideoFacts
+from vdet.pages.batch import NO_STILL, VideoFacts
 from vdet.pages.charts import Axis, Plot, Span, Timeline
 from vdet.pages.place import draw_marks, path_marks, traffic_part
 from vdet.pages.render import jpeg_uri, render
+from vdet.pages.vehicles import VehicleRow, table_json
 from vdet.traffic.clock import Clock
 from vdet.traffic.counts import Counts
 from vdet.traffic.crossings import Border
@@ -21,7 +23,7 @@ from vdet.traffic.intervals import Intervals
 from vdet.traffic.records import VehicleRecord
 from vdet.traffic.speeds import KMH
 
-_MOST_VEHICLES = 300  # that are shown one by one
+_MOST_VEHICLES = 300  # in the timeline, and with pictures
 _SPEED_STEP = 5  # km/h, of the classes of speeds
 _DOUBT = "#f3d9a4", "#333"  # colours of the row that says when the results are doubtful
 _STOOD = {"standing": "standing", "unknown": "not seen moving"}
@@ -117,7 +119,7 @@ class VideoPage:
             conditions=tuple(
                 finding.text for finding in self.findings if finding.severity == "warning"
             ),
-            rows=self._rows(),
+            rows=self._rows(self.pictures),
         )
 
     @property
@@ -136,16 +138,19 @@ class VideoPage:
         totals = self.counts.totals if self.counts else ()
         return {f"{total.name}: {total.direction}": total.count for total in totals if total.count}
 
-    def _rows(self) -> tuple[VehicleRow, ...]:
+    def _rows(self, pictures: Mapping[int, str]) -> tuple[VehicleRow, ...]:
+        """Return the rows of the table, with the addresses of pictures by the ids of vehicles."""
         ways: dict[int, dict[str, None]] = {}
         for event in self.counts.events if self.counts else ():
             ways.setdefault(event.id, {})[event.name] = None
         return tuple(
-            self._row(record, " → ".join(ways.get(record.id, ()))) for record in self.records
+            self._row(record, " → ".join(ways.get(record.id, ())), pictures.get(record.id, ""))
+            for record in self.records
         )
 
-    def _row(self, record: VehicleRecord, way: str) -> VehicleRow:
+    def _row(self, record: VehicleRecord, way: str, picture: str) -> VehicleRow:
         return VehicleRow(
+            id=record.id,
             class_name=record.class_name,
             first=round(record.first, 3),
             moment=self.player.moment(record.first) if self.player else "0",
@@ -153,8 +158,10 @@ class VideoPage:
             clock=self.clock and self.clock.at(record.first).isoformat(timespec="seconds"),
             speed=round(KMH * record.speeds.quantile(0.5), 1) if record.speeds else None,
             way=way,
-            picture=self.pictures.get(record.id, ""),
             motion=record.motion or "",
+            distance=None if record.distance is None else round(record.distance, 1),
+            lane=record.lane,
+            picture=picture,
         )
 
     def html(self) -> str:
@@ -162,7 +169,9 @@ class VideoPage:
         longest = sorted(self.records, key=lambda record: -record.seconds)[:_MOST_VEHICLES]
         shown = sorted(longest, key=lambda record: (record.first, record.id))
         x = charts.time_axis(self.start, self.end, self.zero)
-        speeds = [KMH * record.speeds.quantile(0.5) for record in self.records if record.speeds]
+        known = {number: picture for number, (_, picture) in self.thumbnails.items()}
+        rows = self._rows({item.id: known[item.id] for item in shown if item.id in known})
+        speeds = [row.speed for row in rows if row.speed is not None]
         title = "Vehicles by their median speed"
         return render(
             "video.html",
@@ -176,6 +185,7 @@ class VideoPage:
             traffic=self.counts
             and traffic_part(self.counts, self.records, self.poster, self.borders, self.ground),
             paths=self._paths(),
+            table=table_json([("", "" if self.player else None, "", rows)]),
         )
 
     @property
@@ -221,13 +231,16 @@ class VideoPage:
         first = {number: intervals.start_in(0, number) for number in intervals.numbers}
         if len(first) == 1:
             return []
-        came = Counter(first[intervals.number(0, record.first)] for record in self.records)
+        came: dict[str, Counter[float]] = {}
+        for record in (record for record in self.records if record.has_driven):
+            name = record.class_name or UNKNOWN
+            came.setdefault(name, Counter())[first[intervals.number(0, record.first)]] += 1
         counted: dict[str, Counter[float]] = {}
         for event in self.counts.events if self.counts else ():
             found = counted.setdefault(f"{event.name}: {event.direction}", Counter())
             found[first[intervals.number(0, event.time)]] += 1
-        series = {"First seen": {"vehicles": came}, "At lines and zones": counted}
-        x = charts.time_axis(min(first.values()), max(first.values()) + step, self.zero)
+        series = {"First seen": came, "At lines and zones": counted}
+        x = charts.time_axis(self.start, self.end, self.zero)
         return [
             charts.interval_plot(some, x, step, name, self.zero)
             for name, some in series.items()

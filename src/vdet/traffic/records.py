@@ -29,10 +29,10 @@ _COLUMNS = (
     *("mean_score", "best_score"),
     *("start_x", "start_y", "end_x", "end_y", "length", "length_share"),
     *("x", "y", "width", "height"),
-    *("metres", "speed", "speed_85", "speed_sd", "motion"),
+    *("metres", "speed", "speed_85", "speed_sd", "motion", "distance", "lane"),
 )
 """Columns of a `.csv`; `clock` is the moment of `first`, x, y, width and height are those of the
-largest box, speeds are km/h.
+largest box, speeds are km/h, `distance` is the smallest one from the camera, metres.
 """
 
 _MOVED = 0.5
@@ -78,6 +78,10 @@ class VehicleRecord:
         None where they are not known.
     motion
         None where the camera may have moved.
+    distance
+        The smallest one from the camera, metres; None where it is not known.
+    lanes
+        Number of frames that show it in each lane, as `Track.lane` counts them.
     """
 
     id: int
@@ -94,6 +98,13 @@ class VehicleRecord:
     followed: list[tuple[float, float]] = field(default_factory=list)
     speeds: "Speeds | None" = None
     motion: Motion | None = None
+    distance: float | None = None
+    lanes: Counter[int] = field(default_factory=Counter)
+
+    @property
+    def lane(self) -> int | None:
+        """The lane in which most frames show it; None where none is known."""
+        return next((lane for lane, _ in self.lanes.most_common(1)), None)
 
     @property
     def has_driven(self) -> bool:
@@ -122,6 +133,10 @@ class VehicleRecord:
         self.best_score = max(self.best_score, track.score)
         self.class_name = track.class_name
         self.largest = max(self.largest, track.box, key=lambda box: box.area)
+        if track.distance is not None:
+            self.distance = min(track.distance, self.distance or track.distance)
+        if track.lane is not None:
+            self.lanes[track.lane] += 1
         only_lost = self.states.total() == self.states["predicted"]
         if track.state != "predicted" and only_lost:
             self.path.clear()
@@ -254,6 +269,8 @@ def _row(record: VehicleRecord, clock: Clock | None) -> dict[str, Any]:
         *record.largest.xywh,
         *speeds,
         record.motion,
+        None if record.distance is None else round(record.distance, 1),
+        record.lane,
     )
     return dict(zip(_COLUMNS, values, strict=True))
 
@@ -267,7 +284,7 @@ def _item(row: Mapping[str, Any]) -> dict[str, Any]:
         "length_share": row["length_share"],
     }
     largest = {name: row[name] for name in ("x", "y", "width", "height")}
-    first, last = ({name: row[name] for name in some} for some in (_COLUMNS[:11], _COLUMNS[-5:]))
+    first, last = ({name: row[name] for name in some} for some in (_COLUMNS[:11], _COLUMNS[-7:]))
     return {**first, "path": path, "largest": largest, **last}
 
 

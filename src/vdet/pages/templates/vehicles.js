@@ -1,4 +1,4 @@
-// The table of all vehicles of a batch: filtered, sorted, and shown a page at a time.
+// The table of the vehicles of a page: filtered, sorted, and shown some rows at a time.
 "use strict";
 
 const data = JSON.parse(document.getElementById("vehicles").textContent);
@@ -6,14 +6,23 @@ const PER_PAGE = 100;
 
 // Columns: heading, text of a cell, and what rows are sorted by (numbers sort with nulls last).
 const columns = [
+  { name: "id", text: i => `#${data.id[i]}`, key: i => data.id[i] },
   { name: "class", text: i => data.classes[data.class[i]], key: i => data.classes[data.class[i]] },
-  { name: "video", text: i => data.videos[data.video[i]].name, key: i => data.video[i] },
+  { name: "video", text: i => data.videos[data.video[i]].name, key: i => data.video[i], used: "video" },
   { name: "time", text: timeText, key: i => data.clock[i] ?? data.first[i], link: true },
   { name: "seconds", text: i => data.seconds[i].toFixed(1), key: i => data.seconds[i] },
   { name: "km/h", text: i => number(data.speed[i]), key: i => data.speed[i], used: "speed" },
   { name: "lines", text: i => data.ways[data.way[i]], key: i => data.ways[data.way[i]], used: "way" },
+  { name: "lane", text: i => data.lane[i] ?? "–", key: i => data.lane[i], used: "lane" },
+  { name: "metres", text: i => number(data.distance[i]), key: i => data.distance[i], used: "distance" },
   { name: "moves", text: i => data.states[data.state[i]], key: i => data.state[i], used: "state" },
-].filter(column => !column.used || data[column.used].some(value => value !== null && value !== 0));
+].filter(column => !column.used || isUsed(column.used));
+
+// Return whether a column says something: numbers of texts and of videos are 0 for nothing else.
+function isUsed(name) {
+  const coded = ["video", "class", "way", "state"].includes(name);
+  return data[name].some(value => coded ? value > 0 : value !== null);
+}
 
 const form = document.getElementById("filters");
 const body = document.querySelector("#found tbody");
@@ -55,6 +64,8 @@ function filtered() {
   choice("state", data.state);
   limits("seconds", data.seconds);
   limits("speed", data.speed);
+  limits("distance", data.distance);
+  if (values.lane) tests.push(i => data.lane[i] === Number(values.lane));
   if (values.video) {
     const text = values.video.toLowerCase();
     const named = data.videos.map(video => video.name.toLowerCase().includes(text));
@@ -86,9 +97,11 @@ function sorted(found) {
 
 function cell(column, i) {
   const element = document.createElement("td");
-  if (column.link) {
+  const { page } = data.videos[data.video[i]];
+  if (column.link && page !== null) {
     const link = element.appendChild(document.createElement("a"));
-    link.href = `${data.videos[data.video[i]].page}#t=${data.moment[i]}`;
+    link.href = `${page}#t=${data.moment[i]}`;
+    if (!page) link.dataset.time = data.moment[i];
     link.textContent = column.text(i);
   } else {
     element.textContent = column.text(i);
@@ -148,7 +161,7 @@ function fill(name, values) {
   const select = form.elements[name];
   const used = values.map((value, number) => [value, number]).filter(([value]) => value);
   select.append(...used.map(([value, number]) => new Option(value, number)));
-  select.closest("label").hidden = used.length === 0;
+  select.closest("label").hidden = used.length < 2;
 }
 
 const head = document.querySelector("#found thead tr");
@@ -157,10 +170,10 @@ head.append(...columns.map(heading));
 fill("class", data.classes);
 fill("way", data.ways);
 fill("state", data.states);
-for (const name of ["speed", "clock"]) {
-  if (!data[name].some(value => value !== null)) {
-    for (const element of form.querySelectorAll(`[data-needs="${name}"]`)) element.hidden = true;
-  }
+const lanes = [...new Set(data.lane)].filter(lane => lane !== null).sort((a, b) => a - b);
+form.elements.lane.append(...lanes.map(lane => new Option(lane)));
+for (const element of form.querySelectorAll("[data-needs]")) {
+  element.hidden = !isUsed(element.dataset.needs);
 }
 form.addEventListener("input", update);
 form.addEventListener("reset", () => setTimeout(update));
