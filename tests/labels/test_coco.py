@@ -56,12 +56,6 @@ def test_what_does_not_fit_is_refused_with_its_place(data: bytes, message: str) 
     assert str(caught.value).startswith(f"a.json{message}")
 
 
-def test_a_crowd_is_an_ignore_region() -> None:
-    for crowd in (1, True, 0, False):
-        saved = read_coco(Path("a.json"), changed("annotations", 0, iscrowd=crowd))
-        assert [row.ignored for row in saved.labels] == [bool(crowd), False, False]
-
-
 @pytest.mark.parametrize("before", [b"", b'{"id": 1, "name": "car"}, '], ids=["first", "later"])
 def test_an_entry_that_would_take_much_memory_is_refused_before_it_is_read(before: bytes) -> None:
     data = b'{"images": [], "categories": [' + before + b'{"id": [' + b"[]," * 6_000_000

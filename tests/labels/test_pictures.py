@@ -168,113 +168,94 @@ def test_boxes_that_cannot_be_pixels_of_their_pictures_are_refused(
         read_labelled_pictures(tmp_path)
 
 
-class TestWhichForm:
-    def test_a_coco_file_may_be_given_itself(self, tmp_path: Path) -> None:
-        path = write_coco(tmp_path, SCENE)
-        assert len(read_labelled_pictures(path).pictures) == 2
-
-    def test_nothing_known_says_what_was_looked_for(self, tmp_path: Path) -> None:
-        with pytest.raises(TruthError, match=r"with one \.json file \(COCO\), image_2 and"):
-            read_labelled_pictures(tmp_path)
-
-    @pytest.mark.parametrize("name", ["none", "labels.txt"])
-    def test_neither_a_folder_nor_json(self, tmp_path: Path, name: str) -> None:
-        with pytest.raises(TruthError, match="labelled pictures not found"):
-            read_labelled_pictures(tmp_path / name)
-
-    def test_of_several_json_files_one_must_be_given(self, tmp_path: Path) -> None:
-        path = write_coco(tmp_path, SCENE)
-        shutil.copy(path, tmp_path / "other.json")
-        with pytest.raises(TruthError, match=r"\(annotations\.json, other\.json\); pass the one"):
-            read_labelled_pictures(tmp_path)
-
-
-class TestCoco:
-    def edited(self, folder: Path, key: str, index: int, **values: Any) -> Path:
-        """Write the scene with other values in one of its entries."""
-        path = write_coco(folder, SCENE)
-        document = json.loads(path.read_text(encoding="utf-8"))
-        document[key][index].update(values)
-        path.write_text(json.dumps(document), encoding="utf-8")
-        return path
-
-    @pytest.mark.parametrize("place", ["labels.json", "annotations/labels.json"])
-    @pytest.mark.parametrize("folder", ["val", "images/default"])  # the second is CVAT's
-    def test_the_file_may_lie_above_or_beside_the_pictures(
-        self, tmp_path: Path, place: str, folder: str
-    ) -> None:
-        written = write_coco(tmp_path / "set" / folder, SCENE)
-        path = tmp_path / "set" / place
-        path.parent.mkdir(exist_ok=True)
-        written.rename(path)
-        found = {picture.path.parent for picture in read_labelled_pictures(path).pictures}
-        assert found == {tmp_path / "set" / folder}
-        assert len(read_labelled_pictures(tmp_path / "set").pictures) == 2
-
-    def test_two_folders_with_the_first_picture_are_refused(self, tmp_path: Path) -> None:
-        path = write_coco(tmp_path / "train", SCENE).rename(tmp_path / "labels.json")
-        write_pictures(tmp_path / "val", SCENE)
-        with pytest.raises(TruthError, match=r"first picture, a\.png, lies in .*train and .*val"):
+def test_where_no_set_is_found_it_says_what_was_looked_for(tmp_path: Path) -> None:
+    for path in (tmp_path, tmp_path / "none", tmp_path / "labels.txt"):
+        with pytest.raises(TruthError, match=r"not found: a folder with one \.json file \(COCO\)"):
             read_labelled_pictures(path)
-
-    @pytest.mark.parametrize(
-        ("key", "index", "values", "words"),
-        [
-            ("annotations", 1, {"bbox": [1, 2, 3, 1e9]}, "annotations.1.bbox.3: Input should be"),
-            ("annotations", 1, {"iscrowd": 2}, "annotations.1.iscrowd: Input should be"),
-            ("images", 1, {"file_name": "a.png"}, "has the picture a.png twice"),
-            (
-                "images",
-                0,
-                {"file_name": "../a.png"},
-                "images.0.file_name: ../a.png leads out",
-            ),
-            (
-                "images",
-                1,
-                {"file_name": "/a.png"},
-                "images.1.file_name: /a.png leads out",
-            ),
-            ("images", 1, {"file_name": "x" * 300}, "xx…: not found, but "),
-            ("images", 1, {"file_name": "a\u202eb"}, "a\\u202"),
-            ("images", 1, {"width": -3}, "images.1.width: Input should be greater"),
-        ],
-    )
-    def test_a_wrong_entry_is_refused_by_its_number(
-        self, tmp_path: Path, key: str, index: int, values: dict[str, Any], words: str
-    ) -> None:
-        path = self.edited(tmp_path, key, index, **values)
-        with pytest.raises(TruthError) as caught:
-            read_labelled_pictures(path)
-        assert words in str(caught.value)
-        assert str(caught.value).isprintable()
+    shutil.copy(write_coco(tmp_path, SCENE), tmp_path / "other.json")
+    with pytest.raises(TruthError, match=r"\(annotations\.json, other\.json\); pass the one"):
+        read_labelled_pictures(tmp_path)
 
 
-class TestKitti:
-    def test_what_each_type_means(self, tmp_path: Path) -> None:
-        path = write_kitti(tmp_path, SCENE)
-        kinds = ("Car", "Van", "Truck", "Tram", "Misc", "DontCare", "Person_sitting", "Cyclist")
-        rest = "0 0 0 1 2 11 22 1 1 4 2 1 20 -1.6\n"
-        path.write_text("".join(f"{kind} {rest}" for kind in kinds), encoding="utf-8")
-        image = read_labelled_pictures(tmp_path).pictures[0]
-        assert image.classes == ("car", "car", "truck", *["vehicle"] * 3, "person", "bicycle")
-        assert image.ignored.tolist() == [*[False] * 3, *[True] * 4, False]
-        assert image.boxes[0].tolist() == [1, 2, 11, 22]
+@pytest.mark.parametrize("place", ["labels.json", "annotations/labels.json"])
+@pytest.mark.parametrize("folder", ["val", "images/default"])  # the second is CVAT's
+def test_a_coco_file_may_lie_above_or_beside_the_pictures(
+    tmp_path: Path, place: str, folder: str
+) -> None:
+    written = write_coco(tmp_path / "set" / folder, SCENE)
+    path = tmp_path / "set" / place
+    path.parent.mkdir(exist_ok=True)
+    written.rename(path)
+    found = {picture.path.parent for picture in read_labelled_pictures(path).pictures}
+    assert found == {tmp_path / "set" / folder}
+    assert len(read_labelled_pictures(tmp_path / "set").pictures) == 2
+    write_pictures(tmp_path / "set" / "train", SCENE)
+    write_pictures(tmp_path / "set" / "test", SCENE)
+    with pytest.raises(TruthError, match=r"first picture, a\.png, lies in .*; keep one"):
+        read_labelled_pictures(path)
 
-    @pytest.mark.parametrize(
-        ("line", "words"),
-        [
-            ("Car 0 0 0 1 2 11 22 1 1 4 2 1 20 -1.6 0.9", "KITTI has 15 columns .* has 16"),
-            ("Car 0 0 0 1 2 11", "KITTI has 15 columns .* has 7"),
-        ],
-    )
-    def test_a_wrong_line_is_refused_with_its_number(
-        self, tmp_path: Path, line: str, words: str
-    ) -> None:
-        path = write_kitti(tmp_path, SCENE)
-        path.write_text(f"\n\n{line}\n", encoding="utf-8")
-        with pytest.raises(TruthError, match=rf"a\.txt:3: {words}"):
-            read_labelled_pictures(tmp_path)
+
+@pytest.mark.parametrize(
+    ("key", "values", "words"),
+    [
+        ("annotations", {"bbox": [1, 2, 3, 1e9]}, "annotations.1.bbox.3: Input should be"),
+        ("annotations", {"iscrowd": 2}, "annotations.1.iscrowd: Input should be"),
+        ("images", {"file_name": "a.png"}, "has the picture a.png twice"),
+        ("images", {"file_name": "../a.png"}, "images.1.file_name: ../a.png leads out"),
+        ("images", {"file_name": "/a.png"}, "images.1.file_name: /a.png leads out"),
+        ("images", {"file_name": "x" * 300}, "xx…: not found, but "),
+        ("images", {"file_name": "a\u202eb"}, "a\\u202"),
+        ("images", {"width": -3}, "images.1.width: Input should be greater"),
+    ],
+)
+def test_a_wrong_entry_of_coco_is_refused_by_its_number(
+    tmp_path: Path, key: str, values: dict[str, Any], words: str
+) -> None:
+    path = write_coco(tmp_path, SCENE)
+    document = json.loads(path.read_text(encoding="utf-8"))
+    document[key][1].update(values)
+    path.write_text(json.dumps(document), encoding="utf-8")
+    with pytest.raises(TruthError) as caught:
+        read_labelled_pictures(path)
+    assert words in str(caught.value)
+    assert str(caught.value).isprintable()
+
+
+@pytest.mark.parametrize(
+    ("form", "text", "words"),
+    [
+        ("KITTI", "\n\nCar 0 0 0 1 2 11", r"a\.txt:3: KITTI has 15 columns .* has 7"),
+        ("YOLO", "0 .5 .5 .1 .1\n0 .5 .5 .1", r"a\.txt:2: YOLO has 5 columns, .* has 4"),
+        ("YOLO", "0.5 0.5 0.5 0.1 0.1", r"a\.txt:1: '0\.5' is not a whole number"),
+        ("YOLO", "0 320 200 40 30", r"a\.txt:1: a number is not between 0 and 1"),
+        ("VOC", "<annotations/>", r"a\.xml: <annotations> where the format has <annotation>"),
+        ("VOC", "<annotation>", r"a\.xml:1: broken XML: no element found"),
+        (
+            "VOC",
+            "<annotation><object><name>car</name></object></annotation>",
+            r"a\.xml:object 1: <object> without its <bndbox/xmin>",
+        ),
+        ("VOC", "<annotation><size><width>3</width></size></annotation>", "without its <height>"),
+    ],
+)
+def test_a_wrong_file_of_labels_is_refused_with_the_place(
+    tmp_path: Path, form: str, text: str, words: str
+) -> None:
+    WRITERS[form](tmp_path, SCENE).write_text(text, encoding="utf-8")
+    with pytest.raises(TruthError, match=words) as caught:
+        read_labelled_pictures(tmp_path)
+    assert str(caught.value).isprintable()
+
+
+def test_what_each_type_of_kitti_means(tmp_path: Path) -> None:
+    path = write_kitti(tmp_path, SCENE)
+    kinds = ("Car", "Van", "Truck", "Tram", "Misc", "DontCare", "Person_sitting", "Cyclist")
+    rest = "0 0 0 1 2 11 22 1 1 4 2 1 20 -1.6\n"
+    path.write_text("".join(f"{kind} {rest}" for kind in kinds), encoding="utf-8")
+    image = read_labelled_pictures(tmp_path).pictures[0]
+    assert image.classes == ("car", "car", "truck", *["vehicle"] * 3, "person", "bicycle")
+    assert image.ignored.tolist() == [*[False] * 3, *[True] * 4, False]
+    assert image.boxes[0].tolist() == [1, 2, 11, 22]
 
 
 class TestYolo:
@@ -285,22 +266,6 @@ class TestYolo:
         (tmp_path / "data.yaml").write_text(f"names:\n{names}", encoding="utf-8")
         image = read_labelled_pictures(tmp_path / "train").pictures[0]
         assert image.classes == ("car", "truck", "vehicle")
-
-    @pytest.mark.parametrize(
-        ("line", "words"),
-        [
-            ("0 0.5 0.5 0.1", "YOLO has 5 columns, .* has 4"),
-            ("0.5 0.5 0.5 0.1 0.1", "'0.5' is not a whole number"),
-            ("0 320 200 40 30", "a number is not between 0 and 1"),
-        ],
-    )
-    def test_a_wrong_line_is_refused_with_its_number(
-        self, tmp_path: Path, line: str, words: str
-    ) -> None:
-        path = write_yolo(tmp_path, SCENE)
-        path.write_text(f"0 0.5 0.5 0.1 0.1\n{line}\n", encoding="utf-8")
-        with pytest.raises(TruthError, match=rf"a\.txt:2: {words}"):
-            read_labelled_pictures(tmp_path)
 
     def test_a_polygon_is_taken_as_its_box(self, tmp_path: Path) -> None:
         path = write_yolo(tmp_path, SCENE)
@@ -319,13 +284,12 @@ class TestYolo:
         ],
     )
     def test_names_that_cannot_be_used(self, tmp_path: Path, text: str | None, words: str) -> None:
-        folder = tmp_path / "set"
-        write_yolo(folder, SCENE)
-        (folder / "data.yaml").unlink()
+        write_yolo(tmp_path, SCENE)
+        (tmp_path / "data.yaml").unlink()
         if text is not None:
-            (folder / "data.yaml").write_text(text, encoding="utf-8")
+            (tmp_path / "data.yaml").write_text(text, encoding="utf-8")
         with pytest.raises(TruthError, match=words):
-            read_labelled_pictures(folder)
+            read_labelled_pictures(tmp_path)
 
     def test_labels_without_a_picture_are_refused(self, tmp_path: Path) -> None:
         path = write_yolo(tmp_path, SCENE)
@@ -336,39 +300,12 @@ class TestYolo:
             read_labelled_pictures(tmp_path)
 
 
-class TestVoc:
-    BOX = "<bndbox><xmin>1</xmin><ymin>1</ymin><xmax>9</xmax><ymax>9</ymax></bndbox>"
-
-    def test_pixels_count_from_1_and_the_last_belongs_to_the_box(self, tmp_path: Path) -> None:
-        path = write_voc(tmp_path, SCENE)
-        path.write_text(
-            f"<annotation><object><name>car</name>{self.BOX}</object></annotation>", "utf-8"
-        )
-        image = read_labelled_pictures(tmp_path).pictures[0]
-        assert image.boxes.tolist() == [[0, 0, 9, 9]]
-        assert image.size is None
-
-    @pytest.mark.parametrize(
-        ("text", "words"),
-        [
-            ("<annotations/>", " <annotations> where the format has <annotation>"),
-            ("<annotation>", "1: broken XML: no element found"),
-            (
-                "<annotation>\n<object><name>car</name></object></annotation>",
-                "object 1: <object> without its <bndbox/xmin>",
-            ),
-            ("<annotation><size><width>3</width></size></annotation>", "without its <height>"),
-        ],
-    )
-    def test_a_wrong_file_is_refused_with_its_line(
-        self, tmp_path: Path, text: str, words: str
-    ) -> None:
-        path = write_voc(tmp_path, SCENE)
-        path.write_text(text, encoding="utf-8")
-        with pytest.raises(TruthError) as caught:
-            read_labelled_pictures(tmp_path)
-        assert f"a.xml:{words}" in str(caught.value) or words in str(caught.value)
-        assert str(caught.value).isprintable()
+def test_pixels_of_voc_count_from_1_and_the_last_belongs_to_the_box(tmp_path: Path) -> None:
+    box = "<bndbox><xmin>1</xmin><ymin>1</ymin><xmax>9</xmax><ymax>9</ymax></bndbox>"
+    text = f"<annotation><object><name>car</name>{box}</object></annotation>"
+    write_voc(tmp_path, SCENE).write_text(text, encoding="utf-8")
+    image = read_labelled_pictures(tmp_path).pictures[0]
+    assert (image.boxes.tolist(), image.size) == ([[0, 0, 9, 9]], None)
 
 
 def read_or_refuse(folder: Path) -> None:

@@ -243,11 +243,6 @@ def test_without_a_camera_the_lane_has_no_metres_and_one_warning_says_so(
     assert (read_image(out / "bare.png") == read_image(files.bare)).all()
 
 
-def test_without_lanes_no_lane_is_reported(run: Run, files: Files) -> None:
-    (item,) = read_json(run("detect-image", files.plain, "--json", "-", *files.red))
-    assert "lane" not in item
-
-
 def test_pictures_of_the_stages_are_written(run: Run, files: Files, tmp_path: Path) -> None:
     assert run("detect-image", files.picture, "--stages", tmp_path / "s", *files.lanes).code == 0
     assert sorted(path.name for path in (tmp_path / "s").iterdir()) == STAGES
@@ -262,29 +257,3 @@ def test_a_picture_of_another_aspect_ratio_does_not_stop_the_others(
     assert result.code == 3
     assert "other.png: camera.lens: is for 640×480" in result.err
     assert [path.name for path in out.iterdir()] == ["frame.png"]
-
-
-def test_a_video_of_another_aspect_ratio_is_refused(run: Run, files: Files, tmp_path: Path) -> None:
-    wide = tmp_path / "wide.yaml"
-    matrix = ((960, 0, 640), (0, 960, 360), (0, 0, 1))
-    save_camera(
-        LensSettings(width=1280, height=720, matrix=matrix, distortion=(0, 0, 0, 0, 0), rms=0), wide
-    )
-    outputs = (tmp_path / "out.mp4", "--tracks", tmp_path / "t.csv")
-    result = run("detect-video", files.clip, *outputs, *files.red, "-c", wide, "--lanes")
-    assert result.code == 1
-    assert f"{files.clip}: camera.lens: is for 1280×720" in result.err
-    assert list(tmp_path.iterdir()) == [wide]
-
-
-@pytest.mark.parametrize("command", ["detect-video", "detect-image"])
-def test_wrong_cameras_are_refused(run: Run, files: Files, tmp_path: Path, command: str) -> None:
-    path, out = tmp_path / "my-camera.yaml", tmp_path / "out.mp4"
-    source, outputs = files.clip, [out]
-    if command == "detect-image":
-        source, outputs = files.picture, [Path("-o"), tmp_path / "out.png"]
-    path.write_text("camera: {lens: {width: 640, height: 480}}")
-    result = run(command, source, *outputs, "--lanes", "-c", path)
-    assert result.code == 1
-    assert "camera.lens.matrix: is required" in result.err
-    assert list(tmp_path.iterdir()) == [path]

@@ -61,13 +61,6 @@ def test_a_lane_of_the_right_width_is_found_in_every_test_picture(
         assert lane.radius is None or lane.radius > 400
 
 
-def test_straight_roads_are_straight(calibration: Calibration, real_data: Path) -> None:
-    for number in (1, 2):
-        lane = lane_in(calibration, real_data / "lane_images" / f"straight_lines{number}.jpg")
-        assert abs(lane.curvature) < 1 / 3000
-        assert lane.width == pytest.approx(3.7, abs=0.2)
-
-
 def test_the_lane_is_steady_on_pale_concrete(calibration: Calibration, real_data: Path) -> None:
     finder = finder_of(calibration)
     with VideoReader(real_data / "test_video.mp4") as reader:

@@ -158,10 +158,3 @@ def test_a_picture_without_a_lane_has_none(draw: Callable[[], Image]) -> None:
     finder = RoadFinder(None, LaneSettings(), 1280, 720)
     for _ in range(3):
         assert finder.update(finder.observe(Picture(draw()))).lane is None
-
-
-@pytest.mark.parametrize("size", [(16, 16), (64, 36), (50, 400)])
-def test_unusual_frame_sizes_raise_no_error(size: tuple[int, int]) -> None:
-    image = np.random.default_rng(0).integers(0, 256, (size[1], size[0], 3), dtype=np.uint8)
-    finder = RoadFinder(None, LaneSettings(), *size)
-    assert finder.update(finder.observe(Picture(image))).lane is None

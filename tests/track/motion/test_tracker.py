@@ -150,18 +150,6 @@ def test_a_vehicle_that_comes_out_from_behind_is_shown_once_it_is_clearly_detect
     assert len(follow([*[[hiding]] * 20, *[[hiding, half]] * 6])[-1]) == 1
 
 
-def test_a_hidden_vehicle_is_forgotten_after_some_seconds() -> None:
-    van = moved_to(VAN, 370, 390)
-    clip = [
-        *[[CAR]] * 10,
-        *[[CAR, item] for item in moving(moved_to(VAN, 200, 390), dx=10, frames=10)],
-        *[[van]] * (frames(DEFAULTS.keep_hidden_id_seconds) + 30),
-        *[[moved_to(VAN, 800, 390), CAR]] * 8,
-    ]
-    shown = follow(clip)
-    assert id_at(shown[-1], CAR) not in ids(shown[:20])
-
-
 # One vehicle, one track
 
 
@@ -174,22 +162,9 @@ def test_a_hidden_vehicle_does_not_take_the_detection_of_the_nearer_one() -> Non
     assert shown[-1][0].box.iou(near) > 0.95
 
 
-def test_two_boxes_that_overlap_and_stand_level_are_one_vehicle() -> None:
-    rear, side = Box.sized(400, 400, 120, 80), Box.sized(470, 398, 130, 84)
-    assert ids(follow([[rear, side]] * 30)) == {1}
-
-
 def test_a_vehicle_behind_another_one_is_a_vehicle() -> None:
     behind = Box.sized(480, 395, 90, 45)
     assert ids(follow([[CAR, behind]] * 10)) == {1, 2}
-
-
-def test_two_tracks_that_come_together_become_the_older_one() -> None:
-    other = [moved_to(CAR, max(400, 600 - 10 * n), 400) for n in range(60)]
-    clip = [[CAR], [CAR], *[[CAR, place] for place in other]]
-    shown = follow(clip)
-    assert ids(shown[:12]) == {1, 2}
-    assert ids(shown[-10:]) == {1}
 
 
 def test_a_small_vehicle_before_a_large_one_is_not_a_part_of_it() -> None:

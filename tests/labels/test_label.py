@@ -1,10 +1,14 @@
+"""Labels, and the texts and numbers that they are read from."""
+
+import math
 from pathlib import Path
 
 import pytest
 
 from labels.saving import checked_video, row
 from vdet.errors import TruthError
-from vdet.labels.label import NO_ID, Label, LabelledVideo
+from vdet.labels.label import NO_ID, Label, LabelledVideo, SavedTracks
+from vdet.labels.parsing import numbered_lines, parse_number
 
 
 def scene(frame_count: int | None = None) -> LabelledVideo:
@@ -48,3 +52,41 @@ def test_an_id_twice_in_a_frame_is_refused_with_its_line() -> None:
 def test_a_frame_may_have_many_ignore_regions_without_an_id() -> None:
     rows = [row(line, 1, NO_ID, 0, 0, 5, 5, ignored=True) for line in (1, 2, 3)]
     assert checked_video(rows, FILE).ignored.tolist() == [True] * 3
+
+
+def test_words_for_a_class_become_ours_and_others_stay() -> None:
+    labels = ("Van", "lorry", "tractor", None)
+    rows = [row(1, 1, number, 0, 0, 9, 9, name=label) for number, label in enumerate(labels)]
+    names = [track.class_name for track in next(iter(SavedTracks(tuple(rows)))).tracks]
+    assert names == ["car", "truck", "tractor", None]
+
+
+def test_a_rate_gives_times_to_frames_without() -> None:
+    saved = SavedTracks((row(1, 6, 1, 0, 0, 9, 9), row(1, 7, 1, 0, 0, 9, 9)), times={6: 0.5})
+    assert not saved.has_times
+    assert math.isnan(next(iter(saved)).time)
+    timed = saved.at_rate(10)
+    assert timed.has_times
+    assert [frame.time for frame in timed] == [0.5, 0.5]
+
+
+def test_blank_lines_count() -> None:
+    assert list(numbered_lines(Path("a"), b"a\r\n\r\n b \nc")) == [(1, "a"), (3, "b"), (4, "c")]
+
+
+@pytest.mark.parametrize(
+    "text", ["", "nan", "inf", "-inf", "0x1", "1,5", "car", "1 2", "10000001", "-1e300", "9" * 5000]
+)
+def test_what_is_not_a_number_or_beyond_the_limit_is_refused(text: str) -> None:
+    with pytest.raises(ValueError, match="is not a number of at most 10000000"):
+        parse_number(text)
+
+
+@pytest.mark.parametrize("content", [b"\xff\xfe\x00", bytes(range(256))])
+def test_a_file_that_is_not_text_is_refused(content: bytes) -> None:
+    with pytest.raises(TruthError, match="gt: is not text"):
+        list(numbered_lines(Path("gt"), content))
+
+
+def test_a_byte_order_mark_is_not_part_of_the_text() -> None:
+    assert list(numbered_lines(Path("gt"), b"\xef\xbb\xbf1,2")) == [(1, "1,2")]
