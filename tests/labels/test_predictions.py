@@ -67,11 +67,7 @@ def record(**changes: object) -> str:
         ("jsonl", JSONL + "[" * 100_000 + "\n", ":5: Invalid JSON"),
         ("jsonl", JSONL + record(frame=3), ":5: frame 3 comes after frame 3"),
         ("jsonl", JSONL + record(frame="x"), ":5: frame: Input should be a valid integer"),
-        (
-            "jsonl",
-            JSONL + record(time=0.11),
-            ":5: frame 4 is at 0.11 s; times must",
-        ),
+        ("jsonl", JSONL + record(time=0.11), ":5: frame 4 is at 0.11 s; times must"),
         ("csv", CSV + "1,0.09,2,1,1,9,9,detected\n", ":3: frame 2 is at 0.08 s; times must"),
         ("jsonl", JSONL + record(tracks=None), ":5: tracks: Input should be a valid"),
     ],

@@ -39,11 +39,7 @@ def test_settings_give_words_another_role_and_add_new_ones() -> None:
 
 @pytest.mark.parametrize(
     ("classes", "vehicles"),
-    [
-        (OUR_NAMES, OUR_NAMES),
-        (("car",), ("car",)),
-        (("truck", "tractor"), ("truck",)),
-    ],
+    [(OUR_NAMES, OUR_NAMES), (("car",), ("car",)), (("truck", "tractor"), ("truck",))],
 )
 def test_classes_that_the_detector_does_not_look_for_are_ignored(
     classes: tuple[str, ...], vehicles: tuple[str, ...]

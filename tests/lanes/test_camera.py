@@ -98,19 +98,10 @@ def test_a_camera_is_read_with_all_its_digits(path: Path) -> None:
     ("key", "value", "message"),
     [
         ("width", "wide", "camera.yaml:3:5: camera.lens.width: must be a valid integer"),
-        ("height", 0, "camera.yaml:4:5: camera.lens.height: must be greater than or equal to 16"),
         ("matrix", [[1, 2], [3, 4]], "camera.yaml:6:7: camera.lens.matrix[0][2]: is required"),
-        ("matrix", 7, "camera.yaml:5:5: camera.lens.matrix: must be a list"),
-        (
-            "matrix",
-            [[560, 3, 322], [0, 558, 236], [0, 0, 1]],
-            "5:5: camera.lens.matrix: must be [[fx, 0, c",
-        ),
         ("matrix", [[1, 0, 322], [0, 558, 236], [0, 0, 1]], "with focal lengths of 0.1 to 100 t"),
-        ("matrix", [[560, 0, 322], [0, 1e6, 236], [0, 0, 1]], "with focal lengths of 0.1 to 100"),
         ("matrix", [[560, 0, 322], [0, 558, 500], [0, 0, 1]], "the principal point in the frame"),
         ("distortion", [0, 0, 0, 0, float("nan")], "distortion[4]: must be a finite number"),
-        ("rms", -1, "rms: must be greater than or equal to 0"),
         ("colour", "red", "camera.lens.colour: unknown setting"),
     ],
 )

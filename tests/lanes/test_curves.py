@@ -7,11 +7,7 @@ import pytest
 
 from vdet.boxes import Image
 from vdet.config.schema import LaneSettings
-from vdet.lanes.curves import (
-    LaneCurves,
-    fit_near,
-    fit_new,
-)
+from vdet.lanes.curves import LaneCurves, fit_near, fit_new
 from vdet.lanes.paint import HIDDEN, PAINT
 from vdet.lanes.top_view import TopView
 

@@ -80,11 +80,6 @@ def test_nothing_stands_above_the_horizon_or_nowhere(row: float) -> None:
     assert place((640, row)) is None
 
 
-def test_the_lane_reaches_a_quarter_farther_than_it_is_fitted() -> None:
-    assert place(pixel_of(1.25 * FAR - 0.5, 0)) is not None
-    assert place(pixel_of(1.25 * FAR + 0.5, 0)) is None
-
-
 def test_where_a_row_is_worth_too_many_metres_the_distance_is_not_known() -> None:
     small = PinholeCamera.dashboard(160, 90)
     view = TopView(lane_view(small, near=6, far=FAR), small.width, small.height)

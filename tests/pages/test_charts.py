@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from vdet.pages.charts import (
     clock,
-    histogram,
     interval_plot,
     level_plot,
     number_axis,
@@ -37,14 +36,6 @@ def test_axes_have_round_numbers() -> None:
     assert (fixed.low, fixed.high, fixed.ticks[0]) == (0.5, 0.95, (0.5, "0.5"))
 
 
-def test_a_level_has_a_bar_for_each_step_in_which_something_is_shown() -> None:
-    plot = level_plot([(40, 160), (80, 160), (90, 99)], time_axis(0, 160), "levels", [])
-    heights = {round(bar.left): bar.high for bar in plot.bars}
-    assert [heights.get(second, 0) for second in (39, 40, 80, 90, 99)] == [0, 1, 2, 3, 2]
-    assert plot.y.high == 3
-    assert level_plot([], time_axis(0, 0), "nothing", []).bars == []
-
-
 def test_the_series_of_an_interval_are_stacked_and_named_with_their_sums() -> None:
     series = {"in": Counter({60.0: 3, 120.0: 1}), "out": Counter({120.0: 2})}
     plot = interval_plot(series, time_axis(60, 240), 60, "counts")
@@ -67,21 +58,6 @@ def test_a_time_axis_may_show_the_time_of_the_day() -> None:
     ]  # fmt: skip
     late = [text for _, text in time_axis(0, 120, 86370).ticks]
     assert late == ["23:59:30", "00:00", "00:00:30", "00:01", "00:01:30"]
-
-
-def test_a_histogram_has_a_bar_for_each_class_with_a_value() -> None:
-    plot = histogram([31.0, 34.9, 35.0, 52.0], 5, "speeds", "km/h")
-    assert [(bar.left, bar.right, bar.high) for bar in plot.bars] == [
-        (30, 35, 2), (35, 40, 1), (50, 55, 1),
-    ]  # fmt: skip
-    assert plot.bars[0].title == "30 to 35 km/h"
-
-
-def test_a_jump_of_the_clock_costs_nothing() -> None:
-    late = 6e13
-    series = {"in": Counter({60.0: 3, late: 1})}
-    plot = interval_plot(series, time_axis(0, late), 60, "counts")
-    assert len(plot.bars) == 2
 
 
 @given(

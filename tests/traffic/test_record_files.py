@@ -35,27 +35,12 @@ def test_json_is_a_list_of_vehicles(tmp_path: Path) -> None:
     )
     (item,) = json.loads(written(tmp_path / "a.JSON", truck))
     assert item == {
-        "id": 3,
-        "class": "truck",
-        "clock": None,
-        "first": 0,
-        "last": 0,
-        "seconds": 0,
-        "detected": 0,
-        "interpolated": 0,
-        "predicted": 1,
-        "mean_score": 1,
-        "best_score": 1,
+        "id": 3, "class": "truck", "clock": None, "first": 0, "last": 0, "seconds": 0,
+        "detected": 0, "interpolated": 0, "predicted": 1, "mean_score": 1, "best_score": 1,
         "path": {"start": [16, 42], "end": [16, 42], "length": 0, "length_share": 0},
         "largest": {"x": 1, "y": 2, "width": 30, "height": 40},
-        "metres": None,
-        "speed": None,
-        "speed_85": None,
-        "speed_sd": None,
-        "motion": None,
-        "distance": None,
-        "lane": None,
-    }
+        **dict.fromkeys(("metres", "speed", "speed_85", "speed_sd", "motion", "distance", "lane")),
+    }  # fmt: skip
     assert json.loads(written(tmp_path / "none.json")) == []
 
 

@@ -75,13 +75,6 @@ def test_of_others_the_one_with_the_higher_score_stays_under_the_older_id(
     assert stronger.id == kept
 
 
-def test_a_level_track_that_overlaps_another_one_a_little_keeps_its_id() -> None:
-    hidden, nearer = vehicle(number=1, score=0.6), vehicle(moved(55))
-    hidden.begin = -1.0
-    assert without(hidden, nearer) == [hidden, nearer]
-    assert nearer.id is None
-
-
 def test_of_two_tracks_that_were_apart_the_weaker_is_lost() -> None:
     """A vehicle that drives over a shadow is not lost, though the shadow was there before it."""
     shadow, car = vehicle(number=1, score=0.4), vehicle(moved(10), number=2)

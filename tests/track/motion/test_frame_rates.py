@@ -7,14 +7,7 @@ import pytest
 
 from boxing import moved_to
 from track.motion.scenes import WIDTH, detections, follow, ids, inside
-from track.motion.traffic import (
-    PERFECT,
-    Noise,
-    RoadVehicle,
-    random_traffic,
-    track_scores,
-    truth_at,
-)
+from track.motion.traffic import PERFECT, Noise, RoadVehicle, random_traffic, track_scores, truth_at
 from vdet.boxes import Box
 from vdet.config.schema import MotionTrackerSettings
 from vdet.evaluate.scores import Scores
@@ -99,10 +92,10 @@ def test_perfect_detections_give_each_vehicle_one_id(rate: int) -> None:
 
 
 @cache
-def noisy_traffic(seed: int, rate: int) -> Scores:
+def noisy_traffic(seed: int, rate: int, stride: int = 1) -> Scores:
     vehicles = random_traffic(seed, SECONDS, fastest=12)
     clip = [truth_at(vehicles, n / rate) for n in range(int(SECONDS * rate))]
-    return track_scores(clip, rate, Noise(), seed)
+    return track_scores(clip, rate, Noise(), seed, stride=stride)
 
 
 @pytest.mark.parametrize("rate", [5, 10, 50])
@@ -124,3 +117,13 @@ def test_many_weak_false_detections_do_not_become_tracks(rate: int) -> None:
     assert scores.f1 > 0.93
     shown_after = [(delay or 0) / rate for delay in scores.delays]
     assert max(shown_after) <= max(0.4, 3 / rate)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_drawn_traffic_is_followed_nearly_as_well_where_few_frames_are_searched(seed: int) -> None:
+    every, second, fifth = (noisy_traffic(seed, 25, stride) for stride in (1, 2, 5))
+    assert every.f1 > 0.95
+    assert second.f1 > every.f1 - 0.03
+    assert fifth.f1 > every.f1 - 0.1
+    assert fifth.false_tracks == 0
+    assert np.isclose(second.vehicle_boxes, every.vehicle_boxes)

@@ -23,14 +23,6 @@ def test_matches_in_a_row_are_ended_by_a_region_and_not_by_a_miss() -> None:
     assert car.matches == 0
 
 
-def test_the_latest_image_is_searched_around_the_latest_box() -> None:
-    car = Car(SEED_TRACKER)
-    car.see(Region(Box.sized(0, 0, 60, 60), (30, 30), 2.0), FRAME)
-    car.see(Region(BOX, (141, 92), 2.0, 0.7, {"car": 1.0}), FRAME)
-    found = car.find_in(np.roll(FRAME, (-4, 7), axis=(0, 1)))
-    assert found == Region(moved_to(BOX, 107, 56), (148, 88), 2.0, 0.7, {"car": 1.0})
-
-
 # The search for its image
 
 GREY = np.full((200, 300, 3), 90, np.uint8)
