@@ -124,16 +124,8 @@ _LISTS: dict[str, TypeAdapter[Any]] = {
 _UNLABELLED = "info.unlabelled_classes"  # of our own: they may be there without a label
 
 
-@dataclass
-class _Document:
-    """What a document holds: images by id with their labels, and classes without labels."""
-
-    images: dict[int, _Image]
-    unlabelled: tuple[str, ...]
-
-
-def _read(path: Path, file: BinaryIO) -> _Document:
-    """Return the images of a document with their labels. Raises `TruthError`."""
+def _read(path: Path, file: BinaryIO) -> tuple[list[_Image], tuple[str, ...]]:
+    """Return the images with their labels, and classes without labels. Raises `TruthError`."""
     found: dict[str, list[Any]] = {name: [] for name in (*_LISTS, _UNLABELLED)}
     for place, values in json_values(path, file, *(f"{name}.item" for name in found)):
         name = place.removesuffix(".item")
@@ -160,7 +152,7 @@ def _read(path: Path, file: BinaryIO) -> _Document:
         id_, frame = NO_ID if entry.track_id is None else entry.track_id, image.frame_index or 0
         known = frame + 1, id_, entry.score, entry.iscrowd, state
         image.labels.append(Label(place, box, names[entry.category_id], *known))
-    return _Document(by_id, tuple(unlabelled))
+    return images, tuple(unlabelled)
 
 
 def read_coco(path: Path, data: bytes) -> SavedTracks:
@@ -172,7 +164,7 @@ def read_coco(path: Path, data: bytes) -> SavedTracks:
         The file is not of this form or too large, an id of images or categories or a frame occurs
         twice, a time is wrong, or an annotation names an image or a category that is not there.
     """
-    images = list(_read(path, io.BytesIO(data)).images.values())
+    images, _ = _read(path, io.BytesIO(data))
     labels = tuple(label for image in images for label in image.labels)
     frames = [image.frame_index for image in images if image.frame_index is not None]
     if len(frames) < len(images) or any(label.id == NO_ID for label in labels):
@@ -208,13 +200,13 @@ def read_coco_pictures(path: Path) -> Iterator[LabelledPicture]:
     try:
         with path.open("rb") as file:
             record_input(file.fileno())
-            document = _read(path, file)
+            images, unlabelled = _read(path, file)
     except OSError as error:
         raise TruthError(f"{path}: cannot be read: {error.strerror}") from error
-    for image in document.images.values():
+    for image in images:
         folder = folder or _picture_folder(path, image.file_name)
         picture, labels = folder / image.file_name, tuple(image.labels)
-        yield LabelledPicture(picture, path, labels, image.size, document.unlabelled)
+        yield LabelledPicture(picture, path, labels, image.size, unlabelled)
 
 
 def _picture_folder(path: Path, name: str) -> Path:

@@ -18,8 +18,8 @@ from vdet.errors import TruthError
 from vdet.labels import parsing
 from vdet.labels.documents import json_values
 from vdet.labels.formats import Format, SourceVideo, last_classes
-from vdet.labels.label import SavedTracks, limited
-from vdet.labels.parsing import Index, Row, Times, checked_times, first_mistake
+from vdet.labels.label import SavedTracks
+from vdet.labels.parsing import Index, Row, first_mistake
 from vdet.track.track import FrameTracks
 from vdet.version import __version__
 
@@ -98,7 +98,6 @@ def read_ottrk(path: Path, data: bytes) -> SavedTracks:
     """
     what = f"{path}: is not OTVision's tracks with detections of version {_DETECTIONS}"
     videos: list[_Video] = []
-    moments: Times = {}
 
     def rows() -> Iterator[Row]:
         file, number = bz2.BZ2File(io.BytesIO(data)), count()
@@ -109,16 +108,16 @@ def read_ottrk(path: Path, data: bytes) -> SavedTracks:
                 yield f"{_BOX.removesuffix('item')}{next(number)}", _row(value)
 
     try:
-        labels = limited(path, parsing.row_labels(path, rows(), moments, first_frame=1))
+        labels, moments = parsing.read_rows(path, rows(), first_frame=1)
     except (EOFError, OSError, AttributeError, ValidationError) as error:
         raise TruthError(f"{what}, or is damaged: {first_mistake(error)}") from error
     if not videos:
         raise TruthError(f"{what}: has no {_HEAD}")
     [video, *_] = videos
-    times = {frame: (place, moment - video.begin) for frame, (place, moment) in moments.items()}
+    times = {frame: moment - video.begin for frame, moment in moments.items()}
     size = (video.width, video.height) if video.width and video.height else None
     begin = datetime.fromtimestamp(video.begin, UTC).astimezone()
-    return SavedTracks(labels, None, checked_times(path, times), size, begin)
+    return SavedTracks(labels, None, times, size, begin)
 
 
 def _row(box: Mapping[str, Any]) -> tuple[Any, ...]:

@@ -13,7 +13,7 @@ from pydantic import Field, TypeAdapter, ValidationError
 from vdet.archives import ArchiveError, list_members, open_archive, read_member
 from vdet.errors import TruthError
 from vdet.files import read_whole
-from vdet.labels.label import Corners, Label, from_size, line_error
+from vdet.labels.label import Corners, Label, from_size, limited, line_error
 from vdet.track.track import State
 
 LIMIT = 10_000_000
@@ -177,21 +177,29 @@ Row = tuple[int | str, Sequence[Any]]
 """The place of a box in its file, and its values in the order of `KINDS`."""
 
 
-def row_labels(
-    path: Path, rows: Iterable[Row], times: Times, first_frame: int = 0
-) -> Iterator[Label]:
-    """Yield the label of each row, and put the time of its frame into `times`.
+def read_rows(
+    path: Path, rows: Iterable[Row], times: Times | None = None, first_frame: int = 0
+) -> tuple[tuple[Label, ...], dict[int, float]]:
+    """Return the labels of rows, and the times of all frames.
 
     Parameters
     ----------
+    times
+        Those of frames without a box, which `rows` may fill.
     first_frame
         The number of the first frame of a video in the file.
 
     Raises
     ------
     TruthError
-        A value is not what its column needs.
+        A value is not what its column needs, there are too many rows, or a time is wrong.
     """
+    times = {} if times is None else times
+    return limited(path, _labels(path, rows, times, first_frame)), checked_times(path, times)
+
+
+def _labels(path: Path, rows: Iterable[Row], times: Times, first_frame: int) -> Iterator[Label]:
+    """Yield the label of each row, and put the time of its frame into `times`."""
     left = iter(rows)
     while block := list(islice(left, _BLOCK)):
         places, cells = zip(*block, strict=True)

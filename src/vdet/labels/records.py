@@ -6,9 +6,8 @@ JSON lines have a record for each frame, even one without a box. CSV has a row f
 import csv
 import io
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from datetime import datetime, timedelta
-from itertools import islice
 from operator import itemgetter
 from pathlib import Path
 from typing import Annotated, Any, NotRequired
@@ -19,17 +18,8 @@ from typing_extensions import TypedDict
 from vdet.config.camera import moment
 from vdet.errors import TruthError
 from vdet.labels.formats import Format
-from vdet.labels.label import SavedTracks, limited, line_error
-from vdet.labels.parsing import (
-    KINDS,
-    Index,
-    Row,
-    Times,
-    checked_times,
-    first_mistake,
-    numbered_lines,
-    row_labels,
-)
+from vdet.labels.label import SavedTracks, line_error
+from vdet.labels.parsing import KINDS, Index, Row, Times, first_mistake, numbered_lines, read_rows
 from vdet.track.track import FrameTracks, Track
 
 _NEEDED = ("frame", "time", "id", "x", "y", "width", "height")
@@ -40,6 +30,9 @@ CLOCK = "clock"
 """Name of the fact and of the column that has the moment of a frame, in ISO 8601."""
 
 _OF_TRACK = tuple(KINDS)[2:]
+
+_Clock = tuple[int, str | None, float | str]
+"""The number of a line, the moment that it has, and its time in seconds."""
 
 
 class _Record(TypedDict):
@@ -93,13 +86,12 @@ def read_json_lines(path: Path, data: bytes) -> SavedTracks:
     TruthError
         The file is empty, a line is not such a record, frames do not ascend, or a time is wrong.
     """
-    times: Times = {}
-    labels = limited(path, row_labels(path, _json_rows(path, data, times), times))
+    frames: Times = {}
+    clocks: list[_Clock] = []
+    labels, times = read_rows(path, _json_rows(path, data, frames, clocks), frames)
     if not times:
         raise TruthError(f"{path}: is empty; it should have a record for every frame")
-    line, first = next(numbered_lines(path, data))
-    begin = _begin(path, line, _RECORD.validate_json(first).get("clock"), times)
-    return SavedTracks(labels, tuple(times), checked_times(path, times), begin=begin)
+    return SavedTracks(labels, tuple(times), times, begin=_begin(path, clocks))
 
 
 def read_csv(path: Path, data: bytes) -> SavedTracks:
@@ -113,29 +105,23 @@ def read_csv(path: Path, data: bytes) -> SavedTracks:
         A column is missing or appears twice, a row has another number of cells, a cell is not what
         its column needs, or a time is wrong.
     """
-    times: Times = {}
-    labels = limited(path, row_labels(path, _csv_rows(path, data), times))
-    (_, heading), *rows = islice(numbered_lines(path, data), 2)
-    known = checked_times(path, times)
-    begin = None
-    for line, row in rows:
-        cells = dict(zip(_cells(path, 1, heading), _cells(path, line, row), strict=True))
-        begin = _begin(path, line, cells.get(CLOCK), times)
-    return SavedTracks(labels, times=known, begin=begin)
+    clocks: list[_Clock] = []
+    labels, times = read_rows(path, _csv_rows(path, data, clocks))
+    return SavedTracks(labels, times=times, begin=_begin(path, clocks))
 
 
-def _begin(path: Path, line: int, clock: str | None, times: Times) -> datetime | None:
-    """Return the moment of time 0 from that of the first row."""
-    if not clock:
-        return None
-    try:
-        return moment(clock) - timedelta(seconds=next(iter(times.values()))[1])
-    except (ValueError, OverflowError) as error:
-        raise line_error(path, line, f"clock: {error}") from error
+def _begin(path: Path, clocks: Sequence[_Clock]) -> datetime | None:
+    """Return the moment of time 0 from the clock of the first row."""
+    for line, clock, time in clocks[:1]:
+        try:
+            return moment(clock) - timedelta(seconds=float(time)) if clock else None
+        except (ValueError, OverflowError) as error:
+            raise line_error(path, line, f"clock: {error}") from error
+    return None
 
 
-def _json_rows(path: Path, data: bytes, times: Times) -> Iterator[Row]:
-    """Yield the boxes of every record, and put the time of its frame into `times`."""
+def _json_rows(path: Path, data: bytes, times: Times, clocks: list[_Clock]) -> Iterator[Row]:
+    """Yield the boxes of every record, and put the time and the clock of its frame into lists."""
     last = -1
     for line, content in numbered_lines(path, data):
         try:
@@ -146,12 +132,17 @@ def _json_rows(path: Path, data: bytes, times: Times) -> Iterator[Row]:
             raise line_error(path, line, f"frame {record['frame']} comes after frame {last}")
         last, time = record["frame"], record["time"]
         times[last] = line, time
+        if not clocks:
+            clocks.append((line, record.get("clock"), time))
         for track in record["tracks"]:
             yield line, (last, time, *map(track.get, _OF_TRACK))
 
 
-def _csv_rows(path: Path, data: bytes) -> Iterator[Row]:
-    """Yield the rows of a table; an empty cell is None, and so is one of a missing column."""
+def _csv_rows(path: Path, data: bytes, clocks: list[_Clock]) -> Iterator[Row]:
+    """Yield the rows of a table; an empty cell is None, and so is one of a missing column.
+
+    `clocks` gets that of the first row.
+    """
     lines = numbered_lines(path, data)
     names = _cells(path, *next(lines, (1, "")))
     if any(names.count(name) != 1 for name in _NEEDED):
@@ -164,6 +155,9 @@ def _csv_rows(path: Path, data: bytes) -> Iterator[Row]:
             what = f"has {len(cells)} cells, but the header has {len(names)}"
             raise line_error(path, line, f"this line {what}")
         cells.append("")
+        if not clocks:
+            clock = cells[names.index(CLOCK)] if CLOCK in names else None
+            clocks.append((line, clock, cells[names.index("time")]))
         row: list[Any] = [cell or None for cell in pick(cells)]
         row[_FOOT] = [None if None in row[_FOOT] else row[_FOOT]]
         yield line, row
