@@ -7,8 +7,7 @@ import pytest
 
 from vdet.boxes import Image
 from vdet.config.schema import LaneSettings
-from vdet.lanes.drawing import draw_lane, lane_text, stage_pictures
-from vdet.lanes.road import Lane, RoadFinder
+from vdet.lanes.road import Lane, RoadFinder, draw_lane, lane_text, stage_pictures
 from vdet.media import Picture
 
 LANE = Lane(

@@ -10,7 +10,7 @@ import re
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import BinaryIO, NamedTuple
+from typing import BinaryIO
 from xml.etree import ElementTree as ET
 from xml.sax.saxutils import escape, quoteattr
 
@@ -66,11 +66,8 @@ def _box_lines(boxes: Sequence[tuple[int, Track]], count: int) -> Iterator[str]:
             yield f'    <box frame="{frame + 1}" outside="1" {text}></box>\n'
 
 
-class _Key(NamedTuple):
-    """A box that stands in the file; one that is `outside` ends the one before."""
-
-    label: Label
-    outside: bool
+_Key = tuple[Label, bool]
+"""A box that stands in the file, and whether it is outside: that ends the one before."""
 
 
 def read_cvat(path: Path, data: bytes) -> SavedTracks:
@@ -102,7 +99,7 @@ def _labels(path: Path, root: ET.Element, covered: range | None) -> Iterator[Lab
     """Yield the boxes of all tracks. Raises `TruthError`."""
     for track in root.iterfind("track"):
         try:
-            keys = sorted((_key(track, box) for box in track), key=lambda key: key.label.frame)
+            keys = sorted((_key(track, box) for box in track), key=lambda key: key[0].frame)
             yield from _boxes(covered, keys)
         except ValueError as error:
             raise line_error(path, f"track {track.get('id', ''):.40}", str(error)) from error
@@ -144,7 +141,7 @@ def _key(track: ET.Element, box: ET.Element) -> _Key:
     frame, sides = parse_whole(attribute(box, "frame")), [attribute(box, side) for side in _SIDES]
     state: State = "predicted" if box.get("occluded") == "1" else "detected"
     label = Label(f"track {id_}", parse_corners(sides), name, frame + 1, id_, state=state)
-    return _Key(label, attribute(box, "outside") == "1")
+    return label, attribute(box, "outside") == "1"
 
 
 def _boxes(covered: range | None, keys: Sequence[_Key]) -> Iterator[Label]:
@@ -159,7 +156,7 @@ def _boxes(covered: range | None, keys: Sequence[_Key]) -> Iterator[Label]:
             what = f"it has {every} from {covered.start} to {covered.stop - 1}"
             raise ValueError(f"no frame {index} is in the task; {what}")
         yield label
-        after = keys[number + 1].label if number + 1 < len(keys) else None
+        after = keys[number + 1][0] if number + 1 < len(keys) else None
         end = after.frame - 1 if after else covered.stop if covered else index + 1
         for frame in range(index + step, end, step):
             ratio = (frame - index) / (end - index) if after else 0.0

@@ -59,7 +59,7 @@ class Overlay:
         """
         surface = result.frame.picture.copy(used)
         if result.road and result.road.lane:
-            from vdet.lanes.drawing import draw_lane
+            from vdet.lanes.road import draw_lane
 
             draw_lane(surface, result.road.lane)
         shown = self._shown(result)

@@ -10,7 +10,7 @@ from vdet.config.rendering import render
 from vdet.draw.boxes import WHITE, color_of, draw_box, draw_label, draw_regions
 from vdet.errors import OutputError
 from vdet.files import write_text
-from vdet.lanes.drawing import stage_pictures
+from vdet.lanes.road import stage_pictures
 from vdet.media import Picture
 from vdet.media.images import encode_image, is_picture_name
 from vdet.pages.batch import VideoFacts, write_index
