@@ -44,7 +44,7 @@ _APART = np.array([0, 0, -1, 1, 0])  # the width, from the five parameters
 _PRIOR = np.diag([_BEND_WEIGHT, _MIN_WEIGHT, _MIN_WEIGHT, _MIN_WEIGHT, _PITCH_WEIGHT])
 _PRIOR += _WIDTH_WEIGHT * np.outer(_APART, _APART)
 
-_LEAST_VISIBLE = 0.25
+_MIN_VISIBLE = 0.25
 """Less of a line asks for no less paint: a little paint can be anything."""
 _MARKING = 4.0
 """Shortest length of paint by which a wholly visible line is seen, metres."""
@@ -52,7 +52,7 @@ _SCATTER = 0.08
 """Largest root mean square distance of paint from its curve, metres."""
 _CONVERGENCE = 1.6
 """Most that the lines converge or diverge over the top view, metres: a vehicle pitches."""
-_LEAST_RADIUS = 150.0
+_MIN_RADIUS = 150.0
 """Smallest radius of a bend, metres."""
 _JUMP = 0.35
 """Largest sideways move of a line between two frames, metres."""
@@ -106,8 +106,8 @@ def add_earlier(equations: Equations, earlier: Equations, memory: float) -> Equa
     The pitch of a vehicle changes from frame to frame; its position and the road do not. The
     earlier pitch is eliminated (Schur complement).
     """
-    share = earlier[:, _PITCH] / (earlier[_PITCH, _PITCH] + _PITCH_WEIGHT)
-    rest = earlier - np.outer(share, earlier[_PITCH])
+    factors = earlier[:, _PITCH] / (earlier[_PITCH, _PITCH] + _PITCH_WEIGHT)
+    rest = earlier - np.outer(factors, earlier[_PITCH])
     rest[_PITCH] = rest[:, _PITCH] = 0
     return equations + memory * rest
 
@@ -194,14 +194,14 @@ def _is_plausible(curves: LaneCurves, top_view: TopView) -> bool:
     return (
         abs(curves.width - top_view.lane_width) <= WIDTH_TOLERANCE
         and abs(curves.pitch) * top_view.length * curves.width <= _CONVERGENCE
-        and 2 * abs(curves.bend) * _LEAST_RADIUS <= 1
+        and 2 * abs(curves.bend) * _MIN_RADIUS <= 1
     )
 
 
 def _is_seen(paint: LinePaint, top_view: TopView, x: Float64Array) -> bool:
     """Check that a line has enough paint, close enough to its curve x `(rows,)`."""
-    share = max(paint.visible, _LEAST_VISIBLE)
-    if len(paint.z) < share * _MARKING * ALONG:
+    fraction = max(paint.visible, _MIN_VISIBLE)
+    if len(paint.z) < fraction * _MARKING * ALONG:
         return False
     distance = paint.x - np.interp(-paint.z, -top_view.distances, x)
     return float(np.sqrt(np.mean(distance**2))) <= _SCATTER

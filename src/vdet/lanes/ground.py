@@ -16,7 +16,7 @@ from vdet.lanes.camera import Undistorter
 
 _THIN = 0.01
 """Width of points that count as one line, as a fraction of their length."""
-_MOST_ERROR = 0.03
+_MAX_ERROR = 0.03
 """Largest error of the fit, as a fraction of the length of the area."""
 
 
@@ -115,7 +115,7 @@ def fit_ground(pixels: Float64Array, metres: Float64Array, undistorter: Undistor
     pixel_off = np.hypot(*(_mapped(back, metres) - straight).T)
     area = cv2.convexHull(metres.astype(np.float32))[:, 0].astype(np.float64)
     error, pixel_error = (float(np.sqrt(np.mean(item**2))) for item in (off, pixel_off))
-    if error > _MOST_ERROR * _length(area):
+    if error > _MAX_ERROR * _length(area):
         worst = int(np.argmax(pixel_off))
         raise ConfigError(
             f"camera.ground[{worst}]: lies {off[worst]:.1f} m from where the others say"

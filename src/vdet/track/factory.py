@@ -81,14 +81,14 @@ class InterpolatingTracker:
             return tracks
         end, following = self._searched[1] if len(self._searched) > 1 else (inf, tracks)
         ends = {track.id: track for track in following}
-        share = (time - begin) / (end - begin)
-        return [_moved(track, ends[track.id], share) for track in tracks if track.id in ends]
+        fraction = (time - begin) / (end - begin)
+        return [_moved(track, ends[track.id], fraction) for track in tracks if track.id in ends]
 
 
-def _moved(track: Track, end: Track, share: float) -> Track:
+def _moved(track: Track, end: Track, fraction: float) -> Track:
     """Return a track that has done this fraction of its way to `end`."""
     first, last = (np.array([*item.foot, *astuple(item.box)]) for item in (track, end))
-    x, y, *sides = (first + (last - first) * share).tolist()
+    x, y, *sides = (first + (last - first) * fraction).tolist()
     state: State = "predicted" if track.state == "predicted" else "interpolated"
     return replace(track, box=Box(*sides), whole_foot=(x, y), state=state)
 

@@ -21,7 +21,7 @@ ENTER, EXIT, APPEAR, VANISH = "enter", "exit", "appear", "vanish"
 _AT_EDGE = 0.002
 """A point within this fraction of the frame's side (or one pixel) of the frame's edge lies on it.
 """
-_MOST_AT_EDGE = 0.005
+_MAX_AT_EDGE = 0.005
 """Limit of that one pixel in small frames, as a fraction; lines are longer (`SHORTEST_LINE`)."""
 _INSIDE = 0.01
 """Pixels from the edge of the frame to which points outside are moved."""
@@ -29,7 +29,7 @@ _SETTLED = 0.1
 """Seconds after which a vehicle off a border's band has changed the side."""
 _BAND = 0.05
 """Distance from a border within which a vehicle is on neither side, in heights of its box."""
-_LEAST_BAND = 0.003
+_MIN_BAND = 0.003
 """Smallest such distance, as a fraction of the frame's height."""
 
 _Size = tuple[float, float]
@@ -99,8 +99,8 @@ class Zone:
     def meeting(self, path: Segment) -> float:
         """Return how far along `path` it last meets the border, 0 to 1."""
         start, end = self._in_frame(np.array(path)).tolist()
-        shares = (meeting(((start[0], start[1]), (end[0], end[1])), side) for side in self.sides)
-        return max((share for share in shares if share is not None), default=1.0)
+        fractions = (meeting(((start[0], start[1]), (end[0], end[1])), side) for side in self.sides)
+        return max((fraction for fraction in fractions if fraction is not None), default=1.0)
 
     def _in_frame(self, points: Float64Array) -> Float64Array:
         return np.clip(points, _INSIDE, np.array(self.size) - _INSIDE)
@@ -114,8 +114,8 @@ def distances_to(segments: Sequence[Segment], points: Float64Array) -> Float64Ar
     """Return how far points `(n, 2)` are from the nearest points of segments `(m)`, `(n, m)`."""
     starts, ends = np.array(segments).swapaxes(0, 1)
     ways, there = ends - starts, points[:, np.newaxis] - starts
-    shares = np.clip((there * ways).sum(axis=2) / (ways**2).sum(axis=1), 0, 1)
-    return np.asarray(np.hypot(*np.moveaxis(there - shares[..., np.newaxis] * ways, 2, 0)))
+    fractions = np.clip((there * ways).sum(axis=2) / (ways**2).sum(axis=1), 0, 1)
+    return np.asarray(np.hypot(*np.moveaxis(there - fractions[..., np.newaxis] * ways, 2, 0)))
 
 
 def _are_inside(corners: Sequence[Point], points: Float64Array) -> BoolArray:
@@ -177,7 +177,7 @@ def _inner_sides(corners: Sequence[Point], size: _Size) -> tuple[Segment, ...]:
 
 def _snapped(value: float, length: float) -> float:
     """Return a coordinate, moved onto the frame's edge where it is very near to it."""
-    near = max(min(1.0, _MOST_AT_EDGE * length), _AT_EDGE * length)
+    near = max(min(1.0, _MAX_AT_EDGE * length), _AT_EDGE * length)
     if value <= near:
         return 0.0
     return float(length) if length - value <= near else value
@@ -236,13 +236,14 @@ def _changes(path: VehiclePath, border: Border) -> Iterator[Crossing]:
         if not len(rows) or settled == is_positive:
             continue
         if settled is not None:
-            share, time, place = _meeting(path, border, row)
+            fraction, time, place = _meeting(path, border, row)
             way = math.inf if crossed is None else math.dist(crossed, place)
             if not (is_clear[rows] | (path.heights[rows] <= way)).any():
                 continue  # a way back that is too short
-            crossed = None if share is None else place
-            if share is not None:
-                yield Crossing(time, row if share else row - 1, border.directions[1 - is_positive])
+            crossed = None if fraction is None else place
+            if fraction is not None:
+                at = row if fraction else row - 1
+                yield Crossing(time, at, border.directions[1 - is_positive])
         elif is_positive and isinstance(border, Zone):
             yield Crossing(float(path.times[0]), 0, APPEAR)
         settled = is_positive
@@ -256,7 +257,7 @@ def _settling(
     It is clear where this row or the one before shows it one height of the box away.
     """
     side, away, times = distances >= 0, np.abs(distances), path.times
-    is_off = away > np.maximum(_BAND * path.heights, _LEAST_BAND * border.size[1])
+    is_off = away > np.maximum(_BAND * path.heights, _MIN_BAND * border.size[1])
     is_far = is_off & (away >= path.heights)
     is_same = side[1:] == side[:-1]
     was_far = np.append(False, is_far[:-1] & is_same)
@@ -268,10 +269,13 @@ def _settling(
 
 
 def _meeting(path: VehiclePath, border: Border, row: int) -> tuple[float | None, float, Point]:
-    """Return where a path meets a border between a row and the one before: share, time, place."""
+    """Return where a path meets a border between a row and the one before.
+
+    That is the fraction of the way, None where it does not, and the time and the place.
+    """
     (ax, ay), (bx, by) = path.points[row - 1 : row + 1].tolist()
     before, after = path.times[row - 1 : row + 1].tolist()
-    share = border.meeting(((ax, ay), (bx, by)))
-    along = 1.0 if share is None else share
+    fraction = border.meeting(((ax, ay), (bx, by)))
+    along = 1.0 if fraction is None else fraction
     place = ax + along * (bx - ax), ay + along * (by - ay)
-    return share, before + along * (after - before), place
+    return fraction, before + along * (after - before), place

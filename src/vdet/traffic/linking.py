@@ -32,7 +32,7 @@ _TURNED, _OPPOSITE = 0.15, 0.6
 """
 _REACH = 0.5
 """Farthest that the next track begins from where the last one ended or would be, in heights."""
-_MOST_GROWTH = 2.0
+_MAX_GROWTH = 2.0
 """Largest ratio of the heights of the last box of a track and the first one of the next."""
 _ONWARD = 0.2, 0.3
 """Seconds after which a lost vehicle is taken to have driven on; two places settle a crossing."""
@@ -301,7 +301,7 @@ class _Lost:
         (x, y), (*_, height) = track.written_foot, track.box.xywh
         larger, smaller = np.maximum(self._heights, height), np.minimum(self._heights, height)
         distances = np.hypot(self._x - x, self._y - y)
-        fits = (larger <= _MOST_GROWTH * smaller) & (distances <= _REACH * larger)
+        fits = (larger <= _MAX_GROWTH * smaller) & (distances <= _REACH * larger)
         if not fits.any():
             return None
         key = self._keys[int(np.argmin(np.where(fits, distances, np.inf)))]

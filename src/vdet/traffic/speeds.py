@@ -24,7 +24,7 @@ from vdet.traffic.counts import Counts
 
 WINDOW = 1.0
 """Seconds of a path that give one velocity."""
-LEAST = 0.5
+MIN_SECONDS = 0.5
 """Minimum seconds of a path that give a speed."""
 KMH = 3.6
 """km/h in 1 m/s."""
@@ -40,11 +40,11 @@ _OUTLIERS = 0.1, 4.0
 distances; the larger one counts."""
 _FOOT_ERROR = 0.03
 """Standard deviation of the height at which a box ends, as a fraction of its height."""
-_MOST_ALIKE = 0.9
+_MAX_ALIKE = 0.9
 """Largest correlation of neighbouring places that is believed."""
 _MOVES = 1.0
 """Minimum speed of a vehicle that heads somewhere, m/s."""
-_LEAST_WAY = 1.0
+_MIN_WAY = 1.0
 """Shortest way that a relative error is taken of, metres."""
 _GONE = 10.0
 """Seconds after which a vehicle that is not shown has ended."""
@@ -81,13 +81,13 @@ class Speeds:
         """The length of the way."""
         return float(self._ways.sum())
 
-    def quantile(self, share: float) -> float:
+    def quantile(self, fraction: float) -> float:
         """Return the speed below which the vehicle covers this fraction of its way, m/s."""
         order = np.argsort(self.speeds)
         gone = np.cumsum(self._ways[order])
         if not gone[-1]:
             return 0.0
-        return float(self.speeds[order][np.searchsorted(gone, share * gone[-1])])
+        return float(self.speeds[order][np.searchsorted(gone, fraction * gone[-1])])
 
     @property
     def deviation(self) -> float:
@@ -188,7 +188,7 @@ def measure(ground: Ground, rows: Float64Array) -> Speeds | None:
     `rows` are time, x and y of the foot, width and height of the box, `(n, 5)`.
     """
     rows = rows[np.isfinite(_Sight.of(ground, rows).weights)]
-    if len(rows) < 3 or rows[-1, 0] - rows[0, 0] < LEAST:
+    if len(rows) < 3 or rows[-1, 0] - rows[0, 0] < MIN_SECONDS:
         return None
     seen = _Sight.of(ground, rows)
     line = _Line.of(seen.times, seen.places, seen.weights)
@@ -214,7 +214,7 @@ def _common(ground: Ground, rows: Float64Array) -> float:
     low = [(0, _FOOT_ERROR * height) for height in rows[[0, -1], 4]]
     places = ground.place(np.array([first, last, first + low[0], last + low[1]]))
     way, moved = places[1] - places[0], places[3] - places[2]
-    length = max(float(np.hypot(*way)), _LEAST_WAY)
+    length = max(float(np.hypot(*way)), _MIN_WAY)
     box = float(np.hypot(*(moved - way))) / length
     return math.hypot(0.0 if math.isnan(box) else box, ground.scale_error)
 
@@ -299,6 +299,6 @@ class _Line:
         heading = velocities / np.maximum(np.hypot(*velocities.T), _NOTHING)[:, None]
         off = np.sum((places - fitted) * heading, axis=1) * np.sqrt(weights)
         alike = np.sum(off[1:] * off[:-1]) / max(float(np.sum(off**2)), _NOTHING)
-        alike = float(np.clip(alike, 0, _MOST_ALIKE))
+        alike = float(np.clip(alike, 0, _MAX_ALIKE))
         variance = np.mean(off**2) * (1 + alike) / (1 - alike)
         return cls(velocities, fitted, np.sqrt(variance / spread))

@@ -30,7 +30,7 @@ _OPPOSED, _UP_AND_DOWN = 0.55, 0.1
 the same of their vertical parts: who turns off changes the way across first, but not up and down.
 """
 
-_MOST_UNLIKE = 1.2
+_MAX_UNLIKE = 1.2
 """Largest difference of the appearances of a lost vehicle and of one that may be it."""
 
 _BESIDE = 0.4
@@ -40,14 +40,14 @@ A vehicle may drive away from its track while detections of its parts still hold
 """
 
 _BESIDE_UNLIKE = 0.6
-"""As `_MOST_UNLIKE`, for two tracks that were there at the same time."""
+"""As `_MAX_UNLIKE`, for two tracks that were there at the same time."""
 
 _GROWTH = 3.0
 """How much larger or smaller its box may be then, as an area."""
 
 
 PART = 0.6
-"""A detection with more than this share inside a shown vehicle is a part of it."""
+"""A detection with more than this fraction inside a shown vehicle is a part of it."""
 
 HIDDEN = 0.5
 """A vehicle is hidden where a nearer one covers more than this fraction of it."""
@@ -203,8 +203,8 @@ def _case(vehicle: Vehicle, other: Vehicle, overlap: _Overlap, hidden: Sequence[
             return Case.APART
         return Case.HIDDEN if vehicle.confirmed else Case.PART
     if vehicle.confirmed:
-        share = PART if max(vehicle.age, other.age) > _APART else _LEVEL_OVERLAP
-        return Case.DUPLICATE if overlap.one > share else Case.APART
+        fraction = PART if max(vehicle.age, other.age) > _APART else _LEVEL_OVERLAP
+        return Case.DUPLICATE if overlap.one > fraction else Case.APART
     if vehicle.scores.value <= other.scores.value and overlap.one > _LEVEL_OVERLAP:
         return Case.PART
     if overlap.inside > PART:
@@ -230,7 +230,7 @@ def _may_be(lost: Vehicle, new: Vehicle) -> bool:
         return False
     across, down = lost.history.last_seen.state.velocity * new.history.last_seen.state.velocity
     turned = across + down < -_OPPOSED or down < -_UP_AND_DOWN
-    unlike = _MOST_UNLIKE if beside < 0 else _BESIDE_UNLIKE
+    unlike = _MAX_UNLIKE if beside < 0 else _BESIDE_UNLIKE
     return not turned and bool(differences(lost.appearance, new.appearance) < unlike)
 
 

@@ -15,7 +15,7 @@ from vdet.boxes import Float64Array, Image, iou
 from vdet.media import Picture
 
 WIDEST_BUFFER = 0.25
-"""Most that a box is widened by on each side, shares of its size."""
+"""Most that a box is widened by on each side, fractions of its size."""
 
 _FREE = -1
 
@@ -35,23 +35,23 @@ def buffered_iou(
 ) -> Float64Array:
     """Return how well each expected box fits each found one, 0 to 1, `(n, m)`.
 
-    Both boxes are widened by the buffer of the expected one, in shares of their own sizes. So two
-    boxes that do not touch may still belong together where little is known of the motion.
+    Both boxes are widened by the buffer of the expected one, in fractions of their own sizes. So
+    two boxes that do not touch may still belong together where little is known of the motion.
 
     Parameters
     ----------
     expected, found
         Shapes `(n, 4)` and `(m, 4)`: x1, y1, x2, y2 in pixels, each with an area.
     buffers
-        Shape `(n, 2)`: shares of width and height by which a box is widened on each side.
+        Shape `(n, 2)`: fractions of width and height by which a box is widened on each side.
     """
-    shares = np.minimum(buffers, WIDEST_BUFFER)[:, np.newaxis]
-    return iou(_widened(expected[:, np.newaxis], shares), _widened(found, shares))
+    fractions = np.minimum(buffers, WIDEST_BUFFER)[:, np.newaxis]
+    return iou(_widened(expected[:, np.newaxis], fractions), _widened(found, fractions))
 
 
-def _widened(boxes: Float64Array, shares: Float64Array) -> Float64Array:
+def _widened(boxes: Float64Array, fractions: Float64Array) -> Float64Array:
     near, far = boxes[..., :2], boxes[..., 2:]
-    margin = (far - near) * shares
+    margin = (far - near) * fractions
     return np.concatenate([near - margin, far + margin], axis=-1)
 
 
@@ -81,8 +81,8 @@ def appearances(picture: Picture | None, boxes: Float64Array) -> Float64Array:
 
 def differences(some: Float64Array, others: Float64Array) -> Float64Array:
     """Return how much appearances, `(…, 2, 3)`, differ: 0 for equal ones, and for unknown ones."""
-    shares = (some - others) / _UNITS
-    return np.asarray(np.sqrt(np.nan_to_num(shares**2).mean(axis=(-2, -1))))
+    units = (some - others) / _UNITS
+    return np.asarray(np.sqrt(np.nan_to_num(units**2).mean(axis=(-2, -1))))
 
 
 def _mean(picture: Picture, box: Float64Array) -> list[float]:

@@ -5,7 +5,7 @@ nearly constant velocity is that of Bar-Shalom, Li and Kirubarajan, "Estimation 
 to Tracking and Navigation", 2001, section 6.2.2 (white noise acceleration in continuous time).
 
 The centre's x and y and the logarithms of width and height are four independent filters. All
-uncertainty is in shares of the vehicle's size, so that near and far vehicles, and small and large
+uncertainty is in fractions of the vehicle's size, so near and far vehicles, and small and large
 frames, are treated alike; times are seconds.
 """
 
@@ -16,10 +16,10 @@ import numpy as np
 
 from vdet.boxes import Float64Array
 
-_MOST_NEARER = 0.3
+_MAX_NEARER = 0.3
 """Largest change of the distance in a step that is believed, as a fraction of it."""
 
-_MOST_NEARER_RATE = 0.75
+_MAX_NEARER_RATE = 0.75
 """The same of a second: what comes out from behind another vehicle seems to come nearer faster."""
 
 _ACCELERATION = 0.8
@@ -42,8 +42,8 @@ class MotionState:
         float64 `(4, 2)`: centre x and y in full-frame pixels, log width and log height of the
         whole vehicle in pixels; each with its change a second.
     covariance
-        float64 `(4, 2, 2)`: of each of the four and its change; lengths in shares of the vehicle's
-        width (x) and height (y).
+        float64 `(4, 2, 2)`: of each of the four and its change; lengths in fractions of the
+        vehicle's width (x) and height (y).
     expected
         The mean before what this frame showed; None in the first frame.
     gain
@@ -80,16 +80,16 @@ class MotionState:
 
     @property
     def deviation(self) -> Float64Array:
-        """Standard deviation of the centre's x and y, `(2,)`, shares of width and height."""
+        """Standard deviation of the centre's x and y, `(2,)`, fractions of width and height."""
         return np.sqrt(self.covariance[:2, 0, 0])
 
     def moved(self, seconds: float) -> Float64Array:
-        """Return the mean so many seconds later.
+        """Return the mean `seconds` later.
 
         What moves evenly on the road comes near as its size grows, and ever faster in the picture:
         with a distance of Z, size and place change by 1 / Z and velocity by 1 / Z².
         """
-        most = min(_MOST_NEARER, _MOST_NEARER_RATE * abs(seconds))
+        most = min(_MAX_NEARER, _MAX_NEARER_RATE * abs(seconds))
         nearer = float(np.clip(np.mean(self.mean[2:, 1]) * seconds, -most, most))
         growth = 1 / (1 - nearer)
         mean = self.mean @ np.array([[1.0, 0.0], [seconds, 1.0]])
@@ -114,7 +114,7 @@ class MotionState:
         box
             x1, y1, x2, y2 in full-frame pixels, inside the frame, with an area.
         noise
-            Its standard deviation, in shares of the vehicle's size.
+            Its standard deviation, in fractions of the vehicle's size.
         size
             Width and height of the frame, pixels.
         """

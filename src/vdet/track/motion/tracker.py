@@ -39,7 +39,7 @@ class MotionTracker:
     Parameters
     ----------
     settings
-        Its lengths are shares of the vehicles' own size or of the frame.
+        Its lengths are fractions of the vehicles' own size or of the frame.
     width, height
         Size of the frames, pixels.
     """
@@ -104,8 +104,8 @@ class MotionTracker:
                 shown.append((vehicle, place, box, score))
         shown_boxes = np.reshape([box for _, _, box, _ in shown], (-1, 4))
         nested = are_nested(shown_boxes, [score for *_, score in shown])
-        each = zip(shown, nested, strict=True)
-        tracks = [self._track(*which) for which, is_nested in each if not is_nested]
+        pairs = zip(shown, nested, strict=True)
+        tracks = [self._track(*item) for item, is_nested in pairs if not is_nested]
         return sorted(tracks, key=lambda track: track.id)
 
     def _place(self, vehicle: Vehicle, time: float) -> Place | None:
@@ -128,8 +128,8 @@ class MotionTracker:
     def _staying(self) -> list[Vehicle]:
         """Return the vehicles that are neither over nor out of the frame."""
         are_inside = _are_large(self._boxes(self._vehicles))
-        each = zip(self._vehicles, are_inside, strict=True)
-        return [vehicle for vehicle, is_inside in each if is_inside and not vehicle.is_over]
+        pairs = zip(self._vehicles, are_inside, strict=True)
+        return [vehicle for vehicle, is_inside in pairs if is_inside and not vehicle.is_over]
 
     def _observations(self, detections: Boxes, picture: Picture | None) -> list[Observation]:
         boxes = visible(detections.sides, self._size)

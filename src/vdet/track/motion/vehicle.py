@@ -141,8 +141,8 @@ class History:
             # The misses between are of the same track.
             after = bisect_right(moments, time, key=lambda moment: moment.time)
             before = after - 1
-        share = (time - moments[before].time) / (moments[after].time - moments[before].time)
-        return np.asarray(means[before][:, 0] * (1 - share) + means[after][:, 0] * share)
+        fraction = (time - moments[before].time) / (moments[after].time - moments[before].time)
+        return np.asarray(means[before][:, 0] * (1 - fraction) + means[after][:, 0] * fraction)
 
     def _entering(self, first: int, time: float) -> Place | None:
         """Return where the vehicle was before its first detection, if it came into the frame."""
@@ -191,7 +191,7 @@ _NOISE = 0.12
 """Standard deviation of the sides of a detection with score 1, as a fraction of the vehicle's size.
 """
 
-_LEAST_SCORE = 0.05
+_MIN_SCORE = 0.05
 """Below this score the box of a detection is not taken to be any less exact."""
 
 
@@ -224,7 +224,7 @@ class Observation:
     @property
     def noise(self) -> float:
         """Standard deviation of the box: its variance grows as the score falls."""
-        return float(_NOISE / max(self.score, _LEAST_SCORE) ** 0.5)
+        return float(_NOISE / max(self.score, _MIN_SCORE) ** 0.5)
 
 
 @dataclass(eq=False, slots=True)
