@@ -123,53 +123,43 @@ def test_confirmed_cars_apart_stay_apart_and_move_to_their_matches() -> None:
     assert [place.centroid for place in result.places.values()] == [left.center, right.center]
 
 
-# Rules 6 and 7
+# Rules 6 to 8 and 11: one car and one region
+
+WIDE = Box.sized(100, 200, 320, 80)
+
+
+@pytest.mark.parametrize(
+    ("car", "region", "added", "cars"),
+    [
+        (LEFT, Box.sized(110, 200, 66, 80), False, 1),  # two thirds of its width
+        (LEFT, Box.sized(110, 200, 67, 80), True, 1),
+        (LEFT, Box.sized(110, 200, 250, 80), True, 1),
+        (WIDE, Box.sized(150, 200, 200, 80), False, 1),  # 200 pixels are enough for any car
+        (WIDE, Box.sized(150, 200, 201, 80), True, 1),
+        (LEFT, Box.sized(250, 200, 80, 80), True, 1),  # 50 pixels are near
+        (LEFT, Box.sized(251, 200, 80, 80), False, 2),
+        (LEFT, Box.sized(210, 200, 66, 80), False, 1),  # too narrow, and no new car
+        (LEFT, Box.sized(210, 200, 67, 80), True, 1),
+    ],
+)
+def test_a_region_of_good_size_in_or_near_a_car_is_added_to_it(
+    car: Box, region: Box, added: bool, cars: int
+) -> None:
+    known = a_car(car, road())
+    result = associate([known], [region])
+    assert (known in result.places, len(result.cars)) == (added, cars)
 
 
 @pytest.mark.parametrize(("peak", "needed"), [(4.0, 10), (4.1, 3)])
-def test_a_peak_above_4_makes_the_car_inside_need_only_3_detections(
+def test_a_peak_above_4_makes_a_known_or_a_new_car_need_only_3_detections(
     peak: float, needed: int
 ) -> None:
-    car = a_car(LEFT, road())
-    associate([car], [LEFT], peak=peak)
-    assert car.needed == needed
-
-
-@pytest.mark.parametrize(("width", "added"), [(66, False), (67, True), (250, True)])
-def test_a_region_wider_than_two_thirds_of_its_car_is_added(width: int, added: bool) -> None:
-    car = a_car(LEFT, road())
-    result = associate([car], [Box.sized(110, 200, width, 80)])
-    assert (car in result.places) is added
-    assert result.cars == [car]
-
-
-@pytest.mark.parametrize(("width", "added"), [(200, False), (201, True)])
-def test_a_region_wider_than_200_pixels_is_added_to_any_car(width: int, added: bool) -> None:
-    car = a_car(Box.sized(100, 200, 320, 80), road())
-    assert (car in associate([car], [Box.sized(150, 200, width, 80)]).places) is added
-
-
-# Rule 8
-
-
-@pytest.mark.parametrize(("x", "car_is_near"), [(250, True), (251, False)])
-def test_a_region_of_good_size_within_50_pixels_of_a_car_is_added_to_it(
-    x: int, car_is_near: bool
-) -> None:
-    car = a_car(LEFT, road())
-    result = associate([car], [Box.sized(x, 200, 80, 80)])
-    assert (car in result.places) is car_is_near
-    assert len(result.cars) == (1 if car_is_near else 2)
-
-
-@pytest.mark.parametrize(("width", "added"), [(66, False), (67, True)])
-def test_a_near_region_that_is_too_narrow_is_neither_added_nor_a_new_car(
-    width: int, added: bool
-) -> None:
-    car = a_car(LEFT, road())
-    result = associate([car], [Box.sized(210, 200, width, 80)])
-    assert (car in result.places) is added
-    assert result.cars == [car]
+    known, far = a_car(LEFT, road()), Box.sized(600, 200, 90, 80)
+    result = associate([known], [LEFT, far], peak=peak)
+    old, new = result.cars
+    assert (old, old.needed) == (known, needed)
+    assert boxes_of(result) == {known: LEFT, new: far}
+    assert (new.needed, new.id, new.in_a_row) == (needed, None, 0)
 
 
 def test_of_two_near_cars_the_nearer_gets_the_region() -> None:
@@ -231,17 +221,6 @@ def test_regions_of_a_cars_size_but_too_wide_make_two_cars_shown_at_once(
 
 
 # Rule 11
-
-
-@pytest.mark.parametrize(("peak", "needed"), [(4.0, 10), (4.1, 3)])
-def test_a_region_with_no_car_near_is_a_new_car(peak: float, needed: int) -> None:
-    known = a_car(LEFT, road())
-    far = Box.sized(600, 200, 90, 80)
-    result = associate([known], [far], peak=peak)
-    old, new = result.cars
-    assert old is known
-    assert boxes_of(result) == {new: far}
-    assert (new.needed, new.id, new.in_a_row) == (needed, None, 0)
 
 
 def test_a_region_beside_a_car_that_has_its_own_is_a_new_car() -> None:
