@@ -78,6 +78,8 @@ def test_proposed_lines_work_at_once_beside_what_a_file_has(run: Run) -> None:
     rows = [line.split()[1:4] for line in counted.out.splitlines()]
     assert ["right", "right", "6"] in rows
     assert ["gate", "left", "6"] in rows
+    facing = run("draw", "frame.png", *tracks, "--facing", "n", "--propose", "east.yaml")
+    assert "eastbound: 6 vehicles" in facing.out
 
 
 def test_a_part_of_saved_tracks_is_used(run: Run) -> None:

@@ -16,9 +16,9 @@ UP = [through((0.5 * n, 800 + 30 * n, 700), (4 + 0.5 * n, 790 + 20 * n, 80)) for
 RIGHT = [through((n, 20, 200), (5 + n, 1260, 220 + 5 * n)) for n in range(5)]
 
 
-def proposed(*paths: Path) -> tuple[ProposedLine, ...]:
+def proposed(*paths: Path, facing: str | None = None) -> tuple[ProposedLine, ...]:
     linked = link_tracks(frames(*paths, seconds=14), WIDTH, HEIGHT)
-    return propose_lines(linked, WIDTH, HEIGHT)
+    return propose_lines(linked, WIDTH, HEIGHT, facing)
 
 
 def counted(lines: Sequence[ProposedLine], *paths: Path) -> dict[tuple[str, str], int]:
@@ -39,6 +39,15 @@ def test_each_stream_has_a_line_of_its_own_that_is_named_by_its_direction() -> N
         ("down", "down", "up", 6), ("up", "up", "down", 5),
     ]  # fmt: skip
     assert counted(lines, *DOWN, *UP) == {("down", "down"): 6, ("up", "up"): 5}
+
+
+def test_with_the_camera_s_direction_lines_are_named_by_the_compass() -> None:
+    for facing, names in {
+        "N": ("southbound", "northbound"),
+        "SE": ("northwestbound", "southeastbound"),
+    }.items():
+        [line] = proposed(*DOWN, facing=facing)
+        assert (line.left, line.right) == names
 
 
 def test_lines_lie_in_the_frame_and_do_not_cross_each_other() -> None:

@@ -43,6 +43,11 @@ _OUTPUTS, _SETTINGS = (".html", ".jpg", ".png", ".svg"), (".yaml", ".yml")
 @options.option(
     "--propose FILE", "Write settings with a line across each main stream, .yaml.", options.PATH
 )
+@options.option(
+    "--facing DIRECTION",
+    "Where the camera looks, as in N or SW, to name proposed lines.",
+    click.Choice(("N", "NE", "E", "SE", "S", "SW", "W", "NW"), case_sensitive=False),
+)
 @options.option("--tracks-from FILE", "Take the vehicles from this file of tracks.", name="tracks")
 @options.start_option
 @options.end_option
@@ -52,6 +57,7 @@ def draw(
     clip: Path,
     output: Path | None,
     propose: Path | None,
+    facing: str | None,
     tracks: Path | None,
     start: Fraction | None,
     end: Fraction | None,
@@ -78,7 +84,7 @@ def draw(
     with progress_steps(" frames") as steps:
         image, frames = _watched(clip, tracks, settings, (start, end), steps)
     settings.camera.check_frames(image.shape[1], image.shape[0])
-    drawing = Drawing(image, frames, settings, choice.given())
+    drawing = Drawing(image, frames, settings, choice.given(), facing)
     if propose and not drawing.proposals:
         raise ConfigError(f"{clip}: no stream has enough vehicles; draw lines with -o gate.html")
     with OutputFiles(overwrite=overwrite) as files:

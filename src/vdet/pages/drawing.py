@@ -41,6 +41,8 @@ class Drawing:
         The tracks of its vehicles.
     values
         What settings files say so far, with fractions of the frame.
+    facing
+        As of `propose_lines`.
 
     Attributes
     ----------
@@ -56,13 +58,14 @@ class Drawing:
         frames: Sequence[FrameTracks],
         settings: Settings,
         values: Mapping[str, Any],
+        facing: str | None = None,
     ) -> None:
         height, width = image.shape[:2]
         self._image, self._frames, self._size = image, frames, (width, height)
         self._settings, self._values = settings, values
         confirmed, every = settings.traffic.min_seen_seconds, link_tracks(frames, width, height)
         self.paths: list[VehiclePath] = [item for item in every if item.seconds >= confirmed]
-        self.proposals: tuple[ProposedLine, ...] = propose_lines(self.paths, width, height)
+        self.proposals: tuple[ProposedLine, ...] = propose_lines(self.paths, width, height, facing)
 
     def output(self, path: Path, name: str) -> bytes:
         """Return the file that the suffix of `path` asks for: a page, settings or a picture.

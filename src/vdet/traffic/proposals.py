@@ -44,7 +44,9 @@ _SPACING, _AROUND = 0.01, 4
 before and after one that its way follows from.
 """
 _WORDS = ("right", "down", "left", "up")
-"""Directions in the picture, turned by a quarter each."""
+_NAMES = ("north", "northeast", "east", "southeast", "south", "southwest", "west", "northwest")
+COMPASS = ("N", "NE", "E", "SE", "S", "SW", "W", "NW")
+"""Directions in which a camera may look."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +87,7 @@ class _Candidate:
 
 
 def propose_lines(
-    paths: Sequence[VehiclePath], width: int, height: int
+    paths: Sequence[VehiclePath], width: int, height: int, facing: str | None = None
 ) -> tuple[ProposedLine, ...]:
     """Return a line across each stream that has enough vehicles, the busiest first.
 
@@ -93,6 +95,8 @@ def propose_lines(
     ----------
     width, height
         Size of the frames, pixels.
+    facing
+        Where the camera looks, one of `COMPASS`; None where that is not known.
     """
     moving = [
         path
@@ -109,8 +113,7 @@ def propose_lines(
         best = max(gain for gain, _ in gains)
         good = (item for gain, item in gains if gain >= _NEAR_BEST * best)
         line = min(good, key=lambda item: item.place)
-        turn = round(math.atan2(line.way[1], line.way[0]) / (math.pi / 2)) % 4
-        ahead, back = _WORDS[turn], _WORDS[turn - 2]
+        ahead, back = _directions(line.way, facing)
         names[ahead] += 1
         name = f"{ahead} {names[ahead]}" if names[ahead] > 1 else ahead
         lines.append(ProposedLine(name, *line.ends, ahead, back, int(left[line.own].sum())))
@@ -119,6 +122,15 @@ def propose_lines(
             candidate for candidate in candidates if meeting(candidate.ends, line.ends) is None
         ]
     return tuple(lines)
+
+
+def _directions(way: Float64Array, facing: str | None) -> tuple[str, str]:
+    """Return the names of a direction in the picture and of the opposite one."""
+    turn = round(math.atan2(way[1], way[0]) / (math.pi / 2)) % 4
+    if facing is None:
+        return _WORDS[turn], _WORDS[turn - 2]
+    ahead = COMPASS.index(facing) + 2 * (1 + turn)
+    return f"{_NAMES[ahead % 8]}bound", f"{_NAMES[(ahead + 4) % 8]}bound"
 
 
 class _Streams:
