@@ -28,12 +28,6 @@ def columns(*each: Box) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
 
 
 class TestBox:
-    def test_a_box_has_a_size_a_middle_and_a_foot(self) -> None:
-        box = Box(10, 20, 40.5, 60)
-        assert (box.width, box.height, box.area) == (30.5, 40, 1220)
-        assert (box.center, box.foot) == ((25.25, 40), (25.25, 60))
-        assert Box.sized(0, 0, -3, -4).area == 0
-
     @pytest.mark.parametrize(
         ("point", "inside"),
         [((10, 20), True), ((39.9, 59.9), True), ((40, 30), False), ((20, 60), False)],
@@ -59,17 +53,6 @@ class TestBox:
         assert pixels(one.intersection(other)) == common
         assert pixels(one.union(other)) >= total
         assert one.iou(other) == pytest.approx(len(common) / len(total) if total else 0)
-
-    @given(boxes)
-    def test_a_clipped_box_lies_in_the_image(self, box: Box) -> None:
-        assert pixels(box.clipped(40, 30)) == pixels(box) & pixels(Box(0, 0, 40, 30))
-
-    @pytest.mark.parametrize(
-        ("other", "gap"),
-        [(Box(10, 0, 15, 10), 0), (Box(17, 0, 22, 10), 7), (Box(13, 14, 18, 19), 5)],
-    )
-    def test_gap_is_the_distance_between_outlines(self, other: Box, gap: float) -> None:
-        assert Box(0, 0, 10, 10).gap(other) == other.gap(Box(0, 0, 10, 10)) == gap
 
 
 @given(solid, solid)
@@ -144,11 +127,6 @@ class TestBoxes:
         for name, column in FOUND.data.items():
             assert chosen.data[name].tolist() == column[expected].tolist()
         assert (chosen.names, chosen.trace) == (("car", "lorry"), "trace")
-
-    @pytest.mark.parametrize("row", [3, [3]])
-    def test_a_row_beyond_the_last_is_refused(self, row: Any) -> None:
-        with pytest.raises(IndexError):
-            FOUND[row]
 
     @pytest.mark.parametrize(
         ("changes", "message"),
