@@ -12,10 +12,9 @@ from hypothesis import strategies as st
 from lanes import chessboards
 from vdet.boxes import Box
 from vdet.config.schema import LaneSettings
-from vdet.lanes.camera import Undistorter
+from vdet.lanes.camera import TopView, Undistorter
 from vdet.lanes.curves import LaneCurves
 from vdet.lanes.road import Road, RoadFinder, RoadPosition, position_on_road
-from vdet.lanes.top_view import TopView
 from vdet.media import Picture
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.render import render

@@ -7,7 +7,7 @@ import pytest
 from pydantic import ValidationError
 
 from vdet.config.schema import LaneSettings
-from vdet.lanes.top_view import TopView
+from vdet.lanes.camera import TopView
 from vdet.synthetic.camera import PinholeCamera
 
 SettingsFor = Callable[[PinholeCamera], LaneSettings]

@@ -1,4 +1,9 @@
-"""Pictures, points and boxes without the distortion of a lens; the file of a calibrated one."""
+"""Frames without the distortion of a lens, and the road as seen from straight above.
+
+In the top view the ground is taken as flat. Its coordinates are x, metres to the right of the
+camera, and z, metres ahead of it. The column of the vanishing point is x = 0 at every distance;
+that is exact if the camera looks along the road and does not roll.
+"""
 
 from pathlib import Path
 
@@ -8,6 +13,7 @@ import yaml
 
 from vdet.boxes import Box, Float64Array, Image
 from vdet.config.camera import LensSettings
+from vdet.config.schema import LaneSettings
 from vdet.files import write_whole
 
 _SIDE_POINTS = np.linspace(0, 1, 16)
@@ -86,3 +92,98 @@ def save_camera(lens: LensSettings, path: Path, *, overwrite: bool = False) -> N
     heading = "# A camera, written by `vdet calibrate`; lengths are pixels of its photographs.\n"
     text = yaml.safe_dump({"camera": {"lens": lens.model_dump(mode="json")}}, sort_keys=False)
     write_whole(path, heading + text, overwrite=overwrite)
+
+
+ACROSS = 30.0
+"""Pixels per metre, across the road."""
+ALONG = 8.0
+"""Pixels per metre, along the road."""
+_USUAL_WIDTH, _USUAL_LENGTH = 3.7, 37.0
+"""Metres of a lane that nobody measured, across and along: for the search, not for results."""
+_MARGIN = 3.0
+"""Metres of road that are shown on each side of the lane."""
+
+
+class TopView:
+    """Converts between ground, undistorted frames of one size, and pictures from above."""
+
+    def __init__(self, settings: LaneSettings, width: int, height: int) -> None:
+        self.lane_width = settings.lane_width or _USUAL_WIDTH
+        """Of the lane that is looked for, metres."""
+        self.length = settings.length or _USUAL_LENGTH
+        """Of the trapezoid, metres."""
+        near = settings.bottom_right - settings.bottom_left  # of the frame's width
+        far = settings.top_right - settings.top_left
+        start = self.length * far / (near - far)  # widths in the frame are proportional to 1/z
+        end = start + self.length
+        left = (settings.bottom_left - settings.top_left) / (near - far) * self.lane_width
+        right = left + self.lane_width
+        corners = [
+            (settings.bottom_left, settings.bottom),
+            (settings.bottom_right, settings.bottom),
+            (settings.top_right, settings.top),
+            (settings.top_left, settings.top),
+        ]
+        ground = np.array([(left, start), (right, start), (right, end), (left, end)], np.float32)
+        frame = (np.array(corners) * (width, height)).astype(np.float32)
+        self.corners = np.asarray(frame, np.float64), np.asarray(ground, np.float64)
+        """The corners of the trapezoid, in pixels of the undistorted frame and metres."""
+        self._to_frame = np.asarray(cv2.getPerspectiveTransform(ground, frame), np.float64)
+        """From `(x, z, 1)`, metres, to pixels of the undistorted frame."""
+        self._to_ground = np.linalg.inv(self._to_frame)
+        rows = round(self.length * ALONG)
+        columns = round((self.lane_width + 2 * _MARGIN) * ACROSS)
+        self.distances = start + (rows - 0.5 - np.arange(rows, dtype=np.float64)) / ALONG
+        """z of each row, metres; the first row is the farthest."""
+        self.laterals = (np.arange(columns, dtype=np.float64) + 0.5 - columns / 2) / ACROSS
+        """x of each column, metres."""
+        x, z = self.laterals[0], self.distances[0]
+        self._warp = self._to_frame @ [[1 / ACROSS, 0, x], [0, -1 / ALONG, z], [0, 0, 1]]
+        """From `(column, row, 1)` of the top view to pixels of the undistorted frame."""
+        self._to_top = np.asarray(np.linalg.inv(self._warp), np.float64)
+
+    def pixels(self) -> Float64Array:
+        """Return the pixels of the undistorted frame, `(rows, columns, 2)`, that it shows."""
+        rows, columns = np.mgrid[: len(self.distances), : len(self.laterals)]
+        shown = _transform(self._warp, np.column_stack([columns.ravel(), rows.ravel()]))
+        return shown.reshape(*rows.shape, 2)
+
+    def picture(self, frame: Image) -> Image:
+        """Return what it shows of an undistorted frame."""
+        size = len(self.laterals), len(self.distances)
+        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        return np.asarray(cv2.warpPerspective(frame, self._warp, size, flags=flags), np.uint8)
+
+    def ground_to_frame(self, x: Float64Array, z: Float64Array) -> Float64Array:
+        """Return the pixels `(n, 2)` in the undistorted frame of ground points, metres `(n,)`."""
+        return _transform(self._to_frame, np.asarray(np.column_stack([x, z]), np.float64))
+
+    def sight(self, pixel: tuple[float, float]) -> tuple[float, float]:
+        """Return x / z and 1 / z of the ground point that a pixel of the undistorted frame shows.
+
+        1 / z, in 1/m, is proportional to the rows below the horizon; it is 0 there, and negative
+        above it. x / z does not depend on the scale of the ground, and has no unit.
+        """
+        x, z, one = (self._to_ground @ (*pixel, 1.0)).tolist()
+        return x / z, one / z
+
+    def frame_to_top(self, pixels: Float64Array) -> Float64Array:
+        """Return where pixels `(n, 2)` of the undistorted frame lie in the top view, `(n, 2)`."""
+        return _transform(self._to_top, pixels)
+
+    def columns(self, x: Float64Array) -> Float64Array:
+        """Return the columns of the top view at lateral positions x, metres."""
+        return np.asarray((x - self.laterals[0]) * ACROSS)
+
+    @property
+    def outline(self) -> Float64Array:
+        """The corners of the top view in the undistorted frame, pixels `(4, 2)`."""
+        right, bottom = len(self.laterals) - 0.5, len(self.distances) - 0.5
+        corners = [[-0.5, -0.5], [right, -0.5], [right, bottom], [-0.5, bottom]]
+        return _transform(self._warp, np.array(corners))
+
+
+def _transform(matrix: Float64Array, points: Float64Array) -> Float64Array:
+    """Apply a homography to points `(n, 2)`."""
+    moved = points @ matrix[:, :2].T + matrix[:, 2]
+    return np.asarray(moved[:, :2] / moved[:, 2:])

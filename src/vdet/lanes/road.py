@@ -17,10 +17,18 @@ from vdet.config.camera import LensSettings
 from vdet.config.schema import LaneSettings
 from vdet.draw.boxes import draw_label, line_width
 from vdet.draw.paint import Color, Surface, draw_lines, shade
-from vdet.lanes.camera import Maps, Undistorter, warped
-from vdet.lanes.curves import Equations, FrameFit, LaneCurves, add_earlier, fit_near, fit_new, solve
-from vdet.lanes.paint import hide, paint_mask
-from vdet.lanes.top_view import TopView
+from vdet.lanes.camera import Maps, TopView, Undistorter, warped
+from vdet.lanes.curves import (
+    Equations,
+    FrameFit,
+    LaneCurves,
+    add_earlier,
+    fit_near,
+    fit_new,
+    hide,
+    paint_mask,
+    solve,
+)
 from vdet.media import Picture
 from vdet.media.images import split_channels
 
@@ -131,7 +139,7 @@ class Road:
     """The road in one frame of a video."""
 
     view: FrameView
-    """The frame's pictures, from `RoadFinder.observe`; in `mask`, vehicles are `paint.HIDDEN`."""
+    """The frame's pictures, from `RoadFinder.observe`; in `mask`, vehicles are `HIDDEN`."""
     lane: Lane | None
     """The lane, smoothed over this frame and those before; None if it is not reliably known."""
     curves: LaneCurves | None
