@@ -11,8 +11,7 @@ from pydantic import ValidationError
 from vdet.config.camera import CameraSettings, ClockSettings, moment
 from vdet.config.schema import InputSettings, Settings
 from vdet.errors import ConfigError
-from vdet.traffic.clock import Clock, find_clock
-from vdet.traffic.intervals import Intervals
+from vdet.traffic.clock import Clock, Intervals, find_clock
 
 
 @pytest.fixture(autouse=True)

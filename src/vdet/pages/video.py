@@ -16,10 +16,9 @@ from vdet.pages.charts import Axis, Plot, Span, Timeline
 from vdet.pages.place import draw_marks, path_marks, traffic_part
 from vdet.pages.render import jpeg_uri, render
 from vdet.pages.vehicles import VehicleRow, table_json
-from vdet.traffic.clock import Clock
+from vdet.traffic.clock import Clock, Intervals
 from vdet.traffic.counts import Counts
 from vdet.traffic.crossings import Border
-from vdet.traffic.intervals import Intervals
 from vdet.traffic.records import VehicleRecord
 from vdet.traffic.speeds import KMH
 

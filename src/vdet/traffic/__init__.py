@@ -26,7 +26,6 @@ The counts of a video follow from its tracks alone (`FrameTracks`), live or from
 
 `linking` makes a path of the tracks of each vehicle. `crossings` places lines and zones in the
 frame; what it finds is a pure function of one path and one of them. `counter` puts the events
-together, `intervals` has the parts of time of all tables and pages, `counts` the events and the
-tables that follow from them, `clock` the moment at which a video begins, `count_files` writes all
-of it.
+together, `counts` has the events and the tables that follow from them, `clock` the moment at which
+a video begins and the intervals of all tables and pages, `count_files` writes all of it.
 """

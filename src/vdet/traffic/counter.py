@@ -8,6 +8,7 @@ from statistics import median
 
 from vdet.config.places import TrafficSettings
 from vdet.track.track import FrameTracks
+from vdet.traffic.clock import Span, add_frame
 from vdet.traffic.counts import Counts, Event, Way
 from vdet.traffic.crossings import (
     VANISH,
@@ -18,7 +19,6 @@ from vdet.traffic.crossings import (
     distances_to,
     place,
 )
-from vdet.traffic.intervals import Span, add_frame
 from vdet.traffic.linking import GAP, TrackLinker, VehiclePath
 
 _OLDEST = 0.2

@@ -12,10 +12,9 @@ from vdet.labels.reading import read_tracks
 from vdet.lanes.ground import ground_of
 from vdet.progress import Advance
 from vdet.track.track import FrameTracks
-from vdet.traffic.clock import Clock, find_clock
+from vdet.traffic.clock import Clock, Span, find_clock
 from vdet.traffic.counter import VehicleCounter
 from vdet.traffic.counts import Counts
-from vdet.traffic.intervals import Span
 from vdet.traffic.speeds import SpeedMeter, with_speeds
 
 _SEAM = 2.0

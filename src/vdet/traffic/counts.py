@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, TypeVar
 
 from vdet.detect.classes import UNKNOWN
 from vdet.errors import ConfigError
-from vdet.traffic.clock import Clock
+from vdet.traffic.clock import Clock, Intervals, Moment, Span
 from vdet.traffic.crossings import APPEAR, ENTER, EXIT, VANISH
-from vdet.traffic.intervals import Intervals, Moment, Span
 
 if TYPE_CHECKING:
     import pandas as pd
