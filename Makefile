@@ -48,7 +48,7 @@ dist: $(TOOLS)  ## build the wheel, install it into an empty environment, and tr
 	$(PYTHON) -m venv build/try
 	build/try/bin/python -m pip install --quiet --disable-pip-version-check dist/*.whl \
 		--constraint constraints.txt
-	cd build/try && bin/vdet doctor && bin/vdet demo demo
+	cd build/try && bin/vdet info && bin/vdet demo demo
 
 bench: $(TOOLS)  ## measure speed and memory, as ratios of one run
 	$(BIN)/python -m benchmarks

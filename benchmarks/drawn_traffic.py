@@ -12,7 +12,7 @@ from vdet.config.schema import LaneSettings, Settings
 from vdet.detect.protocol import DetectorModel
 from vdet.labels.label import Label, LabelledVideo
 from vdet.media import Frame, Picture, Planes, VideoInfo
-from vdet.media.coding import Coding
+from vdet.media.frame import Coding
 from vdet.run.loop import build, peek
 from vdet.run.result import FrameResult
 from vdet.synthetic.camera import PinholeCamera
@@ -60,21 +60,12 @@ def lane_view(
 
     The camera is in the middle of a lane that is `width` metres wide; it sees the road at `near`.
     """
-    ends = np.array([[x, 0, z] for z in (far, near) for x in (-width / 2, width / 2)])
+    side = width / 2
+    corners = (-side, near), (side, near), (side, far), (-side, far)
+    ends = np.array([[x, 0, z] for x, z in corners])
     straight = replace(camera, curvature=0.0)
-    [(top_left, top), (top_right, _), (bottom_left, bottom), (bottom_right, _)] = (
-        straight.project(ends) / (camera.width, camera.height)
-    ).tolist()
-    return LaneSettings(
-        top=top,
-        bottom=bottom,
-        top_left=top_left,
-        top_right=top_right,
-        bottom_left=bottom_left,
-        bottom_right=bottom_right,
-        lane_width=width,
-        length=far - near,
-    )
+    points = straight.project(ends) / (camera.width, camera.height)
+    return LaneSettings.model_validate({"points": points.tolist(), "metres": (width, far - near)})
 
 
 def as_planes(frame: Frame) -> Frame:

@@ -16,7 +16,7 @@ from vdet.detect.factory import load_detector
 from vdet.detect.svm.dense_search import DenseSearch
 from vdet.detect.svm.search import Engine, FrameSearch
 from vdet.media import Picture, Planes
-from vdet.media.coding import Coding
+from vdet.media.frame import Coding
 
 HEIGHTS = (720, 1080, 2160)
 DECODED = 60

@@ -323,7 +323,7 @@ def main() -> None:
     parser.add_argument("--base", type=Path, help="network that has seen no fold: the start")
     parser.add_argument("--model", type=Path, action="append", default=[], help="measured too")
     parser.add_argument(
-        "--set", action="append", default=[], help="setting, as train.net.width=320"
+        "--set", action="append", default=[], help="setting, as train.net.steps=2000"
     )
     arguments = parser.parse_args()
     arguments.work.mkdir(parents=True, exist_ok=True)

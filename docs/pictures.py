@@ -81,7 +81,7 @@ def main() -> None:
         counts = (
             "-c",
             str(demo / "gate.yaml"),
-            *_settings("draw.trails=3", "draw.time=true"),
+            *_settings("draw.trails=3"),
         )
         pictures = {
             "vdet": frame_with_vehicles(road, 21, *label),

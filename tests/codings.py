@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from vdet.media import Picture, Planes
-from vdet.media.coding import Coding
+from vdet.media.frame import Coding
 
 LIMITED, FULL, HD = Coding(), Coding(full_range=True), Coding("bt709")
 CODINGS = {

@@ -15,8 +15,7 @@ from hypothesis import settings
 
 from drawn_patches import write_patches
 from vdet.cli import main
-from vdet.config.schema import Settings, SvmSettings, TrainSettings
-from vdet.config.train import SvmTrainingSettings
+from vdet.config.schema import Settings, SvmSettings, SvmTrainingSettings, TrainSettings
 from vdet.detect.svm.model import save_model
 from vdet.learn.svm.dataset import find_patches
 from vdet.learn.svm.training import train

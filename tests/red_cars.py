@@ -9,18 +9,17 @@ import numpy as np
 
 from boxing import moved_to
 from vdet.boxes import NO_BOXES, Box, Boxes, Image
-from vdet.config.schema import Settings, SvmSettings
-from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
-from vdet.config.svm import (
+from vdet.config.detector import (
     FeatureSettings,
     HeatSettings,
     HistogramSettings,
     PerspectiveSettings,
     ScoreSettings,
     SearchSettings,
-    StillSettings,
     WindowSettings,
 )
+from vdet.config.schema import Settings, SvmSettings
+from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
 from vdet.config.tracker import RulesTrackerSettings
 from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.model import LinearModel, save_model
@@ -43,9 +42,10 @@ SETTINGS = Settings(
             ),
             perspective=PerspectiveSettings(sizes=()),
         ),
-        heat=HeatSettings(frames=2, blur=15, threshold=1.4, regions="outline"),
+        heat=HeatSettings(frames=2, threshold=1.4, votes=None),
         score=ScoreSettings(middle=1.4),
-        stills=StillSettings(strength=0, width=30 / WIDTH, height=30 / HEIGHT),
+        min_score_still=0,
+        min_size_still=(30 / WIDTH, 30 / HEIGHT),
     ),
     tracker=scale_lengths(RulesTrackerSettings(min_region=30, confident_peak=4), SCALE),
 )
@@ -65,7 +65,7 @@ def by_perspective(horizon: float | None, *sizes: float) -> Settings:
             search=SearchSettings(probability=0.5, perspective=perspective),
             heat=HeatSettings(votes=0.5),
             score=ScoreSettings(middle=0.2, slope=4),
-            stills=StillSettings(strength=0.3),
+            min_score_still=0.835,
         )
     )
 

@@ -144,13 +144,13 @@ def test_the_format_is_written_counted_and_compared(
 def test_the_step_changes_what_all_outputs_get(package: Path, clip: Path, tmp_path: Path) -> None:
     tally, tracks = tmp_path / "tally.txt", tmp_path / "t.csv"
     options = ("--no-video", "--tracks", tracks, "--sink", f"tally={tally}", *CHOSEN)
-    narrow = ("--set", "steps.names=[wide]")
+    narrow = ("--set", "steps=[wide]")
     done = vdet(package, "detect-video", clip, *options, *narrow)
     assert done.returncode == 0, done.stderr
     assert CAR.width < WIDTH / 4
     assert tally.read_text() == "".join(f"{number} 0\n" for number in range(FRAMES))
     assert len(tracks.read_text().splitlines()) == 1, "the heading alone"
-    again = (*options, "--overwrite", "--set", "steps.names=[none]")
+    again = (*options, "--overwrite", "--set", "steps=[none]")
     unknown = vdet(package, "detect-video", clip, *again)
     assert "none: unknown step; known: wide" in unknown.stderr
 

@@ -29,7 +29,8 @@ import numpy as np
 
 from vdet.boxes import Box, Boxes, Image
 from vdet.conditions.finding import Finding
-from vdet.config.loading import find_config, kind_of_model
+from vdet.config.kinds import kind_of_model
+from vdet.config.loading import find_config
 from vdet.config.loading import load_settings as load_layers
 from vdet.config.schema import DetectorSettings, Settings, TrackerSettings
 from vdet.detect.factory import DetectorKind, DetectorObject, as_model, load_detector

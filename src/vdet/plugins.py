@@ -18,13 +18,19 @@ FORMATS = "vdet.formats"
 COMMANDS = "vdet.commands"
 
 _BUILT_IN: dict[str, dict[str, str]] = {
-    COMMANDS: {"eval": "vdet.cli.evaluate:eval_group"}
-    | {
-        name: "vdet.cli.{0}:{0}".format(name.replace("-", "_"))
-        for name in (
-            *("calibrate", "config", "count", "demo", "detect-image", "detect-video", "doctor"),
-            *("draw", "info", "mine", "train", "train-net"),
-        )
+    COMMANDS: {
+        "calibrate": "vdet.cli.calibrate:calibrate",
+        "config": "vdet.cli.info:config",
+        "count": "vdet.cli.count:count",
+        "demo": "vdet.cli.demo:demo",
+        "detect-image": "vdet.cli.detect_image:detect_image",
+        "detect-video": "vdet.cli.detect_video:detect_video",
+        "draw": "vdet.cli.draw:draw",
+        "eval": "vdet.cli.evaluate:eval_group",
+        "info": "vdet.cli.info:info",
+        "mine": "vdet.cli.train:mine",
+        "train": "vdet.cli.train:train",
+        "train-net": "vdet.cli.train:train_net",
     },
     DETECTORS: {"svm": "vdet.detect.svm.kind:SVM", "net": "vdet.detect.onnx.detector:NET"},
     TRACKERS: {"motion": "vdet.track.factory:MOTION", "rules": "vdet.track.factory:RULES"},
@@ -36,7 +42,7 @@ _BUILT_IN: dict[str, dict[str, str]] = {
         "json": "vdet.run.sinks.data:JSON",
         "vehicles": "vdet.run.sinks.data:VEHICLES",
         "crops": "vdet.run.sinks.folders:CROPS",
-        "clips": "vdet.run.sinks.clips:CLIPS",
+        "clips": "vdet.run.sinks.folders:CLIPS",
         "page": "vdet.run.sinks.folders:PAGE",
         "counts": "vdet.run.sinks.data:COUNTS",
         "flows": "vdet.run.sinks.data:FLOWS",

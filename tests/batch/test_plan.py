@@ -9,7 +9,7 @@ from typing import ClassVar
 import pytest
 
 from vdet.batch.manifest import Record, Written, open_manifest
-from vdet.batch.plan import OutputSuffix, Plan, make_plan
+from vdet.batch.run import OutputSuffix, Plan, make_plan
 from vdet.errors import BatchError, OutputError
 from vdet.files import recorded_inputs
 from vdet.run.sinks import data
@@ -23,7 +23,7 @@ VIDEO: dict[str, str | None] = {"video": None}
 @pytest.fixture(autouse=True)
 def simple_digest(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("vdet.batch.task.result_digest", digest)
-    monkeypatch.setattr("vdet.batch.plan.load_detector", lambda _: None)
+    monkeypatch.setattr("vdet.batch.run.load_detector", lambda _: None)
 
 
 def digest(run: Run) -> str:

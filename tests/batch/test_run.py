@@ -13,8 +13,7 @@ import pytest
 
 from red_cars import red_settings
 from running import names, write_drive
-from vdet.batch.plan import OutputSuffix, Plan, make_plan
-from vdet.batch.run import run_batch
+from vdet.batch.run import OutputSuffix, Plan, make_plan, run_batch
 from vdet.batch.task import process_file
 from vdet.errors import BatchError, OutputError
 from vdet.run.sinks import data

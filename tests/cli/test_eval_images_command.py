@@ -59,8 +59,8 @@ def test_the_boxes_that_count_are_those_that_detect_image_shows(
     boxes = [box for picture in json.loads(shown.out) for box in picture["boxes"]]
     measured = json.loads(run("eval", "images", folder, *red, "--json", "-").out)
     assert measured["mean"]["matches"] + measured["mean"]["false_positives"] == len(boxes) == 1
-    assert boxes[0]["score"] >= measured["score"] == pytest.approx(PERSPECTIVE.svm.shown_score)
-    options = (*red, "--set", "detector.stills.strength=1e9", "--json", "-")
+    assert boxes[0]["score"] >= measured["score"] == pytest.approx(PERSPECTIVE.svm.min_score_still)
+    options = (*red, "--set", "detector.min_score_still=1", "--json", "-")
     assert json.loads(run("eval", "images", folder, *options).out)["mean"]["matches"] == 0
 
 
@@ -84,7 +84,7 @@ def test_several_sets_a_table_and_a_page(
     first, second, *_ = result.out.splitlines()
     assert first.startswith(f"vdet {vdet.__version__}, detector svm, model red.npz, ")
     assert first.endswith("red.yaml detector.search.probability=0.6")
-    assert second == f"boxes from score {PERSPECTIVE.svm.shown_score:.2f}"
+    assert second == f"boxes from score {PERSPECTIVE.svm.min_score_still:.2f}"
     for words in (str(sets[0]), str(sets[1]), "mean of 2", "cow (2)"):
         assert words in result.out
     assert "data:image/jpeg" in (folder / "page.html").read_text(encoding="utf-8")

@@ -1,8 +1,10 @@
-"""`vdet info`: what a video, a picture or a model file is."""
+"""`vdet info`: what a file is, and whether vdet works on this machine."""
 
 import json
 import os
+from importlib.metadata import PackageNotFoundError
 from pathlib import Path
+from typing import Any, NoReturn
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ import pytest
 from clips import write_clip
 from conftest import Run
 from detect.onnx.graphs import RedBox, ultralytics, write_network
+from vdet.errors import ModelError
 from vdet.media.images import write_image
 
 MODELS = Path(__file__).parents[2] / "src" / "vdet" / "models"
@@ -94,3 +97,53 @@ def test_what_is_neither_is_an_error(run: Run, tmp_path: Path, name: str, words:
 def test_a_pipe_is_refused(run: Run, tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     assert "can be read only once" in run("info", tmp_path / "pipe").err
+
+
+def test_without_a_file_the_machine_is_checked(run: Run) -> None:
+    result = run("info", "--json", "-")
+    assert result.code == 0
+    values = json.loads(result.out)
+    assert values["works"]
+    assert not [text for text in map(str, values.values()) if text.startswith("broken")]
+    assert {"vdet", "numpy", "codec h264", "settings default"} <= values.keys()
+
+
+def test_what_does_not_work_is_named_with_what_to_do(
+    run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: Any) -> NoReturn:
+        raise ModelError("net.onnx: is damaged")
+
+    def version(name: str) -> str:
+        if name in ("dask", "numpy"):
+            raise PackageNotFoundError
+        return "1.0"
+
+    monkeypatch.setattr("importlib.metadata.version", version)
+    monkeypatch.setattr("av.Codec", fail)
+    monkeypatch.setattr("vdet.detect.factory.load_detector", fail)
+    result = run("info")
+    assert result.code == 1
+    assert "dask (extra dask): absent; pip install dask\n" in result.out
+    assert "numpy: broken; pip install numpy\n" in result.out
+    assert "codec h264: broken; " in result.out
+    assert "settings default: broken; net.onnx: is damaged; install vdet again\n" in result.out
+    assert result.out.endswith("works: False\n")
+
+
+def test_another_opencv_over_ours_is_named_with_the_cure(
+    run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: Any) -> NoReturn:
+        raise AttributeError("module 'cv2' has no attribute 'HOGDescriptor'")
+
+    monkeypatch.delattr("cv2.HOGDescriptor")
+    monkeypatch.setattr("cv2.__version__", "5.0.0")
+    cure = (
+        "OpenCV is 5.0.0: opencv-python has replaced opencv-python-headless; run "
+        '"pip uninstall -y opencv-python opencv-python-headless" and then '
+        "\"pip install 'opencv-python-headless<5'\"\n"
+    )
+    assert f"cv2: broken; {cure}" in run("info").out
+    monkeypatch.setattr("vdet.config.rendering.render", fail)
+    assert run("config").err == f"vdet: {cure}"

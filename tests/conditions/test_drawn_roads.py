@@ -7,11 +7,9 @@ from benchmarks.conditions import EXPECTED, SETTINGS, Changed, drawn_road
 from vdet import load_settings
 from vdet.boxes import NO_BOXES
 from vdet.conditions.watch import Conditions, small_luma
-from vdet.config.conditions import ConditionSettings
-from vdet.config.schema import Settings
+from vdet.config.schema import ConditionSettings, Settings
 from vdet.media import Picture
-from vdet.media.coding import Coding
-from vdet.media.frame import Planes
+from vdet.media.frame import Coding, Planes
 
 
 @pytest.fixture(scope="module")

@@ -4,21 +4,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from vdet.config.detector import HeatSettings, PerspectiveSettings, SearchSettings
 from vdet.config.loading import find_config, load_settings
-from vdet.config.schema import Settings, SvmSettings, TrainSettings
-from vdet.config.svm import HeatSettings, SearchSettings, WindowSettings
-from vdet.config.train import SvmTrainingSettings
+from vdet.config.schema import Settings, SvmSettings, SvmTrainingSettings, TrainSettings
 from vdet.errors import ConfigError
 
-WINDOWS = """\
-detector:
-  search:
-    windows:
-    - {size: 64, overlap: 0.5, top: 0, bottom: 100}
-    - {size: 96, overlap: 0.5, top: 0, bottom: 200}
-"""
-FIRST = WindowSettings(size=64, overlap=0.5, top=0, bottom=100)
-SECOND = WindowSettings(size=96, overlap=0.5, top=0, bottom=200)
 SVM = Settings(detector=SvmSettings())
 
 
@@ -43,81 +33,61 @@ def test_without_file_and_assignments_the_settings_are_the_defaults() -> None:
     assert load_settings() == Settings()
 
 
-def test_a_file_changes_what_it_names_and_nothing_else(path: Path) -> None:
-    loaded = load(path, "detector:\n  heat:\n    frames: 5\ntrain: {svm: {C: 1e-3}}\n")
-    heat = HeatSettings(frames=5)
-    expected = Settings(
-        detector=SvmSettings(heat=heat), train=TrainSettings(svm=SvmTrainingSettings(C=0.001))
+def test_a_layer_changes_what_it_names_and_nothing_else(path: Path) -> None:
+    text = (
+        "detector:\n  heat: {frames: 5, threshold: 2}\n  search: {perspective: {sizes: [0.5]}}\n"
+        "train: {svm: {C: 1e-3}}\ntracker:\n"
     )
-    assert loaded == expected
-    assert loaded.svm.heat.threshold == SVM.svm.heat.threshold
-
-
-def test_assignments_lie_over_the_file_and_later_ones_over_earlier_ones(path: Path) -> None:
-    heat = load(
-        path,
-        "detector: {heat: {frames: 5, blur: 7, threshold: 2}}",
-        *("detector.heat.frames=6", "detector.heat.blur=8", "detector.heat.frames=7"),
-    ).svm.heat
-    assert (heat.frames, heat.blur, heat.threshold) == (7, 8, 2.0)
-
-
-def test_a_list_in_a_file_replaces_the_whole_default_list(path: Path) -> None:
-    search = load(path, "detector: {search: {perspective: {sizes: [0.5]}}}").svm.search
-    assert len(SearchSettings().perspective.sizes) > 1
-    assert search.perspective.sizes == (0.5,)
+    frames = "detector.heat.frames=6", "detector.heat.frames=7"
+    assert load(path, text, *frames) == Settings(
+        detector=SvmSettings(
+            heat=HeatSettings(frames=7, threshold=2),
+            search=SearchSettings(perspective=PerspectiveSettings(sizes=(0.5,))),
+        ),
+        train=TrainSettings(svm=SvmTrainingSettings(C=0.001)),
+    )
 
 
 def test_all_errors_are_given_at_once(path: Path) -> None:
-    text = "detector: {heat: {frames: 0, blur: -1}}\ntrain:\n  svm: {C: -1}\ntrakcer: {}\n"
+    text = (
+        "detector: {heat: {frames: 0, votes: -1}, search: {windows: [{size: 64, overlap: 0.5}]}}\n"
+        "train:\n  svm: {C: -1}\ntrakcer: {}\n"
+    )
     assert sorted(refusal(path, text, "output.crf=99")) == [
         "--set: output.crf: must be less than or equal to 51 (got 99)",
         "my.yaml:1:19: detector.heat.frames: must be greater than or equal to 1 (got 0)",
-        "my.yaml:1:30: detector.heat.blur: must be greater than or equal to 1 (got -1)",
+        "my.yaml:1:30: detector.heat.votes: must be greater than or equal to 0 (got -1)",
+        "my.yaml:1:61: detector.search.windows[0].bottom: is required",
+        "my.yaml:1:61: detector.search.windows[0].top: is required",
         "my.yaml:3:9: train.svm.C: must be greater than 0 (got -1)",
         "my.yaml:4:1: trakcer: unknown setting; did you mean tracker?",
     ]
 
 
 @pytest.mark.parametrize(
-    ("text", "column", "message"),
-    [
-        ("heat: {x: 3}", 19, "heat.x: unknown setting; known settings: frames, blur, threshold, "),
-        ("features: {hog: {cel: 3}}", 29, "features.hog.cel: unknown setting; did you mean cell?"),
-        ("heat: 3", 12, "heat: must be a section, key: value (got 3)"),
-        ("heat: {frames: 2001-01-01}", 19, "heat.frames: must be a valid integer (got datetime"),
-        ("heat: {threshold: 1e999}", 19, "heat.threshold: must be a finite number (got inf)"),
-        ("features: {patch: 62}", 12, "features: patch must be a multiple of hog.cell (4)"),
-        ("search: {windows: [5]}", 31, "search.windows[0]: must be a section, key: value"),
-        (
-            "search: {windows: [{size: 64, overlap: 0.8, top: 0, bottom: 63}]}",
-            31,
-            "search.windows[0]: bottom must be at least top + size",
-        ),
-        ("heat: {regions: some}", 19, "heat.regions: must be 'outline' or 'votes' (got 'some')"),
-    ],
-)
-def test_a_mistake_in_the_detector_is_explained_in_one_line(
-    path: Path, text: str, column: int, message: str
-) -> None:
-    (line,) = refusal(path, f"detector: {{{text}}}")
-    assert line.startswith(f"my.yaml:1:{column}: detector.{message}")
-
-
-@pytest.mark.parametrize(
     ("text", "message"),
     [
+        ("detector: {heat: {x: 3}}", "1:19: detector.heat.x: unknown setting; known settings: fr"),
         (
-            "tracker: {confirm_second: 3}",
-            "1:11: tracker.confirm_second: unknown setting; did you mean confirm_seconds?",
+            "detector: {features: {hog: {cel: 3}}}",
+            "1:29: detector.features.hog.cel: unknown setting; did you mean cell?",
+        ),
+        ("detector: {heat: 3}", "1:12: detector.heat: must be a section, key: value (got 3)"),
+        (
+            "detector: {heat: {threshold: 1e999}}",
+            "1:19: detector.heat.threshold: must be a finite number (got inf)",
+        ),
+        (
+            "detector: {features: {patch: 62}}",
+            "1:12: detector.features: patch must be a multiple of hog.cell (4)",
+        ),
+        (
+            "detector: {search: {windows: [{size: 64, overlap: 0.8, top: 0, bottom: 63}]}}",
+            "1:31: detector.search.windows[0]: bottom must be at least top + size",
         ),
         (
             "tracker: {kind: rules, histroy: 3}",
             "1:24: tracker.histroy: unknown setting; did you mean history?",
-        ),
-        (
-            "heat: {frames: 3}",
-            "1:1: heat: unknown setting; known settings: detector, tracker, camera, ",
         ),
         ("'': 1", "1:1: : unknown setting; known settings: detector, tracker, "),
         ("draw: {label: score}", "1:8: draw.label: must be a list (got"),
@@ -130,43 +100,19 @@ def test_a_mistake_is_explained_in_one_line(path: Path, text: str, message: str)
     assert line.startswith(f"my.yaml:{message}")
 
 
-def test_each_missing_key_of_an_item_is_named(path: Path) -> None:
-    assert refusal(path, "detector: {search: {windows: [{size: 64, overlap: 0.5}]}}") == [
-        "my.yaml:1:31: detector.search.windows[0].top: is required",
-        "my.yaml:1:31: detector.search.windows[0].bottom: is required",
-    ]
-
-
 @pytest.mark.parametrize(
     ("assignment", "message"),
     [
-        ("heat.frames=x", "heat.frames: must be a valid integer"),
-        ("heat.frames.0=5", "heat.frames: must be a valid integer"),
-        ("heat.frames" + ".a" * 5000 + "=3", "heat.frames: must be a valid integer"),
-        ("search.windows.0.size=64", "search.windows: must be a list (got"),
-    ],
-)
-def test_a_mistake_in_an_assignment_to_the_detector_is_explained_in_one_line(
-    assignment: str, message: str
-) -> None:
-    with pytest.raises(ConfigError) as error:
-        load_settings((), [f"detector.{assignment}"], detector="svm")
-    (line,) = str(error.value).split("\n")
-    assert line.startswith(f"--set: detector.{message}")
-
-
-@pytest.mark.parametrize(
-    ("assignment", "message"),
-    [
+        ("detector.heat.frames" + ".a" * 5000 + "=3", "detector.heat.frames: must be a valid int"),
+        ("detector.search.windows.0.size=64", "detector.search.windows: must be a list (got"),
         ("tracker.0=3", "tracker.0: unknown setting; known settings: kind, look_ahead, "),
-        ("0=3", "0: unknown setting; known settings: detector, tracker, "),
         ("9" * 5000 + "=3", "9999"),
     ],
 )
-def test_a_mistake_in_an_assignment_is_explained_in_one_line(assignment: str, message: str) -> None:
-    with pytest.raises(ConfigError) as error:
-        load_settings((), [assignment], detector="svm")
-    (line,) = str(error.value).split("\n")
+def test_a_mistake_in_an_assignment_is_explained_in_one_line(
+    path: Path, assignment: str, message: str
+) -> None:
+    (line,) = refusal(path, "", assignment)
     assert line.startswith(f"--set: {message}")
 
 
@@ -197,60 +143,32 @@ _YAML = st.recursive(
     ),
     max_leaves=8,
 )
+_ASSIGNMENTS = st.tuples(st.lists(_NAMES).map(".".join), _YAML).map("=".join)
 
 
-@given(st.one_of(_YAML, st.text(), st.lists(_SCALARS).map("\n".join)))
-@settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
-def test_any_text_gives_settings_or_a_config_error(path: Path, text: str) -> None:
+@given(_YAML | st.text() | st.lists(_SCALARS).map("\n".join), st.text() | _ASSIGNMENTS)
+@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_any_text_gives_settings_or_a_config_error(path: Path, text: str, assignment: str) -> None:
     path.write_text(text, encoding="utf-8", errors="surrogatepass")
-    try:
-        loaded = load_settings([path])
-    except ConfigError as error:
-        assert str(error).startswith(str(path))  # noqa: PT017
-    else:
-        assert isinstance(loaded, Settings)
+    for paths, assignments, name in (([path], [], str(path)), ([], [assignment], "--set")):
+        try:
+            loaded = load_settings(paths, assignments)
+        except ConfigError as error:
+            assert str(error).startswith(name)  # noqa: PT017
+        else:
+            assert isinstance(loaded, Settings)
 
 
-@given(st.one_of(st.text(), st.tuples(st.lists(_NAMES).map(".".join), _YAML).map("=".join)))
-@settings(max_examples=200)
-def test_any_assignment_gives_settings_or_a_config_error(text: str) -> None:
-    try:
-        loaded = load_settings((), [text])
-    except ConfigError as error:
-        assert str(error).startswith("--set")  # noqa: PT017
-    else:
-        assert isinstance(loaded, Settings)
-
-
-def test_a_section_of_which_nothing_is_given_stays_as_it_was(tmp_path: Path) -> None:
-    file = tmp_path / "my.yaml"
-    file.write_text("detector:\n  # kind: svm\n  heat:\n    # threshold: 2\ntracker:\n")
-    assert load_settings([file], detector="svm") == SVM
-
-
-@pytest.fixture
-def _in_an_empty_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_a_shipped_config_is_found_by_its_name_and_another_by_its_path(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     monkeypatch.chdir(tmp_path)
-
-
-@pytest.mark.usefixtures("_in_an_empty_folder")
-class TestFindConfig:
-    def test_shipped_configs_are_found_by_their_names(self) -> None:
-        assert load_settings([find_config("default")]) == Settings()
-        assert load_settings([find_config("seed")]).svm.features.patch == 64
-
-    def test_a_path_is_taken_as_it_is(self, tmp_path: Path) -> None:
-        (tmp_path / "my.yaml").touch()
-        assert find_config("my.yaml") == Path("my.yaml")
-        assert find_config(str(tmp_path / "my.yaml")) == tmp_path / "my.yaml"
-
-    def test_a_file_of_the_name_does_not_replace_the_shipped_config(self, tmp_path: Path) -> None:
-        (tmp_path / "seed").touch()
-        assert find_config("seed").name == "seed.yaml"
-        assert find_config("./seed") == Path("seed")
-
-    @pytest.mark.parametrize("name", ["no", "seed.yaml", "../configs/seed"])
-    def test_an_unknown_name_names_the_shipped_configs(self, name: str) -> None:
+    (tmp_path / "my.yaml").touch()
+    (tmp_path / "seed").touch()
+    assert load_settings([find_config("default")]) == load_settings([find_config("net")])
+    assert find_config("my.yaml") == Path("my.yaml")
+    assert (find_config("seed").name, find_config("./seed")) == ("seed.yaml", Path("seed"))
+    for name in ("no", "seed.yaml", "../configs/seed"):
         with pytest.raises(ConfigError) as error:
             find_config(name)
         shipped = "default, project-camera, seed, svm"

@@ -3,9 +3,9 @@ from typing import Any
 import pytest
 
 from seed import SEED
+from vdet.config.detector import SearchSettings, WindowSettings
 from vdet.config.schema import Settings, SvmSettings
 from vdet.config.section import scale_lengths
-from vdet.config.svm import HeatSettings, SearchSettings, WindowSettings
 from vdet.config.tracker import RulesTrackerSettings
 
 WINDOWS = (WindowSettings(size=64, overlap=0.5, top=400, bottom=500),)
@@ -15,7 +15,6 @@ BOTH = Settings(
 """Settings with every frame length: window sets over fixed rows, and the rules."""
 LENGTHS = {
     *(f"detector.search.windows.0.{key}" for key in ("size", "top", "bottom")),
-    "detector.heat.blur",
     "tracker.min_region",
     "tracker.near",
     "tracker.wide",
@@ -35,12 +34,8 @@ def leaves(value: Any, key: str = "") -> dict[str, Any]:
     return {k: v for n, item in items for k, v in leaves(item, f"{key}.{n}".lstrip(".")).items()}
 
 
-def scaled(rows: int, settings: Settings = BOTH) -> Settings:
-    return scale_lengths(settings, rows / 720)
-
-
 def test_every_frame_length_is_scaled_and_nothing_else() -> None:
-    before, after = leaves(BOTH.model_dump()), leaves(scaled(1440).model_dump())
+    before, after = leaves(BOTH.model_dump()), leaves(scale_lengths(BOTH, 2).model_dump())
     assert {key for key in before if before[key] != after[key]} == LENGTHS
     for key in LENGTHS:
         assert after[key] == 2 * before[key]
@@ -51,18 +46,12 @@ def test_every_frame_length_is_scaled_and_nothing_else() -> None:
     [
         (360, (64, 190, 360), (32, 200, 250)),
         (1080, (192, 570, 1080), (96, 600, 750)),
-        (2160, (384, 1140, 2160), (192, 1200, 1500)),
-        (480, (85, 253, 480), (43, 267, 333)),
+        (480, (85, 253, 480), (43, 267, 333)),  # halves are rounded up
     ],
 )
 def test_windows_keep_their_place_in_a_frame_of_another_height(
     rows: int, large: tuple[int, ...], small: tuple[int, ...]
 ) -> None:
-    windows = scaled(rows, SEED).svm.search.windows
+    windows = scale_lengths(SEED, rows / 720).svm.search.windows
     assert [(w.size, w.top, w.bottom) for w in windows] == [large, small]
     assert [w.overlap for w in windows] == [0.8, 0.8]
-
-
-@pytest.mark.parametrize(("blur", "factor", "expected"), [(15, 0.5, 8), (5, 0.5, 3), (1, 0.4, 0)])
-def test_products_are_rounded_halves_up(blur: int, factor: float, expected: int) -> None:
-    assert scale_lengths(HeatSettings(blur=blur), factor).blur == expected

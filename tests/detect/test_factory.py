@@ -8,10 +8,9 @@ from textwrap import dedent
 import numpy as np
 import pytest
 
-from vdet.config.detector import DetectorSettings
+from vdet.config.detector import DetectorSettings, FeatureSettings
 from vdet.config.loading import load_settings
 from vdet.config.schema import NetworkSettings, Settings, SvmSettings
-from vdet.config.svm import FeatureSettings
 from vdet.detect.factory import load_detector, model_file, trained_on
 from vdet.detect.onnx.detector import NetworkModel
 from vdet.detect.protocol import stage_pictures_of

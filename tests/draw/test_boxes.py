@@ -10,6 +10,7 @@ from vdet.draw.boxes import (
     GREEN,
     RED,
     WHITE,
+    Color,
     color_of,
     draw_box,
     draw_label,
@@ -17,7 +18,6 @@ from vdet.draw.boxes import (
     line_width,
     text_color,
 )
-from vdet.draw.paint import Color
 
 HEIGHTS = [180, 240, 360, 480, 540, 720, 1080, 2160]
 

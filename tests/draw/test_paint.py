@@ -10,10 +10,19 @@ from numpy.typing import NDArray
 
 from vdet.boxes import Box
 from vdet.config.places import LineSettings, TrafficSettings, ZoneSettings
-from vdet.draw.boxes import BLACK, draw_box, draw_label
-from vdet.draw.paint import Color, Surface, draw_arrow, draw_lines, fill, shade, write_text
-from vdet.media.coding import Coding
-from vdet.media.frame import Planes
+from vdet.draw.boxes import (
+    BLACK,
+    Color,
+    Surface,
+    draw_arrow,
+    draw_box,
+    draw_label,
+    draw_lines,
+    fill,
+    shade,
+    write_text,
+)
+from vdet.media.frame import Coding, Planes
 from vdet.pages.place import border_marks, draw_marks
 from vdet.traffic.crossings import place
 

@@ -7,9 +7,9 @@ import numpy as np
 
 from evaluate.scenes import TEN, drive, video
 from vdet.boxes import Boxes
-from vdet.evaluate.classes import ClassResult, class_results
 from vdet.evaluate.comparison import compare
 from vdet.evaluate.images import Counting, MeasuredImage
+from vdet.evaluate.scores import ClassResult, class_results
 from vdet.labels.label import Label
 from vdet.labels.pictures import LabelledPicture
 

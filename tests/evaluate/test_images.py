@@ -16,7 +16,7 @@ from vdet.labels.pictures import LabelledPictures
 from vdet.labels.reading import read_labelled_pictures
 
 DETECTOR = PERSPECTIVE.svm
-COUNTING = Counting(DETECTOR.shown_score, 0)
+COUNTING = Counting(DETECTOR.min_score_still, 0)
 
 
 @pytest.fixture

@@ -3,7 +3,7 @@ import pytest
 from evaluate.scenes import TEN, drive, video
 from labels.saving import row
 from vdet.evaluate.comparison import compare
-from vdet.evaluate.mistakes import Mistake, mistakes
+from vdet.evaluate.report import Mistake, mistakes
 from vdet.labels.label import LabelledVideo
 
 BOX = 0.0, 0.0, 100.0, 100.0

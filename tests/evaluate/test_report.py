@@ -11,9 +11,16 @@ from pages.html import Elements
 from vdet.boxes import Boxes
 from vdet.evaluate.comparison import compare
 from vdet.evaluate.images import Counting, ImagesResult, MeasuredImage, score_source
-from vdet.evaluate.mistakes import FOUND, TRUE, mistake_tiles, worst_tiles
 from vdet.evaluate.output import RunName
-from vdet.evaluate.report import images_report, tracks_report, video_report
+from vdet.evaluate.report import (
+    FOUND,
+    TRUE,
+    images_report,
+    mistake_tiles,
+    tracks_report,
+    video_report,
+    worst_tiles,
+)
 from vdet.evaluate.video import ClipResult, RunResult, score_files
 from vdet.labels.label import Label, from_size
 from vdet.labels.reading import read_labelled_pictures

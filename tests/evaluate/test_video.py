@@ -69,7 +69,7 @@ def test_settings_side_by_side_give_what_each_gives_alone(
         variant("detector.stride=2"),
         variant("detector.search.perspective.sizes=[0.25]", "detector.stride=3"),
         variant("detector.search.perspective={sizes: [0.25], horizon: 0.5}"),
-        variant("detector.heat.regions=votes", "detector.heat.votes=0.02"),
+        variant("detector.heat.votes=0.02"),
         replace(variant(), settings=motion),
     ]
     with VideoReader(clip_path, frames=FRAMES) as reader:

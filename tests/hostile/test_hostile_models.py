@@ -16,7 +16,7 @@ import pytest
 
 from hostile.mutations import mutated, with_other_words
 from hostile.trials import broken_promises, files_in, try_all
-from vdet.config.svm import FeatureSettings, HistogramSettings, HogSettings
+from vdet.config.detector import FeatureSettings, HistogramSettings, HogSettings
 from vdet.detect.svm.model import FORMAT_VERSION, load_model
 from vdet.errors import ModelError
 

@@ -6,7 +6,7 @@ import pytest
 from labels.saving import car, checked_video, frame, row, written
 from vdet.errors import TruthError
 from vdet.evaluate.comparison import compare
-from vdet.evaluate.mistakes import mistakes
+from vdet.evaluate.report import mistakes
 from vdet.labels import mot
 from vdet.labels.formats import Format, track_formats
 from vdet.labels.label import spread_frames

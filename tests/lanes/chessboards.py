@@ -7,11 +7,9 @@ from vdet.boxes import Image
 from vdet.config.camera import LensSettings
 
 CAMERA = LensSettings(
-    width=640,
-    height=480,
+    size=(640, 480),
     matrix=((560.0, 0.0, 322.0), (0.0, 558.0, 236.0), (0.0, 0.0, 1.0)),
     distortion=(-0.25, 0.06, 0.0005, -0.0004, 0.0),
-    rms=0.5,
 )
 """A camera with visible lens distortion."""
 PATTERN = (9, 6)
@@ -35,14 +33,14 @@ def _photograph(camera: LensSettings, pose: np.ndarray[tuple[int], np.dtype[np.f
     middle = np.array([(PATTERN[0] - 1) / 2, (PATTERN[1] - 1) / 2, 0])
     shift = pose[3:] - rotation @ middle
     to_board = np.linalg.inv(np.column_stack([rotation[:, 0], rotation[:, 1], shift]))
-    columns, rows = np.meshgrid(np.arange(camera.width), np.arange(camera.height))
+    columns, rows = np.meshgrid(*map(np.arange, camera.size))
     pixels = np.stack([columns.ravel(), rows.ravel()], axis=1).astype(np.float64)
     rays = cv2.undistortPoints(
         pixels[:, None], np.array(camera.matrix), np.array(camera.distortion)
     )[:, 0]
     board = np.column_stack([rays, np.ones(len(rays))]) @ to_board.T
     places = (board[:, :2] / board[:, 2:] + 2) * _TEXELS - 0.5
-    x, y = (places[:, i].reshape(camera.height, camera.width).astype(np.float32) for i in (0, 1))
+    x, y = (places[:, i].reshape(*camera.size[::-1]).astype(np.float32) for i in (0, 1))
     drawn = cv2.remap(_board(), x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     return np.asarray(
         cv2.cvtColor(cv2.GaussianBlur(drawn, (3, 3), 0.7), cv2.COLOR_GRAY2BGR), np.uint8

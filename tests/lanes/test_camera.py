@@ -37,7 +37,7 @@ def test_a_frame_of_twice_the_size_is_undistorted_in_the_same_way(undistorter: U
 
 def test_an_aspect_ratio_may_differ_by_rounding_only() -> None:
     matrix = ((1150, 0, 640), (0, 1150, 360), (0, 0, 1))
-    camera = LensSettings(width=1280, height=720, matrix=matrix, distortion=(0, 0, 0, 0, 0), rms=1)
+    camera = LensSettings(size=(1280, 720), matrix=matrix, distortion=(0, 0, 0, 0, 0))
     assert camera.matrix_for(854, 480)[0][0] == pytest.approx(767, abs=1)
     for size in ((640, 480), (720, 1280), (1320, 720)):
         with pytest.raises(ConfigError, match=r"is for 1280×720, not"):
@@ -97,8 +97,8 @@ def test_a_camera_is_read_with_all_its_digits(path: Path) -> None:
 @pytest.mark.parametrize(
     ("key", "value", "message"),
     [
-        ("width", "wide", "camera.yaml:3:5: camera.lens.width: must be a valid integer"),
-        ("matrix", [[1, 2], [3, 4]], "camera.yaml:6:7: camera.lens.matrix[0][2]: is required"),
+        ("size", ["wide", 480], "camera.yaml:4:7: camera.lens.size[0]: must be a valid integer"),
+        ("matrix", [[1, 2], [3, 4]], "camera.yaml:7:7: camera.lens.matrix[0][2]: is required"),
         ("matrix", [[1, 0, 322], [0, 558, 236], [0, 0, 1]], "with focal lengths of 0.1 to 100 t"),
         ("matrix", [[560, 0, 322], [0, 558, 500], [0, 0, 1]], "the principal point in the frame"),
         ("distortion", [0, 0, 0, 0, float("nan")], "distortion[4]: must be a finite number"),

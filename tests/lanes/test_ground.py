@@ -17,11 +17,9 @@ PLAIN = Undistorter(None, WIDTH, HEIGHT)
 EDGE = 0.5
 """Whole numbers are middles of pixels in a file, and edges of pixels in boxes."""
 CAMERA = LensSettings(
-    width=WIDTH,
-    height=HEIGHT,
+    size=(WIDTH, HEIGHT),
     matrix=((1000, 0, 640), (0, 1000, 360), (0, 0, 1)),
     distortion=(-0.25, 0.05, 0, 0, 0),
-    rms=0.2,
 )
 
 

@@ -16,9 +16,9 @@ from conftest import Outcome, Run
 from red_cars import SETTINGS, red_finder
 from vdet.boxes import Box, Image
 from vdet.config.camera import LensSettings
+from vdet.config.detector import WindowSettings
 from vdet.config.schema import LaneSettings, OutputSettings, Settings
 from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
-from vdet.config.svm import WindowSettings
 from vdet.detect.svm.model import save_model
 from vdet.draw.boxes import color_of
 from vdet.lanes.camera import Undistorter, save_camera
@@ -32,11 +32,9 @@ from vdet.synthetic.scene import Scene
 
 WIDTH, HEIGHT, COUNT = 640, 480, 10
 LENS = LensSettings(
-    width=WIDTH,
-    height=HEIGHT,
+    size=(WIDTH, HEIGHT),
     matrix=((480, 0, 320), (0, 480, 240), (0, 0, 1)),
     distortion=(-0.35, 0.1, 0.0, 0.0, 0.0),
-    rms=0.4,
 )
 CAR = Box.sized(500, 300, 64, 56)  # in the distorted frame, near its edge
 CORNER = np.s_[400:, 600:]

@@ -34,10 +34,10 @@ def test_seventeen_of_twenty_boards_are_found_and_one_of_them_is_an_outlier(
 
 def test_the_real_camera_is_recovered(calibration: Calibration) -> None:
     camera = calibration.camera
-    assert (camera.width, camera.height) == (1280, 720)
+    assert camera.size == (1280, 720)
     assert camera.matrix[0][0] == pytest.approx(1155, abs=8)
     assert camera.matrix[1][1] == pytest.approx(1155, abs=8)
-    assert camera.rms < 1.0
+    assert calibration.rms < 1.0
 
 
 def finder_of(calibration: Calibration) -> RoadFinder:

@@ -1,6 +1,7 @@
 """The top view: ground, rows, columns and pixels agree."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,12 +25,12 @@ def test_the_trapezoid_may_be_measured_away_from_the_middle_of_the_lane(
 ) -> None:
     middle = settings_for(CAMERA)
     shift = 0.5 * CAMERA.focal / CAMERA.width  # half a metre; divide by the distance
-    sides = {"top_left": 42, "top_right": 42, "bottom_left": 6, "bottom_right": 6}
-    moved = {name: getattr(middle, name) - shift / metres for name, metres in sides.items()}
+    corners = zip(middle.points, (6, 6, 42, 42), strict=True)
+    moved = tuple((x - shift / metres, y) for (x, y), metres in corners)
     x, z = np.array([-1.0, 2.0]), np.array([10.0, 30.0])
     one, other = (
         TopView(settings, 1280, 720).ground_to_frame(x, z)
-        for settings in (middle, middle.model_copy(update=moved))
+        for settings in (middle, middle.model_copy(update={"points": moved}))
     )
     assert one == pytest.approx(other, abs=0.01)
 
@@ -37,14 +38,13 @@ def test_the_trapezoid_may_be_measured_away_from_the_middle_of_the_lane(
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"top": 0.95}, "bottom must be below top"),
-        ({"top_left": 0.6}, "closer together at top"),
-        ({"bottom_left": 0.46, "bottom_right": 0.54}, "closer together at top"),
-        ({"length": float("nan")}, "finite"),
+        ({"points": [(0.2, 0.6), (0.8, 0.6), (0.5, 0.9), (0.4, 0.9)]}, "two of a nearer row"),
+        ({"points": [(0.2, 0.9), (0.8, 0.8), (0.5, 0.6), (0.4, 0.6)]}, "two of a nearer row"),
+        ({"points": [(0.2, 0.9), (0.8, 0.9), (0.4, 0.6), (0.5, 0.6)]}, "closer together"),
+        ({"points": [(0.4, 0.9), (0.5, 0.9), (0.5, 0.6), (0.4, 0.6)]}, "closer together"),
+        ({"metres": (3.7, float("nan"))}, "finite"),
     ],
 )
-def test_settings_that_are_not_a_trapezoid_are_refused(
-    changes: dict[str, float], message: str
-) -> None:
+def test_settings_that_are_not_a_trapezoid_are_refused(changes: Any, message: str) -> None:
     with pytest.raises(ValidationError, match=message):
-        LaneSettings(**(LaneSettings().model_dump() | changes))
+        LaneSettings(**changes)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from clips import draw_frame, read_number
 from vdet.config.schema import InputSettings
 from vdet.errors import VideoError
-from vdet.media.numbered import find_sequence
+from vdet.media.images import find_sequence
 from vdet.media.reader import VideoReader
 
 

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 
 from codings import CODINGS, in_any_coding
 from vdet.boxes import Image
-from vdet.media.coding import Coding, Layers
-from vdet.media.frame import Planes
+from vdet.media.frame import Coding, Layers, Planes
 
 
 def decoded(

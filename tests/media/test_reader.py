@@ -18,8 +18,7 @@ from clips import read_number, write_clip
 from vdet.config.schema import InputSettings
 from vdet.errors import VideoError
 from vdet.media import Frame
-from vdet.media.coding import Coding
-from vdet.media.frame import ColorTags
+from vdet.media.frame import Coding, ColorTags
 from vdet.media.images import Orientation
 from vdet.media.reader import VideoReader, next_time
 

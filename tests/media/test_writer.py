@@ -18,8 +18,7 @@ from vdet.config.schema import OutputSettings
 from vdet.errors import OutputError, VideoError
 from vdet.files import staged
 from vdet.media import ColorTags, Frame, Picture, VideoInfo
-from vdet.media.coding import Coding
-from vdet.media.frame import Planes, Tags
+from vdet.media.frame import Coding, Planes, Tags
 from vdet.media.reader import VideoReader
 from vdet.media.writer import VideoWriter, may_replace_video
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from pages.html import Elements
-from vdet.evaluate.mistakes import Tile
-from vdet.evaluate.report import Report
+from vdet.evaluate.report import Report, Tile
 from vdet.files import write_text
 from vdet.pages.render import link_to
 

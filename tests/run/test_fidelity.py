@@ -17,8 +17,7 @@ from red_cars import HEIGHT, SETTINGS, WIDTH, car_at, drive, road
 from run.red_runs import outputs, read, run_red, video_info, with_search
 from vdet.config.schema import DrawSettings, OutputSettings, Settings
 from vdet.media import ColorTags, Picture
-from vdet.media.coding import Coding
-from vdet.media.frame import UNSPECIFIED, Planes
+from vdet.media.frame import UNSPECIFIED, Coding, Planes
 from vdet.media.images import Orientation
 from vdet.media.reader import VideoReader
 from vdet.media.writer import VideoWriter

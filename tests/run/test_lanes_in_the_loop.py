@@ -9,11 +9,9 @@ from vdet.config.schema import LaneSettings
 from vdet.lanes.camera import Undistorter
 
 LENS = LensSettings(
-    width=WIDTH,
-    height=HEIGHT,
+    size=(WIDTH, HEIGHT),
     matrix=((240, 0, 160), (0, 240, 120), (0, 0, 1)),
     distortion=(-0.35, 0.1, 0.0, 0.0, 0.0),
-    rms=0.4,
 )
 WITH_LANES = SETTINGS.model_copy(
     update={"camera": CameraSettings(lens=LENS), "lanes": LaneSettings(enabled=True)}

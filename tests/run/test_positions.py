@@ -26,11 +26,9 @@ WIDTH, HEIGHT = 640, 360
 AHEAD = 18.0
 CAMERA = PinholeCamera.dashboard(WIDTH, HEIGHT)
 LENS = LensSettings(
-    width=WIDTH,
-    height=HEIGHT,
+    size=(WIDTH, HEIGHT),
     matrix=((CAMERA.focal, 0, WIDTH / 2), (0, CAMERA.focal, HEIGHT / 2), (0, 0, 1)),
     distortion=(0, 0, 0, 0, 0),
-    rms=0,
 )
 SETTINGS = Settings(
     camera=CameraSettings(lens=LENS),

@@ -13,7 +13,7 @@ from run.red_runs import follow, write
 from vdet.config.schema import MotionTrackerSettings, NetworkSettings, Settings, SvmSettings
 from vdet.errors import OutputError
 from vdet.media import Frame, Picture
-from vdet.run.rate import SearchRate
+from vdet.run.loop import SearchRate
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output
 

@@ -9,8 +9,7 @@ from pathlib import Path
 
 from vdet.errors import BatchError, VideoError
 from vdet.media.demux import refuse_stream
-from vdet.media.images import PICTURE_SUFFIXES
-from vdet.media.numbered import find_sequence
+from vdet.media.images import PICTURE_SUFFIXES, find_sequence
 
 _log = logging.getLogger("vdet")
 

@@ -1,17 +1,167 @@
-"""Run a planned batch: process every file, and write its record when it has ended."""
+"""Plan a batch, and run it: process every file, and write its record when it has ended."""
 
 import os
-from collections.abc import Generator
+from collections.abc import Generator, Iterable, Mapping, Sequence
 from contextlib import closing
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 
-from vdet.batch.manifest import Record, open_manifest, read_batch
-from vdet.batch.plan import Plan
-from vdet.batch.task import known_outputs, new_record, process_file
-from vdet.files import OutputFiles, make_folder, output_errors, remove_stale
+from vdet.batch.inputs import InputVideo, find_sources
+from vdet.batch.manifest import MANIFEST, Record, open_manifest, read_batch
+from vdet.batch.task import is_done, known_outputs, new_record, process_file, replacing_ours
+from vdet.detect.factory import load_detector
+from vdet.errors import BatchError, OutputError
+from vdet.files import (
+    OutputFiles,
+    check_output,
+    is_input,
+    make_folder,
+    output_errors,
+    record_input,
+    remove_stale,
+)
+from vdet.run.sinks.protocol import BatchTotal, Output, check_sinks, sink_kind
 from vdet.run.video import Run
 from vdet.workers import Workers, call_all
+
+
+@dataclass(frozen=True, slots=True)
+class OutputSuffix:
+    """An output that every video of a batch gets.
+
+    Attributes
+    ----------
+    sink
+        The name of its sink.
+    suffix
+        The ending of its name, after that of the video. None: the video's own suffix if the sink
+        can write it, else the first that the sink can write.
+    """
+
+    sink: str
+    suffix: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """The runs to do and those that are left out; all their outputs lie in `folder`.
+
+    Attributes
+    ----------
+    totals
+        The files over all videos: path, kind, and ending of the outputs that each is made from, by
+        their number in every run.
+    """
+
+    folder: Path
+    runs: tuple[Run, ...]
+    skipped: tuple[Run, ...]
+    totals: Mapping[int, tuple[Path, BatchTotal, str]]
+
+
+def make_plan(
+    clips: Sequence[Path],
+    folder: Path,
+    common: Run,
+    suffixes: Sequence[OutputSuffix],
+    *,
+    skip_existing: bool = False,
+) -> Plan:
+    """Plan a run for every video of `clips`; outputs lie in `folder` by the places of the videos.
+
+    The paths in the settings become absolute: processes on other machines work in other folders.
+
+    Parameters
+    ----------
+    common
+        A run with what all runs have in common.
+    suffixes
+        The outputs of each video; a sink may come several times.
+    skip_existing
+        Skip runs whose outputs all exist, and are up to date as the manifest says. All outputs of
+        the other runs are made again, but only those that vdet wrote are replaced.
+
+    Raises
+    ------
+    BatchError
+        There is no video; an input lies in `folder`, or `folder` in an input; two outputs have one
+        name; with `skip_existing`, an output exists that vdet did not write.
+    OutputError
+        An output cannot be written, or already exists; the manifest cannot be used.
+    ConfigError, ModelError
+        There is no sink of a name, or the detector cannot be loaded.
+    """
+    settings = common.settings.with_paths(lambda path: str(Path(path).absolute()))
+    load_detector(settings.detector)
+    sources = find_sources(clips)
+    _refuse_nested(clips, sources, folder)
+    runs = [
+        replace(
+            common,
+            settings=settings,
+            source=source.path,
+            outputs=tuple(
+                Output(suffix.sink, _path(folder / source.place, suffix)) for suffix in suffixes
+            ),
+        )
+        for source in sources
+    ]
+    totals = {
+        number: (folder / f"{total.name}{total.suffix or ending}", total, ending)
+        for number, suffix in enumerate(suffixes)
+        for ending in (suffix.suffix or "",)
+        if (total := sink_kind(suffix.sink).total)
+    }
+    _refuse_shared(runs, [path for path, *_ in totals.values()], folder)
+    manifest, skipped = folder / MANIFEST, []
+    check_output(manifest, overwrite=True, makes_folder=True)
+    if skip_existing:
+        known, every, runs = known_outputs(read_batch(folder)), runs, []
+        for run in every:
+            if is_done(run, known):
+                skipped.append(run)
+            else:
+                runs.append(replacing_ours(run, known))
+    for run in runs:
+        check_sinks(run.outputs, overwrite=run.overwrite, makes_folder=True)
+    for path, *_ in totals.values():
+        replaces = common.overwrite or (skip_existing and manifest.exists())
+        check_output(path, overwrite=replaces, makes_folder=True)
+    return Plan(folder, tuple(runs), tuple(skipped), totals)
+
+
+def _path(place: Path, output: OutputSuffix) -> Path:
+    if output.suffix is not None:
+        return place.with_suffix(output.suffix)
+    writable = sink_kind(output.sink).endings
+    if not writable or place.suffix.lower() in writable:
+        return place
+    return place.with_suffix(writable[0])
+
+
+def _refuse_nested(clips: Iterable[Path], sources: Iterable[InputVideo], folder: Path) -> None:
+    inner = folder.resolve()
+    for clip in clips:
+        if clip.is_dir() and inner.is_relative_to(clip.resolve()):
+            raise BatchError(f"{folder}: lies in the input {clip}; use a folder outside")
+    for source in sources:
+        if source.path.resolve().is_relative_to(inner):
+            raise BatchError(f"{source.path}: lies in the output folder {folder}; use another")
+
+
+def _refuse_shared(runs: Iterable[Run], totals: Iterable[Path], folder: Path) -> None:
+    """Refuse an output with the name of another output, of a total, the manifest or an input."""
+    record_input(*(run.source for run in runs))
+    owners = {folder / MANIFEST: "the manifest"}
+    makers = [(path, "the outputs of all videos") for path in totals]
+    makers += [(output.path, str(run.source)) for run in runs for output in run.outputs]
+    for path, maker in makers:
+        if is_input(path):
+            raise OutputError(f"{path}: is an input itself; use another folder")
+        if path in owners:
+            raise BatchError(f"{owners[path]} and {maker}: both would become {path}; rename one")
+        owners[path] = maker
 
 
 def run_batch(

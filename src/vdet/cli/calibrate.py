@@ -47,7 +47,7 @@ def calibrate(
     for path, reason in result.skipped.items():
         log.warning("%s: not used: %s", path, reason)
     save_camera(result.camera, output, overwrite=overwrite)
-    camera = result.camera
-    lens = f"focal length {camera.matrix[0][0]:.0f} px, RMS error {camera.rms:.2f} px"
+    camera, (width, height) = result.camera, result.camera.size
+    lens = f"focal length {camera.matrix[0][0]:.0f} px, RMS error {result.rms:.2f} px"
     used = f"{len(result.photos)} of {len(found)} photographs used"
-    print_lines(f"{output}: {camera.width}×{camera.height}, {lens}, {used}")
+    print_lines(f"{output}: {width}×{height}, {lens}, {used}")

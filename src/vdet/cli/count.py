@@ -11,8 +11,8 @@ import click
 
 from vdet.cli import options
 from vdet.cli.command import command
-from vdet.cli.counting import check_counting, counting_options
 from vdet.cli.messages import is_quiet, print_lines, print_message, progress_steps
+from vdet.cli.results import check_counting, counting_options
 from vdet.files import OutputFiles, output_errors
 
 if TYPE_CHECKING:

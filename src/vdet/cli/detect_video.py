@@ -15,13 +15,13 @@ import click
 
 from vdet.cli import options
 from vdet.cli.command import command
-from vdet.cli.counting import check_counting, counting_options
 from vdet.cli.messages import is_quiet, print_lines, print_message, progress_steps
+from vdet.cli.results import check_counting, counting_options
 from vdet.errors import DOUBTFUL, counted, failure_code
 
 if TYPE_CHECKING:
     from vdet.batch.manifest import Record
-    from vdet.batch.plan import OutputSuffix, Plan
+    from vdet.batch.run import OutputSuffix, Plan
     from vdet.run.video import Run
     from vdet.workers import Workers
 
@@ -232,7 +232,7 @@ def _process_one(run: "Run") -> bool:
 
 def _read_suffixes(wanted: Sequence[options.Wanted], *, no_video: bool) -> "list[OutputSuffix]":
     """Return which outputs the videos of a batch get; raise `click.UsageError` on nonsense."""
-    from vdet.batch.plan import OutputSuffix
+    from vdet.batch.run import OutputSuffix
 
     suffixes = [OutputSuffix(sink, _suffix(sink, path)) for sink, path in wanted]
     if not no_video and not any(suffix.sink == "video" for suffix in suffixes):
@@ -262,7 +262,7 @@ def _process_batch(
     strict: bool,
 ) -> int:
     """Process a batch, or list what would be written, and return the exit code."""
-    from vdet.batch.plan import make_plan
+    from vdet.batch.run import make_plan
 
     folder = batch.folder or Path()
     if batch.scheduler:  # the workers were started in other folders

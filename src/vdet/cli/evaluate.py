@@ -49,7 +49,7 @@ def images(
     model = load_detector(detector.showing_all())
     sets = [read_labelled_pictures(path, roles) for path in data]
     results.check()
-    counting = Counting(detector.shown_score, min_width)
+    counting = Counting(detector.min_score_still, min_width)
     with progress_steps(" pictures") as steps:
         progress = partial(steps, "")
         result = evaluate_images(sets, model, counting, threads=core_count(), progress=progress)

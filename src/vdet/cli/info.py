@@ -1,44 +1,49 @@
-"""`vdet info`: what a video, a picture or a model file is."""
+"""`vdet info`: what a file is, how a camera is described, whether vdet works; `vdet config`."""
 
+import re
+from collections.abc import Callable, Iterator
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import click
 
 from vdet.cli.command import command
+from vdet.cli.messages import print_lines
 from vdet.cli.options import INPUT, SettingsChoice, settings_options
 from vdet.cli.results import Results, facts_options
-from vdet.errors import counted, printable
+from vdet.errors import counted, in_one_line, opencv_fault, printable
+from vdet.version import __version__
 
 Facts = dict[str, Any]
 """Values for JSON, by name; each is also a line of text."""
 
+_BROKEN = "broken"
 _SPEED = 50
 """Speed whose error is given where both places that it follows from are off by a pixel, km/h."""
 _ANY_SIZE = 1000, 1000
 """Size of the frames, pixels, where points are fractions of them."""
 
 
-@command(
-    "vdet info in.mp4", "vdet info in.mp4 --json -", "vdet info model.npz", "vdet info -c gate.yaml"
-)
+@command("vdet info in.mp4", "vdet info model.npz --json -", "vdet info -c gate.yaml", "vdet info")
 @click.argument("path", type=INPUT, metavar="[FILE]", required=False)
 @facts_options
 @settings_options("camera.size=[960,540]")
-def info(path: Path | None, results: Results, choice: SettingsChoice) -> None:
-    """Describe a video, a picture, a model file, or the settings of a camera.
+def info(path: Path | None, results: Results, choice: SettingsChoice) -> int:
+    """Describe a video, a picture, a model file, the settings of a camera, or this machine.
 
     FILE is a video or numbered pictures (what it holds, where the horizon is), a picture, a linear
     model (.npz), or a network (.onnx) of vdet or of another tool. With --json, a model's file also
     says how it was trained. Without FILE, the places and points of the ground in settings (-c) are
-    checked, and what an error of a pixel there means for speeds.
+    checked, and what an error of a pixel there means for speeds. With neither, packages, codecs and
+    the shipped models are checked; the exit code is 1 if something that vdet needs does not work.
     """
     from vdet.media.images import is_picture_name
 
     results.check()
     if path is None:
-        facts = _settings(choice)
+        facts = _settings(choice) if choice.configs else _machine()
     else:
         describe = {".npz": _linear_model, ".onnx": _network}.get(path.suffix.lower())
         if describe is None:
@@ -46,6 +51,61 @@ def info(path: Path | None, results: Results, choice: SettingsChoice) -> None:
         facts = {"file": str(path)} | describe(path)
     shown = {name.replace("_", " "): facts[name] for name in facts if name != "provenance"}
     results.print([f"{name}: {_text(value)}" for name, value in shown.items()], facts)
+    return int(facts.get("works") is False)
+
+
+def _machine() -> Facts:
+    """Return what was found of everything that vdet needs, and whether all of it works."""
+    from vdet.config.loading import shipped_configs
+    from vdet.workers import core_count
+
+    checks = {"codec h264": _codec}
+    checks |= {
+        f"settings {name}": partial(_shipped, path) for name, path in shipped_configs().items()
+    }
+    found = {"vdet": f"{__version__}, on {core_count()} cores", **dict(_packages())}
+    found["cv2"] = f"{_BROKEN}; {fault}" if (fault := opencv_fault()) else "ok"
+    found |= {name: _checked(check) for name, check in checks.items()}
+    return found | {"works": not any(text.startswith(_BROKEN) for text in found.values())}
+
+
+def _packages() -> Iterator[tuple[str, str]]:
+    """Yield the packages that vdet needs, and those of each extra, with their versions."""
+    from importlib.metadata import PackageNotFoundError, requires, version
+
+    for requirement in requires("vdet") or ():
+        package = re.split(r"[^\w.-]", requirement)[0]
+        extra = re.search(r"extra == .(\w+)", requirement)
+        if extra and extra[1] == "dev":
+            continue
+        name = f"{package} (extra {extra[1]})" if extra else package
+        try:
+            yield name, version(package)
+        except PackageNotFoundError:
+            yield name, f"{'absent' if extra else _BROKEN}; pip install {package}"
+
+
+def _checked(check: Callable[[], str]) -> str:
+    try:
+        return check()
+    except Exception as error:  # whatever it is, it does not work
+        return f"{_BROKEN}; {in_one_line(error)}; install vdet again"
+
+
+def _codec() -> str:
+    import av
+
+    av.Codec("libx264", "w")
+    av.Codec("h264", "r")
+    return "ok"
+
+
+def _shipped(path: Path) -> str:
+    from vdet.config.loading import load_settings
+    from vdet.detect.factory import load_detector
+
+    load_detector(load_settings([path]).detector)
+    return f"{path}, its model loads"
 
 
 def _settings(choice: SettingsChoice) -> Facts:
@@ -56,8 +116,6 @@ def _settings(choice: SettingsChoice) -> Facts:
     from vdet.traffic.crossings import place
     from vdet.traffic.speeds import KMH, WINDOW
 
-    if not choice.configs:
-        raise click.UsageError("nothing to describe; pass FILE or -c FILE")
     settings = choice.read()
     size = settings.camera.size or _ANY_SIZE
     lines, zones = place(settings.traffic, *size)
@@ -92,7 +150,7 @@ def _text(value: Any) -> str:
         return "; ".join(map(printable, value)) or "none"
     if isinstance(value, float):
         return f"{value:.6g}"
-    return "unknown" if value is None else printable(str(value))
+    return "unknown" if value is None else str(value)
 
 
 def _linear_model(path: Path) -> Facts:
@@ -170,3 +228,15 @@ def _video(path: Path) -> Facts:
             **asdict(info.tags),
             "horizon": find_horizon(images),
         }
+
+
+@command("vdet config > my.yaml", "vdet config -c seed --set output.crf=18")
+@settings_options("tracker.kind=rules")
+def config(choice: SettingsChoice) -> None:
+    """Print the effective settings as commented YAML.
+
+    Save them, change what you like, and pass the file to a command with -c.
+    """
+    from vdet.config.rendering import render
+
+    print_lines(*render(choice.read()).splitlines())

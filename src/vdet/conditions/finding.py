@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from vdet.config.conditions import Code
+from vdet.config.schema import Code
 
 Span = tuple[float, float]
 """From when to when, seconds as in the tracks."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from vdet.boxes import Float64Array, Image
 from vdet.conditions.finding import Finding, Severity, joined, when
-from vdet.config.conditions import Code
+from vdet.config.schema import Code
 
 _TOP = 0.35
 """Where the part of the plane begins that shows a road, as a fraction of its height."""

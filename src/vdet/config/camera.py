@@ -9,7 +9,7 @@ from zoneinfo import ZoneInfo
 from pydantic import Field, field_validator
 from pydantic_core.core_schema import ValidationInfo
 
-from vdet.config.places import Coordinate, Place
+from vdet.config.places import Coordinate, Place, Size
 from vdet.config.section import Section
 from vdet.errors import ConfigError
 
@@ -19,8 +19,6 @@ _EARLIEST, _LATEST = 1990, 9000
 """Years of moments; cameras without a clock begin in 1904, 1970 or 1980."""
 _LENS_TOLERANCE = 0.005  # accepts 854×480 for 1280×720
 
-Side = Annotated[int, Field(ge=16, le=100_000)]
-Size = tuple[Side, Side]
 _Coefficient = Annotated[float, Field(ge=-1000, le=1000)]
 _Row = tuple[float, float, float]
 
@@ -32,18 +30,12 @@ class LensSettings(Section):
     right, y points down, and whole numbers are pixel centres.
     """
 
-    width: Side
-    """Width of the calibration photographs."""
-    height: Side
-    """Height of the calibration photographs."""
+    size: Size
+    """Width and height of the calibration photographs."""
     matrix: tuple[_Row, _Row, _Row]
     """Focal lengths and principal point: `((fx, 0, cx), (0, fy, cy), (0, 0, 1))`."""
     distortion: tuple[_Coefficient, _Coefficient, _Coefficient, _Coefficient, _Coefficient]
     """k1, k2, p1, p2, k3."""
-    rms: float = Field(ge=0)
-    """Root mean square distance between the corners in the photographs and those that the camera
-    model predicts.
-    """
 
     @field_validator("matrix")
     @classmethod
@@ -51,8 +43,8 @@ class LensSettings(Section):
         cls, matrix: tuple[_Row, _Row, _Row], info: ValidationInfo
     ) -> tuple[_Row, _Row, _Row]:
         (fx, skew, x), (zero, fy, y), last = matrix
-        width, height = (info.data.get(side) for side in ("width", "height"))
-        if width and height:  # else they are wrong themselves
+        if size := info.data.get("size"):  # else it is wrong itself
+            width, height = size
             is_real = 0.1 * width <= min(fx, fy) and max(fx, fy) <= 100 * width
             in_frame = 0 <= x < width and 0 <= y < height
             if not (is_real and in_frame and (skew, zero, last) == (0, 0, (0, 0, 1))):
@@ -70,11 +62,12 @@ class LensSettings(Section):
         ConfigError
             The aspect ratio differs, so the frame is not a resized one.
         """
-        across, down = width / self.width, height / self.height
+        across, down = width / self.size[0], height / self.size[1]
         if abs(across / down - 1) > _LENS_TOLERANCE:
             raise ConfigError(
-                f"camera.lens: is for {self.width}×{self.height}, not {width}×{height}; "
-                "calibrate again"
+                "camera.lens: is for {}×{}, not {width}×{height}; calibrate again".format(
+                    *self.size, width=width, height=height
+                )
             )
         (fx, _, cx), (_, fy, cy), last = self.matrix
         x, y = (cx + 0.5) * across - 0.5, (cy + 0.5) * down - 0.5

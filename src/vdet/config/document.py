@@ -2,14 +2,13 @@
 
 import re
 import reprlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from itertools import islice
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import yaml
-from pydantic import TypeAdapter, ValidationError
+from yaml.constructor import ConstructorError
 
 from vdet.errors import ConfigError, printable
 from vdet.files import read_whole
@@ -17,10 +16,6 @@ from vdet.files import read_whole
 MAX_BYTES = 100_000
 """Ten times the size of all settings with all their comments."""
 MAX_INTEGER_BITS = 64
-MAX_MISTAKES = 20
-"""Maximum number of mistakes of one file that are shown; the others are counted."""
-
-T = TypeVar("T")
 
 Key = tuple[str | int, ...]
 """Path to a value from the root: `("search", "windows", 0, "size")`."""
@@ -52,19 +47,11 @@ def format_key(key: Key) -> str:
     return text
 
 
-def config_error(lines: Iterable[str], count: int) -> ConfigError:
-    """Return the error for `count` mistakes; only the first of their `lines` are shown."""
-    shown = list(islice(lines, MAX_MISTAKES))
-    if count > len(shown):
-        shown.append(f"… and {count - len(shown)} more mistakes")
-    return ConfigError(*shown)
-
-
 class _Loader(yaml.SafeLoader):
-    """Safe YAML in which `1e-3` is a number, and aliases and tags are refused.
+    """Safe YAML with text as keys, each once, and without aliases and tags.
 
-    In YAML 1.1 a number with an exponent needs a dot and a sign: `1.0e-3`. A few aliases can expand
-    to billions of values, a tag can ask for any kind of value; settings need neither.
+    A few aliases can expand to billions of values, a tag can ask for any kind of value; settings
+    need neither.
     """
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
@@ -75,10 +62,31 @@ class _Loader(yaml.SafeLoader):
             refused = "tags (!name)"
         else:
             return super().compose_node(parent, index)
-        problem = f"{refused} are not accepted"
-        raise yaml.composer.ComposerError(None, None, problem, event.start_mark)
+        raise ConstructorError(None, None, f"{refused} are not accepted", event.start_mark)
+
+    def construct_object(self, node: yaml.Node, deep: bool = False) -> Any:
+        try:
+            value = super().construct_object(node, deep)
+            if isinstance(value, int) and value.bit_length() > MAX_INTEGER_BITS:
+                raise OverflowError("the number is too large")
+        except (ValueError, OverflowError) as error:
+            raise ConstructorError(None, None, str(error), node.start_mark) from error
+        return value
+
+    def mapping(self, node: yaml.MappingNode) -> dict[str, Any]:
+        values: dict[str, Any] = {}
+        for key, value in node.value:
+            problem = None if isinstance(key, yaml.ScalarNode) else f"a {key.id} cannot be a key"
+            if problem is None and key.value in values:
+                problem = f"{printable(key.value)} appears twice; remove one"
+            if problem:
+                raise ConstructorError(None, None, problem, key.start_mark)
+            values[key.value] = self.construct_object(value, deep=True)
+        return values
 
 
+_Loader.add_constructor("tag:yaml.org,2002:map", _Loader.mapping)
+# In YAML 1.1 a number with an exponent needs a dot and a sign: `1.0e-3`.
 _Loader.add_implicit_resolver(
     "tag:yaml.org,2002:float",
     re.compile(r"^[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)[eE][-+]?[0-9]+$"),
@@ -98,38 +106,13 @@ def read_document(path: Path) -> Document:
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise ConfigError(f"{path}: is not UTF-8 text; that unknown settings file") from error
+        raise ConfigError(f"{path}: is not UTF-8 text; settings files are") from error
     return parse_document(text, str(path))
-
-
-def read_values(path: Path, kind: type[T], mistakes: Mapping[str, str]) -> T:
-    """Read a YAML file as a value of a class that pydantic checks.
-
-    `mistakes` are messages by pydantic's type of the mistake.
-
-    Raises
-    ------
-    ConfigError
-        As of `read_document`; or the values are wrong, with one line for each mistake.
-    """
-    document = read_document(path)
-    try:
-        return TypeAdapter(kind).validate_python(document.values)
-    except ValidationError as error:
-        lines = []
-        for detail in error.errors():
-            key = tuple(detail["loc"])
-            said = detail["msg"].removeprefix("Value error, ").removeprefix("Input ")
-            named = f"{format_key(key)}: " if key else ""
-            text = mistakes.get(detail["type"], said)
-            lines.append(f"{document.place_of(key)}: {named}{text}")
-        raise config_error(lines, len(lines)) from error
 
 
 def parse_document(text: str, name: str) -> Document:
     """Read YAML text; `name` is its name in messages. Raises `ConfigError`."""
-    places: dict[Key, str] = {}
-    values = _Reader(name, places).value(_compose(text, name), ())
+    values, places = _parse(text, name)
     if not isinstance(values, dict | None):
         got = reprlib.repr(values)
         raise ConfigError(f"{name}:1:1: expected settings (key: value), got {got}")
@@ -148,16 +131,22 @@ def parse_assignment(text: str) -> Document:
     path: Key = tuple(key.strip().split("."))
     if not equals or not all(path):
         raise ConfigError(f"--set {text}: expected KEY=VALUE, as in output.crf=18")
-    name, places = "--set", dict[Key, str]()
-    nested = _Reader(name, places).value(_compose(value, name), path)
+    nested, places = _parse(value, "--set")
     for part in reversed(path):
         nested = {part: nested}
-    return Document(name, nested, dict.fromkeys([*places, path], name))
+    inside = ((*path, *key) for key in places or [()])
+    return Document("--set", nested, dict.fromkeys(inside, "--set"))
 
 
-def _compose(text: str, name: str) -> yaml.Node | None:
+def _parse(text: str, name: str) -> tuple[Any, dict[Key, str]]:
+    """Return the value of YAML text, and the places of all keys in it. Raises `ConfigError`."""
     try:
-        return yaml.compose(text, _Loader)
+        loader = _Loader(text)
+        node = loader.get_single_node()
+        if node is None:
+            return None, {}
+        value = loader.construct_document(node)
+        marks = dict(_marks(node, ()))
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         place = f"{name}:{mark.line + 1}:{mark.column + 1}" if mark else name
@@ -166,47 +155,16 @@ def _compose(text: str, name: str) -> yaml.Node | None:
         raise ConfigError(f"{name}: is not YAML: {' '.join(str(error).split())}") from error
     except RecursionError as error:
         raise ConfigError(f"{name}: is nested too deeply") from error
+    return value, {key: f"{name}:{mark.line + 1}:{mark.column + 1}" for key, mark in marks.items()}
 
 
-@dataclass(frozen=True, slots=True)
-class _Reader:
-    """Turns nodes into values, and adds their places to `places`. Raises `ConfigError`."""
-
-    name: str
-    places: dict[Key, str]
-
-    def value(self, node: yaml.Node | None, key: Key) -> Any:
-        if node is None:
-            return None
-        self.places.setdefault(key, self._place(node))
-        if isinstance(node, yaml.MappingNode):
-            return self._mapping(node, key)
-        if isinstance(node, yaml.SequenceNode):
-            return [self.value(item, (*key, i)) for i, item in enumerate(node.value)]
-        return self._scalar(node)
-
-    def _mapping(self, node: yaml.MappingNode, key: Key) -> dict[str, Any]:
-        values: dict[str, Any] = {}
-        for name_node, value_node in node.value:
-            place = self._place(name_node)
-            if not isinstance(name_node, yaml.ScalarNode):
-                raise ConfigError(f"{place}: expected a key, got a {name_node.id}")
-            name = name_node.value
-            if name in values:
-                raise ConfigError(f"{place}: {printable(name)}: appears twice; remove one")
-            self.places[(*key, name)] = place
-            values[name] = self.value(value_node, (*key, name))
-        return values
-
-    def _scalar(self, node: yaml.Node) -> Any:
-        try:
-            value = yaml.constructor.SafeConstructor().construct_object(node)
-            if isinstance(value, int) and value.bit_length() > MAX_INTEGER_BITS:
-                raise OverflowError("the number is too large")
-        except (yaml.YAMLError, ValueError, OverflowError) as error:
-            problem = getattr(error, "problem", None) or error
-            raise ConfigError(f"{self._place(node)}: cannot be understood: {problem}") from error
-        return value
-
-    def _place(self, node: yaml.Node) -> str:
-        return f"{self.name}:{node.start_mark.line + 1}:{node.start_mark.column + 1}"
+def _marks(node: yaml.Node, key: Key) -> Iterator[tuple[Key, yaml.Mark]]:
+    """Yield where a value and everything in it stands; a named one stands where its name does."""
+    yield key, node.start_mark
+    if isinstance(node, yaml.MappingNode):
+        for name, value in node.value:
+            yield from _marks(value, (*key, name.value))
+            yield (*key, name.value), name.start_mark
+    elif isinstance(node, yaml.SequenceNode):
+        for index, item in enumerate(node.value):
+            yield from _marks(item, (*key, index))

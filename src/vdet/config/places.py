@@ -1,19 +1,29 @@
 """The sections `regions` and `traffic`: places in the frame.
 
 Points are fractions of the frame's width and height. In a file with `camera.size` they are pixels
-of frames of that size; `vdet.config.loading` turns them into fractions.
+of frames of that size, until `to_fractions` changes them.
 """
 
-from collections.abc import Iterable
-from typing import Annotated, Literal
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field, field_validator, model_validator
+from pydantic import (
+    AfterValidator,
+    Field,
+    TypeAdapter,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
 
 from vdet.config.section import Section
 from vdet.polygons import Point, crosses_itself
 
 Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
 Place = tuple[Coordinate, Coordinate]
+Side = Annotated[int, Field(ge=16, le=100_000)]
+Size = tuple[Side, Side]
+"""Width and height of frames, in pixels."""
 Name = Annotated[str, Field(min_length=1, max_length=80)]
 
 MOST_CORNERS = 100
@@ -160,3 +170,65 @@ class TrafficSettings(Section):
             if max(abs(ax - bx), abs(ay - by)) < SHORTEST_LINE:
                 raise ValueError(f"{name}: is shorter than 1 % of the frame; make it longer")
         return self
+
+
+_POINTS = {
+    ("regions",): {"points"},
+    ("traffic", "lines"): {"start", "end"},
+    ("traffic", "zones"): {"points"},
+    ("camera", "ground"): {"pixel"},
+    ("lanes",): {"points"},
+}
+"""The sections and lists of sections with points, and the keys of the points in each."""
+_DIGITS = 3  # of pixels
+
+
+def to_fractions(values: Mapping[str, Any]) -> None:
+    """Turn the points of settings with `camera.size` into fractions of the frame.
+
+    What is not a point, or not a size, stays: it is refused with all other mistakes.
+    """
+    if size := _size(values):
+        _change(values, lambda x, y: [x / size[0], y / size[1]])
+
+
+def to_pixels(values: Mapping[str, Any]) -> None:
+    """Turn the points of settings with `camera.size` into pixels of such frames."""
+    if size := _size(values):
+        _change(values, lambda x, y: [round(x * size[0], _DIGITS), round(y * size[1], _DIGITS)])
+
+
+def _size(values: Mapping[str, Any]) -> Size | None:
+    try:
+        return TypeAdapter(Size).validate_python(inside(values, "camera", "size"))
+    except ValidationError:
+        return None
+
+
+def _change(values: Mapping[str, Any], change: Any) -> None:
+    def changed(value: Any) -> Any:
+        match value:
+            case [int() | float() as x, int() | float() as y]:
+                return change(x, y)
+            case [*points]:
+                return [changed(point) for point in points]
+        return value
+
+    for places, keys in _POINTS.items():
+        for item in items(values, *places):
+            for key in keys & item.keys():
+                item[key] = changed(item[key])
+
+
+def inside(values: Any, *keys: str) -> Any:
+    """Return the value of a key in nested sections; None where there is none."""
+    for key in keys:
+        values = values.get(key) if isinstance(values, dict) else None
+    return values
+
+
+def items(values: Any, *keys: str) -> Iterator[dict[str, Any]]:
+    """Yield the sections in a list in nested sections, or the section that is there."""
+    found = inside(values, *keys)
+    found = found if isinstance(found, list) else [found]
+    yield from (item for item in found if isinstance(item, dict))

@@ -13,7 +13,7 @@ import yaml
 from pydantic.fields import FieldInfo
 from pydantic_core import to_jsonable_python
 
-from vdet.config.points import to_pixels
+from vdet.config.places import to_pixels
 from vdet.config.schema import Section, Settings
 
 HEADING = "# vdet settings. `vdet config` prints the effective ones."

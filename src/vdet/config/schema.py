@@ -4,26 +4,20 @@ The defaults are those of `configs/default.yaml`, which is their printed form.
 """
 
 from collections.abc import Callable
+from functools import partial
 from typing import Annotated, Literal
 
-from pydantic import Field, SerializeAsAny, field_validator, model_validator
+from pydantic import BeforeValidator, Field, SerializeAsAny, field_validator, model_validator
 
 from vdet.config.camera import CameraSettings, moment
-from vdet.config.conditions import ConditionSettings
-from vdet.config.detector import DetectorSettings, NetworkSettings
-from vdet.config.places import RegionList, TrafficSettings
+from vdet.config.detector import DetectorSettings, NetworkSettings, SvmSettings
+from vdet.config.kinds import with_kind
+from vdet.config.places import Place, RegionList, TrafficSettings
 from vdet.config.section import Section, Share
-from vdet.config.svm import SvmSettings
 from vdet.config.tracker import MotionTrackerSettings, TrackerSettings
-from vdet.config.train import TrainSettings
 from vdet.errors import ConfigError
 
-
-class StepSettings(Section):
-    """Steps of other packages, between the tracker and the outputs."""
-
-    names: tuple[str, ...] = ()
-    """Names of the steps, in order."""
+Metres = Annotated[float, Field(gt=0, le=200)]
 
 
 class LaneSettings(Section):
@@ -31,40 +25,87 @@ class LaneSettings(Section):
 
     The trapezoid here is where many dashboard cameras see their lane. For a camera of your own,
     take an undistorted frame of a straight and level road. Choose two rows: the nearer one above
-    the bonnet, the farther one a little below the horizon. Note the columns at which the lines of
+    the bonnet, the farther one a little below the horizon. Note the points at which the lines of
     the vehicle's lane cross them.
     """
 
     enabled: bool = False
     """Find the lane, and draw it."""
-    top: Share = 0.63
-    """Farther row, as a fraction of the frame's height."""
-    bottom: Share = 0.93
-    """Nearer row, as a fraction of the frame's height."""
-    top_left: float = Field(0.46, ge=-2, le=3)
-    """Column of the left line in the farther row, as a fraction of the frame's width."""
-    top_right: float = Field(0.54, ge=-2, le=3)
-    """Column of the right line in the farther row."""
-    bottom_left: float = Field(0.21, ge=-2, le=3)
-    """Column of the left line in the nearer row."""
-    bottom_right: float = Field(0.79, ge=-2, le=3)
-    """Column of the right line in the nearer row."""
-    lane_width: float | None = Field(None, gt=0, le=20)
-    """Width of the lane in metres. null: not known, so nothing is given in metres."""
-    length: float | None = Field(None, gt=1, le=200)
-    """Distance between the two rows on the road, in metres. Measure it by dashes of known length,
-    or compute focal length × lane_width × (1 / lane width in the farther row − 1 / lane width in
-    the nearer row), all but lane_width in pixels. null: not known, so nothing is given in metres.
+    points: tuple[Place, Place, Place, Place] = (
+        (0.21, 0.93), (0.79, 0.93), (0.54, 0.63), (0.46, 0.63),
+    )  # fmt: skip
+    """Where the lines cross two rows: near left, near right, far right, far left; x and y."""
+    metres: tuple[Metres, Metres] | None = None
+    """Width of the lane, and distance between the two rows on the road, in metres. Measure the
+    distance by dashes of known length, or compute focal length × width × (1 / width in the farther
+    row − 1 / width in the nearer row), the last two and the focal length in pixels. null: not
+    known, so nothing is given in metres.
     """
 
     @model_validator(mode="after")
     def _is_a_trapezoid(self) -> "LaneSettings":
-        if self.bottom <= self.top:
-            raise ValueError("bottom must be below top, a larger fraction of the height")
-        far, near = self.top_right - self.top_left, self.bottom_right - self.bottom_left
-        if not 0 < far < 0.9 * near:
-            raise ValueError("the lines must be closer together at top than at bottom")
+        (x1, bottom), (x2, also_bottom), (x3, top), (x4, also_top) = self.points
+        if bottom != also_bottom or top != also_top or bottom <= top:
+            raise ValueError("points must be two of a nearer row, and then two of a farther one")
+        if not 0 < x3 - x4 < 0.9 * (x2 - x1):
+            raise ValueError("the lines must be closer together in the farther row")
         return self
+
+
+Code = Literal[
+    "camera-moves", "camera-moved", "unexplained-motion", "dark", "haze", "blur",
+    "lane-geometry", "classes", "small-frames",
+]  # fmt: skip
+"""What makes a result doubtful; docs/conditions.md explains each."""
+
+
+class ConditionSettings(Section):
+    """What makes a result doubtful: the findings about a video."""
+
+    ignore: tuple[Code, ...] = Field((), max_length=100)
+    """Codes of findings to leave out: camera-moves, camera-moved, unexplained-motion, dark, haze,
+    blur, lane-geometry, classes, small-frames.
+    """
+
+
+class SvmTrainingSettings(Section):
+    """How `vdet train` fits the linear SVM."""
+
+    C: float = Field(3e-5, gt=0, le=1e6)
+    """Penalty of errors. Smaller values give a smoother model."""
+    augmentation: bool = True
+    """Learn from further samples: the mirror image of each patch, and of some patches a copy that
+    the side of a frame cuts off, and a part as an example of what is not a vehicle.
+    """
+
+
+class NetworkTrainingSettings(Section):
+    """How `vdet train-net` trains the network."""
+
+    steps: int = Field(4700, ge=1, le=10_000_000)
+    """Number of steps."""
+    batch: int = Field(16, ge=1, le=1024)
+    """Number of pictures in a step."""
+    size: tuple[
+        Annotated[int, Field(ge=64, le=4096, multiple_of=64)],
+        Annotated[int, Field(ge=64, le=4096, multiple_of=32)],
+    ] = (640, 352)
+    """Width and height of the pictures, multiples of 64 and 32."""
+    learning_rate: float = Field(1e-3, gt=0, le=1)
+    """Highest learning rate of AdamW."""
+    classes: tuple[str, ...] = Field(
+        ("car", "truck", "bus", "motorcycle", "bicycle", "person"), min_length=1, max_length=100
+    )
+    """Classes to learn, in the order of the network's outputs."""
+    weights: dict[str, Annotated[float, Field(gt=0, le=1000)]] = Field({})
+    """How often to draw pictures of a set, by its name, relative to others."""
+
+
+class TrainSettings(Section):
+    """Training of models: `vdet train` and `vdet train-net`."""
+
+    svm: SvmTrainingSettings = SvmTrainingSettings()
+    net: NetworkTrainingSettings = NetworkTrainingSettings()
 
 
 Role = Literal["vehicle", "ignored", "other"]
@@ -126,8 +167,6 @@ class ClipSettings(Section):
 class DrawSettings(Section):
     """What is drawn on videos and pictures."""
 
-    boxes: bool = True
-    """Draw a box around each vehicle."""
     predicted: Literal["dashed", "plain", "hidden"] = "dashed"
     """How to draw vehicles whose place is predicted: with dashed boxes, plain boxes, or not at all.
     """
@@ -137,19 +176,19 @@ class DrawSettings(Section):
     """
     colors: Literal["id", "class", "one"] = "id"
     """Use one colour for each id, for each class, or for all vehicles (one)."""
-    thickness: float = Field(1.0, gt=0, le=20)
-    """Factor of the width of lines, which otherwise depends on the frame."""
     trails: Seconds | None = None
     """Draw the path of each vehicle over this many seconds of a video."""
-    time: bool = False
-    """Draw the time since the first frame of a video."""
 
 
 class Settings(Section):
     """All settings, one field for each section."""
 
-    detector: SerializeAsAny[DetectorSettings] = NetworkSettings()
-    tracker: SerializeAsAny[TrackerSettings] = MotionTrackerSettings()
+    detector: Annotated[
+        SerializeAsAny[DetectorSettings], BeforeValidator(partial(with_kind, "detector"))
+    ] = NetworkSettings()
+    tracker: Annotated[
+        SerializeAsAny[TrackerSettings], BeforeValidator(partial(with_kind, "tracker"))
+    ] = MotionTrackerSettings()
     camera: CameraSettings = CameraSettings()
     regions: RegionList = ()
     """Regions of the frame in which vehicles are shown.
@@ -157,7 +196,8 @@ class Settings(Section):
     A vehicle is where the middle of its lower edge is. Without an included region the whole frame
     counts, except for excluded ones.
     """
-    steps: StepSettings = StepSettings()
+    steps: tuple[str, ...] = ()
+    """Steps of other packages, between the tracker and the outputs: their names, in order."""
     traffic: TrafficSettings = TrafficSettings()
     lanes: LaneSettings = LaneSettings()
     conditions: ConditionSettings = ConditionSettings()
@@ -181,11 +221,7 @@ class Settings(Section):
     @property
     def missing_for_metres(self) -> tuple[str, ...]:
         """The keys that are not given, and without which the lane has no metres."""
-        needed = {
-            "camera.lens": self.camera.lens,
-            "lanes.lane_width": self.lanes.lane_width,
-            "lanes.length": self.lanes.length,
-        }
+        needed = {"camera.lens": self.camera.lens, "lanes.metres": self.lanes.metres}
         return tuple(key for key, value in needed.items() if value is None)
 
     def __hash__(self) -> int:  # some fields are dictionaries

@@ -47,7 +47,7 @@ def load_detector(settings: DetectorSettings) -> DetectorModel:
     """
     kind, model = None, Path(settings.model) if settings.model else None
     if model:
-        from vdet.config.loading import kind_of_model  # it imports YAML
+        from vdet.config.kinds import kind_of_model  # it imports YAML
 
         kind = kind_of_model(model)
     if kind and settings.model_suffix and kind != settings.kind:

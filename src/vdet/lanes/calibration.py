@@ -47,6 +47,8 @@ class Calibration:
     """A camera, and the photographs that it was fitted to."""
 
     camera: LensSettings
+    rms: float
+    """Root mean square distance between the corners in the photographs and the camera's, pixels."""
     photos: list[BoardPhoto]
     skipped: dict[Path, str]
     """The photographs that were not used, each with the reason."""
@@ -81,14 +83,14 @@ def calibrate(paths: Iterable[Path], pattern: Pattern) -> Calibration:
             skipped[photo.path] = f"is an outlier: error {error:.2f} px, median {median:.2f} px"
     used = _without(skipped, photos, pattern)
     if len(used) < len(photos):
-        camera, _ = _fit(used, pattern, size)
+        camera, errors = _fit(used, pattern, size)
     if camera is None:
         raise ImageError(
             "the focal length cannot be found: all photographs show the board from much the same "
             f"side; take some with the board slanted by {MIN_ANGLE:.0f}° or more, to the left and "
             "to the right, up and down"
         )
-    return Calibration(camera, used, skipped)
+    return Calibration(camera, float(np.sqrt(np.mean(np.square(errors)))), used, skipped)
 
 
 def find_corners(image: Image, pattern: Pattern) -> Float32Array | None:
@@ -146,7 +148,7 @@ def _fit(
     board = np.zeros((pattern[0] * pattern[1], 3), np.float32)  # a square is 1 unit long
     board[:, :2] = np.mgrid[: pattern[0], : pattern[1]].T.reshape(-1, 2)
     corners = [photo.corners for photo in photos]
-    rms, matrix, distortion, rotations, *_, errors = cv2.calibrateCameraExtended(
+    _, matrix, distortion, rotations, *_, errors = cv2.calibrateCameraExtended(
         [board] * len(photos), corners, size, np.eye(3), np.zeros(5)
     )
     normals = np.array([cv2.Rodrigues(np.asarray(rotation))[0][:, 2] for rotation in rotations])
@@ -155,11 +157,7 @@ def _fit(
         k1, k2, p1, p2, k3 = np.ravel(distortion).tolist()
         with suppress(ValidationError):  # no real camera has such values
             camera = LensSettings(
-                width=size[0],
-                height=size[1],
-                matrix=matrix.tolist(),
-                distortion=(k1, k2, p1, p2, k3),
-                rms=rms,
+                size=size, matrix=matrix.tolist(), distortion=(k1, k2, p1, p2, k3)
             )
     return camera, np.ravel(errors).tolist()
 

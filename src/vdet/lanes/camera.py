@@ -98,7 +98,7 @@ ACROSS = 30.0
 """Pixels per metre, across the road."""
 ALONG = 8.0
 """Pixels per metre, along the road."""
-_USUAL_WIDTH, _USUAL_LENGTH = 3.7, 37.0
+_USUAL = 3.7, 37.0
 """Metres of a lane that nobody measured, across and along: for the search, not for results."""
 _MARGIN = 3.0
 """Metres of road that are shown on each side of the lane."""
@@ -108,24 +108,17 @@ class TopView:
     """Converts between ground, undistorted frames of one size, and pictures from above."""
 
     def __init__(self, settings: LaneSettings, width: int, height: int) -> None:
-        self.lane_width = settings.lane_width or _USUAL_WIDTH
-        """Of the lane that is looked for, metres."""
-        self.length = settings.length or _USUAL_LENGTH
-        """Of the trapezoid, metres."""
-        near = settings.bottom_right - settings.bottom_left  # of the frame's width
-        far = settings.top_right - settings.top_left
+        self.lane_width, self.length = settings.metres or _USUAL
+        """Of the lane that is looked for, and along the trapezoid, metres."""
+        corners = np.array(settings.points)
+        near_left, near_right, far_right, far_left = corners[:, 0].tolist()
+        near, far = near_right - near_left, far_right - far_left  # of the frame's width
         start = self.length * far / (near - far)  # widths in the frame are proportional to 1/z
         end = start + self.length
-        left = (settings.bottom_left - settings.top_left) / (near - far) * self.lane_width
+        left = (near_left - far_left) / (near - far) * self.lane_width
         right = left + self.lane_width
-        corners = [
-            (settings.bottom_left, settings.bottom),
-            (settings.bottom_right, settings.bottom),
-            (settings.top_right, settings.top),
-            (settings.top_left, settings.top),
-        ]
         ground = np.array([(left, start), (right, start), (right, end), (left, end)], np.float32)
-        frame = (np.array(corners) * (width, height)).astype(np.float32)
+        frame = (corners * (width, height)).astype(np.float32)
         self.corners = np.asarray(frame, np.float64), np.asarray(ground, np.float64)
         """The corners of the trapezoid, in pixels of the undistorted frame and metres."""
         self._to_frame = np.asarray(cv2.getPerspectiveTransform(ground, frame), np.float64)

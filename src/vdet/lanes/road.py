@@ -15,8 +15,7 @@ import numpy as np
 from vdet.boxes import Box, Float64Array, Image
 from vdet.config.camera import LensSettings
 from vdet.config.schema import LaneSettings
-from vdet.draw.boxes import draw_label, line_width
-from vdet.draw.paint import Color, Surface, draw_lines, shade
+from vdet.draw.boxes import Color, Surface, draw_label, draw_lines, line_width, shade
 from vdet.lanes.camera import Maps, TopView, Undistorter, warped
 from vdet.lanes.curves import (
     Equations,

@@ -10,8 +10,7 @@ from av.stream import Stream
 
 from vdet.config.schema import InputSettings, OutputSettings
 from vdet.errors import OutputError
-from vdet.media.clock import ClockUnwrapper
-from vdet.media.demux import is_pipe, open_input, packets, picture_stream
+from vdet.media.demux import ClockUnwrapper, is_pipe, open_input, packets, picture_stream
 from vdet.media.images import is_picture_name
 from vdet.media.reader import VideoReader
 from vdet.media.writer import VIDEO_SUFFIXES, VideoWriter

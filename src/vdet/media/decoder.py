@@ -12,9 +12,8 @@ from av.stream import Stream
 
 from vdet.errors import ImageError
 from vdet.media import demux
-from vdet.media.clock import ClockUnwrapper
-from vdet.media.images import read_encoded
-from vdet.media.numbered import find_sequence
+from vdet.media.demux import ClockUnwrapper
+from vdet.media.images import find_sequence, read_encoded
 
 _LONGEST_GROUP = 600  # packets from one key frame to the next, which are held in memory
 _COUNTABLE = ("av1", "h264", "hevc", "libdav1d", "mjpeg", "mpeg2video", "mpeg4", "png", "vp9")

@@ -19,11 +19,9 @@ from vdet.boxes import Image
 from vdet.config.schema import InputSettings
 from vdet.errors import VideoError
 from vdet.media import demux
-from vdet.media.coding import Coding
 from vdet.media.decoder import Decoder
-from vdet.media.frame import Frame, Picture, Planes, VideoInfo, bgr_of
-from vdet.media.images import Orientation, upright
-from vdet.media.numbered import ASSUMED_RATE
+from vdet.media.frame import Coding, Frame, Picture, Planes, VideoInfo, bgr_of
+from vdet.media.images import ASSUMED_RATE, Orientation, upright
 
 _log = logging.getLogger("vdet")
 _DEFAULTS = InputSettings()

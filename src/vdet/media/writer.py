@@ -17,10 +17,8 @@ from av.video.reformatter import ColorRange
 
 from vdet.config.schema import OutputSettings
 from vdet.errors import OutputError, VideoError
-from vdet.media.clock import ClockUnwrapper
-from vdet.media.coding import Coding
-from vdet.media.demux import SAFELY, open_input, packets, picture_stream
-from vdet.media.frame import UNSPECIFIED, Frame, Picture, Planes, VideoInfo
+from vdet.media.demux import SAFELY, ClockUnwrapper, open_input, packets, picture_stream
+from vdet.media.frame import UNSPECIFIED, Coding, Frame, Picture, Planes, VideoInfo
 from vdet.version import __version__
 
 _log = logging.getLogger("vdet")

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vdet.draw.boxes import color_of, text_color
-from vdet.draw.paint import Color
+from vdet.draw.boxes import Color, color_of, text_color
 
 FILL, BAD, SOFT = "var(--fill)", "var(--bad)", "var(--soft)"
 """Colours of the style: what is right, what is wrong, and what is less important."""

@@ -13,7 +13,7 @@ import yaml
 from markupsafe import Markup
 
 from vdet.boxes import Float64Array, Image
-from vdet.config.points import to_pixels
+from vdet.config.places import to_pixels
 from vdet.config.schema import Settings
 from vdet.detect.classes import UNKNOWN
 from vdet.lanes.ground import ground_of

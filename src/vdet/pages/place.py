@@ -13,9 +13,19 @@ import numpy as np
 
 from vdet.boxes import Image
 from vdet.detect.classes import UNKNOWN
-from vdet.draw import paint
-from vdet.draw.boxes import LINE, WHITE, ZONE, color_of, draw_label, line_width
-from vdet.draw.paint import Color, Surface
+from vdet.draw.boxes import (
+    LINE,
+    WHITE,
+    ZONE,
+    Color,
+    Surface,
+    color_of,
+    draw_arrow,
+    draw_label,
+    draw_lines,
+    line_width,
+    shade,
+)
 from vdet.lanes.ground import Ground
 from vdet.pages.charts import hex_color
 from vdet.pages.render import render
@@ -149,14 +159,14 @@ def draw_marks(surface: Surface, marks: Iterable[Mark]) -> None:
     drawn = list(marks)
     for mark in drawn:
         if mark.is_closed:
-            paint.shade(surface, mark.points, mark.color, _SHADE)
-        paint.draw_lines(surface, mark.points, mark.color, mark.width, closed=mark.is_closed)
+            shade(surface, mark.points, mark.color, _SHADE)
+        draw_lines(surface, mark.points, mark.color, mark.width, closed=mark.is_closed)
         if mark.is_arrow:
             end, length = mark.points[-1], max(3 * mark.width, _TIP * surface.shape[1])
             back = (point for point in reversed(mark.points) if math.dist(point, end) >= length)
             start = next(back, mark.points[0])
             tip = length / max(length, math.dist(start, end))
-            paint.draw_arrow(surface, start, end, mark.color, mark.width, tip=tip)
+            draw_arrow(surface, start, end, mark.color, mark.width, tip=tip)
     for mark in drawn:
         if mark.label:
             draw_label(surface, mark.label, mark.at, mark.color)

@@ -77,7 +77,7 @@ def make_steps(context: StepContext, others: Sequence[Step] = ()) -> list[Step]:
     ConfigError, ImageError
         The regions or the lens do not fit the frames.
     ConfigError
-        There is no step with a name in `settings.steps.names`.
+        There is no step with a name in `settings.steps`.
     """
     settings, width, height = context.settings, context.width, context.height
     steps: list[Step | None] = []
@@ -95,7 +95,7 @@ def make_steps(context: StepContext, others: Sequence[Step] = ()) -> list[Step]:
         from vdet.regions import Regions
 
         steps.append(RegionStep(Regions(settings.regions, width, height)))
-    steps += [load_plugin(STEPS, name)(context) for name in settings.steps.names]
+    steps += [load_plugin(STEPS, name)(context) for name in settings.steps]
     return [step for step in (*steps, *others) if step is not None]
 
 

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from vdet.boxes import Float64Array, Image
-from vdet.draw.paint import Color
+from vdet.draw.boxes import Color
 
 NEAR = 0.5
 """Metres; nothing nearer than this is drawn."""

@@ -5,7 +5,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from vdet.draw.paint import Color
+from vdet.draw.boxes import Color
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.scene import (
     PERIOD,

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from vdet.boxes import Float64Array, Image, Int64Array
-from vdet.draw.paint import Color
+from vdet.draw.boxes import Color
 from vdet.synthetic.camera import PinholeCamera, beyond_near, fill, mixed, shaded
 from vdet.synthetic.scene import Body, Scene, SceneVehicle, Waypoint
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from vdet.config.camera import moment
 from vdet.config.schema import Settings
 from vdet.errors import ConfigError
-from vdet.media.numbered import find_sequence
+from vdet.media.images import find_sequence
 from vdet.track.track import FrameTracks
 
 _log = logging.getLogger("vdet")

@@ -10,7 +10,7 @@ from codings import in_any_coding
 from vdet.boxes import Float64Array
 from vdet.detect.onnx.preparation import Fit, InputForm
 from vdet.media import Picture, Planes
-from vdet.media.coding import Coding
+from vdet.media.frame import Coding
 from vdet.synthetic.random_scenes import demo_scene
 from vdet.synthetic.render import render
 

@@ -10,7 +10,7 @@ from benchmarks.patch_search import PatchSearch
 from drawn_patches import draw_patches
 from seed import SEED
 from vdet.boxes import Float32Array, Image
-from vdet.config.svm import FeatureSettings, WindowSettings
+from vdet.config.detector import FeatureSettings, WindowSettings
 from vdet.detect.svm.dense_search import DenseSearch
 from vdet.detect.svm.features import FeatureExtractor, to_patch
 from vdet.detect.svm.model import BoxRegression, LinearModel

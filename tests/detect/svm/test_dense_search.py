@@ -12,7 +12,7 @@ import pytest
 from benchmarks.patch_search import PatchSearch
 
 from vdet.boxes import Image
-from vdet.config.svm import FeatureSettings, HogSettings
+from vdet.config.detector import FeatureSettings, HogSettings
 from vdet.detect.svm.dense_search import Blocks, DenseSearch, Gradients, table_sums
 from vdet.detect.svm.features import FeatureExtractor, split
 from vdet.detect.svm.model import BoxRegression, LinearModel

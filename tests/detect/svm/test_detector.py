@@ -10,7 +10,6 @@ from boxing import moved_to, rounded
 from red_cars import CAR, HEIGHT, SETTINGS, THREE_SETS, WIDTH, by_perspective, red_finder, road
 from vdet.boxes import Box, Boxes, Image
 from vdet.config.schema import SvmSettings
-from vdet.config.svm import StillSettings
 from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.heat import HotRegion
 from vdet.detect.svm.search import FrameSearch
@@ -103,7 +102,7 @@ class TestDefaultSettings:
     def test_two_cars_that_one_hot_region_covers_are_told_apart(self) -> None:
         cars = moved_to(CAR, 60, 120), moved_to(CAR, 156, 120)  # half a car between them
         image = road(*cars)
-        outlines = detect_still(image, but(DEFAULT, "heat", regions="outline"))
+        outlines = detect_still(image, but(DEFAULT, "heat", votes=None))
         assert len(outlines) == 1
         voted = rounded(detect_still(image, DEFAULT))
         assert len(voted) == 2
@@ -176,22 +175,20 @@ class TestStillPictures:
     def test_a_detection_is_shown_if_it_is_large_and_strong_enough(
         self, settings: SvmSettings
     ) -> None:
-        everything = settings.model_copy(update={"stills": StillSettings(strength=0, width=0)})
-        whole = detect_still(road(CAR), everything)
-        (box,), (strength,) = rounded(whole), whole.data["strength"].tolist()
+        def still(score: float, width: float, height: float) -> Boxes:
+            limits = {"min_score_still": score, "min_size_still": (width, height)}
+            return detect_still(road(CAR), settings.model_copy(update=limits))
+
+        whole = still(0, 0, 0)
+        (box,), (score,) = rounded(whole), whole.scores.tolist()
         width, height = box.width / WIDTH, box.height / HEIGHT
-        minimum = StillSettings(strength=strength - 1e-4, width=width, height=height)
-        for stills, shown in (
-            (minimum, True),
-            (minimum.model_copy(update={"strength": strength + 0.01}), False),
-            (minimum.model_copy(update={"width": width + 1 / WIDTH}), False),
-            (minimum.model_copy(update={"height": height + 1 / HEIGHT}), False),
-        ):
-            found = detect_still(road(CAR), settings.model_copy(update={"stills": stills}))
-            assert rounded(found) == ([box] if shown else [])
+        assert rounded(still(score - 1e-4, width, height)) == [box]
+        assert len(still(score + 1e-4, width, height)) == 0
+        assert len(still(score, width + 1 / WIDTH, height)) == 0
+        assert len(still(score, width, height + 1 / HEIGHT)) == 0
 
     def test_weak_and_small_detections_are_left_out_of_still_pictures_only(self) -> None:
-        settings = but(ROWS, "stills", strength=100.0)
+        settings = ROWS.model_copy(update={"min_score_still": 1.0})
         assert len(detect_still(road(CAR), settings)) == 0
         assert len(detect_video(road(CAR), road(CAR), settings=settings)[-1]) == 1
 

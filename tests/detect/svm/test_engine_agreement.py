@@ -20,8 +20,8 @@ from detect.svm.engine_comparison import (
 )
 from seed import SEED
 from vdet.boxes import Image, from_sizes, iou_matrix
+from vdet.config.detector import FeatureSettings, HistogramSettings, HogSettings, SearchSettings
 from vdet.config.schema import SvmSettings
-from vdet.config.svm import FeatureSettings, HistogramSettings, HogSettings, SearchSettings
 from vdet.detect.svm.dense_search import DenseSearch
 from vdet.detect.svm.horizon import find_horizon
 from vdet.detect.svm.kind import shipped_model
@@ -29,7 +29,7 @@ from vdet.detect.svm.model import LinearModel, load_model
 from vdet.detect.svm.search import Engine, FrameSearch
 from vdet.detect.svm.windows import WindowGrid, Windows, lay_grids
 from vdet.media import Picture, Planes
-from vdet.media.coding import Coding
+from vdet.media.frame import Coding
 
 SHIPPED = {"seed": SEED.svm, "default": SvmSettings()}
 GRIDS = {

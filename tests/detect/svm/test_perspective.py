@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vdet.config.svm import FeatureSettings, PerspectiveSettings
+from vdet.config.detector import FeatureSettings, PerspectiveSettings
 from vdet.detect.svm.windows import WindowGrid, lay_perspective
 
 FEATURES = FeatureSettings()

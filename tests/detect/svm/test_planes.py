@@ -7,12 +7,12 @@ import numpy as np
 from codings import in_any_coding
 from detect.svm.engine_comparison import fitted, log_odds, road
 from vdet.boxes import Float32Array, Float64Array, Image, iou_matrix
+from vdet.config.detector import FeatureSettings
 from vdet.config.schema import SvmSettings
-from vdet.config.svm import FeatureSettings
 from vdet.detect.factory import load_detector
 from vdet.detect.svm.search import FrameSearch
 from vdet.media import Picture, Planes
-from vdet.media.coding import Coding
+from vdet.media.frame import Coding
 from vdet.synthetic.random_scenes import demo_scene
 from vdet.synthetic.truth import true_boxes
 

@@ -5,11 +5,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vdet.boxes import Image
-from vdet.config.svm import FeatureSettings
+from vdet.config.detector import FeatureSettings
 from vdet.detect.svm.features import Channels, resize, split
 from vdet.detect.svm.pyramid import FramePyramid
 from vdet.media import Picture, Planes
-from vdet.media.coding import Coding
+from vdet.media.frame import Coding
 
 FEATURES = FeatureSettings(halved=())
 FRAME = np.random.default_rng(0).integers(0, 256, (97, 131, 3), dtype=np.uint8)

@@ -5,15 +5,15 @@ import pytest
 
 import seed
 from vdet.boxes import Image, Int32Array
-from vdet.config.schema import SvmSettings
-from vdet.config.section import scale_lengths
-from vdet.config.svm import (
+from vdet.config.detector import (
     FeatureSettings,
     HistogramSettings,
     PerspectiveSettings,
     SearchSettings,
     WindowSettings,
 )
+from vdet.config.schema import SvmSettings
+from vdet.config.section import scale_lengths
 from vdet.detect.svm.dense_search import DenseSearch
 from vdet.detect.svm.horizon import DEFAULT_HORIZON
 from vdet.detect.svm.model import BoxRegression, LinearModel

@@ -6,9 +6,9 @@ import pytest
 from boxing import moved_to
 from red_cars import CAR, HEIGHT, PERSPECTIVE, SCALE, SETTINGS, WIDTH, red_finder, road
 from vdet.boxes import Image
+from vdet.config.detector import WindowSettings
 from vdet.config.schema import SvmSettings
 from vdet.config.section import scale_lengths
-from vdet.config.svm import WindowSettings
 from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.heat import Heat
 from vdet.detect.svm.stages import blend_heat

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from seed import SEED
 from vdet.boxes import Int32Array
-from vdet.config.svm import WindowSettings
+from vdet.config.detector import WindowSettings
 from vdet.detect.svm.windows import WindowGrid, Windows, lay_grid
 
 LARGE, SMALL = SEED.svm.search.windows

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from learn.net.blocks import block_picture, block_source
-from vdet.config.train import NetworkTrainingSettings
+from vdet.config.schema import NetworkTrainingSettings
 from vdet.learn.net.augmentation import Drawing, Paster, SampleDrawer, repeat_factors
 from vdet.learn.net.sources import MAX_PIXELS, NetSample, NetSource
 from vdet.learn.net.weather import with_weather
@@ -78,18 +78,20 @@ def test_large_pictures_are_held_smaller_with_their_boxes() -> None:
     assert sample.boxes == pytest.approx(block_picture(1, 1280, 720).boxes * factor, rel=0.01)
 
 
-def test_small_sources_and_those_with_a_weight_come_more_often() -> None:
+def test_small_sources_and_those_with_a_weight_come_more_often(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     small = NetSource("small", [block_picture(0)])
     large = NetSource("large", [without_objects(WHITE)] * 9)
-    settings = SETTINGS.model_copy(update={"repeat_threshold": 0.0})
+    monkeypatch.setattr("vdet.learn.net.augmentation.REPEAT_THRESHOLD", 0.0)
 
     def drawn(settings: NetworkTrainingSettings) -> int:
         drawer = SampleDrawer([small, large], settings)
         picks = [drawer._pick(np.random.default_rng(seed)) for seed in range(200)]
         return sum(pick is small.samples[0] for pick in picks)
 
-    assert 30 <= drawn(settings) <= 70  # one in four, not one in ten
-    assert 80 <= drawn(settings.model_copy(update={"weights": {"small": 3.0}})) <= 120  # half
+    assert 30 <= drawn(SETTINGS) <= 70  # one in four, not one in ten
+    assert 80 <= drawn(SETTINGS.model_copy(update={"weights": {"small": 3.0}})) <= 120  # half
 
 
 def test_pictures_with_rare_classes_come_more_often() -> None:

@@ -12,8 +12,7 @@ torch = pytest.importorskip(
 from torch import Tensor  # noqa: E402
 
 from learn.net.blocks import block_picture, block_source  # noqa: E402
-from vdet.config.schema import NetworkSettings  # noqa: E402
-from vdet.config.train import NetworkTrainingSettings  # noqa: E402
+from vdet.config.schema import NetworkSettings, NetworkTrainingSettings  # noqa: E402
 from vdet.detect.onnx.detector import NetworkModel  # noqa: E402
 from vdet.detect.onnx.recognition import Header  # noqa: E402
 from vdet.errors import DataError  # noqa: E402
@@ -39,7 +38,7 @@ from vdet.testing import check_detector  # noqa: E402
 
 CLASSES = ("car", "truck", "bus")
 QUICK = NetworkTrainingSettings(
-    steps=120, batch=4, width=256, height=128, learning_rate=3e-3, classes=CLASSES
+    steps=120, batch=4, size=(256, 128), learning_rate=3e-3, classes=CLASSES
 )
 
 

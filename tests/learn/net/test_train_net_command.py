@@ -18,7 +18,7 @@ torch = pytest.importorskip(
 
 QUICK = tuple(
     argument
-    for value in ("steps=2", "batch=2", "width=128", "height=64")
+    for value in ("steps=2", "batch=2", "size=[128,64]")
     for argument in ("--set", f"train.net.{value}")
 )
 CAR = Boxed("car", (20, 30, 60, 40))

@@ -13,9 +13,8 @@ from sklearn.preprocessing import StandardScaler
 from sklearn.svm import LinearSVC
 
 from vdet.boxes import BoolArray, Float32Array
-from vdet.config.schema import Settings, SvmSettings, TrainSettings
-from vdet.config.svm import FeatureSettings
-from vdet.config.train import SvmTrainingSettings
+from vdet.config.detector import FeatureSettings
+from vdet.config.schema import Settings, SvmSettings, SvmTrainingSettings, TrainSettings
 from vdet.detect.svm.model import LinearModel
 from vdet.errors import DataError
 from vdet.learn.svm.dataset import PatchFile

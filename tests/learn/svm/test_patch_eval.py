@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vdet.config.schema import Settings, SvmSettings, TrainSettings
-from vdet.config.svm import FeatureSettings, HistogramSettings
-from vdet.config.train import SvmTrainingSettings
+from vdet.config.detector import FeatureSettings, HistogramSettings
+from vdet.config.schema import Settings, SvmSettings, SvmTrainingSettings, TrainSettings
 from vdet.learn.svm.dataset import find_patches
 from vdet.learn.svm.training import evaluate_patches, train
 from vdet.media.images import write_image

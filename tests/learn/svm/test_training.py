@@ -9,9 +9,8 @@ import pytest
 
 import vdet
 from vdet.boxes import Image
-from vdet.config.schema import Settings, SvmSettings, TrainSettings
-from vdet.config.svm import FeatureSettings, HistogramSettings, HogSettings
-from vdet.config.train import SvmTrainingSettings
+from vdet.config.detector import FeatureSettings, HistogramSettings, HogSettings
+from vdet.config.schema import Settings, SvmSettings, SvmTrainingSettings, TrainSettings
 from vdet.detect.svm.features import FeatureExtractor
 from vdet.detect.svm.model import load_model, save_model
 from vdet.errors import DataError

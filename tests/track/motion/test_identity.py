@@ -10,10 +10,9 @@ import pytest
 from track.motion.scenes import HEIGHT, RATE, WIDTH, detections
 from vdet.boxes import Box
 from vdet.config.schema import MotionTrackerSettings
-from vdet.draw.paint import Color
+from vdet.draw.boxes import Color
 from vdet.media import Picture
-from vdet.media.coding import Coding
-from vdet.media.frame import Planes
+from vdet.media.frame import Coding, Planes
 from vdet.track.motion.pairing import appearances, differences
 from vdet.track.motion.tracker import MotionTracker
 

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 from vdet.boxes import Float32Array
-from vdet.config.svm import FeatureSettings
+from vdet.config.detector import FeatureSettings
 from vdet.detect.svm.features import Channels, hog_descriptor, patch_descriptors
 from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.pyramid import FramePyramid

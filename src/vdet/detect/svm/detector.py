@@ -9,7 +9,6 @@ import numpy as np
 
 from vdet.boxes import Boxes, Image, are_nested
 from vdet.config.schema import SvmSettings
-from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
 from vdet.detect.svm.heat import Heat, HotRegion, find_regions, sum_heat
 from vdet.detect.svm.horizon import DEFAULT_HORIZON, find_horizon
 from vdet.detect.svm.model import LinearModel
@@ -81,7 +80,7 @@ class SvmDetector:
 
     def __init__(self, search: FrameSearch, settings: SvmSettings, size: tuple[int, int]) -> None:
         self._search, self._settings, self._size = search, settings, size
-        self._heat = scale_lengths(settings.heat, size[1] / REFERENCE_HEIGHT)
+        self._heat = settings.heat
         self._recent: deque[Windows] = deque(maxlen=self._heat.frames)
 
     def search(self, picture: Picture, index: int | None) -> Candidates:
@@ -106,7 +105,7 @@ class SvmDetector:
 
     def _regions(self, heat: Heat) -> list[HotRegion]:
         regions = find_regions(heat, self._heat.threshold)
-        if self._heat.regions == "votes":
+        if self._heat.votes is not None:
             votes = Votes.of(self._recent, self._size)
             regions = split_regions(regions, votes, self._heat.votes)
         inside = (replace(region, box=region.box.clipped(*self._size)) for region in regions)
@@ -123,8 +122,8 @@ class SvmDetector:
 
     def _shown_in_still(self, found: Boxes) -> Boxes:
         """Return the detections that are strong and large enough, without those inside another."""
-        stills, strengths = self._settings.stills, found.data["strength"]
-        smallest = np.array([stills.width, stills.height]) * self._size
-        sizes = found.sides[:, 2:] - found.sides[:, :2]
-        shown = found[(strengths >= stills.strength) & (sizes >= smallest).all(axis=1)]
+        settings = self._settings
+        smallest = np.array(settings.min_size_still) * self._size
+        large = (found.sides[:, 2:] - found.sides[:, :2] >= smallest).all(axis=1)
+        shown = found[large & (found.scores >= settings.min_score_still)]
         return shown[~are_nested(shown.sides, shown.data["strength"])]

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vdet.boxes import Float32Array, Image
-from vdet.config.svm import FeatureSettings
+from vdet.config.detector import FeatureSettings
 from vdet.media.images import split_channels
 
 Channels = tuple[Image, Image, Image]

@@ -12,7 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from vdet.boxes import Box, Float32Array, from_sizes
-from vdet.config.svm import HeatSettings
+from vdet.config.detector import HeatSettings
+from vdet.config.section import REFERENCE_HEIGHT
 from vdet.detect.svm.windows import Windows
 
 
@@ -48,6 +49,8 @@ class HotRegion:
     strength: float
 
 
+_BLUR = 15
+"""Side of the Gaussian kernel that blurs the heat, in pixels of `REFERENCE_HEIGHT` rows."""
 _SHRINK = 4
 """Pixels across and down that a value of the heat covers, with votes; 1 with outlines."""
 
@@ -55,7 +58,7 @@ _SHRINK = 4
 def sum_heat(recent: Sequence[Windows], size: tuple[int, int], settings: HeatSettings) -> Heat:
     """Return the blurred sum of the hits of the last frames.
 
-    Each hit adds to the values that its vehicle covers: its probability or, with `regions: votes`,
+    Each hit adds to the values that its vehicle covers: its probability or, with `votes`,
     its probability times its share.
 
     Parameters
@@ -64,10 +67,8 @@ def sum_heat(recent: Sequence[Windows], size: tuple[int, int], settings: HeatSet
         The hits of each frame.
     size
         Width and height of the frames, pixels.
-    settings
-        Lengths already scaled to that size.
     """
-    by_votes = settings.regions == "votes"
+    by_votes = settings.votes is not None
     shrink = _SHRINK if by_votes else 1
     total = np.zeros([-(-side // shrink) for side in reversed(size)], np.float32)
     for hits in recent:
@@ -77,7 +78,7 @@ def sum_heat(recent: Sequence[Windows], size: tuple[int, int], settings: HeatSet
         for (left, top, right, bottom), heat in zip(sides.tolist(), heats.tolist(), strict=True):
             values[top:bottom, left:right] += heat
         total += values
-    side = settings.blur // shrink | 1  # a Gaussian kernel has a middle
+    side = int(_BLUR * size[1] / REFERENCE_HEIGHT + 0.5) // shrink | 1  # a kernel has a middle
     if side > 1:
         cv2.GaussianBlur(total, (side, side), 0, dst=total)
     return Heat(total, shrink)

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
+from vdet.config.detector import FeatureSettings
 from vdet.config.schema import SvmSettings
-from vdet.config.svm import FeatureSettings
 from vdet.detect.factory import DetectorKind
 from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.model import load_model

@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from vdet.archives import open_archive, read_member
 from vdet.boxes import Float32Array
-from vdet.config.svm import FeatureSettings
+from vdet.config.detector import FeatureSettings
 from vdet.errors import ModelError
 from vdet.files import read_whole
 

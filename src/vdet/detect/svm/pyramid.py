@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 
 from vdet.boxes import Image
-from vdet.config.svm import FeatureSettings
+from vdet.config.detector import FeatureSettings
 from vdet.detect.svm.features import Channels, halve, resize, split
 from vdet.media import Picture
 

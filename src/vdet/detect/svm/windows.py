@@ -15,9 +15,9 @@ import numpy as np
 import numpy.typing as npt
 
 from vdet.boxes import Float32Array, Int32Array
+from vdet.config.detector import FeatureSettings, PerspectiveSettings, WindowSettings
 from vdet.config.schema import SvmSettings
 from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
-from vdet.config.svm import FeatureSettings, PerspectiveSettings, WindowSettings
 
 IndexArray = npt.NDArray[np.intp]
 

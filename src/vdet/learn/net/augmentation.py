@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vdet.boxes import Float32Array, Float64Array, Image, area, coverage, iou_matrix
-from vdet.config.train import NetworkTrainingSettings
+from vdet.config.schema import NetworkTrainingSettings
 from vdet.detect.onnx.preparation import GREY
 from vdet.learn.net.sources import NetSample, NetSource, join
 from vdet.learn.net.weather import with_weather
@@ -21,6 +21,8 @@ _MOSAIC_SCALES = 0.5, 1.5
 """Smallest and largest scale of the four pictures of a mosaic."""
 _MIN_VISIBLE = 0.25  # fraction of a vehicle that is left after cropping, else it is ignored
 _ASPECT = 0.1  # most change of the width relative to the height
+REPEAT_THRESHOLD = 0.4
+"""Pictures with a class that is in a smaller fraction of the pictures are drawn more often."""
 _TILTED = 0.25  # fraction of pictures that are turned
 _TILT = 3.0  # deviation of their angles, degrees
 
@@ -64,7 +66,7 @@ class SampleDrawer:
         weights = [settings.weights.get(source.name, 1.0) for source in sources]
         chances = np.repeat(np.array(weights) / np.sqrt(np.maximum(sizes, 1)), sizes)
         chances /= chances.sum()
-        chances *= repeat_factors(self._samples, chances, settings.repeat_threshold)
+        chances *= repeat_factors(self._samples, chances, REPEAT_THRESHOLD)
         self._chances = chances / chances.sum()
         self._paster = Paster(self._samples)
 

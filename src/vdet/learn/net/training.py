@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from vdet.config.train import NetworkTrainingSettings
+from vdet.config.schema import NetworkTrainingSettings
 from vdet.detect.onnx.recognition import Header, read_header
 from vdet.detect.onnx.session import Session
 from vdet.errors import DataError
@@ -98,7 +98,7 @@ def train_to_file(
         "report": {"sources": [asdict(report) for _, report in sources]},
         **({"base": before.provenance} if before else {}),
     }
-    pixels = settings.width * settings.height
+    pixels = settings.size[0] * settings.size[1]
     header = Header(classes=settings.classes, pixels=pixels, provenance=provenance)
     export_network(network, header, output, overwrite=overwrite)
     checkpoint.unlink(missing_ok=True)
@@ -177,10 +177,11 @@ def _batches(
 
 
 def _drawing(settings: NetworkTrainingSettings, step: int) -> Drawing:
+    width, height = settings.size
     mosaics = 0.0 if step >= (1 - _PLAIN) * settings.steps else _MOSAICS
     if step < _SMALL * settings.steps:
-        return Drawing(settings.width // 2, settings.height // 64 * 32, _MAGNIFIED, mosaics)
-    return Drawing(settings.width, settings.height, 1.0, mosaics)
+        return Drawing(width // 2, height // 64 * 32, _MAGNIFIED, mosaics)
+    return Drawing(width, height, 1.0, mosaics)
 
 
 def _to_batch(samples: Sequence[NetSample]) -> Batch:

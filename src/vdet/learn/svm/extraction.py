@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vdet.boxes import BoolArray, Float32Array
-from vdet.config.svm import FeatureSettings
+from vdet.config.detector import FeatureSettings
 from vdet.detect.svm.features import FeatureExtractor, to_patch
 from vdet.errors import DataError
 from vdet.learn.svm.augmentation import PatchSample, augment

@@ -2,14 +2,13 @@
 
 import zlib
 from collections.abc import Sequence
-from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from vdet.config.schema import Settings
 from vdet.detect.classes import OUR_NAMES
 from vdet.draw import boxes
-from vdet.draw.paint import Color, Surface, draw_lines
+from vdet.draw.boxes import Color, Surface, draw_lines
 from vdet.errors import OutputError
 from vdet.media import Frame, Picture, Planes, VideoInfo
 from vdet.media.images import PICTURE_SUFFIXES, encode_image
@@ -34,7 +33,7 @@ class Overlay:
     Parameters
     ----------
     video
-        None for a still picture, which has no trails and no time.
+        None for a still picture, which has no trails.
     counter
         Its counts so far are drawn, if the settings say so.
     """
@@ -46,7 +45,7 @@ class Overlay:
         counter: "VehicleCounter | None" = None,
     ) -> None:
         self._settings, self._draw = settings, settings.draw
-        self._start = video.start if video else None
+        self._longest = self._draw.trails if video else None
         self._counter = counter if settings.traffic.draw else None
         automatic = VIDEO_LABELS if video else PICTURE_LABELS
         self._labels = automatic if self._draw.label is None else (self._draw.label,)
@@ -67,9 +66,6 @@ class Overlay:
             draw_running_counts(surface, self._counter)
         self._draw_trails(surface, shown, float(result.frame.time))
         self._draw_vehicles(surface, shown)
-        if self._draw.time and self._start is not None:
-            time = time_text(result.frame.time - self._start)
-            boxes.draw_label(surface, time, (0, surface.shape[0]), boxes.BLACK)
         return surface
 
     def _shown(self, result: FrameResult) -> list[Track]:
@@ -79,25 +75,23 @@ class Overlay:
         return sorted(tracks, key=lambda track: track.box.y2)
 
     def _draw_trails(self, surface: Surface, shown: Sequence[Track], now: float) -> None:
-        longest = self._draw.trails
-        if self._start is None or not longest:
+        if not self._longest:
             return
         for track in shown:
             self._trails.setdefault(track.id, []).append((now, track.foot))
         for number, points in list(self._trails.items()):
-            self._trails[number] = [point for point in points if now - point[0] <= longest]
+            self._trails[number] = [point for point in points if now - point[0] <= self._longest]
             if not self._trails[number]:
                 del self._trails[number]
-        width = boxes.line_width(surface, self._draw.thickness)
+        width = boxes.line_width(surface)
         for track in shown:
             path = [point for _, point in self._trails[track.id]]
             draw_lines(surface, path, self._color(track), width)
 
     def _draw_vehicles(self, surface: Surface, shown: Sequence[Track]) -> None:
-        for track in shown if self._draw.boxes else ():
+        for track in shown:
             dashed = self._draw.predicted == "dashed" and track.state == "predicted"
-            color, thickness = self._color(track), self._draw.thickness
-            boxes.draw_box(surface, track.box, color, dashed=dashed, thickness=thickness)
+            boxes.draw_box(surface, track.box, self._color(track), dashed=dashed)
         texts = [[label_text(track, parts) for parts in self._labels] for track in shown]
         colors = [self._color(track) for track in shown]
         boxes.draw_labels(surface, [track.box for track in shown], texts, colors)
@@ -119,13 +113,6 @@ def label_text(track: Track, parts: Sequence[str]) -> str:
     texts = {"id": f"#{track.id}", "class": track.class_name, "score": f"{track.score:.2f}"}
     texts["distance"] = distance
     return " ".join(text for part in parts if (text := texts[part]))
-
-
-def time_text(time: Fraction) -> str:
-    """Write a time in seconds as hours, minutes and seconds: 0:01:02.345."""
-    thousandths = round(time * 1000)
-    minutes, rest = divmod(max(0, thousandths), 60_000)
-    return f"{minutes // 60}:{minutes % 60:02}:{rest // 1000:02}.{rest % 1000:03}"
 
 
 def _class_number(name: str | None) -> int:

@@ -1,17 +1,21 @@
-"""The sinks that fill a folder: `stages` of one frame, `crops` of vehicles, and the `page`."""
+"""The sinks that fill a folder: `stages` of a frame, `crops`, `clips`, and the `page`."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 from vdet.boxes import Image
 from vdet.config.rendering import render
+from vdet.detect.classes import UNKNOWN
 from vdet.draw.boxes import WHITE, color_of, draw_box, draw_label, draw_regions
 from vdet.errors import OutputError
 from vdet.files import write_text
 from vdet.lanes.road import stage_pictures
 from vdet.media import Picture
+from vdet.media.cutting import can_copy, copied_suffix, copy_part, encode_part
 from vdet.media.images import encode_image, is_picture_name
 from vdet.pages.batch import VideoFacts, write_index
 from vdet.pages.render import PAGE_NAME, jpeg_uri, link_to
@@ -20,7 +24,7 @@ from vdet.regions import lay_regions
 from vdet.run.result import FrameResult, findings_in
 from vdet.run.sinks.drawn import PICTURE_LABELS, label_text
 from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
-from vdet.traffic.records import BestCrops, Crop
+from vdet.traffic.records import BestCrops, Crop, VehicleRecord
 
 _BOXES = "boxes"
 _CROP_NAME = re.compile(r"vehicle-\d{4,}-at--?\d+\.\d{3}s\.(jpg|png)")
@@ -205,3 +209,87 @@ def _write_index(summaries: Mapping[str, dict[str, Any]], target: Path) -> None:
 
 _INDEX = BatchTotal("index", _write_index, suffix=".html")
 PAGE = SinkKind(PageSink, what="pages", marker=PAGE_NAME, takes="videos", total=_INDEX)
+
+
+_NAME = re.compile(r"clip-[\dT-]+-\S+-\d+(\+\d+)?\.(mp4|mov|mkv)")
+_PRECISION = 1_000_000  # parts of a second
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """A time in which vehicles are shown: seconds in the video, with the margins around it."""
+
+    start: float
+    end: float
+    vehicles: tuple[VehicleRecord, ...]
+
+
+def scenes(records: Iterable[VehicleRecord], margin: float) -> list[Scene]:
+    """Return the times of vehicles with `margin` seconds around them; those that touch are one."""
+    found: list[Scene] = []
+    for record in sorted(records, key=lambda record: record.first):
+        start, end = record.first - margin, record.last + margin
+        if found and start <= found[-1].end:
+            last = found.pop()
+            start, end = last.start, max(end, last.end)
+            found.append(Scene(start, end, (*last.vehicles, record)))
+        else:
+            found.append(Scene(start, end, (record,)))
+    return found
+
+
+class ClipSink(BaseSink):
+    """Cuts the clips at the end of the run; with lines or zones, of vehicles counted there."""
+
+    def __init__(self, path: Path, context: SinkContext) -> None:
+        super().__init__(path, context)
+        self._folder = context.files.stage_folder(path, _NAME)
+
+    def write(self, result: FrameResult) -> None:
+        """Do nothing: the run keeps the records."""
+
+    def finish(self) -> None:
+        """Write the clips."""
+        settings, source = self.context.settings, self.video.path
+        copies = not settings.clips.exact and can_copy(source)
+        suffix = copied_suffix(source) if copies else ".mp4"
+        for scene in scenes(self._chosen(), settings.clips.margin):
+            target = self._folder / f"{self._name(scene)}{suffix}"
+            start, end = _exact(scene.start), _exact(scene.end)
+            if copies:
+                copy_part(source, start, end, target)
+            else:
+                first = self.video.start
+                encode_part(
+                    source,
+                    max(start - first, Fraction(0)),
+                    end - first,
+                    target,
+                    reading=settings.input,
+                    writing=settings.output,
+                )
+
+    def _chosen(self) -> Sequence[VehicleRecord]:
+        records = self.traffic.vehicles
+        counts = self.traffic.counts()
+        if counts is None:
+            return records
+        counted = {event.id for event in counts.events}
+        return [record for record in records if record.id in counted]
+
+    def _name(self, scene: Scene) -> str:
+        first, clock = scene.vehicles[0], self.context.clock
+        seconds = int(first.first)
+        moment = f"{seconds // 3600:02}-{seconds // 60 % 60:02}-{seconds % 60:02}"
+        if clock:
+            moment = clock.at(first.first).strftime("%Y-%m-%dT%H-%M-%S")
+        kind = re.sub(r"[^\w-]+", "-", first.class_name or UNKNOWN)
+        others = f"+{len(scene.vehicles) - 1}" if len(scene.vehicles) > 1 else ""
+        return f"clip-{moment}-{kind}-{first.id}{others}"
+
+
+def _exact(seconds: float) -> Fraction:
+    return Fraction(round(seconds * _PRECISION), _PRECISION)
+
+
+CLIPS = SinkKind(ClipSink, what="clips", marker="clip-*.*", takes="videos")
