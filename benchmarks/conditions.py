@@ -23,7 +23,8 @@ from vdet.conditions.watch import Conditions, small_luma
 from vdet.config.loading import load_settings
 from vdet.config.places import LineSettings, TrafficSettings
 from vdet.config.schema import Settings
-from vdet.detect.factory import load_detector, trained_on
+from vdet.detect.factory import load_detector
+from vdet.detect.onnx.detector import SHIPPED, trained_on
 from vdet.labels.reading import read_labelled_pictures
 from vdet.media import Picture
 from vdet.media.images import read_image
@@ -152,7 +153,7 @@ def measure_pictures(roads: Path) -> None:
     """
     settings = load_settings(assignments=["detector.min_score_still=0.1"])
     search = PictureSearch(load_detector(settings.detector), settings)
-    seen = trained_on(settings.detector)
+    seen = trained_on(SHIPPED)
     rows = []
     for path in sorted(item for item in roads.iterdir() if item.is_dir()):
         rows += [(path.name, *row) for row in _measured(path, search, altered=path.name in seen)]

@@ -6,8 +6,7 @@ from pathlib import Path
 
 from vdet.config.loading import find_config, load_settings
 from vdet.config.schema import Settings
-from vdet.detect.svm.detector import SvmModel
-from vdet.detect.svm.kind import shipped_model
+from vdet.detect.svm.detector import SvmModel, shipped_model
 from vdet.detect.svm.model import LinearModel, load_model
 from vdet.media import Picture
 from vdet.media.reader import VideoReader

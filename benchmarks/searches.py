@@ -13,8 +13,7 @@ from benchmarks.patch_search import PatchSearch
 from benchmarks.rounds import Task, measure
 from vdet.config.schema import DetectorSettings, NetworkSettings, SvmSettings
 from vdet.detect.factory import load_detector
-from vdet.detect.svm.dense_search import DenseSearch
-from vdet.detect.svm.search import Engine, FrameSearch
+from vdet.detect.svm.search import DenseSearch, Engine, FrameSearch
 from vdet.media import Picture, Planes
 from vdet.media.frame import Coding
 

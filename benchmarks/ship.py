@@ -24,7 +24,7 @@ def from_checkpoint(path: Path, output: Path) -> None:
     """Write the averaged weights of a checkpoint as a network without a calibration of its own."""
     import torch
 
-    from vdet.learn.net.architecture import Network
+    from vdet.learn.net.network import Network
 
     state: dict[str, Any] = torch.load(path, weights_only=True)
     settings = dict(state["settings"])
@@ -39,8 +39,8 @@ def from_checkpoint(path: Path, output: Path) -> None:
     if base != "None" and Path(base).exists():
         before = read_header(Session(Path(base)))
         provenance["base"] = before.provenance if before else {}
-    pixels = settings["width"] * settings["height"]
-    header = Header(classes=settings["classes"], pixels=pixels, provenance=provenance)
+    width, height = settings.get("size") or (settings["width"], settings["height"])
+    header = Header(classes=settings["classes"], pixels=width * height, provenance=provenance)
     export_network(network, header, output, overwrite=True)
 
 

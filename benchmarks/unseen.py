@@ -22,7 +22,9 @@ from sklearn.linear_model import LogisticRegression
 from vdet.boxes import BoolArray, Float64Array, Int64Array
 from vdet.config.loading import load_settings
 from vdet.config.schema import NetworkSettings, Settings
-from vdet.detect.factory import load_detector, trained_on
+from vdet.detect.classes import OUR_NAMES
+from vdet.detect.factory import load_detector
+from vdet.detect.onnx.detector import trained_on
 from vdet.detect.onnx.recognition import Calibration, read_header
 from vdet.detect.onnx.session import Session
 from vdet.evaluate.comparison import MATCH_IOU, UNKNOWN, ComparedFrame
@@ -56,8 +58,8 @@ _HIGH = {
 _MIN_WIDTHS = {False: 0.03, True: 0.02}
 """Narrower objects are ignore regions, fraction of the picture's width; True: for `_HIGH`."""
 
-_MIN_SCORE = 5e-5  # of a calibrated network; its output is about 0.02 there
-_ENOUGH = 100  # right boxes of a class that has a calibration of its own
+_MIN_SCORE = 2e-3  # of a calibrated network; hardly any box below shows an object
+_ENOUGH = 50  # right boxes of a class that has a calibration of its own
 _FROM_RANDOM = "train.net.learning_rate=0.002"  # the default rate is for a training from a base
 
 
@@ -118,7 +120,7 @@ class Findings:
 
     def save(self, path: Path) -> None:
         """Write the findings as JSON."""
-        rows = [[row.set, row.named, row.score, row.found] for row in self.rows]
+        rows = [[row.set, row.named, round(row.score, 5), row.found] for row in self.rows]
         write_json({"objects": self.objects, "rows": rows}, str(path), overwrite=True)
 
     @classmethod
@@ -178,9 +180,11 @@ def fit(rows: Sequence[Finding], given: Calibration) -> Calibration:
     `given` is the calibration of the network that gave the scores.
     Source: Platt, "Probabilistic outputs for support vector machines", 1999.
     """
+    right: BoolArray = np.array([row.found is not None for row in rows])
+    if not right.any() or right.all():
+        return given
     scores = np.array([row.score for row in rows]).clip(1e-6, 1 - 1e-6)
     logits: Float64Array = np.log(scores / (1 - scores))
-    right: BoolArray = np.array([row.found is not None for row in rows])
     model = LogisticRegression(C=1e6).fit(logits[:, np.newaxis], right)
     slope, offset = float(model.coef_[0, 0]), float(model.intercept_[0])
     return Calibration(
@@ -190,11 +194,13 @@ def fit(rows: Sequence[Finding], given: Calibration) -> Calibration:
 
 def summarize(findings: Findings, given: Calibration) -> dict[str, Any]:
     """Return the best F1 of every set and class, and the calibrations, as JSON values."""
-    by_set, by_class = defaultdict(list), defaultdict(list)
+    totals = sum(map(Counter, findings.objects.values()), Counter[str]())
+    known = sorted(totals.keys() - {UNKNOWN}, key=(*OUR_NAMES, *sorted(totals)).index)
+    by_class: dict[str, list[Finding]] = {name: [] for name in known}
+    by_set: dict[str, list[Finding]] = {name: [] for name in findings.objects}
     for row in findings.rows:
         by_set[row.set].append(row)
-        by_class[row.named].append(row)
-    totals = sum(map(Counter, findings.objects.values()), Counter[str]())
+        by_class.setdefault(row.named, []).append(row)
     sets = {
         name: _scores(by_set[name], None, sum(counts.values()))
         for name, counts in findings.objects.items()
@@ -206,7 +212,7 @@ def summarize(findings: Findings, given: Calibration) -> dict[str, Any]:
     }
     calibrations = {
         name: fit(rows, given).model_dump()
-        for name, rows in sorted(by_class.items())
+        for name, rows in by_class.items()
         if sum(row.found is not None for row in rows) >= _ENOUGH
     }
     common = fit(findings.rows, given).model_dump()
@@ -329,10 +335,10 @@ def main() -> None:
     arguments.work.mkdir(parents=True, exist_ok=True)
     unseen = Unseen(arguments)
     found: dict[str, list[Findings]] = defaultdict(list)
-    networks = {str(model): model for model in arguments.model}
+    networks: dict[str, Path] = {}
     for fold in range(arguments.folds):
-        if arguments.steps:
-            networks = {OURS: unseen.network(fold)} | networks
+        networks = {OURS: unseen.network(fold)} if arguments.steps else {}
+        networks |= {str(model): model for model in arguments.model}
         for name, network in networks.items():
             found[name].append(unseen.findings(network, fold))
     results = {}
@@ -345,7 +351,7 @@ def main() -> None:
         results[name] = summarize(Findings.joined(parts), given)
         print("\n".join(summary_lines(name, results[name])))
     for model in arguments.model:
-        seen = trained_on(NetworkSettings(model=str(model)))
+        seen = trained_on(model)
         print(f"{model} has seen: {', '.join(seen) or 'not known'}")
     write_json(results, str(arguments.work / "results.json"), overwrite=True)
     if arguments.steps:

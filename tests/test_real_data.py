@@ -17,9 +17,8 @@ from conftest import Run
 from seed import SEED
 from vdet.boxes import Box
 from vdet.config.schema import SvmSettings
-from vdet.detect.svm.detector import SvmModel
+from vdet.detect.svm.detector import SvmModel, shipped_model
 from vdet.detect.svm.features import FeatureExtractor, to_patch
-from vdet.detect.svm.kind import shipped_model
 from vdet.detect.svm.model import LinearModel, load_model
 from vdet.learn.svm.dataset import find_patches, read_patches
 from vdet.learn.svm.extraction import hold_out

@@ -11,7 +11,7 @@ import numpy as np
 from vdet.config.loading import load_settings
 from vdet.config.schema import Settings
 from vdet.detect.factory import load_detector
-from vdet.detect.svm.kind import load_svm
+from vdet.detect.svm.detector import load_svm
 from vdet.detect.svm.model import save_model
 from vdet.errors import OutputError
 from vdet.evaluate.output import table

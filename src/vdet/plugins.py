@@ -32,7 +32,7 @@ _BUILT_IN: dict[str, dict[str, str]] = {
         "train": "vdet.cli.train:train",
         "train-net": "vdet.cli.train:train_net",
     },
-    DETECTORS: {"svm": "vdet.detect.svm.kind:SVM", "net": "vdet.detect.onnx.detector:NET"},
+    DETECTORS: {"svm": "vdet.detect.svm.detector:SVM", "net": "vdet.detect.onnx.detector:NET"},
     TRACKERS: {"motion": "vdet.track.factory:MOTION", "rules": "vdet.track.factory:RULES"},
     SINKS: {
         "video": "vdet.run.sinks.drawn:VIDEO",

@@ -5,22 +5,15 @@ from collections.abc import Iterator
 from pathlib import Path
 from textwrap import dedent
 
-import numpy as np
 import pytest
 
-from vdet.config.detector import DetectorSettings, FeatureSettings
+from vdet.config.detector import DetectorSettings
 from vdet.config.loading import load_settings
 from vdet.config.schema import NetworkSettings, Settings, SvmSettings
-from vdet.detect.factory import load_detector, model_file, trained_on
+from vdet.detect.factory import load_detector, model_file
 from vdet.detect.onnx.detector import NetworkModel
-from vdet.detect.protocol import stage_pictures_of
-from vdet.detect.svm.detector import SvmModel
-from vdet.detect.svm.kind import shipped_model
-from vdet.detect.svm.model import load_model
+from vdet.detect.svm.detector import SvmModel, shipped_model
 from vdet.errors import ConfigError, ModelError
-from vdet.media import Picture
-
-OTHER = FeatureSettings(patch=48)
 
 
 class TestLinearModel:
@@ -43,47 +36,11 @@ class TestLinearModel:
         with pytest.raises(ConfigError, match=f"^{file}: is for detector.kind: {kinds}; "):
             load_detector(settings)
 
-    @pytest.mark.parametrize("name", ["svm", "seed"])
-    def test_the_shipped_model_is_the_one_with_the_features_of_the_settings(
-        self, name: str
-    ) -> None:
-        models = Path(shipped_model(SvmSettings())).parent
-        features = load_model(models / f"{name}.npz").features
-        settings = SvmSettings(features=features)
-        assert model_file(settings) == models / f"{name}.npz"
-        assert isinstance(load_detector(settings), SvmModel)
-
-    def test_features_that_no_shipped_model_has_are_refused_with_advice(self) -> None:
-        settings = SvmSettings(features=OTHER)
-        for load in (load_detector, model_file):
-            with pytest.raises(ModelError, match=r"no shipped model .* pass --model, or train one"):
-                load(settings)
-
     def test_a_model_file_is_taken_instead_of_the_shipped_one(self) -> None:
         seed = shipped_model(SvmSettings()).with_name("seed.npz")
         settings = SvmSettings(model=str(seed))
         assert model_file(settings) == seed
         assert isinstance(load_detector(settings), SvmModel)
-
-    def test_a_model_brings_its_features_where_the_settings_leave_the_default(self) -> None:
-        seed = shipped_model(SvmSettings()).with_name("seed.npz")
-        image = np.zeros((720, 1280, 3), np.uint8)
-        model = load_detector(SvmSettings(model=str(seed)))
-        detector = model.for_video(1280, 720, [image])
-        sheet = stage_pictures_of(detector)(
-            image, detector.detect(detector.search(Picture(image), None))
-        )
-        assert list(sheet) == ["windows", "hits", "heat"]
-
-    def test_features_asked_for_must_be_those_of_the_model(self) -> None:
-        default = shipped_model(SvmSettings())
-        with pytest.raises(ModelError, match="was trained with other features"):
-            load_detector(SvmSettings(features=OTHER, model=str(default)))
-
-    def test_the_names_of_the_data_that_the_shipped_models_have_seen_are_known(self) -> None:
-        names = trained_on(SvmSettings())
-        assert {"KITTI_extracted", "GTI_Far", "mined_project_video"} <= set(names)
-        assert {"idd", "project_video.mp4"} <= set(trained_on(NetworkSettings()))
 
     def test_a_missing_model_file_is_named(self, tmp_path: Path) -> None:
         with pytest.raises(ModelError, match=r"none\.npz: cannot be read"):

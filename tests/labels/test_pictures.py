@@ -195,6 +195,14 @@ def test_a_coco_file_may_lie_above_or_beside_the_pictures(
         read_labelled_pictures(path)
 
 
+def test_what_other_programs_say_of_an_image_does_not_matter(tmp_path: Path) -> None:
+    path = write_coco(tmp_path, SCENE)
+    document = json.loads(path.read_text(encoding="utf-8"))
+    document["images"][0] |= {"time": "night", "weather": "rain", "camera": "north"}
+    path.write_text(json.dumps(document), encoding="utf-8")
+    assert len(read_labelled_pictures(tmp_path).pictures) == 2
+
+
 @pytest.mark.parametrize(
     ("key", "values", "words"),
     [

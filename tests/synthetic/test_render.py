@@ -1,6 +1,5 @@
 from collections.abc import Callable
 from dataclasses import replace
-from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -40,16 +39,6 @@ def test_a_solid_line_is_drawn_where_the_projection_puts_it(
         brightness = image[row, left : left + 51].astype(float).sum(axis=1)
         bright = np.flatnonzero(brightness > (brightness.min() + brightness.max()) / 2)
         assert left + bright.mean() == pytest.approx(u, abs=1)
-
-
-def test_a_dash_comes_nearer_as_the_camera_moves(make_scene: MakeScene) -> None:
-    # Dashes of 3 m begin every 12 m; the first one begins at 0.
-    scene = replace(make_scene(), speed=2.0, rate=Fraction(1))
-    for index, (painted, bare) in enumerate([(13.5, 16.0), (11.5, 14.0), (9.5, 12.0)]):
-        image = render(scene, index)
-        points = np.array([[1.85, 0.0, painted], [1.85, 0.0, bare]])
-        (u0, v0), (u1, v1) = scene.camera.project(points).round().astype(int)
-        assert int(image[v0, u0].min()) > int(image[v1, u1].max()) + 60
 
 
 def test_a_shadow_darkens_the_road_where_it_lies(make_scene: MakeScene) -> None:

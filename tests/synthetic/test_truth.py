@@ -56,25 +56,6 @@ def test_a_vehicle_may_drive_in_any_direction(
     assert found.box.width / found.box.height > 1 + length / 5
 
 
-@pytest.mark.parametrize("ahead", [1.0, 3.0, 4.5])
-def test_a_vehicle_beside_the_camera_is_clipped_to_the_frame(
-    make_scene: MakeScene, parked: Parked, ahead: float
-) -> None:
-    scene = make_scene(parked(1, ahead, 3.7))
-    [found] = true_boxes(scene, 0)
-    assert found.box.x2 == 1280
-    # below, the shadow on the ground shows too
-    assert found.box.pixels[:3] == pytest.approx(drawn_box(scene).pixels[:3], abs=2)
-    assert found.hidden == 0
-
-
-def test_a_vehicle_behind_the_camera_or_outside_its_times_has_no_box(
-    make_scene: MakeScene, parked: Parked
-) -> None:
-    gone = SceneVehicle(2, (Waypoint(5.0, 20.0, 0.0),), color=(0, 0, 0))
-    assert true_boxes(make_scene(parked(1, -8.0, 3.7), gone), 0) == ()
-
-
 def test_a_vehicle_right_behind_a_nearer_one_is_hidden_but_keeps_its_box(
     make_scene: MakeScene, parked: Parked
 ) -> None:

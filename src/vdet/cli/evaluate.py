@@ -73,7 +73,7 @@ def patches(data: tuple[Path, ...], choice: options.SettingsChoice, results: Res
     on all of DATA. Without, a new model is tested on the last patches of each folder.
     """
     settings = choice.read(detector="svm")
-    from vdet.detect.svm.kind import requested_features
+    from vdet.detect.svm.detector import requested_features
     from vdet.detect.svm.model import load_model
     from vdet.evaluate.output import RunName
     from vdet.learn.svm.dataset import find_patches

@@ -154,7 +154,7 @@ def _text(value: Any) -> str:
 
 
 def _linear_model(path: Path) -> Facts:
-    from vdet.detect.svm.kind import trained_on
+    from vdet.detect.svm.detector import trained_on
     from vdet.detect.svm.model import load_model
 
     model = load_model(path)

@@ -1,7 +1,5 @@
 """`vdet mine`, `vdet train` and `vdet train-net`: from labelled data to models."""
 
-import json
-from dataclasses import asdict
 from pathlib import Path
 
 import click
@@ -10,7 +8,7 @@ from vdet.cli import options
 from vdet.cli.command import command
 from vdet.cli.messages import live_bar, print_lines, progress_steps
 from vdet.errors import DataError, counted
-from vdet.files import OutputFiles, check_output, output_errors, write_text
+from vdet.files import check_output, staged
 
 
 @command(
@@ -34,13 +32,11 @@ def train(
     Each DATA is a folder or a zip file with pictures in vehicles/<group>/ and
     non-vehicles/<group>/. A file boxes.csv beside these folders says where in a patch the vehicle
     is; vdet mine writes it. With it the model learns where the sides of vehicles are. The metrics
-    are printed, and written beside the model as model.npz.json.
+    are printed; vdet info --json reads them from the model.
     """
     settings = choice.read(detector="svm")
     options.check_suffix(output, ".npz", what="models")
-    metrics_path = output.with_name(f"{output.name}.json")
-    for path in (output, metrics_path):
-        check_output(path, overwrite=overwrite)
+    check_output(output, overwrite=overwrite)
     from vdet.detect.svm.model import save_model
     from vdet.learn.svm.dataset import find_patches
     from vdet.learn.svm.training import train as fit_model
@@ -48,19 +44,16 @@ def train(
     files = find_patches(data)
     with progress_steps("") as steps:
         model, metrics = fit_model(files, settings, jobs=jobs, steps=steps)
-    with OutputFiles(overwrite=overwrite) as outputs:
-        with output_errors(output):
-            save_model(model, outputs.stage(output))
-        with output_errors(metrics_path):
-            write_text(outputs.stage(metrics_path), json.dumps(asdict(metrics), indent=2) + "\n")
-    print_lines(*metrics.lines(), "", f"{output}: the model; {metrics_path}: the metrics")
+    with staged(output, overwrite=overwrite) as temporary:
+        save_model(model, temporary)
+    print_lines(*metrics.lines(), "", f"{output}: the model")
 
 
 @command(
     "vdet mine in.mp4 --truth gt.txt -o mined.zip",
-    "vdet mine a.mp4 b.mp4 --truth a.txt --truth b.txt pictures/ -o mined.zip",
+    "vdet mine a.mp4 b.mp4 --truth a.txt --truth b.txt -o mined.zip",
 )
-@click.argument("sources", nargs=-1, required=True, type=options.INPUT, metavar="SOURCE...")
+@click.argument("videos", nargs=-1, required=True, type=options.INPUT, metavar="IN...")
 @options.truth_option
 @options.output_file_option("Zip file to write.")
 @options.option("--every N", "Use every N-th frame of a video.", options.POSITIVE, default=4)
@@ -75,7 +68,7 @@ def train(
 @options.settings_options("labels.roles.tram=vehicle", options.model_option)
 @options.overwrite_option
 def mine(
-    sources: tuple[Path, ...],
+    videos: tuple[Path, ...],
     truths: tuple[Path, ...],
     output: Path,
     every: int,
@@ -84,10 +77,7 @@ def mine(
     choice: options.SettingsChoice,
     overwrite: bool,
 ) -> None:
-    """Cut patches for vdet train out of labelled videos and pictures.
-
-    Each SOURCE is a video with a --truth, or labelled pictures: a folder (COCO, KITTI, YOLO or
-    Pascal VOC), or a COCO file.
+    """Cut patches for vdet train out of labelled videos.
 
     Vehicles are cut out where the truth has them, and come with their boxes. False alarms are cut
     out too: windows that the model takes for vehicles where there is none, or only a part of one.
@@ -97,21 +87,16 @@ def mine(
         raise click.UsageError("--until must not be before --from")
     options.check_suffix(output, ".zip", what="patches")
     settings = choice.read_for_whole_frames(detector="svm")
-    from vdet.detect.svm.kind import load_svm
-    from vdet.labels.reading import holds_labelled_pictures
+    from vdet.detect.svm.detector import load_svm
     from vdet.learn.svm import mining
 
     check_output(output, overwrite=overwrite)
-    videos = [path for path in sources if not holds_labelled_pictures(path)]
     if len(videos) != len(truths):
         given = f"videos: {len(videos)}, truths: {len(truths)}"
         raise click.UsageError(f"pass one --truth for each video ({given})")
-    labels = dict(zip(videos, truths, strict=True))
     labelled = [
-        mining.VideoSource(path, labels[path], every, first, until)
-        if path in labels
-        else mining.PictureSource(path)
-        for path in sources
+        mining.VideoSource(video, truth, every, first, until)
+        for video, truth in zip(videos, truths, strict=True)
     ]
     model = load_svm(settings.svm, Path(settings.svm.model) if settings.svm.model else None)
     with progress_steps(" frames") as steps:

@@ -25,14 +25,11 @@ class DetectorKind:
         Loads it from its settings and a model file; None stands for the shipped file.
     shipped
         Returns the shipped model file for some settings; None where the kind needs no file.
-    trained_on
-        Returns the names of the data that a model file was trained on, if the file names them.
     """
 
     settings: type[DetectorSettings]
     load: Callable[[Any, Path | None], DetectorModel]
     shipped: Callable[[Any], Path | None] = lambda _: None
-    trained_on: Callable[[Path], tuple[str, ...]] = lambda _: ()
 
 
 def load_detector(settings: DetectorSettings) -> DetectorModel:
@@ -60,12 +57,6 @@ def load_detector(settings: DetectorSettings) -> DetectorModel:
 def model_file(settings: DetectorSettings) -> Path | None:
     """Return the model file that `load_detector` would read; None for a detector without one."""
     return Path(settings.model) if settings.model else _kind(settings).shipped(settings)
-
-
-def trained_on(settings: DetectorSettings) -> tuple[str, ...]:
-    """Return the names of the data that a detector was trained on, if its model file names them."""
-    path = model_file(settings)
-    return _kind(settings).trained_on(path) if path else ()
 
 
 def _kind(settings: DetectorSettings) -> DetectorKind:

@@ -12,6 +12,7 @@ import json
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from functools import partial
+from math import nan
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any, BinaryIO
 
@@ -106,7 +107,7 @@ class _Image:
     height: Index | None = None
     file_name: Annotated[str, AfterValidator(_inside)] = ""
     frame_index: Index | None = None
-    time: float | None = None
+    time: float | str | None = None  # "night" in some sets of pictures
     labels: list[Label] = Field(default_factory=list, init=False)
 
     @property
@@ -173,7 +174,7 @@ def read_coco(path: Path, data: bytes) -> SavedTracks:
     if len(set(frames)) < len(images):
         raise TruthError(f"{path}: a frame_index occurs twice; several videos need a file for each")
     times: Times = {
-        frame: (f"images.{number}", image.time)
+        frame: (f"images.{number}", nan if isinstance(image.time, str) else image.time)
         for number, (frame, image) in enumerate(zip(frames, images, strict=True))
         if image.time is not None
     }

@@ -128,11 +128,6 @@ def read_labelled_pictures(path: Path, roles: Roles = DEFAULT_ROLES) -> Labelled
     return checked_pictures(str(path), _pictures(path), roles)
 
 
-def holds_labelled_pictures(path: Path) -> bool:
-    """Return whether a path looks like labelled pictures, not like a folder of patches."""
-    return any(form.is_in(path) for form in _FORMS) or bool(_coco_files(path))
-
-
 def _coco_files(path: Path) -> list[Path]:
     """Return what may be a COCO file, without what is not a regular file: a FIFO may never end."""
     if not path.is_dir():

@@ -1,5 +1,6 @@
 """Networks of the usual tools: recognised without a setting, and their boxes are right."""
 
+import math
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
@@ -21,6 +22,7 @@ from detect.onnx.graphs import (
 from vdet.boxes import Boxes, Image
 from vdet.config.schema import NetworkSettings
 from vdet.detect.onnx.detector import NetworkModel
+from vdet.detect.onnx.layouts import cell_centers, our_cells
 from vdet.detect.onnx.recognition import COCO, recognize
 from vdet.detect.onnx.session import Session
 from vdet.errors import ModelError
@@ -82,15 +84,6 @@ def test_a_centred_letterbox_in_rgb(
     assert len(detect(path, frame_with_red(64, 64))) == 1  # the dark grey of 60 has 0.24
     assert detect(path, frame_with_red(64, 64)).scores == pytest.approx([60 / 255], abs=0.01)
     assert recognize(Session(path)).name == name
-
-
-def test_the_metadata_give_the_size_of_an_input_of_any_size(tmp_path: Path) -> None:
-    form = ultralytics(SIZE, BOX, 80)
-    path = write_network(
-        tmp_path / "net.onnx", form, SIZE, (64, 32), metadata=ULTRALYTICS, dynamic=True
-    )
-    found = detect(path, frame_with_red(128, 128))
-    assert found.sides == pytest.approx(np.array([[96, 112, 160, 144]]), abs=0.01)
 
 
 @pytest.mark.parametrize("raw", [True, False], ids=["raw", "decoded"])
@@ -232,10 +225,11 @@ def test_what_is_not_known_is_refused_with_what_was_seen(
         detect(path, frame_with_red(128, 128))
 
 
-def test_a_file_that_is_no_network_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "net.onnx"
-    path.write_bytes(b"no network")
-    with pytest.raises(ModelError, match=r"net\.onnx: onnxruntime cannot load it"):
-        NetworkModel(path, NetworkSettings())
-    with pytest.raises(ModelError, match=r"none\.onnx"):
-        NetworkModel(tmp_path / "none.onnx", NetworkSettings())
+def test_the_score_of_a_box_is_calibrated_by_the_class_it_is_named() -> None:
+    table = np.zeros((1, 21, 7), np.float32)  # 16 + 4 + 1 cells of two classes
+    table[..., 0], table[0, 3, 6] = 0.5, 1.0
+    calibration = np.array([[1, 0], [2, -3]], np.float32)
+    found = our_cells([table], 0.01, cells=cell_centers(32, 32), calibration=calibration)
+    assert found.classes.tolist() == [0, 0, 0, 1, *[0] * 17]
+    expected = [1 / (1 + math.exp(-(1 * 0.5 + 0))), 1 / (1 + math.exp(-(2 * 0.5 - 3)))]
+    assert found.scores[[0, 3]].tolist() == pytest.approx(expected, abs=1e-6)

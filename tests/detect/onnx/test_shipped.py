@@ -12,7 +12,7 @@ from vdet.detect.protocol import stage_pictures_of
 from vdet.media import Picture
 from vdet.testing import check_detector
 
-MOST_BYTES = 1_500_000
+MOST_BYTES = 2_500_000
 SIZES = [(1280, 720), (640, 480), (1242, 375), (270, 480), (64, 64)]
 
 

@@ -1,7 +1,7 @@
 """The dense engine compared with the patch engine, with models fitted to generated patches."""
 
 import functools
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -11,10 +11,10 @@ from drawn_patches import draw_patches
 from seed import SEED
 from vdet.boxes import Float32Array, Image
 from vdet.config.detector import FeatureSettings, WindowSettings
-from vdet.detect.svm.dense_search import DenseSearch
 from vdet.detect.svm.features import FeatureExtractor, to_patch
-from vdet.detect.svm.model import BoxRegression, LinearModel
+from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.pyramid import FramePyramid
+from vdet.detect.svm.search import DenseSearch
 from vdet.detect.svm.windows import WindowGrid, lay_grid
 from vdet.media import Picture, Planes
 from vdet.synthetic.random_scenes import demo_scene
@@ -75,31 +75,6 @@ def fitted(features: FeatureSettings, members: int = 1) -> LinearModel:
     weights, biases = (np.array(item, np.float32) for item in zip(*fits, strict=True))
     slopes = np.full(members, -4, np.float32)
     return LinearModel(features, weights, biases, slopes, np.zeros(members, np.float32))
-
-
-def with_boxes(model: LinearModel) -> LinearModel:
-    """Add a box regression to a model, fitted to crops of vehicle patches."""
-    rng = np.random.default_rng(2)
-    patches = _patches()[0][:_EACH] * 2
-    zooms = rng.uniform(0.6, 1, len(patches))
-    crops = [_crop(*item, rng) for item in zip(patches, zooms, strict=True)]
-    extractor = FeatureExtractor(model.features)
-    vectors = extractor.describe_all(to_patch(crop, model.features.patch) for crop, _ in crops)
-    hogs = vectors[:, : model.features.hog_length].astype(np.float64)
-    targets = np.array([sides for _, sides in crops])
-    weights, biases = _ridge(hogs, targets - targets.mean(axis=0))
-    biases = biases + targets.mean(axis=0)
-    boxes = BoxRegression(weights.T.astype(np.float32), biases.astype(np.float32))
-    return replace(model, box_regression=boxes)
-
-
-def _crop(patch: Image, zoom: float, rng: np.random.Generator) -> tuple[Image, list[float]]:
-    """Crop a vehicle patch at random; return the crop and the patch's sides from its middle."""
-    whole = len(patch)
-    side = round(zoom * whole)
-    x, y = rng.integers(0, whole - side + 1, 2).tolist()
-    sides = [(0 - x) / side, (0 - y) / side, (whole - x) / side, (whole - y) / side]
-    return patch[y : y + side, x : x + side], [side - 0.5 for side in sides]
 
 
 def _ridge(vectors: Exact, targets: Exact) -> tuple[Exact, Exact]:

@@ -10,10 +10,9 @@ from boxing import moved_to, rounded
 from red_cars import CAR, HEIGHT, SETTINGS, THREE_SETS, WIDTH, by_perspective, red_finder, road
 from vdet.boxes import Box, Boxes, Image
 from vdet.config.schema import SvmSettings
-from vdet.detect.svm.detector import SvmModel
+from vdet.detect.svm.detector import SvmModel, Trace
 from vdet.detect.svm.heat import HotRegion
 from vdet.detect.svm.search import FrameSearch
-from vdet.detect.svm.stages import Trace
 from vdet.errors import FrameSizeError
 from vdet.media import Picture
 
@@ -59,11 +58,6 @@ def test_a_car_in_consecutive_frames_is_detected_by_a_box_around_it() -> None:
     assert box.contains((detections.data["centroid"][0, 0], detections.data["centroid"][0, 1]))
 
 
-def test_the_first_frame_alone_is_half_as_hot_as_two() -> None:
-    first, second = (trace_of(item).heat for item in detect_video(road(CAR), road(CAR)))
-    np.testing.assert_allclose(second.values, 2 * first.values, rtol=1e-5)
-
-
 def test_the_heat_of_a_car_that_has_gone_is_forgotten() -> None:
     *_, detections = detect_video(road(CAR), road(), road())
     assert trace_of(detections).heat.peak == 0
@@ -74,11 +68,6 @@ def test_nothing_is_detected_on_an_empty_road() -> None:
     detections = detect_still(road())
     assert len(detections) == 0
     assert trace_of(detections).heat.values.shape == (240, 320)
-
-
-def test_two_cars_apart_are_two_detections() -> None:
-    boxes = rounded(detect_still(road(CAR, moved_to(CAR, 224, 120))))
-    assert [box.x1 < 190 for box in boxes] == [True, False]
 
 
 def test_lengths_scale_with_the_frame() -> None:
@@ -128,9 +117,6 @@ class TestDefaultSettings:
             np.testing.assert_array_equal(
                 detections[-1].data["strength"], expected[-1].data["strength"]
             )
-
-    def test_nothing_is_detected_on_an_empty_road(self) -> None:
-        assert len(detect_still(road(), DEFAULT)) == 0
 
 
 class TestStillPictures:
@@ -187,11 +173,6 @@ class TestStillPictures:
         assert len(still(score, width + 1 / WIDTH, height)) == 0
         assert len(still(score, width, height + 1 / HEIGHT)) == 0
 
-    def test_weak_and_small_detections_are_left_out_of_still_pictures_only(self) -> None:
-        settings = ROWS.model_copy(update={"min_score_still": 1.0})
-        assert len(detect_still(road(CAR), settings)) == 0
-        assert len(detect_video(road(CAR), road(CAR), settings=settings)[-1]) == 1
-
 
 class TestHorizon:
     UNSET = by_perspective(None, 0.15, 0.2).svm
@@ -202,12 +183,6 @@ class TestHorizon:
         with caplog.at_level("INFO", "vdet"):
             SvmModel(MODEL, settings).for_video(WIDTH, HEIGHT, [road()] * count)
         return "".join(f"{record.levelname} {record.message}" for record in caplog.records)
-
-    def test_one_in_the_settings_is_not_searched_for(
-        self, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-    ) -> None:
-        monkeypatch.setattr("vdet.detect.svm.detector.find_horizon", pytest.fail)
-        assert self.reported(DEFAULT, 5, caplog) == "INFO the horizon lies at 0.50 of the height"
 
     def test_none_is_searched_for_where_no_window_set_depends_on_it(
         self, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
@@ -229,18 +204,6 @@ class TestHorizon:
 def test_a_picture_too_small_to_search_is_refused(shape: tuple[int, int, int]) -> None:
     with pytest.raises(FrameSizeError, match="no search window fits"):
         detect_still(np.zeros(shape, np.uint8))
-
-
-@pytest.mark.parametrize("value", [0, 128, 255])
-def test_a_picture_of_one_colour_is_searched_without_warnings(value: int) -> None:
-    image = np.full((240, 320, 3), value, np.uint8)
-    assert len(trace_of(detect_still(image)).grids) == 1
-
-
-def test_a_picture_is_not_changed() -> None:
-    image = road(CAR)
-    detect_still(image)
-    np.testing.assert_array_equal(image, road(CAR))
 
 
 def test_one_loaded_model_serves_frames_of_any_size() -> None:

@@ -1,6 +1,5 @@
 import cv2
 import numpy as np
-import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
@@ -44,12 +43,6 @@ def test_the_histogram_part_is_what_numpy_gives_for_each_channel_of_ycrcb() -> N
     np.testing.assert_array_equal(FeatureExtractor(FEATURES).describe(PATCH)[4704:], expected)
 
 
-@pytest.mark.parametrize("bins", [8, 16, 32, 64, 128, 256])
-def test_a_histogram_counts_every_value_once(bins: int) -> None:
-    channel = np.repeat(np.arange(256, dtype=np.uint8), 2).reshape(16, 32)
-    assert histogram(channel, bins).tolist() == [2 * 256 // bins] * bins
-
-
 def test_a_halved_channel_is_described_at_half_its_size() -> None:
     features = seed_but(halved=(1, 2))
     _, red, blue = split(PATCH, FEATURES)
@@ -62,26 +55,11 @@ def test_a_halved_channel_is_described_at_half_its_size() -> None:
     np.testing.assert_array_equal(vector[4704:], [*whole[4704:4736], *np.concatenate(counts)])
 
 
-@pytest.mark.parametrize("side", [33, 48, 63, 65, 100, 128])
-def test_a_crop_less_than_twice_too_large_is_resized_bilinearly(side: int) -> None:
-    expected = cv2.resize(PATCH, (side, side), interpolation=cv2.INTER_LINEAR)
-    np.testing.assert_array_equal(to_patch(PATCH, side), expected)
-
-
 def test_a_crop_twice_too_large_is_halved_each_pixel_the_mean_of_four() -> None:
     means = PATCH.reshape(32, 2, 32, 2, 3).mean(axis=(1, 3))
     np.testing.assert_allclose(halve(PATCH), means, atol=0.5)
     np.testing.assert_array_equal(to_patch(PATCH, 32), halve(PATCH))
     np.testing.assert_array_equal(to_patch(PATCH, 16), halve(halve(PATCH)))
-
-
-@pytest.mark.parametrize(("height", "width"), [(64, 63), (63, 64), (61, 61)])
-def test_a_crop_twice_too_large_with_an_odd_side_is_averaged_by_area(
-    height: int, width: int
-) -> None:
-    crop = PATCH[:height, :width]
-    expected = cv2.resize(crop, (16, 16), interpolation=cv2.INTER_AREA)
-    np.testing.assert_array_equal(to_patch(crop, 16), expected)
 
 
 def test_every_pixel_counts_however_small_the_patch() -> None:

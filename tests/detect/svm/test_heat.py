@@ -43,10 +43,6 @@ def test_heat_is_the_sum_of_the_probabilities_of_the_windows_over_a_pixel() -> N
     assert heat.sum() == 400 * 0.5 + 400 * 0.75
 
 
-def test_heat_is_summed_over_the_frames() -> None:
-    assert heat_of(*(found((0, 0, 5, 5, p)) for p in (0.25, 1, 0.125))).peak == 1.375
-
-
 def test_blur_spreads_heat_and_conserves_it() -> None:
     window = found((40, 20, 20, 20, 1))
     sharp = np.zeros((720, 100), np.float32)
@@ -95,14 +91,6 @@ def test_a_hit_heats_its_vehicle_and_not_its_window() -> None:
     np.testing.assert_array_equal(heat_of(shown).values, expected.values)
 
 
-@pytest.mark.parametrize(("x", "first"), [(9.4, 9), (9.6, 10), (-0.4, 0)])
-def test_the_sides_of_a_vehicle_are_rounded_to_pixels(x: float, first: int) -> None:
-    window = found((10, 10, 20, 20, 1))
-    shown = replace(window, vehicles=np.array([[x, 5, 20, 10]], np.float32))
-    (columns,) = np.nonzero(heat_of(shown).values[7])
-    assert columns.tolist() == list(range(first, first + 20))
-
-
 def test_with_votes_a_value_stands_for_4_by_4_pixels() -> None:
     window = found((16, 8, 32, 24, 0.5))
     heat = heat_of(window, votes=0.1)
@@ -134,18 +122,6 @@ def test_a_rectangle_gives_its_box_its_middle_and_its_peak() -> None:
     assert region.strength == 5
 
 
-def test_regions_are_ordered_from_the_top_and_then_from_the_left() -> None:
-    heat = drawn((60, 5, 4, 4, 2), (5, 5, 4, 4, 2), (30, 40, 4, 4, 2), (2, 20, 4, 4, 2))
-    corners = [(region.box.x1, region.box.y1) for region in find_regions(heat, 1)]
-    assert corners == [(5, 5), (60, 5), (2, 20), (30, 40)]
-
-
-def test_heat_equal_to_the_threshold_is_not_hot() -> None:
-    heat = drawn((10, 10, 10, 10, 1.5))
-    assert find_regions(heat, 1.5) == []
-    assert len(find_regions(heat, 1.4999)) == 1
-
-
 def test_a_hole_does_not_split_a_region() -> None:
     (region,) = find_regions(drawn((20, 10, 30, 30, 2), (30, 20, 10, 10, 0)), 1)
     assert region.box == Box.sized(20, 10, 30, 30)
@@ -158,10 +134,3 @@ def test_the_strength_is_the_peak_of_the_region_and_not_of_its_box() -> None:
     heat = drawn((10, 10, 5, 40, 2), (10, 45, 40, 5, 2), (30, 15, 5, 5, 9))
     peaks = {region.box: region.strength for region in find_regions(heat, 1)}
     assert peaks == {Box.sized(10, 10, 40, 40): 2.0, Box.sized(30, 15, 5, 5): 9.0}
-
-
-def test_a_single_pixel_is_a_region_with_its_middle() -> None:
-    (region,) = find_regions(drawn((7, 9, 1, 1, 3)), 1)
-    assert region.box == Box.sized(7, 9, 1, 1)
-    assert region.centroid == (7.5, 9.5)
-    assert region.strength == 3

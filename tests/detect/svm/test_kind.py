@@ -9,7 +9,7 @@ from vdet.config.detector import FeatureSettings
 from vdet.config.loading import find_config, load_settings
 from vdet.config.schema import SvmSettings
 from vdet.detect.factory import load_detector, model_file
-from vdet.detect.svm.kind import requested_features, shipped_model
+from vdet.detect.svm.detector import requested_features, shipped_model
 from vdet.detect.svm.model import load_model, save_model
 from vdet.errors import ModelError
 

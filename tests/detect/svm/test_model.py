@@ -166,32 +166,6 @@ def test_the_regression_of_boxes_is_kept_bit_for_bit(path: Path) -> None:
         assert array.dtype == np.float32
 
 
-@pytest.mark.parametrize(
-    ("name", "array", "message"),
-    [
-        (
-            "box_weights",
-            np.zeros((4, 95), np.float32),
-            r"box_weights are damaged, or not of shape \(4, 96\); train it",
-        ),
-        ("box_weights", np.zeros((4, 120), np.float32), "box_weights are damaged"),
-        ("box_weights", np.zeros((3, 96), np.float32), "box_weights are damaged"),
-        ("box_weights", np.zeros(384, np.float32), "box_weights are damaged"),
-        ("box_weights", np.zeros((4, 96)), "box_weights are damaged"),
-        ("box_weights", np.full((4, 96), np.nan, np.float32), "box_weights are damaged"),
-        ("box_biases", np.zeros(3, np.float32), "box_biases are damaged"),
-        ("box_biases", np.zeros((4, 1), np.float32), "box_biases are damaged"),
-        ("box_biases", np.zeros(4, "S4"), "box_biases are damaged"),
-        ("box_biases", np.array([0, 0, np.inf, 0], np.float32), "box_biases are damaged"),
-    ],
-)
-def test_a_regression_that_does_not_fit_is_refused(
-    path: Path, name: str, array: npt.NDArray[Any], message: str
-) -> None:
-    with pytest.raises(ModelError, match=message):
-        load_model(write_with_boxes(path, **{name: array}))
-
-
 @pytest.mark.parametrize("missing", ["box_weights", "box_biases"])
 def test_a_regression_with_one_of_its_two_arrays_is_damaged(path: Path, missing: str) -> None:
     arrays = {name: array for name, array in box_arrays().items() if name != missing}
@@ -205,11 +179,6 @@ def test_a_model_asked_for_other_features_says_which_it_has(path: Path) -> None:
     message = r'trained with other features: detector\.features=\{"patch":16,'
     with pytest.raises(ModelError, match=message):
         load_model(path, asked)
-
-
-def test_a_missing_model_is_named(path: Path) -> None:
-    with pytest.raises(ModelError, match=r"model\.npz: cannot be read: No such file"):
-        load_model(path)
 
 
 @pytest.mark.parametrize("data", [b"", b"not a zip file", b"PK\x05\x06" + bytes(18)])
@@ -232,28 +201,18 @@ def test_a_model_cut_off_anywhere_is_damaged(path: Path) -> None:
     ("header", "message"),
     [
         (header_of(format="something else"), "is not a vdet model"),
-        (header_of(format=...), "is not a vdet model"),
-        ([1, 2], "is not a vdet model"),
-        (None, "is not a vdet model"),
         (b"{not json", "is not a vdet model"),
         (b"\xff\xfe\xff", "is not a vdet model"),
         (b"[" * 100_000, "is not a vdet model"),
         (header_of(version=1), r"of version 1, not 2; train it again"),
         (header_of(version=[1]), r"of version \[1\]"),
-        (header_of(version="1"), "of version '1'"),
-        (header_of(version=...), "is not a vdet model"),
-        (header_of(features=...), "is not a vdet model, or is damaged"),
-        (header_of(features=[]), "is not a vdet model, or is damaged"),
         (header_of(features={"patch": 63}), "is not a vdet model, or is damaged"),
-        (header_of(features={"patch": math.nan}), "is not a vdet model, or is damaged"),
         (header_of(features={"colour": "red"}), "is not a vdet model, or is damaged"),
         (
             header_of(features=SMALL.model_dump(mode="json") | {"color_space": "HSV"}),
             "has another colour space than YCrCb",
         ),
         (header_of(provenance=[]), "is not a vdet model, or is damaged"),
-        (header_of(provenance="me"), "is not a vdet model, or is damaged"),
-        (header_of(provenance=None), "is not a vdet model, or is damaged"),
     ],
 )
 def test_a_header_that_is_not_understood_is_refused(
@@ -275,16 +234,13 @@ def test_a_model_without_one_of_its_parts_is_damaged(path: Path, missing: str) -
     ("name", "array", "message"),
     [
         ("weights", np.zeros((2, 119), np.float32), r"or not of shape \(2, 120\)"),
-        ("weights", np.zeros((3, 120), np.float32), r"or not of shape \(2, 120\)"),
-        ("weights", np.zeros(120, np.float32), "weights are damaged"),
-        ("weights", np.zeros((2, 120, 1), np.float32), "weights are damaged"),
         ("weights", np.zeros((2, 120)), "weights are damaged"),
         ("weights", np.full((2, 120), np.nan, np.float32), "weights are damaged"),
         ("biases", np.zeros((2, 1), np.float32), "biases are damaged"),
         ("biases", np.array([0, np.inf], np.float32), "biases are damaged"),
         ("biases", np.zeros(2, "S4"), "biases are damaged"),
-        ("biases", np.zeros(2, [("a", "f4")]), "biases are damaged"),
-        ("slopes", np.zeros(3, np.float32), "slopes are damaged"),
+        ("box_weights", np.zeros((4, 95), np.float32), r"or not of shape \(4, 96\); train it"),
+        ("box_biases", np.array([0, 0, np.inf, 0], np.float32), "box_biases are damaged"),
         ("slopes", np.zeros(2, ">f4"), "slopes are damaged"),
         ("slopes", np.array([np.nan, 0], np.float32), "slopes are damaged"),
         ("offsets", np.float32(0), "offsets are damaged"),
@@ -295,7 +251,7 @@ def test_an_array_that_does_not_fit_is_refused(
     path: Path, name: str, array: npt.NDArray[Any], message: str
 ) -> None:
     with pytest.raises(ModelError, match=message):
-        load_model(write_npz(path, header_of(), **{name: array}))
+        load_model(write_with_boxes(path, **{name: array}))
 
 
 def test_a_model_without_members_is_refused(path: Path) -> None:
@@ -326,15 +282,6 @@ def test_pickled_objects_are_refused_and_not_run(path: Path, tmp_path: Path) -> 
     assert not (tmp_path / "sprung").exists()
 
 
-def test_a_pickle_of_the_declared_length_is_not_run(path: Path, tmp_path: Path) -> None:
-    pickled = pickle.dumps(_Trap(tmp_path / "sprung"))
-    pickled += bytes(-len(pickled) % 8)
-    data = npy_header("|O", f"({len(pickled) // 8},)") + pickled
-    with pytest.raises(ModelError, match="damaged"):
-        load_model(write_members(path, members_of(model_of(2), weights=data)))
-    assert not (tmp_path / "sprung").exists()
-
-
 def test_no_memory_is_allocated_for_a_shape_that_the_file_does_not_hold(path: Path) -> None:
     data = npy_header("<f4", "(1000000000,)") + bytes(192)
     write_members(path, members_of(model_of(2), weights=data))
@@ -344,12 +291,3 @@ def test_no_memory_is_allocated_for_a_shape_that_the_file_does_not_hold(path: Pa
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert peak < 10_000_000
-
-
-@pytest.mark.parametrize(
-    "shape", ["(1000000000,)", "(2, 1000000000000000000)", "(-1,)", "(-2, -24)", "(True,)", "'x'"]
-)
-def test_a_shape_that_the_file_does_not_hold_is_refused(path: Path, shape: str) -> None:
-    data = npy_header("<f4", shape) + bytes(192)
-    with pytest.raises(ModelError, match="damaged"):
-        load_model(write_members(path, members_of(model_of(2), weights=data)))

@@ -1,4 +1,3 @@
-import math
 from fractions import Fraction
 
 import pytest
@@ -30,12 +29,6 @@ def rows_of(grid: WindowGrid) -> tuple[int, int]:
     return int(boxes[0, 1]), int(boxes[-1, 1] + boxes[-1, 3])
 
 
-class TestSizes:
-    def test_sizes_are_shares_of_the_frames_width_in_their_order(self) -> None:
-        assert [grid.size for grid in laid()] == [round(1280 * share) for share in SIZES]
-        assert [grid.size for grid in laid(sizes=(0.25, 0.05))] == [320, 64]
-
-
 class TestRows:
     @pytest.mark.parametrize("horizon", [0.35, 0.5, 0.6])
     def test_windows_end_below_the_horizon_by_0_6_to_1_1_of_their_sides(
@@ -49,17 +42,6 @@ class TestRows:
             first, last = top + grid.size - horizon * 2000, bottom - horizon * 2000
             assert abs(first - 0.6 * grid.size) <= rounding
             assert abs(last - 1.1 * grid.size) <= rounding + grid.step / 2
-
-    def test_rows_below_the_frame_are_left_out(self) -> None:
-        whole = laid(height=2000, horizon=0.3, sizes=(0.25,))[0]
-        bottom = rows_of(whole)[1] - 100
-        (grid,) = laid(height=bottom, horizon=600 / bottom, sizes=(0.25,))
-        assert grid.top == whole.top
-        assert grid.rows == whole.rows - math.ceil(100 / grid.step)
-
-    def test_a_set_that_would_begin_too_low_is_left_out(self) -> None:
-        sizes = [grid.size for grid in laid(horizon=0.9)]
-        assert sizes == [size for size in (64, 80, 112, 160, 224, 320) if 0.6 * size <= 72]
 
 
 class TestBeyondTheSides:
@@ -86,10 +68,6 @@ class TestHalving:
                 halved = grid.size // divisor
             lengths = (grid.size, grid.left, grid.top, grid.step)
             assert [Fraction(length) % divisor for length in lengths] == [0, 0, 0, 0]
-
-    def test_a_step_is_a_cell(self) -> None:
-        for grid in laid():
-            assert grid.step == Fraction(grid.size, 8)
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,4 @@
-import av
 import numpy as np
-import numpy.typing as npt
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -8,15 +6,14 @@ from vdet.boxes import Image
 from vdet.config.detector import FeatureSettings
 from vdet.detect.svm.features import Channels, resize, split
 from vdet.detect.svm.pyramid import FramePyramid
-from vdet.media import Picture, Planes
-from vdet.media.frame import Coding
+from vdet.media import Picture
 
 FEATURES = FeatureSettings(halved=())
 FRAME = np.random.default_rng(0).integers(0, 256, (97, 131, 3), dtype=np.uint8)
 
 
 def pyramid(
-    pixels: Image | Planes = FRAME, top: int = 0, bottom: int | None = None, margin: int = 0
+    pixels: Image = FRAME, top: int = 0, bottom: int | None = None, margin: int = 0
 ) -> FramePyramid:
     return FramePyramid(Picture(pixels), FEATURES, top, bottom, margin)
 
@@ -57,21 +54,6 @@ def test_a_cut_of_halvable_size_is_halved_from_odd_and_even_pixels(
     np.testing.assert_allclose(cut, expected, atol=2 + np.log2(factor) / 2)  # each halving rounds
 
 
-def test_pixels_outside_the_searched_rows_do_not_matter() -> None:
-    other = np.array(FRAME)
-    other[:32] = other[80:] = 0
-    rows, columns = slice(40, 72), slice(0, 64)
-    first = pyramid(FRAME, 32, 80).cut(rows, columns, 16, 8)
-    second = pyramid(other, 32, 80).cut(rows, columns, 16, 8)
-    np.testing.assert_array_equal(first, second)
-
-
-@given(spans(97), spans(131), st.integers(0, 96))
-def test_a_cut_at_full_size_is_a_window_of_the_frame(rows: slice, columns: slice, top: int) -> None:
-    window = at_full_size(pyramid(FRAME, min(top, rows.start)), rows, columns)
-    np.testing.assert_array_equal(window, split(FRAME[rows, columns], FEATURES))
-
-
 def at_full_size(frame: FramePyramid, rows: slice, columns: slice) -> Channels:
     return frame.cut(rows, columns, columns.stop - columns.start, rows.stop - rows.start)
 
@@ -91,37 +73,3 @@ def test_beyond_the_sides_the_outermost_columns_repeat(
     np.testing.assert_array_equal(window, split(expected, FEATURES))
     cut = frame.cut(rows, of_frame, side, side)
     np.testing.assert_array_equal(cut, resized(expected, side, side))
-
-
-SIZES = [(132, 98), (131, 97), (132, 97), (131, 98)]
-
-
-def noisy_planes(width: int, height: int, coding: Coding) -> Planes:
-    planes = Planes(av.VideoFrame(width, height, "yuv420p"), coding)
-    rng = np.random.default_rng(1)
-    for layer in planes.layers:
-        layer[:] = rng.integers(0, 256, layer.shape, dtype=np.uint8)
-    return planes
-
-
-def full_range(values: Image, base: int, steps: int) -> Image:
-    """Return values with the full range; `base` keeps its meaning, `steps` become 255."""
-    zero = 0 if base == 16 else base
-    return (zero + (values - float(base)) * 255 / steps).round().clip(0, 255).astype(np.uint8)
-
-
-def channels_of(planes: Planes) -> npt.NDArray[np.uint8]:
-    """Return luma, red and blue of each pixel, `(3, H, W)`, as BT.601 with the full range."""
-    height, width = planes.shape
-    luma, blue, red = planes.layers
-    if planes.coding.matrix == "bt709":
-        luma, blue, red = planes.coding.to_common((luma, blue, red))
-    elif not planes.coding.full_range:
-        luma = full_range(luma, 16, 219)
-        blue, red = full_range(blue, 128, 224), full_range(red, 128, 224)
-    whole = (item.repeat(2, 0).repeat(2, 1)[:height, :width] for item in (red, blue))
-    return np.array([luma, *whole])
-
-
-class TestPlanes:
-    """Planes are taken for the channels YCrCb."""

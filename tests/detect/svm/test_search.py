@@ -14,10 +14,9 @@ from vdet.config.detector import (
 )
 from vdet.config.schema import SvmSettings
 from vdet.config.section import scale_lengths
-from vdet.detect.svm.dense_search import DenseSearch
 from vdet.detect.svm.horizon import DEFAULT_HORIZON
 from vdet.detect.svm.model import BoxRegression, LinearModel
-from vdet.detect.svm.search import Engine, FrameSearch
+from vdet.detect.svm.search import DenseSearch, Engine, FrameSearch
 from vdet.detect.svm.windows import Windows, lay_grids
 from vdet.errors import FrameSizeError, ImageError
 from vdet.media import Picture
@@ -89,17 +88,6 @@ class TestLayingGrids:
     def test_the_seed_has_831_windows_on_a_720p_frame_the_large_ones_first(self) -> None:
         assert laid(1280, 720)[:, 2].tolist() == [128] * 423 + [64] * 408
 
-    def test_all_default_sets_fit_into_a_720p_frame(self) -> None:
-        settings = SvmSettings()
-        grids = lay_grids(settings, settings.features, 1280, 720, horizon=DEFAULT_HORIZON)
-        shares = settings.search.perspective.sizes
-        assert [grid.size for grid in grids] == [round(1280 * share) for share in shares]
-
-    def test_the_horizon_moves_only_the_sets_that_follow_the_perspective(self) -> None:
-        assert laid(1280, 720, SEED).tolist() == laid(1280, 720, SEED, horizon=0.4).tolist()
-        high, low = (laid(1280, 720, SvmSettings(), horizon=horizon) for horizon in (0.25, 0.35))
-        assert (low[:, 1] - high[:, 1]).tolist() == [72] * len(high)
-
     @pytest.mark.parametrize(
         ("width", "height"), [(640, 360), (1920, 1080), (1279, 721), (853, 480)]
     )
@@ -108,29 +96,6 @@ class TestLayingGrids:
         factor = height / 720
         assert large.boxes[0].tolist() == [0, *[int(n * factor + 0.5) for n in (380, 128, 128)]]
         assert small.boxes[0].tolist() == [0, *[int(n * factor + 0.5) for n in (400, 64, 64)]]
-
-    @pytest.mark.parametrize("settings", [SEED, SvmSettings()], ids=["seed", "default"])
-    @pytest.mark.parametrize(
-        ("width", "height"), [(1280, 720), (1277, 719), (1281, 721), (129, 720), (333, 77)]
-    )
-    def test_windows_lie_inside_the_frame_or_beyond_its_sides_as_far_as_set(
-        self, settings: SvmSettings, width: int, height: int
-    ) -> None:
-        x, y, w, h = laid(width, height, settings).T
-        beyond = 0.7 if settings.search.perspective.sizes else 0
-        assert (x >= -beyond * w).all()
-        assert (y >= 0).all()
-        assert (x + w <= width + beyond * w).all()
-        assert (y + h <= height).all()
-
-    def test_a_set_that_does_not_fit_leaves_the_others(self) -> None:
-        # the large windows are wider than the frame, the small ones are not
-        assert [
-            grid.size for grid in lay_grids(SEED, COLOUR, 100, 720, horizon=DEFAULT_HORIZON)
-        ] == [64]
-
-    def test_no_window_is_ever_smaller_than_a_pixel(self) -> None:
-        assert lay_grids(SEED, COLOUR, 400, 2, horizon=DEFAULT_HORIZON) == []
 
 
 class TestSearching:
@@ -145,14 +110,6 @@ class TestSearching:
         assert found.probabilities.dtype == found.shares.dtype == np.float32
         assert len(np.unique(found.probabilities)) > len(found) / 2
 
-    def test_nothing_outside_the_search_rows_matters(self) -> None:
-        search = search_of(SMALL)
-        other = FRAME.copy()
-        other[:8] = 0
-        np.testing.assert_array_equal(
-            search_all(search, other).probabilities, search_all(search).probabilities
-        )
-
     def test_what_lies_beyond_the_sides_repeats_the_outermost_columns(self) -> None:
         wide = np.pad(FRAME, ((0, 0), (24, 24), (0, 0)), mode="edge")
         sizes = tuple(size * 160 / 208 for size in PERSPECTIVE.search.perspective.sizes)
@@ -165,12 +122,6 @@ class TestSearching:
         assert ours.boxes[:, 0].min() == -24
         for box, probability in zip(ours.boxes.tolist(), ours.probabilities.tolist(), strict=True):
             assert expected[tuple(box)] == pytest.approx(probability, abs=1e-5)
-
-
-def test_the_windows_are_those_of_the_grids_in_their_order() -> None:
-    search = by_perspective()
-    expected = np.concatenate([grid.boxes for grid in search.grids])
-    np.testing.assert_array_equal(search_all(search).boxes, expected)
 
 
 class TestVehicles:

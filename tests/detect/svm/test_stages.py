@@ -9,9 +9,8 @@ from vdet.boxes import Image
 from vdet.config.detector import WindowSettings
 from vdet.config.schema import SvmSettings
 from vdet.config.section import scale_lengths
-from vdet.detect.svm.detector import SvmModel
+from vdet.detect.svm.detector import SvmModel, blend_heat
 from vdet.detect.svm.heat import Heat
-from vdet.detect.svm.stages import blend_heat
 from vdet.draw.boxes import color_of
 from vdet.media import Picture
 
@@ -32,32 +31,11 @@ def with_windows(*sets: WindowSettings) -> SvmSettings:
     return ROWS.model_copy(update={"search": search})
 
 
-@pytest.mark.parametrize("image", [road(CAR), road()], ids=["a car", "nothing found"])
-def test_there_are_three_pictures_in_the_order_of_the_stages(image: Image) -> None:
-    pictures = pictures_of(image)
-    assert list(pictures) == NAMES
-    for name in NAMES:
-        assert pictures[name].shape == image.shape
-        assert pictures[name].dtype == np.uint8
-
-
-def test_the_frame_itself_is_not_drawn_on() -> None:
-    image = road(CAR)
-    pictures_of(image)
-    np.testing.assert_array_equal(image, road(CAR))
-
-
 def test_hits_are_drawn_around_the_car_alone() -> None:
     changed = (pictures_of(road(CAR))["hits"] != road(CAR)).any(axis=2)
     rows, columns = np.nonzero(changed)
     assert CAR.x1 - 32 <= columns.min() < columns.max() < CAR.x2 + 40
     assert CAR.y1 - 64 <= rows.min() < rows.max() < CAR.y2 + 40
-
-
-def test_heat_is_brightest_on_the_car() -> None:
-    heat = pictures_of(road(CAR))["heat"].sum(axis=2, dtype=int)
-    on_car = heat[CAR.y1 + 10 : CAR.y2 - 10, CAR.x1 + 10 : CAR.x2 - 10]
-    assert on_car.min() > heat[200:, 200:].max()
 
 
 def test_every_window_set_has_a_grid_of_its_own_colour() -> None:

@@ -1,7 +1,6 @@
 """Vehicles from votes around known boxes."""
 
 from collections.abc import Sequence
-from random import Random
 
 import numpy as np
 import pytest
@@ -63,17 +62,6 @@ class TestVehicles:
         assert left.iou(LEFT) > 0.9
         assert right.iou(RIGHT) > 0.9
 
-    def test_the_vehicle_that_more_votes_agree_with_comes_first(self) -> None:
-        weak, strong = around(LEFT, 0.05), around(RIGHT, 0.1)
-        first, second = split(weak + strong)
-        assert first.box.iou(RIGHT) > 0.9
-        assert first.strength > second.strength
-
-    def test_scattered_votes_do_not_pull_the_box_far(self) -> None:
-        stray = [exactly(moved_to(LEFT, x, y), 0.1) for x, y in ((60, 100), (140, 130), (100, 60))]
-        (vehicle, *_) = split(around(LEFT) + stray)
-        assert vehicle.box.iou(LEFT) > 0.85
-
 
 class TestWeights:
     def test_the_strength_is_the_weight_of_the_votes_that_agree(self) -> None:
@@ -85,10 +73,6 @@ class TestWeights:
     def test_a_vehicle_needs_a_least_weight(self, minimum: float, count: int) -> None:
         assert len(split([exactly(LEFT, 0.1)] * 3, minimum=minimum)) == count
 
-    def test_many_weak_votes_are_a_vehicle_but_one_is_not(self) -> None:
-        assert len(split(around(LEFT, 0.02, count=20))) == 1
-        assert split(around(LEFT, 0.02, count=1)) == []
-
     def test_presence_and_position_have_weights_of_their_own(self) -> None:
         off = moved_to(LEFT, 120, 100)
         table = np.array([exactly(LEFT, 0)[:4], exactly(off, 0)[:4]], np.float64)
@@ -97,17 +81,6 @@ class TestWeights:
         (vehicle,) = split_regions([HotRegion(EVERYWHERE, (0, 0), 1)], votes, 0.12)
         assert vehicle.box == LEFT
         assert vehicle.strength == pytest.approx(0.2 + 0.6 * LEFT.iou(off))
-
-    def test_a_single_vote_of_high_position_weight_does_not_hide_a_vehicle(self) -> None:
-        lone = exactly(moved_to(LEFT, 300, 100), 0)[:4]
-        table = np.array([lone, *[exactly(LEFT, 0)[:4]] * 3], np.float64)
-        votes = Votes(
-            from_sizes(table),
-            presence=np.array([0.01, 0.1, 0.1, 0.1]),
-            position=np.array([9, 1, 1, 1.0]),
-        )
-        (vehicle,) = split_regions([HotRegion(EVERYWHERE, (0, 0), 1)], votes, 0.12)
-        assert vehicle.box == LEFT
 
 
 class TestParts:
@@ -128,13 +101,6 @@ class TestParts:
         found = split([exactly(LEFT, 1), exactly(part, 0.5)], left, right)
         assert boxes(found) == [LEFT]
 
-    def test_votes_for_a_part_of_one_vehicle_do_not_count_for_another(self) -> None:
-        part = Box.sized(140, 110, 44, 40)  # in LEFT, except its end, which lies in RIGHT
-        assert RIGHT.iou(part) > 0.1
-        found = split([exactly(LEFT, 1), exactly(RIGHT, 0.5), exactly(part, 0.25)])
-        assert boxes(found) == [LEFT, RIGHT]
-        assert found[1].strength == 0.5
-
 
 class TestRegions:
     def test_a_region_has_the_votes_whose_middle_lies_in_it(self) -> None:
@@ -151,12 +117,6 @@ class TestRegions:
         votes = around(LEFT)
         (alone,) = split(votes)
         assert split(votes, Box.sized(90, 90, 100, 100), *aside) == [alone]
-
-    def test_regions_that_a_third_one_joins_are_split_as_one(self) -> None:
-        left, right = Box.sized(0, 0, 130, 300), Box.sized(150, 0, 100, 300)
-        votes = around(LEFT)
-        (alone,) = split(votes)
-        assert split(votes, left, right, Box.sized(120, 0, 40, 300)) == [alone]
 
 
 def collected(*windows: Windows) -> Votes:
@@ -219,15 +179,3 @@ def test_boxes_lie_within_the_hull_of_the_votes(votes: list[Vote]) -> None:
         assert left - 1 <= box.x1 < box.x2 <= right + 1
         assert top - 1 <= box.y1 < box.y2 <= bottom + 1
     assert found
-
-
-@given(some_votes, st.randoms(use_true_random=False))
-def test_the_order_of_the_votes_does_not_matter(votes: list[Vote], random: Random) -> None:
-    shuffled = list(votes)
-    random.shuffle(shuffled)
-    one, other = (sorted(boxes(split(item)), key=str) for item in (votes, shuffled))
-    assert len(one) == len(other)
-    for a, b in zip(one, other, strict=True):
-        np.testing.assert_allclose(
-            [a.x1, a.y1, a.width, a.height], [b.x1, b.y1, b.width, b.height], atol=1
-        )

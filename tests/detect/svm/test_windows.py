@@ -27,13 +27,6 @@ def test_the_seed_sets_have_423_and_408_windows_on_a_720p_frame() -> None:
     assert len(lay_grid(SMALL, 1280, 720)) == len(boxes_of(SMALL, 1280, 720)) == 408
 
 
-def test_windows_are_laid_row_by_row_from_the_top_left() -> None:
-    boxes = boxes_of(band(10, 0.5, 7, 22), 20)
-    expected = [[0, 7], [5, 7], [10, 7], [0, 12], [5, 12], [10, 12]]
-    assert boxes.tolist() == [[x, y, 10, 10] for x, y in expected]
-    assert boxes.dtype == np.int32
-
-
 def test_step_and_buffer_are_truncated() -> None:
     # size 20, overlap 0.33: step int(13.4) = 13, buffer int(6.6) = 6, columns (100 - 6) // 13 = 7
     assert boxes_of(band(20, 0.33, 0, 20), 100)[:, 0].tolist() == [0, 13, 26, 39, 52, 65, 78]
@@ -64,16 +57,6 @@ def test_all_windows_lie_inside_band_and_frame(
     assert ((w == size) & (h == size)).all()
 
 
-@given(st.integers(8, 200), st.floats(0, 0.95), st.integers(0, 300))
-def test_any_frame_that_can_hold_a_window_has_one_at_its_left(
-    size: int, overlap: float, spare: int
-) -> None:
-    assume(int(size * (1 - overlap)) >= 1)
-    boxes = boxes_of(band(size, overlap, 0, size), size + spare)
-    assert len(boxes) >= 1
-    assert boxes[0].tolist() == [0, 0, size, size]
-
-
 def test_the_share_is_one_over_the_number_of_windows_that_cover_a_pixel() -> None:
     grid = lay_grid(band(64, 0.75, 0, 320), 320, 320)
     covered = np.zeros((320, 320))
@@ -90,11 +73,6 @@ def test_the_grids_of_every_nth_window_together_are_the_whole_grid(n: int) -> No
     together = np.concatenate([part.boxes for part in parts])
     assert len(together) == sum(len(part) for part in parts) == len(grid)
     assert {tuple(box) for box in together.tolist()} == {tuple(b) for b in grid.boxes.tolist()}
-
-
-def test_windows_of_a_fractional_step_lie_at_whole_pixels_and_do_not_drift() -> None:
-    grid = WindowGrid(100, Fraction(25, 2), Fraction(0), Fraction(0), columns=9, rows=1)
-    assert grid.boxes[:, 0].tolist() == [0, 12, 25, 38, 50, 62, 75, 88, 100]
 
 
 def test_hits_are_the_windows_of_at_least_the_probability_in_order() -> None:

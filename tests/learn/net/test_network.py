@@ -16,17 +16,16 @@ from vdet.config.schema import NetworkSettings, NetworkTrainingSettings  # noqa:
 from vdet.detect.onnx.detector import NetworkModel  # noqa: E402
 from vdet.detect.onnx.recognition import Header  # noqa: E402
 from vdet.errors import DataError  # noqa: E402
-from vdet.learn.net.architecture import (  # noqa: E402
-    Network,
-    cell_centers,
-    decode,
-    flatten,
-)
+from vdet.learn.net import network  # noqa: E402
 from vdet.learn.net.export import export_network, start_from  # noqa: E402
-from vdet.learn.net.loss import (  # noqa: E402
+from vdet.learn.net.network import (  # noqa: E402  # noqa: E402
+    Network,
     Vehicles,
     assign,
+    cell_centers,
     class_weights,
+    decode,
+    flatten,
     giou,
     paired_iou,
     uncounted,
@@ -132,6 +131,20 @@ def test_a_training_goes_on_from_the_weights_of_an_exported_network(
         progress=lambda _, loss: losses.append(loss),
     )  # fmt: skip
     assert losses[0] < 0.6 * trained[1][0]
+
+
+def test_a_wider_network_gives_at_first_what_its_narrower_base_gives(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    path, pictures = tmp_path / "base.onnx", torch.rand(4, 3, 64, 96) * 255
+    monkeypatch.setattr(network, "TRUNK", ((32, 0), (64, 2), (64, 1), (96, 1)))
+    base = Network(len(CLASSES)).eval()
+    export_network(base, Header(classes=CLASSES), path)
+    monkeypatch.setattr(network, "TRUNK", ((32, 0), (64, 2), (96, 1), (128, 1)))
+    wider = Network(len(CLASSES)).train()
+    start_from(wider, path, pictures, CLASSES)
+    expected, found = flatten(base(pictures)), flatten(wider(pictures))
+    assert torch.allclose(found, expected, atol=1e-3)
 
 
 def test_the_classes_of_a_base_are_found_by_their_names(tmp_path: Path) -> None:
@@ -241,13 +254,6 @@ def test_a_checkpoint_of_another_training_is_refused(tmp_path: Path) -> None:
     path.write_bytes(b"junk")
     with pytest.raises(DataError, match=r"net\.ckpt: is not a checkpoint of this training"):
         train_network(source, settings, path)
-
-
-def test_pictures_without_a_vehicle_are_refused(tmp_path: Path) -> None:
-    empty = block_picture(0)
-    empty = type(empty)(empty.image, empty.boxes[:0], empty.classes[:0], empty.ignored[:0])
-    with pytest.raises(DataError, match="no picture has a vehicle"):
-        train_network([NetSource("empty", [empty])], QUICK, tmp_path / "net.ckpt")
 
 
 def test_a_weight_for_a_source_that_is_not_there_is_refused(tmp_path: Path) -> None:

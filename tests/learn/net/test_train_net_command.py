@@ -7,8 +7,7 @@ import pytest
 
 from conftest import Run
 from labels.writers import WRITERS, Boxed, Labelled, write_coco
-from vdet.config.schema import NetworkSettings
-from vdet.detect.factory import trained_on
+from vdet.detect.onnx.detector import trained_on
 from vdet.detect.onnx.recognition import read_header
 from vdet.detect.onnx.session import Session
 
@@ -36,7 +35,7 @@ def test_it_learns_from_pictures_labelled_in_each_form(run: Run, tmp_path: Path,
     result = run("train-net", folder, "-o", output, *QUICK)
     assert result.code == 0, result.err
     assert result.out.splitlines()[0] == "my_set: 2 pictures; 2 car"
-    assert trained_on(NetworkSettings(model=str(output))) == ("my_set",)
+    assert trained_on(output) == ("my_set",)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["my_set", "net.onnx"]
     picture = next(folder.rglob("a.png"))
     found = run("detect-image", picture, "-c", "net", "--model", output, "--json", "-")
@@ -79,7 +78,7 @@ def test_a_network_has_learnt_from_the_sets_of_its_base_too(run: Run, tmp_path: 
     command = ("train-net", write_set(tmp_path / "two"), "-o", output, *QUICK)
     result = run(*command, "--base", base)
     assert result.code == 0, result.err
-    assert trained_on(NetworkSettings(model=str(output))) == ("two", "one")
+    assert trained_on(output) == ("two", "one")
 
 
 def test_a_base_that_is_not_there_is_said_before_the_training(run: Run, tmp_path: Path) -> None:

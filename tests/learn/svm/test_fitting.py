@@ -108,16 +108,6 @@ def test_a_patch_and_the_samples_made_of_it_are_in_the_same_fold() -> None:
     assert abs(leaking.slopes[0]) > 2 * abs(honest.slopes[0])
 
 
-def test_augmented_samples_do_not_count_in_the_calibration() -> None:
-    """They are all non-vehicles; the probabilities are those of the patches."""
-    vectors, vehicle = clouds(400)
-    rows = np.concatenate([vectors, vectors[~vehicle]])
-    labels = np.concatenate([vehicle, np.zeros(np.count_nonzero(~vehicle), bool)])
-    origins = np.concatenate([np.arange(400), np.flatnonzero(~vehicle)])
-    model = fit(rows, labels, origins)
-    assert model.probabilities(vectors).mean() == pytest.approx(vehicle.mean(), abs=0.04)
-
-
 def peak_memory(call: Callable[[], object]) -> int:
     """Return the bytes that `call` had at once."""
     tracemalloc.start()

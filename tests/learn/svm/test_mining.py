@@ -1,8 +1,7 @@
-"""Patches from labelled videos and pictures, where every window is a hit."""
+"""Patches from labelled videos, where every window is a hit."""
 
 import re
 import zipfile
-from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -11,13 +10,12 @@ import pytest
 
 from vdet.boxes import Box, Image
 from vdet.config.schema import OutputSettings, Settings, SvmSettings
-from vdet.detect.svm.kind import load_svm
+from vdet.detect.svm.detector import load_svm
 from vdet.errors import DataError, VideoError
 from vdet.learn.svm.choosing import Most
 from vdet.learn.svm.dataset import find_patches, read_patches
-from vdet.learn.svm.mining import PictureSource, VideoSource, mine
+from vdet.learn.svm.mining import VideoSource, mine
 from vdet.media import Frame, Picture, VideoInfo
-from vdet.media.images import write_image
 from vdet.media.writer import VideoWriter
 
 WIDTH, HEIGHT, FRAMES = 640, 360, 5
@@ -27,7 +25,7 @@ RED, GREEN = (0, 0, 255), (0, 160, 0)
 MODEL = load_svm(SvmSettings(), None)
 SETTINGS = Settings()
 EVERY = Most(probability=0)
-NAME = re.compile(r"(?:frame|picture)(\d{6})_x(-?\d+)_y(\d+)_s(\d{4})\.png")
+NAME = re.compile(r"frame(\d{6})_x(-?\d+)_y(\d+)_s(\d{4})\.png")
 
 
 def draw() -> Image:
@@ -106,33 +104,6 @@ def test_frames_too_small_for_any_window_are_an_error_with_the_name_of_the_video
     assert not (tmp_path / "mined.zip").exists()
 
 
-class TestPictures:
-    """Labelled pictures: a folder in YOLO form, with the car in it."""
-
-    @pytest.fixture
-    def folder(self, tmp_path: Path) -> Path:
-        folder = tmp_path / "city"
-        for name in ("images", "labels"):
-            (folder / name).mkdir(parents=True)
-        write_image(folder / "images" / "a.png", draw())
-        middle = CAR.center[0] / WIDTH, CAR.center[1] / HEIGHT
-        size = CAR.width / WIDTH, CAR.height / HEIGHT
-        row = " ".join(f"{value:.6f}" for value in (*middle, *size))
-        (folder / "labels" / "a.txt").write_text(f"0 {row}\n")
-        (folder / "data.yaml").write_text("names: [car]\n")
-        return folder
-
-    def test_they_are_mined_like_the_frames_of_a_video(
-        self, folder: Path, video: VideoSource, tmp_path: Path
-    ) -> None:
-        sources = (PictureSource(folder), replace(video, last=1))
-        output = tmp_path / "mined.zip"
-        assert mine(sources, output, SETTINGS, MODEL, most=EVERY)[0] == 2
-        vehicles = boxes_of(output, "vehicles/mined_city")
-        assert vehicles == boxes_of(output, "vehicles/mined_road") != []
-        alarms = boxes_of(output, "non-vehicles/mined_city")
-        assert len(alarms) == EVERY.false_alarms
-
-    def test_two_sources_of_one_name_are_refused(self, folder: Path, tmp_path: Path) -> None:
-        with pytest.raises(DataError, match="2 sources are named city; rename them"):
-            mine([PictureSource(folder)] * 2, tmp_path / "mined.zip", SETTINGS, MODEL, most=EVERY)
+def test_two_sources_of_one_name_are_refused(video: VideoSource, tmp_path: Path) -> None:
+    with pytest.raises(DataError, match="2 sources are named road; rename them"):
+        mine([video] * 2, tmp_path / "mined.zip", SETTINGS, MODEL, most=EVERY)

@@ -1,9 +1,8 @@
 import json
 import shutil
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 
@@ -87,38 +86,11 @@ def describe(files: list[PatchFile], *, augmented: bool = False, jobs: int = 1) 
     return extract(files, SETTINGS.svm.features, augmented=augmented, jobs=jobs)
 
 
-def test_patches_are_described_in_order_with_their_class_and_group(files: list[PatchFile]) -> None:
-    data = describe(files)
-    assert data.groups.tolist() == [file.group for file in files]
-    assert data.vehicle.tolist() == [file.vehicle for file in files]
-    assert data.vehicle.sum() == 32
-    last = cv2.imread(str(files[-1].source / files[-1].name))
-    assert last is not None
-    extractor = FeatureExtractor(SETTINGS.svm.features)
-    assert data.vectors.shape == (57, SETTINGS.svm.features.length)
-    expected = extractor.describe(np.asarray(last, np.uint8))
-    np.testing.assert_array_equal(data.vectors[-1], expected)
-
-
 def test_several_threads_give_the_same_as_one(files: list[PatchFile]) -> None:
     one, three = (describe(files, augmented=True, jobs=jobs) for jobs in (1, 3))
     for name in ("vectors", "vehicle", "sides", "origins"):
         np.testing.assert_array_equal(getattr(one, name), getattr(three, name))
     np.testing.assert_array_equal(one.groups, three.groups)
-
-
-def test_augmented_samples_follow_and_have_the_row_of_their_patch(
-    files: list[PatchFile], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    for name in ("CUT", "PART"):
-        monkeypatch.setattr(f"vdet.learn.svm.augmentation.{name}", 0)
-    rows = describe(files, augmented=True)
-    assert len(rows.files) == 57
-    assert rows.origins.tolist() == [patch for patch in range(57) for _ in range(2)]
-    assert rows.vehicle.tolist() == [file.vehicle for file in files for _ in range(2)]
-    last = read_image(files[-1].source / files[-1].name)
-    expected = FeatureExtractor(SETTINGS.svm.features).describe(np.ascontiguousarray(last[:, ::-1]))
-    np.testing.assert_array_equal(rows.vectors[-1], expected)
 
 
 def test_only_the_kept_patches_and_the_samples_made_of_them_are_used() -> None:
@@ -192,14 +164,6 @@ def test_a_trained_model_has_its_provenance_and_can_be_saved(
     assert provenance["training"] == SETTINGS.train.svm.model_dump(mode="json")
     assert provenance["report"] == json.loads(json.dumps(asdict(report)))
     np.testing.assert_array_equal(loaded.weights, model.weights)
-
-
-def test_groups_of_one_patch_each_have_no_tail_to_test(
-    files: list[PatchFile],
-) -> None:
-    lonely = [replace(file, group=f"{file.group}/{i}") for i, file in enumerate(files)]
-    with pytest.raises(DataError, match="no folder has two patches"):
-        train(lonely, SETTINGS, jobs=1)
 
 
 def test_with_boxes_a_model_finds_the_sides_of_vehicles(

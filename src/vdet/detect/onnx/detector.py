@@ -153,5 +153,4 @@ NET = DetectorKind(
     NetworkSettings,
     lambda settings, path: NetworkModel(path or SHIPPED, settings),
     lambda _: SHIPPED,
-    trained_on,
 )

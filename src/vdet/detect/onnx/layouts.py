@@ -39,7 +39,7 @@ OutputLayout = Callable[[Sequence[Array], float], RawBoxes]
 def our_cells(
     outputs: Sequence[Array], minimum: float, *, cells: Cells, calibration: Float32Array
 ) -> RawBoxes:
-    """Read our own networks: `(1, cells, 5 + classes)`; see `vdet.learn.net.architecture`.
+    """Read our own networks: `(1, cells, 5 + classes)`; see `vdet.learn.net.network`.
 
     `cells` are those of the input, from `cell_centers`; `calibration` `(classes, 2)` has slope and
     offset of each class.

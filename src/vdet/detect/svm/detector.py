@@ -1,21 +1,26 @@
-"""The linear model as a detector: windows → heat → hot regions → detections."""
+"""The linear model as the kind of detector `svm`: windows → heat → hot regions → detections."""
 
 import logging
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass, replace
+from pathlib import Path
 
+import cv2
 import numpy as np
 
-from vdet.boxes import Boxes, Image, are_nested
+from vdet.boxes import Box, Boxes, Image, are_nested
+from vdet.config.detector import FeatureSettings
 from vdet.config.schema import SvmSettings
+from vdet.detect.factory import DetectorKind
 from vdet.detect.svm.heat import Heat, HotRegion, find_regions, sum_heat
 from vdet.detect.svm.horizon import DEFAULT_HORIZON, find_horizon
-from vdet.detect.svm.model import LinearModel
+from vdet.detect.svm.model import LinearModel, load_model
 from vdet.detect.svm.search import FrameSearch
-from vdet.detect.svm.stages import Trace, stage_pictures
 from vdet.detect.svm.votes import Votes, split_regions
-from vdet.detect.svm.windows import Windows
+from vdet.detect.svm.windows import WindowGrid, Windows
+from vdet.draw.boxes import GREEN, WHITE, color_of, draw_box, draw_label
+from vdet.errors import ModelError
 from vdet.media import Picture
 
 log = logging.getLogger("vdet")
@@ -30,6 +35,19 @@ class Candidates:
 
     windows: Windows
     is_still: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Trace:
+    """What the stage pictures of a frame need.
+
+    `hits` are the windows of at least `detector.search.probability`, `heat` is the heatmap of the
+    last frames, `grids` are the window sets.
+    """
+
+    hits: Windows
+    heat: Heat
+    grids: tuple[WindowGrid, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -127,3 +145,78 @@ class SvmDetector:
         large = (found.sides[:, 2:] - found.sides[:, :2] >= smallest).all(axis=1)
         shown = found[large & (found.scores >= settings.min_score_still)]
         return shown[~are_nested(shown.sides, shown.data["strength"])]
+
+
+_MODELS = Path(__file__).parents[2] / "models"
+
+
+def shipped_model(settings: SvmSettings) -> Path:
+    """Return the shipped model that was trained with the features in the settings.
+
+    Raises
+    ------
+    ModelError
+        There is none.
+    """
+    for path in sorted(_MODELS.glob("*.npz")):
+        if load_model(path).features == settings.features:
+            return path
+    raise ModelError("no shipped model has these features; pass --model, or train one")
+
+
+def load_svm(settings: SvmSettings, path: Path | None) -> SvmModel:
+    """Load a linear model; `path` is its file, None for the shipped one.
+
+    Features that the settings give must be those that the model was trained with. Where they give
+    none, the model's own are used.
+
+    Raises
+    ------
+    ModelError
+        The file cannot be used, or the model was trained with other features.
+    """
+    model = load_model(path or shipped_model(settings), requested_features(settings))
+    return SvmModel(model, settings)
+
+
+def requested_features(settings: SvmSettings) -> FeatureSettings | None:
+    """Return the features that a model must have; None where the settings give none."""
+    return settings.features if "features" in settings.model_fields_set else None
+
+
+def trained_on(path: Path) -> tuple[str, ...]:
+    """Return the names of the groups of patches that a linear model was trained on."""
+    try:
+        groups = load_model(path).provenance["report"]["groups"]
+        return tuple(dict.fromkeys(str(group).rpartition("/")[2] for group in groups))
+    except (LookupError, TypeError):
+        return ()
+
+
+SVM = DetectorKind(SvmSettings, load_svm, shipped_model)
+
+
+def stage_pictures(image: Image, trace: Trace) -> dict[str, Image]:
+    """Return three pictures of a frame, BGR uint8 `(H, W, 3)`, by name: windows, hits, heat."""
+    windows, hits = (image * 0.6).astype(np.uint8), image.copy()
+    for number, grid in enumerate(trace.grids):
+        boxes = [Box.sized(*box) for box in grid.boxes.tolist()]
+        extent = Box(boxes[0].x1, boxes[0].y1, boxes[-1].x2, boxes[-1].y2)
+        example = boxes[number * grid.columns // len(trace.grids)]
+        draw_box(windows, extent, color_of(number))
+        draw_box(windows, example, color_of(number), f"{grid.size} px: {len(grid)} windows")
+    for row in np.argsort(trace.hits.probabilities).tolist():  # the likeliest is on top
+        box = Box.sized(*trace.hits.boxes[row].tolist())
+        draw_box(hits, box, GREEN, f"{trace.hits.probabilities[row]:.2f}")
+    heat = blend_heat(image, trace.heat)
+    draw_label(heat, f"peak {trace.heat.peak:.1f}", (0, 0), WHITE)
+    return {"windows": windows, "hits": hits, "heat": heat}
+
+
+def blend_heat(image: Image, heat: Heat) -> Image:
+    """Return the darkened image with the heat over it: black, red, white at the peak."""
+    scale = 255 / heat.peak if heat.peak > 0 else 0
+    shade = (heat.values * scale).astype(np.uint8)
+    large = np.kron(shade, np.ones((heat.shrink, heat.shrink), np.uint8))
+    colored = cv2.applyColorMap(large[: image.shape[0], : image.shape[1]], cv2.COLORMAP_HOT)
+    return np.asarray(cv2.addWeighted(image, 0.5, colored, 0.8, 0), np.uint8)

@@ -1,17 +1,35 @@
-"""The search of frames of one size: each window set is laid over the frame and searched."""
+"""The search of frames of one size: each window set is laid over the frame and searched.
+
+The search is dense: a strip of the frame is described once for all the windows in it. A strip is
+what a grid covers, at the scale where a window is a patch. Windows that are whole cells apart share
+its HOG blocks (`Blocks`), which is fast: so are the sets that follow the perspective. A grid of
+which every second window is whole cells apart is searched as four such grids. The windows of any
+other grid share only the gradients of the strip (`Gradients`): so do those of 128 pixels of the
+original. All share sums over its pixels (`table_sums`).
+"""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Protocol
 
+import cv2
 import numpy as np
 
 from vdet.boxes import Float32Array
+from vdet.config.detector import FeatureSettings
 from vdet.config.schema import SvmSettings
-from vdet.detect.svm.dense_search import DenseSearch
+from vdet.detect.svm.features import Channels, hog_descriptor, patch_descriptors
 from vdet.detect.svm.horizon import DEFAULT_HORIZON
 from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.pyramid import FramePyramid
-from vdet.detect.svm.windows import GridResult, WindowGrid, Windows, lay_grids
+from vdet.detect.svm.windows import (
+    WINDOW_SIDES,
+    GridResult,
+    IndexArray,
+    WindowGrid,
+    Windows,
+    lay_grids,
+)
 from vdet.errors import FrameSizeError, ImageError
 from vdet.media import Picture
 
@@ -34,6 +52,179 @@ class GridSearch(Protocol):
 
 Engine = Callable[[LinearModel, WindowGrid], GridSearch]
 """Makes the search of a grid."""
+
+
+MAX_PHASES = 2
+"""Most grids of shared blocks, across and down, that a grid is split into; with more of them,
+sharing only the gradients is faster."""
+
+BATCH = 8192
+"""Number of windows whose vectors are in memory at once."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Part:
+    """`n` windows of a grid that lie at whole pixels of one strip, in each channel of a patch.
+
+    `numbers` `(n,)` counts them in the grid, `x` and `y` `(n,)` are their top-left pixels in the
+    strip, which `strip` cuts out of a frame.
+    """
+
+    numbers: IndexArray
+    strip: tuple[slice, slice, int, int]
+    x: IndexArray
+    y: IndexArray
+
+
+class DenseSearch:
+    """Searches the windows of one grid, split into parts whose windows lie on the same strip."""
+
+    def __init__(self, model: LinearModel, grid: WindowGrid) -> None:
+        features = model.features
+        pixels = grid.step * features.patch / grid.size  # from window to window, of the patch
+        self._hog: type[Blocks | Gradients] = Blocks
+        n = (pixels / features.hog.cell).denominator
+        if n > MAX_PHASES:
+            self._hog = Gradients
+            n = (pixels / max(map(features.shrink, range(3)))).denominator
+        self._model, self._count = model, len(grid)
+        self._weights, of_colours = np.split(model.weights, [features.hog_length], axis=1)
+        bins = features.histogram.bins
+        self._tables = np.repeat(of_colours.reshape(-1, 3, bins), 256 // bins, axis=2)
+        self._parts = [
+            _part(grid, features.patch, n, column, row)
+            for row in range(min(n, grid.rows))
+            for column in range(min(n, grid.columns))
+        ]
+
+    def search(self, frame: FramePyramid, probability: float) -> GridResult:
+        """Search a frame; windows of at least this probability are hits."""
+        model, features = self._model, self._model.features
+        probabilities = np.zeros(self._count, np.float32)
+        sides = np.tile(WINDOW_SIDES, (self._count, 1))
+        for part in self._parts:
+            strip = frame.cut(*part.strip)
+            hog = self._hog(strip, features)
+            values = table_sums(strip, self._tables, features, part.x, part.y)
+            values += hog.values(self._weights, part.x, part.y)
+            found = model.to_probabilities(values + model.biases)
+            probabilities[part.numbers] = found
+            hits = found >= probability
+            if model.box_regression is not None and hits.any():
+                vectors = hog.vectors(part.x[hits], part.y[hits])
+                sides[part.numbers[hits]] = model.box_regression.sides(vectors)
+        return GridResult(probabilities, sides)
+
+
+def _part(grid: WindowGrid, patch: int, n: int, column: int, row: int) -> _Part:
+    """Return every n-th window, from this column and row on."""
+    numbers = np.arange(len(grid)).reshape(grid.rows, grid.columns)[row::n, column::n]
+    pixels = int(n * grid.step * patch / grid.size)
+    y, x = np.indices(numbers.shape).reshape(2, -1) * pixels
+    return _Part(numbers.ravel(), grid.every_nth(n, column, row).strip(patch), x, y)
+
+
+class Blocks:
+    """The HOG of windows that are whole cells apart: each block of the strip is computed once.
+
+    `x` and `y`, `(n,)`, are the top-left pixels of windows in the strip.
+    """
+
+    def __init__(self, strip: Channels, features: FeatureSettings) -> None:
+        self._features = features
+        hog = features.hog
+        height, width = (side * features.shrink(0) for side in strip[0].shape)
+        columns, rows = (side // hog.cell - hog.block + 1 for side in (width, height))
+        # A descriptor whose window is the strip gives each block once, column by column.
+        vectors = [
+            hog_descriptor(features, (width, height), number).compute(channel)
+            for number, channel in enumerate(strip)
+        ]
+        blocks = [np.reshape(vector, (columns, rows, -1)) for vector in vectors]
+        self._blocks = np.concatenate(blocks, axis=-1, dtype=np.float32)
+
+    def vectors(self, x: IndexArray, y: IndexArray) -> Float32Array:
+        """Return the HOG of windows as `FeatureExtractor` orders it, float32 `(n, h)`."""
+        steps = np.arange(self._features.blocks)
+        columns = self._cells(x)[:, np.newaxis, np.newaxis] + steps[:, np.newaxis]
+        rows = self._cells(y)[:, np.newaxis, np.newaxis] + steps
+        by_block = self._blocks[columns, rows].reshape(len(x), len(steps) ** 2, 3, -1)
+        return np.asarray(by_block.swapaxes(1, 2).reshape(len(x), -1), np.float32)
+
+    def values(self, weights: Float32Array, x: IndexArray, y: IndexArray) -> Float32Array:
+        """Return the HOG of windows times weights, `(m, h)` → float32 `(n, m)`."""
+        # A matrix product weights every block as if it lay in each place (i, j) of a window.
+        columns, rows, length = self._blocks.shape
+        side, count = self._features.blocks, len(weights)
+        by_place = weights.reshape(count, 3, side**2, -1).swapaxes(1, 2).reshape(-1, length)
+        planes = by_place @ self._blocks.reshape(-1, length).T
+        planes = planes.reshape(count, side, side, columns * rows)
+        # Block (i, j) of the window that begins at block k is block k + i·rows + j.
+        last = columns * rows - side + 1
+        down = np.zeros((count, side, last), np.float32)
+        for j in range(side):
+            down += planes[:, :, j, j : j + last]
+        last -= (side - 1) * rows
+        sums = np.zeros((count, last), np.float32)
+        for i in range(side):
+            sums += down[:, i, i * rows : i * rows + last]
+        return sums[:, self._cells(x) * rows + self._cells(y)].T
+
+    def _cells(self, pixels: IndexArray) -> IndexArray:
+        return pixels // self._features.hog.cell
+
+
+class Gradients:
+    """The HOG of windows at any pixels: gradients are shared (`HOGDescriptor.compute`)."""
+
+    def __init__(self, strip: Channels, features: FeatureSettings) -> None:
+        self._strip, self._features = strip, features
+        self._descriptors = patch_descriptors(features)
+
+    def vectors(self, x: IndexArray, y: IndexArray) -> Float32Array:
+        """Return the HOG of windows as `FeatureExtractor` orders it, float32 `(n, h)`."""
+        parts = []
+        for number, (hog, channel) in enumerate(zip(self._descriptors, self._strip, strict=True)):
+            places = np.stack([x, y], axis=1) // self._features.shrink(number)
+            vectors = hog.compute(channel, locations=list(map(tuple, places.tolist())))
+            parts.append(np.reshape(vectors, (len(x), -1)))
+        return np.concatenate(parts, axis=1, dtype=np.float32)
+
+    def values(self, weights: Float32Array, x: IndexArray, y: IndexArray) -> Float32Array:
+        """Return the HOG of windows times weights, `(m, h)` → float32 `(n, m)`."""
+        batches = (slice(first, first + BATCH) for first in range(0, len(x), BATCH))
+        return np.concatenate([self.vectors(x[some], y[some]) @ weights.T for some in batches])
+
+
+def table_sums(
+    strip: Channels,
+    tables: Float32Array,
+    features: FeatureSettings,
+    x: IndexArray,
+    y: IndexArray,
+) -> Float32Array:
+    """Sum what the pixels of windows add: their colour histograms times weights.
+
+    Parameters
+    ----------
+    tables
+        float32 `(m, 3, 256)`: what a pixel adds, by channel and value.
+    x, y
+        Top-left pixels of the windows in the strip, `(n,)`.
+
+    Returns
+    -------
+    float32 `(n, m)`.
+    """
+    sums = np.zeros((len(x), len(tables)), np.float32)
+    for number, channel in enumerate(strip):
+        shrink = features.shrink(number)
+        left, top, side = x // shrink, y // shrink, features.patch // shrink
+        for row, table in enumerate(tables[:, number]):
+            integral = np.asarray(cv2.integral(cv2.LUT(channel, table)))
+            lower = integral[top + side, left + side] - integral[top + side, left]
+            sums[:, row] += lower - integral[top, left + side] + integral[top, left]
+    return sums
 
 
 class FrameSearch:

@@ -21,7 +21,7 @@ from vdet.detect.onnx.recognition import HEADER_KEY, Header, read_header
 from vdet.detect.onnx.session import Session
 from vdet.errors import DataError
 from vdet.files import staged
-from vdet.learn.net.architecture import Network
+from vdet.learn.net.network import Network
 
 _OPSET = 17
 _MIN_WEIGHT = 1e-12  # smaller ones lead to denormal numbers, which are slow
@@ -85,8 +85,9 @@ def start_from(network: Network, path: Path, pictures: Tensor, classes: Sequence
     """Give a network the weights of a file that `export_network` has written.
 
     Normalisation is part of the convolutions there. Each normalisation of the network gets the
-    mean and deviation of what it sees in some pictures, and undoes itself at first. Classes that
-    the file does not know have random weights, and change no other output.
+    mean and deviation of what it sees in some pictures, and undoes itself at first. Layers may be
+    wider than those of the file: further channels have random weights and change no output yet.
+    So have classes that the file does not know.
 
     Parameters
     ----------
@@ -107,15 +108,18 @@ def start_from(network: Network, path: Path, pictures: Tensor, classes: Sequence
         nonlocal bias
         if isinstance(layer, nn.BatchNorm2d):
             variance, mean = torch.var_mean(inputs[0], (0, 2, 3))
-            layer.weight.copy_(torch.sqrt(variance + layer.eps))
-            layer.bias.copy_(bias + mean)
+            known = slice(len(bias))
+            layer.weight[known] = torch.sqrt(variance + layer.eps)[known]
+            layer.bias[known] = bias + mean[known]
             layer.load_state_dict({"running_mean": mean, "running_var": variance}, strict=False)
             return
         weight, bias = next(folded)
+        rows = list(range(len(weight)))
         if layer.bias is not None:  # a head: its classes may be others, or in another order
-            layer.weight[places], layer.bias[places] = weight[columns], bias[columns]
-        else:
-            layer.weight.copy_(255 * weight if layer is network.stem else weight)
+            rows, weight, bias = places, weight[columns], bias[columns]
+            layer.bias[rows] = bias
+        layer.weight[rows] = 0  # the known channels do not depend on further inputs
+        layer.weight[rows, : weight.shape[1]] = 255 * weight if layer is network.stem else weight
 
     layers = [
         module for module in network.modules() if isinstance(module, nn.Conv2d | nn.BatchNorm2d)

@@ -17,10 +17,9 @@ from vdet.detect.onnx.recognition import Header, read_header
 from vdet.detect.onnx.session import Session
 from vdet.errors import DataError
 from vdet.files import staged
-from vdet.learn.net.architecture import Network
 from vdet.learn.net.augmentation import Drawing, SampleDrawer
 from vdet.learn.net.export import export_network, start_from
-from vdet.learn.net.loss import Batch, Vehicles, class_weights, loss_of
+from vdet.learn.net.network import Batch, Network, Vehicles, class_weights, loss_of
 from vdet.learn.net.sources import NetSample, NetSource, Source, join
 from vdet.run.threads import prefetch
 from vdet.version import __version__

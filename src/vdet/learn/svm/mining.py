@@ -1,4 +1,4 @@
-"""Mining: labelled videos and pictures → a zip file of patches for the training.
+"""Mining: labelled videos → a zip file of patches for the training.
 
 Vehicles and false alarms are cut out of the frames. `choosing` compares the windows of a frame with
 its vehicles and takes some of each kind.
@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,10 +21,9 @@ from vdet.config.schema import Settings
 from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.features import cut_window, to_patch
 from vdet.detect.svm.windows import Windows
-from vdet.errors import DataError, ImageError, TruthError, VideoError
+from vdet.errors import DataError, TruthError, VideoError
 from vdet.labels.label import LabelledVideo, spread_frames
-from vdet.labels.pictures import LabelledPicture
-from vdet.labels.reading import read_labelled_pictures, read_truth
+from vdet.labels.reading import read_truth
 from vdet.labels.roles import Roles
 from vdet.learn.svm.choosing import MOST, Most, PatchKind, choose_windows, cut_sides
 from vdet.learn.svm.dataset import patch_archive
@@ -43,18 +43,13 @@ _FOLDERS: dict[PatchKind, str] = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class LabelledFrame:
-    """A frame or a picture with its windows.
+class LabelledFrame(NamedTuple):
+    """A frame, its number counted from 0, with its windows and its labels."""
 
-    The names of its patches begin with `name`. Which windows are chosen depends on `number`.
-    """
-
-    name: str
     number: int
     image: Image
     windows: Windows
-    labels: LabelledVideo | LabelledPicture
+    labels: LabelledVideo
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,46 +98,15 @@ class VideoSource:
                 vehicles = labels.boxes[~labels.ignored]
                 cuts_off = any(cut_sides(box, info.width).any() for box in vehicles)
                 if number in regular or (number >= self.first and cuts_off):
-                    image, name = frame.image, f"frame{number:06}"
-                    windows = detector.search(Picture(image), None).windows
-                    yield LabelledFrame(name, frame.index, image, windows, labels)
+                    windows = detector.search(Picture(frame.image), None).windows
+                    yield LabelledFrame(frame.index, frame.image, windows, labels)
                 advance(1)
         if number < last:
             truth.check_end(self.truth, number)
 
 
-@dataclass(frozen=True, slots=True)
-class PictureSource:
-    """A set of labelled pictures: a folder, or a COCO file."""
-
-    path: Path
-
-    def frames(
-        self, model: SvmModel, settings: Settings, progress: Progress
-    ) -> Iterator[LabelledFrame]:
-        """Yield all pictures; `progress` gets their number.
-
-        Raises
-        ------
-        TruthError
-            The labels cannot be used.
-        ImageError
-            A picture cannot be read or searched.
-        """
-        pictures = read_labelled_pictures(self.path, Roles.from_settings(settings)).pictures
-        advance = progress(len(pictures))
-        for number, labelled in enumerate(pictures):
-            image = labelled.read()
-            height, width = image.shape[:2]
-            with named_errors(labelled.path, ImageError):
-                detector = model.for_video(width, height, [image])
-            windows = detector.search(Picture(image), None).windows
-            yield LabelledFrame(f"picture{number + 1:06}", number, image, windows, labelled)
-            advance(1)
-
-
 def mine(
-    sources: Sequence[VideoSource | PictureSource],
+    sources: Sequence[VideoSource],
     output: Path,
     settings: Settings,
     model: SvmModel,
@@ -176,8 +140,8 @@ def mine(
     ------
     TruthError
         Labels cannot be used, or have nothing about the frames.
-    VideoError, ImageError
-        A video or a picture cannot be read or searched.
+    VideoError
+        A video cannot be read or searched.
     DataError
         There is nothing to learn from these frames, or two sources have one name.
     OutputError
@@ -202,7 +166,7 @@ def mine(
                     x, y, side, _ = chosen.box.xywh
                     patch = to_patch(cut_window(frame.image, x, y, side, side), PATCH)
                     folder = _FOLDERS[chosen.kind].format(stem)
-                    name = f"{folder}/{frame.name}_x{x:04}_y{y:04}_s{side:04}.png"
+                    name = f"{folder}/frame{frame.number + 1:06}_x{x:04}_y{y:04}_s{side:04}.png"
                     add(name, patch, chosen.sides)
                     counts[chosen.kind] += 1
         if not counts:

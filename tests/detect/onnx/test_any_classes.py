@@ -1,0 +1,56 @@
+"""Networks of any number of classes work in every output."""
+
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from conftest import Run
+from detect.onnx.graphs import RedBox, ultralytics, write_network
+from vdet.config.schema import OutputSettings
+from vdet.labels.reading import read_predictions
+from vdet.media import Frame, Picture, VideoInfo
+from vdet.media.writer import VideoWriter
+
+SIZE = 256, 128
+FORMATS = (".txt", ".csv", ".jsonl", ".coco.json", ".xml", ".kitti.txt", ".yolo.zip", ".ottrk")
+GATE = "traffic: {lines: [{name: gate, start: [0.1, 0.5], end: [0.9, 0.5]}]}\n"
+
+
+@pytest.fixture
+def clip(tmp_path: Path) -> Path:
+    """A second of a grey video with a red square in the middle."""
+    image = np.full((SIZE[1], SIZE[0], 3), 60, np.uint8)
+    image[48:80, 112:144] = 0, 0, 255
+    path, rate = tmp_path / "in.mp4", Fraction(12)
+    info = VideoInfo(path, *SIZE, rate, 1 / rate, frames=12)
+    with VideoWriter(path, info, OutputSettings(crf=1)) as writer:
+        for index in range(12):
+            writer.write(Frame(index, index / rate, Picture(image)))
+    return path
+
+
+@pytest.mark.parametrize("count", [2, 20])
+def test_a_vehicle_of_any_class_is_in_every_output(
+    run: Run, clip: Path, tmp_path: Path, count: int
+) -> None:
+    names = [f"kind {number}" for number in range(count)]
+    form = ultralytics((128, 64), RedBox(64, 32, 16, 16, count - 1), count)
+    metadata = {"task": "detect", "names": str(dict(enumerate(names))), "imgsz": "[64, 128]"}
+    network = write_network(tmp_path / "net.onnx", form, (128, 64), (64, 32), metadata=metadata)
+    (tmp_path / "gate.yaml").write_text(GATE)
+    tracks = [tmp_path / f"found{suffix}" for suffix in FORMATS]
+    outputs = ("vehicles.json", "vehicles.csv", "counts.csv", "flows.csv", "page", "crops")
+    result = run(
+        "detect-video", clip, tmp_path / "out.mp4", "-q", "--model", network,
+        "--set", f"detector.classes={names}", "-c", tmp_path / "gate.yaml",
+        *(item for path in tracks for item in ("--tracks", path)),
+        *(item for name in outputs for item in (f"--{name.split('.')[0]}", tmp_path / name)),
+    )  # fmt: skip
+    assert result.code == 0, result.err
+    assert all((tmp_path / name).exists() for name in outputs)
+    for path in tracks:
+        assert len(read_predictions(path).boxes), path
+    assert names[-1] in (tmp_path / "vehicles.csv").read_text(encoding="utf-8")
+    assert names[-1] in (tmp_path / "page" / "page.html").read_text(encoding="utf-8")
