@@ -40,6 +40,7 @@ _BUILT_IN: dict[str, dict[str, str]] = {
         "stages": "vdet.run.sinks.folders:STAGES",
         "picture": "vdet.run.sinks.drawn:PICTURE",
         "json": "vdet.run.sinks.data:JSON",
+        "labels": "vdet.run.sinks.data:LABELS",
         "vehicles": "vdet.run.sinks.data:VEHICLES",
         "crops": "vdet.run.sinks.folders:CROPS",
         "clips": "vdet.run.sinks.folders:CLIPS",

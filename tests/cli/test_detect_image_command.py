@@ -1,12 +1,14 @@
 """`vdet detect-image`."""
 
 import json
+import zipfile
 from pathlib import Path
 
 import pytest
 
 from conftest import Run
 from quick import QUICK_OPTIONS, only_windows
+from vdet.labels.reading import read_labelled_pictures
 from vdet.media.images import read_image, write_image
 from vdet.synthetic.render import render
 from vdet.synthetic.scene import Scene
@@ -119,3 +121,24 @@ def test_if_no_picture_works_the_exit_code_is_1(run: Run, tmp_path: Path) -> Non
     result = run("detect-image", tmp_path, "--json", "-")
     assert result.code == 1
     assert result.err.count("is not a picture") == 2
+
+
+def test_labels_of_a_folder_and_those_below_are_read_by_eval_images(
+    run: Run, picture: Path, model_path: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / "set" / "images"
+    (folder / "north").mkdir(parents=True)
+    for name in ("a.png", "north/a.png"):
+        (folder / name).write_bytes(picture.read_bytes())
+    files = [tmp_path / "set" / f"boxes{ending}" for ending in (".coco.json", ".xml", ".yolo.zip")]
+    options = [word for file in files for word in ("--labels", file)]
+    result = run("detect-image", folder, *options, "--model", model_path, *QUICK_OPTIONS)
+    assert result.code == 0, result.err
+    zipfile.ZipFile(files[-1]).extractall(tmp_path / "set")
+    names = [folder / "a.png", folder / "north" / "a.png"]
+    for labels in (*files[:-1], tmp_path / "set"):
+        found = read_labelled_pictures(labels).pictures
+        assert [item.path for item in found] == names
+        first, second = ([label.box for label in item.labels] for item in found)
+        assert first
+        assert first == second

@@ -126,7 +126,7 @@ class TestWriting:
         ("<svg/>", " <svg> where the format has <annotations>"),
         (
             track('<polygon frame="0" points="1,2;3,4"/>'),
-            "track 3: <polygon> in a track; only boxes",
+            "track 3: <polygon> is not a box; only boxes",
         ),
         (track(BOX.replace(' xtl="10"', "")), "track 3: <box> without its 'xtl'"),
         (track(BOX.replace("10", "NaN")), "track 3: 'NaN' is not a number"),

@@ -1,27 +1,33 @@
 """Every format of the registry: what is written is read again, and what is damaged is refused."""
 
 import math
-from dataclasses import replace
+import zipfile
+from collections.abc import Callable, Iterator
+from dataclasses import astuple, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import get_args
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from labels.saving import VIDEO, car, frame, read_back, written
 from vdet.boxes import Box
-from vdet.detect.classes import OUR_NAMES
+from vdet.detect.classes import OUR_NAMES, UNKNOWN
 from vdet.errors import TruthError
-from vdet.labels.coco import COCO
-from vdet.labels.cvat import CVAT
+from vdet.labels.coco import COCO, read_coco_pictures
+from vdet.labels.cvat import CVAT, read_cvat_pictures
 from vdet.labels.formats import Format, track_formats
 from vdet.labels.kitti import KITTI
-from vdet.labels.label import SavedTracks
+from vdet.labels.label import Label, SavedTracks
 from vdet.labels.mot import MOT
 from vdet.labels.ottrk import OTTRK
+from vdet.labels.pictures import LabelledPicture
 from vdet.labels.records import CSV, JSON_LINES
-from vdet.labels.yolo import YOLO
+from vdet.labels.yolo import YOLO, YOLO_PICTURES
+from vdet.media.images import write_image
 from vdet.track.track import FrameTracks, State, Track
 
 WHOLE = {CSV, JSON_LINES}
@@ -45,6 +51,13 @@ def boxes(draw: st.DrawFn) -> Box:
     right, bottom = draw(st.integers(x + 1, VIDEO.width)), draw(st.integers(y + 1, VIDEO.height))
     return Box.sized(x, y, right - x, bottom - y)
 
+
+READERS: dict[Format, Callable[[Path], Iterator[LabelledPicture]]] = {
+    COCO: read_coco_pictures,
+    CVAT: read_cvat_pictures,
+    YOLO: lambda path: YOLO_PICTURES.read(path.parent),
+}
+"""How the labels of pictures are read again."""
 
 CLASSES = st.sampled_from([None, *OUR_NAMES, "tractor", 'a <"b"> & c, d', "Überlandbus 🚌"])
 PLACES = st.floats(-3000, 3000).map(lambda value: round(value, 2))
@@ -146,3 +159,53 @@ def test_a_box_may_reach_out_of_the_frame(tmp_path: Path, form: Format) -> None:
     saved = read_back(form, tmp_path, written(form, [frame(2, car(1, box))]))
     inside = box.clipped(1280, 720)
     assert list(saved)[-1].tracks[0].box == (inside if form is YOLO else box)
+
+
+@st.composite
+def labelled(draw: st.DrawFn) -> list[LabelledPicture]:
+    """Give pictures with boxes, some in folders; no two boxes of one are the same."""
+    names = st.sampled_from(["a.png", "b/a.png", "b/c d/é & <e>.jpg", "b/2.jpg"])
+    return [
+        LabelledPicture(
+            Path(name),
+            Path(),
+            tuple(
+                Label("", astuple(box), draw(CLASSES) or UNKNOWN, score=0.5)
+                for box in draw(st.sets(boxes(), max_size=4))
+            ),
+            (VIDEO.width, VIDEO.height),
+        )
+        for name in sorted(draw(st.sets(names, min_size=1)))
+    ]
+
+
+def test_every_format_that_pictures_are_written_in_is_read() -> None:
+    assert {form for form in FORMATS if form.pictures} == READERS.keys()
+
+
+@pytest.mark.parametrize("form", READERS, ids=lambda form: form.name)
+@settings(max_examples=20)
+@given(pictures=labelled())
+def test_labels_of_pictures_are_read_again(form: Format, pictures: list[LabelledPicture]) -> None:
+    assert form.pictures is not None
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        path, images = folder / f"set{form.suffix}", folder / "images"
+        for picture in pictures:
+            (images / picture.path).parent.mkdir(parents=True, exist_ok=True)
+            write_image(images / picture.path, np.zeros((VIDEO.height, VIDEO.width, 3), np.uint8))
+        with path.open("wb") as file:
+            form.pictures(file, pictures)
+        if form is YOLO:
+            with zipfile.ZipFile(path) as archive:
+                archive.extractall(folder)
+        found = list(READERS[form](path))
+    expected = {
+        images / picture.path: sorted((label.box, label.name) for label in picture.labels)
+        for picture in pictures
+    }
+    read = {
+        picture.path: sorted((Box(*label.box).pixels, label.name) for label in picture.labels)
+        for picture in found
+    }
+    assert read == expected

@@ -36,9 +36,10 @@ class TestFindingImages:
         touch(*(tmp_path / name for name in ("b.png", "a.JPG", "c.webp", "notes.txt")))
         assert [path.name for path in find_images([tmp_path])] == ["a.JPG", "b.png", "c.webp"]
 
-    def test_folders_inside_a_folder_are_not_searched(self, tmp_path: Path) -> None:
-        touch(tmp_path / "a.png", tmp_path / "more" / "b.png")
-        assert find_images([tmp_path]) == [tmp_path / "a.png"]
+    def test_each_picture_below_a_folder_has_its_place(self, tmp_path: Path) -> None:
+        touch(tmp_path / "b.png", tmp_path / "a" / "b.png", tmp_path / ".thumbs" / "b.png")
+        places = (Path("a/b.png"), Path("b.png"))
+        assert find_images([tmp_path]) == {tmp_path / place: place for place in places}
 
     def test_a_picture_that_is_named_twice_is_taken_once(self, tmp_path: Path) -> None:
         touch(tmp_path / "a.png", tmp_path / "b.png")
@@ -55,32 +56,37 @@ class TestFindingImages:
             find_images([tmp_path / "none.png"])
 
 
+def placed(folder: Path, *names: str) -> dict[Path, Path]:
+    return {folder / name: Path(name) for name in names}
+
+
 class TestPlan:
     def test_one_picture_goes_to_the_file_named(self, tmp_path: Path) -> None:
         source, out = tmp_path / "a.png", tmp_path / "found.jpg"
-        expected = PictureJob(source, (Output("picture", out),))
-        assert plan_pictures([source], out, None, overwrite=False) == [expected]
+        expected = PictureJob(source, (Output("picture", out),), Path("a.png"))
+        assert plan_pictures(placed(tmp_path, "a.png"), out, None, overwrite=False) == [expected]
 
     def test_several_keep_their_names_in_the_folder(self, tmp_path: Path) -> None:
-        sources = [tmp_path / "a.png", tmp_path / "b.jpg"]
+        sources = placed(tmp_path, "a.png", "north/a.png")
         jobs = plan_pictures(sources, tmp_path / "out", None, overwrite=False)
         assert [job.outputs for job in jobs] == [
-            (Output("picture", tmp_path / "out" / source.name),) for source in sources
+            (Output("picture", tmp_path / "out" / place),) for place in sources.values()
         ]
 
     def test_without_an_output_no_picture_is_written(self, tmp_path: Path) -> None:
-        (job,) = plan_pictures([tmp_path / "a.png"], None, tmp_path / "stages", overwrite=False)
+        sources = placed(tmp_path, "a.png")
+        (job,) = plan_pictures(sources, None, tmp_path / "stages", overwrite=False)
         assert [output.sink for output in job.outputs] == ["stages"]
 
     def test_stages_of_several_go_into_a_folder_each(self, tmp_path: Path) -> None:
-        sources = [tmp_path / "a.png", tmp_path / "b.png"]
+        sources = placed(tmp_path, "a.png", "b.png")
         jobs = plan_pictures(sources, None, tmp_path / "stages", overwrite=False)
         assert [job.outputs for job in jobs] == [
             (Output("stages", tmp_path / "stages" / name),) for name in "ab"
         ]
 
     def test_one_output_that_is_there_already_refuses_all(self, tmp_path: Path) -> None:
-        sources = [tmp_path / "a.png", tmp_path / "b.png"]
+        sources = placed(tmp_path, "a.png", "b.png")
         touch(tmp_path / "out" / "b.png")
         with pytest.raises(OutputError, match=r"b\.png: already exists"):
             plan_pictures(sources, tmp_path / "out", None, overwrite=False)
@@ -88,7 +94,7 @@ class TestPlan:
 
     def test_a_file_where_the_folder_should_be_is_refused(self, tmp_path: Path) -> None:
         touch(tmp_path / "out")
-        sources = [tmp_path / "a.png", tmp_path / "b.png"]
+        sources = placed(tmp_path, "a.png", "b.png")
         with pytest.raises(OutputError, match=r"the folder .*out is not a folder"):
             plan_pictures(sources, tmp_path / "out", None, overwrite=True)
 

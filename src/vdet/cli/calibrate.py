@@ -39,7 +39,7 @@ def calibrate(
     if not (3 <= min(pattern) <= max(pattern) <= 999):
         raise click.UsageError("--pattern: must be 3 to 999 inner corners, such as 9x6")
     options.check_suffix(output, ".yaml", ".yml", what="cameras")
-    found = find_images(photos)
+    found = list(find_images(photos))
     check_output(output, overwrite=overwrite)
     with progress_steps("") as steps:
         steps(f"searching {counted(len(found), 'photograph')}", None)

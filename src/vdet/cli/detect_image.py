@@ -22,16 +22,22 @@ log = logging.getLogger("vdet")
     "vdet detect-image road.jpg",
     "vdet detect-image road.jpg -o found.jpg --json -",
     "vdet detect-image pictures/ -o found/ --json boxes.json",
+    "vdet detect-image pictures/ --labels pictures.coco.json",
     "vdet detect-image road.jpg --stages stages",
 )
 @click.argument("images", nargs=-1, required=True, type=options.PATH, metavar="IMAGE...")
 @options.option(
     "-o, --output PATH",
-    "Write the picture with its boxes. For several pictures, a folder.",
+    "Write the picture with its boxes. For several pictures, a folder, in which they keep their "
+    "names and folders.",
     options.PATH,
 )
 @options.option("--stages DIR", "Write a picture of every stage into DIR.")
 @options.output_option("--json FILE", "Write the boxes to FILE, or with - to standard output.")
+@options.output_option(
+    "--labels FILE",
+    "Write the boxes for label tools: .coco.json, .xml (CVAT), or .yolo.zip. Can be repeated.",
+)
 @options.sink_option
 @options.lanes_option
 @options.settings_options("detector.min_score_still=0.5", options.model_option)
@@ -45,8 +51,8 @@ def detect_image(
 ) -> int:
     """Find vehicles in pictures.
 
-    Each IMAGE is a file, or a folder of files. Without an output, the vehicles are printed: class,
-    score, and box in pixels, as x, y, width and height.
+    Each IMAGE is a file, or a folder with pictures in it and below. Without an output, the vehicles
+    are printed: class, score, and box in pixels, as x, y, width and height.
     """
     settings = choice.read()
     options.warn_of_lanes(settings)

@@ -9,75 +9,103 @@ format"; Dave et al., "TAO: A Large-Scale Benchmark for Tracking Any Object", 20
 
 import io
 import json
-from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from functools import partial
 from math import nan
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Annotated, Any, BinaryIO
 
 from pydantic import AfterValidator, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
-from vdet.errors import TruthError, printable
+from vdet.boxes import Box
+from vdet.detect.classes import UNKNOWN
+from vdet.errors import TruthError
 from vdet.files import record_input
 from vdet.labels.documents import json_values
 from vdet.labels.formats import Format, SourceVideo, last_classes
 from vdet.labels.label import MAX_LABELS, NO_ID, Label, SavedTracks, Size, from_size, line_error
 from vdet.labels.parsing import Index, Number, Times, checked_times, first_mistake
-from vdet.labels.pictures import LabelledPicture, is_file
+from vdet.labels.pictures import LabelledPicture, inside, picture_folder
 from vdet.track.track import FrameTracks, State
 
 _VIDEO = 1
 """Id of the only video."""
 
-_ANNOTATIONS = "annotations"  # the folder of label files in the COCO set itself
+
+class _Writer:
+    """Collects a document, and writes each entry on its line."""
+
+    def __init__(self, *names: str) -> None:
+        # Entries are kept as text, which is smaller than dictionaries.
+        self._lists: dict[str, list[str]] = {name: [] for name in (*names, "annotations")}
+        self._categories: dict[str, int] = {}
+
+    def add(self, name: str, /, **entry: Any) -> None:
+        """Add an entry to a list."""
+        self._lists[name].append(json.dumps(entry))
+
+    def add_box(self, image: int, box: Box, category: int, score: float, **more: Any) -> None:
+        """Add an annotation; its `score` is one that other programs ignore."""
+        x, y, width, height = box.xywh
+        self.add(
+            "annotations",
+            id=len(self._lists["annotations"]) + 1,
+            image_id=image,
+            category_id=category,
+            bbox=[x, y, width, height],
+            area=width * height,
+            iscrowd=0,
+            score=round(score, 4),
+            **more,
+        )
+
+    def category(self, name: str) -> int:
+        """Return the id of a category, a new one where it has none."""
+        return self._categories.setdefault(name, len(self._categories) + 1)
+
+    def end(self, file: BinaryIO) -> None:
+        """Write the document."""
+        self._lists["categories"] = []
+        for name, number in self._categories.items():
+            self.add("categories", id=number, name=name)
+        parts = (f'"{name}": [\n' + ",\n".join(some) + "\n]" for name, some in self._lists.items())
+        file.write(("{\n" + ",\n".join(parts) + "\n}\n").encode())
 
 
 def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) -> None:
-    """Write all images and annotations, each on its line.
+    """Write the tracks of a video.
 
-    An annotation has a `score`, and an image its `time` in seconds, which other programs ignore.
-    `attributes.occluded` says that the vehicle is lost.
+    An image has its `time` in seconds, which other programs ignore. `attributes.occluded` says that
+    the vehicle is lost.
     """
     size = {"width": video.width, "height": video.height}
-    classes = last_classes(frames)
-    categories: dict[str, int] = defaultdict(lambda: len(categories) + 1)  # the id of each name
-    lists: dict[str, list[str]] = {  # entries as text, which is smaller than dictionaries
-        "videos": [json.dumps({"id": _VIDEO, "name": video.name, **size})],
-        **{name: [] for name in ("images", "tracks", "annotations")},
-    }
+    classes, writer = last_classes(frames), _Writer("videos", "images", "tracks")
+    writer.add("videos", id=_VIDEO, name=video.name, **size)
     for number, frame in enumerate(frames, start=1):
-        name = f"frame_{frame.index:06}.png"
+        name, time = f"frame_{frame.index:06}.png", round(frame.time, 6)
         image = {"id": number, "video_id": _VIDEO, "frame_index": frame.index, "file_name": name}
-        lists["images"].append(json.dumps({**image, **size, "time": round(frame.time, 6)}))
+        writer.add("images", **image, **size, time=time)
         for track in frame.tracks:
-            x, y, width, height = track.box.xywh
-            annotation = {
-                "id": len(lists["annotations"]) + 1,
-                "image_id": number,
-                "category_id": categories[classes[track.id]],
-                "track_id": track.id,
-                "bbox": [x, y, width, height],
-                "area": width * height,
-                "iscrowd": 0,
-                "score": round(track.score, 4),
-                "attributes": {"occluded": track.state == "predicted"},
-            }
-            lists["annotations"].append(json.dumps(annotation))
+            category = writer.category(classes[track.id])
+            lost = {"occluded": track.state == "predicted"}
+            more = {"track_id": track.id, "attributes": lost}
+            writer.add_box(number, track.box, category, track.score, **more)
     for id_, name in classes.items():
-        entry = {"id": id_, "video_id": _VIDEO, "category_id": categories[name]}
-        lists["tracks"].append(json.dumps(entry))
-    lists["categories"] = [json.dumps({"id": n, "name": name}) for name, n in categories.items()]
-    parts = (f'"{name}": [\n' + ",\n".join(items) + "\n]" for name, items in lists.items())
-    file.write(("{\n" + ",\n".join(parts) + "\n}\n").encode())
+        writer.add("tracks", id=id_, video_id=_VIDEO, category_id=writer.category(name))
+    writer.end(file)
 
 
-def _inside(name: str) -> str:
-    """Refuse the name of a picture that leads out of the set."""
-    if PurePosixPath(name).is_absolute() or ".." in PurePosixPath(name).parts:
-        raise ValueError(f"{printable(name)} leads out of the set")
-    return name
+def _write_pictures(file: BinaryIO, pictures: Sequence[LabelledPicture]) -> None:
+    writer = _Writer("images")
+    for number, picture in enumerate(pictures, start=1):
+        width, height = picture.size or (None, None)
+        name = picture.path.as_posix()
+        writer.add("images", id=number, file_name=name, width=width, height=height)
+        for label in picture.labels:
+            category = writer.category(label.name or UNKNOWN)
+            writer.add_box(number, Box(*label.box), category, label.score)
+    writer.end(file)
 
 
 _entry = partial(dataclass, frozen=True, slots=True, kw_only=True)
@@ -105,7 +133,7 @@ class _Image:
     id: int
     width: Index | None = None
     height: Index | None = None
-    file_name: Annotated[str, AfterValidator(_inside)] = ""
+    file_name: Annotated[str, AfterValidator(inside)] = ""
     frame_index: Index | None = None
     time: float | str | None = None  # "night" in some sets of pictures
     labels: list[Label] = Field(default_factory=list, init=False)
@@ -182,14 +210,14 @@ def read_coco(path: Path, data: bytes) -> SavedTracks:
     return SavedTracks(labels, tuple(sorted(frames)), checked_times(path, times), size)
 
 
-COCO = Format("COCO", ".coco.json", read_coco, whole=_write)
+COCO = Format("COCO", ".coco.json", read_coco, whole=_write, pictures=_write_pictures)
 
 
 def read_coco_pictures(path: Path) -> Iterator[LabelledPicture]:
     """Yield every picture of a COCO file; `iscrowd: 1` marks an ignore region.
 
-    Pictures lie beside the file or at most two folders below, as in `images/default` of CVAT; if
-    the file is in `annotations`, beside or below that folder. Only boxes and categories are used.
+    Pictures lie where `picture_folder` says, as in `images/default` of CVAT. Only boxes and
+    categories are used.
 
     Raises
     ------
@@ -205,20 +233,6 @@ def read_coco_pictures(path: Path) -> Iterator[LabelledPicture]:
     except OSError as error:
         raise TruthError(f"{path}: cannot be read: {error.strerror}") from error
     for image in images:
-        folder = folder or _picture_folder(path, image.file_name)
+        folder = folder or picture_folder(path, image.file_name)
         picture, labels = folder / image.file_name, tuple(image.labels)
         yield LabelledPicture(picture, path, labels, image.size, unlabelled)
-
-
-def _picture_folder(path: Path, name: str) -> Path:
-    """Return the folder that the names of pictures are relative to: the one with the first."""
-    near, shown = path.parent, printable(name)
-    above = near.parent if near.name == _ANNOTATIONS else near
-    for level in ([near], [above], sorted(above.glob("*/")), sorted(above.glob("*/*/"))):
-        found = [folder for folder in level if is_file(folder / name)]
-        if len(found) > 1:
-            where = " and ".join(str(folder) for folder in found[:2])
-            raise TruthError(f"{path}: its first picture, {shown}, lies in {where}; keep one")
-        if found:
-            return found[0]
-    raise TruthError(f"{path}: its first picture, {shown}, is missing beside it and below")

@@ -1,4 +1,6 @@
-"""CVAT for video 1.1: XML with a track for every vehicle; frames and pixels count from 0.
+"""CVAT 1.1: XML with a track for every vehicle of a video, or with pictures and their boxes.
+
+Frames and pixels count from 0.
 
 CVAT takes from such a file only boxes with `keyframe="1"`, so every box is one. It continues a
 track until a box that is `outside`, so there is one after the last box before each gap, and after
@@ -8,17 +10,26 @@ Source: the CVAT manual, "XML annotation format", section "Interpolation".
 
 import re
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import BinaryIO
 from xml.etree import ElementTree as ET
 from xml.sax.saxutils import escape, quoteattr
 
+from vdet.boxes import Box
+from vdet.detect.classes import UNKNOWN
 from vdet.errors import TruthError, escaped
 from vdet.labels.documents import attribute, read_xml, size_of, text_of
 from vdet.labels.formats import Format, SourceVideo, last_classes
 from vdet.labels.label import Corners, Label, SavedTracks, limited, line_error
-from vdet.labels.parsing import archive_members, parse_corners, parse_number, parse_whole
+from vdet.labels.parsing import (
+    archive_members,
+    parse_corners,
+    parse_number,
+    parse_whole,
+    read_bytes,
+)
+from vdet.labels.pictures import LabelledPicture, inside, picture_folder
 from vdet.track.track import FrameTracks, State, Track
 
 _MEMBER = "annotations.xml"  # in the zip file that CVAT exports
@@ -34,19 +45,11 @@ def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) ->
         for track in frame.tracks:
             boxes[track.id].append((frame.index, track))
     labels = {id_: escaped(name) for id_, name in last_classes(frames).items()}
-    names = sorted(f"<label><name>{escape(name)}</name></label>" for name in set(labels.values()))
-    head = f"""<?xml version="1.0" encoding="utf-8"?>
-<annotations>
-  <version>1.1</version>
-  <meta><task>
-    <name>{escape(escaped(video.name))}</name>
+    task = f"""<name>{escape(escaped(video.name))}</name>
     <size>{count}</size><mode>interpolation</mode>
     <start_frame>0</start_frame><stop_frame>{max(0, count - 1)}</stop_frame>
-    <labels>{"".join(names)}</labels>
-    <original_size><width>{video.width}</width><height>{video.height}</height></original_size>
-  </task></meta>
-"""
-    file.write(head.encode())
+    <original_size><width>{video.width}</width><height>{video.height}</height></original_size>"""
+    _write_head(file, task, labels.values())
     for id_, label in labels.items():
         file.write(f'  <track id="{id_}" label={quoteattr(label)} source="auto">\n'.encode())
         file.writelines(line.encode() for line in _box_lines(boxes[id_], count))
@@ -54,13 +57,46 @@ def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) ->
     file.write(b"</annotations>\n")
 
 
+def _write_pictures(file: BinaryIO, pictures: Sequence[LabelledPicture]) -> None:
+    names = [escaped(label.name or UNKNOWN) for item in pictures for label in item.labels]
+    _write_head(file, f"<size>{len(pictures)}</size><mode>annotation</mode>", names)
+    for number, picture in enumerate(pictures):
+        (width, height), path = picture.size or (0, 0), escaped(picture.path.as_posix())
+        size = f'width="{width}" height="{height}"'
+        file.write(f'  <image id="{number}" name={quoteattr(path)} {size}>\n'.encode())
+        for label in picture.labels:
+            name = quoteattr(escaped(label.name or UNKNOWN))
+            text = f'source="auto" occluded="0" {_corners(Box(*label.box))} z_order="0"'
+            file.write(f"    <box label={name} {text}></box>\n".encode())
+        file.write(b"  </image>\n")
+    file.write(b"</annotations>\n")
+
+
+def _write_head(file: BinaryIO, task: str, names: Iterable[str]) -> None:
+    """Write the start of a file, up to the first track or picture."""
+    labels = sorted(f"<label><name>{escape(name)}</name></label>" for name in set(names))
+    head = f"""<?xml version="1.0" encoding="utf-8"?>
+<annotations>
+  <version>1.1</version>
+  <meta><task>
+    {task}
+    <labels>{"".join(labels)}</labels>
+  </task></meta>
+"""
+    file.write(head.encode())
+
+
+def _corners(box: Box) -> str:
+    x1, y1, x2, y2 = box.pixels
+    return f'xtl="{x1:.2f}" ytl="{y1:.2f}" xbr="{x2:.2f}" ybr="{y2:.2f}"'
+
+
 def _box_lines(boxes: Sequence[tuple[int, Track]], count: int) -> Iterator[str]:
     """Yield the boxes of a track, and a box outside in the frame after each stretch of them."""
     following = [frame for frame, _ in boxes[1:]]
     for (frame, track), after in zip(boxes, [*following, None], strict=True):
-        x1, y1, x2, y2 = track.box.pixels
-        corners = f'xtl="{x1:.2f}" ytl="{y1:.2f}" xbr="{x2:.2f}" ybr="{y2:.2f}"'
-        text = f'occluded="{int(track.state == "predicted")}" keyframe="1" {corners} z_order="0"'
+        lost = int(track.state == "predicted")
+        text = f'occluded="{lost}" keyframe="1" {_corners(track.box)} z_order="0"'
         yield f'    <box frame="{frame}" outside="0" {text}></box>\n'
         if after != frame + 1 and frame + 1 < count:
             yield f'    <box frame="{frame + 1}" outside="1" {text}></box>\n'
@@ -93,6 +129,28 @@ def read_cvat(path: Path, data: bytes) -> SavedTracks:
         raise line_error(path, "meta", str(error)) from error
     labels = limited(path, _labels(path, root, covered), _MAX_LABELS)
     return SavedTracks(labels, covered, size=size)
+
+
+def read_cvat_pictures(path: Path) -> Iterator[LabelledPicture]:
+    """Yield every picture of a file of "CVAT for images 1.1".
+
+    Pictures lie where `picture_folder` says. Errors as of `read_cvat`.
+    """
+    folder = None
+    for image in read_xml(path, read_bytes(path), "annotations").iterfind("image"):
+        place = f"image {image.get('id', ''):.40}"
+        try:
+            name, size = inside(attribute(image, "name")), None
+            if "width" in image.attrib:
+                size = (
+                    parse_whole(attribute(image, "width")),
+                    parse_whole(attribute(image, "height")),
+                )
+            labels = tuple(Label(place, _sides(box), attribute(box, "label")) for box in image)
+        except ValueError as error:
+            raise line_error(path, place, str(error)) from error
+        folder = folder or picture_folder(path, name)
+        yield LabelledPicture(folder / name, path, labels, size)
 
 
 def _labels(path: Path, root: ET.Element, covered: range | None) -> Iterator[Label]:
@@ -133,15 +191,19 @@ def _frames(tasks: Sequence[ET.Element]) -> range | None:
 
 
 def _key(track: ET.Element, box: ET.Element) -> _Key:
+    sides, name = _sides(box), attribute(track, "label")
+    id_, frame = parse_whole(attribute(track, "id")), parse_whole(attribute(box, "frame"))
+    state: State = "predicted" if box.get("occluded") == "1" else "detected"
+    label = Label(f"track {id_}", sides, name, frame + 1, id_, state=state)
+    return label, attribute(box, "outside") == "1"
+
+
+def _sides(box: ET.Element) -> Corners:
     if box.tag != "box":
-        raise ValueError(f"<{box.tag:.40}> in a track; only boxes can be scored")
+        raise ValueError(f"<{box.tag:.40}> is not a box; only boxes can be scored")
     if parse_number(box.get("rotation", "0")):
         raise ValueError("the box is rotated; only upright boxes can be scored")
-    name, id_ = attribute(track, "label"), parse_whole(attribute(track, "id"))
-    frame, sides = parse_whole(attribute(box, "frame")), [attribute(box, side) for side in _SIDES]
-    state: State = "predicted" if box.get("occluded") == "1" else "detected"
-    label = Label(f"track {id_}", parse_corners(sides), name, frame + 1, id_, state=state)
-    return label, attribute(box, "outside") == "1"
+    return parse_corners([attribute(box, side) for side in _SIDES])
 
 
 def _boxes(covered: range | None, keys: Sequence[_Key]) -> Iterator[Label]:
@@ -168,4 +230,4 @@ def _between(label: Label, after: Label, ratio: float) -> Corners:
     return x1, y1, x2, y2
 
 
-CVAT = Format("CVAT for video 1.1", ".xml", read_cvat, whole=_write)
+CVAT = Format("CVAT for video 1.1", ".xml", read_cvat, whole=_write, pictures=_write_pictures)

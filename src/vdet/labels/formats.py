@@ -13,6 +13,7 @@ from vdet.detect.classes import UNKNOWN
 from vdet.errors import TruthError
 from vdet.labels.label import SavedTracks
 from vdet.labels.parsing import numbered_lines
+from vdet.labels.pictures import LabelledPicture
 from vdet.plugins import FORMATS, load_plugin, plugin_names
 from vdet.track.track import FrameTracks
 
@@ -46,6 +47,9 @@ Lines = Callable[[FrameTracks], Iterable[str]]
 WriteWhole = Callable[[BinaryIO, SourceVideo, Sequence[FrameTracks]], None]
 """Writes all frames of a video into a binary file."""
 
+WritePictures = Callable[[BinaryIO, Sequence[LabelledPicture]], None]
+"""Writes labelled pictures, whose paths are their names in the file, into a binary file."""
+
 
 @dataclass(frozen=True, slots=True)
 class Format:
@@ -65,8 +69,9 @@ class Format:
         For a format with lines for each frame: the function that returns them, and the first line
         of the file.
     whole
-        For a format that is written at the end: the function that writes it. Such a format needs a
-        video; the others also take still pictures.
+        For a format that is written at the end: the function that writes it.
+    pictures
+        For a format that labels of still pictures have too: the function that writes them.
     """
 
     name: str
@@ -75,6 +80,7 @@ class Format:
     lines: Lines | None = None
     heading: str = ""
     whole: WriteWhole | None = None
+    pictures: WritePictures | None = None
 
 
 class TrackWriter:
@@ -112,6 +118,11 @@ def track_formats() -> list[Format]:
 def track_suffixes() -> list[str]:
     """Return the endings of files of tracks."""
     return [track_format.suffix for track_format in track_formats()]
+
+
+def picture_suffixes() -> list[str]:
+    """Return the endings of files of labels of pictures."""
+    return [form.suffix for form in track_formats() if form.pictures]
 
 
 def format_for(path: Path) -> Format | None:

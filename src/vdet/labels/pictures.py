@@ -6,7 +6,7 @@ import os
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 import numpy as np
 
@@ -25,6 +25,9 @@ MAX_BOXES = 2_000_000
 
 _SLACK = 0.1
 """How far beyond a side of the picture boxes may reach, as a fraction of it."""
+
+ANNOTATIONS = "annotations"
+"""The folder of label files in the COCO set itself."""
 
 log = logging.getLogger("vdet")
 
@@ -176,6 +179,31 @@ def _with_roles(
 def is_file(path: Path) -> bool:
     """Return whether there is such a file; not where the name is too long for one."""
     return os.path.isfile(path)  # noqa: PTH113  # the method of `Path` raises
+
+
+def inside(name: str) -> str:
+    """Return the name of a picture in a file. Raises `ValueError` if it leads out of the set."""
+    if PurePosixPath(name).is_absolute() or ".." in PurePosixPath(name).parts:
+        raise ValueError(f"{printable(name)} leads out of the set")
+    return name
+
+
+def picture_folder(path: Path, name: str) -> Path:
+    """Return the folder that the names of pictures are relative to: the one with the first.
+
+    It is that of the file of labels or at most two folders below; if the file is in `annotations`,
+    above that folder. Raises `TruthError` if there is none or several.
+    """
+    near, shown = path.parent, printable(name)
+    above = near.parent if near.name == ANNOTATIONS else near
+    for level in ([near], [above], sorted(above.glob("*/")), sorted(above.glob("*/*/"))):
+        found = [folder for folder in level if is_file(folder / name)]
+        if len(found) > 1:
+            where = " and ".join(str(folder) for folder in found[:2])
+            raise TruthError(f"{path}: its first picture, {shown}, lies in {where}; keep one")
+        if found:
+            return found[0]
+    raise TruthError(f"{path}: its first picture, {shown}, is missing beside it and below")
 
 
 Parse = Callable[[Path, Path], tuple[tuple[Label, ...], Size | None]]

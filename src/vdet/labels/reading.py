@@ -8,6 +8,7 @@ from pathlib import Path
 from vdet.archives import is_hidden
 from vdet.errors import TruthError
 from vdet.labels.coco import read_coco_pictures
+from vdet.labels.cvat import read_cvat_pictures
 from vdet.labels.formats import recognise, track_formats
 from vdet.labels.kitti import KITTI_PICTURES
 from vdet.labels.label import Label, LabelledVideo, SavedTracks, checked_labels, line_error
@@ -19,7 +20,10 @@ from vdet.labels.voc import VOC_PICTURES
 from vdet.labels.yolo import YOLO_PICTURES
 
 _FORMS = (KITTI_PICTURES, YOLO_PICTURES, VOC_PICTURES)
-"""The forms of labelled pictures, but for COCO."""
+"""The forms of labelled pictures with a file for each picture."""
+
+_READERS = {".json": read_coco_pictures, ".xml": read_cvat_pictures}
+"""Readers of files that label many pictures."""
 
 
 def read_tracks(path: Path, rate: float | None = None) -> SavedTracks:
@@ -128,11 +132,12 @@ def read_labelled_pictures(path: Path, roles: Roles = DEFAULT_ROLES) -> Labelled
     return checked_pictures(str(path), _pictures(path), roles)
 
 
-def _coco_files(path: Path) -> list[Path]:
-    """Return what may be a COCO file, without what is not a regular file: a FIFO may never end."""
+def _files(path: Path) -> list[Path]:
+    """Return what may be a file of labels, if it is a regular file: a FIFO may never end."""
     if not path.is_dir():
-        return [path] if path.suffix.lower() == ".json" and path.is_file() else []
-    files = sorted([*path.glob("*.json"), *path.glob("annotations/*.json")])
+        return [path] if path.suffix.lower() in _READERS and path.is_file() else []
+    names = "*.json", "annotations/*.json", "annotations.xml"
+    files = sorted(file for name in names for file in path.glob(name))
     return [file for file in files if file.is_file() and not is_hidden(file.relative_to(path))]
 
 
@@ -140,12 +145,12 @@ def _pictures(path: Path) -> Iterable[LabelledPicture]:
     for form in _FORMS:
         if form.is_in(path):
             return form.read(path)
-    files = _coco_files(path)
+    files = _files(path)
     if len(files) == 1:
-        return read_coco_pictures(files[0])
+        return _READERS[files[0].suffix.lower()](files[0])
     if files:
         names = ", ".join(str(file.relative_to(path)) for file in files[:5])
-        raise TruthError(f"{path}: holds several .json files ({names}); pass the one with labels")
+        raise TruthError(f"{path}: holds several such files ({names}); pass the one with labels")
     wanted = ", ".join(f"{' and '.join(form.folders)} ({form.name})" for form in _FORMS)
     what = "labelled pictures not found: a folder with one .json file (COCO)"
-    raise TruthError(f"{path}: {what}, {wanted}")
+    raise TruthError(f"{path}: {what}, {wanted} or annotations.xml (CVAT)")

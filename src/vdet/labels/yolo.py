@@ -14,15 +14,16 @@ import json
 import logging
 import re
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any, BinaryIO
 
 from vdet.archives import store
+from vdet.boxes import Box
 from vdet.config.document import MAX_BYTES, parse_document
 from vdet.detect.classes import UNKNOWN
-from vdet.errors import ConfigError, ImageError, TruthError, escaped, printable
+from vdet.errors import ConfigError, ImageError, OutputError, TruthError, escaped, printable
 from vdet.labels.formats import Format, SourceVideo
 from vdet.labels.label import Label, SavedTracks, Size, limited
 from vdet.labels.parsing import (
@@ -33,9 +34,9 @@ from vdet.labels.parsing import (
     parse_whole,
     read_bytes,
 )
-from vdet.labels.pictures import Parse, PictureFormat
+from vdet.labels.pictures import LabelledPicture, Parse, PictureFormat
 from vdet.media.images import read_header
-from vdet.track.track import FrameTracks, Track
+from vdet.track.track import FrameTracks
 
 _DATA = "data.yaml"
 _NUMBER = re.compile(r"([0-9]{1,8})$", re.ASCII)
@@ -53,24 +54,46 @@ def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) ->
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
         store(archive, "train.txt", pictures)
         for frame in frames:
-            lines = "".join(_line(track, size, classes) for track in frame.tracks)
-            store(archive, f"labels/train/frame_{frame.index:06}.txt", lines)
-        names = json.dumps([escaped(name) for name in classes or (UNKNOWN,)], ensure_ascii=False)
+            lines = (_line(t.box, t.class_name, size, classes, f" {t.id}") for t in frame.tracks)
+            store(archive, f"labels/train/frame_{frame.index:06}.txt", "".join(lines))
         sides = f"width: {video.width}\nheight: {video.height}\n"
-        parts = "path: .\ntrain: train.txt\nval: train.txt\n"  # Ultralytics needs both
-        store(archive, _DATA, f"{parts}names: {names}\n{sides}")
+        store(archive, _DATA, _description("train.txt", classes) + sides)
 
 
-def _line(track: Track, size: Size, classes: dict[str, int]) -> str:
-    """Return the line of a track, and give its class a number."""
+def _write_pictures(file: BinaryIO, pictures: Sequence[LabelledPicture]) -> None:
+    """Write the archive, which is unpacked beside the folder `images` with the pictures."""
+    classes: dict[str, int] = {}
+    texts: dict[str, str] = {}
+    for picture in pictures:
+        name = f"labels/{picture.path.with_suffix('.txt').as_posix()}"
+        if name in texts:
+            what = "YOLO needs pictures with different names; this one occurs with two endings"
+            raise OutputError(f"{picture.path.with_suffix('')}: {what}")
+        size = picture.size or (1, 1)
+        lines = (_line(Box(*label.box), label.name, size, classes) for label in picture.labels)
+        texts[name] = "".join(lines)
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, text in texts.items():
+            store(archive, name, text)
+        store(archive, _DATA, _description("images", classes))
+
+
+def _description(pictures: str, classes: Iterable[str]) -> str:
+    """Return the start of `data.yaml`; Ultralytics needs both `train` and `val`."""
+    names = json.dumps([escaped(name) for name in classes] or [UNKNOWN], ensure_ascii=False)
+    return f"path: .\ntrain: {pictures}\nval: {pictures}\nnames: {names}\n"
+
+
+def _line(box: Box, name: str | None, size: Size, classes: dict[str, int], end: str = "") -> str:
+    """Return the line of a box, and give its class a number."""
     width, height = size
-    box = track.box.rounded.clipped(width, height)
+    box = box.rounded.clipped(width, height)
     if not box.area:
         return ""
-    number = classes.setdefault(track.class_name or UNKNOWN, len(classes))
+    number = classes.setdefault(name or UNKNOWN, len(classes))
     x, y = box.center
     ratios = (x / width, y / height, box.width / width, box.height / height)
-    return f"{number} {' '.join(f'{ratio:.6f}' for ratio in ratios)} {track.id}\n"
+    return f"{number} {' '.join(f'{ratio:.6f}' for ratio in ratios)}{end}\n"
 
 
 def read_yolo(path: Path, data: bytes) -> SavedTracks:
@@ -197,5 +220,5 @@ def _parser(folder: Path) -> Parse:
     return parse
 
 
-YOLO = Format("YOLO", ".yolo.zip", read_yolo, whole=_write)
+YOLO = Format("YOLO", ".yolo.zip", read_yolo, whole=_write, pictures=_write_pictures)
 YOLO_PICTURES = PictureFormat("YOLO", ("images", "labels"), ".txt", _parser, is_whole=True)

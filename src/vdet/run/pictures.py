@@ -1,11 +1,12 @@
 """Vehicles in still pictures: read the picture, detect, give the result to sinks."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
+from vdet.archives import is_hidden
 from vdet.boxes import Boxes, Image
 from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel, stage_pictures_of
@@ -22,40 +23,48 @@ from vdet.run.threads import map_ordered
 
 @dataclass(frozen=True, slots=True)
 class PictureJob:
-    """A picture, and the outputs that are written for it alone."""
+    """A picture, and the outputs that are written for it alone.
+
+    `place` is its path below the folder that it was found by; None: its name.
+    """
 
     source: Path
     outputs: tuple[Output, ...]
+    place: Path | None = None
 
 
-def find_images(paths: Sequence[Path]) -> list[Path]:
-    """Return the pictures that `paths` name: files, and the pictures in folders.
+def find_images(paths: Sequence[Path]) -> dict[Path, Path]:
+    """Return the pictures that `paths` name: files, and the pictures in and below folders.
 
-    Folders inside these folders are not searched. The pictures are recorded as inputs.
+    Each has its path below the folder; hidden files and folders are left out. The pictures are
+    recorded as inputs.
 
     Raises
     ------
     ImageError
         A path does not exist, or a folder holds no picture.
     """
-    found: list[Path] = []
+    found: dict[Path, Path] = {}
     for path in paths:
         if path.is_dir():
-            inside = sorted(p for p in path.iterdir() if is_picture_name(p) and p.is_file())
-            if not inside:
+            pictures = sorted(p for p in filter(is_picture_name, path.rglob("*")) if p.is_file())
+            places = {picture: picture.relative_to(path) for picture in pictures}
+            places = {p: place for p, place in places.items() if not is_hidden(place)}
+            if not places:
                 names = ", ".join(sorted(PICTURE_SUFFIXES))
                 raise ImageError(f"{path}: holds no pictures ({names})")
-            found += inside
+            for picture, place in places.items():
+                found.setdefault(picture, place)
         elif path.exists():
-            found.append(path)
+            found.setdefault(path, Path(path.name))
         else:
             raise ImageError(f"{path}: not found")
     record_input(*found)
-    return list(dict.fromkeys(found))
+    return found
 
 
 def plan_pictures(
-    sources: Sequence[Path],
+    sources: Mapping[Path, Path],
     out: Path | None,
     stages: Path | None,
     *,
@@ -65,9 +74,11 @@ def plan_pictures(
 
     Parameters
     ----------
+    sources
+        As `find_images` returns them.
     out
         A file, if there is a single source and `out` has the suffix of a picture; else a folder,
-        in which the pictures keep their names. None: no pictures.
+        in which the pictures keep their names and folders. None: no pictures.
     stages
         Folder of the stage pictures; of several sources, each gets a folder in it. None: none.
 
@@ -79,13 +90,13 @@ def plan_pictures(
     several = len(sources) > 1
     is_file = out is not None and not several and out.suffix.lower() in PICTURE_SUFFIXES
 
-    def wanted(source: Path) -> Iterator[Output]:
+    def wanted(place: Path) -> Iterator[Output]:
         if out is not None:
-            yield Output("picture", out if is_file else out / source.name)
+            yield Output("picture", out if is_file else out / place)
         if stages is not None:
-            yield Output("stages", stages / source.stem if several else stages)
+            yield Output("stages", stages / place.with_suffix("") if several else stages)
 
-    jobs = [PictureJob(source, tuple(wanted(source))) for source in sources]
+    jobs = [PictureJob(source, tuple(wanted(place)), place) for source, place in sources.items()]
     outputs = [output for job in jobs for output in job.outputs]
     check_sinks(outputs, overwrite=overwrite, makes_folder=not is_file)
     return jobs
@@ -124,15 +135,20 @@ class PictureSearch:
         return finish
 
     @contextmanager
-    def open_sinks(self, outputs: Sequence[Output], *, overwrite: bool) -> Iterator[Sinks]:
-        """Yield the sinks of outputs that appear together at the end of the block."""
+    def open_sinks(
+        self, outputs: Sequence[Output], jobs: Sequence[PictureJob], *, overwrite: bool
+    ) -> Iterator[Sinks]:
+        """Yield the sinks of outputs of some pictures; they appear together after the block."""
 
         def stage_pictures(image: Image, detections: Boxes) -> dict[str, Image]:
             detector = build(self.model, self.settings, None, [image]).detector
             return stage_pictures_of(detector)(image, detections)
 
         with OutputFiles(overwrite=overwrite) as files:
-            context = SinkContext(files, self.settings, stage_pictures=stage_pictures)
+            places = {job.source: job.place for job in jobs if job.place}
+            context = SinkContext(
+                files, self.settings, places=places, stage_pictures=stage_pictures
+            )
             with open_sinks(outputs, context) as sinks:
                 yield sinks
 
@@ -167,7 +183,7 @@ def run_pictures(
 
     failures: list[ImageError] = []
     with (
-        search.open_sinks(shared, overwrite=overwrite) as sinks,
+        search.open_sinks(shared, jobs, overwrite=overwrite) as sinks,
         map_ordered(begin, jobs, threads) as results,
     ):
         advance = progress(len(jobs))
@@ -176,7 +192,7 @@ def run_pictures(
                 if isinstance(searched, ImageError):
                     raise searched
                 result = searched()
-                with search.open_sinks(job.outputs, overwrite=overwrite) as own:
+                with search.open_sinks(job.outputs, [job], overwrite=overwrite) as own:
                     own.write(result)
                     sinks.write(result)
                 on_result(result)

@@ -13,7 +13,6 @@ import pytest
 from run.red_runs import result_of, write
 from vdet.boxes import Box
 from vdet.config.schema import LaneSettings
-from vdet.errors import OutputError
 from vdet.lanes.road import Lane, Road, RoadFinder
 from vdet.media import Picture
 from vdet.run.result import FrameResult
@@ -118,13 +117,6 @@ def test_json_lines_tell_the_lane_where_it_was_looked_for(tmp_path: Path) -> Non
         lanes.append(record.pop("lane"))
         assert record == json.loads(other)
     assert lanes == [LANE.record(), None, None]
-
-
-def test_formats_that_describe_the_video_are_not_for_pictures(tmp_path: Path) -> None:
-    for ending in (".coco.json", ".xml", ".yolo.zip"):
-        with pytest.raises(OutputError, match=r"is for videos; choose another format"):
-            write(Output("tracks", tmp_path / f"a{ending}"), RESULTS, video=None)
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_video_is_described_by_its_name_and_size(tmp_path: Path) -> None:

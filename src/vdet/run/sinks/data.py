@@ -1,4 +1,4 @@
-"""The sinks that write data: `tracks`, `json`, `vehicles`, `counts` and `flows`.
+"""The sinks that write data: `tracks`, `json`, `labels`, `vehicles`, `counts` and `flows`.
 
 Times are in seconds and those of the input. Pixels are those of the input frame, counted from 0.
 """
@@ -6,14 +6,23 @@ Times are in seconds and those of the input. Pixels are those of the input frame
 import json
 import sys
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import astuple, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, BinaryIO, Self
 
+from vdet.detect.classes import UNKNOWN
 from vdet.errors import OutputError
 from vdet.files import print_now
-from vdet.labels.formats import SourceVideo, TrackWriter, format_for, track_suffixes
+from vdet.labels.formats import (
+    SourceVideo,
+    TrackWriter,
+    format_for,
+    picture_suffixes,
+    track_suffixes,
+)
+from vdet.labels.label import Label
+from vdet.labels.pictures import LabelledPicture
 from vdet.labels.records import CLOCK, JSON_LINES, track_record
 from vdet.run.result import FrameResult, findings_in
 from vdet.run.sinks.protocol import STANDARD_OUTPUT, BaseSink, BatchTotal, SinkContext, SinkKind
@@ -44,14 +53,10 @@ class TrackSink(BaseSink):
             return self
         form = format_for(self.path)
         assert form is not None  # the suffixes of the kind say so
-        video = self.context.video
-        if form.whole and video is None:
-            raise OutputError(f"{self.path}: {form.name} is for videos; choose another format")
-        source = None
-        if video is not None:  # a whole video has the frames that are read
-            frames = video.frames if self.context.is_part else None
-            begin = self.context.clock.zero if self.context.clock else None
-            source = SourceVideo(video.path.name, video.width, video.height, frames, begin)
+        video = self.video
+        frames = video.frames if self.context.is_part else None  # else those that are read
+        begin = self.context.clock.zero if self.context.clock else None
+        source = SourceVideo(video.path.name, video.width, video.height, frames, begin)
         self._file = self.context.files.stage(self.path).open("wb")
         self._writer = TrackWriter(form, self._file, source)
         return self
@@ -74,7 +79,40 @@ class TrackSink(BaseSink):
             sys.stdout.flush()
 
 
-TRACKS = SinkKind(TrackSink, track_suffixes, "tracks", writes_standard_output=True)
+TRACKS = SinkKind(TrackSink, track_suffixes, "tracks", writes_standard_output=True, takes="videos")
+
+
+class LabelSink(BaseSink):
+    """Collects the boxes of pictures, and writes them at the end in a format of labels.
+
+    The end of the name chooses the format. A picture is named by its path below the folder that it
+    was found by.
+    """
+
+    def __init__(self, path: Path, context: SinkContext) -> None:
+        super().__init__(path, context)
+        self._pictures: list[LabelledPicture] = []
+
+    def finish(self) -> None:
+        """Write the file."""
+        form = format_for(self.path)
+        assert form is not None  # the suffixes of the kind say so
+        assert form.pictures is not None
+        with self.context.files.stage(self.path).open("wb") as file:
+            form.pictures(file, self._pictures)
+
+    def write(self, result: FrameResult) -> None:
+        """Add a picture."""
+        place = self.context.places.get(result.source, Path(result.source.name))
+        size = result.frame.picture.width, result.frame.picture.height
+        labels = tuple(
+            Label("", astuple(track.box), track.class_name or UNKNOWN, score=track.score)
+            for track in result.tracks
+        )
+        self._pictures.append(LabelledPicture(place, self.path, labels, size))
+
+
+LABELS = SinkKind(LabelSink, picture_suffixes, "labels of pictures", takes="pictures")
 
 
 class JsonSink(BaseSink):

@@ -64,6 +64,8 @@ class SinkContext:
         vehicles, which are known when sinks finish; None for still pictures.
     facts
         What the steps found out about the whole video; empty before sinks finish.
+    places
+        Of still pictures: their paths below the folders that they were found by.
     stage_pictures
         Returns a picture of each stage of the detection by its name, in order. It takes the image
         of a frame and its detections.
@@ -78,6 +80,7 @@ class SinkContext:
     outputs: tuple[Output, ...] = ()
     traffic: LiveTraffic | None = None
     facts: dict[str, Fact] = field(default_factory=dict)
+    places: Mapping[Path, Path] = field(default_factory=dict)
     stage_pictures: StagePictures = lambda *_: {}
 
     @property
