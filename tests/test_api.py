@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 import vdet
-from doc_pages import blocks
+from doc_pages import DOCS, blocks
 from red_cars import HEIGHT, WIDTH, car_at, drive
 from running import frames_of, write_drive
 from vdet.boxes import Image
@@ -57,6 +57,20 @@ def test_the_page_runs_and_leaves_its_files(page: tuple[Path, dict[str, Any]]) -
     (track,) = names["tracks"]
     assert (track.id, track.state) == (1, "detected")
     assert abs(track.box.x1 - 657) <= 10
+
+
+def test_the_notebook_runs_and_has_no_outputs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cells = json.loads((DOCS / "notebook.ipynb").read_text("utf-8"))["cells"]
+    assert [cell.get("outputs", []) for cell in cells] == [[]] * 8
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, Any] = {}
+    for number, cell in enumerate(cells, start=1):
+        if cell["cell_type"] == "code":
+            exec(compile("".join(cell["source"]), f"docs/notebook.ipynb:{number}", "exec"), names)
+    assert sum(total.count for total in names["counts"].totals) > 0
+    assert len(names["results"].vehicles) > 1
 
 
 def test_every_public_name_is_there_and_documented() -> None:
