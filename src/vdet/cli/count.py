@@ -11,7 +11,7 @@ import click
 
 from vdet.cli import options
 from vdet.cli.command import command
-from vdet.cli.messages import is_quiet, print_lines, print_message, progress_steps
+from vdet.cli.messages import announce, print_lines, progress_steps
 from vdet.cli.results import check_counting, counting_options
 from vdet.files import OutputFiles, output_errors
 
@@ -79,8 +79,8 @@ def count(
     finally:
         gc.enable()
     for name, counts in videos.items():
-        if counts.clock and not is_quiet():
-            print_message(f"{name}: begins {counts.clock}")
+        if counts.clock:
+            announce(f"{name}: begins {counts.clock}")
         for warning in counts.warnings:
             log.warning("%s: %s", name, warning)
     with OutputFiles(overwrite=overwrite) as files:

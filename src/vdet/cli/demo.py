@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from vdet.cli.command import command
-from vdet.cli.messages import is_quiet, print_lines, print_message, progress_steps
+from vdet.cli.messages import announce, print_lines, progress_steps
 from vdet.cli.options import PATH, option, overwrite_option
 
 
@@ -24,8 +24,7 @@ def demo(folder: Path, seed: int, overwrite: bool) -> None:
     from vdet.demo import METRICS, TRUTH, run_demo
 
     with progress_steps("") as steps:
-        say = (lambda _: None) if is_quiet() else print_message
-        result = run_demo(folder, seed=seed, overwrite=overwrite, announce=say, steps=steps)
+        result = run_demo(folder, seed=seed, overwrite=overwrite, announce=announce, steps=steps)
     print_lines(
         *result,
         "",

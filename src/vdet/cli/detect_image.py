@@ -9,7 +9,7 @@ import click
 
 from vdet.cli import options
 from vdet.cli.command import command
-from vdet.cli.messages import print_message, progress_steps
+from vdet.cli.messages import print_lines, progress_steps
 from vdet.errors import counted, failure_code
 
 if TYPE_CHECKING:
@@ -90,4 +90,4 @@ def _print_vehicles(result: "FrameResult") -> None:
     for track in result.tracks:
         box = ", ".join(map(str, track.box.xywh))
         rows.append(f"  {track.class_name or 'vehicle':8} {track.score:.2f}  {box}")
-    print_message(f"{result.source}: {counted(len(rows), 'vehicle')}", *rows, err=False)
+    print_lines(f"{result.source}: {counted(len(rows), 'vehicle')}", *rows)

@@ -15,7 +15,7 @@ import click
 
 from vdet.cli import options
 from vdet.cli.command import command
-from vdet.cli.messages import is_quiet, print_lines, print_message, progress_steps
+from vdet.cli.messages import announce, print_lines, progress_steps
 from vdet.cli.results import check_counting, counting_options
 from vdet.errors import DOUBTFUL, counted, failure_code
 
@@ -218,15 +218,12 @@ def _process_one(run: "Run") -> bool:
     with progress_steps(" frames") as steps:
         steps("opening", None)
         totals = run_video(run, model, progress=partial(steps, ""))
-    if not is_quiet():
-        rate = totals.frames / totals.seconds
-        found = f"{counted(totals.frames, 'frame')}, {counted(totals.tracks, 'track')}"
-        print_message(f"{run.source}: {found}, {totals.seconds:.1f} s, {rate:.1f} frames/s")
-        for output in run.outputs:
-            if output.sink == "video":
-                print_message(f"{output.path}: written")
-        if totals.clock and run.settings.traffic:
-            print_message(f"{run.source}: begins {totals.clock}")
+    rate = totals.frames / totals.seconds
+    found = f"{counted(totals.frames, 'frame')}, {counted(totals.tracks, 'track')}"
+    announce(f"{run.source}: {found}, {totals.seconds:.1f} s, {rate:.1f} frames/s")
+    announce(*(f"{output.path}: written" for output in run.outputs if output.sink == "video"))
+    if totals.clock and run.settings.traffic:
+        announce(f"{run.source}: begins {totals.clock}")
     return findings_in(totals.facts).is_doubtful
 
 
@@ -312,10 +309,9 @@ def _run(plan: "Plan", workers: "Workers", threads: int) -> tuple[int, int]:
             found = record.facts.get(CONDITIONS, ())
             doubtful += any(finding["severity"] == "warning" for finding in found)
             advance(1)
-    if not is_quiet():
-        skipped = f"{len(plan.skipped)} skipped, " if plan.skipped else ""
-        done = counted(len(plan.runs) - failed, "file")
-        print_message(f"{plan.folder}: {done} done, {skipped}{failed} failed")
+    skipped = f"{len(plan.skipped)} skipped, " if plan.skipped else ""
+    done = counted(len(plan.runs) - failed, "file")
+    announce(f"{plan.folder}: {done} done, {skipped}{failed} failed")
     return failed, doubtful
 
 
@@ -324,7 +320,7 @@ def _print_result(run: "Run", record: "Record") -> None:
         log.warning("%s", warning)
     if record.error:
         log.error("%s", record.error)
-    elif not is_quiet():
+    else:
         found = f"{counted(record.frames or 0, 'frame')}, {counted(record.tracks or 0, 'track')}"
         begin = f", begins {record.begin}" if record.begin and run.settings.traffic else ""
-        print_message(f"{run.source}: {found}, {record.seconds:.1f} s{begin}")
+        announce(f"{run.source}: {found}, {record.seconds:.1f} s{begin}")

@@ -5,7 +5,7 @@ import sys
 import threading
 import warnings
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,7 +22,7 @@ REFRESH_INTERVAL = 1.0  # seconds
 
 
 def print_lines(*lines: str, err: bool = False) -> None:
-    """Print each text as one line.
+    """Print each text as one line; a progress bar moves below them.
 
     Texts may have names of files in them: a name could forge a line, or control the terminal.
 
@@ -33,7 +33,9 @@ def print_lines(*lines: str, err: bool = False) -> None:
     OutputError
         It cannot be written for another reason.
     """
-    with output_errors(Path("standard error" if err else "standard output")):
+    name = Path("standard error" if err else "standard output")
+    bars = sys.modules.get("tqdm")  # imported where there is a bar
+    with bars.tqdm.external_write_mode() if bars else nullcontext(), output_errors(name):
         click.echo("\n".join(map(escaped, lines)), err=err)
 
 
@@ -43,15 +45,10 @@ def is_quiet() -> bool:
     return bool(context and context.obj)
 
 
-def print_message(*lines: str, err: bool = True) -> None:
-    """Print lines, by default on standard error; a progress bar moves below them."""
-    if "tqdm" not in sys.modules:  # then there is no bar
-        print_lines(*lines, err=err)
-        return
-    from tqdm import tqdm
-
-    with tqdm.external_write_mode():
-        print_lines(*lines, err=err)
+def announce(*lines: str) -> None:
+    """Print lines on standard error, but not with `--quiet`."""
+    if lines and not is_quiet():
+        print_lines(*lines, err=True)
 
 
 class _LogHandler(logging.Handler):
@@ -59,7 +56,7 @@ class _LogHandler(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         level = "" if record.levelno < logging.WARNING else f"{record.levelname.lower()}: "
-        print_message(f"vdet: {level}{record.getMessage()}")
+        print_lines(f"vdet: {level}{record.getMessage()}", err=True)
 
 
 def set_up_logs(*, verbose: bool, quiet: bool) -> None:
