@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from vdet.batch.inputs import find_sources
-from vdet.errors import BatchError, VideoError
+from vdet.errors import BatchError
 
 
 @pytest.fixture
@@ -117,11 +117,6 @@ def test_a_pattern_without_a_suffix_takes_videos_only() -> None:
         "day2/c.avi",
     ]
     assert found("clips/*.txt") == [("clips/notes.txt", "notes.txt")]
-
-
-def test_an_address_is_refused() -> None:
-    with pytest.raises(VideoError, match=r"^rtsp:/camera/1: streams are not read; record it"):
-        find_sources([Path("rtsp://camera/1")])
 
 
 @pytest.mark.usefixtures("folder")

@@ -5,7 +5,6 @@ import json
 import re
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from conftest import Run
@@ -13,7 +12,6 @@ from red_cars import SETTINGS, red_finder
 from running import write_drive
 from vdet.config.rendering import render
 from vdet.detect.svm.model import save_model
-from vdet.media.images import write_image
 
 LINES = """
 camera: {size: [320, 240]}
@@ -238,28 +236,6 @@ def test_each_video_of_a_batch_has_its_counts_and_all_have_a_total(
 
 
 class TestRegions:
-    def test_roi_takes_polygons_or_a_mask(self, run: Run, folder: Path, tmp_path: Path) -> None:
-        (tmp_path / "regions.yaml").write_text(
-            "camera: {size: [320, 240]}\n"
-            "regions: [{name: right, points: [[100, 0], [320, 0], [320, 240], [100, 240]]}]\n"
-        )
-        mask = np.zeros((240, 320, 3), np.uint8)
-        mask[:, 100:] = 255
-        write_image(tmp_path / "mask.png", mask)
-        (tmp_path / "mask.yaml").write_text("regions: [{name: right, mask: mask.png}]")
-        found = {}
-        for name in ("", "regions.yaml", "mask.yaml"):
-            out = tmp_path / f"found-{name}.csv"
-            roi = ("-c", tmp_path / name) if name else ()
-            wanted = ("--no-video", "--tracks", out, *roi)
-            result = run("detect-video", folder / "red.mp4", *options(folder), *wanted)
-            assert result.code == 0, result.err
-            rows = list(csv.DictReader(out.read_text().splitlines()))
-            found[name] = [int(row["x"]) + int(row["width"]) / 2 for row in rows]
-        assert min(found[""]) < 95
-        assert 100 <= min(found["regions.yaml"]) < 110
-        assert found["regions.yaml"] == found["mask.yaml"]
-
     @pytest.mark.parametrize(
         "command",
         [

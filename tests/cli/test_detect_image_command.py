@@ -25,16 +25,6 @@ def picture(scene: Scene, tmp_path: Path) -> Path:
     return path
 
 
-def test_never_writes_over_a_mask_that_it_reads(run: Run, picture: Path, tmp_path: Path) -> None:
-    mask = tmp_path / "mask.png"
-    write_image(mask, read_image(picture))
-    before = mask.read_bytes()
-    regions = ("--set", f"regions=[{{name: a, mask: {mask}}}]")
-    result = run("detect-image", picture, *regions, "-o", mask, "--overwrite")
-    assert (result.code, "is the input itself" in result.err) == (1, True)
-    assert mask.read_bytes() == before
-
-
 def test_json_has_the_boxes(run: Run, picture: Path, model_path: Path, scene: Scene) -> None:
     result = run("detect-image", picture, "--json", "-", "--model", model_path, *QUICK_OPTIONS)
     assert result.code == 0, result.err
@@ -86,12 +76,6 @@ def test_without_an_output_the_vehicles_are_printed(
     for row, box in zip(rows, item["boxes"], strict=True):
         place = ", ".join(str(box[side]) for side in ("x", "y", "width", "height"))
         assert row == f"  vehicle  {box['score']:.2f}  {place}"
-
-
-def test_never_writes_over_its_input(run: Run, picture: Path) -> None:
-    result = run("detect-image", picture, "-o", picture, "--overwrite")
-    assert result.code == 1
-    assert "is the input itself" in result.err
 
 
 def test_two_inputs_of_one_name(run: Run, picture: Path, tmp_path: Path) -> None:

@@ -160,18 +160,6 @@ def test_what_vdet_wrote_and_what_is_no_video_is_replaced(
         assert len(_times(out)) == frames
 
 
-@pytest.mark.parametrize(("option", "suffix"), [("out", ".mp4"), ("tracks", ".csv")])
-def test_never_writes_over_its_input(
-    run: Run, clip_path: Path, tmp_path: Path, option: str, suffix: str
-) -> None:
-    clip = Path(shutil.copy(clip_path, tmp_path / f"clip{suffix}"))
-    target = (clip,) if option == "out" else ("--no-video", "--tracks", clip)
-    result = run("detect-video", clip, *target, "--overwrite")
-    assert result.code == 1
-    assert "is the input itself" in result.err
-    assert len(_times(clip)) == 30
-
-
 @pytest.mark.parametrize("target", [("out/in.json",), ("again/in.json",), (".json", "-d", "out")])
 def test_never_writes_over_settings_that_it_reads(
     run: Run,

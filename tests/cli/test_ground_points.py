@@ -55,8 +55,6 @@ def test_a_file_is_checked_with_what_a_pixel_is_worth(run: Run) -> None:
         "at far: a pixel is 0.041 × 0.210 m, 50 km/h ± 2.2 %",
     ):
         assert text in result.out
-    without = run("info")
-    assert (without.code, "nothing to describe" in without.err) == (2, True)
 
 
 def test_bad_points_are_refused_in_words(run: Run) -> None:

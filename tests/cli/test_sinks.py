@@ -142,22 +142,6 @@ class TestTogether:
             ("windows", "hits", "heat", "boxes"), start=1)]  # fmt: skip
         assert names(out) == ["a.csv", "a.mp4", "b.txt", *stages]
 
-    def test_no_output_is_there_before_the_end(
-        self, run: Run, clip: Path, out: Path, red: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        seen: list[str] = []
-        write = TrackSink.write
-
-        def look(sink: TrackSink, result: Any) -> None:
-            write(sink, result)
-            seen.extend(name for name in names(out) if not name.startswith("."))
-
-        monkeypatch.setattr(TrackSink, "write", look)
-        command = ("detect-video", clip, out / "a.mp4", "--tracks", out / "a.csv", *red)
-        assert run(*command).code == 0
-        assert seen == []
-        assert names(out) == ["a.csv", "a.mp4"]
-
 
 class TestDetectImage:
     def test_a_sink_gets_the_results_of_all_pictures(

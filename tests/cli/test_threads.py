@@ -23,14 +23,3 @@ def test_tracks_are_the_same_whatever_the_threads_and_at_every_run(
     assert any(record["tracks"] for record in records), "nothing found: the test would say nothing"
     assert [record["frame"] for record in records] == list(range(30))
     assert texts[1:] == texts[:1] * 3
-
-
-def test_the_video_is_the_same_too(run: Run, clip_path: Path, tmp_path: Path) -> None:
-    videos = []
-    for threads in (1, 3):
-        out = tmp_path / f"{threads}.mp4"
-        options = (*SOON, "--threads", str(threads), "--frames", "12")
-        result = run("detect-video", clip_path, out, *options)
-        assert result.code == 0, result.err
-        videos.append(out.read_bytes())
-    assert videos[0] == videos[1]

@@ -1,4 +1,4 @@
-"""Our metrics beside those of trackeval and pycocotools; `golden/make_golden.py` says how made."""
+"""Our metrics beside those of trackeval and pycocotools, from `benchmarks/golden_scores.py`."""
 
 import json
 from dataclasses import asdict

@@ -268,22 +268,6 @@ class TestFaults:
         else:
             assert len(warnings()) <= 1
 
-    @pytest.mark.parametrize("share", [0.3, 0.6, 0.9])
-    @pytest.mark.parametrize("suffix", ["mkv", "ts"])
-    def test_a_file_that_was_cut_through_a_frame_gives_the_frames_before_it(
-        self, suffix: str, share: float, *, tmp_path: Path, warnings: Warnings
-    ) -> None:
-        large: dict[str, Any] = {
-            "codec": "mpeg2video",
-            "size": (320, 192),
-            "options": {"qscale": "2", "g": "1"},
-        }
-        path = write_clip(tmp_path / f"cut.{suffix}", count=40, **large)
-        with VideoReader(cut_off(path, share)) as reader:
-            assert abs(len(list(reader)) - 40 * share) < 3
-            assert reader.damaged <= 1
-        assert suffix != "mkv" or "ends early" in warnings()[0]
-
     @pytest.mark.parametrize("codec", ["libvpx", "libvpx-vp9"])
     def test_transparency_between_the_packets_is_no_damage(
         self, codec: str, tmp_path: Path, warnings: Warnings
@@ -361,10 +345,6 @@ def clock_times(*stamps: int | None) -> list[Fraction]:
         stated = None if stamp is None else stamp * TICK
         times.append(next_time(times[-1] if times else None, stated, PERIOD))
     return times
-
-
-def test_a_missing_stamp_is_one_period_after_the_frame_before() -> None:
-    assert clock_times(None, None, 200, None) == [0, PERIOD, Fraction(1, 5), Fraction(6, 25)]
 
 
 @given(st.lists(st.none() | st.integers(-(2**40), 2**40)))

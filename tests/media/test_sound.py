@@ -74,18 +74,6 @@ def test_every_sound_stream_is_copied(tmp_path: Path) -> None:
         assert_same(sound(target, track), kept)
 
 
-def test_a_part_has_the_sound_of_that_part(tmp_path: Path) -> None:
-    source = write_clip(tmp_path / "in.mp4", sounds=["aac"], count=40)
-    target = copy(source, tmp_path / "out.mp4", first=10, last=30, whole=False)
-    begin, end = Fraction(10, 25), Fraction(30, 25)
-    packet = Fraction(1024, 48_000)
-    expected = [
-        (time - begin, data) for time, data in sound(source) if begin - packet <= time < end
-    ]
-    assert len(expected) == pytest.approx(0.8 / packet, abs=2)
-    assert_same(sound(target), expected)
-
-
 def test_damaged_sound_does_not_affect_the_picture(tmp_path: Path, warnings: Warnings) -> None:
     source = write_clip(tmp_path / "in.ts", sounds=["aac"], count=50)
     data = bytearray(source.read_bytes())

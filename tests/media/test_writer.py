@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable, Iterable
-from contextlib import ExitStack, suppress
+from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -203,22 +203,6 @@ class TestPlanes:
         with av.open(str(tmp_path / "out.mp4")) as container:
             context = container.streams.video[0].codec_context
             assert (context.colorspace, context.pix_fmt) == (matrix, pixels)
-
-    def test_of_one_frame_can_be_written_to_several_videos(self, tmp_path: Path) -> None:
-        source = write_clip(tmp_path / "in.mp4")
-        paths = [tmp_path / "a.mp4", tmp_path / "b.mkv"]
-        with VideoReader(source) as reader, ExitStack() as stack:
-            writers = [
-                stack.enter_context(VideoWriter(path, reader.info, LOSSLESS)) for path in paths
-            ]
-            frames = list(reader)
-            for frame in frames:
-                for writer in writers:
-                    writer.write(frame)
-        for path in paths:
-            for one, other in zip(frames, read(path), strict=True):
-                assert other.time == one.time
-                np.testing.assert_array_equal(planes_of(other).luma, planes_of(one).luma)
 
 
 def write_on(writer: VideoWriter, frames: Iterable[Frame]) -> None:

@@ -151,17 +151,6 @@ class TestRun:
         assert (totals.width, totals.height) == (WIDTH, HEIGHT)
         assert totals.seconds > 0
 
-    def test_progress_gets_every_frame(self, red_clip: Path) -> None:
-        calls: list[int | None] = []
-
-        def progress(total: int | None) -> Callable[[int], object]:
-            calls.append(total)
-            return calls.append
-
-        run_red(video.Run(red_clip, frames=20), progress=progress)
-        assert calls[0] == 20
-        assert sum(advance or 0 for advance in calls[1:]) == 20
-
     def test_stages_alone_need_only_the_frames_around_their_moment(
         self, red_clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:

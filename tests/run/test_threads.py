@@ -89,12 +89,6 @@ def setting(event: threading.Event, items: Iterable[int]) -> Iterator[int]:
 
 
 class TestPrefetch:
-    @pytest.mark.parametrize("depth", [1, 4, 100])
-    def test_gives_all_items_in_order(self, depth: int, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr("vdet.run.threads.DEPTH", depth)
-        with prefetch(range(50)) as items:
-            assert list(items) == list(range(50))
-
     @pytest.mark.parametrize("take", [1, 3])
     def test_a_generator_is_closed_by_the_thread_that_ran_it(self, take: int) -> None:
         threads: list[threading.Thread] = []
@@ -127,16 +121,6 @@ class TestPrefetch:
 
 
 class TestWriteAsync:
-    @pytest.mark.parametrize("depth", [1, 4, 100])
-    def test_passes_all_items_on_in_order(
-        self, depth: int, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        monkeypatch.setattr("vdet.run.threads.DEPTH", depth)
-        taken: list[int] = []
-        with write_async(taken.append, within=nullcontext()) as hand_over:
-            hand_all(range(50), hand_over)
-        assert taken == list(range(50))
-
     @Errors
     def test_an_error_of_the_giver_is_an_error_in_the_context_too(
         self, kind: type[BaseException]

@@ -3,7 +3,7 @@
 They need an environment of their own (trackeval wants the GUI OpenCV and an old NumPy):
 
     python3 -m venv golden && golden/bin/pip install "numpy<2" trackeval==1.0.0 pycocotools==2.0.11
-    golden/bin/python tests/evaluate/golden/make_golden.py
+    golden/bin/python benchmarks/golden_scores.py
 
 The scenes go through trackeval's KITTI reader and preprocessing, with ignore regions as DontCare,
 and through pycocotools with ignore regions as crowds. Boxes are higher than the 25 pixels that
@@ -27,7 +27,7 @@ Row = list[float]  # frame from 1, id, x, y, width, height, then score or ignore
 Scene = tuple[list[Row], list[Row]]  # truth, prediction
 
 FRAMES = 24
-HERE = Path(__file__).parent
+HERE = Path(__file__).parents[1] / "tests" / "evaluate" / "golden"
 
 
 def drive(vehicle: int, frames: range, x: float, y: float, step: float) -> list[Row]:
