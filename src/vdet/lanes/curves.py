@@ -51,7 +51,7 @@ MARGIN = 0.5
 FINE_MARGIN = 0.2
 """Largest distance of paint from a curve that was fitted to this frame, metres."""
 WIDTH_TOLERANCE = 0.6
-"""Largest difference between the width of the lane and `lanes.lane_width`, metres."""
+"""Largest difference between the width of the lane and that in `lanes.metres`."""
 
 _LINE_WIDTH = 0.15
 """Width of a painted line, metres."""
