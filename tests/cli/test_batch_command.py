@@ -125,7 +125,7 @@ def test_after_other_settings_or_another_model_videos_are_made_again(
     assert run(*arguments).code == 0
     dry = (*arguments, "--skip-existing", "--dry-run")
     assert run(*dry).out.count("up to date") == 2
-    (tmp_path / "steps").write_text("steps: {names: [theirs]}")
+    (tmp_path / "steps").write_text("steps: [theirs]")
     other_step = ("-c", tmp_path / "steps")
     changes = (("--set", "tracker.confirm_seconds=0.3"), ("--set", "output.crf=30"), ("-c", "svm"))
     for change in (*changes, ("--frames", "3"), other_step):
