@@ -107,6 +107,16 @@ def test_it_prints_the_totals(run: Run, folder: Path, tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["t.csv"]
 
 
+def test_classes_can_be_chosen(run: Run, folder: Path, tmp_path: Path) -> None:
+    tracks = write_tracks(tmp_path / "t.csv")
+    counted = {
+        names: run("count", tracks, "-c", folder / "lines.yaml", *names)
+        for names in (("--class", "truck"), ("--class", "truck", "--class", "vehicle"))
+    }
+    totals = [re.findall(r"gate +out +(\d+)", result.out) for result in counted.values()]
+    assert totals == [["0"], ["1"]]
+
+
 def test_of_a_video_it_says_what_to_run_first(run: Run, folder: Path) -> None:
     result = run("count", folder / "red.mp4", "-c", folder / "lines.yaml")
     assert result.code == 2

@@ -16,6 +16,7 @@ _OTHERS = "Input"
 HEADINGS: Mapping[str, Sequence[str]] = {
     "Outputs": (
         *("--output", "--no-video", "--tracks", "--counts", "--flows", "--interval", "--vehicles"),
+        "--class",
         *("--crops", "--clips", "--margin", "--exact", "--json", "--page", "--propose"),
         *("--stages", "--at", "--sink", "--overwrite"),
     ),

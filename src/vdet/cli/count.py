@@ -40,6 +40,7 @@ log = logging.getLogger("vdet")
     options.RATE,
     show_default="from the times in TRACKS",
 )
+@options.class_option
 @options.settings_options("traffic.min_seen_seconds=0.5")
 @options.overwrite_option
 def count(

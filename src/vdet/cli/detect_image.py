@@ -39,6 +39,7 @@ log = logging.getLogger("vdet")
     "Write the boxes for label tools: .coco.json, .xml (CVAT), or .yolo.zip. Can be repeated.",
 )
 @options.sink_option
+@options.class_option
 @options.lanes_option
 @options.settings_options("detector.min_score_still=0.5", options.model_option)
 @options.overwrite_option

@@ -125,6 +125,7 @@ _batch_options = options.bundle(
 @options.option(
     "--strict", "Exit with code 4 if a result is doubtful. The outputs are written all the same."
 )
+@options.class_option
 @_batch_options
 @options.lanes_option
 @options.settings_options("output.crf=18", options.model_option)

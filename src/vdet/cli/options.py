@@ -174,21 +174,30 @@ Short = tuple[str, Any]
 _SHORT = f"{__name__}.short"
 
 
-def short_form(shown: str, key: str, text: str, kind: Any = None) -> Callable[[F], F]:
+def short_form(
+    shown: str, key: str, text: str, kind: Any = None, *, multiple: bool = False
+) -> Callable[[F], F]:
     """Add an option that is a short form of a setting: see `SettingsChoice`."""
 
     def keep(context: click.Context, _: click.Parameter, given: Any) -> None:
-        if given not in (None, False):
+        if given not in (None, ()) and given is not False:
             context.meta.setdefault(_SHORT, []).append((key, given))
 
     words = f"{text.removesuffix('.')} (`{key}`)."
-    return option(shown, words, kind, expose_value=False, callback=keep)
+    return option(shown, words, kind, expose_value=False, callback=keep, multiple=multiple)
 
 
 model_option = short_form(
     "--model FILE",
     "detector.model",
     "Model of the detector: .npz from vdet train, or .onnx. It decides which detector runs.",
+)
+class_option = short_form(
+    "--class NAME",
+    "classes",
+    "Keep only vehicles of this class, such as truck. Can be repeated.",
+    str,
+    multiple=True,
 )
 lanes_option = short_form("--lanes", "lanes.enabled", "Find the lane too, and draw it.")
 

@@ -7,7 +7,14 @@ from collections.abc import Callable
 from functools import partial
 from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, Field, SerializeAsAny, field_validator, model_validator
+from pydantic import (
+    BeforeValidator,
+    Field,
+    SerializeAsAny,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
 from vdet.config.camera import CameraSettings, moment
 from vdet.config.detector import DetectorSettings, NetworkSettings, SvmSettings
@@ -196,6 +203,11 @@ class Settings(Section):
     A vehicle is where the middle of its lower edge is. Without an included region the whole frame
     counts, except for excluded ones.
     """
+    classes: tuple[str, ...] = Field((), max_length=100)
+    """Classes of vehicles that are shown and counted, of those in detector.classes. []: all.
+
+    The class of a vehicle is that of its track: so far in boxes, the last one in all else.
+    """
     steps: tuple[str, ...] = ()
     """Steps of other packages, between the tracker and the outputs: their names, in order."""
     traffic: TrafficSettings = TrafficSettings()
@@ -207,6 +219,19 @@ class Settings(Section):
     output: OutputSettings = OutputSettings()
     clips: ClipSettings = ClipSettings()
     draw: DrawSettings = DrawSettings()
+
+    @field_validator("classes")
+    @classmethod
+    def _are_looked_for(cls, classes: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
+        detector = info.data.get("detector")
+        if classes and isinstance(detector, SvmSettings):
+            raise ValueError("has no effect: the linear SVM knows no classes")
+        known = detector.vehicle_classes if detector else classes
+        for name in classes:
+            if name not in known:
+                words = f"{name}: unknown class; known: {', '.join(known)}"
+                raise ValueError(f"{words}; detector.classes can have more")
+        return classes
 
     def with_paths(self, change: Callable[[str], str]) -> "Settings":
         """Return the settings with the paths of the model file and of masks changed."""

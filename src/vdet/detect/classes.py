@@ -1,5 +1,7 @@
 """Classes of vehicles: their names in all outputs, and the words that mean them elsewhere."""
 
+import re
+from collections.abc import Collection
 from functools import lru_cache
 
 OUR_NAMES = ("car", "truck", "bus", "motorcycle", "bicycle", "person", "vehicle")
@@ -18,6 +20,16 @@ WORDS = {
     "vehicle": ("vehicle", "other vehicle", "rickshaw", "auto-rickshaw", "tuk-tuk", "tempo"),
 }
 """For each of `OUR_NAMES` the words that label files and networks use."""
+
+
+def is_chosen(class_name: str | None, chosen: Collection[str]) -> bool:
+    """Return whether a vehicle is of one of the chosen classes; none means all."""
+    return not chosen or (class_name or UNKNOWN) in chosen
+
+
+def in_file_name(class_name: str | None) -> str:
+    """Return a class as a part of the name of a file."""
+    return re.sub(r"[^\w-]+", "-", class_name or UNKNOWN)
 
 
 @lru_cache(maxsize=1000)

@@ -130,7 +130,8 @@ class PictureSearch:
 
         def finish() -> FrameResult:
             with named_errors(source, ImageError):
-                return pipeline.complete(pipeline.observe(frame, candidates, source))
+                result = pipeline.complete(pipeline.observe(frame, candidates, source))
+                return result.of_classes(self.settings.classes)
 
         return finish
 

@@ -1,7 +1,7 @@
 """The result of one frame, and what steps find out beside its tracks."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
@@ -9,6 +9,7 @@ import cv2
 
 from vdet.boxes import Boxes
 from vdet.conditions.finding import Findings
+from vdet.detect.classes import is_chosen
 from vdet.draw.boxes import color_of, draw_box
 from vdet.media import Frame
 from vdet.track.track import FrameTracks, Track
@@ -75,6 +76,11 @@ class FrameResult:
         """The tracks with the number and the time of the frame, and its facts."""
         facts = {name: fact.record() for name, fact in self.facts.items()}
         return FrameTracks(self.frame.index, float(self.frame.time), self.tracks, facts)
+
+    def of_classes(self, classes: Collection[str]) -> "FrameResult":
+        """Return the result with only the tracks of some classes; none means all."""
+        chosen = (track for track in self.tracks if is_chosen(track.class_name, classes))
+        return replace(self, tracks=tuple(chosen)) if classes else self
 
     def _repr_png_(self) -> bytes:
         """Return the frame with its vehicles, which notebooks show."""

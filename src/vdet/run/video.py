@@ -163,7 +163,7 @@ def open_video(
             with closing(pipeline.follow(frames, run.source, threads=threads)) as found:
                 for result in found:
                     traffic.add(result.frame_tracks)
-                    yield result
+                    yield result.of_classes(settings.classes)
             facts.update(pipeline.facts())
             traffic.end(is_still=findings_in(facts).is_still)
 

@@ -2,11 +2,12 @@
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from statistics import median
 
 from vdet.config.places import TrafficSettings
+from vdet.detect.classes import is_chosen
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Span, add_frame
 from vdet.traffic.counts import Counts, Event, Way
@@ -44,6 +45,13 @@ class _Passage:
 class VehicleCounter:
     """Counts the vehicles of one video, or of several that follow one another.
 
+    Parameters
+    ----------
+    begun
+        Number of vehicles before the first one.
+    classes
+        Only vehicles of these classes are counted; none means all.
+
     Attributes
     ----------
     lines, zones
@@ -59,7 +67,16 @@ class VehicleCounter:
         They are given for frames of another aspect ratio than `width` × `height` pixels.
     """
 
-    def __init__(self, settings: TrafficSettings, width: int, height: int, begun: int = 0) -> None:
+    def __init__(
+        self,
+        settings: TrafficSettings,
+        width: int,
+        height: int,
+        *,
+        begun: int = 0,
+        classes: Collection[str] = (),
+    ) -> None:
+        self._classes = classes
         self.lines, self.zones = place(settings, width, height)
         self.spans: list[Span] = []
         self._borders: tuple[Border, ...] = (*self.lines, *self.zones)
@@ -115,8 +132,12 @@ class VehicleCounter:
         return self._so_far
 
     def _passages(self, paths: Iterable[VehiclePath]) -> list[_Passage]:
-        """Return what vehicles do, but for those that are seen too shortly to count."""
-        return [self._passage(path) for path in paths if path.seconds >= self._confirmed]
+        """Return what vehicles do that count: of the classes, and not seen too shortly."""
+        return [
+            self._passage(path)
+            for path in paths
+            if path.seconds >= self._confirmed and is_chosen(path.class_name, self._classes)
+        ]
 
     def _passage(self, path: VehiclePath) -> _Passage:
         found = {border.name: crossings(path, border) for border in self._borders}

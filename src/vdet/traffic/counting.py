@@ -125,7 +125,9 @@ class _Group:
         settings.camera.check_frames(*size)
         self._size = size
         self._ground = ground_of(settings.camera, *size)
-        self.counter = VehicleCounter(settings.traffic, *size, begun=begun)
+        self.counter = VehicleCounter(
+            settings.traffic, *size, begun=begun, classes=settings.classes
+        )
         self._videos: list[_Video] = []
 
     def goes_on(self, size: tuple[int, int], clock: Clock | None, first: float | None) -> bool:

@@ -4,6 +4,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from vdet.config.schema import Settings
+from vdet.detect.classes import is_chosen
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Clock
 from vdet.traffic.records import VehicleRecord, VehicleRecords
@@ -26,7 +27,7 @@ class LiveTraffic:
     speeds
         None without points of the ground.
     vehicles
-        A record of each vehicle, by id; none before `end`.
+        A record of each vehicle of the classes in the settings, by id; none before `end`.
 
     Raises
     ------
@@ -43,10 +44,11 @@ class LiveTraffic:
     ) -> None:
         self.clock = clock
         self._records = VehicleRecords(width)
+        self._classes = settings.classes
         if settings.traffic:
             from vdet.traffic.counter import VehicleCounter
 
-            self.counter = VehicleCounter(settings.traffic, width, height)
+            self.counter = VehicleCounter(settings.traffic, width, height, classes=self._classes)
         if settings.camera.ground:
             from vdet.lanes.ground import ground_of
             from vdet.traffic.speeds import SpeedMeter
@@ -72,4 +74,6 @@ class LiveTraffic:
 
     def end(self, *, is_still: bool = False) -> None:
         """Make the records, after the last frame; `is_still` as of `VehicleRecords.end`."""
-        self.vehicles = self._records.end(self.speeds, is_still=is_still)
+        records = self._records.end(self.speeds, is_still=is_still)
+        chosen = (record for record in records if is_chosen(record.class_name, self._classes))
+        self.vehicles = tuple(chosen)

@@ -9,7 +9,7 @@ from typing import Any
 
 from vdet.boxes import Image
 from vdet.config.rendering import render
-from vdet.detect.classes import UNKNOWN
+from vdet.detect.classes import in_file_name
 from vdet.draw.boxes import WHITE, color_of, draw_box, draw_label, draw_regions
 from vdet.errors import OutputError
 from vdet.files import write_text
@@ -27,7 +27,7 @@ from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.traffic.records import BestCrops, Crop, VehicleRecord
 
 _BOXES = "boxes"
-_CROP_NAME = re.compile(r"vehicle-\d{4,}-at--?\d+\.\d{3}s\.(jpg|png)")
+_CROP_NAME = re.compile(r"vehicle-\d{4,}(-[\w-]+)?-at--?\d+\.\d{3}s\.(jpg|png)")
 _GAP = 1.0  # minimum seconds between two frames that the page calls a gap
 _THUMBNAIL = 200  # longer side of the picture of a vehicle, pixels
 
@@ -88,11 +88,17 @@ class CropSink(BaseSink):
         super().__init__(path, context)
         self._folder = context.files.stage_folder(path, _CROP_NAME)
         self._best = BestCrops()
-        self._written: dict[int, Path] = {}
+        self._written: dict[int, tuple[float, Path]] = {}
 
     def finish(self) -> None:
-        """Write the pictures of the vehicles that are still shown."""
+        """Write the pictures of the vehicles that are still shown, and name those with a record."""
         self._write_all(self._best.end())
+        for vehicle in self.traffic.vehicles:
+            if vehicle.id in self._written:
+                time, path = self._written.pop(vehicle.id)
+                path.rename(self._folder / _crop_name(vehicle, time))
+        for _, path in self._written.values():
+            path.unlink()
 
     def write(self, result: FrameResult) -> None:
         """Look for better pictures in a frame."""
@@ -100,15 +106,13 @@ class CropSink(BaseSink):
 
     def _write_all(self, crops: list[Crop]) -> None:
         for crop in crops:
-            if crop.id in self._written:
-                self._written[crop.id].unlink()
-            name = _crop_name(crop.id, crop.time)
-            self._written[crop.id] = path = self._folder / name
+            path = self._folder / f"{crop.id}.jpg"
             path.write_bytes(encode_image(crop.image, path))
+            self._written[crop.id] = crop.time, path
 
 
-def _crop_name(number: int, time: float) -> str:
-    return f"vehicle-{number:04d}-at-{time:.3f}s.jpg"
+def _crop_name(vehicle: VehicleRecord, time: float) -> str:
+    return f"vehicle-{vehicle.id:04d}-{in_file_name(vehicle.class_name)}-at-{time:.3f}s.jpg"
 
 
 CROPS = SinkKind(CropSink, what="pictures of vehicles", marker="vehicle-*-at-*s.*", takes="videos")
@@ -185,8 +189,9 @@ class PageSink(BaseSink):
             return {}
         times = {number: time for number, (time, _) in self._thumbnails.items()}
         return {
-            number: link_to(folder / _crop_name(number, time), self.path)
-            for number, time in times.items()
+            vehicle.id: link_to(folder / _crop_name(vehicle, times[vehicle.id]), self.path)
+            for vehicle in self.traffic.vehicles
+            if vehicle.id in times
         }
 
     def _player(self) -> Player | None:
@@ -283,7 +288,7 @@ class ClipSink(BaseSink):
         moment = f"{seconds // 3600:02}-{seconds // 60 % 60:02}-{seconds % 60:02}"
         if clock:
             moment = clock.at(first.first).strftime("%Y-%m-%dT%H-%M-%S")
-        kind = re.sub(r"[^\w-]+", "-", first.class_name or UNKNOWN)
+        kind = in_file_name(first.class_name)
         others = f"+{len(scene.vehicles) - 1}" if len(scene.vehicles) > 1 else ""
         return f"clip-{moment}-{kind}-{first.id}{others}"
 

@@ -1,0 +1,85 @@
+"""The setting `classes`: only vehicles of some classes are shown and counted."""
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+
+from boxing import moved_to
+from red_cars import CAR, NullDetector, car_at
+from run.red_runs import outputs
+from running import names
+from vdet.boxes import Boxes
+from vdet.config.loading import load_settings
+from vdet.config.places import LineSettings, TrafficSettings
+from vdet.config.schema import Settings
+from vdet.errors import ConfigError
+from vdet.media import Picture
+from vdet.run.video import Run, run_video
+from vdet.track.track import Track
+from vdet.traffic.counting import count_files
+
+GATE = LineSettings(name="gate", start=(0.3, 0), end=(0.3, 1))
+SETTINGS = Settings(traffic=TrafficSettings(lines=(GATE,)))
+TRUCKS = SETTINGS.model_copy(update={"classes": ("truck",)})
+
+
+class TwoVehicles:
+    """Follows one that becomes a truck in the last of 50 frames, and a car beside it."""
+
+    def update(self, _: Boxes, time: float, __: Picture | None = None) -> list[Track]:
+        box, kind = car_at(round(25 * time)), "truck" if time > 1.7 else "car"
+        below = moved_to(CAR, box.x1, box.y1 + 60)
+        return [Track(1, box, 0.9, "detected", kind), Track(2, below, 0.9, "detected", "car")]
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    with path.open() as file:
+        return list(csv.DictReader(file))
+
+
+def test_boxes_go_by_the_class_so_far_and_all_else_by_the_last_one(
+    red_clip: Path, tmp_path: Path
+) -> None:
+    files = {name: tmp_path / f"{name}.csv" for name in ("vehicles", "counts", "tracks")}
+    wanted = outputs(**files, crops=tmp_path / "crops")
+    run_video(Run(red_clip, wanted, TRUCKS), NullDetector(), tracker=TwoVehicles())
+    rows = rows_of(files["tracks"])
+    assert {row["class"] for row in rows} == {"truck"}
+    assert min(float(row["time"]) for row in rows) > 1.7
+    (vehicle,) = rows_of(files["vehicles"])
+    assert (vehicle["id"], vehicle["class"], vehicle["first"]) == ("1", "truck", "0.0")
+    (event,) = rows_of(files["counts"])
+    assert (event["id"], event["class"], float(event["time"]) < 1.7) == ("1", "truck", True)
+    (crop,) = names(tmp_path / "crops")
+    assert crop.startswith("vehicle-0001-truck-at-")
+
+
+def test_saved_tracks_are_counted_as_live(red_clip: Path, tmp_path: Path) -> None:
+    live, saved = tmp_path / "live.json", tmp_path / "all.jsonl"
+    for settings, wanted in ((TRUCKS, outputs(counts=live)), (SETTINGS, outputs(tracks=saved))):
+        run_video(Run(red_clip, wanted, settings), NullDetector(), tracker=TwoVehicles())
+    (counts,) = count_files([saved], TRUCKS, (320, 240)).values()
+    events = json.loads(live.read_text())["events"]
+    assert [(event.id, event.time) for event in counts.events] == [
+        (event["id"], event["time"]) for event in events
+    ]
+    assert len(events) == 1
+
+
+@pytest.mark.parametrize(
+    ("assignments", "words"),
+    [
+        (
+            ["detector.classes=[car, bus]", "classes=[lorry]"],
+            "classes: lorry: unknown class; known: car, bus; detector.classes can have more",
+        ),
+        (["detector.kind=svm", "classes=[car]"], "classes: has no effect"),
+    ],
+)
+def test_a_class_that_nothing_looks_for_is_refused(assignments: list[str], words: str) -> None:
+    with pytest.raises(ConfigError, match=words):
+        load_settings([], assignments)
+    known = ["detector.classes=[car, tram]", "classes=[tram]"]
+    assert load_settings([], known).classes == ("tram",)
