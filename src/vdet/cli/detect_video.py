@@ -83,7 +83,8 @@ _batch_options = options.bundle(
 )
 @options.output_option(
     "--vehicles FILE",
-    "Write a record of each vehicle: .csv or .json. With -d, only the ending of the names.",
+    "Write a record of each vehicle: .csv, .json or .parquet. With -d, only the ending of the "
+    "names.",
 )
 @options.output_option(
     "--crops DIR",

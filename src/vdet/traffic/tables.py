@@ -8,13 +8,15 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from vdet.errors import OutputError
 from vdet.files import write_text
 
-SUFFIXES = (".csv", ".json")
+SUFFIXES = (".csv", ".json", ".parquet")
 
 VIDEO = "video"
 """The column that has the name of the video."""
-
+_TEXTS = (VIDEO, "class", "clock", "motion")
+"""Columns of text in Parquet."""
 
 _FORMULA = re.compile(r"[=+@\t\r-](?!\d*\.?\d*(e-?\d+)?$)")
 """How a text begins that a spreadsheet takes for a formula; a number is none."""
@@ -54,10 +56,38 @@ def write_json(path: Path, value: Any) -> None:
     write_text(path, text)
 
 
+def check_table(path: Path) -> None:
+    """Refuse a table that needs a package that is not installed. Raises `OutputError`."""
+    if _is_parquet(path):
+        try:
+            import pyarrow.parquet  # noqa: F401
+        except ImportError as error:
+            raise OutputError(f"{path}: pyarrow is not installed; pip install pyarrow") from error
+
+
+def _is_parquet(path: Path) -> bool:
+    return path.suffix.lower() == ".parquet"
+
+
+def _write_parquet(path: Path, columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
+    """Write a table; a column without a value has numbers, or text where others have."""
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    arrays = {}
+    for number, name in enumerate(columns):
+        array = pa.array([row[number] for row in rows])
+        empty = pa.string() if name in _TEXTS else pa.float64()
+        arrays[name] = array.cast(empty) if pa.types.is_null(array.type) else array
+    parquet.write_table(pa.table(arrays), path)
+
+
 def write_content(path: Path, content: Any) -> None:
     """Write JSON or a table (a list: heading, rows), as the suffix of `path` says."""
     if is_json(path):
         write_json(path, content)
+    elif _is_parquet(path):
+        _write_parquet(path, content[0], content[1:])
     else:
         heading, *rows = content
         write_table(path, heading, rows)

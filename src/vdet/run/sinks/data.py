@@ -28,7 +28,7 @@ from vdet.run.result import FrameResult, findings_in
 from vdet.run.sinks.protocol import STANDARD_OUTPUT, BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.traffic import count_files
 from vdet.traffic.records import join_records, records_content
-from vdet.traffic.tables import SUFFIXES, write_content
+from vdet.traffic.tables import SUFFIXES, check_table, write_content
 
 MakeContent = Callable[[Path, count_files.Videos, int | None], Any]
 
@@ -167,7 +167,7 @@ class _TableSink(BaseSink):
 
 
 class VehicleSink(_TableSink):
-    """Writes a record of each vehicle, at the end, as `.csv` or `.json`."""
+    """Writes a record of each vehicle, at the end, as `.csv`, `.json` or `.parquet`."""
 
     def make_content(self) -> Any:
         """Return the records."""
@@ -192,6 +192,7 @@ VEHICLES = SinkKind(
     SUFFIXES,
     "records of vehicles",
     takes="videos",
+    check=check_table,
     total=BatchTotal("all", join_records),
 )
 

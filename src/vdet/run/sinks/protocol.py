@@ -169,6 +169,8 @@ class SinkKind:
         "videos" or "pictures" if the sink can take results of these only.
     may_replace
         Whether `--overwrite` may replace a file.
+    check
+        Refuses an output that cannot be written for another reason: raises `OutputError`.
     total
         What a batch writes in addition, over all its videos.
     """
@@ -181,6 +183,7 @@ class SinkKind:
     one_frame: bool = False
     takes: Literal["videos", "pictures", "both"] = "both"
     may_replace: Callable[[Path], bool] = lambda _: True
+    check: Callable[[Path], object] = lambda _: None
     total: BatchTotal | None = None
 
     @property
@@ -216,6 +219,7 @@ def check_sinks(outputs: Sequence[Output], *, overwrite: bool, makes_folder: boo
     seen: set[Path] = set()
     for output in outputs:
         kind, path = _kind_for(output), output.path
+        kind.check(path)
         if path.resolve() in seen:
             raise OutputError(f"{path}: is used for two outputs; rename one")
         seen.add(path.resolve())

@@ -1,0 +1,64 @@
+"""Records of vehicles as Parquet, and the questions of the page on batches, which run here."""
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from doc_pages import blocks
+from traffic.passing import WIDTH, frame, summarize, track
+from vdet.boxes import Box
+from vdet.errors import OutputError
+from vdet.run.sinks.protocol import Output, check_sinks
+from vdet.traffic.records import join_records, records_content
+
+BOX = Box.sized(5, 5, 30, 30)
+
+
+def write_all(folder: Path) -> Path:
+    """Write the records of two videos."""
+    path = folder / "found" / "all.parquet"
+    path.parent.mkdir()
+    truck = track(1, BOX, class_name="truck", lane=0, distance=18.4)
+    parts = {"a": [frame(0, truck), frame(1, truck, track(2, BOX))], "b": [frame(0, track(1, BOX))]}
+    content = {
+        name: records_content(summarize(frames, WIDTH), path) for name, frames in parts.items()
+    }
+    join_records(content, path)
+    return path
+
+
+def test_columns_keep_their_types_where_no_value_is_known(tmp_path: Path) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet")
+    table = parquet.read_table(write_all(tmp_path))
+    kinds = {field.name: str(field.type) for field in table.schema}
+    names = ("video", "id", "class", "clock", "first", "lane", "speed")
+    assert [kinds[name] for name in names] == [
+        "string", "int64", "string", "string", "double", "int64", "double",
+    ]  # fmt: skip
+    assert table.column("video").to_pylist() == ["a", "a", "b"]
+
+
+def test_the_questions_of_the_page_on_batches_are_answered(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for package in ("pyarrow", "duckdb", "pandas"):
+        pytest.importorskip(package)
+    write_all(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, Any] = {}
+    for block in blocks("batch.md"):
+        exec(block, names)
+    assert names["ahead"] == [("a", 0.0, 0.04, 18.4)]
+    assert names["by_hour"] == [(None, "truck", 1, None), (None, None, 2, None)]
+    assert names["most"].to_dict() == {"a": 2, "b": 1}
+
+
+def test_without_pyarrow_one_line_says_what_to_install(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    output = Output("vehicles", tmp_path / "a.parquet")
+    with pytest.raises(OutputError, match="pyarrow is not installed; pip install pyarrow"):
+        check_sinks([output], overwrite=False)
