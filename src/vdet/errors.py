@@ -1,10 +1,12 @@
-"""Kinds of errors, each with the exit code of the program; names and numbers in messages.
+"""Kinds of errors, each with the exit code of the program; names, numbers and times in messages.
 
 Exit codes: 0 success, 1 an error below, 2 wrong usage (click's own), 3 some files of a batch
 failed, 4 a result is doubtful and `--strict` was given, 130 interrupted.
 A message is one line (a `ConfigError` may be several, one for each mistake): what is wrong, where,
 and what to do about it.
 """
+
+from fractions import Fraction
 
 SOME_FAILED = 3
 DOUBTFUL = 4
@@ -131,3 +133,12 @@ def counted(count: int, noun: str) -> str:
 def named(count: int, noun: str) -> str:
     """Return the noun for a number of things: `car`, `cars`, `buses`."""
     return noun if count == 1 else noun + ("es" if noun.endswith(("s", "x", "ch")) else "s")
+
+
+def clock(seconds: float | Fraction, digits: int = 0, *, hours: bool = False) -> str:
+    """Return a time as `1:05`, or `2:01:05`; always as this with `hours`, and with decimals."""
+    whole, part = divmod(round(abs(seconds) * 10**digits), 10**digits)
+    minutes, rest = divmod(whole, 60)
+    text = f"{minutes // 60}:{minutes % 60:02}" if hours or minutes >= 60 else f"{minutes}"
+    text += f":{rest:02}" + (f".{part:0{digits}}" if digits else "")
+    return f"−{text}" if seconds < 0 and (whole or part) else text

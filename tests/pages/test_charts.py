@@ -2,18 +2,20 @@
 
 from collections import Counter
 from collections.abc import Sequence
+from fractions import Fraction
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from vdet.errors import clock
 from vdet.pages.charts import (
-    clock,
     interval_plot,
     level_plot,
     number_axis,
     pack,
     time_axis,
+    time_text,
 )
 
 
@@ -22,8 +24,16 @@ from vdet.pages.charts import (
     [(0, "0:00"), (7.25, "0:07.2"), (59.96, "1:00"), (75, "1:15"), (3600, "1:00:00"),
      (7384.5, "2:03:04.5"), (-0.5, "−0:00.5"), (-0.01, "0:00")],
 )  # fmt: skip
-def test_times_are_written_as_a_clock_shows_them(seconds: float, text: str) -> None:
-    assert clock(seconds) == text
+def test_times_have_tenths_where_they_are_not_whole(seconds: float, text: str) -> None:
+    assert time_text(seconds) == text
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [(0, "0:00:00.000"), (59.9996, "0:01:00.000"), (3600 * 12 + 61.5, "12:01:01.500")],
+)
+def test_times_can_have_hours_and_milliseconds(seconds: float, text: str) -> None:
+    assert clock(Fraction(seconds), 3, hours=True) == text
 
 
 def test_axes_have_round_numbers() -> None:

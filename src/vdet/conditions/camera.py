@@ -10,7 +10,8 @@ import cv2
 import numpy as np
 
 from vdet.boxes import BoolArray, Box, Float32Array, Float64Array, Image
-from vdet.conditions.finding import Finding, joined, moment, when
+from vdet.conditions.finding import Finding, joined, when
+from vdet.errors import clock
 
 _LIMIT = 0.01
 """Displacement of a camera that is not worth a word, as a fraction of the frame's width."""
@@ -101,8 +102,8 @@ class CameraWatch:
             spread = _distances(after, np.median(after, axis=0))
             if np.quantile(spread, 0.95) <= _LIMIT:
                 text = (
-                    f"the camera was moved at {moment(start)}, {much}: lines and regions fit only "
-                    "before or only after; process both parts apart"
+                    f"the camera was moved at {clock(int(start))}, {much}: lines and regions fit "
+                    "only before or only after; process both parts apart"
                 )
                 return [Finding("camera-moved", text, ((start, end),), value=size)]
         text = (

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from vdet.config.schema import Code
+from vdet.errors import clock
 
 Span = tuple[float, float]
 """From when to when, seconds as in the tracks."""
@@ -88,11 +89,4 @@ def when(spans: Sequence[Span]) -> str:
     """Return "from 0:05 to 0:32"; of several spans, the longest and how many more there are."""
     first, last = max(spans, key=lambda span: span[1] - span[0])
     others = f" (and {len(spans) - 1} more)" if len(spans) > 1 else ""
-    return f"from {moment(first)} to {moment(last)}{others}"
-
-
-def moment(seconds: float) -> str:
-    """Return a time as 1:05 or 2:01:05."""
-    minutes, seconds = divmod(int(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours}:{minutes:02}:{seconds:02}" if hours else f"{minutes}:{seconds:02}"
+    return f"from {clock(int(first))} to {clock(int(last))}{others}"

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vdet.draw.boxes import Color, color_of, text_color
+from vdet.errors import clock
 
 FILL, BAD, SOFT = "var(--fill)", "var(--bad)", "var(--soft)"
 """Colours of the style: what is right, what is wrong, and what is less important."""
@@ -118,15 +119,9 @@ def hex_color(bgr: Color) -> str:
     return "#{:02x}{:02x}{:02x}".format(*bgr[::-1])
 
 
-def clock(seconds: float) -> str:
+def time_text(seconds: float) -> str:
     """Write a time as `m:ss` or `h:mm:ss`, with tenths where it is not a whole second."""
-    tenths = round(abs(seconds) * 10)
-    whole, tenth = divmod(tenths, 10)
-    hours, rest = divmod(whole, 3600)
-    minutes, rest = divmod(rest, 60)
-    text = f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
-    sign = "−" if seconds < 0 and tenths else ""
-    return sign + text + (f".{tenth}" if tenth else "")
+    return clock(seconds, 1).removesuffix(".0")
 
 
 def time_axis(start: float, end: float, zero: float | None = None) -> Axis:
@@ -141,7 +136,7 @@ def time_axis(start: float, end: float, zero: float | None = None) -> Axis:
 def _time_text(seconds: float, zero: float | None) -> str:
     """Write a time in the video, or the time of the day where it is known."""
     if zero is None:
-        return clock(seconds)
+        return time_text(seconds)
     minutes, rest = divmod(round(seconds + zero) % 86400, 60)
     return f"{minutes // 60:02}:{minutes % 60:02}" + (f":{rest:02}" if rest else "")
 
@@ -184,7 +179,7 @@ def level_plot(
     ]
     y = _counts(levels.max())
     bars += [
-        Bar(*gap, 0, y.high, SOFT, f"no frames: {' to '.join(map(clock, gap))}") for gap in gaps
+        Bar(*gap, 0, y.high, SOFT, f"no frames: {' to '.join(map(time_text, gap))}") for gap in gaps
     ]
     legend = [("no frames in the video", SOFT)] if gaps else []
     return Plot(title, x, y, bars, legend=legend)

@@ -11,7 +11,7 @@ import numpy as np
 
 from vdet.boxes import Image
 from vdet.errors import counted, escaped
-from vdet.pages.charts import clock, hex_color
+from vdet.pages.charts import hex_color, time_text
 from vdet.version import __version__
 
 PAGE_NAME = "page.html"
@@ -31,7 +31,8 @@ def render(template: str, **values: Any) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"clock": clock, "counted": counted, "jpeg": jpeg_uri, "hex": hex_color}
+    environment.filters |= {"counted": counted, "jpeg": jpeg_uri, "hex": hex_color}
+    environment.filters["clock"] = time_text
     environment.filters["line"] = lambda text: escaped(str(text))
     return environment.get_template(template).render(values, version=__version__)
 

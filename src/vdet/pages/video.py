@@ -278,9 +278,8 @@ def _timeline(shown: Sequence[VehicleRecord], findings: Sequence[Finding], x: Ax
 def _spans(record: VehicleRecord, row: int) -> list[Span]:
     """Return a bar for each time in which a vehicle is shown and not lost; the longest is named."""
     name = f" ({record.class_name})" if record.class_name else ""
-    title = (
-        f"vehicle {record.id}{name}: {charts.clock(record.first)} to {charts.clock(record.last)}"
-    )
+    times = " to ".join(map(charts.time_text, (record.first, record.last)))
+    title = f"vehicle {record.id}{name}: {times}"
     fill, ink = charts.vehicle_colors(record.id)
     longest = max(record.followed, key=lambda span: span[1] - span[0])
     return [

@@ -11,7 +11,7 @@ from vdet.boxes import Image
 from vdet.config.rendering import render
 from vdet.detect.classes import in_file_name
 from vdet.draw.boxes import WHITE, color_of, draw_box, draw_label, draw_regions
-from vdet.errors import OutputError
+from vdet.errors import OutputError, clock
 from vdet.files import write_text
 from vdet.lanes.road import stage_pictures
 from vdet.media import Picture
@@ -283,11 +283,10 @@ class ClipSink(BaseSink):
         return [record for record in records if record.id in counted]
 
     def _name(self, scene: Scene) -> str:
-        first, clock = scene.vehicles[0], self.context.clock
-        seconds = int(first.first)
-        moment = f"{seconds // 3600:02}-{seconds // 60 % 60:02}-{seconds % 60:02}"
-        if clock:
-            moment = clock.at(first.first).strftime("%Y-%m-%dT%H-%M-%S")
+        first, when = scene.vehicles[0], self.context.clock
+        moment = clock(int(first.first), hours=True).zfill(8).replace(":", "-")
+        if when:
+            moment = when.at(first.first).strftime("%Y-%m-%dT%H-%M-%S")
         kind = in_file_name(first.class_name)
         others = f"+{len(scene.vehicles) - 1}" if len(scene.vehicles) > 1 else ""
         return f"clip-{moment}-{kind}-{first.id}{others}"
