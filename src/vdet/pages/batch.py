@@ -7,7 +7,7 @@ from pathlib import Path
 from pydantic import BaseModel, ConfigDict, Field
 
 from vdet.files import write_text
-from vdet.pages.render import link_to, render
+from vdet.pages.render import PAGE_NAME, link_to, render
 from vdet.pages.vehicles import VehicleRow, table_json
 
 NO_STILL = "data:image/jpeg;base64,"
@@ -40,11 +40,6 @@ def write_index(videos: Sequence[tuple[str, Path, VideoFacts]], target: Path) ->
     for _, _, facts in videos:
         counts.update(facts.counts)
     linked = [(name, link_to(page, Path()), facts) for name, page, facts in videos]
-    folders = [f"{link_to(page.parent, Path())}/" for _, page, _ in videos]
-    table = table_json(
-        [
-            (name, page, folder, facts.rows)
-            for (name, page, facts), folder in zip(linked, folders, strict=True)
-        ]
-    )
+    parts = [(name, page, page.removesuffix(PAGE_NAME), facts.rows) for name, page, facts in linked]
+    table = table_json(parts)
     write_text(target, render("index.html", videos=linked, counts=counts, table=table))

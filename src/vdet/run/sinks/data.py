@@ -153,7 +153,7 @@ JSON = SinkKind(JsonSink, what="lists of boxes", writes_standard_output=True, ta
 
 
 class _TableSink(BaseSink):
-    """Writes a table or JSON of the traffic at the end; `write_content` takes `make_content`."""
+    """Writes a table or JSON at the end; `make_content` is what `write_content` takes."""
 
     make_content: Callable[[], Any]
 
@@ -161,9 +161,6 @@ class _TableSink(BaseSink):
         """Write it, and keep it for the file over all videos."""
         self.summary = self.make_content()
         write_content(self.context.files.stage(self.path), self.summary)
-
-    def write(self, result: FrameResult) -> None:
-        """Do nothing: the run reads the tracks."""
 
 
 class VehicleSink(_TableSink):
@@ -174,16 +171,12 @@ class VehicleSink(_TableSink):
         return records_content(self.traffic.vehicles, self.path, self.traffic.clock)
 
 
-class ConditionSink(BaseSink):
+class ConditionSink(_TableSink):
     """Writes what makes the results of a video doubtful, at the end: a list of findings."""
 
-    def finish(self) -> None:
-        """Write the findings."""
-        found = findings_in(self.context.facts).record()
-        self.context.files.stage(self.path).write_text(json.dumps(found, indent=2) + "\n", "utf-8")
-
-    def write(self, result: FrameResult) -> None:
-        """Do nothing: a step watches the conditions."""
+    def make_content(self) -> Any:
+        """Return the findings."""
+        return findings_in(self.context.facts).record()
 
 
 CONDITIONS = SinkKind(ConditionSink, (".json",), "findings", takes="videos")

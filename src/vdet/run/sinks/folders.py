@@ -250,9 +250,6 @@ class ClipSink(BaseSink):
         super().__init__(path, context)
         self._folder = context.files.stage_folder(path, _NAME)
 
-    def write(self, result: FrameResult) -> None:
-        """Do nothing: the run keeps the records."""
-
     def finish(self) -> None:
         """Write the clips."""
         settings, source = self.context.settings, self.video.path

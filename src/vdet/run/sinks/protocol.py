@@ -120,6 +120,9 @@ class BaseSink:
         if kind is None:
             self.finish()
 
+    def write(self, result: FrameResult) -> None:
+        """Take the next result; what the run reads of it, and the steps, is known at the end."""
+
     def finish(self) -> None:
         """Write what is still to be written."""
 
