@@ -1,0 +1,137 @@
+"""Pages of many vehicles: how long they take to make, and to open and filter in Chromium.
+
+    python -m benchmarks.pages
+
+The index of a batch has 100,000 vehicles of 10,000 videos; the page of a video has 1,200 vehicles
+with speeds, and flows. The first view is from the start of the navigation to the last row.
+"""
+
+import json
+import re
+import shutil
+import subprocess
+import tempfile
+import time
+from collections import Counter
+from fractions import Fraction
+from html import unescape
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.pole_cameras import HEIGHT, WIDTH
+from vdet.boxes import Box
+from vdet.media import VideoInfo
+from vdet.pages.batch import VideoFacts, write_index
+from vdet.pages.render import jpeg_uri
+from vdet.pages.vehicles import VehicleRow
+from vdet.pages.video import VideoPage
+from vdet.traffic.records import VehicleRecord
+from vdet.traffic.speeds import Speeds
+
+CLASSES = ("car", "car", "car", "truck", "bus", "motorcycle")
+FILTERS = {"class": "2", "video": "clip012", "seconds-min": "5", "from": "2026-05-04T10:00"}
+STILL = np.full((112, 200, 3), 90, np.uint8)
+MEASURES = f"""<script>
+const taken = {{ first: performance.now() }};
+for (const [name, value] of Object.entries({json.dumps(FILTERS)})) {{
+  form.elements[name].value = value;
+  const begin = performance.now();
+  form.dispatchEvent(new Event("input"));
+  taken[name] = performance.now() - begin;
+}}
+document.title = JSON.stringify(taken);
+</script></body>"""
+
+
+def index_page(path: Path, videos: int = 10_000, each: int = 10) -> None:
+    """Write the page of a batch."""
+    rng = np.random.default_rng(1)
+    still, written = jpeg_uri(STILL), []
+    for number in range(videos):
+        rows = tuple(
+            VehicleRow(
+                id=n + 1,
+                class_name=CLASSES[rng.integers(len(CLASSES))],
+                first=round(float(600 * rng.random()), 3),
+                moment="12.345",
+                seconds=round(float(20 * rng.random()), 1),
+                clock=f"2026-05-{number % 28 + 1:02}T{number % 24:02}:30:07+02:00",
+                speed=round(float(90 * rng.random()), 1),
+                way=("", "north → south", "south → north")[rng.integers(3)],
+            )
+            for n in range(each)
+        )
+        facts = VideoFacts(seconds=600, frames=15000, vehicles=each, most=3, still=still, rows=rows)
+        name = f"day{number // 100}/clip{number:05}"
+        written.append((name, Path(f"{name}.page/page.html"), facts))
+    write_index(written, path)
+
+
+def video_page(vehicles: int = 1200, length: float = 3600.0) -> str:
+    """Return the page of an hour."""
+    rng = np.random.default_rng(1)
+    records = []
+    for number in range(1, vehicles + 1):
+        first, seconds = float(rng.random() * (length - 8)), float(2 + 5 * rng.random())
+        x, y = np.linspace(300, 900, 40), np.linspace(300, 650, 40)
+        times, places = first + np.linspace(0, seconds, 40), np.stack([x, y], axis=1) / 30
+        speeds = Speeds(times, places, np.full(40, 8 + 6 * rng.random()), np.full(40, 0.2), 0.01)
+        box = Box.sized(860, 560, 80, 60)
+        records.append(
+            VehicleRecord(
+                *(number, WIDTH, first, first + seconds, box, seconds),
+                states=Counter(detected=int(25 * seconds)),
+                path=list(zip(x.tolist(), y.tolist(), strict=True)),
+                followed=[(first, first + seconds)],
+                speeds=speeds,
+                motion="drove",
+            )
+        )
+    thumbnails = {record.id: (record.first, jpeg_uri(STILL)) for record in records}
+    info = VideoInfo(Path("hour.mp4"), WIDTH, HEIGHT, Fraction(25), Fraction(1, 25))
+    still = np.full((HEIGHT, WIDTH, 3), 90, np.uint8)
+    page = VideoPage(
+        video=info,
+        frames=int(25 * length),
+        start=0.0,
+        end=length,
+        records=records,
+        thumbnails=thumbnails,
+        poster=still,
+        player=None,
+        settings="",
+    )
+    return page.html()
+
+
+def in_chromium(page: Path) -> dict[str, float]:
+    """Return the milliseconds until the first view, and of each filter."""
+    acts = page.with_name("acts.html")
+    acts.write_text(page.read_text("utf-8").replace("</body>", MEASURES), "utf-8")
+    options = ("--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={page.parent}")
+    command = ["chromium", *options, "--dump-dom", acts.as_uri()]
+    html = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    title, *_ = re.findall("<title>(.*?)</title>", html)
+    found: dict[str, float] = json.loads(unescape(title))
+    return found
+
+
+def main() -> None:
+    with tempfile.TemporaryDirectory() as name:
+        page, begin = Path(name) / "index.html", time.perf_counter()
+        index_page(page)
+        print(f"index of 100,000 vehicles: {time.perf_counter() - begin:.2f} s to make")
+        if shutil.which("chromium"):
+            for what, taken in in_chromium(page).items():
+                print(f"  {what}: {taken:.0f} ms")
+    video_page()  # the first one loads packages
+    begin = time.process_time()
+    video_page()
+    print(
+        f"page of 1,200 vehicles with speeds: {time.process_time() - begin:.2f} s of a core to make"
+    )
+
+
+if __name__ == "__main__":
+    main()
