@@ -174,9 +174,6 @@ class ClipSettings(Section):
 class DrawSettings(Section):
     """What is drawn on videos and pictures."""
 
-    predicted: Literal["dashed", "plain", "hidden"] = "dashed"
-    """How to draw vehicles whose place is predicted: with dashed boxes, plain boxes, or not at all.
-    """
     label: tuple[LabelPart, ...] | None = Field(None, max_length=4)
     """Parts of the label in order: id, class, score, distance. Unknown ones are left out. []: no
     labels. null: the id in a video, the score in a picture, and the class where it fits.

@@ -131,17 +131,6 @@ def test_a_still_picture_shows_scores_without_ids() -> None:
 # Boxes
 
 
-LOST = Track(1, CAR, 0.9, state="predicted")
-SEEN = replace(LOST, state="detected")
-
-
-def test_lost_boxes_can_be_as_the_others_or_hidden() -> None:
-    plain = drawn_on(result_of(LOST), predicted="plain")
-    np.testing.assert_array_equal(plain, drawn_on(result_of(SEEN)))
-    hidden = drawn_on(result_of(LOST), predicted="hidden")
-    np.testing.assert_array_equal(hidden, road(CAR))
-
-
 def test_colors_can_be_those_of_the_classes() -> None:
     boxes = [Box.sized(10 + 60 * n, 100, 50, 50) for n in range(5)]
     names = ["car", "car", "truck", "tram", None]

@@ -70,9 +70,7 @@ class Overlay:
 
     def _shown(self, result: FrameResult) -> list[Track]:
         """Return the vehicles to draw, with the boxes to draw, the farthest first."""
-        hides = self._draw.predicted == "hidden"
-        tracks = [track for track in result.tracks if not (hides and track.state == "predicted")]
-        return sorted(tracks, key=lambda track: track.box.y2)
+        return sorted(result.tracks, key=lambda track: track.box.y2)
 
     def _draw_trails(self, surface: Surface, shown: Sequence[Track], now: float) -> None:
         if not self._longest:
@@ -90,7 +88,7 @@ class Overlay:
 
     def _draw_vehicles(self, surface: Surface, shown: Sequence[Track]) -> None:
         for track in shown:
-            dashed = self._draw.predicted == "dashed" and track.state == "predicted"
+            dashed = track.state == "predicted"
             boxes.draw_box(surface, track.box, self._color(track), dashed=dashed)
         texts = [[label_text(track, parts) for parts in self._labels] for track in shown]
         colors = [self._color(track) for track in shown]
