@@ -26,6 +26,7 @@ from vdet.pages.batch import VideoFacts, write_index
 from vdet.pages.render import jpeg_uri
 from vdet.pages.vehicles import VehicleRow
 from vdet.pages.video import VideoPage
+from vdet.track.track import State
 from vdet.traffic.records import VehicleRecord
 from vdet.traffic.speeds import Speeds
 
@@ -78,10 +79,11 @@ def video_page(vehicles: int = 1200, length: float = 3600.0) -> str:
         times, places = first + np.linspace(0, seconds, 40), np.stack([x, y], axis=1) / 30
         speeds = Speeds(times, places, np.full(40, 8 + 6 * rng.random()), np.full(40, 0.2), 0.01)
         box = Box.sized(860, 560, 80, 60)
+        states: Counter[State] = Counter({"detected": int(25 * seconds)})
         records.append(
             VehicleRecord(
                 *(number, WIDTH, first, first + seconds, box, seconds),
-                states=Counter(detected=int(25 * seconds)),
+                states=states,
                 path=list(zip(x.tolist(), y.tolist(), strict=True)),
                 followed=[(first, first + seconds)],
                 speeds=speeds,
