@@ -56,7 +56,8 @@ def detect_image(
     are printed: class, score, and box in pixels, as x, y, width and height.
     """
     settings = choice.read()
-    options.warn_of_lanes(settings)
+    if settings.lack_of_metres:
+        log.warning("%s", settings.lack_of_metres)
     from vdet.detect.factory import load_detector
     from vdet.regions import check_masks
     from vdet.run.pictures import PictureSearch, find_images, plan_pictures, run_pictures

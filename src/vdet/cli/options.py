@@ -4,7 +4,6 @@ A *bundle* adds several options to a command, which gets their values as one arg
 """
 
 import json
-import logging
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields
@@ -42,7 +41,6 @@ RATE = click.FloatRange(min=0, min_open=True)
 SHARE = click.FloatRange(0, 1)
 TIME_FORM = "[[HH:]MM:]SS"
 
-log = logging.getLogger("vdet")
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -250,12 +248,6 @@ class SettingsChoice:
         if settings.regions:
             raise ConfigError("regions: this command uses whole frames; remove the regions")
         return settings
-
-
-def warn_of_lanes(settings: "Settings") -> None:
-    """Warn if the lane is looked for with a camera that is not described."""
-    if settings.lanes.enabled and (missing := settings.missing_for_metres):
-        log.warning("lanes: nothing is given in metres without %s", ", ".join(missing))
 
 
 def settings_options(example: str, *more: Callable[..., Any]) -> Callable[[F], F]:

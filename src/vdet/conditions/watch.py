@@ -76,9 +76,8 @@ class Conditions:
     def _of_settings(self) -> list[Finding]:
         """Return what the settings and the size of the frames make doubtful."""
         found, settings = [], self._settings
-        if settings.lanes.enabled and (missing := settings.missing_for_metres):
-            text = f"lanes: nothing is given in metres without {', '.join(missing)}"
-            found.append(Finding("lane-geometry", text))
+        if settings.lack_of_metres:
+            found.append(Finding("lane-geometry", settings.lack_of_metres))
         if self._unknown:
             text = f"detector.classes: the network does not know {', '.join(self._unknown)}"
             found.append(Finding("classes", text))

@@ -241,10 +241,12 @@ class Settings(Section):
         return self.model_copy(update={"regions": regions, "detector": detector})
 
     @property
-    def missing_for_metres(self) -> tuple[str, ...]:
-        """The keys that are not given, and without which the lane has no metres."""
+    def lack_of_metres(self) -> str | None:
+        """A sentence that says what is missing, where lanes are looked for without a camera."""
         needed = {"camera.lens": self.camera.lens, "lanes.metres": self.lanes.metres}
-        return tuple(key for key, value in needed.items() if value is None)
+        missing = ", ".join(key for key, value in needed.items() if value is None)
+        is_lacking = self.lanes.enabled and bool(missing)
+        return f"lanes: nothing is given in metres without {missing}" if is_lacking else None
 
     def __hash__(self) -> int:  # some fields are dictionaries
         return hash(self.model_dump_json())

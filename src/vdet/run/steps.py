@@ -89,7 +89,7 @@ def make_steps(context: StepContext, others: Sequence[Step] = ()) -> list[Step]:
         from vdet.lanes.road import RoadFinder
 
         roads = RoadFinder(settings.camera.lens, settings.lanes, width, height)
-        has_metres = not settings.missing_for_metres
+        has_metres = settings.lack_of_metres is None
         steps.append(LaneStep(roads, settings.detector.foot, has_metres=has_metres))
     if settings.regions:
         from vdet.regions import Regions
