@@ -7,28 +7,30 @@ A drawn road is seen from a pole. After `CHANGE` seconds the camera shakes or is
 dark, foggy or blurred, or some vehicles are hidden from the tracker; the others have true boxes.
 """
 
+import json
 import sys
-from collections.abc import Callable, Iterator
-from dataclasses import astuple, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
 import numpy as np
 from sklearn.linear_model import LogisticRegression
 
-from vdet.boxes import Box, Boxes, Float64Array, Image
+from vdet.boxes import Box, Boxes, Float64Array, Image, Int64Array
+from vdet.conditions import visibility
 from vdet.conditions.finding import Finding
 from vdet.conditions.visibility import Sight
-from vdet.conditions.watch import Conditions, small_luma
+from vdet.conditions.watch import Conditions, halved, small_luma
 from vdet.config.loading import load_settings
 from vdet.config.places import LineSettings, TrafficSettings
 from vdet.config.schema import Settings
 from vdet.detect.factory import load_detector
 from vdet.detect.onnx.detector import SHIPPED, trained_on
+from vdet.detect.protocol import DetectorModel
 from vdet.labels.reading import read_labelled_pictures
 from vdet.media import Picture
 from vdet.media.images import read_image
-from vdet.run.pictures import PictureSearch
 from vdet.synthetic.random_scenes import pole_scene
 from vdet.synthetic.render import Renderer
 from vdet.synthetic.scene import Scene
@@ -57,8 +59,13 @@ _SMALLEST = 0.025
 """Width of vehicles that are counted in pictures, as a fraction of the picture's."""
 _FOUND = 0.45
 """Least intersection over union of a vehicle that was found."""
-_MOST = 150
-"""Pictures of a set that are searched."""
+_MOST = {True: 16, False: 32}
+"""Pictures of a set that are searched: of one that the network has learnt, and of others."""
+_CHANGES = "drops", "night", "drops", "fog", "drops", "blur"
+"""How pictures are changed in turn; other sets than those learnt show real dark, fog and blur."""
+_LEARNT = 0.5
+"""By how much the logarithm of the odds to find a vehicle is higher in sets that a network has
+learnt, where there are no others to measure it by."""
 
 
 class Changed:
@@ -107,7 +114,7 @@ def _change(kind: str, rng: np.random.Generator) -> Callable[[Image, float], Ima
     """Return a function that changes an image at a time."""
     grey, veil = rng.uniform(150, 210), rng.uniform(0.7, 0.9)
     gain, gamma = rng.uniform(0.15, 0.35), rng.uniform(1.3, 2.0)
-    sigma = rng.uniform(6, 10)
+    sigma, seed = rng.uniform(0.005, 0.008), int(rng.integers(1000))
     far, phase, turn = rng.uniform(0.02, 0.05), rng.uniform(0, 2 * np.pi, 3), rng.uniform(-2, 2)
 
     def moved(image: Image, x: float, y: float, degrees: float) -> Image:
@@ -128,10 +135,50 @@ def _change(kind: str, rng: np.random.Generator) -> Callable[[Image, float], Ima
         "shaken": shaken,
         "bumped": bumped,
         "night": lambda image, _: np.asarray((image / 255) ** gamma * gain * 255, np.uint8),
-        "fog": lambda image, _: np.asarray(image * (1 - veil) + grey * veil, np.uint8),
-        "blur": lambda image, _: np.asarray(cv2.GaussianBlur(image, (0, 0), sigma)),
+        "fog": lambda image, _: _in_fog(image, grey, veil),
+        "blur": lambda image, _: np.asarray(
+            cv2.GaussianBlur(image, (0, 0), sigma * image.shape[1])
+        ),
+        "drops": lambda image, _: with_drops(image, seed),
     }
     return changes.get(kind, lambda image, _: image)
+
+
+def _in_fog(image: Image, grey: float, veil: float) -> Image:
+    """Soften an image and blend it with grey: all that is far, and less of what is near."""
+    soft = cv2.GaussianBlur(image, (0, 0), 0.002 * image.shape[1])
+    part = veil * np.linspace(1.1, 0.9, len(image))[:, np.newaxis, np.newaxis]
+    return np.asarray(soft * (1 - part) + grey * part, np.uint8)
+
+
+def with_drops(image: Image, seed: int) -> Image:
+    """Draw drops on the lens: each shows all that is behind it, small and upside down."""
+    rng = np.random.default_rng(seed)
+    height, width = image.shape[:2]
+    veil, far, largest = rng.uniform(0, 0.3), rng.uniform(0.0006, 0.003), rng.uniform(0.006, 0.03)
+    behind = cv2.GaussianBlur(image, (0, 0), far * width) * (1 - veil) + veil * 1.4 * image.mean()
+    y, x = np.mgrid[:height, :width].astype(np.float32)
+    from_x, from_y, shade, alpha = x.copy(), y.copy(), np.ones_like(x), np.zeros_like(x)
+    for _ in range(int(60 * 25 ** rng.random())):
+        radius, zoom = width * (0.002 + largest * rng.random() ** 3), rng.uniform(4, 12)
+        tall = radius * rng.uniform(0.9, 1.6)
+        x0, y0 = rng.uniform(0, width), rng.uniform(0, height)
+        part = np.s_[
+            max(0, int(y0 - tall)) : int(y0 + tall) + 2,
+            max(0, int(x0 - radius)) : int(x0 + radius) + 2,
+        ]
+        off = ((x[part] - x0) / radius) ** 2 + ((y[part] - y0) / tall) ** 2
+        inside = off < 1
+        from_x[part][inside] = (x0 - (x[part] - x0) * zoom)[inside]
+        from_y[part][inside] = (y0 - (y[part] - y0) * zoom)[inside]
+        shade[part][inside] = (1.15 - 0.6 * off**2)[inside]
+        alpha[part] = np.maximum(alpha[part], np.clip(1.5 * (1 - off), 0, 1))
+    soft = cv2.GaussianBlur(image, (0, 0), 0.006 * width)
+    border = cv2.BORDER_REFLECT
+    small = cv2.remap(soft, from_x, from_y, cv2.INTER_LINEAR, borderMode=border)
+    alpha = cv2.GaussianBlur(alpha, (0, 0), 0.6)[..., np.newaxis]
+    shown = behind * (1 - alpha) + small * shade[..., np.newaxis] * alpha
+    return np.asarray(np.clip(shown, 0, 255), np.uint8)
 
 
 def compare_drawn() -> None:
@@ -145,66 +192,120 @@ def compare_drawn() -> None:
         print(f"{kind:10} {count} of {_SEEDS}")
 
 
+@dataclass(frozen=True, slots=True)
+class Look:
+    """A picture of a set, as it is or changed: what one sees, the vehicles, and those found."""
+
+    name: str
+    is_seen: bool
+    change: str
+    sight: Sight
+    vehicles: int
+    found: int
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """What the recall depends on."""
+        return *self.sight.looks, self.sight.weak, self.sight.sure
+
+
 def measure_pictures(roads: Path) -> None:
-    """Print the recall by sight in sets that the network has not seen, and the weights.
+    """Write the weights of `visibility`, and print what the other sets tell of each set.
 
-    Each of these sets is predicted from all others, and from the sets that the network has seen:
-    as they are, and in the dark, in fog and blurred. What it has seen has an offset of its own.
+    Pictures are searched as frames of a video, as they are and changed: see `_CHANGES`.
     """
-    settings = load_settings(assignments=["detector.min_score_still=0.1"])
-    search = PictureSearch(load_detector(settings.detector), settings)
-    seen = trained_on(SHIPPED)
-    rows = []
-    for path in sorted(item for item in roads.iterdir() if item.is_dir()):
-        rows += [(path.name, *row) for row in _measured(path, search, altered=path.name in seen)]
-    names = np.array([row[0] for row in rows])
-    is_seen = np.isin(names, seen)
-    counts = np.array([row[2:] for row in rows], np.float64)
-    features = np.array([_features(row[1]) for row in rows])
-    features = np.column_stack([features, is_seen])
-    predicted = np.zeros(len(rows))
-    for name in set(names[~is_seen]):
-        model = _fit(features[names != name], counts[names != name])
-        predicted[names == name] = model.predict_proba(features[names == name])[:, 1]
-    codes = np.array([row[1].code or "clear" for row in rows])
+    settings = load_settings().detector
+    model, seen = load_detector(settings), trained_on(SHIPPED)
+    sets = sorted(item for item in roads.iterdir() if item.is_dir())
+    looks = [look for path in sets for look in _measured(path, model, is_seen=path.name in seen)]
+    weights = {"recall": _fit_recall(looks), "drops": _fit_drops(looks)}
+    text = json.dumps({name: values.round(3).tolist() for name, values in weights.items()})
+    Path(visibility.__file__).with_name("weights.json").write_text(f"{text}\n", encoding="utf-8")
+    visibility.read_weights.cache_clear()
+    recalls, drops = [], []
+    for path in sets:
+        own = [look for look in looks if look.name == path.name]
+        others = [look for look in looks if look.name != path.name]
+        by_recall, by_drops = _fit_recall(others), _fit_drops(others)
+        recalls += [_probability(by_recall, look.values) for look in own]
+        drops += [_probability(by_drops, look.sight.looks) for look in own]
+    _print_recall(looks, recalls)
+    _print_drops(looks, drops)
+
+
+def _print_recall(looks: Sequence[Look], recalls: Sequence[float]) -> None:
+    """Print the recall by sight, of sets that the network has not learnt if there are any."""
+    has_new = not all(look.is_seen for look in looks)
+    codes = [look.sight.code or "clear" for look in looks]
     for code in sorted(set(codes)):
-        rows_of = (codes == code) & ~is_seen
-        every, found = counts[rows_of].T
-        reported = predicted[rows_of]
+        rows = [
+            (recall, look.found / look.vehicles, look.vehicles)
+            for look, recall, own in zip(looks, recalls, codes, strict=True)
+            if own == code and not (has_new and look.is_seen) and look.change in ("", code)
+        ]
+        if rows:
+            reported, true, number = np.array(rows).T
+            of_all = np.average(reported, weights=number), np.average(true, weights=number)
+            print(
+                f"{code}: {len(rows)} pictures, {number.sum():.0f} vehicles; by picture: reported "
+                f"{reported.mean():.2f}, true {true.mean():.2f}; by vehicle: reported "
+                f"{of_all[0]:.2f}, true {of_all[1]:.2f}"
+            )
+
+
+def _print_drops(looks: Sequence[Look], drops: Sequence[float]) -> None:
+    """Print how often drops are reported in each set, where it is not dark, hazy or blurred."""
+    reported: dict[tuple[str, str], list[bool]] = {}
+    for look, chance in zip(looks, drops, strict=True):
+        if look.change in ("", "drops") and look.sight.dim() is None:
+            is_reported = chance > visibility.LIKELY
+            for name in (look.name, "all sets"):
+                reported.setdefault((name, look.change), []).append(is_reported)
+    for name in dict.fromkeys(name for name, _ in reported):
+        without, drawn = reported.get((name, ""), []), reported.get((name, "drops"), [])
         print(
-            f"{code}: {len(every)} pictures, {every.sum():.0f} vehicles; by picture: reported "
-            f"{reported.mean():.2f}, true {np.mean(found / every):.2f}; by vehicle: reported "
-            f"{(reported * every).sum() / every.sum():.2f}, true {found.sum() / every.sum():.2f}"
+            f"{name}: drops in {sum(without)} of {len(without)}, drawn {sum(drawn)} of {len(drawn)}"
         )
-    whole = _fit(features, counts)
-    print("weights", whole.coef_[0][:-1].round(2).tolist(), "bias", whole.intercept_.round(2))
 
 
-def _features(sight: Sight) -> Float64Array:
-    brightness, contrast, sharpness, weak, sure = astuple(sight)
-    seen = np.log(np.maximum((brightness + 5, contrast, sharpness), 0.05))
-    return np.array([*seen, weak, sure])
+def _fit_recall(looks: Sequence[Look]) -> Float64Array:
+    """Return the weights of the fraction of vehicles that are found, and the bias.
 
-
-def _fit(features: Float64Array, counts: Float64Array) -> LogisticRegression:
-    """Fit the fraction of vehicles that are found; `counts` are all, and those found."""
-    every, found = counts.T
-    usual = np.minimum(1, 6 / every)  # a picture full of vehicles does not outweigh the others
-    weights = np.concatenate([found * usual, (every - found) * usual])
-    labels = np.repeat([1, 0], len(every))
-    model = LogisticRegression(C=10, max_iter=2000)
-    return model.fit(np.vstack([features, features]), labels, sample_weight=weights)
-
-
-def _measured(
-    path: Path, search: PictureSearch, *, altered: bool
-) -> Iterator[tuple[Sight, int, int]]:
-    """Yield the sight of each picture of a set with vehicles, their number, and how many found.
-
-    With `altered`, each is measured a second time, changed: dark, foggy and blurred in turn.
+    What the network has learnt has an offset of its own.
     """
+    values = np.array([(*look.values, look.is_seen) for look in looks], np.float64)
+    every, found = np.array([(look.vehicles, look.found) for look in looks], np.float64).T
+    usual = np.minimum(1, 6 / every)  # a picture full of vehicles does not outweigh the others
+    labels = np.repeat([1, 0], len(every))
+    shares = np.concatenate([found * usual, (every - found) * usual])
+    *weights, learnt, bias = _fit(np.vstack([values, values]), labels, shares)
+    if values[:, -1].all():  # nothing tells how much less is found elsewhere
+        bias += learnt - _LEARNT
+    return np.array([*weights, bias])
+
+
+def _fit_drops(looks: Sequence[Look]) -> Float64Array:
+    """Return the weights of drops on the lens, and the bias, where one sees well without."""
+    used = [look for look in looks if look.change in ("", "drops") and look.sight.dim(1.2) is None]
+    values = np.array([look.sight.looks for look in used])
+    labels = np.array([look.change == "drops" for look in used], int)
+    number = np.bincount(labels)
+    return _fit(values, labels, 1 / number[labels] * len(labels))
+
+
+def _fit(values: Float64Array, labels: Int64Array, shares: Float64Array) -> Float64Array:
+    model = LogisticRegression(C=10, max_iter=5000).fit(values, labels, sample_weight=shares)
+    return np.array([*model.coef_[0], model.intercept_[0]])
+
+
+def _probability(weights: Float64Array, values: Sequence[float]) -> float:
+    return float(1 / (1 + np.exp(-np.dot(weights, (*values, 1.0)))))
+
+
+def _measured(path: Path, model: DetectorModel, *, is_seen: bool) -> Iterator[Look]:
+    """Yield each picture of a set that has vehicles, and the same changed."""
     pictures = read_labelled_pictures(path).pictures
-    for number, labelled in enumerate(pictures[:: max(1, len(pictures) // _MOST)]):
+    for number, labelled in enumerate(pictures[:: max(1, len(pictures) // _MOST[is_seen])]):
         image = read_image(labelled.path)
         truth = [
             Box(*label.box)
@@ -215,14 +316,19 @@ def _measured(
         ]
         if not truth:
             continue
-        kind = ("night", "fog", "blur")[number % 3]
-        change = _change(kind, np.random.default_rng(number))
-        for shown in (image, change(image, 0.0))[: 1 + altered]:
-            found = search.detect(labelled.path, shown).detections
-            scores = np.array([item.score for item in found], np.float64)
-            sure = [item.box for item in found if item.score >= 0.4]
+        change = _CHANGES[number % len(_CHANGES)]
+        for how in ("", change) if is_seen or change == "drops" else ("",):
+            shown = _change(how, np.random.default_rng(number))(image, 0.0)
+            picture = Picture(np.ascontiguousarray(shown))
+            search = model.for_video(picture.width, picture.height, [shown])
+            boxes = search.detect(search.search(picture, 0))
+            scores = np.array([item.score for item in boxes], np.float64)
+            sure = [item.box for item in boxes if item.score >= 0.4]
             hits = sum(any(_iou(box, other) >= _FOUND for other in sure) for box in truth)
-            yield Sight.of(small_luma(Picture(shown)), scores), len(truth), hits
+            plane = small_luma(picture)
+            sight = Sight.of(plane, halved(plane), scores)
+            code = {"night": "dark", "fog": "haze"}.get(how, how)
+            yield Look(path.name, is_seen, code, sight, len(truth), hits)
 
 
 def _iou(box: Box, other: Box) -> float:

@@ -6,7 +6,7 @@ and drops on the lens do not.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 import cv2
@@ -40,32 +40,21 @@ _GAP = 5.0
 
 @dataclass(slots=True)
 class Mover:
-    """What moved: from when to when, from where to where (pixels of planes `width` pixels wide).
+    """What moved: when, where (pixels of a plane), and how large it was last.
 
     `is_found` says whether it came out of the box of a vehicle, or was found in the end.
     """
 
-    width: int
-    first: float
-    start: Point
-    place: Point
     is_found: bool
-    last: float = 0.0
     size: float = 0.0
-    planes: int = 0
-    way: float = 0.0
+    times: list[float] = field(default_factory=list)
+    places: list[Point] = field(default_factory=list)
 
-    def add(self, time: float, place: Point, size: float) -> None:
-        """Add the next plane that shows it."""
-        self.way += math.dist(self.place, place)
-        self.place, self.last, self.size = place, time, size
-        self.planes += 1
-
-    @property
-    def has_travelled(self) -> bool:
-        """Whether it moved on."""
-        minimum = max(_TRAVEL * self.width, self.size, _STRAIGHT * self.way)
-        return self.planes >= _PLANES and math.dist(self.start, self.place) >= minimum
+    def has_travelled(self, width: int) -> bool:
+        """Return whether it moved on, in planes of this width."""
+        way = sum(map(math.dist, self.places, self.places[1:]))
+        minimum = max(_TRAVEL * width, self.size, _STRAIGHT * way)
+        return len(self.places) >= _PLANES and math.dist(self.places[0], self.places[-1]) >= minimum
 
 
 @dataclass(slots=True)
@@ -109,12 +98,13 @@ class MotionWatch:
 
     def findings(self) -> list[Finding]:
         """Return how much of what travelled is not a vehicle that was found, and when."""
-        every = self._ended + [mover for mover in self._movers if mover.has_travelled]
-        left = [item for item in every if not item.is_found]
+        left = [item for item in self._ended + self._travelled(self._movers) if not item.is_found]
         fraction = len(left) / max(1, len(left) + len(self._driven))
         if len(left) < _FEWEST or fraction < _FRACTION:
             return []
-        spans = joined(sorted(time for item in left for time in (item.first, item.last)), _GAP)
+        spans = joined(
+            sorted(time for item in left for time in (item.times[0], item.times[-1])), _GAP
+        )
         text = (
             f"{fraction:.0%} of what moved is not a vehicle that was found, most {when(spans)}: "
             "it is hard to see, or of a kind that the detector does not look for"
@@ -125,17 +115,22 @@ class MotionWatch:
         """Continue the movers; `before` is where boxes were in the plane before."""
         left, going = list(self._movers), []
         for center, size in self._things(differs):
-            mover = min(left, key=lambda item: math.dist(item.place, center), default=None)
-            if mover and math.dist(mover.place, center) < _REACH * size:
+            mover = min(left, key=lambda item: math.dist(item.places[-1], center), default=None)
+            if mover and math.dist(mover.places[-1], center) < _REACH * size:
                 left.remove(mover)
             else:
-                mover = Mover(differs.shape[1], time, center, center, _is_in(center, before))
-            mover.add(time, center, size)
+                mover = Mover(_is_in(center, before))
+            mover.size = size
+            mover.times.append(time)
+            mover.places.append(center)
             going.append(mover)
         for mover in left:
-            mover.is_found |= _is_in(mover.place, self._covered)
-        self._ended += [item for item in left if item.has_travelled]
+            mover.is_found |= _is_in(mover.places[-1], self._covered)
+        self._ended += self._travelled(left)
         self._movers = going
+
+    def _travelled(self, movers: Iterable[Mover]) -> list[Mover]:
+        return [item for item in movers if item.has_travelled(self._covered.shape[1])]
 
     def _things(self, differs: Image) -> list[tuple[Point, float]]:
         """Return the middle and the size of what differs outside the boxes, the largest first."""

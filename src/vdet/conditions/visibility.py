@@ -1,16 +1,19 @@
 """How well one sees in the parts of a video, and what the shipped network finds in such pictures.
 
-`benchmarks/conditions.py` measures what it finds in pictures of many roads. The recall is fitted
-to how bright, contrasty and sharp they are, and to how sure the network is of what it finds.
+`benchmarks/conditions.py` measures what it finds in pictures of many roads, and writes the weights
+of two logistic regressions: of the recall, and of how likely there are drops on the lens.
 """
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
 
 import cv2
 import numpy as np
 
-from vdet.boxes import Float64Array, Image
+from vdet.boxes import Float32Array, Float64Array, Image
 from vdet.conditions.finding import Finding, Severity, joined, when
 from vdet.config.schema import Code
 
@@ -27,7 +30,7 @@ _DOUBTED = 0.5, 1.2
 _PLAIN = 1.0
 """Local contrast of a plane that shows nothing to be seen, grey levels."""
 _SHORTEST = 3.0
-"""Seconds of bad sight that are reported, or half of a shorter video; an underpass is shorter."""
+"""Seconds of bad sight from which it is reported; an underpass is shorter."""
 _GAP = 2.0
 """Seconds of good sight that end a span."""
 _AROUND = 2
@@ -36,31 +39,47 @@ _SURE = 0.4
 """Score of a vehicle that is shown."""
 _NOTED = 0.6
 """Recall from which bad sight is only noted."""
-_WEIGHTS = np.array([-0.11, 0.68, 1.83, -4.19, 3.34])
-_BIAS = -0.84
-"""Of the logarithms of brightness, contrast and sharpness, the weak fraction of all scores, and the
-mean of the others: fitted by `benchmarks/conditions.py`."""
+LIKELY = 0.9
+"""Probability of drops on the lens from which they are reported."""
+_TILES = 16, 9
+"""Parts of a plane in which it is more or less fine: columns, rows."""
 
 _WORDS: dict[Code, str] = {
     "dark": "it is dark",
     "haze": "contrast is low, as in fog or spray",
     "blur": "the picture is not sharp",
+    "drops": "there are drops, dirt or spray on the lens",
 }
 
 
 @dataclass(frozen=True, slots=True)
 class Sight:
-    """How well one sees in a plane; the first three are grey levels, or ratios of them."""
+    """How well one sees in a frame.
+
+    Attributes
+    ----------
+    brightness, contrast, sharpness
+        Of the part that shows a road: grey levels, and the fine contrast per coarse contrast.
+    texture
+        Logarithms of the finest and the next contrast, how even the finest is over the frame, and
+        how much edges have one direction. Drops are soft, everywhere, and of all directions.
+    weak, sure
+        Fraction of all scores that weak detections have, and the mean score of the others.
+    """
 
     brightness: float
     contrast: float
     sharpness: float
+    texture: tuple[float, ...]
     weak: float
     sure: float
 
     @classmethod
-    def of(cls, plane: Image, scores: Float64Array) -> "Sight":
-        """Measure a plane, uint8 `(h, w)`; `scores` are those of all detections in its frame."""
+    def of(cls, fine_plane: Image, plane: Image, scores: Float64Array) -> "Sight":
+        """Measure the planes of a frame, uint8 `(2h, 2w)` and `(h, w)`.
+
+        `scores` are those of all its detections.
+        """
         lower = plane[int(_TOP * len(plane)) :].astype(np.float32)
         squares = cv2.blur(lower * lower, (15, 15)) - cv2.blur(lower, (15, 15)) ** 2
         contrast = float(np.sqrt(np.maximum(squares, 0)).mean())
@@ -70,26 +89,67 @@ class Sight:
         is_sure = scores >= _SURE
         weak = float(scores[~is_sure].sum() / max(scores.sum(), 0.1))
         sure = float(scores[is_sure].mean()) if is_sure.any() else _SURE
-        return cls(float(lower.mean()), contrast, fine / max(coarse, 0.3), weak, sure)
+        sharpness, texture = fine / max(coarse, 0.3), _texture(fine_plane.astype(np.float32))
+        return cls(float(lower.mean()), contrast, sharpness, texture, weak, sure)
+
+    @property
+    def looks(self) -> tuple[float, ...]:
+        """What `weights.json` weighs of the picture alone."""
+        seen = np.log(np.maximum((self.brightness + 5, self.contrast, self.sharpness), 0.05))
+        return *seen.tolist(), *self.texture
 
     @property
     def code(self) -> Code | None:
         """Why one does not see well; None if one does."""
+        recall, factor = _DOUBTED
         if self.contrast < _PLAIN:
             return None
-        recall, factor = _DOUBTED
-        wide = factor if self.recall < recall else 1.0
-        if self.brightness < wide * _DARK:
-            return "dark"
-        if self.contrast < wide * _HAZY * (self.brightness + 5):
-            return "haze"
-        return "blur" if self.sharpness < wide * _BLURRED else None
+        drops: Code | None = "drops" if self.drops > LIKELY else None
+        return self.dim(factor if self.recall < recall else 1.0) or drops
+
+    def dim(self, factor: float = 1.0) -> Code | None:
+        """Return whether it is dark, hazy or blurred; a larger factor widens these limits."""
+        reasons: dict[Code, bool] = {
+            "dark": self.brightness < factor * _DARK,
+            "haze": self.contrast < factor * _HAZY * (self.brightness + 5),
+            "blur": self.sharpness < factor * _BLURRED,
+        }
+        return next((code for code, is_so in reasons.items() if is_so), None)
+
+    @property
+    def drops(self) -> float:
+        """How likely there are drops on the lens, 0 to 1, where it is not dark, hazy or blurred."""
+        return _probability("drops", self.looks)
 
     @property
     def recall(self) -> float:
         """The fraction of the vehicles that the shipped network finds in such pictures."""
-        seen = np.log(np.maximum((self.brightness + 5, self.contrast, self.sharpness), 0.05))
-        return float(1 / (1 + np.exp(-(_WEIGHTS @ (*seen, self.weak, self.sure) + _BIAS))))
+        return _probability("recall", (*self.looks, self.weak, self.sure))
+
+
+def _texture(pixels: Float32Array) -> tuple[float, ...]:
+    """Return `Sight.texture` of a plane."""
+    soft, softer, edges = (cv2.GaussianBlur(pixels, (0, 0), sigma) for sigma in (0.7, 1.4, 1.0))
+    fine = np.abs(pixels - soft)
+    few, many = np.quantile(cv2.resize(fine, _TILES, interpolation=cv2.INTER_AREA), (0.1, 0.75))
+    x, y = cv2.Sobel(edges, cv2.CV_32F, 1, 0), cv2.Sobel(edges, cv2.CV_32F, 0, 1)
+    xx, yy, xy = (cv2.blur(product, (9, 9)) for product in (x * x, y * y, x * y))
+    directed = np.hypot(xx - yy, 2 * xy) / (xx + yy + 1)  # coherence of the structure tensor
+    light = float(pixels.mean()) + 5
+    levels = (float(band.mean()) / light + 0.001 for band in (fine, np.abs(soft - softer)))
+    even = (few + 0.05) / (many + 0.05)
+    return *(float(np.log(level)) for level in (*levels, even)), float(directed.mean())
+
+
+@cache
+def read_weights() -> dict[str, list[float]]:
+    """Return the weights by what they tell; the last of each is the bias."""
+    weights = files("vdet.conditions").joinpath("weights.json").read_text(encoding="utf-8")
+    return dict(json.loads(weights))
+
+
+def _probability(name: str, values: Sequence[float]) -> float:
+    return float(1 / (1 + np.exp(-np.dot(read_weights()[name], (*values, 1.0)))))
 
 
 def findings(times: Sequence[float], sights: Sequence[Sight], *, is_shipped: bool) -> list[Finding]:

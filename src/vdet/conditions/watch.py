@@ -16,8 +16,8 @@ from vdet.track.track import Track
 
 _STEP = 0.24
 """Seconds between two planes."""
-_WIDTH = 160
-"""Of a plane, pixels."""
+_WIDTH = 320
+"""Of a plane, pixels; what moves is measured on planes of half of it."""
 _NARROW = 320
 """Width of frames that are smaller than any the detectors were measured on, pixels."""
 
@@ -50,15 +50,16 @@ class Conditions:
         """Add a frame that was searched, with its detections and the vehicles that are shown."""
         if self._times and time - self._times[-1] < _STEP:
             return
-        plane = small_luma(picture)
+        fine_plane = small_luma(picture)
+        plane = halved(fine_plane)
+        scores = np.array([item.score for item in found], np.float64)
+        self._sights.append(visibility.Sight.of(fine_plane, plane, scores))
         scale = plane.shape[1] / picture.width
         boxes = {track.id: _enlarged(track.box, scale) for track in tracks}
         self._times.append(time)
         if not self._camera.add(time, plane, boxes.values()):
             self._motion.reset()
         self._motion.add(time, plane, boxes)
-        scores = np.array([item.score for item in found], np.float64)
-        self._sights.append(visibility.Sight.of(plane, scores))
 
     def findings(self) -> tuple[Finding, ...]:
         """Return what was found out so far, but for what the settings leave out."""
@@ -85,6 +86,12 @@ class Conditions:
             text = f"frames are {self._width} pixels wide, fewer than detectors are measured on"
             found.append(Finding("small-frames", text, severity="note"))
         return found
+
+
+def halved(plane: Image) -> Image:
+    """Return a plane of half the width and height."""
+    half = cv2.resize(plane, (0, 0), fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
+    return np.asarray(half, np.uint8)
 
 
 def small_luma(picture: Picture) -> Image:

@@ -60,7 +60,7 @@ class LaneSettings(Section):
 
 
 Code = Literal[
-    "camera-moves", "camera-moved", "unexplained-motion", "dark", "haze", "blur",
+    "camera-moves", "camera-moved", "unexplained-motion", "dark", "haze", "blur", "drops",
     "lane-geometry", "classes", "small-frames",
 ]  # fmt: skip
 """What makes a result doubtful; docs/conditions.md explains each."""
@@ -71,7 +71,7 @@ class ConditionSettings(Section):
 
     ignore: tuple[Code, ...] = Field((), max_length=100)
     """Codes of findings to leave out: camera-moves, camera-moved, unexplained-motion, dark, haze,
-    blur, lane-geometry, classes, small-frames.
+    blur, drops, lane-geometry, classes, small-frames.
     """
 
 
