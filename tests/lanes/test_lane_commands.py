@@ -100,7 +100,7 @@ def files(
     write_image(made.bare, np.full((HEIGHT, WIDTH, 3), 90, np.uint8))
     save_camera(LENS, made.camera)
     settings = red_settings(settings_for(road.camera))
-    values = settings.model_dump(mode="json", exclude_none=True)
+    values = settings.model_dump(mode="json")
     made.settings.write_text(yaml.safe_dump(values), encoding="utf-8")
     save_model(red_finder(), made.model)
     return made
