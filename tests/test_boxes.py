@@ -141,8 +141,8 @@ class TestBoxes:
                 {"sides": [*SIDES[:2], [5, 5, 5, 9]]},
                 "sides: .* no area; must be x1 < x2 and y1 < y2",
             ),
-            ({"scores": [0, 1, 1.01]}, "scores: a score is not in 0 to 1"),
-            ({"classes": [0, 1, 2]}, "classes: an index that `names` does not have"),
+            ({"scores": [0, 1, 1.01]}, "scores: must be from 0 to 1"),
+            ({"classes": [0, 1, 2]}, "classes: an index is not in `names`"),
             ({"data": {"class_scores": [[1]] * 3}}, "class_scores: must have a column for each"),
         ],
     )

@@ -54,7 +54,7 @@ class TestMasks:
         ]  # fmt: skip
 
     def test_one_of_another_shape_is_refused(self, mask: dict[str, Any]) -> None:
-        with pytest.raises(ConfigError, match="has another shape than the frames"):
+        with pytest.raises(ConfigError, match="its aspect ratio differs from frames"):
             laid(mask, size=(320, 240))
 
     def test_one_that_is_no_picture_is_refused_before_any_work(self, tmp_path: Path) -> None:

@@ -64,13 +64,13 @@ def list_members(file: Path | IO[bytes]) -> list[str]:
 def _mistake(member: zipfile.ZipInfo, earlier: Mapping[str, None]) -> str | None:
     posix, windows = PurePosixPath(member.filename), PureWindowsPath(member.filename)
     if posix.is_absolute() or windows.drive or windows.root:
-        return "has an absolute name; make the archive again, with names relative to its top folder"
+        return "has an absolute name; create the archive again with relative names"
     if ".." in windows.parts:
-        return "has '..' in its name; make the archive again, with names relative to its top folder"
+        return "has '..' in its name; create the archive again with relative names"
     if stat.S_ISLNK(member.external_attr >> 16):
         return "is a symbolic link; put the file itself in its place"
     if member.filename in earlier:
-        return "is in it twice; keep one"
+        return "occurs twice; keep one"
     return None
 
 

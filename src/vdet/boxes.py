@@ -197,9 +197,9 @@ class Boxes:
         if (self.sides[:, 2:] <= self.sides[:, :2]).any():
             raise ValueError("sides: a box has no area; must be x1 < x2 and y1 < y2")
         if ((self.scores < 0) | (self.scores > 1)).any():
-            raise ValueError("scores: a score is not in 0 to 1")
+            raise ValueError("scores: must be from 0 to 1")
         if self.classes is not None and not np.isin(self.classes, range(len(names))).all():
-            raise ValueError("classes: an index that `names` does not have")
+            raise ValueError("classes: an index is not in `names`")
         if self.data.get("class_scores", np.empty((0, len(names)))).shape[1:] != (len(names),):
             raise ValueError("class_scores: must have a column for each of `names`")
 
@@ -306,7 +306,7 @@ def _column(
     if not column.size and 0 in shape:
         column = column.reshape(shape)
     if column.shape != shape:
-        raise ValueError(f"{name}: of shape {column.shape}, expected {shape}")
+        raise ValueError(f"{name}: has shape {column.shape}, expected {shape}")
     if not np.isfinite(column).all():
         raise ValueError(f"{name}: a value is not a finite number")
     column.flags.writeable = False

@@ -95,7 +95,7 @@ def run_demo(
 
     scene, pole, rng = demo_scene(seed), pole_scene(seed), np.random.default_rng(seed)
     middle = scene.frames / scene.rate / 2
-    announce("1/4 drawing two roads with vehicles …")
+    announce("1/4 drawing two synthetic roads with vehicles …")
     steps("drawing", None)
     draw(scene, folder / ROAD, folder / TRUTH)
     draw(pole, folder / POLE, folder / POLE_TRUTH)

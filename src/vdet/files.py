@@ -104,7 +104,9 @@ def _check_replaceable(path: Path) -> None:
     if is_input(path):
         raise OutputError(f"{path}: is the input itself; use another output")
     if not (path.is_file() or path.is_symlink()):
-        raise OutputError(f"{path}: is not a regular file, and is kept; use another output")
+        raise OutputError(
+            f"{path}: is not a regular file and will not be replaced; use another output"
+        )
 
 
 def make_folder(folder: Path) -> None:
@@ -247,7 +249,7 @@ def _add_name(path: Path, file: Path, undo: contextlib.ExitStack) -> None:
         os.link(file, path)
     except OSError:
         if os.path.lexists(path):
-            raise OutputError(f"{path}: has appeared during the run; use another output") from None
+            raise OutputError(f"{path}: appeared during the run; use another output") from None
         file.replace(path)  # a file system without hard links
 
 

@@ -86,7 +86,7 @@ def _read_mask(path: str, width: int, height: int) -> BoolArray:
         CameraSettings(size=(columns, rows)).check_frames(width, height)
     except ConfigError as error:
         raise ConfigError(
-            f"{path}: has another shape than the frames of {width}×{height}; draw it over one"
+            f"{path}: its aspect ratio differs from frames of {width}×{height}; draw it on a frame"
         ) from error
     grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
     return np.asarray(cv2.resize(grey, (width, height), interpolation=cv2.INTER_NEAREST) >= _WHITE)

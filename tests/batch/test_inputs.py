@@ -99,7 +99,7 @@ class TestPictures:
         pictures(Path("drives/one"), 0, 2, 3)
         pictures(Path("drives/two"), 0, 1)
         assert [place for _, place in found("drives")] == ["two.png"]
-        assert "drives/one: picture 1 is missing; put a copy" in caplog.text
+        assert "drives/one: image 1 is missing; copy image" in caplog.text
 
     def test_a_pattern_of_numbered_pictures_is_a_video_with_the_name_of_the_folder(self) -> None:
         pictures(Path("frames"), 3, 4)

@@ -158,7 +158,7 @@ class TestJobs:
         record("clips/a.mp4", "out/a.csv")
         change()
         os.utime("clips/a.mp4", (0, 0))
-        with pytest.raises(BatchError, match=r"^out/a\.csv: was changed since vdet wrote it"):
+        with pytest.raises(BatchError, match=r"^out/a\.csv: has changed since vdet wrote it"):
             self.tracks_alone()
 
     def tracks_alone(self) -> Plan:
@@ -173,7 +173,7 @@ class TestJobs:
 @pytest.mark.usefixtures("clips")
 class TestRefused:
     def test_two_inputs_of_one_name(self) -> None:
-        words = r"^clips/a\.mp4 and clips/day/a\.mp4: both would become out/a\.mp4"
+        words = r"^clips/a\.mp4 and clips/day/a\.mp4: both would be written to out/a\.mp4"
         with pytest.raises(BatchError, match=words):
             plan("clips/a.mp4", "clips/day/a.mp4")
 
@@ -185,14 +185,14 @@ class TestRefused:
 
     @pytest.mark.parametrize("folder", ["clips", "clips/out", "clips/day", "."])
     def test_inputs_and_outputs_in_one_another(self, folder: str) -> None:
-        with pytest.raises(BatchError, match=r"lies in the (input|output folder)"):
+        with pytest.raises(BatchError, match=r"is inside the (input|output folder)"):
             plan("clips", folder=folder)
 
     def test_outputs_that_a_pattern_matches(self) -> None:
         assert plan("clips/*/*.mp4", folder="clips/found").runs
         Path("clips/found").mkdir()
         Path("clips/found/a.mp4").touch()
-        with pytest.raises(BatchError, match=r"^clips/found/a.mp4: lies in the output folder"):
+        with pytest.raises(BatchError, match=r"^clips/found/a.mp4: is inside the output folder"):
             plan("clips/*/*.mp4", folder="clips/found")
 
     def test_an_output_that_is_an_input(self) -> None:
@@ -237,7 +237,9 @@ class TestTotals:
 
     def test_a_video_must_not_have_its_name(self) -> None:
         Path("clips/all.mp4").write_bytes(b"clip")
-        with pytest.raises(BatchError, match=r"clips/all\.mp4: both would become out/all\.csv"):
+        with pytest.raises(
+            BatchError, match=r"clips/all\.mp4: both would be written to out/all\.csv"
+        ):
             plan_outputs("clips", suffixes={"tracks": ".csv"})
 
 
@@ -276,7 +278,7 @@ class TestFolders:
     def test_one_that_is_gone_is_made_again_and_one_that_was_changed_is_kept(self) -> None:
         self.record()
         Path("out/a.stages/3-boxes.png").write_bytes(b"picture")
-        with pytest.raises(BatchError, match=r"out/a\.stages: was changed since vdet wrote it"):
+        with pytest.raises(BatchError, match=r"out/a\.stages: has changed since vdet wrote it"):
             self.plan(skip_existing=True)
         Path("out/a.stages").rename("elsewhere")
         assert not self.plan(skip_existing=True).runs[0].overwrite

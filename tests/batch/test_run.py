@@ -104,7 +104,7 @@ def test_outputs_of_which_a_kill_left_some_are_made_again(clips: Path, plan: Mak
     assert plan(skip_existing=True).runs[0].overwrite
     assert process_file(first, folder=out).error is None
     first.outputs[1].path.write_text("corrected by hand")
-    with pytest.raises(BatchError, match=r"c\.cars\.json: was changed since vdet wrote it"):
+    with pytest.raises(BatchError, match=r"c\.cars\.json: has changed since vdet wrote it"):
         plan(skip_existing=True)
 
 
@@ -124,7 +124,7 @@ def test_a_foreign_file_is_kept_also_when_a_process_was_killed(
     path = first.outputs[0].path
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text("theirs")
-    words = "was changed since vdet wrote it" if has_note else "has appeared during the run"
+    words = "has changed since vdet wrote it" if has_note else "appeared during the run"
     assert f"{path}: {words}" in str(process_file(first, folder=out).error)
     assert path.read_text() == "theirs"
 

@@ -29,7 +29,7 @@ def test_makes_a_camera_of_a_folder_and_names_what_it_skipped(
     camera = load_settings([tmp_path / "camera.yaml"]).camera.lens
     assert camera is not None
     assert camera.matrix[0][0] == pytest.approx(560, rel=0.01)
-    assert "wall.png: not used: no board of 9×6 inner corners is seen" in result.err
+    assert "wall.png: not used: no board of 9×6 inner corners found" in result.err
     assert "640×480, focal length 56" in result.out
     assert "6 of 7 photographs used" in result.out
 

@@ -177,7 +177,7 @@ def test_shares_need_the_size_of_the_frames(run: Run, tmp_path: Path) -> None:
         ),
         (["t.csv", "-c", "l.yaml", "--counts", "c.txt"], 1, "must end in .csv, .json"),
         (["t.csv", "-c", "l.yaml", "--counts", "t.csv"], 1, "is the input itself"),
-        (["t.txt", "-c", "l.yaml"], 1, "has no times; pass the frames per second"),
+        (["t.txt", "-c", "l.yaml"], 1, "has no times; pass the frame rate"),
         (["none.csv", "-c", "l.yaml"], 1, "none.csv"),
         (
             ["t.csv", "-c", "short.yaml"],

@@ -95,7 +95,7 @@ def test_one_bad_picture_does_not_stop_the_others(
     out = tmp_path / "out"
     result = run("detect-image", picture.parent, "-o", out, "--model", model_path, *FEW_WINDOWS)
     assert result.code == 3
-    assert "a.png: is not a picture, or is damaged" in result.err
+    assert "a.png: is not an image, or is damaged" in result.err
     assert [p.name for p in out.iterdir()] == ["road.png"]
 
 
@@ -104,7 +104,7 @@ def test_if_no_picture_works_the_exit_code_is_1(run: Run, tmp_path: Path) -> Non
         (tmp_path / name).write_bytes(b"text")
     result = run("detect-image", tmp_path, "--json", "-")
     assert result.code == 1
-    assert result.err.count("is not a picture") == 2
+    assert result.err.count("is not an image") == 2
 
 
 def test_labels_of_a_folder_and_those_below_are_read_by_eval_images(

@@ -118,7 +118,7 @@ def test_a_picture_of_every_stage_of_one_moment(
         (("--tracks", "t.csv"), "pass one OUT, or --no-video"),
         (("out.mp4", "--no-video"), "pass one OUT, or --no-video"),
         (("--no-video",), "no output; add one"),
-        (("out.mp4", "--stages", "x"), "--stages and --at go together"),
+        (("out.mp4", "--stages", "x"), "--stages and --at must be used together"),
         (("out.mp4", "--start", "5", "--end", "5"), "--end must be later"),
         (("out.mp4", "--start", "soon"), "is not a time"),
         (("out.mp4", "--start", "1:2:3:4"), "is not a time"),

@@ -104,10 +104,10 @@ def test_the_picture_for_a_report_has_lines_flows_and_numbers(run: Run) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ((), "there is nothing to write"),
+        ((), "no output; use -o FILE"),
         (("-o", "a.txt"), "pages must end in .html"),
         (("--propose", "a.txt"), "settings must end in .yaml"),
-        (("-o", "a.jpg"), "a.jpg: has nothing to show"),
+        (("-o", "a.jpg"), "a.jpg: nothing to draw"),
         (("-o", "lines.html", "-c", "wide.yaml"), "whose shape"),
         (("--propose", "a.yaml", "--tracks-from", "few.csv"), "no stream has enough vehicles"),
         (("-o", "frame.png", "-c", "lines.yaml", "--overwrite"), "frame.png"),

@@ -94,7 +94,7 @@ def test_several_sets_a_table_and_a_page(
     ("arguments", "code", "words"),
     [
         ((), 2, "Missing argument 'DATA...'"),
-        (("none",), 1, "none: labelled pictures not found"),
+        (("none",), 1, "none: labelled images not found"),
         (("set", "--min-width", "2"), 2, "2.0 is not in the range"),
         (("set", "--page", "set/a.png"), 1, "the folder set/a.png is not a folder"),
         (("set", "--set", "detector.kind=sonar"), 1, "sonar: unknown detector"),

@@ -45,7 +45,7 @@ def test_writes_a_page(run: Run, found: Path, truth: Path, tmp_path: Path) -> No
     result = run("eval", "tracks", found, truth, "--page", tmp_path / "page")
     assert result.code == 0, result.err
     html = (tmp_path / "page" / "page.html").read_text()
-    for words in ("largest mistakes in", "missed vehicle 1", "frames 1–10 compared"):
+    for words in ("worst errors in", "missed vehicle 1", "frames 1–10 compared"):
         assert words in html
     assert f"compared with {truth} by vdet {vdet.__version__}" in html
 

@@ -57,7 +57,7 @@ def test_several_videos_and_a_sweep(
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
-        ((), 2, "1 videos need as many --truth, not 0"),
+        ((), 2, "pass one --truth for each video (videos: 1, truths: 0)"),
         (("--truth", "gt.txt", "--truth", "gt.txt"), 2, "not 2"),
         (("--truth", "none.txt"), 1, "none.txt: cannot be read"),
         (

@@ -63,7 +63,7 @@ def test_bad_points_are_refused_in_words(run: Run) -> None:
     for command in (("info",), ("count", "tracks.csv")):
         result = run(*command, "-c", "gate.yaml")
         assert result.code == 1
-        assert "camera.ground: the horizon would run between them" in result.err
+        assert "camera.ground: the horizon is between the points" in result.err
 
 
 def test_counts_have_the_speeds_at_their_lines(run: Run) -> None:

@@ -52,7 +52,7 @@ def test_numbers_and_page_appear_together_or_not_at_all(tmp_path: Path) -> None:
     with pytest.raises(VideoError):
         results.print([], {}, fail)
     assert not list(tmp_path.iterdir())
-    with pytest.raises(OutputError, match="has appeared during the run"):
+    with pytest.raises(OutputError, match="appeared during the run"):
         results.print([], {}, write_meanwhile)
     assert [item.name for item in tmp_path.iterdir()] == ["page"]
     assert (tmp_path / "page" / "page.html").read_text() == "of another"

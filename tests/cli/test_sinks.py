@@ -169,7 +169,7 @@ class TestDetectImage:
         write_image(twin, road())
         several = run("detect-image", twin, picture, *sink, "--overwrite")
         assert several.code == 1
-        assert "a.png: takes one picture; for several give a folder" in several.err
+        assert "a.png: is for one image; for several, use a folder" in several.err
         assert (out / "a.png").read_bytes() == before
 
 
@@ -196,7 +196,7 @@ class TestBatch:
             (("--sink", "json=.json"), 2, "json: cannot be written with -d"),
             (("--sink", "stages=.png", "--at", "1"), 2, "stages: cannot be written with -d"),
             (("--sink", "tallies=.csv"), 1, f"tallies: unknown sink; {KNOWN}"),
-            (("--tracks", ".csv", "--sink", "tracks=.csv"), 1, "both would become"),
+            (("--tracks", ".csv", "--sink", "tracks=.csv"), 1, "both would be written to"),
         ],
     )
     def test_what_cannot_be_is_refused_before_any_work(

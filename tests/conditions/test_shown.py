@@ -12,7 +12,7 @@ from red_cars import red_settings
 from running import write_drive
 from vdet.config.rendering import render
 
-TEXT = "lanes: nothing is given in metres without camera.lens, lanes.metres"
+TEXT = "lanes: no values in metres without camera.lens, lanes.metres"
 FINDING: dict[str, Any] = {
     "code": "lane-geometry", "severity": "warning", "text": TEXT, "times": [], "value": None,
 }  # fmt: skip

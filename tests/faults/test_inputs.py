@@ -87,7 +87,7 @@ def test_a_fifo_in_a_set_of_labelled_pictures_is_not_waited_for(tmp_path: Path) 
 def test_a_fifo_where_a_coco_file_may_be_is_not_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "labels.json")
     for path in (tmp_path, tmp_path / "labels.json"):
-        with pytest.raises(VdetError, match="labelled pictures not found"):
+        with pytest.raises(VdetError, match="labelled images not found"):
             read_labelled_pictures(path)
 
 

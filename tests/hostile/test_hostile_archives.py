@@ -86,10 +86,10 @@ BAD_NAMES = {
     "//host/vehicles/x.png": "has an absolute name",
     "\\\\host\\vehicles\\x.png": "has an absolute name",
     "C:\\vehicles\\x.png": "has an absolute name",
-    "vehicles/far/1.png": "is in it twice",
+    "vehicles/far/1.png": "occurs twice",
 }
-ALL_BROKEN = ": is not a readable picture"
-SOME_BROKEN = ": is not a readable picture"
+ALL_BROKEN = ": is not a readable image"
+SOME_BROKEN = ": is not a readable image"
 WICKED = BAD_NAMES | {
     "a symbolic link": "its member vehicles/far/x.png is a symbolic link",
     "a link to a folder": "its member vehicles/x is a symbolic link",
@@ -99,13 +99,13 @@ WICKED = BAD_NAMES | {
     "unpacked in one go": ALL_BROKEN,
     "other sizes than claimed": ALL_BROKEN,
     "bombs": SOME_BROKEN,
-    "bombs that claim to be small": ": is not a readable picture",
+    "bombs that claim to be small": ": is not a readable image",
     "pictures of 10¹⁰ pixels": SOME_BROKEN,
     "no pictures": SOME_BROKEN,
     "empty pictures": ALL_BROKEN,
-    "a set in a set": "no pictures in vehicles/",
-    "nothing": "no pictures in vehicles/",
-    "one class": "no pictures in non-vehicles/",
+    "a set in a set": "no images in vehicles/",
+    "nothing": "no images in vehicles/",
+    "one class": "no images in non-vehicles/",
 }
 """What is refused, and the words that say why."""
 

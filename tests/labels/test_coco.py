@@ -36,7 +36,7 @@ def changed(name: str, number: int, **values: object) -> bytes:
     [
         (b"{", ": is not JSON: parse error"),
         (changed("images", 1, id=1), ": is not COCO: an id of images or categories occurs twice"),
-        (changed("images", 1, frame_index=4), ": a frame_index occurs twice; several videos need"),
+        (changed("images", 1, frame_index=4), ": a frame_index occurs twice; use one file"),
         (changed("images", 1, time=0.15), ":images.1: frame 5 is at 0.15 s; times must"),
         (changed("images", 1, frame_index=-1), ": is not COCO: images.1.frame_index: Input should"),
         (changed("categories", 1, id=1), ": is not COCO: an id of images or categories occurs"),

@@ -40,7 +40,7 @@ def test_truth_can_be_read_as_tracks_without_its_ignore_regions(tmp_path: Path) 
         ("2.5,7,1,1,20,10,1,3,1", "'2.5' is not a whole number"),
         (
             "2,7,1,1,20,10,0.9,3,1",
-            "with nine columns, column 7 must be a flag, 0 or 1, but is 0.9; a file of",
+            "with nine columns, column 7 must be a flag, 0 or 1, but is 0.9; a results file",
         ),
     ],
 )

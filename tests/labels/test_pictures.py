@@ -109,7 +109,7 @@ def test_a_picture_of_another_size_than_its_labels_say_is_refused(
     image = read_labelled_pictures(tmp_path).pictures[0]
     assert image.read().shape == (HEIGHT, WIDTH, 3)
     write_pictures(image.path.parent, {"a": Labelled(HEIGHT, WIDTH)})
-    with pytest.raises(ImageError, match=r"a\.png: is 32×64, .* labels for 64×32"):
+    with pytest.raises(ImageError, match=r"a\.png: is 32×64, .* labels are for 64×32"):
         image.read()
 
 
@@ -148,9 +148,7 @@ def test_a_label_that_occurs_twice_counts_once(
     write_coco(tmp_path, scene_of((1, 2, 20, 10), (1, 2, 20, 10), (1, 2, 20, 11)))
     (picture,) = read_labelled_pictures(tmp_path).pictures
     assert picture.boxes.tolist() == [[1, 2, 21, 12], [1, 2, 21, 13]]
-    assert caplog.messages == [
-        f"{tmp_path}: has 1 label twice in the same picture; each counts once"
-    ]
+    assert caplog.messages == [f"{tmp_path}: has 1 label twice in the same image; each counts once"]
 
 
 @pytest.mark.parametrize(
@@ -170,7 +168,9 @@ def test_boxes_that_cannot_be_pixels_of_their_pictures_are_refused(
 
 def test_where_no_set_is_found_it_says_what_was_looked_for(tmp_path: Path) -> None:
     for path in (tmp_path, tmp_path / "none", tmp_path / "labels.txt"):
-        with pytest.raises(TruthError, match=r"not found: a folder with one \.json file \(COCO\)"):
+        with pytest.raises(
+            TruthError, match=r"not found; use a folder with one \.json file \(COCO\)"
+        ):
             read_labelled_pictures(path)
     shutil.copy(write_coco(tmp_path, SCENE), tmp_path / "other.json")
     with pytest.raises(TruthError, match=r"\(annotations\.json, other\.json\); pass the one"):
@@ -304,7 +304,7 @@ class TestYolo:
         (path.parent / "classes.txt").write_text("car\n", encoding="utf-8")
         assert len(read_labelled_pictures(tmp_path).pictures) == 2
         path.rename(path.with_name("c.txt"))
-        with pytest.raises(TruthError, match=r"c\.txt: has no picture of its name below"):
+        with pytest.raises(TruthError, match=r"c\.txt: has no image of its name below"):
             read_labelled_pictures(tmp_path)
 
 

@@ -70,7 +70,7 @@ class TestReading:
     def test_names_from_1_are_warned_of(self, caplog: pytest.LogCaptureFixture) -> None:
         assert read_yolo(FILE, archive(labels__f1="", labels__f2="")).known == [1, 2]
         assert caplog.messages == [
-            "a.zip: frames are numbered from 0, and the first file is of frame 1"
+            "a.zip: frames are numbered from 0, but the first file is for frame 1"
         ]
 
 
@@ -86,7 +86,7 @@ class TestReading:
         (described(DATA.replace("200", "0")), ":data.yaml: needs the size of the frames"),
         (described(DATA.replace("[car, truck]", "car")), ":data.yaml: names must be"),
         (described("a: &a [b]\nc: [*a, *a]"), ":data.yaml:2:5: is not YAML: aliases"),
-        (archive(labels__road=""), ": labels/road.txt must end with the number of a frame"),
+        (archive(labels__road=""), ": labels/road.txt must end in a frame number"),
         (
             archive(labels__f0="\n0 0.5 0.5 0.1 0.1"),
             ":labels/f0.txt:2: YOLO with tracks has 6 or 7",

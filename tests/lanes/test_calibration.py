@@ -70,9 +70,9 @@ def test_photographs_that_cannot_be_used_are_skipped_with_a_reason(
     broken.write_bytes(b"no picture")
     large = written(cv2.resize(read_image(photos[0]), (960, 720)), tmp_path / "large.png")
     skipped = calibrate([*photos[1:7], blank, broken, large], PATTERN).skipped
-    assert skipped.pop(broken).startswith("is not a picture")
+    assert skipped.pop(broken).startswith("is not an image")
     assert skipped == {
-        blank: "no board of 9×6 inner corners is seen",
+        blank: "no board of 9×6 inner corners found",
         large: "is 960×720, the others are 640×480",
     }
 
@@ -102,5 +102,5 @@ def test_boards_that_are_all_seen_from_the_front_are_refused(tmp_path: Path) -> 
         moved = np.array([[1, 0, 4.0 * number], [0, 1, 3.0 * number]])
         image = cv2.warpAffine(front, moved, (640, 480), borderMode=cv2.BORDER_REPLICATE)
         same.append(written(image, tmp_path / f"{number}.png"))
-    with pytest.raises(ImageError, match=r"much the same side; take some with the board slanted"):
+    with pytest.raises(ImageError, match=r"nearly the same angle; take some with the board tilted"):
         calibrate(same, PATTERN)

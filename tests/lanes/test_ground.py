@@ -49,11 +49,11 @@ def test_a_place_is_known_up_to_one_length_beyond_the_area(beyond: float, known:
 @pytest.mark.parametrize(
     ("metres", "pixels", "message"),
     [
-        (CORNERS[:3], seen(CORNERS[:3]), "camera.ground: 3 are given; at least four are needed"),
-        (CORNERS * (0, 1), seen(CORNERS * (0, 1)), "lie on a line (pixel)"),
-        (np.array([(0, 14), (0, 20), (0, 30), (5, 30)]), None, "or all but one, lie on a line"),
-        (CORNERS * (0, 1), seen(CORNERS), "lie on a line (metres)"),
-        (CORNERS, seen(CORNERS)[[0, 2, 1, 3]], "the horizon would run between them"),
+        (CORNERS[:3], seen(CORNERS[:3]), "camera.ground: has 3 points; must be at least four"),
+        (CORNERS * (0, 1), seen(CORNERS * (0, 1)), "are on a line (pixel)"),
+        (np.array([(0, 14), (0, 20), (0, 30), (5, 30)]), None, "or all but one, are on a line"),
+        (CORNERS * (0, 1), seen(CORNERS), "are on a line (metres)"),
+        (CORNERS, seen(CORNERS)[[0, 2, 1, 3]], "the horizon is between the points"),
     ],
 )
 def test_points_that_fix_no_plane_are_refused_in_words(
@@ -69,7 +69,7 @@ def test_a_point_that_does_not_fit_the_others_is_named() -> None:
     wrong = metres.copy()
     wrong[4] = 5.0, 30.0
     with pytest.raises(
-        ConfigError, match=r"camera\.ground\[4\]: lies .* m from where the others say"
+        ConfigError, match=r"camera\.ground\[4\]: is .*m from where the other points place it"
     ):
         fitted(wrong, seen(metres))
 

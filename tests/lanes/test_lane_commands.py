@@ -237,7 +237,7 @@ def test_without_a_camera_the_lane_has_no_metres_and_one_warning_says_so(
     assert plain["boxes"] == []
     assert bare["lane"] is None
     assert result.err.count("warning") == 1
-    assert "lanes: nothing is given in metres without camera.lens" in result.err
+    assert "lanes: no values in metres without camera.lens" in result.err
     assert (read_image(out / "bare.png") == read_image(files.bare)).all()
 
 

@@ -38,8 +38,8 @@ def test_the_trapezoid_may_be_measured_away_from_the_middle_of_the_lane(
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"points": [(0.2, 0.6), (0.8, 0.6), (0.5, 0.9), (0.4, 0.9)]}, "two of a nearer row"),
-        ({"points": [(0.2, 0.9), (0.8, 0.8), (0.5, 0.6), (0.4, 0.6)]}, "two of a nearer row"),
+        ({"points": [(0.2, 0.6), (0.8, 0.6), (0.5, 0.9), (0.4, 0.9)]}, "two in a near row"),
+        ({"points": [(0.2, 0.9), (0.8, 0.8), (0.5, 0.6), (0.4, 0.6)]}, "two in a near row"),
         ({"points": [(0.2, 0.9), (0.8, 0.9), (0.4, 0.6), (0.5, 0.6)]}, "closer together"),
         ({"points": [(0.4, 0.9), (0.5, 0.9), (0.5, 0.6), (0.4, 0.6)]}, "closer together"),
         ({"metres": (3.7, float("nan"))}, "finite"),

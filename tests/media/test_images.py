@@ -139,7 +139,7 @@ def test_a_jpeg_that_was_cut_off_is_read_as_far_as_it_goes_with_a_warning(
     path.write_bytes(encoded(".jpg", smooth())[:-100])
     image = read_image(path)
     np.testing.assert_allclose(image[:8], smooth()[:8], atol=12)
-    assert caplog.messages == [f"{path}: was cut off, and is read as far as it goes"]
+    assert caplog.messages == [f"{path}: is truncated; read up to the cut"]
 
 
 @pytest.mark.parametrize(
@@ -156,7 +156,7 @@ def test_a_jpeg_that_was_cut_off_is_read_as_far_as_it_goes_with_a_warning(
 def test_the_error_names_a_file_that_is_no_picture(tmp_path: Path, data: bytes) -> None:
     path = tmp_path / "broken.png"
     path.write_bytes(data)
-    with pytest.raises(ImageError, match=r"broken\.png: is not a picture, or is damaged"):
+    with pytest.raises(ImageError, match=r"broken\.png: is not an image, or is damaged"):
         read_image(path)
 
 

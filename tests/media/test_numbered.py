@@ -66,12 +66,12 @@ SEVERAL = "several kinds of names; use a pattern, as in img_%04d.png"
 @pytest.mark.parametrize(
     ("name", "names", "words"),
     [
-        ("", ["a.png"], "no numbered pictures found; use a video, or -d DIR"),
-        ("", ["1.png", "3.png", "4.png"], "picture 2 is missing; put a copy of 1"),
+        ("", ["a.png"], "no numbered images found; use a video, or -d DIR"),
+        ("", ["1.png", "3.png", "4.png"], "image 2 is missing; copy image 1"),
         ("", ["a_01.png", "a_02.png", "b_01.png"], SEVERAL),
         ("", ["1_01.png", "2_01.png"], SEVERAL),
-        ("img_%02d.png", [], "no numbered pictures found"),
-        ("img_%02d.png", ["img_1.png"], "no numbered pictures found"),
+        ("img_%02d.png", [], "no numbered images found"),
+        ("img_%02d.png", ["img_1.png"], "no numbered images found"),
         ("img_%02d.png", ["img_06.png", "img_09.png", "img_15.png"], "picture 12 is missing"),
     ],
 )

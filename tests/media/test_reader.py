@@ -335,7 +335,7 @@ def test_pixels_that_cannot_be_converted_are_one_error(
 
 @pytest.mark.parametrize("address", ["rtsp://camera/1", "https://host/a.mp4", "udp://@:1234"])
 def test_an_address_is_refused(address: str) -> None:
-    with pytest.raises(VideoError, match="streams are not read; record it into a file first"):
+    with pytest.raises(VideoError, match="streams are not supported; save it to a file first"):
         VideoReader(Path(address))
 
 

@@ -214,7 +214,7 @@ def write_on(writer: VideoWriter, frames: Iterable[Frame]) -> None:
 
 class TestAllOrNothing:
     def test_no_frames_make_no_file(self, tmp_path: Path) -> None:
-        with pytest.raises(VideoError, match=r"out\.mp4: there was no frame to write"):
+        with pytest.raises(VideoError, match=r"out\.mp4: no frames to write"):
             write(tmp_path / "out.mp4", [])
         assert listing(tmp_path) == []
 

@@ -91,7 +91,7 @@ def test_its_table_has_every_vehicle(tmp_path: Path) -> None:
 
 
 def test_of_no_video_it_says_so(tmp_path: Path) -> None:
-    assert "No video could be searched." in Elements(index(tmp_path, {})).text
+    assert "No video was processed." in Elements(index(tmp_path, {})).text
 
 
 @pytest.mark.skipif(not shutil.which("chromium"), reason="needs Chromium")

@@ -56,7 +56,7 @@ def test_a_picture_shows_only_what_stands_in_the_region(settings: Settings) -> N
 
 def test_regions_for_another_shape_name_the_file(red_clip: Path, tmp_path: Path) -> None:
     settings = within().model_copy(update={"camera": CameraSettings(size=(100, 100))})
-    with pytest.raises(VideoError, match=r"red\.mp4: camera\.size: places are given for frames"):
+    with pytest.raises(VideoError, match=r"red\.mp4: camera\.size: points are for frames"):
         run_red(Run(red_clip, outputs(tracks=tmp_path / "t.csv")), settings)
     with pytest.raises(ImageError, match=r"a\.png: camera\.size"):
         PictureSearch(model_for(settings), settings).detect(Path("a.png"), road(CAR))

@@ -40,7 +40,7 @@ def test_numbers_may_rise_by_a_step_and_an_assumed_rate_is_reported(
     shown = process(pattern.parent)
     assert_whole(shown, [6, 9, 12, 15])
     (warning,) = shown.warnings
-    assert "25 pictures a second are assumed" in warning
+    assert "25 images per second are assumed" in warning
 
 
 def test_a_damaged_picture_is_counted_as_lost(tmp_path: Path, process: Process) -> None:

@@ -73,7 +73,7 @@ def test_frames_that_change_size_are_scaled_to_the_first_with_a_warning(
     assert {image.shape for image in shown.images} == {(96, 160, 3)}
     assert_whole(shown, [*range(6), *range(9)])
     (warning,) = shown.warnings
-    assert "both.h264: frames of other sizes are scaled to that of the first" in warning
+    assert "both.h264: frames of other sizes are scaled to the first" in warning
 
 
 def _tiny(path: Path, size: tuple[int, int]) -> Path:

@@ -88,7 +88,7 @@ class TestNewIds:
 @pytest.mark.parametrize("times", [(0.0, math.nan), (0.0, math.inf), (1.0, 0.5)])
 def test_times_that_no_video_has_are_refused(times: tuple[float, float]) -> None:
     video = [FrameTracks(n, time, (track((600, 300)),)) for n, time in enumerate(times)]
-    with pytest.raises(TruthError, match=r"frame \d: .* s is before .* s; times must rise"):
+    with pytest.raises(TruthError, match=r"frame \d: .* s is before .* s; times must increase"):
         counts(video, LineSettings(name="line", start=(0, 450), end=(1280, 450)))
 
 

@@ -101,7 +101,7 @@ def _pictures_in(folder: Path, base: Path) -> Iterator[InputVideo]:
     try:
         sequence = find_sequence(folder)
     except VideoError as error:
-        _log.warning("%s; left out", error)
+        _log.warning("%s; skipped", error)
         return
     assert sequence is not None
     place = Path(folder.absolute().name) if folder == base else folder.relative_to(base)

@@ -158,7 +158,7 @@ def open_manifest(folder: Path) -> Iterator[Callable[[Record], None]]:
         try:
             lock(descriptor)
         except BlockingIOError:
-            message = f"{path}: another batch writes here; wait, or use another folder"
+            message = f"{path}: another batch is writing here; wait, or use another folder"
             raise OutputError(message) from None
 
         def add(record: Record) -> None:

@@ -144,10 +144,10 @@ def _refuse_nested(clips: Iterable[Path], sources: Iterable[InputVideo], folder:
     inner = folder.resolve()
     for clip in clips:
         if clip.is_dir() and inner.is_relative_to(clip.resolve()):
-            raise BatchError(f"{folder}: lies in the input {clip}; use a folder outside")
+            raise BatchError(f"{folder}: is inside the input {clip}; use another folder")
     for source in sources:
         if source.path.resolve().is_relative_to(inner):
-            raise BatchError(f"{source.path}: lies in the output folder {folder}; use another")
+            raise BatchError(f"{source.path}: is inside the output folder {folder}; use another")
 
 
 def _refuse_shared(runs: Iterable[Run], totals: Iterable[Path], folder: Path) -> None:
@@ -160,7 +160,9 @@ def _refuse_shared(runs: Iterable[Run], totals: Iterable[Path], folder: Path) ->
         if is_input(path):
             raise OutputError(f"{path}: is an input itself; use another folder")
         if path in owners:
-            raise BatchError(f"{owners[path]} and {maker}: both would become {path}; rename one")
+            raise BatchError(
+                f"{owners[path]} and {maker}: both would be written to {path}; rename one"
+            )
         owners[path] = maker
 
 
@@ -201,7 +203,7 @@ def run_batch(
 
 
 def _record_of_killed(run: Run) -> Record:
-    error = f"{run.source}: its process was killed, or crashed; it may have run out of memory"
+    error = f"{run.source}: its process was killed or crashed; it may have run out of memory"
     return replace(new_record(run), error=error)
 
 

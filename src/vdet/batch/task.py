@@ -98,7 +98,7 @@ def replacing_ours(run: Run, known: Known) -> Run:
         state, ours = output_state(output), known.get(os.path.realpath(output.path), ())
         if state and state[0] and state not in {written.state for written in ours}:
             raise BatchError(
-                f"{output.path}: was changed since vdet wrote it; remove it, or use --overwrite"
+                f"{output.path}: has changed since vdet wrote it; remove it, or use --overwrite"
             )
     return replace(run, overwrite=any(os.path.lexists(output.path) for output in run.outputs))
 

@@ -19,7 +19,7 @@ log = logging.getLogger("vdet")
 @options.output_file_option("Camera file to write, .yaml.")
 @options.option(
     "--pattern NxM",
-    "Inner corners of the board, along and across, 3 to 999.",
+    "Inner corners of the board per row and column, 3 to 999.",
     options.parse_pair,
     default="9x6",
 )
@@ -27,10 +27,10 @@ log = logging.getLogger("vdet")
 def calibrate(
     photos: tuple[Path, ...], output: Path, pattern: tuple[int, int], overwrite: bool
 ) -> None:
-    """Measure a camera with photographs of a chessboard.
+    """Calibrate a camera with photographs of a chessboard.
 
-    Its focal length and lens distortion are computed. Each PHOTO is a file, or a folder of files.
-    Take ten or more, of the whole flat board, from different sides.
+    Computes its focal length and lens distortion. Each PHOTO is a file, or a folder of files. Take
+    ten or more photographs of the whole flat board from different angles.
     """
     from vdet.lanes.calibration import calibrate as fit
     from vdet.lanes.camera import save_camera

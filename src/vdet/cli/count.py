@@ -30,15 +30,15 @@ log = logging.getLogger("vdet")
 @counting_options()
 @options.option(
     "--size WIDTHxHEIGHT",
-    "Size of the frames of the video, pixels.",
+    "Frame size of the video in pixels.",
     options.parse_pair,
-    show_default="as TRACKS say, else the size that the lines are given for",
+    show_default="from TRACKS, else camera.size",
 )
 @options.option(
     "--rate FPS",
-    "Frames per second of the video, for TRACKS without times.",
+    "Frame rate of the video, for TRACKS without times.",
     options.RATE,
-    show_default="from the times in TRACKS",
+    show_default="from TRACKS",
 )
 @options.class_option
 @options.settings_options("traffic.min_seen_seconds=0.5")
@@ -52,9 +52,9 @@ def count(
 ) -> None:
     """Count the vehicles of track files at lines and in zones.
 
-    TRACKS are files of vdet detect-video --tracks. Nothing is detected again, and the counts are
-    the same as those of detect-video --counts. Where the clocks of TRACKS say that one follows
-    another, a vehicle that both of them show counts once.
+    TRACKS are files of vdet detect-video --tracks. Vehicles are not detected again, and the counts
+    are the same as those of detect-video --counts. If the clock times of TRACKS follow one another,
+    a vehicle in two of them counts once.
     """
     from vdet.batch.inputs import VIDEO_INPUT_SUFFIXES
 

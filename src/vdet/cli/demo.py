@@ -11,15 +11,15 @@ from vdet.cli.options import PATH, option, overwrite_option
 
 @command("vdet demo", "vdet demo folder --seed 2 --overwrite")
 @click.argument("folder", default=Path("demo"), type=PATH, metavar="[DIR]")
-@option("--seed N", "Seed of everything that is drawn.", click.IntRange(min=0), default=5)
+@option("--seed N", "Seed of the random scenes.", click.IntRange(min=0), default=5)
 @overwrite_option
 def demo(folder: Path, seed: int, overwrite: bool) -> None:
-    """Try the whole program on drawn roads.
+    """Try the whole program on synthetic roads.
 
-    Two roads with vehicles are drawn, from a moving camera and from a pole. The network finds them,
-    and counts those from the pole. Then a linear model is trained on patches of other drawn roads
-    and finds them too. All is compared with the truth. All files are written into DIR, by default
-    into demo.
+    Draws two roads with vehicles, from a moving camera and from a pole. The network finds the
+    vehicles, and counts those seen from the pole. Then a linear model is trained on patches of
+    other synthetic roads and finds the vehicles too. All results are compared with the ground
+    truth. All files are written into DIR, by default demo.
     """
     from vdet.demo import METRICS, TRUTH, run_demo
 
@@ -28,12 +28,12 @@ def demo(folder: Path, seed: int, overwrite: bool) -> None:
     print_lines(
         *result,
         "",
-        "Look at",
+        "Results:",
         f"  {folder / 'found.mp4'}  the road with the vehicles that the network found",
         f"  {folder / 'counted.mp4'}  the road from the pole, with lines and counts",
         f"  {folder / 'page' / 'page.html'}  its page; {folder / 'flows.csv'} has the flows",
-        f"  {folder / 'found.csv'}  the tracks; {folder / TRUTH} has the true ones",
+        f"  {folder / 'found.csv'}  the tracks; {folder / TRUTH} has the ground truth",
         f"  {folder / 'stages'}/  every stage of the linear model in one frame",
         f"  {folder / METRICS}  the metrics of the training",
-        "Then try your own:  vdet detect-video in.mp4 out.mp4",
+        "Next, try your own video:  vdet detect-video in.mp4 out.mp4",
     )

@@ -21,22 +21,22 @@ log = logging.getLogger("vdet")
 @command(
     "vdet detect-image road.jpg",
     "vdet detect-image road.jpg -o found.jpg --json -",
-    "vdet detect-image pictures/ -o found/ --json boxes.json",
-    "vdet detect-image pictures/ --labels pictures.coco.json",
+    "vdet detect-image images/ -o found/ --json boxes.json",
+    "vdet detect-image images/ --labels images.coco.json",
     "vdet detect-image road.jpg --stages stages",
 )
 @click.argument("images", nargs=-1, required=True, type=options.PATH, metavar="IMAGE...")
 @options.option(
     "-o, --output PATH",
-    "Write the picture with its boxes. For several pictures, a folder, in which they keep their "
+    "Write the image with its boxes. For several images, a folder, in which they keep their "
     "names and folders.",
     options.PATH,
 )
-@options.option("--stages DIR", "Write a picture of every stage into DIR.")
-@options.output_option("--json FILE", "Write the boxes to FILE, or with - to standard output.")
+@options.option("--stages DIR", "Write an image of every stage into DIR.")
+@options.output_option("--json FILE", "Write the boxes to FILE. With -, to standard output.")
 @options.output_option(
     "--labels FILE",
-    "Write the boxes for label tools: .coco.json, .xml (CVAT), or .yolo.zip. Can be repeated.",
+    "Write the boxes for labelling tools: .coco.json, .xml (CVAT), or .yolo.zip. Can be repeated.",
 )
 @options.sink_option
 @options.class_option
@@ -50,10 +50,10 @@ def detect_image(
     choice: options.SettingsChoice,
     overwrite: bool,
 ) -> int:
-    """Find vehicles in pictures.
+    """Find vehicles in images.
 
-    Each IMAGE is a file, or a folder with pictures in it and below. Without an output, the vehicles
-    are printed: class, score, and box in pixels, as x, y, width and height.
+    Each IMAGE is a file, or a folder (searched recursively). Without an output option, prints the
+    vehicles: class, score, and box in pixels as x, y, width and height.
     """
     settings = choice.read()
     if settings.lack_of_metres:
@@ -72,7 +72,7 @@ def detect_image(
     check_sinks(shared, overwrite=overwrite)
     jobs = plan_pictures(sources, output, stages, overwrite=overwrite)
     is_printed = not (output or stages or shared)
-    with progress_steps(" pictures") as steps:
+    with progress_steps(" images") as steps:
         failures = run_pictures(
             jobs,
             shared,

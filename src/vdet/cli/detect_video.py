@@ -45,11 +45,11 @@ class BatchOptions:
         """Raise `click.UsageError` where options do not go together."""
         others = self.jobs or self.skip_existing or self.dry_run or self.scheduler
         if self.folder is None and others:
-            raise click.UsageError("--jobs, --skip-existing, --dry-run and --scheduler go with -d")
+            raise click.UsageError("--jobs, --skip-existing, --dry-run and --scheduler require -d")
         if overwrite and self.skip_existing:
-            raise click.UsageError("--overwrite and --skip-existing do not go together")
+            raise click.UsageError("--overwrite and --skip-existing cannot be used together")
         if self.jobs and self.scheduler:
-            raise click.UsageError("--jobs is for this machine; remove it, or --scheduler")
+            raise click.UsageError("--jobs and --scheduler cannot be used together")
 
 
 _batch_options = options.bundle(
@@ -74,12 +74,12 @@ _batch_options = options.bundle(
     "vdet detect-video clips/ -d found --tracks .jsonl --skip-existing",
 )
 @click.argument("videos", nargs=-1, required=True, type=options.PATH, metavar="IN [OUT] | CLIP...")
-@options.option("--no-video", "Write no video, only other outputs.")
+@options.option("--no-video", "Do not write a video, only other outputs.")
 @options.output_option(
     "--tracks FILE",
     "Write the boxes of every frame: .txt (MOTChallenge), .csv, .jsonl, .coco.json, .xml "
-    "(CVAT), .kitti.txt, .yolo.zip or .ottrk. With -, they go to standard output as .jsonl. With "
-    "-d, only the ending of the names. Can be repeated.",
+    "(CVAT), .kitti.txt, .yolo.zip or .ottrk. With -, write .jsonl to standard output. With -d, "
+    "only the ending of the names. Can be repeated.",
 )
 @options.output_option(
     "--vehicles FILE",
@@ -88,21 +88,21 @@ _batch_options = options.bundle(
 )
 @options.output_option(
     "--crops DIR",
-    "Write the best picture of each vehicle into DIR. With -d, an ending such as .crops.",
+    "Write the best image of each vehicle into DIR. With -d, an ending such as .crops.",
 )
 @options.output_option(
     "--page DIR",
-    "Write page.html, a page about the vehicles, into DIR. With -d, an ending such as .page.",
+    "Write a report about the vehicles, page.html, into DIR. With -d, an ending such as .page.",
 )
 @options.output_option(
     "--clips DIR",
-    "Cut a short video for each time in which a vehicle is shown, or with lines or zones one that "
-    "is counted, into DIR. With -d, an ending such as .clips.",
+    "Write a clip of each time in which vehicles are shown (with lines or zones: counted) into "
+    "DIR. With -d, an ending such as .clips.",
 )
 @options.short_form(
-    "--margin SECONDS", "clips.margin", "Begin before and end after the vehicle.", float
+    "--margin SECONDS", "clips.margin", "Time added to a clip before and after.", float
 )
-@options.short_form("--exact", "clips.exact", "Encode clips, exact to the frame.")
+@options.short_form("--exact", "clips.exact", "Cut clips at exact frames, which encodes them.")
 @counting_options(" With -d, only the ending of the names.")
 @options.sink_option
 @options.start_option
@@ -115,18 +115,14 @@ _batch_options = options.bundle(
     "--threads N",
     "Search one video in N threads.",
     options.PROCESSES,
-    show_default="one for each core, shared by --jobs",
+    show_default="one per core, shared by --jobs",
 )
 @options.output_option(
-    "--stages DIR", "Write a picture of every stage of one frame into DIR. Goes with --at."
-)
-@options.option(
-    f"--at {options.TIME_FORM}", "Show the frame at this time with --stages.", options.parse_time
-)
-@options.option(
-    "--strict", "Exit with code 4 if a result is doubtful. The outputs are written all the same."
+    "--stages DIR", "Write an image of every stage of one frame into DIR. Requires --at."
 )
 @options.class_option
+@options.option(f"--at {options.TIME_FORM}", "Time of the frame for --stages.", options.parse_time)
+@options.option("--strict", "Exit with code 4 if a result is doubtful. Outputs are still written.")
 @_batch_options
 @options.lanes_option
 @options.settings_options("output.crf=18", options.model_option)
@@ -144,21 +140,21 @@ def detect_video(
     strict: bool,
     batch: BatchOptions,
 ) -> int:
-    """Find and follow vehicles in one video, or in many.
+    """Find and follow vehicles in one video or many.
 
-    IN is a video. OUT is written: the same video with a box around each vehicle. Without OUT and
-    other outputs, it is written beside IN, as in.vdet.mp4.
+    IN is a video. OUT is a copy of it with a box around each vehicle. Without any output, OUT is
+    beside IN, named in.vdet.mp4.
 
-    With -d DIR, every CLIP is processed. A CLIP is a video, a folder with videos in it or below it,
-    or a quoted pattern such as 'day*/*.mp4'. The outputs of each video are written into DIR, and a
-    record of each into manifest.jsonl there.
+    With -d DIR, every CLIP is processed. A CLIP is a video, a folder (searched recursively), or a
+    quoted pattern such as 'day*/*.mp4'. The outputs go into DIR, with a record of each video in
+    manifest.jsonl.
     """
     wanted = options.wanted_outputs()
     batch.check(overwrite=overwrite)
     if start is not None and end is not None and end <= start:
         raise click.UsageError("--end must be later than --start")
     if (at is None) == any(sink == "stages" for sink, _ in wanted):
-        raise click.UsageError("--stages and --at go together")
+        raise click.UsageError("--stages and --at must be used together")
     source = Path()
     if batch.folder is None:
         source, video = _in_and_out(videos, no_video=no_video, is_alone=not wanted)
@@ -195,8 +191,8 @@ def _in_and_out(
     if len(outputs) > 1 or is_kept:
         shown = shlex.join(map(str, clips[:2])) + (" …" if len(clips) > 2 else "")
         raise click.UsageError(
-            f"{outputs[0]} would be replaced, and vdet did not write it; remove it, or for several "
-            f"videos name a folder: vdet detect-video {shown} -d found"
+            f"{outputs[0]} would be replaced, but vdet did not write it; remove it, or for several "
+            f"videos use a folder: vdet detect-video {shown} -d found"
         )
     if no_video == bool(outputs):
         raise click.UsageError("pass one OUT, or --no-video; or -d DIR for several videos")

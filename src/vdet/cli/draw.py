@@ -37,18 +37,22 @@ _OUTPUTS, _SETTINGS = (".html", ".jpg", ".png", ".svg"), (".yaml", ".yml")
 @click.argument("clip", type=options.INPUT, metavar="CLIP")
 @options.option(
     "-o, --output FILE",
-    "Page to write, .html, or picture of the place for a report, .jpg, .png or .svg.",
+    "Page to write, .html, or image of the scene for a report, .jpg, .png or .svg.",
     options.PATH,
 )
 @options.option(
-    "--propose FILE", "Write settings with a line across each main stream, .yaml.", options.PATH
+    "--propose FILE",
+    "Propose a line across each main stream and write the settings, .yaml.",
+    options.PATH,
 )
 @options.option(
     "--facing DIRECTION",
-    "Where the camera looks, as in N or SW, to name proposed lines.",
+    "Direction of the camera, such as N or SW, for the names of proposed lines.",
     click.Choice(("N", "NE", "E", "SE", "S", "SW", "W", "NW"), case_sensitive=False),
 )
-@options.option("--tracks-from FILE", "Take the vehicles from this file of tracks.", name="tracks")
+@options.option(
+    "--tracks-from FILE", "Read the tracks from FILE instead of detecting vehicles.", name="tracks"
+)
 @options.start_option
 @options.end_option
 @options.settings_options("detector.stride=2", options.model_option)
@@ -64,23 +68,23 @@ def draw(
     choice: options.SettingsChoice,
     overwrite: bool,
 ) -> None:
-    """Draw where vehicles are counted, in a page with their paths.
+    """Write a page for drawing lines and zones over the paths of vehicles.
 
-    CLIP is a video, or with --tracks-from also a picture of its frames. The page shows at once what
-    a line counts, and saves settings for -c. It is one file and needs no network.
+    CLIP is a video, or with --tracks-from also an image of one frame. The page shows live counts
+    for each line, and saves settings for -c. It is one file and needs no network.
     """
     from vdet.pages.drawing import Drawing
 
     outputs = [path for path in (output, propose) if path]
     settings = choice.read()
     if not outputs:
-        raise click.UsageError("there is nothing to write; use -o FILE or --propose FILE")
+        raise click.UsageError("no output; use -o FILE or --propose FILE")
     for path, suffixes in ((output, _OUTPUTS), (propose, _SETTINGS)):
         if path:
             options.check_suffix(path, *suffixes, what="pages" if path is output else "settings")
             check_output(path, overwrite=overwrite)
     if output and output.suffix.lower() != ".html" and not settings.traffic:
-        raise ConfigError(f"{output}: has nothing to show; add lines or zones with -c FILE")
+        raise ConfigError(f"{output}: nothing to draw; add lines or zones with -c FILE")
     with progress_steps(" frames") as steps:
         image, frames = _watched(clip, tracks, settings, (start, end), steps)
     settings.camera.check_frames(image.shape[1], image.shape[0])
@@ -130,7 +134,7 @@ def _watched(
                 clip, start=start, end=end, frames=_STILL_FRAMES, settings=settings.input
             ) as reader:
                 found.extend(_saved(tracks, float(reader.info.rate), part))
-                steps("reading the place", None)
+                steps("reading the scene", None)
                 yield from reader
             return
         # All vehicles: the page shows what regions leave out.
@@ -144,7 +148,7 @@ def _watched(
 
     images = _spread(frames())
     if not images:
-        raise VideoError(f"{clip}: has no frame in this part; check --start")
+        raise VideoError(f"{clip}: no frames in this part; check --start and --end")
     return np.median(images, axis=0).astype(np.uint8), found
 
 

@@ -21,7 +21,7 @@ _data = click.argument("data", nargs=-1, required=True, type=options.INPUT, meta
 @_data
 @options.option(
     "--min-width FRACTION",
-    "Ignore vehicles narrower than this fraction of the picture's width, 0 to 1.",
+    "Ignore vehicles narrower than this fraction of the image width, 0 to 1.",
     options.SHARE,
     default=0.0,
 )
@@ -30,10 +30,10 @@ _data = click.argument("data", nargs=-1, required=True, type=options.INPUT, meta
 def images(
     data: tuple[Path, ...], min_width: float, choice: options.SettingsChoice, results: Results
 ) -> None:
-    """Measure detection in labelled pictures.
+    """Measure detection in labelled images.
 
-    Each DATA is a folder in COCO, KITTI, YOLO or Pascal VOC form, or a COCO file. Each picture is
-    searched on its own, and compared with its labels.
+    Each DATA is a folder in COCO, KITTI, YOLO or Pascal VOC format, or a COCO file. Each image is
+    searched on its own and compared with its labels.
     """
     settings = choice.read_for_whole_frames()
     from vdet.detect.factory import load_detector, model_file
@@ -50,7 +50,7 @@ def images(
     sets = [read_labelled_pictures(path, roles) for path in data]
     results.check()
     counting = Counting(detector.min_score_still, min_width)
-    with progress_steps(" pictures") as steps:
+    with progress_steps(" images") as steps:
         progress = partial(steps, "")
         result = evaluate_images(sets, model, counting, threads=core_count(), progress=progress)
     name = RunName(detector.kind, model_file(detector), choice.name, choice.assignments)
@@ -69,8 +69,8 @@ _ON_ALL = "if the model was trained on some of these patches, the scores are too
 def patches(data: tuple[Path, ...], choice: options.SettingsChoice, results: Results) -> None:
     """Measure the classifier on labelled patches.
 
-    Each DATA is a folder or a zip file, as vdet train takes it. With --model, this model is tested
-    on all of DATA. Without, a new model is tested on the last patches of each folder.
+    Each DATA is a folder or a zip file, as for vdet train. With --model, that model is tested on
+    all of DATA. Otherwise a new model is trained, and tested on the last patches of each folder.
     """
     settings = choice.read(detector="svm")
     from vdet.detect.svm.detector import requested_features
@@ -104,9 +104,9 @@ def tracks(
     choice: options.SettingsChoice,
     results: Results,
 ) -> None:
-    """Compare a file of tracks with the truth.
+    """Compare a file of tracks with the ground truth.
 
-    PRED is a file of vdet detect-video --tracks. TRUTH is MOTChallenge gt.txt, KITTI tracking
+    PRED is a file of vdet detect-video --tracks. TRUTH is a MOTChallenge gt.txt, KITTI tracking
     labels, CVAT for video 1.1, COCO or YOLO with tracks, or a .csv or .jsonl of vdet.
     """
     from vdet.evaluate.report import tracks_report
@@ -142,11 +142,13 @@ def video(
 ) -> None:
     """Measure detection and tracking in labelled video.
 
-    Vehicles are found and followed in each video IN, and compared with its truth. Vehicles
-    outside the regions of the settings do not count.
+    Tracks the vehicles in each video IN, and compares them with its ground truth. Vehicles outside
+    the regions of the settings do not count.
     """
     if (given := len(truths)) != len(videos):
-        raise click.UsageError(f"{len(videos)} videos need as many --truth, not {given}")
+        raise click.UsageError(
+            f"pass one --truth for each video (videos: {len(videos)}, truths: {given})"
+        )
     base = choice.read()
     from vdet.detect.factory import load_detector, model_file
     from vdet.evaluate.output import RunName

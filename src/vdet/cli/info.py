@@ -31,13 +31,13 @@ _ANY_SIZE = 1000, 1000
 @facts_options
 @settings_options("camera.size=[960,540]")
 def info(path: Path | None, results: Results, choice: SettingsChoice) -> int:
-    """Describe a video, a picture, a model file, the settings of a camera, or this machine.
+    """Describe a video, an image, a model file, the settings of a camera, or this machine.
 
-    FILE is a video or numbered pictures (what it holds, where the horizon is), a picture, a linear
-    model (.npz), or a network (.onnx) of vdet or of another tool. With --json, a model's file also
-    says how it was trained. Without FILE, the places and points of the ground in settings (-c) are
-    checked, and what an error of a pixel there means for speeds. With neither, packages, codecs and
-    the shipped models are checked; the exit code is 1 if something that vdet needs does not work.
+    FILE is a video, numbered images, an image, a linear model (.npz), or a network (.onnx) of vdet
+    or of another tool. For a model, --json also writes how it was trained. Without FILE, checks the
+    lines, zones and ground points of the settings (-c), and prints the effect of an error of one
+    pixel on speeds. With neither, checks packages, codecs and the shipped models; the exit code is
+    1 if something that vdet needs does not work.
     """
     from vdet.media.images import is_picture_name
 
@@ -203,7 +203,7 @@ def _video(path: Path) -> Facts:
     from vdet.run.loop import FIRST_FRAMES
 
     if is_pipe(path):
-        raise VideoError(f"{path}: can be read only once; write it into a file first")
+        raise VideoError(f"{path}: can be read only once; save it to a file first")
     with VideoReader(path, frames=FIRST_FRAMES) as reader:
         info, images = reader.info, [frame.image for frame in reader]
     with open_input(path) as container:

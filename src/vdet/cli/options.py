@@ -67,7 +67,7 @@ def parse_pair(text: str) -> tuple[int, int]:
     """Return both numbers of a text such as 1280x720. Raises `click.BadParameter`."""
     match = _PAIR.fullmatch(text)
     if not match:
-        raise click.BadParameter(f"{text!r} is not two numbers with an x between them")
+        raise click.BadParameter(f"{text!r} is not two numbers separated by x")
     return int(match[1]), int(match[2])
 
 
@@ -134,25 +134,25 @@ scheduler_option = option(
 )
 until_option = option(
     "--until FRAME",
-    "End with this frame, counted from 1.",
+    "Stop after this frame, counted from 1.",
     POSITIVE,
-    show_default="the last one in the truth",
+    show_default="last frame of the ground truth",
 )
 truth_option = option(
     "--truth FILE",
-    "True boxes: MOTChallenge, KITTI, CVAT, COCO, YOLO, .csv or .jsonl. Repeat it for each video.",
+    "Ground truth: MOTChallenge, KITTI, CVAT, COCO, YOLO, .csv or .jsonl. Repeat for each video.",
     name="truths",
     multiple=True,
 )
 start_option = option(
-    f"--start {TIME_FORM}", "Begin at this time, as in 90, 1:30 or 0:01:30.5.", parse_time
+    f"--start {TIME_FORM}", "Start at this time, such as 90, 1:30 or 0:01:30.5.", parse_time
 )
 end_option = option(f"--end {TIME_FORM}", "Stop before this time.", parse_time)
 
 
 def jobs_option(text: str) -> Callable[[F], F]:
     """Add `--jobs N`."""
-    return option("--jobs N", text, PROCESSES, show_default="one for each core")
+    return option("--jobs N", text, PROCESSES, show_default="one per core")
 
 
 def output_file_option(text: str) -> Callable[[F], F]:
@@ -188,7 +188,7 @@ def short_form(
 model_option = short_form(
     "--model FILE",
     "detector.model",
-    "Model of the detector: .npz from vdet train, or .onnx. It decides which detector runs.",
+    "Detector model: .npz from vdet train, or .onnx. It determines which detector runs.",
 )
 class_option = short_form(
     "--class NAME",
@@ -197,7 +197,7 @@ class_option = short_form(
     str,
     multiple=True,
 )
-lanes_option = short_form("--lanes", "lanes.enabled", "Find the lane too, and draw it.")
+lanes_option = short_form("--lanes", "lanes.enabled", "Find and draw the lane.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -321,7 +321,7 @@ def _parse_sink(text: str) -> Wanted:
 
 sink_option = option(
     "--sink NAME=FILE",
-    "Write another output: the name of a sink, and a file. Can be repeated.",
+    "Write another output with the sink NAME. Can be repeated.",
     _parse_sink,
     multiple=True,
     expose_value=False,

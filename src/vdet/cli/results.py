@@ -82,11 +82,11 @@ class Results:
 
 _json_option = option(
     "--json FILE",
-    "Write the results to FILE. With -, they go to standard output, the text to standard error.",
+    "Write the results to FILE. With -, to standard output, and the text to standard error.",
     str,
     name="json_target",
 )
-_page_option = option("--page DIR", "Write page.html, with charts, into DIR.")
+_page_option = option("--page DIR", "Write a report with charts, page.html, into DIR.")
 
 facts_options = bundle("results", Results, _json_option, overwrite_option)
 """`--json FILE` and `--overwrite`."""
@@ -117,22 +117,21 @@ def counting_options(more: str = "") -> Callable[[F], F]:
     """
     counts = options.output_option(
         "--counts FILE",
-        "Write which vehicles cross lines and visit zones: .csv has the events, .totals.csv, "
-        ".wide.csv and .zones.csv have tables by interval, .json has it all. Can be repeated."
-        + more,
+        "Write counts at lines and zones: .csv has the events; .totals.csv, .wide.csv and "
+        ".zones.csv have tables by interval; .json has everything. Can be repeated." + more,
     )
     flows = options.output_option(
         "--flows FILE",
-        "Write how many vehicles go from which line or zone to which: .csv has a row for each "
-        "interval, flow and class, .wide.csv a row for each interval, with sums, .matrix.csv is a "
-        "matrix, .json has all but the wide one. Can be repeated." + more,
+        "Write flows from one line or zone to another: .csv has a row for each interval, flow and "
+        "class; .wide.csv has a row for each interval, with sums; .matrix.csv has a matrix; .json "
+        "has the flows and the matrix. Can be repeated." + more,
     )
     interval = short_form(
         "--interval TIME",
         "traffic.interval",
-        "Interval of tables, and of the bars of a page, as in 5min, 15min or 1h.",
+        "Interval of tables and charts, such as 5min, 15min or 1h.",
     )
     begin = short_form(
-        "--begin TIME", "input.begin", "When the video begins, as in '2026-05-01 07:00+02:00'."
+        "--begin TIME", "input.begin", "Start time of the video, such as '2026-05-01 07:00+02:00'."
     )
     return lambda command: counts(flows(interval(begin(command))))

@@ -18,7 +18,7 @@ from vdet.files import check_output, staged
 @click.argument("data", nargs=-1, required=True, type=options.INPUT, metavar="DATA...")
 @options.output_file_option("Model file to write, .npz.")
 @options.settings_options("train.svm.C=1e-4")
-@options.jobs_option("Describe patches in N threads.")
+@options.jobs_option("Compute features in N threads.")
 @options.overwrite_option
 def train(
     data: tuple[Path, ...],
@@ -29,10 +29,10 @@ def train(
 ) -> None:
     """Train a linear model on labelled patches.
 
-    Each DATA is a folder or a zip file with pictures in vehicles/<group>/ and
-    non-vehicles/<group>/. A file boxes.csv beside these folders says where in a patch the vehicle
-    is; vdet mine writes it. With it the model learns where the sides of vehicles are. The metrics
-    are printed; vdet info --json reads them from the model.
+    Each DATA is a folder or a zip file with images in vehicles/<group>/ and non-vehicles/<group>/.
+    A file boxes.csv beside these folders, such as vdet mine writes, has the box of the vehicle in
+    each patch; with it the model also learns to find the sides of vehicles. The metrics are
+    printed and stored in the model; vdet info --json reads them.
     """
     settings = choice.read(detector="svm")
     options.check_suffix(output, ".npz", what="models")
@@ -59,7 +59,7 @@ def train(
 @options.option("--every N", "Use every N-th frame of a video.", options.POSITIVE, default=4)
 @options.option(
     "--from FRAME",
-    "Begin at this frame, counted from 1.",
+    "Start at this frame, counted from 1.",
     options.POSITIVE,
     name="first",
     default=1,
@@ -79,9 +79,9 @@ def mine(
 ) -> None:
     """Cut patches for vdet train out of labelled videos.
 
-    Vehicles are cut out where the truth has them, and come with their boxes. False alarms are cut
-    out too: windows that the model takes for vehicles where there is none, or only a part of one.
-    Nothing is cut out of ignore regions.
+    Writes the labelled vehicles with their boxes, and false alarms: windows that the model
+    classifies as vehicles although they contain none, or only a part of one. Ignore regions are
+    skipped.
     """
     if until is not None and until < first:
         raise click.UsageError("--until must not be before --from")
@@ -116,13 +116,13 @@ def mine(
 @options.output_file_option("Network to write, .onnx.")
 @options.option(
     "--video CLIP TRUTH",
-    "Learn from every fourth frame of a labelled video too. Can be repeated.",
+    "Also train on every fourth frame of a labelled video. Can be repeated.",
     options.INPUT,
     name="clips",
     nargs=2,
     multiple=True,
 )
-@options.option("--base FILE", "Start from the weights of a network of vdet train-net.")
+@options.option("--base FILE", "Start from the weights of this network of vdet train-net.")
 @options.settings_options("train.net.steps=4000")
 @options.overwrite_option
 def train_net(
@@ -133,11 +133,11 @@ def train_net(
     choice: options.SettingsChoice,
     overwrite: bool,
 ) -> None:
-    """Train a network on labelled pictures.
+    """Train a network on labelled images.
 
-    Each DATA is a set of labelled pictures: COCO, KITTI, YOLO or Pascal VOC. The training saves its
-    state beside the network, as .ckpt; if it is stopped, the same command resumes it.
-    Needs torch and onnx: pip install torch onnx
+    Each DATA is a set of labelled images in COCO, KITTI, YOLO or Pascal VOC format. The state is
+    saved beside the network, as .ckpt; if training stops, run the same command to resume.
+    Requires torch and onnx: pip install torch onnx
     """
     if not data and not clips:
         raise click.UsageError("nothing to learn from; pass DATA or --video")

@@ -102,13 +102,13 @@ class CameraWatch:
             spread = _distances(after, np.median(after, axis=0))
             if np.quantile(spread, 0.95) <= _LIMIT:
                 text = (
-                    f"the camera was moved at {clock(int(start))}, {much}: lines and regions fit "
-                    "only before or only after; process both parts apart"
+                    f"the camera moved at {clock(int(start))}, {much}: lines, zones and regions "
+                    "fit only before or after; process both parts separately"
                 )
                 return [Finding("camera-moved", text, ((start, end),), value=size)]
         text = (
-            f"the camera moves {when(spans)}, {much}: lines, zones, regions and the ground do not "
-            "stay where they were drawn; do not trust counts and speeds of these times"
+            f"the camera moves {when(spans)}, {much}: lines, zones, regions and ground points do "
+            "not fit the view; do not trust counts and speeds of these times"
         )
         return [Finding("camera-moves", text, tuple(spans), value=size)]
 

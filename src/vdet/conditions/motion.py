@@ -106,8 +106,8 @@ class MotionWatch:
             sorted(time for item in left for time in (item.times[0], item.times[-1])), _GAP
         )
         text = (
-            f"{fraction:.0%} of what moved is not a vehicle that was found, most {when(spans)}: "
-            "it is hard to see, or of a kind that the detector does not look for"
+            f"{fraction:.0%} of the moving objects are not detected vehicles, mostly "
+            f"{when(spans)}: poor visibility, or classes that are not detected"
         )
         return [Finding("unexplained-motion", text, tuple(spans), value=fraction)]
 

@@ -47,8 +47,8 @@ _TILES = 16, 9
 _WORDS: dict[Code, str] = {
     "dark": "it is dark",
     "haze": "contrast is low, as in fog or spray",
-    "blur": "the picture is not sharp",
-    "drops": "there are drops, dirt or spray on the lens",
+    "blur": "the image is blurred",
+    "drops": "drops, dirt or spray are on the lens",
 }
 
 
@@ -164,11 +164,11 @@ def findings(times: Sequence[float], sights: Sequence[Sight], *, is_shipped: boo
         spans = [span for span in joined(bad, _GAP) if span[1] - span[0] >= _SHORTEST]
         if not spans:
             continue
-        tells, recall = "fewer vehicles are found in such pictures", None
+        tells, recall = "fewer vehicles are found in such images", None
         if is_shipped:
             seen = [sight.recall for time, sight in zip(times, sights, strict=True) if time in bad]
             recall = float(np.mean(seen))
-            tells = f"in such pictures the network finds about {10 * recall:.0f} of 10 vehicles"
+            tells = f"in such images the network finds about {10 * recall:.0f} of 10 vehicles"
         severity: Severity = "warning" if recall is None or recall < _NOTED else "note"
         text = f"{words} {when(spans)}: {tells}"
         found.append(Finding(code, text, tuple(spans), severity, recall))

@@ -83,7 +83,9 @@ class Conditions:
             text = f"detector.classes: the network does not know {', '.join(self._unknown)}"
             found.append(Finding("classes", text))
         if self._width < _NARROW:
-            text = f"frames are {self._width} pixels wide, fewer than detectors are measured on"
+            text = (
+                f"frames are {self._width} pixels wide, fewer than in measurements of the detectors"
+            )
             found.append(Finding("small-frames", text, severity="note"))
         return found
 

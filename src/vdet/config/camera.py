@@ -78,9 +78,9 @@ class GroundPoint(Section):
     """A point of the road."""
 
     pixel: Place
-    """Where it is in the frame, x and y; whole numbers are the middles of pixels."""
+    """Position in the frame, x and y; whole numbers are the centres of pixels."""
     metres: tuple[Coordinate, Coordinate]
-    """Where it is on the road, x and y in metres from any point, at right angles."""
+    """Position on the road, x and y in metres at right angles, from any origin."""
 
 
 _CODES = {"%Y": r"\d{4}", **dict.fromkeys(("%m", "%d", "%H", "%M", "%S", "%y"), r"\d\d")}
@@ -105,14 +105,14 @@ def moment(text: str) -> datetime:
 
 
 class ClockSettings(Section):
-    """When the videos of the camera begin."""
+    """Start times of the camera's videos."""
 
     pattern: str | None = Field(None, max_length=200)
-    """Pattern of the time in the names of videos, as in %Y%m%d_%H%M%S. null: a time in the name,
-    else the creation time in the video.
+    """Pattern of the time in file names, such as %Y%m%d_%H%M%S. null: a time in the name, else the
+    creation time in the video.
     """
     zone: str | None = Field(None, max_length=100)
-    """Time zone of names and of tables, as in Europe/Berlin. null: that of this computer."""
+    """Time zone of file names and tables, such as Europe/Berlin. null: that of this computer."""
 
     @field_validator("pattern")
     @classmethod
@@ -120,7 +120,7 @@ class ClockSettings(Section):
         if pattern is not None:
             rest = re.sub("|".join(_CODES), "", pattern)
             if "%" in rest or pattern == rest:
-                raise ValueError(f"a pattern has only {', '.join(_CODES)} and other text")
+                raise ValueError(f"a pattern can only contain {', '.join(_CODES)} and other text")
         return pattern
 
     @field_validator("zone")
@@ -159,14 +159,13 @@ class CameraSettings(Section):
     """The camera: its frames, lens, road and clock. Lines and zones refer to its frames."""
 
     size: Size | None = None
-    """Width and height in pixels of the frames that the points in this file are given for. Frames
-    of another size are fine if they have the same aspect ratio. null: points are fractions of the
-    frame, 0 to 1.
+    """Width and height in pixels of the frames that points in this file refer to. Other frame sizes
+    need the same aspect ratio. null: points are fractions of the frame, 0 to 1.
     """
     lens: LensSettings | None = None
-    """The lens, from `vdet calibrate`. null: it does not distort."""
+    """The lens, from `vdet calibrate`. null: no distortion."""
     ground: tuple[GroundPoint, ...] = Field((), max_length=100)
-    """Points of the road in pixels and metres, four or more, around the part of the road in which
+    """At least four points of the road in pixels and metres, around the part of the road in which
     speeds and distances are measured.
     """
     clock: ClockSettings = ClockSettings()
@@ -179,6 +178,6 @@ class CameraSettings(Section):
         aspect = (width / height) / (given_width / given_height)
         if abs(aspect - 1) > _ASPECT_TOLERANCE:
             raise ConfigError(
-                f"camera.size: places are given for frames of {given_width}×{given_height}, "
-                f"whose shape is not that of {width}×{height}; describe the camera for these"
+                f"camera.size: points are for frames of {given_width}×{given_height}, "
+                f"whose aspect ratio differs from {width}×{height}; define them for this size"
             )

@@ -21,15 +21,15 @@ class DetectorSettings(Section):
 
     kind: str
     model: str | None = Field(None, min_length=1, max_length=4096)
-    """Model file: .npz from `vdet train`, or .onnx. null: the shipped one that fits."""
+    """Model file: .npz from `vdet train`, or .onnx. null: the shipped model for these settings."""
     searches_per_second: Searches = None
-    """Search at least this many frames in a second of video. The tracker predicts where the
-    vehicles are in the others. null: search all frames.
+    """Search at least this many frames per second of video; the tracker estimates the vehicles in
+    the others. null: search all frames.
     """
     stride: int | None = Field(None, ge=1, le=100)
     """Search every N-th frame. Overrides searches_per_second."""
     min_score_still: Share = 0.0
-    """Minimum score of a vehicle in a still picture. In video, the tracker decides."""
+    """Minimum score of a vehicle in a single image. In video, the tracker decides."""
 
     @property
     def search_key(self) -> object:
@@ -56,7 +56,7 @@ class DetectorSettings(Section):
 
 
 class NetworkSettings(DetectorSettings):
-    """The detector: a network in an ONNX file, our own or another."""
+    """The detector: a network in an ONNX file, shipped or from another tool."""
 
     model_suffix: ClassVar[str | None] = ".onnx"
 
@@ -71,11 +71,11 @@ class NetworkSettings(DetectorSettings):
     classes: tuple[str, ...] = Field(
         ("car", "truck", "bus", "motorcycle", "bicycle", "vehicle"), min_length=1, max_length=100
     )
-    """Classes that count: car, truck, bus, motorcycle, bicycle, person, vehicle (of unknown kind),
-    or any other that the network knows.
+    """Classes to detect: car, truck, bus, motorcycle, bicycle, person, vehicle (of unknown kind),
+    or any other class of the network.
     """
     class_names: tuple[str, ...] | None = Field(None, max_length=10_000)
-    """Names of the classes in the network's order. null: those in its file."""
+    """Class names in the order of the network. null: those in its file."""
 
     @property
     def search_key(self) -> object:
@@ -89,7 +89,7 @@ class NetworkSettings(DetectorSettings):
 
 
 class HogSettings(Section):
-    """Histograms of oriented gradients (Dalal & Triggs 2005), as cv2.HOGDescriptor gives them."""
+    """Histograms of oriented gradients (Dalal & Triggs 2005), computed by cv2.HOGDescriptor."""
 
     orientations: int = Field(8, ge=2, le=32)
     """Number of bins for gradient directions of 0 to 180°."""
@@ -107,13 +107,13 @@ class HistogramSettings(Section):
 
 
 class FeatureSettings(Section):
-    """Features of a patch; they must be those that the model was trained with."""
+    """Features of a patch; must match those that the model was trained with."""
 
     patch: int = Field(32, ge=16, le=256)
     """Side of a patch, in pixels."""
     halved: Annotated[tuple[Literal[0, 1, 2], ...], Field(max_length=3)] = (1, 2)
-    """Channels of YCrCb that are described at half their size, with HOG cells of half the side.
-    Video has chroma at half size.
+    """Channels of YCrCb to use at half size, with HOG cells of half the side. Video has chroma at
+    half size.
     """
     hog: HogSettings = HogSettings()
     histogram: HistogramSettings = HistogramSettings()
@@ -154,7 +154,7 @@ class WindowSettings(Section):
     size: Annotated[int, Field(ge=8, le=100_000), FRAME_LENGTH]
     """Side of a window, in pixels."""
     overlap: float = Field(ge=0, lt=1)
-    """Fraction of a window that the next one covers too."""
+    """Fraction of a window that the next one overlaps."""
     top: Pixels
     """First row of the band."""
     bottom: Pixels
@@ -168,7 +168,7 @@ class WindowSettings(Section):
 
 
 class PerspectiveSettings(Section):
-    """Window sets whose rows follow from their size, because vehicles stand on a flat road."""
+    """Window sets whose rows follow from their size, assuming a flat road."""
 
     sizes: tuple[Annotated[float, Field(gt=0, le=1)], ...] = Field(
         (0.05, 0.0625, 0.0875, 0.125, 0.175, 0.25, 0.3), max_length=32
@@ -183,20 +183,20 @@ class PerspectiveSettings(Section):
 
 
 class SearchSettings(Section):
-    """Which windows of a frame are searched."""
+    """The windows of a frame to search."""
 
     probability: Share = 0.3
-    """Minimum probability of a hit: a window that counts as evidence."""
+    """Minimum probability of a hit, a window that counts as evidence."""
     windows: tuple[WindowSettings, ...] = Field((), max_length=32)
     """Window sets over fixed rows."""
     perspective: PerspectiveSettings = PerspectiveSettings()
 
 
 class HeatSettings(Section):
-    """How the hits of consecutive frames are summed into a heatmap, and become detections."""
+    """How to sum the hits of consecutive frames into a heatmap, and turn it into detections."""
 
     frames: int = Field(2, ge=1, le=100)
-    """Number of searched frames whose hits are summed."""
+    """Number of searched frames to sum."""
     threshold: float = Field(0.075, ge=0)
     """Heat above which a pixel is hot."""
     votes: float | None = Field(0.12, ge=0)
@@ -237,7 +237,7 @@ class SvmSettings(DetectorSettings):
     searches_per_second: Searches = 8.0
     min_score_still: Share = 0.844
     min_size_still: tuple[Share, Share] = (0.028, 0.0)
-    """Minimum width and height of a vehicle in a still picture, as fractions of the picture's."""
+    """Minimum width and height of a vehicle in a single image, as fractions of the image's."""
     features: FeatureSettings = FeatureSettings()
     search: SearchSettings = SearchSettings()
     heat: HeatSettings = HeatSettings()

@@ -106,7 +106,7 @@ def read_document(path: Path) -> Document:
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise ConfigError(f"{path}: is not UTF-8 text; settings files are") from error
+        raise ConfigError(f"{path}: is not UTF-8 text; save it as UTF-8") from error
     return parse_document(text, str(path))
 
 

@@ -41,8 +41,8 @@ def check_shapes(shapes: Iterable[tuple[str, Iterable[Point]]]) -> None:
         seen.add(name)
         if any(not (0 <= x <= 1 and 0 <= y <= 1) for x, y in points):
             raise ValueError(
-                f"{name}: a point lies outside the frame; points are pixels of frames of "
-                "camera.size, or fractions of the frame without it"
+                f"{name}: a point is outside the frame; points are in pixels of "
+                "camera.size, or without it in fractions of the frame"
             )
 
 
@@ -65,13 +65,13 @@ class RegionSettings(Section):
     """A region in which vehicles are shown, or not: a polygon or a mask."""
 
     name: Name
-    """Name, different from all others."""
+    """Unique name."""
     points: Polygon | None = None
-    """Corners of a polygon in order, x and y. The last one is joined to the first."""
+    """Corners of a polygon in order, x and y. The last corner is joined to the first."""
     mask: str | None = Field(None, min_length=1, max_length=4096)
-    """Picture with the aspect ratio of the frame; the region is where it is white."""
+    """Image with the aspect ratio of the frame, white inside the region."""
     kind: Literal["include", "exclude"] = "include"
-    """include: vehicles in it are shown. exclude: they are not, even inside an included region."""
+    """include: show vehicles in it. exclude: do not show them, even inside an included region."""
 
     @model_validator(mode="after")
     def _has_a_shape(self) -> "RegionSettings":
@@ -94,13 +94,13 @@ class LineSettings(Section):
     """A line; crossings are counted by direction."""
 
     name: Name
-    """Name, different from all others."""
+    """Unique name."""
     start: Place
     """Start, x and y."""
     end: Place
     """End, x and y."""
     left: Name = "left"
-    """Name of the direction to the left, from the start."""
+    """Name of the direction to the left, seen from the start."""
     right: Name = "right"
     """Name of the direction to the right."""
 
@@ -117,9 +117,9 @@ class ZoneSettings(Section):
     """A zone; vehicles that enter, leave and stay are counted."""
 
     name: Name
-    """Name, different from all others."""
+    """Unique name."""
     points: Polygon
-    """Corners in order, x and y. The last one is joined to the first."""
+    """Corners in order, x and y. The last corner is joined to the first."""
 
 
 INTERVALS = {"s": 1, "min": 60, "h": 3600}
@@ -135,13 +135,13 @@ class TrafficSettings(Section):
     zones: tuple[ZoneSettings, ...] = Field((), max_length=MOST_SHAPES)
     """Zones."""
     interval: str | None = Field(None, pattern=r"^[1-9][0-9]{0,4} ?(s|min|h)$")
-    """Interval of tables and of the bars of a page, as in 5min, 15min or 1h. null: the whole video;
-    on a page 1min.
+    """Interval of tables and charts, such as 5min, 15min or 1h. null: the whole video; 1min in
+    charts.
     """
     draw: bool = False
-    """Draw the lines and zones with their running counts into the video."""
+    """Draw the lines and zones with their current counts into the video."""
     min_seen_seconds: float = Field(0.2, ge=0, le=10)
-    """Ignore vehicles that are detected for fewer seconds than this."""
+    """Minimum seconds of detections for a vehicle to count."""
 
     def __bool__(self) -> bool:
         return bool(self.lines or self.zones)

@@ -28,7 +28,7 @@ Metres = Annotated[float, Field(gt=0, le=200)]
 
 
 class LaneSettings(Section):
-    """The lane: whether it is looked for, and a trapezoid whose sides are its lines on a straight.
+    """The lane: whether to find it, and a trapezoid along its lines on a straight road.
 
     The trapezoid here is where many dashboard cameras see their lane. For a camera of your own,
     take an undistorted frame of a straight and level road. Choose two rows: the nearer one above
@@ -37,25 +37,25 @@ class LaneSettings(Section):
     """
 
     enabled: bool = False
-    """Find the lane, and draw it."""
+    """Find and draw the lane."""
     points: tuple[Place, Place, Place, Place] = (
         (0.21, 0.93), (0.79, 0.93), (0.54, 0.63), (0.46, 0.63),
     )  # fmt: skip
     """Where the lines cross two rows: near left, near right, far right, far left; x and y."""
     metres: tuple[Metres, Metres] | None = None
     """Width of the lane, and distance between the two rows on the road, in metres. Measure the
-    distance by dashes of known length, or compute focal length × width × (1 / width in the farther
-    row − 1 / width in the nearer row), the last two and the focal length in pixels. null: not
-    known, so nothing is given in metres.
+    distance with dashes of known length, or compute focal length × width × (1 / width in the far
+    row − 1 / width in the near row), with the last two and the focal length in pixels. null:
+    unknown, so there are no values in metres.
     """
 
     @model_validator(mode="after")
     def _is_a_trapezoid(self) -> "LaneSettings":
         (x1, bottom), (x2, also_bottom), (x3, top), (x4, also_top) = self.points
         if bottom != also_bottom or top != also_top or bottom <= top:
-            raise ValueError("points must be two of a nearer row, and then two of a farther one")
+            raise ValueError("points must be two in a near row, then two in a far row")
         if not 0 < x3 - x4 < 0.9 * (x2 - x1):
-            raise ValueError("the lines must be closer together in the farther row")
+            raise ValueError("the lines must be closer together in the far row")
         return self
 
 
@@ -67,10 +67,10 @@ Code = Literal[
 
 
 class ConditionSettings(Section):
-    """What makes a result doubtful: the findings about a video."""
+    """Reasons to doubt a result: the findings about a video."""
 
     ignore: tuple[Code, ...] = Field((), max_length=100)
-    """Codes of findings to leave out: camera-moves, camera-moved, unexplained-motion, dark, haze,
+    """Codes of findings to suppress: camera-moves, camera-moved, unexplained-motion, dark, haze,
     blur, drops, lane-geometry, classes, small-frames.
     """
 
@@ -81,8 +81,8 @@ class SvmTrainingSettings(Section):
     C: float = Field(3e-5, gt=0, le=1e6)
     """Penalty of errors. Smaller values give a smoother model."""
     augmentation: bool = True
-    """Learn from further samples: the mirror image of each patch, and of some patches a copy that
-    the side of a frame cuts off, and a part as an example of what is not a vehicle.
+    """Add samples: the mirror image of each patch, and for some patches a copy cut off by the side
+    of a frame, and a part as a negative example.
     """
 
 
@@ -92,12 +92,12 @@ class NetworkTrainingSettings(Section):
     steps: int = Field(4700, ge=1, le=10_000_000)
     """Number of steps."""
     batch: int = Field(16, ge=1, le=1024)
-    """Number of pictures in a step."""
+    """Number of images per step."""
     size: tuple[
         Annotated[int, Field(ge=64, le=4096, multiple_of=64)],
         Annotated[int, Field(ge=64, le=4096, multiple_of=32)],
     ] = (640, 352)
-    """Width and height of the pictures, multiples of 64 and 32."""
+    """Width and height of the images, multiples of 64 and 32."""
     learning_rate: float = Field(1e-3, gt=0, le=1)
     """Highest learning rate of AdamW."""
     classes: tuple[str, ...] = Field(
@@ -105,7 +105,7 @@ class NetworkTrainingSettings(Section):
     )
     """Classes to learn, in the order of the network's outputs."""
     weights: dict[str, Annotated[float, Field(gt=0, le=1000)]] = Field({})
-    """How often to draw pictures of a set, by its name, relative to others."""
+    """Relative sampling rate of a set's images, by its name."""
 
 
 class TrainSettings(Section):
@@ -120,12 +120,12 @@ Role = Literal["vehicle", "ignored", "other"]
 
 
 class LabelSettings(Section):
-    """What the labels of videos and pictures mean."""
+    """Meaning of the labels of videos and images."""
 
     roles: dict[str, Role] = Field({}, max_length=1000)
-    """vehicle: must be found. ignored: detections there are not judged. other: left out. Without a
-    role, car, truck, bus, motorcycle, bicycle, person and vehicle must be found if the detector
-    looks for them, and are ignored if not.
+    """vehicle: must be detected. ignored: detections there do not count. other: no vehicle. Without
+    a role, car, truck, bus, motorcycle, bicycle, person and vehicle must be detected if they are in
+    detector.classes, and are ignored otherwise.
     """
 
 
@@ -134,14 +134,14 @@ Seconds = Annotated[float, Field(gt=0, le=60)]
 
 
 class InputSettings(Section):
-    """The video that is read."""
+    """The input video."""
 
     max_damaged: Share = 0.05
     """Maximum fraction of damaged or lost frames."""
     begin: str | None = Field(None, max_length=100)
-    """When the video begins, as in '2026-05-01 07:00+02:00'. null: as camera.clock says."""
+    """Start time of the video, such as '2026-05-01 07:00+02:00'. null: from camera.clock."""
     frame_rate: float | None = Field(None, ge=0.01, le=1000)
-    """Frames per second of numbered pictures (img_%04d.png). null: 25, with a warning."""
+    """Frames per second of numbered images (img_%04d.png). null: 25, with a warning."""
 
     @field_validator("begin")
     @classmethod
@@ -152,7 +152,7 @@ class InputSettings(Section):
 
 
 class OutputSettings(Section):
-    """The video that is written, in H.264."""
+    """The output video, in H.264."""
 
     preset: Literal["ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow"] = (
         "superfast"
@@ -166,22 +166,22 @@ class ClipSettings(Section):
     """The clips that `--clips` cuts out of a video."""
 
     margin: float = Field(2.0, ge=0, le=3600)
-    """Seconds before and after a vehicle. Clips that touch are joined."""
+    """Seconds to add before and after a vehicle. Clips that touch are joined."""
     exact: bool = False
-    """true: encode clips again, exact to the frame. false: copy from key frame to key frame."""
+    """true: cut at exact frames, which encodes again. false: copy whole key-frame intervals."""
 
 
 class DrawSettings(Section):
-    """What is drawn on videos and pictures."""
+    """What to draw on videos and images."""
 
     label: tuple[LabelPart, ...] | None = Field(None, max_length=4)
-    """Parts of the label in order: id, class, score, distance. Unknown ones are left out. []: no
-    labels. null: the id in a video, the score in a picture, and the class where it fits.
+    """Parts of the label in order: id, class, score, distance. Unknown values are omitted. []: no
+    labels. null: the id in a video, the score in an image, and the class if it fits.
     """
     colors: Literal["id", "class", "one"] = "id"
     """Use one colour for each id, for each class, or for all vehicles (one)."""
     trails: Seconds | None = None
-    """Draw the path of each vehicle over this many seconds of a video."""
+    """Seconds of each vehicle's path to draw in a video. null: no path."""
 
 
 class Settings(Section):
@@ -197,16 +197,16 @@ class Settings(Section):
     regions: RegionList = ()
     """Regions of the frame in which vehicles are shown.
 
-    A vehicle is where the middle of its lower edge is. Without an included region the whole frame
-    counts, except for excluded ones.
+    The position of a vehicle is the middle of its lower edge. Without an included region the whole
+    frame counts, except excluded regions.
     """
     classes: tuple[str, ...] = Field((), max_length=100)
-    """Classes of vehicles that are shown and counted, of those in detector.classes. []: all.
+    """Classes of vehicles to show and count, out of detector.classes. []: all.
 
-    The class of a vehicle is that of its track: so far in boxes, the last one in all else.
+    The class is that of the track: the current one in boxes, the final one everywhere else.
     """
     steps: tuple[str, ...] = ()
-    """Steps of other packages, between the tracker and the outputs: their names, in order."""
+    """Names of steps of other packages to run between the tracker and the outputs, in order."""
     traffic: TrafficSettings = TrafficSettings()
     lanes: LaneSettings = LaneSettings()
     conditions: ConditionSettings = ConditionSettings()
@@ -246,7 +246,7 @@ class Settings(Section):
         needed = {"camera.lens": self.camera.lens, "lanes.metres": self.lanes.metres}
         missing = ", ".join(key for key, value in needed.items() if value is None)
         is_lacking = self.lanes.enabled and bool(missing)
-        return f"lanes: nothing is given in metres without {missing}" if is_lacking else None
+        return f"lanes: no values in metres without {missing}" if is_lacking else None
 
     def __hash__(self) -> int:  # some fields are dictionaries
         return hash(self.model_dump_json())

@@ -314,7 +314,7 @@ def _class_table(classes: Iterable[ClassResult]) -> Table:
 
 def _mistake_table(clip: ClipResult) -> Table:
     """Return the largest mistakes."""
-    return (f"largest mistakes in {clip.name}", "frames", "boxes", "best IoU"), [
+    return (f"worst errors in {clip.name}", "frames", "boxes", "best IoU"), [
         [mistake.name, mistake.span, str(mistake.boxes), share(mistake.overlap, 2)]
         for mistake in mistakes(clip.comparison)[:_MOST_MISTAKES]
     ]

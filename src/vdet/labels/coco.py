@@ -200,7 +200,7 @@ def read_coco(path: Path, data: bytes) -> SavedTracks:
         what = "needs the frame_index of each image and the track_id of each annotation"
         raise TruthError(f"{path}: {what}; CVAT has them in 'CVAT for video 1.1'")
     if len(set(frames)) < len(images):
-        raise TruthError(f"{path}: a frame_index occurs twice; several videos need a file for each")
+        raise TruthError(f"{path}: a frame_index occurs twice; use one file for each video")
     times: Times = {
         frame: (f"images.{number}", nan if isinstance(image.time, str) else image.time)
         for number, (frame, image) in enumerate(zip(frames, images, strict=True))

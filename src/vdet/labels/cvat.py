@@ -183,7 +183,7 @@ def _frames(tasks: Sequence[ET.Element]) -> range | None:
     rule = tasks[0].findtext("frame_filter", "").strip()
     step = re.fullmatch(r"(?:step=0*([1-9][0-9]{0,6}))?", rule)
     if step is None:
-        raise ValueError(f"the frame filter {rule!r:.40} is unknown; only step=NUMBER is known")
+        raise ValueError(f"unknown frame filter {rule!r:.40}; only step=NUMBER is supported")
     first, last = (parse_whole(text_of(tasks[0], name)) for name in names)
     if last - first > _MAX_LABELS:
         raise ValueError(f"has more than {_MAX_LABELS:,} frames; cut the video into parts")
@@ -216,7 +216,7 @@ def _boxes(covered: range | None, keys: Sequence[_Key]) -> Iterator[Label]:
         if covered is not None and index not in covered:
             every = f"every {step}. frame" if step > 1 else "the frames"
             what = f"it has {every} from {covered.start} to {covered.stop - 1}"
-            raise ValueError(f"no frame {index} is in the task; {what}")
+            raise ValueError(f"the task has no frame {index}; {what}")
         yield label
         after = keys[number + 1][0] if number + 1 < len(keys) else None
         end = after.frame - 1 if after else covered.stop if covered else index + 1

@@ -154,7 +154,7 @@ def recognise(path: Path, data: bytes) -> Format:
     form: Format | None = load_plugin(FORMATS, content) if content else by_name
     if form is None:
         suffixes = ", ".join(track_suffixes())
-        raise TruthError(f"{path}: is empty; tracks and truth are files as {suffixes}")
+        raise TruthError(f"{path}: is empty; tracks and ground truth must be one of {suffixes}")
     return form
 
 

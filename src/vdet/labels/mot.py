@@ -47,7 +47,7 @@ def _label(place: int, columns: Sequence[str]) -> Label:
     is_truth = len(columns) == _TRUTH_COLUMNS
     if is_truth and seventh not in {0, 1}:
         what = f"with nine columns, column 7 must be a flag, 0 or 1, but is {seventh:g}"
-        raise ValueError(f"{what}; a file of results needs ten columns")
+        raise ValueError(f"{what}; a results file needs ten columns")
     box, score = from_size(left - 1, top - 1, width, height), 1.0 if is_truth else seventh
     return Label(place, box, None, frame, id_, score, ignored=is_truth and seventh == 0)
 

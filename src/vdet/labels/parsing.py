@@ -102,7 +102,8 @@ def label_lines(
             if counts is not None and len(columns) not in counts:
                 wanted, between = " or ".join(map(str, counts)), "commas" if separator else "spaces"
                 raise ValueError(
-                    f"{form} has {wanted} columns between {between}; this line has {len(columns)}"
+                    f"{form} has {wanted} columns separated by {between}; this line has "
+                    f"{len(columns)}"
                 )
             label = parse(line, columns)
         except ValueError as error:
@@ -149,7 +150,7 @@ def checked_times(path: Path, times: Times) -> dict[int, float]:
     latest = -_LATEST
     for frame, (place, time) in sorted(times.items()):
         if not latest <= time <= _LATEST:
-            what = f"frame {frame} is at {time:g} s; times must be numbers that do not fall"
+            what = f"frame {frame} is at {time:g} s; times must be numbers and must not decrease"
             raise line_error(path, place, what)
         latest = time
     return {frame: time for frame, (_, time) in times.items()}

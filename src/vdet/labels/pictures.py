@@ -82,7 +82,7 @@ class LabelledPicture:
         height, width = image.shape[:2]
         if self.size not in (None, (width, height)):
             wanted = f"{self.size[0]}×{self.size[1]}"
-            raise ImageError(f"{self.path}: is {width}×{height}, its labels for {wanted}")
+            raise ImageError(f"{self.path}: is {width}×{height}, but its labels are for {wanted}")
         return image
 
 
@@ -124,23 +124,23 @@ def checked_pictures(
         repeated += len(picture.labels) - len(labels)
         absurd += sum(_is_absurd(label.box, picture.size) for label in labels)
         if len(checked) == MAX_PICTURES or boxes > MAX_BOXES:
-            most = f"{MAX_PICTURES:,} pictures or {MAX_BOXES:,} boxes"
+            most = f"{MAX_PICTURES:,} images or {MAX_BOXES:,} boxes"
             raise TruthError(f"{name}: has more than {most}; cut it into parts")
         if picture.path in checked:
-            raise TruthError(f"{name}: has the picture {printable(picture.path.name)} twice")
+            raise TruthError(f"{name}: has the image {printable(picture.path.name)} twice")
         checked[picture.path] = replace(
             picture,
             labels=tuple(_with_roles(replace(picture, labels=labels), roles, *counts)),
             unlabelled=tuple(filter(None, map(roles.class_of, picture.unlabelled))),
         )
     if not checked:
-        raise TruthError(f"{name}: has no labelled picture")
+        raise TruthError(f"{name}: has no labelled images")
     if absurd > boxes / 2:
-        what = f"{absurd} of {counted(boxes, 'box')} lie outside their pictures or within a pixel"
-        raise TruthError(f"{name}: {what}; the numbers must be pixels, as the format has them")
+        what = f"{absurd} of {counted(boxes, 'box')} are outside their images or within a pixel"
+        raise TruthError(f"{name}: {what}; the numbers must be in the unit of the format")
     if repeated:
         twice = counted(repeated, "label")
-        log.warning("%s: has %s twice in the same picture; each counts once", name, twice)
+        log.warning("%s: has %s twice in the same image; each counts once", name, twice)
     others, ignored = (tuple(count.most_common()) for count in counts)
     return LabelledPictures(name, tuple(checked.values()), others, ignored)
 
@@ -167,7 +167,7 @@ def _with_roles(
             continue
         mistake = mistake_in_box(label)
         if count == MAX_IN_FRAME:
-            mistake = f"the picture has more than {MAX_IN_FRAME:,} boxes"
+            mistake = f"the image has more than {MAX_IN_FRAME:,} boxes"
         if mistake:
             raise line_error(picture.file, label.place, mistake)
         count += 1
@@ -182,9 +182,9 @@ def is_file(path: Path) -> bool:
 
 
 def inside(name: str) -> str:
-    """Return the name of a picture in a file. Raises `ValueError` if it leads out of the set."""
+    """Return the name of a picture in a file. Raises `ValueError` if it points outside the set."""
     if PurePosixPath(name).is_absolute() or ".." in PurePosixPath(name).parts:
-        raise ValueError(f"{printable(name)} leads out of the set")
+        raise ValueError(f"{printable(name)} points outside the set")
     return name
 
 
@@ -200,10 +200,10 @@ def picture_folder(path: Path, name: str) -> Path:
         found = [folder for folder in level if is_file(folder / name)]
         if len(found) > 1:
             where = " and ".join(str(folder) for folder in found[:2])
-            raise TruthError(f"{path}: its first picture, {shown}, lies in {where}; keep one")
+            raise TruthError(f"{path}: its first image, {shown}, is in {where}; keep one")
         if found:
             return found[0]
-    raise TruthError(f"{path}: its first picture, {shown}, is missing beside it and below")
+    raise TruthError(f"{path}: its first image, {shown}, was not found beside it or below")
 
 
 Parse = Callable[[Path, Path], tuple[tuple[Label, ...], Size | None]]
@@ -261,7 +261,7 @@ class PictureFormat:
             elif self.is_whole:
                 yield LabelledPicture(picture, picture)
         if unused := files.keys() - used:
-            raise TruthError(f"{files[min(unused)]}: has no picture of its name below {pictures}")
+            raise TruthError(f"{files[min(unused)]}: has no image of its name below {pictures}")
 
 
 def _is_other(name: Path) -> bool:

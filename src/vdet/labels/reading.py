@@ -92,7 +92,7 @@ def read_true_labels(path: Path, roles: Roles) -> SavedTracks:
     data = read_bytes(path)
     if not data.strip():
         names = ", ".join(track_format.name for track_format in track_formats())
-        raise TruthError(f"{path}: is empty; truth is a file of {names}")
+        raise TruthError(f"{path}: is empty; ground truth must be a file of {names}")
     form = recognise(path, data)
     saved = form.read(path, data)
     labels: Iterable[Label] = saved.labels
@@ -150,7 +150,7 @@ def _pictures(path: Path) -> Iterable[LabelledPicture]:
         return _READERS[files[0].suffix.lower()](files[0])
     if files:
         names = ", ".join(str(file.relative_to(path)) for file in files[:5])
-        raise TruthError(f"{path}: holds several such files ({names}); pass the one with labels")
+        raise TruthError(f"{path}: contains several such files ({names}); pass the one with labels")
     wanted = ", ".join(f"{' and '.join(form.folders)} ({form.name})" for form in _FORMS)
-    what = "labelled pictures not found: a folder with one .json file (COCO)"
+    what = "labelled images not found; use a folder with one .json file (COCO)"
     raise TruthError(f"{path}: {what}, {wanted} or annotations.xml (CVAT)")

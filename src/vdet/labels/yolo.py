@@ -121,7 +121,7 @@ def read_yolo(path: Path, data: bytes) -> SavedTracks:
         raise TruthError(f"{where}: needs the size of the frames, as width: 1280, height: 720")
     frames = sorted((_frame(path, name), name) for name in members if name not in described)
     if frames and frames[0][0] == 1:
-        log.warning("%s: frames are numbered from 0, and the first file is of frame 1", path)
+        log.warning("%s: frames are numbered from 0, but the first file is for frame 1", path)
     parse = partial(_track_label, names=names, size=size)
     counts, form = (_COLUMNS + 1, _COLUMNS + 2), "YOLO with tracks"
     labels = (
@@ -154,7 +154,7 @@ def _frame(path: Path, name: str) -> int:
     """Return the number of the frame that a file of labels is of."""
     number = _NUMBER.search(PurePosixPath(name).stem)
     if number is None:
-        raise TruthError(f"{path}: {printable(name)} must end with the number of a frame")
+        raise TruthError(f"{path}: {printable(name)} must end in a frame number")
     return int(number[1])
 
 
@@ -191,7 +191,7 @@ def _pixels(text: str, side: int) -> float:
     """Return a fraction of a side of the frame in pixels. Raises ValueError."""
     pixels = parse_number(text) * side
     if not -1 <= pixels <= side + 1:
-        raise ValueError("a number is not between 0 and 1; YOLO has fractions of the picture")
+        raise ValueError("a number is not between 0 and 1; YOLO uses fractions of the image")
     return min(max(pixels, 0.0), float(side))
 
 

@@ -86,9 +86,9 @@ def calibrate(paths: Iterable[Path], pattern: Pattern) -> Calibration:
         camera, errors = _fit(used, pattern, size)
     if camera is None:
         raise ImageError(
-            "the focal length cannot be found: all photographs show the board from much the same "
-            f"side; take some with the board slanted by {MIN_ANGLE:.0f}° or more, to the left and "
-            "to the right, up and down"
+            "cannot compute the focal length: all photographs show the board from nearly the same "
+            f"angle; take some with the board tilted by {MIN_ANGLE:.0f}° or more, left and "
+            "right, up and down"
         )
     return Calibration(camera, float(np.sqrt(np.mean(np.square(errors)))), used, skipped)
 
@@ -119,7 +119,7 @@ def _find_board(path: Path, pattern: Pattern) -> BoardPhoto | str:
         return str(error).removeprefix(f"{path}: ")
     corners = find_corners(image, pattern)
     if corners is None:
-        return f"no board of {_text(pattern)} inner corners is seen"
+        return f"no board of {_text(pattern)} inner corners found"
     return BoardPhoto(path, (image.shape[1], image.shape[0]), corners)
 
 
@@ -131,7 +131,7 @@ def _without(
     if len(kept) < MIN_PHOTOS:
         raise ImageError(
             f"only {len(kept)} of {len(kept) + len(skipped)} photographs can be used, at least "
-            f"{MIN_PHOTOS} are needed; take more of the whole board from different sides, or "
+            f"{MIN_PHOTOS} are needed; take more of the whole board from different angles, or "
             f"use another --pattern than {_text(pattern)}"
         )
     return kept

@@ -97,18 +97,18 @@ def fit_ground(pixels: Float64Array, metres: Float64Array, undistorter: Undistor
         them, or they do not fit together.
     """
     if len(pixels) < 4:
-        raise ConfigError(f"camera.ground: {len(pixels)} are given; at least four are needed")
+        raise ConfigError(f"camera.ground: has {len(pixels)} points; must be at least four")
     straight = undistorter.points(pixels)
     for points, unit in ((straight, "pixel"), (metres, "metres")):
         if any(_is_thin(np.delete(points, row, axis=0)) for row in range(len(points))):
             raise ConfigError(
-                f"camera.ground: all, or all but one, lie on a line ({unit}); add corners"
+                f"camera.ground: all points, or all but one, are on a line ({unit}); add corners"
             )
     to_pixels, _ = cv2.findHomography(metres, straight)
     inverse = np.linalg.inv(to_pixels) if to_pixels is not None else np.zeros((3, 3))
     depths = straight @ inverse[2, :2] + inverse[2, 2]
     if not (np.all(depths > 0) or np.all(depths < 0)):
-        raise ConfigError("camera.ground: the horizon would run between them; two may be exchanged")
+        raise ConfigError("camera.ground: the horizon is between the points; two may be swapped")
     to_metres = np.asarray(inverse * np.sign(depths[0]), np.float64)
     off = np.hypot(*(_mapped(to_metres, straight) - metres).T)
     back = np.asarray(np.linalg.inv(to_metres), np.float64)
@@ -118,7 +118,7 @@ def fit_ground(pixels: Float64Array, metres: Float64Array, undistorter: Undistor
     if error > _MAX_ERROR * _length(area):
         worst = int(np.argmax(pixel_off))
         raise ConfigError(
-            f"camera.ground[{worst}]: lies {off[worst]:.1f} m from where the others say"
+            f"camera.ground[{worst}]: is {off[worst]:.1f} m from where the other points place it"
         )
     rows = _mapped(to_metres, straight + np.array((0, 1))) - _mapped(to_metres, straight)
     row = float(np.median(np.hypot(*rows.T)))

@@ -73,7 +73,7 @@ def open_input(path: Path, frame_rate: float | None = None) -> InputContainer:
 def refuse_stream(path: Path) -> None:
     """Refuse an address, or ``-``. Raises `VideoError`."""
     if not path.exists() and _STREAM.match(str(path)):
-        raise VideoError(f"{path}: streams are not read; record it into a file first")
+        raise VideoError(f"{path}: streams are not supported; save it to a file first")
 
 
 def is_pipe(path: Path) -> bool:
@@ -122,9 +122,9 @@ def picture_stream(container: InputContainer, path: Path) -> VideoStream:
     """
     for stream in moving_streams(container):
         if stream.codec_context is None:
-            raise VideoError(f"{path}: its codec is not known here; convert it to H.264 first")
+            raise VideoError(f"{path}: its codec is unknown; convert it to H.264 first")
         return stream
-    raise VideoError(f"{path}: has no moving pictures; use a video file")
+    raise VideoError(f"{path}: has no video stream; use a video file")
 
 
 def moving_streams(container: InputContainer) -> list[VideoStream]:

@@ -31,7 +31,7 @@ MAX_BYTES = 256_000_000
 PICTURE_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp"})
 
 _FORMATS = ("PNG", "JPEG", "BMP", "TIFF", "WEBP")
-_NO_PICTURE = "is not a picture, or is damaged (PNG, JPEG, BMP, TIFF, WebP)"
+_NO_PICTURE = "is not an image, or is damaged (PNG, JPEG, BMP, TIFF, WebP)"
 _TOO_LARGE = (
     f"has more than {MAX_PICTURE_PIXELS:,} pixels, or a side of more than {MAX_PICTURE_SIDE:,}; "
     "make it smaller"
@@ -102,7 +102,7 @@ def read_image(path: Path) -> Image:
     data = read_encoded(path)
     image = _decode(data, path)
     if _is_cut_off(data):
-        log.warning("%s: was cut off, and is read as far as it goes", path)
+        log.warning("%s: is truncated; read up to the cut", path)
     return image
 
 
@@ -132,7 +132,7 @@ def read_header(path: Path) -> tuple[tuple[int, int], Orientation]:
 def read_encoded(path: Path) -> bytes:
     """Return the content of the file of a picture. Raises `ImageError`."""
     if path.is_fifo():  # it may never end, or never begin
-        raise ImageError(f"{path}: can be read only once; write it into a file first")
+        raise ImageError(f"{path}: can be read only once; save it to a file first")
     return read_whole(path, most=MAX_BYTES, what="picture", error=ImageError)
 
 
@@ -151,7 +151,7 @@ def encode_image(image: Image, path: Path) -> bytes:
     except cv2.error:
         written = False
     if not written:
-        raise ImageError(f"{path}: pictures must end in {', '.join(sorted(PICTURE_SUFFIXES))}")
+        raise ImageError(f"{path}: images must end in {', '.join(sorted(PICTURE_SUFFIXES))}")
     return data.tobytes()
 
 
@@ -292,7 +292,7 @@ def find_sequence(path: Path) -> PictureSequence | None:
     )
     numbers, files = [number for number, _ in found], tuple(file for _, file in found)
     if not files:
-        raise VideoError(f"{path}: no numbered pictures found; use a video, or -d DIR for a folder")
+        raise VideoError(f"{path}: no numbered images found; use a video, or -d DIR for a folder")
     record_input(*files)
     if by_the_clock := _by_the_clock(files):
         return by_the_clock
@@ -303,7 +303,9 @@ def find_sequence(path: Path) -> PictureSequence | None:
     step = min(steps, default=1)
     for number, gap in zip(numbers, steps, strict=False):
         if gap != step:
-            raise VideoError(f"{path}: picture {number + step} is missing; put a copy of {number}")
+            raise VideoError(
+                f"{path}: image {number + step} is missing; copy image {number} in its place"
+            )
     return PictureSequence(files)
 
 

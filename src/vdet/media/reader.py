@@ -87,7 +87,7 @@ class VideoReader:
         first = next(self._pictures, None)
         if first is None or max(first.width, first.height) > _MAX_SIDE:
             raise VideoError(
-                f"{path}: not one frame can be decoded; use a file that plays, with frames of "
+                f"{path}: no frame can be decoded; use a file that plays, with frames of "
                 f"at most {demux.MAX_PIXELS // 10**6} million pixels and sides of {_MAX_SIDE}"
             )
         stream = self._decoder.stream
@@ -134,9 +134,9 @@ class VideoReader:
     def _assumptions(self) -> Iterator[str]:
         """Yield what is read in another way than the file, or the user, may mean."""
         if isinstance(self._decoder.ticks, range) and self._settings.frame_rate is None:
-            yield f"{ASSUMED_RATE:.0f} pictures a second are assumed; --set input.frame_rate=N"
+            yield f"{ASSUMED_RATE:.0f} images per second are assumed; set input.frame_rate"
         if self._decoder.container.streams.audio and not self.info.has_sound:
-            yield "its sound is left out: a pipe can be read only once"
+            yield "its sound is dropped: a pipe can be read only once"
         streams = len(demux.moving_streams(self._decoder.container))
         if streams > 1:
             yield f"has {streams} video streams; only the first is used"
@@ -227,9 +227,9 @@ class VideoReader:
         if restarts := self._decoder.clock.restarts:
             self._faults.append(f"its clock restarts {restarts}×; the parts follow one another")
         if (videos := demux.joined_videos(self.info.path)) > 1:
-            self._faults.append(f"{videos} videos joined in one file; only the first is read")
+            self._faults.append(f"{videos} videos are joined in one file; only the first is read")
         if self._is_scaled:
-            self._faults.append("frames of other sizes are scaled to that of the first")
+            self._faults.append("frames of other sizes are scaled to the first")
         if self._faults:
             _log.warning("%s: %s", self.info.path, "; ".join(self._faults))
 

@@ -66,7 +66,7 @@ class SoundCopy:
         """Close the source; warn of packets that could not be copied."""
         if self._left_out:
             fault = "damaged, or without a time of their own"
-            _log.warning("%s: %d sound packets left out: %s", self._path, self._left_out, fault)
+            _log.warning("%s: %d sound packets dropped: %s", self._path, self._left_out, fault)
         self._packets.close()
         self._source.close()
 
@@ -237,9 +237,7 @@ class VideoWriter:
         """Refuse more ticks from one frame to the next than mp4 can hold."""
         ticks = seconds * max(self._time_base.denominator, 20_000)  # FFmpeg writes no coarser ones
         if ticks >= 2**31 and self._container.format.name != "matroska":
-            raise OutputError(
-                f"{self._name}: cannot hold a pause of {int(seconds)} s; name it .mkv"
-            )
+            raise OutputError(f"{self._name}: cannot hold a pause of {int(seconds)} s; use .mkv")
 
     def __enter__(self) -> Self:
         return self
@@ -258,7 +256,7 @@ class VideoWriter:
     def _finish(self) -> None:
         """Write what is left: frames that the encoder holds back, sound, the file's index."""
         if self._origin is None:
-            raise VideoError(f"{self._name}: there was no frame to write; check the times given")
+            raise VideoError(f"{self._name}: no frames to write; check the times")
         self._container.mux(self._stream.encode(None))
         if self._sound:
             end = self._last * self._time_base + self._period

@@ -118,8 +118,8 @@ class Drawing:
 
 
 _PROPOSED = """\
-# Lines across the main streams, proposed by vdet draw. The stream crosses a line to its left: that
-# of someone who looks from start to end. Look at them, and move them:
+# Lines across the main streams, proposed by vdet draw. A stream crosses its line to the left, seen
+# from start to end. Check and move the lines:
 # vdet draw CLIP -c THIS_FILE -o gate.html"""
 
 

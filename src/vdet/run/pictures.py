@@ -52,7 +52,7 @@ def find_images(paths: Sequence[Path]) -> dict[Path, Path]:
             places = {p: place for p, place in places.items() if not is_hidden(place)}
             if not places:
                 names = ", ".join(sorted(PICTURE_SUFFIXES))
-                raise ImageError(f"{path}: holds no pictures ({names})")
+                raise ImageError(f"{path}: contains no images ({names})")
             for picture, place in places.items():
                 found.setdefault(picture, place)
         elif path.exists():

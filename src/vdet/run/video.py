@@ -300,7 +300,7 @@ def write_outputs(
             frames += 1
             advance(1)
         if not frames:
-            raise _no_frame(run, "there is no frame at these times", video.reader)
+            raise _no_frame(run, "no frames at these times", video.reader)
         counts = video.traffic.counts()
         found = [line for fact in video.facts.values() for line in str(fact).splitlines()]
         for warning in (*(counts.warnings if counts else ()), *found):

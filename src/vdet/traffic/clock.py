@@ -64,7 +64,7 @@ def find_clock(
     """Return the clock of a video; None if nothing says when it begins.
 
     `input.begin` decides, then the pattern of `camera.clock`, then `zero`, then a time in its name
-    or in that of its first picture, then the creation time of the video. A time without a zone is
+    or in that of its first image, then the creation time of the video. A time without a zone is
     in that of the camera. If the name and the creation time differ by more than a minute, a warning
     (logger "vdet") has both.
 
@@ -104,9 +104,7 @@ def _found(path: Path, settings: Settings, created: str | None) -> tuple[datetim
     sequence = find_sequence(path)
     named, written = clock.time_in((sequence.files[0] if sequence else path).name), None
     if clock.pattern and not named:
-        raise ConfigError(
-            f"{path}: its name has no time like {clock.pattern}: camera.clock.pattern"
-        )
+        raise ConfigError(f"{path}: its name does not match camera.clock.pattern, {clock.pattern}")
     with suppress(ValueError):
         written = moment(created or "")
     if not named:
@@ -116,7 +114,7 @@ def _found(path: Path, settings: Settings, created: str | None) -> tuple[datetim
             _text(_utc(time, zone).astimezone(zone)) for time in (named, written)
         )
         _log.warning(
-            "%s: begins %s by its name, %s by its metadata; the name is used; --begin decides",
+            "%s: begins %s by its name, %s by its metadata; using the name; --begin overrides it",
             *(path, by_name, by_metadata),
         )
     return named, "from its name"

@@ -187,12 +187,12 @@ def _line_warnings(lines: Sequence[PlacedLine], passages: Sequence[_Passage]) ->
         if missed > few:
             yield (
                 f"{line.name}: tracks that begin or end at this line and are not counted: "
-                f"{missed}; move it to where vehicles are followed longer"
+                f"{missed}; move it to where vehicles are tracked longer"
             )
         if again > few:
             yield (
                 f"{line.name}: paths that cross this line more than once: {again}; place it across "
-                "the way of the vehicles"
+                "the road"
             )
         if found and line.length < median(height for heights in found for height in heights):
             yield f"{line.name}: this line is shorter than a vehicle; make it longer"

@@ -63,7 +63,7 @@ def count_files(
     for path in paths:
         saved = read_tracks(path, rate)
         if not saved.has_times:
-            raise TruthError(f"{path}: has no times; pass the frames per second, as in --rate 25")
+            raise TruthError(f"{path}: has no times; pass the frame rate, as in --rate 25")
         clock = find_clock(path, settings, None, saved.times.get(0, 0.0), saved.begin)
         place = _size(settings, size or saved.size)
         first = min(saved.times.values(), default=None)
@@ -155,7 +155,8 @@ class _Group:
         for frame in frames:
             if not latest <= frame.time < math.inf:
                 raise TruthError(
-                    f"frame {frame.index}: {frame.time:g} s is before {latest:g} s; times must rise"
+                    f"frame {frame.index}: {frame.time:g} s is before {latest:g} s; times must "
+                    "increase"
                 )
             latest = frame.time
             self.counter.update(replace(frame, time=latest + shift) if shift else frame)

@@ -195,7 +195,7 @@ class TestHorizon:
         self, count: int, level: str, caplog: pytest.LogCaptureFixture
     ) -> None:
         line = self.reported(self.UNSET, count, caplog)
-        assert line.startswith(f"{level} no horizon is found: 0.58 of the hei")
+        assert line.startswith(f"{level} no horizon found: 0.58 of the hei")
         assert "set detector.search.perspective.horizon" in line
         assert "lies" not in line
 

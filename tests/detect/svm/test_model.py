@@ -210,7 +210,7 @@ def test_a_model_cut_off_anywhere_is_damaged(path: Path) -> None:
         (header_of(features={"colour": "red"}), "is not a vdet model, or is damaged"),
         (
             header_of(features=SMALL.model_dump(mode="json") | {"color_space": "HSV"}),
-            "has another colour space than YCrCb",
+            "its colour space is not YCrCb",
         ),
         (header_of(provenance=[]), "is not a vdet model, or is damaged"),
     ],

@@ -184,7 +184,7 @@ def test_rare_classes_weigh_more_and_unknown_kinds_as_much_as_the_most_frequent(
 def test_a_base_of_another_form_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "junk.onnx"
     path.write_bytes(b"junk")
-    with pytest.raises(DataError, match="is not a network that vdet train-net has written"):
+    with pytest.raises(DataError, match="is not a network of vdet train-net"):
         train_network([block_source(4)], QUICK, tmp_path / "a.ckpt", base=path)
 
 
@@ -247,9 +247,9 @@ def test_a_checkpoint_of_another_training_is_refused(tmp_path: Path) -> None:
     other = settings.model_copy(update={"learning_rate": 1e-4})
     with pytest.raises(DataError, match=r"net\.ckpt: belongs to a training with other settings"):
         train_network(source, other, path)
-    with pytest.raises(DataError, match=r"net\.ckpt: belongs to a training with .* another base"):
+    with pytest.raises(DataError, match=r"net\.ckpt: belongs to a training with .* base"):
         train_network(source, settings, path, base=tmp_path / "base.onnx")
-    with pytest.raises(DataError, match=r"net\.ckpt: belongs to a training with .* pictures"):
+    with pytest.raises(DataError, match=r"net\.ckpt: belongs to a training with .* images"):
         train_network([block_source(5)], settings, path)
     path.write_bytes(b"junk")
     with pytest.raises(DataError, match=r"net\.ckpt: is not a checkpoint of this training"):
@@ -258,6 +258,6 @@ def test_a_checkpoint_of_another_training_is_refused(tmp_path: Path) -> None:
 
 def test_a_weight_for_a_source_that_is_not_there_is_refused(tmp_path: Path) -> None:
     settings = QUICK.model_copy(update={"weights": {"block": 2.0}})
-    message = r"train\.net\.weights: no set of pictures is named block; there are blocks"
+    message = r"train\.net\.weights: unknown set block; there are blocks"
     with pytest.raises(DataError, match=message):
         train_network([block_source(2)], settings, tmp_path / "net.ckpt")

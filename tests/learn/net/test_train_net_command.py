@@ -34,7 +34,7 @@ def test_it_learns_from_pictures_labelled_in_each_form(run: Run, tmp_path: Path,
     folder, output = write_set(tmp_path / "my_set", form), tmp_path / "net.onnx"
     result = run("train-net", folder, "-o", output, *QUICK)
     assert result.code == 0, result.err
-    assert result.out.splitlines()[0] == "my_set: 2 pictures; 2 car"
+    assert result.out.splitlines()[0] == "my_set: 2 images; 2 car"
     assert trained_on(output) == ("my_set",)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["my_set", "net.onnx"]
     picture = next(folder.rglob("a.png"))
@@ -107,7 +107,7 @@ def test_it_says_what_becomes_of_each_label(run: Run, tmp_path: Path) -> None:
     result = run("train-net", pictures, "-o", tmp_path / "net.onnx", *QUICK, *classes)
     assert result.code == 0, result.err
     assert result.out.splitlines()[:4] == [
-        "set: 1 picture; 2 car, 1 bus, 1 vehicle",
+        "set: 1 image; 2 car, 1 bus, 1 vehicle",
         "  not labelled, so not background: bicycle",
         "  ignored: 1 person",
         "  background, as their label is unknown: 1 cow",

@@ -84,7 +84,7 @@ def test_other_files_than_patches_are_skipped(tmp_path: Path, make: Maker) -> No
 )
 def test_a_missing_class_is_named(tmp_path: Path, present: str, missing: str) -> None:
     make_folder(tmp_path, [f"{present}/far/1.png"])
-    with pytest.raises(DataError, match=f"no pictures in {missing}/<group>/"):
+    with pytest.raises(DataError, match=f"no images in {missing}/<group>/"):
         find_patches([tmp_path])
 
 

@@ -86,7 +86,7 @@ def test_windows_on_the_truth_are_vehicles_and_others_false_alarms(
 
 
 def test_nothing_wanted_is_an_error(video: VideoSource, tmp_path: Path) -> None:
-    with pytest.raises(DataError, match=r"road\.mp4: no window fits a vehicle or is a false alarm"):
+    with pytest.raises(DataError, match=r"road\.mp4: no window shows a vehicle or a false alarm"):
         mine([video], tmp_path / "mined.zip", SETTINGS, MODEL, most=Most(0, 0, 0))
     assert not (tmp_path / "mined.zip").exists()
 

@@ -115,7 +115,7 @@ def test_broken_patches_are_an_error_that_names_the_first(
     broken = [PatchFile(tmp_path, f"vehicles/{i}.png", "vehicles/far", True) for i in range(3)]
     for file in broken:
         (tmp_path / file.name).write_text("no picture")
-    with pytest.raises(DataError, match=r"vehicles/0\.png: is not a readable picture$"):
+    with pytest.raises(DataError, match=r"vehicles/0\.png: is not a readable image$"):
         train([*files[:9], *broken, *files[9:]], SETTINGS, jobs=1)
 
 

@@ -36,5 +36,5 @@ def test_the_text_has_the_accuracies_the_confusion_and_the_groups() -> None:
 
 
 def test_the_text_says_what_a_model_of_patches_alone_lacks() -> None:
-    words = "no patch came from vdet mine: in video, such a model finds far fewer vehicles"
+    words = "no patches from vdet mine: in video, such a model finds far fewer vehicles"
     assert words in replace(METRICS, box_error=None).lines()

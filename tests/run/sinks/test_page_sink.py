@@ -104,4 +104,4 @@ def test_times_without_frames_are_named(tmp_path: Path) -> None:
     times = (Fraction(0), Fraction(1, 25), Fraction(5), Fraction(126, 25))
     results = [result_of(CAR, index=n, time=time) for n, time in enumerate(times)]
     write(Output("page", tmp_path / "page"), results)
-    assert "There are no frames from 0:00 to 0:05." in page_of(tmp_path / "page").text
+    assert "No frames from 0:00 to 0:05." in page_of(tmp_path / "page").text

@@ -46,7 +46,7 @@ def our_cells(
     """
     table = outputs[0][0]
     if len(table) != len(cells[1]):
-        raise ValueError("not one row for each cell")
+        raise ValueError("not one row per cell")
     slopes, offsets = calibration[table[:, 5:].argmax(axis=1)].T
     logits = slopes * table[:, 0] + offsets
     rows = np.flatnonzero(logits >= math.log(minimum / (1 - minimum)))

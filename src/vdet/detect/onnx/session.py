@@ -78,7 +78,7 @@ class Session:
         for input_ in self.inputs:
             if input_.type not in TYPES:
                 raise ModelError(
-                    f"{path}: its input {input_.name:.40} is a {input_.type}, no picture"
+                    f"{path}: its input {input_.name:.40} is a {input_.type}, not an image"
                 )
         if any(len(value) > _MAX_METADATA for value in self.metadata.values()):
             raise ModelError(f"{path}: has metadata of more than {_MAX_METADATA:,} characters")
@@ -104,7 +104,7 @@ class Session:
             outputs.set_exception(self._failed(_in_words(error)))
 
     def _failed(self, reason: str) -> ModelError:
-        return ModelError(f"{self.path}: does not run on a picture: {reason}")
+        return ModelError(f"{self.path}: fails on an image: {reason}")
 
 
 def _limited_options() -> Any:

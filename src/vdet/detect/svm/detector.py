@@ -80,10 +80,10 @@ class SvmModel:
         if horizon is None and (horizon := find_horizon(images)) is None:
             # A folder may hold many pictures without a horizon: only videos warn.
             level = logging.WARNING if len(images) > 1 else logging.INFO
-            found = f"no horizon is found: {DEFAULT_HORIZON} of the height is assumed"
+            found = f"no horizon found: {DEFAULT_HORIZON} of the height is assumed"
             log.log(level, "%s; set detector.search.perspective.horizon", found)
             return DEFAULT_HORIZON
-        log.info("the horizon lies at %.2f of the height", horizon)
+        log.info("the horizon is at %.2f of the height", horizon)
         return horizon
 
 

@@ -149,7 +149,7 @@ def _read(archive: zipfile.ZipFile) -> LinearModel:
     # have HOG, which are settings no more. That of the original does not say what is halved: none.
     known = {"halved": ()} | header["features"]
     if known.pop("color_space", "YCrCb") != "YCrCb":
-        raise ModelError("has another colour space than YCrCb")
+        raise ModelError("its colour space is not YCrCb")
     known.pop("spatial", None)
     known["hog"].pop("channels", None)
     boxes = [arrays[name] for name in _BOX_NAMES if name in arrays]

@@ -136,7 +136,7 @@ def start_from(network: Network, path: Path, pictures: Tensor, classes: Sequence
         if next(folded, None) is not None:
             raise ValueError("more convolutions than the network has")
     except Exception as error:  # onnx and torch raise many kinds for a file of another form
-        raise DataError(f"{path}: is not a network that vdet train-net has written") from error
+        raise DataError(f"{path}: is not a network of vdet train-net") from error
     finally:
         for hook in hooks:
             hook.remove()

@@ -118,7 +118,7 @@ class SourceReport:
         """Yield as lines of text what is learnt, and what not."""
         learnt = _counted(self.vehicles) or "nothing to learn"
         plural = "" if self.pictures == 1 else "s"
-        yield f"{self.name}: {self.pictures:,} picture{plural}; {learnt}"
+        yield f"{self.name}: {self.pictures:,} image{plural}; {learnt}"
         if self.unlabelled:
             yield f"  not labelled, so not background: {', '.join(self.unlabelled)}"
         if self.ignored:

@@ -136,12 +136,11 @@ def train_network(
         such a network, or the checkpoint belongs to another training.
     """
     if not any((~sample.ignored).any() for source in sources for sample in source.samples):
-        raise DataError("no picture has a vehicle; pass labelled pictures")
+        raise DataError("no image has a vehicle; pass labelled images")
     names = sorted(source.name for source in sources)
     if unknown := sorted(settings.weights.keys() - names):
         raise DataError(
-            f"train.net.weights: no set of pictures is named {unknown[0]}; "
-            f"there are {', '.join(names)}"
+            f"train.net.weights: unknown set {unknown[0]}; there are {', '.join(names)}"
         )
     learnt_with = {
         "sources": [(source.name, len(source.samples)) for source in sources],
@@ -278,5 +277,5 @@ class _Training:
         except Exception as error:  # torch raises many kinds for a file of another form
             raise DataError(f"{path}: is not a checkpoint of this training; remove it") from error
         if not same:
-            others = "with other settings, other pictures or another base"
+            others = "with other settings, images or base"
             raise DataError(f"{path}: belongs to a training {others}; remove it")

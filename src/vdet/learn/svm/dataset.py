@@ -76,7 +76,7 @@ def find_patches(sources: Sequence[Path]) -> list[PatchFile]:
     files = [file for source in dict.fromkeys(sources) for file in _find_in(source)]
     for name, vehicle in CLASSES.items():
         if not any(file.vehicle is vehicle and not file.is_boxed for file in files):
-            raise DataError(f"{', '.join(map(str, sources))}: no pictures in {name}/<group>/")
+            raise DataError(f"{', '.join(map(str, sources))}: no images in {name}/<group>/")
     return sorted(files, key=lambda file: (file.group, _numeric(file.name), file.source))
 
 
@@ -94,7 +94,7 @@ def _find_in(source: Path) -> list[PatchFile]:
     files = [file for name in names if (file := _patch_file(source, name, boxes))]
     if not files:
         raise DataError(
-            f"{source}: no pictures in vehicles/<group>/ or non-vehicles/<group>/; see vdet mine"
+            f"{source}: no images in vehicles/<group>/ or non-vehicles/<group>/; see vdet mine"
         )
     return files
 

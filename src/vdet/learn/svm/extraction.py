@@ -100,7 +100,7 @@ def extract(
     def samples() -> Iterator[list[PatchSample]]:
         for file, image in zip(files, read_patches(files), strict=True):
             if image is None:
-                raise DataError(f"{file}: is not a readable picture")
+                raise DataError(f"{file}: is not a readable image")
             whole = PatchSample(image, file.vehicle, np.array(file.sides or UNKNOWN, np.float32))
             rng = np.random.default_rng(zlib.crc32(image.tobytes()))
             yield [whole, *(augment(whole, rng) if augmented else ())]

@@ -171,5 +171,5 @@ def mine(
                     counts[chosen.kind] += 1
         if not counts:
             shown = ", ".join(str(source.path) for source in sources)
-            raise DataError(f"{shown}: no window fits a vehicle or is a false alarm; try others")
+            raise DataError(f"{shown}: no window shows a vehicle or a false alarm; use others")
     return searched, counts

@@ -110,7 +110,7 @@ class TrainingMetrics:
         yield from self.test.lines()
         yield ""
         if self.box_error is None:
-            yield "no patch came from vdet mine: in video, such a model finds far fewer vehicles"
+            yield "no patches from vdet mine: in video, such a model finds far fewer vehicles"
         else:
             yield f"sides of vehicles' boxes: mean error {self.box_error:.3f} of a patch's side"
 
@@ -146,7 +146,7 @@ def train(
     features, augmented = settings.svm.features, settings.train.svm.augmentation
     boxed = [file for file in files if file.is_boxed]
     data, held, model = _fit_part(files, settings, jobs=jobs, steps=steps)
-    progress = steps("describing patches with boxes", len(boxed))
+    progress = steps("computing features of patches with boxes", len(boxed))
     of_boxed = extract(boxed, features, augmented=augmented, jobs=jobs, progress=progress)
     steps("fitting the sides of boxes", None)
     regression, box_error = fit_boxes(
@@ -203,7 +203,7 @@ def _fit_part(
     data = extract(files, settings.svm.features, augmented=augmented, jobs=jobs, progress=progress)
     held = hold_out(data.groups)
     if not held.any():
-        raise DataError("no folder has two patches, of which one could be held out; use more")
+        raise DataError("no folder has two patches, so none can be held out; add more")
     steps("fitting the classifier", None)
     return data, held, fit(data.of(~held), settings)
 

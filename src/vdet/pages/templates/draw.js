@@ -185,8 +185,8 @@ function warningsOf(line, visits, paths, span) {
   return [
     paths.length && !visits.length && "no path crosses this line; move it",
     missed > few && `tracks that begin or end at this line and are not counted: ${missed}; ` +
-      "move it to where vehicles are followed longer",
-    again > few && `paths that cross this line more than once: ${again}; place it across the way of the vehicles`,
+      "move it to where vehicles are tracked longer",
+    again > few && `paths that cross this line more than once: ${again}; place it across the road`,
     heights.length && line.length < quantile(heights, 0.5) && "this line is shorter than a vehicle; make it longer",
   ].filter(text => text);
 }
@@ -321,7 +321,7 @@ function writeYaml(places, size, rest, name) {
   const list = (kind, indent, note) => places[kind].length ? [`${indent}${kind}:  # ${note}`,
     ...places[kind].map(item => `${indent}  - {${line(kind, item)}}`)] : [];
   const traffic = [
-    ...list("lines", "  ", "left and right of someone who looks from start to end"),
+    ...list("lines", "  ", "left and right are seen from start to end"),
     ...list("zones", "  ", "polygons in which vehicles are counted"), ...rest.traffic];
   return [
     `${MARK}: this file says where the vehicles of a camera are counted.`,
@@ -362,12 +362,12 @@ function problemsOf({ lines, zones, regions, ground }, size) {
   const isShort = ({ start, end }) => [0, 1].every(i => Math.abs(start[i] - end[i]) < 0.01 * size[i]);
   const say = (some, text) => some.map(each => `${each.name}: ${text}`);
   return [
-    ...say([...lines, ...zones].filter(isTwice), "this name is used twice"),
-    ...say(regions.filter(isTwice), "this name is used twice"),
+    ...say([...lines, ...zones].filter(isTwice), "the name is used twice"),
+    ...say(regions.filter(isTwice), "the name is used twice"),
     ...say(lines.filter(isShort), "is shorter than 1 % of the frame"),
-    ...say(lines.filter(line => line.left === line.right), "both sides have one name"),
+    ...say(lines.filter(line => line.left === line.right), "both sides have the same name"),
     ...say([...zones, ...regions].filter(each => each.points && crossesItself(each.points)), "crosses or touches itself"),
-    ...(ground.length && ground.length < 4 ? ["ground: needs four points or more, with their metres"] :
+    ...(ground.length && ground.length < 4 ? ["ground: needs at least four points with their metres"] :
       ground.length && !fitGround(ground) ? ["ground: these points do not fix a plane; check their metres"] : []),
   ];
 }
@@ -662,9 +662,9 @@ async function openPage(data) {
     const set = () => {
       const made = levelGround(places.ground.map(each => each.pixel), inputs.map(input => Number(input.value)), size);
       if (made) change(() => { [places.ground, selected] = [made, null]; });
-      else say("These lengths do not fit the points: 1 and 2, then 3 and 4, run from near to far.");
+      else say("These lengths do not fit the points: points 1 and 2, then 3 and 4, must go from near to far.");
     };
-    return [el("p", {}, "Are these the ends of two known lengths along one straight lane, from near to far? The camera is taken as level."),
+    return [el("p", {}, "Ends of two known lengths along one straight lane, from near to far. The camera is assumed to be level."),
       ...inputs.map((input, i) => el("label", {}, `Points ${2 * i + 1} to ${2 * i + 2}, m`, input)), button("Set the metres", set, "lengths")];
   }
 
@@ -679,7 +679,7 @@ async function openPage(data) {
       return el("button", { class: "row", "aria-pressed": each === item(), onclick: choose },
         el("b", {}, each.name ?? `ground ${index + 1}`), el("span", {}, counts ?? note));
     }));
-    get("list").replaceChildren(...(rows.length ? rows : [el("p", {}, "Nothing is drawn yet.")]));
+    get("list").replaceChildren(...(rows.length ? rows : [el("p", {}, "Nothing drawn yet.")]));
   }
 
   function errorOf({ pixel, metres }) {

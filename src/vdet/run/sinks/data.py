@@ -200,7 +200,7 @@ class CountsSink(_TableSink):
         super().__init__(path, context)
         self._make = make
         if not context.settings.traffic:
-            raise OutputError(f"{path}: there is nothing to count at; add lines or zones")
+            raise OutputError(f"{path}: no lines or zones to count at; add them to the settings")
 
     def make_content(self) -> Any:
         """Return the table."""

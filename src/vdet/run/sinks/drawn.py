@@ -184,7 +184,7 @@ class PictureSink(BaseSink):
         Raises `OutputError` for a second picture.
         """
         if self._is_done:
-            raise OutputError(f"{self.path}: takes one picture; for several give a folder")
+            raise OutputError(f"{self.path}: is for one image; for several, use a folder")
         self._is_done = True
         data = encode_image(Picture(self._overlay.draw(result)).image, self.path)
         self.context.files.stage(self.path).write_bytes(data)
