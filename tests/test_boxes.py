@@ -131,11 +131,11 @@ class TestBoxes:
     @pytest.mark.parametrize(
         ("changes", "message"),
         [
-            ({"sides": [[1, 2, 3]] * 3}, r"sides: of shape \(3, 3\)"),
-            ({"scores": [0.5]}, r"scores: of shape \(1,\), expected \(3,\)"),
-            ({"classes": [0, 0]}, r"classes: of shape \(2,\)"),
-            ({"ids": [1]}, r"ids: of shape \(1,\)"),
-            ({"data": {"strength": [1]}}, r"strength: of shape \(1,\)"),
+            ({"sides": [[1, 2, 3]] * 3}, r"sides: has shape \(3, 3\)"),
+            ({"scores": [0.5]}, r"scores: has shape \(1,\), expected \(3,\)"),
+            ({"classes": [0, 0]}, r"classes: has shape \(2,\)"),
+            ({"ids": [1]}, r"ids: has shape \(1,\)"),
+            ({"data": {"strength": [1]}}, r"strength: has shape \(1,\)"),
             ({"scores": [0, 1, np.nan]}, "scores: a value is not a finite number"),
             (
                 {"sides": [*SIDES[:2], [5, 5, 5, 9]]},

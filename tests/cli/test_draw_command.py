@@ -108,7 +108,7 @@ def test_the_picture_for_a_report_has_lines_flows_and_numbers(run: Run) -> None:
         (("-o", "a.txt"), "pages must end in .html"),
         (("--propose", "a.txt"), "settings must end in .yaml"),
         (("-o", "a.jpg"), "a.jpg: nothing to draw"),
-        (("-o", "lines.html", "-c", "wide.yaml"), "whose shape"),
+        (("-o", "lines.html", "-c", "wide.yaml"), "whose aspect ratio"),
         (("--propose", "a.yaml", "--tracks-from", "few.csv"), "no stream has enough vehicles"),
         (("-o", "frame.png", "-c", "lines.yaml", "--overwrite"), "frame.png"),
         (("-o", "a.html", "--tracks-from", "t.txt"), "t.txt: has no times"),

@@ -58,7 +58,7 @@ def test_several_videos_and_a_sweep(
     ("arguments", "code", "words"),
     [
         ((), 2, "pass one --truth for each video (videos: 1, truths: 0)"),
-        (("--truth", "gt.txt", "--truth", "gt.txt"), 2, "not 2"),
+        (("--truth", "gt.txt", "--truth", "gt.txt"), 2, "truths: 2)"),
         (("--truth", "none.txt"), 1, "none.txt: cannot be read"),
         (
             ("--truth", "gt.txt", "--sweep", "detector.heat.threshold"),

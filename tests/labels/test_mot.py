@@ -34,7 +34,10 @@ def test_truth_can_be_read_as_tracks_without_its_ignore_regions(tmp_path: Path) 
 @pytest.mark.parametrize(
     ("second", "message"),
     [
-        ("2,7,1,1,20,10,1,3,1,1", "MOTChallenge has 9 columns between commas; this line has 10"),
+        (
+            "2,7,1,1,20,10,1,3,1,1",
+            "MOTChallenge has 9 columns separated by commas; this line has 10",
+        ),
         ("2,7,1,1,20,wide,1,3,1", "'wide' is not a number"),
         ("2,7,nan,1,20,10,1,3,1", "'nan' is not a number"),
         ("2.5,7,1,1,20,10,1,3,1", "'2.5' is not a whole number"),

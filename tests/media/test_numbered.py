@@ -72,7 +72,7 @@ SEVERAL = "several kinds of names; use a pattern, as in img_%04d.png"
         ("", ["1_01.png", "2_01.png"], SEVERAL),
         ("img_%02d.png", [], "no numbered images found"),
         ("img_%02d.png", ["img_1.png"], "no numbered images found"),
-        ("img_%02d.png", ["img_06.png", "img_09.png", "img_15.png"], "picture 12 is missing"),
+        ("img_%02d.png", ["img_06.png", "img_09.png", "img_15.png"], "image 12 is missing"),
     ],
 )
 def test_no_pictures_and_a_gap_are_refused(

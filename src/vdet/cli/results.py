@@ -117,13 +117,13 @@ def counting_options(more: str = "") -> Callable[[F], F]:
     """
     counts = options.output_option(
         "--counts FILE",
-        "Write counts at lines and zones: .csv has the events; .totals.csv, .wide.csv and "
-        ".zones.csv have tables by interval; .json has everything. Can be repeated." + more,
+        "Write counts at lines and zones: .csv has the events, .totals.csv, .wide.csv and "
+        ".zones.csv have tables by interval, .json has everything. Can be repeated." + more,
     )
     flows = options.output_option(
         "--flows FILE",
         "Write flows from one line or zone to another: .csv has a row for each interval, flow and "
-        "class; .wide.csv has a row for each interval, with sums; .matrix.csv has a matrix; .json "
+        "class, .wide.csv has a row for each interval, with sums, .matrix.csv has a matrix, .json "
         "has the flows and the matrix. Can be repeated." + more,
     )
     interval = short_form(
