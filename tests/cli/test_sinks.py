@@ -16,7 +16,7 @@ from vdet.run.sinks.data import TrackSink
 from vdet.run.sinks.drawn import VideoSink
 
 FRAMES = 15
-KNOWN = "known: video, tracks, stages, picture, json, vehicles, crops, clips, page, counts"
+KNOWN = "known: video, tracks, stages, picture, json, labels, vehicles, crops, clips, page, counts"
 
 
 @pytest.fixture
