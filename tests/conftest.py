@@ -1,12 +1,13 @@
 """What many tests need: the program, a small model, a small road clip, the real data set."""
 
+import logging
 import os
 
 if disabled := os.environ.get("OPENCV_CPU_DISABLE"):  # before the first import of OpenCV
     # Its names have hyphens. For one that it does not know, it prints a line in each process.
     os.environ["OPENCV_CPU_DISABLE"] = disabled.replace("_", "-")
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -38,6 +39,15 @@ class Outcome:
 
 
 Run = Callable[..., Outcome]
+
+
+@pytest.fixture(autouse=True)
+def logs() -> Iterator[None]:
+    """Keep how the program sets up its log to one test."""
+    log = logging.getLogger("vdet")
+    before = log.handlers, log.propagate, log.level
+    yield
+    log.handlers, log.propagate, log.level = before
 
 
 @pytest.fixture

@@ -98,7 +98,7 @@ def test_a_second_batch_into_the_folder_is_refused(tmp_path: Path) -> None:
             pass
 
     with open_manifest(tmp_path) as add:
-        with pytest.raises(OutputError, match=r"manifest\.jsonl: another batch writes here"):
+        with pytest.raises(OutputError, match=r"manifest\.jsonl: another batch is writing here"):
             open_again()
         add(RECORD)
     open_again()

@@ -54,7 +54,7 @@ def test_a_region_has_a_polygon_or_a_mask(shape: dict[str, Any]) -> None:
     [
         ({"start": [1, 0.5]}, "start and end must differ"),
         ({"left": "up", "right": "up"}, "left and right must have different names"),
-        ({"end": [1, 1.01]}, "lies outside"),
+        ({"end": [1, 1.01]}, "a point is outside the frame"),
         ({"end": [0.009, 0.509]}, "line: is shorter than 1 % of the frame"),
         ({"name": ""}, "at least 1 character"),
     ],
@@ -95,7 +95,7 @@ def test_frames_of_another_shape_than_the_camera_are_refused() -> None:
     camera = CameraSettings(size=(1280, 720))
     for size in ((640, 360), (1920, 1088)):
         camera.check_frames(*size)
-    with pytest.raises(ConfigError, match="given for frames of 1280×720, whose shape is not"):
+    with pytest.raises(ConfigError, match="1280×720, whose aspect ratio differs from 640"):
         camera.check_frames(640, 480)
     CameraSettings().check_frames(640, 480)
 

@@ -61,5 +61,5 @@ def test_results_do_not_depend_on_threads(red_set: LabelledPictures, model: SvmM
 
 def test_a_picture_that_cannot_be_read_is_named(red_set: LabelledPictures, model: SvmModel) -> None:
     red_set.pictures[2].path.write_bytes(b"no picture")
-    with pytest.raises(ImageError, match=r"2\.png: is not a picture"):
+    with pytest.raises(ImageError, match=r"2\.png: is not an image"):
         evaluate_images([red_set], model, COUNTING, threads=2)

@@ -49,13 +49,10 @@ def contents(folder: Path) -> dict[Path, bytes]:
         "detect-image set/a.png -c settings.yaml --json link.png",
         "detect-video in.mp4 in.mp4",
         "detect-video frames --no-video -c settings.yaml --sink picture=mask.png",
-        "train-net set -o set/annotations.onnx --set train.net.steps=1",
     ],
 )
 def test_inputs_are_kept_also_with_overwrite(run: Run, folder: Path, arguments: str) -> None:
     before = contents(folder)
-    if arguments.startswith("train-net"):
-        pytest.importorskip("torch")
     result = run(*arguments.split(), "--overwrite")
     assert contents(folder) == before, "files were changed, or others were left"
     assert (result.code, KEPT in result.err) == (1, True), result.err

@@ -174,7 +174,7 @@ def test_bad_sets_are_trained_on_or_refused(trials: dict[str, Trial], folder: Pa
     assert trials["whole"].code == 0
     inside, out = folder / "a" / "in", folder / "out"
     assert {path.parent for path in folder.rglob("*")} == {folder, folder / "a", inside, out}
-    assert {path.suffix for path in out.iterdir()} == {".npz", ".json"}
+    assert {path.suffix for path in out.iterdir()} == {".npz"}
 
 
 @pytest.mark.parametrize("name", WICKED)

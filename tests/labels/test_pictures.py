@@ -123,7 +123,7 @@ def test_too_many_pictures_or_boxes_are_refused(
             with pytest.raises(TruthError, match="boxes; cut it into parts"):
                 read_labelled_pictures(tmp_path)
     monkeypatch.setattr(module, "MAX_IN_FRAME", 2)
-    with pytest.raises(TruthError, match=r"annotations\.2: the picture has more than 2 boxes"):
+    with pytest.raises(TruthError, match=r"annotations\.2: the image has more than 2 boxes"):
         read_labelled_pictures(tmp_path)
 
 
@@ -162,7 +162,7 @@ def test_boxes_that_cannot_be_pixels_of_their_pictures_are_refused(
     tmp_path: Path, boxes: list[tuple[float, float, float, float]]
 ) -> None:
     write_coco(tmp_path, scene_of(*boxes))
-    with pytest.raises(TruthError, match=r"2 of \d boxes lie outside their pictures or within a"):
+    with pytest.raises(TruthError, match=r"2 of \d boxes are outside their images or within a"):
         read_labelled_pictures(tmp_path)
 
 
@@ -191,7 +191,7 @@ def test_a_coco_file_may_lie_above_or_beside_the_pictures(
     assert len(read_labelled_pictures(tmp_path / "set").pictures) == 2
     write_pictures(tmp_path / "set" / "train", SCENE)
     write_pictures(tmp_path / "set" / "test", SCENE)
-    with pytest.raises(TruthError, match=r"first picture, a\.png, lies in .*; keep one"):
+    with pytest.raises(TruthError, match=r"first image, a\.png, is in .*; keep one"):
         read_labelled_pictures(path)
 
 
@@ -208,9 +208,13 @@ def test_what_other_programs_say_of_an_image_does_not_matter(tmp_path: Path) -> 
     [
         ("annotations", {"bbox": [1, 2, 3, 1e9]}, "annotations.1.bbox.3: Input should be"),
         ("annotations", {"iscrowd": 2}, "annotations.1.iscrowd: Input should be"),
-        ("images", {"file_name": "a.png"}, "has the picture a.png twice"),
-        ("images", {"file_name": "../a.png"}, "images.1.file_name: ../a.png leads out"),
-        ("images", {"file_name": "/a.png"}, "images.1.file_name: /a.png leads out"),
+        ("images", {"file_name": "a.png"}, "has the image a.png twice"),
+        (
+            "images",
+            {"file_name": "../a.png"},
+            "file_name: ../a.png points outside the set",
+        ),
+        ("images", {"file_name": "/a.png"}, "file_name: /a.png points outside the set"),
         ("images", {"file_name": "x" * 300}, "xx…: not found, but "),
         ("images", {"file_name": "a\u202eb"}, "a\\u202"),
         ("images", {"width": -3}, "images.1.width: Input should be greater"),

@@ -57,5 +57,5 @@ def test_what_other_tools_write_is_refused_in_words_that_fit(
 
 def test_an_empty_file_of_another_name_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.json").touch()
-    with pytest.raises(TruthError, match=r"a\.json: is empty; tracks and truth are files as \.txt"):
+    with pytest.raises(TruthError, match=r"a\.json: is empty; tracks and ground truth must be"):
         read_tracks(tmp_path / "a.json")

@@ -163,7 +163,7 @@ def test_the_error_names_a_file_that_is_no_picture(tmp_path: Path, data: bytes) 
 @pytest.mark.parametrize("read", [read_image, read_header])
 def test_a_pipe_is_refused_at_once(tmp_path: Path, read: Callable[[Path], object]) -> None:
     os.mkfifo(tmp_path / "pipe.png")
-    with pytest.raises(ImageError, match=r"pipe\.png: can be read only once; write it into a file"):
+    with pytest.raises(ImageError, match=r"pipe\.png: can be read only once; save it to a"):
         read(tmp_path / "pipe.png")
 
 

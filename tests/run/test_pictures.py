@@ -48,7 +48,7 @@ class TestFindingImages:
 
     def test_a_folder_without_pictures_is_named(self, tmp_path: Path) -> None:
         touch(tmp_path / "in" / "notes.txt")
-        with pytest.raises(ImageError, match=r"in: holds no pictures \(.*\.png"):
+        with pytest.raises(ImageError, match=r"in: contains no images \(.*\.png"):
             find_images([tmp_path / "in"])
 
     def test_what_is_not_there_is_named(self, tmp_path: Path) -> None:
@@ -159,7 +159,7 @@ class TestSeveral:
         shared = [Output("json", tmp_path / "boxes.json")]
         model = model_for(SETTINGS)
         (failure,) = run_pictures(jobs, shared, PictureSearch(model, SETTINGS), threads=threads)
-        assert "b.png: is not a picture" in str(failure)
+        assert "b.png: is not an image" in str(failure)
         assert self.names(tmp_path) == ["boxes.json", "out-a.png", "out-c.png"]
         items = json.loads((tmp_path / "boxes.json").read_text())
         assert [Path(item["image"]).name for item in items] == ["a.png", "c.png"]

@@ -92,8 +92,9 @@ class Conditions:
 
 def halved(plane: Image) -> Image:
     """Return a plane of half the width and height."""
-    half = cv2.resize(plane, (0, 0), fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
-    return np.asarray(half, np.uint8)
+    height, width = plane.shape
+    half = max(1, round(width / 2)), max(1, round(height / 2))
+    return np.asarray(cv2.resize(plane, half, interpolation=cv2.INTER_AREA), np.uint8)
 
 
 def small_luma(picture: Picture) -> Image:

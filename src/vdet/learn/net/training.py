@@ -154,12 +154,15 @@ def train_network(
         training.restore(checkpoint)
     elif base is not None:
         training.start_from(base, next(_batches(sources, settings, 0)))
-    with prefetch(_batches(sources, settings, training.step)) as batches:
-        for batch in batches:
-            loss = training.learn(batch)
-            progress(training.step, loss)
-            if training.step % CHECKPOINT == 0 or training.step == settings.steps:
-                training.save(checkpoint)
+    try:
+        with prefetch(_batches(sources, settings, training.step)) as batches:
+            for batch in batches:
+                loss = training.learn(batch)
+                progress(training.step, loss)
+                if training.step % CHECKPOINT == 0 or training.step == settings.steps:
+                    training.save(checkpoint)
+    finally:
+        torch.set_flush_denormal(False)
     return training.averaged.eval()
 
 
