@@ -1,5 +1,7 @@
 """Speeds of vehicles on a known road plane."""
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
 
@@ -22,10 +24,12 @@ def measured(
     low: float = 0.0,
     state: State = "detected",
     seed: int = 1,
+    asked: bool = False,
 ) -> Speeds | None:
     """Return the speeds of a vehicle whose foot is at `places`, one each frame.
 
-    `noise` and `low` move the lower edge of its box, as shares of its height.
+    `noise` and `low` move the lower edge of its box, as shares of its height. `asked` asks for the
+    speeds after every frame.
     """
     rng = np.random.default_rng(seed)
     meter = SpeedMeter(GROUND, WIDTH, HEIGHT)
@@ -35,6 +39,8 @@ def measured(
         y += 0.5 + height * (low + noise * rng.standard_normal())
         box = Box(x - height / 2, y - height, x + height / 2, y)
         meter.add(FrameTracks(index, index / rate, (Track(1, box, 0.9, state),)))
+        if asked:
+            meter.speeds()
     return meter.speeds().get(1)
 
 
@@ -57,6 +63,12 @@ def test_a_steady_vehicle_has_its_speed_at_every_frame_rate(speed: float, rate: 
     assert found.speeds == pytest.approx(abs(speed), rel=0.01)
     assert found.quantile(0.5) == pytest.approx(abs(speed), rel=0.01)
     assert found.metres == pytest.approx(2.5 * abs(speed), rel=0.06)
+
+
+def test_speeds_that_are_asked_for_in_the_middle_change_nothing() -> None:
+    asked, alone = (known(measured(driving(12.0), asked=asked)) for asked in (True, False))
+    for field in fields(Speeds):
+        np.testing.assert_array_equal(getattr(asked, field.name), getattr(alone, field.name))
 
 
 def test_the_speed_at_a_time_is_that_of_the_vehicle_then() -> None:

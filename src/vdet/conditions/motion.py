@@ -5,6 +5,7 @@ from it, outside the boxes, is linked from plane to plane. Only what travels cou
 and drops on the lens do not.
 """
 
+import itertools
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -13,7 +14,7 @@ import cv2
 import numpy as np
 
 from vdet.boxes import Box, Float32Array, Image
-from vdet.conditions.finding import Finding, joined, when
+from vdet.conditions.finding import Finding, Span, joined, when
 from vdet.polygons import Point
 
 _RATE = 8.0
@@ -61,7 +62,7 @@ class Mover:
 class MotionWatch:
     """Follows what moves through the planes of one video."""
 
-    _ended: list[Mover] = field(default_factory=list)
+    _ended: list[Span] = field(default_factory=list)
     _movers: list[Mover] = field(default_factory=list)
     _starts: dict[int, Point] = field(default_factory=dict)
     _driven: set[int] = field(default_factory=set)
@@ -98,13 +99,11 @@ class MotionWatch:
 
     def findings(self) -> list[Finding]:
         """Return how much of what travelled is not a vehicle that was found, and when."""
-        left = [item for item in self._ended + self._travelled(self._movers) if not item.is_found]
+        left = self._ended + self._unexplained(self._movers)
         fraction = len(left) / max(1, len(left) + len(self._driven))
         if len(left) < _FEWEST or fraction < _FRACTION:
             return []
-        spans = joined(
-            sorted(time for item in left for time in (item.times[0], item.times[-1])), _GAP
-        )
+        spans = joined(sorted(itertools.chain.from_iterable(left)), _GAP)
         text = (
             f"{fraction:.0%} of the moving objects are not detected vehicles, mostly "
             f"{when(spans)}: poor visibility, or classes that are not detected"
@@ -126,11 +125,14 @@ class MotionWatch:
             going.append(mover)
         for mover in left:
             mover.is_found |= _is_in(mover.places[-1], self._covered)
-        self._ended += self._travelled(left)
+        self._ended += self._unexplained(left)
         self._movers = going
 
-    def _travelled(self, movers: Iterable[Mover]) -> list[Mover]:
-        return [item for item in movers if item.has_travelled(self._covered.shape[1])]
+    def _unexplained(self, movers: Iterable[Mover]) -> list[Span]:
+        """Return from when to when there were those that travelled and were not found."""
+        width = self._covered.shape[1]
+        travelled = (item for item in movers if not item.is_found and item.has_travelled(width))
+        return [(item.times[0], item.times[-1]) for item in travelled]
 
     def _things(self, differs: Image) -> list[tuple[Point, float]]:
         """Return the middle and the size of what differs outside the boxes, the largest first."""

@@ -104,8 +104,9 @@ class Sight:
         recall, factor = _DOUBTED
         if self.contrast < _PLAIN:
             return None
-        drops: Code | None = "drops" if self.drops > LIKELY else None
-        return self.dim(factor if self.recall < recall else 1.0) or drops
+        if dim := self.dim(factor if self.recall < recall else 1.0):
+            return dim
+        return "drops" if self.drops > LIKELY else None
 
     def dim(self, factor: float = 1.0) -> Code | None:
         """Return whether it is dark, hazy or blurred; a larger factor widens these limits."""
@@ -157,7 +158,8 @@ def findings(times: Sequence[float], sights: Sequence[Sight], *, is_shipped: boo
 
     `is_shipped` says whether the shipped network was used: what it finds is known.
     """
-    codes = [_usual(sights[max(0, n - _AROUND) : n + _AROUND + 1]) for n in range(len(sights))]
+    every = [sight.code for sight in sights]
+    codes = [_usual(every[max(0, n - _AROUND) : n + _AROUND + 1]) for n in range(len(every))]
     found = []
     for code, words in _WORDS.items():
         bad = dict.fromkeys(time for time, item in zip(times, codes, strict=True) if item == code)
@@ -175,7 +177,6 @@ def findings(times: Sequence[float], sights: Sequence[Sight], *, is_shipped: boo
     return found
 
 
-def _usual(sights: Sequence[Sight]) -> Code | None:
-    """Return the code that most of them have."""
-    codes = [sight.code for sight in sights]
+def _usual(codes: Sequence[Code | None]) -> Code | None:
+    """Return the most frequent code."""
     return max(codes, key=lambda code: (codes.count(code), code is None))

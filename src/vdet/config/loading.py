@@ -127,7 +127,7 @@ def _with_kinds_over(below: Document, above: Document) -> Document:
     values = dict(below.values)
     for name in GROUPS:
         kind = inside(above.values, name, "kind")
-        if kind is not None and kind != (inside(values, name, "kind") or default_kind(name)):
+        if kind is not None and kind != _kind_in(values, name):
             values[name] = {}
     return _over(Document(below.name, values, below.places), above)
 

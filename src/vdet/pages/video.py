@@ -179,7 +179,7 @@ class VideoPage:
             shown=shown,
             level_plot=charts.level_plot(self._spans, x, "Number of vehicles at once", self.gaps),
             timeline=_timeline(shown, self.findings, x),
-            interval_plots=self._interval_plots(),
+            interval_plots=self._interval_plots(x),
             speed_plot=charts.histogram(speeds, _SPEED_STEP, title, "km/h") if speeds else None,
             traffic=self.counts
             and traffic_part(self.counts, self.records, self.poster, self.borders, self.ground),
@@ -218,7 +218,7 @@ class VideoPage:
             *((name, str(count)) for name, count in self._totals.items()),
         ]
 
-    def _interval_plots(self) -> list[Plot]:
+    def _interval_plots(self, x: Axis) -> list[Plot]:
         """Return vehicles, and the counts of lines and zones, by the intervals of the tables.
 
         There is nothing to compare where there is only one interval.
@@ -239,7 +239,6 @@ class VideoPage:
             found = counted.setdefault(f"{event.name}: {event.direction}", Counter())
             found[first[intervals.number(0, event.time)]] += 1
         series = {"First seen": came, "At lines and zones": counted}
-        x = charts.time_axis(self.start, self.end, self.zero)
         return [
             charts.interval_plot(some, x, step, name, self.zero)
             for name, some in series.items()

@@ -38,6 +38,7 @@ class LiveTraffic:
     counter: "VehicleCounter | None" = None
     speeds: "SpeedMeter | None" = None
     vehicles: tuple[VehicleRecord, ...] = ()
+    _final: "Counts | None" = None
 
     def __init__(
         self, settings: Settings, width: int, height: int, clock: Clock | None = None
@@ -66,14 +67,15 @@ class LiveTraffic:
 
     def counts(self) -> "Counts | None":
         """Return all counts so far, with the speeds that are known."""
-        if self.counter is None:
-            return None
+        if self._final or self.counter is None:
+            return self._final
         from vdet.traffic.speeds import with_speeds
 
         return with_speeds(replace(self.counter.counts(), clock=self.clock), self.speeds)
 
     def end(self, *, is_still: bool = False) -> None:
-        """Make the records, after the last frame; `is_still` as of `VehicleRecords.end`."""
+        """Make records and counts, after the last frame; `is_still` as of `VehicleRecords.end`."""
+        self._final = self.counts()
         records = self._records.end(self.speeds, is_still=is_still)
         chosen = (record for record in records if is_chosen(record.class_name, self._classes))
         self.vehicles = tuple(chosen)

@@ -152,14 +152,17 @@ class SpeedMeter:
                 self._close(number)
 
     def speeds(self) -> dict[int, Speeds]:
-        """Return the speeds of the vehicles by their ids, where they are known; the video ended."""
-        for number in list(self._rows):
-            self._close(number)
-        return {number: speeds for number, speeds in self._known.items() if speeds}
+        """Return the speeds so far of the vehicles by their ids, where they are known."""
+        known = self._known | {number: self._measured(number) for number in self._rows}
+        return {number: speeds for number, speeds in known.items() if speeds}
 
     def _close(self, number: int) -> None:
-        rows = np.array(self._rows.pop(number)).reshape(-1, _COLUMNS)
-        self._known[number] = measure(self.ground, rows) or self._known.get(number)
+        self._known[number] = self._measured(number)
+        del self._rows[number]
+
+    def _measured(self, number: int) -> Speeds | None:
+        rows = np.array(self._rows[number]).reshape(-1, _COLUMNS)
+        return measure(self.ground, rows) or self._known.get(number)
 
 
 def with_speeds(counts: Counts, meter: SpeedMeter | None) -> Counts:

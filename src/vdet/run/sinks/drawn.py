@@ -61,16 +61,12 @@ class Overlay:
             from vdet.lanes.road import draw_lane
 
             draw_lane(surface, result.road.lane)
-        shown = self._shown(result)
+        shown = sorted(result.tracks, key=lambda track: track.box.y2)  # the farthest first
         if self._counter:
             draw_running_counts(surface, self._counter)
         self._draw_trails(surface, shown, float(result.frame.time))
         self._draw_vehicles(surface, shown)
         return surface
-
-    def _shown(self, result: FrameResult) -> list[Track]:
-        """Return the vehicles to draw, with the boxes to draw, the farthest first."""
-        return sorted(result.tracks, key=lambda track: track.box.y2)
 
     def _draw_trails(self, surface: Surface, shown: Sequence[Track], now: float) -> None:
         if not self._longest:
@@ -87,11 +83,10 @@ class Overlay:
             draw_lines(surface, path, self._color(track), width)
 
     def _draw_vehicles(self, surface: Surface, shown: Sequence[Track]) -> None:
-        for track in shown:
-            dashed = track.state == "predicted"
-            boxes.draw_box(surface, track.box, self._color(track), dashed=dashed)
-        texts = [[label_text(track, parts) for parts in self._labels] for track in shown]
         colors = [self._color(track) for track in shown]
+        for track, color in zip(shown, colors, strict=True):
+            boxes.draw_box(surface, track.box, color, dashed=track.state == "predicted")
+        texts = [[label_text(track, parts) for parts in self._labels] for track in shown]
         boxes.draw_labels(surface, [track.box for track in shown], texts, colors)
 
     def _color(self, track: Track) -> Color:
