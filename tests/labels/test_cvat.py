@@ -3,14 +3,17 @@ import zipfile
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
+import numpy as np
 import pytest
 
 from labels.saving import VIDEO, car, frame, read_back, written
 from vdet.errors import TruthError
 from vdet.labels import cvat
-from vdet.labels.cvat import CVAT, read_cvat
+from vdet.labels.cvat import CVAT, read_cvat, read_cvat_pictures
 from vdet.labels.formats import SourceVideo
 from vdet.labels.label import Label
+from vdet.labels.pictures import LabelledPicture
+from vdet.media.images import write_image
 from vdet.track.track import FrameTracks
 
 FILE = Path("annotations.xml")
@@ -161,3 +164,10 @@ def test_a_zip_file_without_annotations_is_refused() -> None:
         archive.writestr("readme.txt", "nothing")
     with pytest.raises(TruthError, match=r"a\.xml: has no annotations\.xml; export"):
         read_cvat(Path("a.xml"), file.getvalue())
+
+
+def test_the_size_of_a_picture_may_be_unknown(tmp_path: Path) -> None:
+    write_image(tmp_path / "a.png", np.zeros((8, 12, 3), np.uint8))
+    path = tmp_path / "annotations.xml"
+    path.write_bytes(document('<image id="0" name="a.png" width="0" height="0"/>').encode())
+    assert list(read_cvat_pictures(path)) == [LabelledPicture(tmp_path / "a.png", path, (), None)]

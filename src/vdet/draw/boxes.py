@@ -86,6 +86,7 @@ def _text_mask(text: str, place: tuple[int, int], scale: float, shape: tuple[int
     return mask
 
 
+@lru_cache(maxsize=1024)
 def text_size(text: str, scale: float) -> tuple[int, int, int]:
     """Return width, height above the baseline and depth below it of a line of text, pixels."""
     (width, height), baseline = cv2.getTextSize(text, _FONT, scale, _stroke(scale))

@@ -24,7 +24,16 @@ from vdet.errors import TruthError
 from vdet.files import record_input
 from vdet.labels.documents import json_values
 from vdet.labels.formats import Format, SourceVideo, last_classes
-from vdet.labels.label import MAX_LABELS, NO_ID, Label, SavedTracks, Size, from_size, line_error
+from vdet.labels.label import (
+    MAX_LABELS,
+    NO_ID,
+    Label,
+    SavedTracks,
+    Size,
+    from_size,
+    known_size,
+    line_error,
+)
 from vdet.labels.parsing import Index, Number, Times, checked_times, first_mistake
 from vdet.labels.pictures import LabelledPicture, inside, picture_folder
 from vdet.track.track import FrameTracks, State
@@ -140,7 +149,7 @@ class _Image:
 
     @property
     def size(self) -> Size | None:
-        return (self.width, self.height) if self.width and self.height else None
+        return known_size(self.width, self.height)
 
 
 _LISTS: dict[str, TypeAdapter[Any]] = {

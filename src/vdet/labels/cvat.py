@@ -21,7 +21,7 @@ from vdet.detect.classes import UNKNOWN
 from vdet.errors import TruthError, escaped
 from vdet.labels.documents import attribute, read_xml, size_of, text_of
 from vdet.labels.formats import Format, SourceVideo, last_classes
-from vdet.labels.label import Corners, Label, SavedTracks, limited, line_error
+from vdet.labels.label import Corners, Label, SavedTracks, known_size, limited, line_error
 from vdet.labels.parsing import (
     archive_members,
     parse_corners,
@@ -142,9 +142,8 @@ def read_cvat_pictures(path: Path) -> Iterator[LabelledPicture]:
         try:
             name, size = inside(attribute(image, "name")), None
             if "width" in image.attrib:
-                size = (
-                    parse_whole(attribute(image, "width")),
-                    parse_whole(attribute(image, "height")),
+                size = known_size(
+                    *(parse_whole(attribute(image, side)) for side in ("width", "height"))
                 )
             labels = tuple(Label(place, _sides(box), attribute(box, "label")) for box in image)
         except ValueError as error:

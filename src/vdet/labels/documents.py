@@ -12,7 +12,7 @@ from xml.parsers import expat
 import ijson
 
 from vdet.errors import TruthError, printable
-from vdet.labels.label import Size, line_error
+from vdet.labels.label import Size, known_size, line_error
 from vdet.labels.parsing import parse_whole
 
 MAX_MEMORY = 700_000_000
@@ -148,5 +148,4 @@ def size_of(element: ET.Element | None) -> Size | None:
     """Return `width` and `height` in an element; None without it, or for 0, as some tools write."""
     if element is None:
         return None
-    width, height = (parse_whole(text_of(element, name)) for name in ("width", "height"))
-    return (width, height) if min(width, height) > 0 else None
+    return known_size(*(parse_whole(text_of(element, name)) for name in ("width", "height")))

@@ -38,6 +38,11 @@ Size = tuple[int, int]
 """Width and height in pixels."""
 
 
+def known_size(width: int | None, height: int | None) -> Size | None:
+    """Return a size; None where a side is missing or 0, as some tools write."""
+    return (width, height) if width and height and min(width, height) > 0 else None
+
+
 class Label(NamedTuple):
     """A labelled box of a file; there may be millions.
 

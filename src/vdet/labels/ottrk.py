@@ -18,7 +18,7 @@ from vdet.errors import TruthError
 from vdet.labels import parsing
 from vdet.labels.documents import json_values
 from vdet.labels.formats import Format, SourceVideo, last_classes
-from vdet.labels.label import SavedTracks
+from vdet.labels.label import SavedTracks, known_size
 from vdet.labels.parsing import Index, Row, first_mistake
 from vdet.track.track import FrameTracks
 from vdet.version import __version__
@@ -115,7 +115,7 @@ def read_ottrk(path: Path, data: bytes) -> SavedTracks:
         raise TruthError(f"{what}: has no {_HEAD}")
     [video, *_] = videos
     times = {frame: moment - video.begin for frame, moment in moments.items()}
-    size = (video.width, video.height) if video.width and video.height else None
+    size = known_size(video.width, video.height)
     begin = datetime.fromtimestamp(video.begin, UTC).astimezone()
     return SavedTracks(labels, None, times, size, begin)
 

@@ -111,13 +111,14 @@ def wide_table(rows: Sequence[CountRow | FlowRow], between: str) -> list[Sequenc
     `between` is the text between the two names of a way.
     """
     found: Counter[tuple[Any, ...]] = Counter()
-    for start, end, *way, name, count in map(_cells, rows):
+    cells = [_cells(row) for row in rows]
+    for start, end, *way, name, count in cells:
         for interval in ((start, end), (ALL, "")):
             for column in ((*way, name), (*way, ALL), (ALL,)):
                 found[*interval, *column] += count
-    intervals = {tuple(_cells(row)[:2]): None for row in rows}
-    classes = {row.class_name: None for row in rows}
-    ways = {tuple(_cells(row)[2:4]): None for row in rows}
+    intervals = dict.fromkeys(tuple(row[:2]) for row in cells)
+    classes = dict.fromkeys(row[4] for row in cells)
+    ways = dict.fromkeys(tuple(row[2:4]) for row in cells)
     columns = [*((*way, name) for way in ways for name in (*classes, ALL)), (ALL,)]
     heading = (*(f"{between.join(way)}, {name}" for *way, name in columns[:-1]), ALL)
     body = (

@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
-from vdet.boxes import Box
+from vdet.boxes import Box, Image
+from vdet.media import Picture
 from vdet.polygons import Point
 from vdet.track.track import FrameTracks, State, Track
 from vdet.traffic.clock import Clock
@@ -15,8 +16,6 @@ from vdet.traffic.tables import VIDEO, is_json, join_tables, plain_moment, write
 
 if TYPE_CHECKING:  # most runs measure no speed
     from vdet.traffic.speeds import SpeedMeter, Speeds
-from vdet.boxes import Image
-from vdet.media import Picture
 
 PATH_STEP = 0.01
 """Distance after which a path gets its next point, as a fraction of the frame's width.

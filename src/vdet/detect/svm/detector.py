@@ -118,8 +118,21 @@ class SvmDetector:
         return self._shown_in_still(found) if candidates.is_still else found
 
     def stage_pictures(self, image: Image, detections: Boxes) -> dict[str, Image]:
-        """Return pictures of the windows, the hits and the heat."""
-        return stage_pictures(image, detections.trace)
+        """Return three pictures of a frame, BGR uint8 `(H, W, 3)`: windows, hits, heat."""
+        trace = detections.trace
+        windows, hits = (image * 0.6).astype(np.uint8), image.copy()
+        for number, grid in enumerate(trace.grids):
+            boxes = [Box.sized(*box) for box in grid.boxes.tolist()]
+            extent = Box(boxes[0].x1, boxes[0].y1, boxes[-1].x2, boxes[-1].y2)
+            example = boxes[number * grid.columns // len(trace.grids)]
+            draw_box(windows, extent, color_of(number))
+            draw_box(windows, example, color_of(number), f"{grid.size} px: {len(grid)} windows")
+        for row in np.argsort(trace.hits.probabilities).tolist():  # the likeliest is on top
+            box = Box.sized(*trace.hits.boxes[row].tolist())
+            draw_box(hits, box, GREEN, f"{trace.hits.probabilities[row]:.2f}")
+        heat = blend_heat(image, trace.heat)
+        draw_label(heat, f"peak {trace.heat.peak:.1f}", (0, 0), WHITE)
+        return {"windows": windows, "hits": hits, "heat": heat}
 
     def _regions(self, heat: Heat) -> list[HotRegion]:
         regions = find_regions(heat, self._heat.threshold)
@@ -194,23 +207,6 @@ def trained_on(path: Path) -> tuple[str, ...]:
 
 
 SVM = DetectorKind(SvmSettings, load_svm, shipped_model)
-
-
-def stage_pictures(image: Image, trace: Trace) -> dict[str, Image]:
-    """Return three pictures of a frame, BGR uint8 `(H, W, 3)`, by name: windows, hits, heat."""
-    windows, hits = (image * 0.6).astype(np.uint8), image.copy()
-    for number, grid in enumerate(trace.grids):
-        boxes = [Box.sized(*box) for box in grid.boxes.tolist()]
-        extent = Box(boxes[0].x1, boxes[0].y1, boxes[-1].x2, boxes[-1].y2)
-        example = boxes[number * grid.columns // len(trace.grids)]
-        draw_box(windows, extent, color_of(number))
-        draw_box(windows, example, color_of(number), f"{grid.size} px: {len(grid)} windows")
-    for row in np.argsort(trace.hits.probabilities).tolist():  # the likeliest is on top
-        box = Box.sized(*trace.hits.boxes[row].tolist())
-        draw_box(hits, box, GREEN, f"{trace.hits.probabilities[row]:.2f}")
-    heat = blend_heat(image, trace.heat)
-    draw_label(heat, f"peak {trace.heat.peak:.1f}", (0, 0), WHITE)
-    return {"windows": windows, "hits": hits, "heat": heat}
 
 
 def blend_heat(image: Image, heat: Heat) -> Image:

@@ -11,7 +11,7 @@ from vdet.boxes import Float32Array, Float64Array, Image, area, coverage, iou_ma
 from vdet.config.schema import NetworkTrainingSettings
 from vdet.detect.onnx.preparation import GREY
 from vdet.learn.net.sources import NetSample, NetSource, join
-from vdet.learn.net.weather import with_weather
+from vdet.learn.net.weather import blended, with_weather
 
 MIN_SIDE = 8.0
 """Minimum longer side of a vehicle, pixels; smaller vehicles are ignored."""
@@ -190,7 +190,7 @@ def _paste(rng: np.random.Generator, sample: NetSample, donor: NetSample, row: i
         return sample
     part = sample.image[y : y + rows, x : x + columns]
     opacity = _feather(columns, inner[0], inner[2]) * _feather(rows, inner[1], inner[3])[:, None]
-    part[:] = part + opacity[..., None] * (patch.astype(np.float32) - part)
+    part[:] = blended(part, patch, opacity)
     return replace(
         sample,
         boxes=np.concatenate([sample.boxes, place[np.newaxis]]),

@@ -113,7 +113,7 @@ def _with_drops(rng: np.random.Generator, image: Image) -> Image:
         part[:] = _image(small * rng.uniform(0.7, 1.3))
         axes = radius, max(2, int(radius * rng.uniform(0.8, 1.6)))
         cv2.ellipse(mask, (x, y), axes, 0, 0, 360, 255, -1)
-    return _blended(image, shown, cv2.GaussianBlur(mask, (0, 0), 1.5) / 255.0)
+    return blended(image, shown, cv2.GaussianBlur(mask, (0, 0), 1.5) / 255.0)
 
 
 def _with_wiper(rng: np.random.Generator, image: Image) -> Image:
@@ -125,10 +125,10 @@ def _with_wiper(rng: np.random.Generator, image: Image) -> Image:
     cv2.line(mask, foot, tip, 255, max(2, int(width * rng.uniform(0.005, 0.025))))
     smeared = cv2.blur(image, (1 + 2 * int(0.01 * width), 1))
     dark = np.full_like(image, 25)
-    return _blended(smeared, dark, cv2.GaussianBlur(mask, (0, 0), 0.006 * width) / 255.0)
+    return blended(smeared, dark, cv2.GaussianBlur(mask, (0, 0), 0.006 * width) / 255.0)
 
 
-def _blended(image: _Values, other: _Values, opacity: _Values) -> Image:
+def blended(image: _Values, other: _Values, opacity: _Values) -> Image:
     """Return the image with another one over it, of an opacity `(H, W)` from 0 to 1."""
     return _image(image + opacity[..., np.newaxis] * (other.astype(np.float32) - image))
 
