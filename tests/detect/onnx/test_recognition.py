@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -87,26 +88,19 @@ def test_a_centred_letterbox_in_rgb(
 
 
 @pytest.mark.parametrize("raw", [True, False], ids=["raw", "decoded"])
-def test_yolox_has_its_letterbox_at_the_top_left_in_bgr(raw: bool, tmp_path: Path) -> None:
-    form = yolox(SIZE, BOX, 80, raw=raw)
+@pytest.mark.parametrize(("classes", "name"), [(80, "car"), (1, "vehicle")])
+def test_yolox_has_its_letterbox_at_the_top_left_in_bgr(
+    raw: bool, classes: int, name: str, tmp_path: Path
+) -> None:
+    """With one class, its table looks like one of boxes after suppression."""
+    form = yolox(SIZE, replace(BOX, class_id=min(2, classes - 1)), classes, raw=raw)
     path = write_network(tmp_path / "net.onnx", form, SIZE, (40, 32))
     found = detect(path, frame_with_red(160, 128))
     # 64 of the 128 columns are the frame: the part beyond it does not count.
     assert found.sides == pytest.approx(np.array([[224, 112, 256, 144]]), abs=0.01)
     assert found.scores == pytest.approx([1.0], abs=0.01)
+    assert class_names(found) == [name]
     assert recognize(Session(path)).name == "YOLOX"
-
-
-@pytest.mark.parametrize("raw", [True, False], ids=["raw", "decoded"])
-def test_yolox_of_one_class_is_not_taken_for_boxes_after_suppression(
-    raw: bool, tmp_path: Path
-) -> None:
-    form = yolox(SIZE, RedBox(x=64, y=32, width=16, height=8), 1, raw=raw)
-    assert form.table.shape == (168, 6)
-    path = write_network(tmp_path / "net.onnx", form, SIZE, (40, 32))
-    found = detect(path, frame_with_red(160, 128))
-    assert found.sides == pytest.approx(np.array([[224, 112, 256, 144]]), abs=0.01)
-    assert class_names(found) == ["vehicle"]
 
 
 def test_rt_detr_stretches_the_frame(tmp_path: Path) -> None:

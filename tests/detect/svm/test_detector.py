@@ -13,7 +13,6 @@ from vdet.config.schema import SvmSettings
 from vdet.detect.svm.detector import SvmModel, Trace
 from vdet.detect.svm.heat import HotRegion
 from vdet.detect.svm.search import FrameSearch
-from vdet.errors import FrameSizeError
 from vdet.media import Picture
 
 MODEL = red_finder()
@@ -58,16 +57,11 @@ def test_a_car_in_consecutive_frames_is_detected_by_a_box_around_it() -> None:
     assert box.contains((detections.data["centroid"][0, 0], detections.data["centroid"][0, 1]))
 
 
-def test_the_heat_of_a_car_that_has_gone_is_forgotten() -> None:
+def test_an_empty_road_has_no_heat_and_that_of_a_car_that_has_gone_is_forgotten() -> None:
     *_, detections = detect_video(road(CAR), road(), road())
+    assert trace_of(detections).heat.values.shape == (240, 320)
     assert trace_of(detections).heat.peak == 0
     assert len(detections) == 0
-
-
-def test_nothing_is_detected_on_an_empty_road() -> None:
-    detections = detect_still(road())
-    assert len(detections) == 0
-    assert trace_of(detections).heat.values.shape == (240, 320)
 
 
 def test_lengths_scale_with_the_frame() -> None:
@@ -198,12 +192,6 @@ class TestHorizon:
         assert line.startswith(f"{level} no horizon found: 0.58 of the hei")
         assert "set detector.search.perspective.horizon" in line
         assert "lies" not in line
-
-
-@pytest.mark.parametrize("shape", [(240, 20, 3), (1, 1, 3), (2, 2, 3)])
-def test_a_picture_too_small_to_search_is_refused(shape: tuple[int, int, int]) -> None:
-    with pytest.raises(FrameSizeError, match="no search window fits"):
-        detect_still(np.zeros(shape, np.uint8))
 
 
 def test_one_loaded_model_serves_frames_of_any_size() -> None:

@@ -1,10 +1,7 @@
-import io
 import json
 import math
 import pickle
-import tracemalloc
 import zipfile
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -40,62 +37,33 @@ def model_with_boxes() -> LinearModel:
     return replace(model_of(2), box_regression=boxes)
 
 
-def boxes_of(model: LinearModel) -> BoxRegression:
-    assert model.box_regression is not None
-    return model.box_regression
-
-
 def header_of(asked: FeatureSettings = SMALL, **changes: Any) -> dict[str, Any]:
-    header = {
-        "format": "vdet model",
-        "version": 2,
-        "features": asked.model_dump(mode="json"),
-        "provenance": {},
-    }
-    return {key: value for key, value in (header | changes).items() if value is not ...}
+    features = asked.model_dump(mode="json")
+    header = {"format": "vdet model", "version": 2, "features": features, "provenance": {}}
+    return header | changes
 
 
 def arrays_of(model: LinearModel) -> dict[str, npt.NDArray[Any]]:
-    return {name: getattr(model, name) for name in ("weights", "biases", "slopes", "offsets")}
+    arrays = {name: getattr(model, name) for name in ("weights", "biases", "slopes", "offsets")}
+    if boxes := model.box_regression:
+        arrays |= {"box_weights": boxes.weights, "box_biases": boxes.biases}
+    return arrays
 
 
-def write_npz(path: Path, header: object, **arrays: npt.NDArray[Any]) -> Path:
+def packed(header: object) -> npt.NDArray[np.uint8]:
     text = header if isinstance(header, bytes) else json.dumps(header).encode()
-    parts: dict[str, Any] = arrays_of(model_of(2)) | arrays
-    np.savez_compressed(path, header=np.frombuffer(text, np.uint8), **parts)
-    return path
+    return np.frombuffer(text, np.uint8)
 
 
-def box_arrays() -> dict[str, npt.NDArray[Any]]:
-    boxes = boxes_of(model_with_boxes())
-    return {"box_weights": boxes.weights, "box_biases": boxes.biases}
-
-
-def write_with_boxes(path: Path, **changes: npt.NDArray[Any]) -> Path:
-    return write_npz(path, header_of(), **box_arrays() | changes)
-
-
-def write_members(path: Path, members: Mapping[str, bytes]) -> Path:
+def write_parts(path: Path, **changes: npt.NDArray[Any] | None) -> Path:
+    """Write a model of two members with boxes, with some parts replaced; None leaves one out."""
+    parts = {"header": packed(header_of()), **arrays_of(model_with_boxes())} | changes
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, data in members.items():
-            archive.writestr(f"{name}.npy", data)
+        for name, array in parts.items():
+            if array is not None:
+                with archive.open(f"{name}.npy", "w") as file:
+                    np.save(file, array, allow_pickle=True)
     return path
-
-
-def npy(array: npt.NDArray[Any]) -> bytes:
-    file = io.BytesIO()
-    np.save(file, array, allow_pickle=True)
-    return file.getvalue()
-
-
-def npy_header(kind: str, shape: str) -> bytes:
-    text = f"{{'descr': {kind!r}, 'fortran_order': False, 'shape': {shape}, }}".encode()
-    return b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text
-
-
-def members_of(model: LinearModel, **changes: bytes) -> dict[str, bytes]:
-    header = np.frombuffer(json.dumps(header_of()).encode(), np.uint8)
-    return {k: npy(v) for k, v in {"header": header, **arrays_of(model)}.items()} | changes
 
 
 @pytest.fixture
@@ -125,16 +93,16 @@ def test_huge_decision_values_give_probabilities_of_0_and_1_without_overflow() -
     assert probabilities.tolist() == pytest.approx([0, 0.5, 1])
 
 
-@pytest.mark.parametrize("members", [1, 3, 20])
-def test_a_saved_model_is_loaded_bit_for_bit(path: Path, members: int) -> None:
-    model = model_of(members)
+@pytest.mark.parametrize("model", [model_of(1), model_of(20), model_with_boxes()])
+def test_a_saved_model_is_loaded_bit_for_bit(path: Path, model: LinearModel) -> None:
     save_model(model, path)
     loaded = load_model(path)
-    assert loaded.features == model.features
-    assert loaded.provenance == model.provenance
+    assert (loaded.features, loaded.provenance) == (model.features, model.provenance)
+    arrays = arrays_of(loaded)
+    assert arrays.keys() == arrays_of(model).keys()
     for name, array in arrays_of(model).items():
-        np.testing.assert_array_equal(getattr(loaded, name), array)
-        assert getattr(loaded, name).dtype == np.float32
+        np.testing.assert_array_equal(arrays[name], array)
+        assert arrays[name].dtype == np.float32
 
 
 def test_a_model_that_does_not_say_which_channels_are_halved_has_none(path: Path) -> None:
@@ -144,8 +112,7 @@ def test_a_model_that_does_not_say_which_channels_are_halved_has_none(path: Path
     header["features"]["color_space"] = "YCrCb"  # as older versions wrote it
     header["features"]["spatial"] = {"size": 0}
     header["features"]["hog"]["channels"] = [0, 1, 2]
-    write_npz(path, header)
-    assert load_model(path).features == features
+    assert load_model(write_parts(path, header=packed(header))).features == features
 
 
 def test_the_sides_of_a_box_are_linear_in_the_hog() -> None:
@@ -153,32 +120,6 @@ def test_the_sides_of_a_box_are_linear_in_the_hog() -> None:
     regression = BoxRegression(weights, np.array([-0.5, -0.5, 0.5, 0.5], np.float32))
     sides = regression.sides(np.array([[0.25, 1], [0, 0]], np.float32))
     assert sides.tolist() == [[-0.25, 0.5, 1, -0.5], [-0.5, -0.5, 0.5, 0.5]]
-
-
-def test_the_regression_of_boxes_is_kept_bit_for_bit(path: Path) -> None:
-    saved = model_with_boxes()
-    save_model(saved, path)
-    loaded = load_model(path, SMALL)
-    np.testing.assert_array_equal(loaded.weights, saved.weights)
-    for name in ("weights", "biases"):
-        array = getattr(boxes_of(loaded), name)
-        np.testing.assert_array_equal(array, getattr(boxes_of(saved), name))
-        assert array.dtype == np.float32
-
-
-@pytest.mark.parametrize("missing", ["box_weights", "box_biases"])
-def test_a_regression_with_one_of_its_two_arrays_is_damaged(path: Path, missing: str) -> None:
-    arrays = {name: array for name, array in box_arrays().items() if name != missing}
-    with pytest.raises(ModelError, match="damaged"):
-        load_model(write_npz(path, header_of(), **arrays))
-
-
-def test_a_model_asked_for_other_features_says_which_it_has(path: Path) -> None:
-    save_model(model_of(1), path)
-    asked = SMALL.model_copy(update={"patch": 32})
-    message = r'trained with other features: detector\.features=\{"patch":16,'
-    with pytest.raises(ModelError, match=message):
-        load_model(path, asked)
 
 
 @pytest.mark.parametrize("data", [b"", b"not a zip file", b"PK\x05\x06" + bytes(18)])
@@ -219,15 +160,13 @@ def test_a_header_that_is_not_understood_is_refused(
     path: Path, header: object, message: str
 ) -> None:
     with pytest.raises(ModelError, match=message):
-        load_model(write_npz(path, header))
+        load_model(write_parts(path, header=packed(header)))
 
 
-@pytest.mark.parametrize("missing", ["header", "weights", "biases", "slopes", "offsets"])
+@pytest.mark.parametrize("missing", ["header", *arrays_of(model_with_boxes())])
 def test_a_model_without_one_of_its_parts_is_damaged(path: Path, missing: str) -> None:
-    members = members_of(model_of(2))
-    del members[missing]
     with pytest.raises(ModelError, match="damaged"):
-        load_model(write_members(path, members))
+        load_model(write_parts(path, **{missing: None}))
 
 
 @pytest.mark.parametrize(
@@ -251,14 +190,14 @@ def test_an_array_that_does_not_fit_is_refused(
     path: Path, name: str, array: npt.NDArray[Any], message: str
 ) -> None:
     with pytest.raises(ModelError, match=message):
-        load_model(write_with_boxes(path, **{name: array}))
+        load_model(write_parts(path, **{name: array}))
 
 
 def test_a_model_without_members_is_refused(path: Path) -> None:
     arrays = {name: np.zeros(0, np.float32) for name in ("biases", "slopes", "offsets")}
     weights = np.zeros((0, 120), np.float32)
     with pytest.raises(ModelError, match="has no SVM; train it again"):
-        load_model(write_npz(path, header_of(), weights=weights, **arrays))
+        load_model(write_parts(path, weights=weights, **arrays))
 
 
 class _Trap:
@@ -275,19 +214,8 @@ def test_pickled_objects_are_refused_and_not_run(path: Path, tmp_path: Path) -> 
     trap = np.array([_Trap(tmp_path / "sprung")], object)
     for name in ("header", "weights"):
         with pytest.raises(ModelError, match="damaged"):
-            load_model(write_members(path, members_of(model_of(2), **{name: npy(trap)})))
+            load_model(write_parts(path, **{name: trap}))
     path.write_bytes(pickle.dumps(trap))
     with pytest.raises(ModelError):
         load_model(path)
     assert not (tmp_path / "sprung").exists()
-
-
-def test_no_memory_is_allocated_for_a_shape_that_the_file_does_not_hold(path: Path) -> None:
-    data = npy_header("<f4", "(1000000000,)") + bytes(192)
-    write_members(path, members_of(model_of(2), weights=data))
-    tracemalloc.start()
-    with pytest.raises(ModelError, match="damaged"):
-        load_model(path)
-    _, peak = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
-    assert peak < 10_000_000

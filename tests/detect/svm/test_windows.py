@@ -5,12 +5,10 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from seed import SEED
 from vdet.boxes import Int32Array
 from vdet.config.detector import WindowSettings
 from vdet.detect.svm.windows import WindowGrid, Windows, lay_grid
 
-LARGE, SMALL = SEED.svm.search.windows
 ROWS = 2000  # of a frame that is higher than all bands here
 
 
@@ -20,11 +18,6 @@ def band(size: int, overlap: float, top: int, bottom: int) -> WindowSettings:
 
 def boxes_of(settings: WindowSettings, width: int, height: int = ROWS) -> Int32Array:
     return lay_grid(settings, width, height).boxes
-
-
-def test_the_seed_sets_have_423_and_408_windows_on_a_720p_frame() -> None:
-    assert len(lay_grid(LARGE, 1280, 720)) == len(boxes_of(LARGE, 1280, 720)) == 423
-    assert len(lay_grid(SMALL, 1280, 720)) == len(boxes_of(SMALL, 1280, 720)) == 408
 
 
 def test_step_and_buffer_are_truncated() -> None:
