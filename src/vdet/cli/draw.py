@@ -17,8 +17,8 @@ from vdet.progress import Steps
 
 if TYPE_CHECKING:
     from vdet.boxes import Image
-    from vdet.config.schema import Settings
     from vdet.media.frame import Frame
+    from vdet.run.video import Run
     from vdet.track.track import FrameTracks
 
 _MAX_SAMPLES = 20
@@ -74,6 +74,7 @@ def draw(
     for each line, and saves settings for -c. It is one file and needs no network.
     """
     from vdet.pages.drawing import Drawing
+    from vdet.run.video import Run
 
     outputs = [path for path in (output, propose) if path]
     settings = choice.read()
@@ -86,7 +87,9 @@ def draw(
     if output and output.suffix.lower() != ".html" and not settings.traffic:
         raise ConfigError(f"{output}: nothing to draw; add lines or zones with -c FILE")
     with progress_steps(" frames") as steps:
-        image, frames = _watched(clip, tracks, settings, (start, end), steps)
+        # All vehicles: the page shows what regions leave out.
+        run = Run(clip, (), settings.model_copy(update={"regions": ()}), start, end)
+        image, frames = _watched(run, tracks, steps)
     settings.camera.check_frames(image.shape[1], image.shape[0])
     drawing = Drawing(image, frames, settings, choice.given(), facing)
     if propose and not drawing.proposals:
@@ -102,13 +105,7 @@ def draw(
     )
 
 
-_Part = tuple[Fraction | None, Fraction | None]
-"""The part of the clip that is used: start and end, seconds."""
-
-
-def _watched(
-    clip: Path, tracks: Path | None, settings: "Settings", part: _Part, steps: Steps
-) -> "tuple[Image, list[FrameTracks]]":
+def _watched(run: "Run", tracks: Path | None, steps: Steps) -> "tuple[Image, list[FrameTracks]]":
     """Return the place, BGR uint8, without the vehicles of a video, and their tracks.
 
     Raises
@@ -121,24 +118,22 @@ def _watched(
     from vdet.detect.factory import load_detector
     from vdet.media.images import is_picture_name, read_image
     from vdet.media.reader import VideoReader
-    from vdet.run.video import Run, open_video
+    from vdet.run.video import open_video
 
+    clip, settings = run.source, run.settings
     if is_picture_name(clip) and "%" not in clip.name:
-        return read_image(clip), _saved(tracks, None, part) if tracks else []
+        return read_image(clip), _saved(tracks, None, run) if tracks else []
     found: list[FrameTracks] = []
 
     def frames() -> "Iterator[Frame]":
-        start, end = part
         if tracks:
             with VideoReader(
-                clip, start=start, end=end, frames=_STILL_FRAMES, settings=settings.input
+                clip, start=run.start, end=run.end, frames=_STILL_FRAMES, settings=settings.input
             ) as reader:
-                found.extend(_saved(tracks, float(reader.info.rate), part))
+                found.extend(_saved(tracks, float(reader.info.rate), run))
                 steps("reading the scene", None)
                 yield from reader
             return
-        # All vehicles: the page shows what regions leave out.
-        run = Run(clip, (), settings.model_copy(update={"regions": ()}), start, end)
         with open_video(run, load_detector(settings.detector)) as video:
             advance = steps("", video.reader.expected)
             for result in video.results:
@@ -163,12 +158,12 @@ def _spread(frames: "Iterable[Frame]") -> "list[Image]":
     return images
 
 
-def _saved(tracks: Path, rate: float | None, part: _Part) -> "list[FrameTracks]":
+def _saved(tracks: Path, rate: float | None, run: "Run") -> "list[FrameTracks]":
     """Return the frames of a file of tracks. Raises `TruthError`."""
     from vdet.labels.reading import read_tracks
 
     saved = read_tracks(tracks, rate)
     if not saved.has_times:
         raise TruthError(f"{tracks}: has no times; CLIP must be the video")
-    start, end = part[0] or -math.inf, part[1] or math.inf
+    start, end = run.start or -math.inf, run.end or math.inf
     return [frame for frame in saved if start <= frame.time < end]

@@ -18,7 +18,7 @@ from vdet.config.schema import Settings
 from vdet.detect.classes import UNKNOWN
 from vdet.lanes.ground import ground_of
 from vdet.media.images import encode_image
-from vdet.pages.place import Mark, draw_marks, place_marks, svg
+from vdet.pages.place import Mark, place_marks, svg, with_marks
 from vdet.pages.render import TEMPLATES, jpeg_uri, render
 from vdet.track.track import FrameTracks
 from vdet.traffic.counting import count_frames
@@ -80,9 +80,7 @@ class Drawing:
         marks = self._marks()
         if path.suffix.lower() == ".svg":
             return svg(self._image, marks).encode("utf-8", "backslashreplace")
-        drawn = self._image.copy()
-        draw_marks(drawn, marks)
-        return encode_image(drawn, path)
+        return encode_image(with_marks(self._image, marks), path)
 
     def _page(self, name: str) -> str:
         places, rest = split(self._values, self._size)
@@ -160,9 +158,6 @@ class _Dumper(yaml.SafeDumper):
     def represent_sequence(self, tag: str, sequence: Any, flow_style: Any = None) -> Any:
         is_flat = not any(isinstance(item, dict) for item in sequence)
         return super().represent_sequence(tag, sequence, is_flat or flow_style)
-
-
-_Dumper.add_representer(tuple, _Dumper.represent_list)
 
 
 def pack(paths: Sequence[VehiclePath]) -> dict[str, Any]:

@@ -12,25 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from vdet.boxes import Image
-from vdet.detect.classes import UNKNOWN
-from vdet.draw.boxes import (
-    LINE,
-    WHITE,
-    ZONE,
-    Color,
-    Surface,
-    color_of,
-    draw_arrow,
-    draw_label,
-    draw_lines,
-    line_width,
-    shade,
-)
+from vdet.draw import boxes
+from vdet.draw.boxes import Color, Surface
 from vdet.lanes.ground import Ground
 from vdet.pages.charts import hex_color
 from vdet.pages.render import render
 from vdet.polygons import Point
-from vdet.traffic.counts import Counts, Event, Way, vehicle_trips
+from vdet.traffic.counts import Counts, Event, Way, class_of, vehicle_trips
 from vdet.traffic.crossings import Border, PlacedLine
 from vdet.traffic.records import VehicleRecord
 
@@ -86,7 +74,6 @@ def place_marks(
 
     `ways` are the paths of tracks by their ids, pixels.
     """
-    width, _ = size
     totals = {(total.name, total.direction): total.count for total in counts.totals}
     marks = [mark for border in borders for mark in border_marks(border, totals)]
     flows = flows_of(counts)
@@ -96,10 +83,10 @@ def place_marks(
         middle = paths[len(paths) // 2] if paths else ()
         path = _inside(middle, size)
         if len(path) > 1:
-            wide = max(2, round(_WIDEST * width * len(trips) / most))
+            wide = max(2, round(_WIDEST * size[0] * len(trips) / most))
             label, at = str(len(trips)), path[len(path) // 2]
-            marks.insert(0, Mark(path, color_of(number), wide, label, at, is_arrow=True))
-    return [*marks, *(_scale(ground, width) if ground else ())]
+            marks.insert(0, Mark(path, boxes.color_of(number), wide, label, at, is_arrow=True))
+    return [*marks, *(_scale(ground, size[0]) if ground else ())]
 
 
 def path_marks(records: Iterable[VehicleRecord], size: tuple[int, int]) -> Iterator[Mark]:
@@ -129,18 +116,18 @@ def border_marks(border: Border, totals: Mapping[Way, int], text: str = "") -> I
     The arrows to both sides are at the start of a line, where no vehicle crosses it.
     """
     height = border.size[1]
-    width = line_width(np.empty((int(height), 0), np.uint8))
+    width = boxes.line_width(np.empty((int(height), 0), np.uint8))
     if not isinstance(border, PlacedLine):
         top = min(border.corners, key=lambda corner: corner[1])
-        yield Mark(border.corners, ZONE, width, border.name + text, top, is_closed=True)
+        yield Mark(border.corners, boxes.ZONE, width, border.name + text, top, is_closed=True)
         return
     (ax, ay), (bx, by) = border.start, border.end
-    yield Mark((border.start, border.end), LINE, width, border.name, border.end)
+    yield Mark((border.start, border.end), boxes.LINE, width, border.name, border.end)
     left = (by - ay) / border.length, (ax - bx) / border.length
     for reach, direction in zip((_SIDE, -_SIDE), border.directions, strict=True):
         tip = ax + reach * height * left[0], ay + reach * height * left[1]
         label = f"{direction} {totals.get((border.name, direction), 0)}"
-        yield Mark((border.start, tip), LINE, width, label, tip, is_arrow=True)
+        yield Mark((border.start, tip), boxes.LINE, width, label, tip, is_arrow=True)
 
 
 def _scale(ground: Ground, columns: int) -> Iterator[Mark]:
@@ -151,7 +138,7 @@ def _scale(ground: Ground, columns: int) -> Iterator[Mark]:
         lengths = [scale for scale in _SCALES if scale <= _SCALE * columns * metres]
         length = max(lengths, default=_SCALES[0])
         half = length / metres / 2
-        yield Mark(((x - half, y), (x + half, y)), WHITE, 3, f"{length} m", (x - half, y))
+        yield Mark(((x - half, y), (x + half, y)), boxes.WHITE, 3, f"{length} m", (x - half, y))
 
 
 def draw_marks(surface: Surface, marks: Iterable[Mark]) -> None:
@@ -159,17 +146,24 @@ def draw_marks(surface: Surface, marks: Iterable[Mark]) -> None:
     drawn = list(marks)
     for mark in drawn:
         if mark.is_closed:
-            shade(surface, mark.points, mark.color, _SHADE)
-        draw_lines(surface, mark.points, mark.color, mark.width, closed=mark.is_closed)
+            boxes.shade(surface, mark.points, mark.color, _SHADE)
+        boxes.draw_lines(surface, mark.points, mark.color, mark.width, closed=mark.is_closed)
         if mark.is_arrow:
             end, length = mark.points[-1], max(3 * mark.width, _TIP * surface.shape[1])
             back = (point for point in reversed(mark.points) if math.dist(point, end) >= length)
             start = next(back, mark.points[0])
             tip = length / max(length, math.dist(start, end))
-            draw_arrow(surface, start, end, mark.color, mark.width, tip=tip)
+            boxes.draw_arrow(surface, start, end, mark.color, mark.width, tip=tip)
     for mark in drawn:
         if mark.label:
-            draw_label(surface, mark.label, mark.at, mark.color)
+            boxes.draw_label(surface, mark.label, mark.at, mark.color)
+
+
+def with_marks(image: Image, marks: Iterable[Mark]) -> Image:
+    """Return a copy of an image with marks on it."""
+    drawn = image.copy()
+    draw_marks(drawn, marks)
+    return drawn
 
 
 def svg(image: Image, marks: Sequence[Mark]) -> str:
@@ -204,32 +198,37 @@ def traffic_part(
     ground: Ground | None = None,
 ) -> TrafficPart:
     """Return the part of a page; `frame` is drawn over, with its lines and zones."""
-    classes = sorted({event.class_name or UNKNOWN for event in counts.events})
+    classes = sorted(set(map(class_of, counts.events)))
     several = classes if len(classes) > 1 else []
-    rows = []
-    for way, trips in flows_of(counts).items():
-        found = Counter(first.class_name or UNKNOWN for first, _ in trips)
-        rows.append((*way, *(str(found[name]) for name in several), str(len(trips))))
+    flows = flows_of(counts)
+    rows = [
+        (*way, *_numbers([first for first, _ in trips], several)) for way, trips in flows.items()
+    ]
+    colors = [hex_color(boxes.color_of(number)) for number in range(len(flows))]
+    picture = None
     if frame is not None:
-        frame = frame.copy()
         ways = {record.id: record.path for record in records}
         size = frame.shape[1], frame.shape[0]
-        draw_marks(frame, place_marks(size, borders, counts, ways, ground))
-    colors = [hex_color(color_of(number)) for number, _ in enumerate(rows)]
-    flows = ("from", "to", *several, "vehicles"), rows
-    return TrafficPart(_totals(counts, several), flows, colors, frame)
+        picture = with_marks(frame, place_marks(size, borders, counts, ways, ground))
+    table = ("from", "to", *several, "vehicles"), rows
+    return TrafficPart(_totals(counts, several), table, colors, picture)
 
 
 def _totals(counts: Counts, classes: Sequence[str]) -> Table:
-    has_speeds = any(event.speed is not None for event in counts.events)
+    headings = ("line or zone", "direction", *classes, "vehicles", "median km/h", "85 % km/h")
     rows = []
     for way in counts.ways:
         events = [event for event in counts.events if (event.name, event.direction) == way]
-        found = Counter(event.class_name or UNKNOWN for event in events)
         speeds = [event.speed for event in events if event.speed is not None]
         numbers = np.quantile(speeds, [0.5, 0.85]).tolist() if speeds else []
         shown = [f"{number:.0f}" for number in numbers] or ["–", "–"]
-        numbered = (*(str(found[name]) for name in classes), str(len(events)))
-        rows.append((*way, *numbered, *(shown if has_speeds else ())))
-    more = ("median km/h", "85 % km/h") if has_speeds else ()
-    return ("line or zone", "direction", *classes, "vehicles", *more), rows
+        rows.append((*way, *_numbers(events, classes), *shown))
+    if all(event.speed is None for event in counts.events):
+        return headings[:-2], [row[:-2] for row in rows]
+    return headings, rows
+
+
+def _numbers(events: Sequence[Event], classes: Sequence[str]) -> list[str]:
+    """Return how many events are of each class, and of all."""
+    found = Counter(map(class_of, events))
+    return [*(str(found[name]) for name in classes), str(len(events))]

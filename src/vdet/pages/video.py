@@ -13,7 +13,7 @@ from vdet.media import VideoInfo
 from vdet.pages import charts
 from vdet.pages.batch import NO_STILL, VideoFacts
 from vdet.pages.charts import Axis, Plot, Span, Timeline
-from vdet.pages.place import draw_marks, path_marks, traffic_part
+from vdet.pages.place import path_marks, traffic_part, with_marks
 from vdet.pages.render import jpeg_uri, render
 from vdet.pages.vehicles import VehicleRow, table_json
 from vdet.traffic.clock import Clock, Intervals
@@ -249,10 +249,8 @@ class VideoPage:
         """Return the frame with the paths of all vehicles."""
         if self.poster is None:
             return None
-        drawn = self.poster.copy()
-        height, width = drawn.shape[:2]
-        draw_marks(drawn, path_marks(self.records, (width, height)))
-        return drawn
+        height, width = self.poster.shape[:2]
+        return with_marks(self.poster, path_marks(self.records, (width, height)))
 
 
 def _timeline(shown: Sequence[VehicleRecord], findings: Sequence[Finding], x: Axis) -> Timeline:

@@ -249,7 +249,7 @@ def count_table(videos: Sequence[Counts], interval: int | None = None) -> list[C
     """
     intervals = _intervals(videos, interval)
     found: _Found = Counter(
-        (intervals.number(which, event.time), (event.name, event.direction), _class_of(event))
+        (intervals.number(which, event.time), (event.name, event.direction), class_of(event))
         for which, video in enumerate(videos)
         for event in video.events
     )
@@ -272,7 +272,7 @@ def flow_table(videos: Sequence[Counts], interval: int | None = None) -> list[Fl
     found: _Found = Counter()
     for (which, first), *others in visits.values():
         flow = first.name, others[-1][-1].name if others else None
-        found[intervals.number(which, first.time), flow, _class_of(first)] += 1
+        found[intervals.number(which, first.time), flow, class_of(first)] += 1
     names = dict.fromkeys(name for video in videos for name, _ in video.ways)
     order = {name: number for number, name in enumerate((*names, None))}
     flows = sorted({way for _, way, _ in found}, key=lambda way: [order[name] for name in way])
@@ -339,7 +339,8 @@ def _intervals(videos: Sequence[Counts], interval: int | None) -> Intervals:
     return Intervals([(video.clock, video.spans) for video in videos], interval)
 
 
-def _class_of(event: Event) -> str:
+def class_of(event: Event) -> str:
+    """Return the class of its vehicle, also where the detector has no classes."""
     return event.class_name or UNKNOWN
 
 
