@@ -16,7 +16,7 @@ import joblib
 import numpy as np
 import numpy.typing as npt
 
-from vdet.boxes import NO_BOXES, BoolArray, Boxes
+from vdet.boxes import NO_BOXES, Boxes
 from vdet.config.loading import load_settings
 from vdet.config.schema import Settings
 from vdet.detect.svm.detector import Candidates, SvmDetector, SvmModel
@@ -27,7 +27,7 @@ from vdet.evaluate.scores import score
 from vdet.labels.label import Label, LabelledVideo
 from vdet.labels.reading import read_truth
 from vdet.learn.svm.dataset import PatchFile, find_patches
-from vdet.learn.svm.extraction import LabelledVectors, extract
+from vdet.learn.svm.extraction import extract
 from vdet.learn.svm.fitting import fit, fit_boxes
 from vdet.media import Frame, Picture
 from vdet.media.reader import VideoReader
@@ -84,7 +84,7 @@ class Searching:
         assert index is not None
         block = int(_block_of(np.array([index + 1]), self.last)[0])
         candidates = self.detectors[block].search(picture, index)
-        return index, candidates.windows.hits(LEAST)
+        return index, candidates[0].hits(LEAST)
 
     def detect(self, candidates: tuple[int, Windows]) -> Boxes:
         index, self.windows[index] = candidates
@@ -100,7 +100,7 @@ class Searched:
 
     def search(self, picture: Picture, index: int | None) -> Candidates:  # noqa: ARG002
         assert index is not None
-        return Candidates(self.windows[index], is_still=False)
+        return self.windows[index], False
 
     def detect(self, candidates: Candidates) -> Boxes:
         return self.detector.detect(candidates)
@@ -133,19 +133,13 @@ def _frames_of(files: Sequence[PatchFile]) -> Numbers:
 
 
 def _models(sources: Sequence[Path], last: int, settings: Settings) -> list[LinearModel]:
-    patches = find_patches(sources)
-    files = [file for file in patches if not file.is_boxed]
-    boxed = [file for file in patches if file.is_boxed]
     features = settings.svm.features
-    data, boxes = (extract(some, features, augmented=False) for some in (files, boxed))
+    data = extract(find_patches(sources), features, augmented=False)
 
     def without(block: int) -> LinearModel:
-        def held_out(some: LabelledVectors) -> BoolArray:
-            return np.equal(_block_of(_frames_of(some.files), last), block)
-
-        model = fit(data.of(~held_out(data)), settings)
-        held = [held_out(some) for some in (data, boxes)]
-        regression, _ = fit_boxes((data, boxes), held, features.hog_length)
+        held = np.equal(_block_of(_frames_of(data.files), last), block)
+        model = fit(data.of(~(held | data.is_boxed)), settings)
+        regression, _ = fit_boxes(data, held, features.hog_length)
         return replace(model, box_regression=regression)
 
     at_once = joblib.Parallel(n_jobs=2, prefer="threads", verbose=5)

@@ -5,10 +5,11 @@ It is slow and simple. The tests and benchmarks compare the dense search with it
 
 import numpy as np
 
+from vdet.boxes import Float32Array
 from vdet.detect.svm.features import FeatureExtractor
 from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.pyramid import FramePyramid
-from vdet.detect.svm.windows import WINDOW_SIDES, GridResult, WindowGrid
+from vdet.detect.svm.windows import WINDOW_SIDES, WindowGrid
 
 
 class PatchSearch:
@@ -19,8 +20,8 @@ class PatchSearch:
         self._boxes = grid.boxes.tolist()
         self._extractor = FeatureExtractor(model.features)
 
-    def search(self, frame: FramePyramid, probability: float) -> GridResult:
-        """Search a frame; windows of at least this probability are hits."""
+    def search(self, frame: FramePyramid, probability: float) -> tuple[Float32Array, Float32Array]:
+        """Search a frame as `DenseSearch.search`."""
         side, regression = self._model.features.patch, self._model.box_regression
         patches = (
             frame.cut(slice(y, y + height), slice(x, x + width), side, side)
@@ -32,4 +33,4 @@ class PatchSearch:
         if regression is not None:
             hits = probabilities >= probability
             sides[hits] = regression.sides(vectors[hits, : self._model.features.hog_length])
-        return GridResult(probabilities, sides)
+        return probabilities, sides

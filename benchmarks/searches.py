@@ -13,7 +13,7 @@ from benchmarks.patch_search import PatchSearch
 from benchmarks.rounds import Task, measure
 from vdet.config.schema import DetectorSettings, NetworkSettings, SvmSettings
 from vdet.detect.factory import load_detector
-from vdet.detect.svm.search import DenseSearch, Engine, FrameSearch
+from vdet.detect.svm.search import DenseSearch, FrameSearch
 from vdet.media import Picture, Planes
 from vdet.media.frame import Coding
 
@@ -55,9 +55,7 @@ def search_times(
     return per_frame | _decoding(path, svm, pictures, rounds)
 
 
-def _search(
-    config: ShippedConfig, pictures: Sequence[Picture], engine: Engine = DenseSearch
-) -> Task:
+def _search(config: ShippedConfig, pictures: Sequence[Picture], engine: type = DenseSearch) -> Task:
     """Search the pictures."""
     width, height = pictures[0].width, pictures[0].height
     search = FrameSearch(config.model, config.settings.svm, width, height, engine=engine)

@@ -29,7 +29,7 @@ from vdet.lanes.curves import (
     solve,
 )
 from vdet.media import Picture
-from vdet.media.images import split_channels
+from vdet.media.images import to_ycrcb
 
 CARRY = 12
 """Number of frames for which an unseen line is kept."""
@@ -224,7 +224,7 @@ class RoadFinder:
             luma, blue, _ = planes.coding.to_common((luma, blue, no_red))
         else:
             top = warped(picture.image, of_frame)
-            luma, _, blue = split_channels(np.asarray(cv2.cvtColor(top, cv2.COLOR_BGR2YCrCb)))
+            luma, _, blue = to_ycrcb(top)
         return FrameView(picture, paint_mask(luma, blue))
 
     def update(self, view: FrameView, vehicles: Iterable[Box] = ()) -> Road:

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from av.video.reformatter import ColorRange
 
 from vdet.boxes import Float64Array, Image
-from vdet.media.images import Orientation, from_16_bits, split_channels
+from vdet.media.images import Orientation, from_16_bits, to_ycrcb
 
 Layers = tuple[Image, Image, Image]
 """Luma, blue and red chroma, uint8 each; chroma may be of half the size of luma."""
@@ -152,7 +152,7 @@ class Planes:
             edge = cv2.BORDER_REPLICATE
             image = cv2.copyMakeBorder(image, 0, height % 2, 0, width % 2, edge).astype(np.uint8)
             height, width = image.shape[:2]
-        luma, red, blue = split_channels(np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2YCrCb)))
+        luma, red, blue = to_ycrcb(image)
         luma, *chroma = coding.from_common((luma, blue, red))
         half = width // 2, height // 2
         blue, red = (

@@ -229,11 +229,12 @@ def _to_bgr(picture: ImageFile, data: bytes) -> Image:
     return np.asarray(cv2.cvtColor(np.asarray(rgb), cv2.COLOR_RGB2BGR), np.uint8)
 
 
-def split_channels(image: Image) -> tuple[Image, Image, Image]:
-    """Return the three channels of an image `(H, W, 3)`, uint8 `(H, W)` each."""
+def to_ycrcb(image: Image) -> tuple[Image, Image, Image]:
+    """Return luma, red and blue chroma of an image, BGR `(H, W, 3)`; uint8 `(H, W)` each."""
+    both = cv2.cvtColor(image, cv2.COLOR_BGR2YCrCb)
     # cv2.split fails where the garbage collector looks at its unfinished tuple in another thread.
-    first, second, third = (np.asarray(cv2.extractChannel(image, n), np.uint8) for n in range(3))
-    return first, second, third
+    luma, red, blue = (np.asarray(cv2.extractChannel(both, n), np.uint8) for n in range(3))
+    return luma, red, blue
 
 
 _PATTERN = re.compile(r"((?:[^%]|%%)*)%(?:0([1-9]\d*))?d((?:[^%]|%%)*)", re.ASCII)

@@ -46,8 +46,8 @@ class EngineResults:
 def compare(model: LinearModel, grids: list[WindowGrid], pixels: Image | Planes) -> EngineResults:
     """Search a frame with both engines."""
     frame = _pyramid(pixels, model.features, grids)
-    dense = [DenseSearch(model, grid).search(frame, 0.5).probabilities for grid in grids]
-    patch = [PatchSearch(model, grid).search(frame, 0.5).probabilities for grid in grids]
+    dense = [DenseSearch(model, grid).search(frame, 0.5)[0] for grid in grids]
+    patch = [PatchSearch(model, grid).search(frame, 0.5)[0] for grid in grids]
     return EngineResults(log_odds(np.concatenate(dense)), log_odds(np.concatenate(patch)))
 
 

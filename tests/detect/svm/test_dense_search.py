@@ -50,16 +50,16 @@ def test_the_sides_in_a_hit_are_those_of_its_hog_features(size: int, step: int) 
     regression = BoxRegression(weights, np.repeat(model.biases, 4))
     search = DenseSearch(replace(model, box_regression=regression), grid)
     frame = FramePyramid(Picture(texture(400)), FEATURES)
-    minimum = float(np.median(search.search(frame, 1).probabilities))
-    found = search.search(frame, minimum)
-    hits = found.probabilities >= minimum
-    assert found.sides.shape == (35, 4)
-    assert found.sides.dtype == np.float32
-    for side in found.sides[hits].T:
+    minimum = float(np.median(search.search(frame, 1)[0]))
+    probabilities, sides = search.search(frame, minimum)
+    hits = probabilities >= minimum
+    assert sides.shape == (35, 4)
+    assert sides.dtype == np.float32
+    for side in sides[hits].T:
         expected = model.to_probabilities(side[:, np.newaxis])
-        np.testing.assert_allclose(found.probabilities[hits], expected, atol=1e-5)
-    assert len(np.unique(found.sides[hits].round(4))) > 8
-    np.testing.assert_array_equal(found.sides[~hits], np.tile(WINDOW_SIDES, (17, 1)))
+        np.testing.assert_allclose(probabilities[hits], expected, atol=1e-5)
+    assert len(np.unique(sides[hits].round(4))) > 8
+    np.testing.assert_array_equal(sides[~hits], np.tile(WINDOW_SIDES, (17, 1)))
 
 
 NOISE = np.random.default_rng(0).integers(0, 256, (96, 160, 3), dtype=np.uint8)

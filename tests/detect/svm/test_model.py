@@ -105,16 +105,6 @@ def test_a_saved_model_is_loaded_bit_for_bit(path: Path, model: LinearModel) -> 
         assert arrays[name].dtype == np.float32
 
 
-def test_a_model_that_does_not_say_which_channels_are_halved_has_none(path: Path) -> None:
-    features = SMALL.model_copy(update={"halved": ()})
-    header = header_of(features)
-    del header["features"]["halved"]
-    header["features"]["color_space"] = "YCrCb"  # as older versions wrote it
-    header["features"]["spatial"] = {"size": 0}
-    header["features"]["hog"]["channels"] = [0, 1, 2]
-    assert load_model(write_parts(path, header=packed(header))).features == features
-
-
 def test_the_sides_of_a_box_are_linear_in_the_hog() -> None:
     weights = np.array([[1, 0], [0, 1], [2, 0], [0, -1]], np.float32)
     regression = BoxRegression(weights, np.array([-0.5, -0.5, 0.5, 0.5], np.float32))
@@ -149,10 +139,6 @@ def test_a_model_cut_off_anywhere_is_damaged(path: Path) -> None:
         (header_of(version=[1]), r"of version \[1\]"),
         (header_of(features={"patch": 63}), "is not a vdet model, or is damaged"),
         (header_of(features={"colour": "red"}), "is not a vdet model, or is damaged"),
-        (
-            header_of(features=SMALL.model_dump(mode="json") | {"color_space": "HSV"}),
-            "its colour space is not YCrCb",
-        ),
         (header_of(provenance=[]), "is not a vdet model, or is damaged"),
     ],
 )

@@ -16,7 +16,7 @@ from vdet.config.schema import SvmSettings
 from vdet.config.section import scale_lengths
 from vdet.detect.svm.horizon import DEFAULT_HORIZON
 from vdet.detect.svm.model import BoxRegression, LinearModel
-from vdet.detect.svm.search import DenseSearch, Engine, FrameSearch
+from vdet.detect.svm.search import FrameSearch
 from vdet.detect.svm.windows import Windows, lay_grids
 from vdet.errors import FrameSizeError, ImageError
 from vdet.media import Picture
@@ -46,9 +46,9 @@ def laid(
     return np.concatenate([grid.boxes for grid in grids])
 
 
-def search_of(features: FeatureSettings, engine: Engine = DenseSearch) -> FrameSearch:
+def search_of(features: FeatureSettings) -> FrameSearch:
     settings = SvmSettings(features=features, search=scale_lengths(fixed(*SETS), 720 / 120))
-    return FrameSearch(model_of(features), settings, 160, 120, engine=engine)
+    return FrameSearch(model_of(features), settings, 160, 120)
 
 
 def fixed(*sets: WindowSettings) -> SearchSettings:

@@ -26,15 +26,8 @@ from vdet.media import Picture
 log = logging.getLogger("vdet")
 
 
-@dataclass(frozen=True, slots=True)
-class Candidates:
-    """What the search of one frame gives.
-
-    `windows` are all that were searched. `is_still` tells a still picture from a frame of a video.
-    """
-
-    windows: Windows
-    is_still: bool
+Candidates = tuple[Windows, bool]
+"""All windows that were searched, and whether in a still picture rather than in a video."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +96,7 @@ class SvmDetector:
 
     def search(self, picture: Picture, index: int | None) -> Candidates:
         """Search the windows of a frame; several threads may call this at once."""
-        return Candidates(self._search.search(picture), is_still=index is None)
+        return self._search.search(picture), index is None
 
     def detect(self, candidates: Candidates) -> Boxes:
         """Add the hits of the next frame to the heat, and return what is hot.
@@ -111,22 +104,31 @@ class SvmDetector:
         A still picture counts as `heat.frames` frames that all show it, so that thresholds mean the
         same as in video.
         """
-        hits = candidates.windows.hits(self._settings.search.probability)
-        self._recent.extend([hits] * (self._heat.frames if candidates.is_still else 1))
+        windows, is_still = candidates
+        hits = windows.hits(self._settings.search.probability)
+        self._recent.extend([hits] * (self._heat.frames if is_still else 1))
         heat = sum_heat(self._recent, self._size, self._heat)
-        found = self._found(self._regions(heat), Trace(hits, heat, self._search.grids))
-        return self._shown_in_still(found) if candidates.is_still else found
+        regions = self._regions(heat)
+        found = Boxes(
+            np.reshape([astuple(region.box) for region in regions], (-1, 4)),
+            [self._settings.score.of(region.strength) for region in regions],
+            data={
+                "centroid": np.reshape([region.centroid for region in regions], (-1, 2)),
+                "strength": [region.strength for region in regions],
+            },
+            trace=Trace(hits, heat, self._search.grids),
+        )
+        return self._shown_in_still(found) if is_still else found
 
     def stage_pictures(self, image: Image, detections: Boxes) -> dict[str, Image]:
         """Return three pictures of a frame, BGR uint8 `(H, W, 3)`: windows, hits, heat."""
         trace = detections.trace
         windows, hits = (image * 0.6).astype(np.uint8), image.copy()
         for number, grid in enumerate(trace.grids):
-            boxes = [Box.sized(*box) for box in grid.boxes.tolist()]
-            extent = Box(boxes[0].x1, boxes[0].y1, boxes[-1].x2, boxes[-1].y2)
+            boxes, color = [Box.sized(*box) for box in grid.boxes.tolist()], color_of(number)
+            draw_box(windows, boxes[0].union(boxes[-1]), color)
             example = boxes[number * grid.columns // len(trace.grids)]
-            draw_box(windows, extent, color_of(number))
-            draw_box(windows, example, color_of(number), f"{grid.size} px: {len(grid)} windows")
+            draw_box(windows, example, color, f"{grid.size} px: {len(grid)} windows")
         for row in np.argsort(trace.hits.probabilities).tolist():  # the likeliest is on top
             box = Box.sized(*trace.hits.boxes[row].tolist())
             draw_box(hits, box, GREEN, f"{trace.hits.probabilities[row]:.2f}")
@@ -141,15 +143,6 @@ class SvmDetector:
             regions = split_regions(regions, votes, self._heat.votes)
         inside = (replace(region, box=region.box.clipped(*self._size)) for region in regions)
         return [region for region in inside if region.box.area]
-
-    def _found(self, regions: Sequence[HotRegion], trace: Trace) -> Boxes:
-        sides = np.reshape([astuple(region.box) for region in regions], (-1, 4))
-        scores = [self._settings.score.of(region.strength) for region in regions]
-        data = {
-            "centroid": np.reshape([region.centroid for region in regions], (-1, 2)),
-            "strength": np.array([region.strength for region in regions], np.float64),
-        }
-        return Boxes(sides, scores, data=data, trace=trace)
 
     def _shown_in_still(self, found: Boxes) -> Boxes:
         """Return the detections that are strong and large enough, without those inside another."""

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from vdet.boxes import Float32Array, Image
 from vdet.config.detector import FeatureSettings
-from vdet.media.images import split_channels
+from vdet.media.images import to_ycrcb
 
 Channels = tuple[Image, Image, Image]
 """Luma, red and blue (YCrCb), uint8 `(H, W)` each; those in `halved`, `(H / 2, W / 2)`."""
@@ -27,7 +27,7 @@ class FeatureExtractor:
 
     def __init__(self, settings: FeatureSettings) -> None:
         self.settings = settings
-        self._descriptors = patch_descriptors(settings)
+        self._descriptors = hog_descriptors(settings, settings.patch, settings.patch)
 
     def describe(self, patch: Image) -> Float32Array:
         """Compute the features of one patch.
@@ -58,32 +58,24 @@ class FeatureExtractor:
 
 def split(image: Image, settings: FeatureSettings) -> Channels:
     """Return the channels of an image, BGR uint8 `(H, W, 3)`."""
-    converted = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2YCrCb), np.uint8)
     luma, red, blue = (
         halve(channel) if number in settings.halved else channel
-        for number, channel in enumerate(split_channels(converted))
+        for number, channel in enumerate(to_ycrcb(image))
     )
     return luma, red, blue
 
 
-def hog_descriptor(
-    settings: FeatureSettings, window: tuple[int, int], channel: int
-) -> cv2.HOGDescriptor:
-    """Return OpenCV's descriptor of a channel, with blocks a cell apart.
+def hog_descriptors(settings: FeatureSettings, width: int, height: int) -> list[cv2.HOGDescriptor]:
+    """Return OpenCV's descriptor of each channel, with blocks a cell apart.
 
-    `window` is its width and height, in pixels of the patch; a halved channel has half of them.
+    Width and height are pixels of the patch; a halved channel has half of them.
     """
-    shrink = settings.shrink(channel)
-    width, height = (side // shrink for side in window)
-    side = settings.hog.cell // shrink
-    block, cell = (settings.hog.block * side,) * 2, (side, side)
-    return cv2.HOGDescriptor((width, height), block, cell, cell, settings.hog.orientations)
-
-
-def patch_descriptors(settings: FeatureSettings) -> list[cv2.HOGDescriptor]:
-    """Return the descriptor of each channel of a patch."""
-    window = settings.patch, settings.patch
-    return [hog_descriptor(settings, window, number) for number in range(3)]
+    hog, descriptors = settings.hog, []
+    for shrink in map(settings.shrink, range(3)):
+        side, window = hog.cell // shrink, (width // shrink, height // shrink)
+        block, cell = (hog.block * side,) * 2, (side, side)
+        descriptors.append(cv2.HOGDescriptor(window, block, cell, cell, hog.orientations))
+    return descriptors
 
 
 def histogram(channel: Image, bins: int) -> npt.NDArray[np.intp]:

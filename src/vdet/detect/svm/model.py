@@ -30,7 +30,7 @@ _NAMES = ("weights", "biases", "slopes", "offsets")
 _BOX_NAMES = ("box_weights", "box_biases")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class BoxRegression:
     """Finds the sides of the vehicle in a window, as linear functions of the window's HOG.
 
@@ -95,18 +95,16 @@ def save_model(model: LinearModel, path: Path) -> None:
         "features": model.features.model_dump(mode="json"),
         "provenance": model.provenance,
     }
-    arrays: dict[str, Any] = _arrays(model)
-    text = np.frombuffer(json.dumps(header).encode(), np.uint8)
+    text, arrays = np.frombuffer(json.dumps(header).encode(), np.uint8), _arrays(model)
     with path.open("wb") as file:
         np.savez_compressed(file, header=text, **arrays)
 
 
-def _arrays(model: LinearModel) -> dict[str, Float32Array]:
+def _arrays(model: LinearModel) -> dict[str, Any]:
     """Return the arrays of a model by their names in the file."""
     arrays = {name: getattr(model, name) for name in _NAMES}
-    if model.box_regression is not None:
-        parts = model.box_regression.weights, model.box_regression.biases
-        arrays |= zip(_BOX_NAMES, parts, strict=True)
+    if boxes := model.box_regression:
+        arrays |= {"box_weights": boxes.weights, "box_biases": boxes.biases}
     return arrays
 
 
@@ -145,16 +143,9 @@ def _read(archive: zipfile.ZipFile) -> LinearModel:
         raise ValueError("not the header of a model")
     if header["version"] != FORMAT_VERSION:
         raise ModelError(f"is of version {header['version']!r:.20}, not {FORMAT_VERSION}")
-    # The shipped models name the colour space, the size of small pictures and the channels that
-    # have HOG, which are settings no more. That of the original does not say what is halved: none.
-    known = {"halved": ()} | header["features"]
-    if known.pop("color_space", "YCrCb") != "YCrCb":
-        raise ModelError("its colour space is not YCrCb")
-    known.pop("spatial", None)
-    known["hog"].pop("channels", None)
     boxes = [arrays[name] for name in _BOX_NAMES if name in arrays]
     model = LinearModel(
-        FeatureSettings.model_validate(known),
+        FeatureSettings.model_validate(header["features"]),
         **{name: arrays[name] for name in _NAMES},
         provenance=header["provenance"],
         box_regression=BoxRegression(*boxes) if boxes else None,

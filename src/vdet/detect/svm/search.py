@@ -9,8 +9,7 @@ original. All share sums over its pixels (`table_sums`).
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Protocol
+from typing import Any
 
 import cv2
 import numpy as np
@@ -18,18 +17,11 @@ import numpy as np
 from vdet.boxes import Float32Array
 from vdet.config.detector import FeatureSettings
 from vdet.config.schema import SvmSettings
-from vdet.detect.svm.features import Channels, hog_descriptor, patch_descriptors
+from vdet.detect.svm.features import Channels, hog_descriptors
 from vdet.detect.svm.horizon import DEFAULT_HORIZON
 from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.pyramid import FramePyramid
-from vdet.detect.svm.windows import (
-    WINDOW_SIDES,
-    GridResult,
-    IndexArray,
-    WindowGrid,
-    Windows,
-    lay_grids,
-)
+from vdet.detect.svm.windows import WINDOW_SIDES, IndexArray, WindowGrid, Windows, lay_grids
 from vdet.errors import FrameSizeError, ImageError
 from vdet.media import Picture
 
@@ -43,17 +35,6 @@ as the windows in it are."""
 _MIN_SIDE = 0.2  # of the smallest vehicle that a window can show, sides of the window
 
 
-class GridSearch(Protocol):
-    """An engine for the windows of one grid."""
-
-    def search(self, frame: FramePyramid, probability: float) -> GridResult:
-        """Search a frame; windows of at least this probability are hits."""
-
-
-Engine = Callable[[LinearModel, WindowGrid], GridSearch]
-"""Makes the search of a grid."""
-
-
 MAX_PHASES = 2
 """Most grids of shared blocks, across and down, that a grid is split into; with more of them,
 sharing only the gradients is faster."""
@@ -62,18 +43,10 @@ BATCH = 8192
 """Number of windows whose vectors are in memory at once."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Part:
-    """`n` windows of a grid that lie at whole pixels of one strip, in each channel of a patch.
-
-    `numbers` `(n,)` counts them in the grid, `x` and `y` `(n,)` are their top-left pixels in the
-    strip, which `strip` cuts out of a frame.
-    """
-
-    numbers: IndexArray
-    strip: tuple[slice, slice, int, int]
-    x: IndexArray
-    y: IndexArray
+_Part = tuple[IndexArray, tuple[slice, slice, int, int], IndexArray, IndexArray]
+"""`n` windows of a grid that lie at whole pixels of one strip, in each channel of a patch: their
+numbers in the grid `(n,)`, the strip (see `WindowGrid.strip`), and x and y of their top-left pixels
+in it, `(n,)` each."""
 
 
 class DenseSearch:
@@ -97,23 +70,30 @@ class DenseSearch:
             for column in range(min(n, grid.columns))
         ]
 
-    def search(self, frame: FramePyramid, probability: float) -> GridResult:
-        """Search a frame; windows of at least this probability are hits."""
+    def search(self, frame: FramePyramid, probability: float) -> tuple[Float32Array, Float32Array]:
+        """Search a frame; windows of at least this probability are hits.
+
+        Returns
+        -------
+        Of each window, in the order of `WindowGrid.boxes`: its probability, float32 `(n,)`; left,
+        top, right and bottom of the vehicle from the centre of the window, in sides of it, float32
+        `(n, 4)`. They are `WINDOW_SIDES` for windows that are not hits, and without box regression.
+        """
         model, features = self._model, self._model.features
         probabilities = np.zeros(self._count, np.float32)
         sides = np.tile(WINDOW_SIDES, (self._count, 1))
-        for part in self._parts:
-            strip = frame.cut(*part.strip)
+        for numbers, place, x, y in self._parts:
+            strip = frame.cut(*place)
             hog = self._hog(strip, features)
-            values = table_sums(strip, self._tables, features, part.x, part.y)
-            values += hog.values(self._weights, part.x, part.y)
+            values = table_sums(strip, self._tables, features, x, y)
+            values += hog.values(self._weights, x, y)
             found = model.to_probabilities(values + model.biases)
-            probabilities[part.numbers] = found
+            probabilities[numbers] = found
             hits = found >= probability
             if model.box_regression is not None and hits.any():
-                vectors = hog.vectors(part.x[hits], part.y[hits])
-                sides[part.numbers[hits]] = model.box_regression.sides(vectors)
-        return GridResult(probabilities, sides)
+                vectors = hog.vectors(x[hits], y[hits])
+                sides[numbers[hits]] = model.box_regression.sides(vectors)
+        return probabilities, sides
 
 
 def _part(grid: WindowGrid, patch: int, n: int, column: int, row: int) -> _Part:
@@ -121,7 +101,7 @@ def _part(grid: WindowGrid, patch: int, n: int, column: int, row: int) -> _Part:
     numbers = np.arange(len(grid)).reshape(grid.rows, grid.columns)[row::n, column::n]
     pixels = int(n * grid.step * patch / grid.size)
     y, x = np.indices(numbers.shape).reshape(2, -1) * pixels
-    return _Part(numbers.ravel(), grid.every_nth(n, column, row).strip(patch), x, y)
+    return numbers.ravel(), grid.every_nth(n, column, row).strip(patch), x, y
 
 
 class Blocks:
@@ -132,15 +112,12 @@ class Blocks:
 
     def __init__(self, strip: Channels, features: FeatureSettings) -> None:
         self._features = features
-        hog = features.hog
+        cell, block = features.hog.cell, features.hog.block
         height, width = (side * features.shrink(0) for side in strip[0].shape)
-        columns, rows = (side // hog.cell - hog.block + 1 for side in (width, height))
+        columns, rows = (side // cell - block + 1 for side in (width, height))
         # A descriptor whose window is the strip gives each block once, column by column.
-        vectors = [
-            hog_descriptor(features, (width, height), number).compute(channel)
-            for number, channel in enumerate(strip)
-        ]
-        blocks = [np.reshape(vector, (columns, rows, -1)) for vector in vectors]
+        pairs = zip(hog_descriptors(features, width, height), strip, strict=True)
+        blocks = [np.reshape(hog.compute(item), (columns, rows, -1)) for hog, item in pairs]
         self._blocks = np.concatenate(blocks, axis=-1, dtype=np.float32)
 
     def vectors(self, x: IndexArray, y: IndexArray) -> Float32Array:
@@ -179,7 +156,7 @@ class Gradients:
 
     def __init__(self, strip: Channels, features: FeatureSettings) -> None:
         self._strip, self._features = strip, features
-        self._descriptors = patch_descriptors(features)
+        self._descriptors = hog_descriptors(features, features.patch, features.patch)
 
     def vectors(self, x: IndexArray, y: IndexArray) -> Float32Array:
         """Return the HOG of windows as `FeatureExtractor` orders it, float32 `(n, h)`."""
@@ -237,6 +214,8 @@ class FrameSearch:
     horizon
         Row of the horizon, fraction of the frames' height, for the sets that follow the
         perspective.
+    engine
+        Makes the search of a grid.
 
     Attributes
     ----------
@@ -259,7 +238,7 @@ class FrameSearch:
         height: int,
         *,
         horizon: float = DEFAULT_HORIZON,
-        engine: Engine = DenseSearch,
+        engine: Callable[[LinearModel, WindowGrid], Any] = DenseSearch,
     ) -> None:
         self.grids = tuple(lay_grids(settings, model.features, width, height, horizon=horizon))
         if not self.grids:
@@ -283,9 +262,8 @@ class FrameSearch:
     def search(self, picture: Picture) -> Windows:
         """Search a frame; return the windows of all sets, in the order of `grids`."""
         frame = FramePyramid(picture, self._features, self._top, self._bottom, self._margin)
-        results = [search.search(frame, self._probability) for search in self._searches]
-        probabilities = np.concatenate([result.probabilities for result in results])
-        sides = np.concatenate([result.sides for result in results])
+        results = (search.search(frame, self._probability) for search in self._searches)
+        probabilities, sides = map(np.concatenate, zip(*results, strict=True))
         vehicles = _vehicle_boxes(self._boxes.astype(np.float32), sides)
         return Windows(self._boxes, probabilities, self._shares, vehicles)
 

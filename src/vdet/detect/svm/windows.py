@@ -10,6 +10,7 @@ sets of all sizes.
 import math
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -65,22 +66,8 @@ class Windows:
     def hits(self, probability: float) -> "Windows":
         """Return the windows of at least this probability, in the same order."""
         keep = self.probabilities >= probability
-        return Windows(
-            self.boxes[keep], self.probabilities[keep], self.shares[keep], self.vehicles[keep]
-        )
-
-
-@dataclass(frozen=True, slots=True)
-class GridResult:
-    """What the search of a grid gives, window by window in the order of `WindowGrid.boxes`.
-
-    `probabilities` is float32 `(n,)`. `sides` is float32 `(n, 4)`: left, top, right and bottom of
-    the vehicle, from the centre of the window in its sides; of windows that are not hits, and by a
-    model without box regression, `WINDOW_SIDES`.
-    """
-
-    probabilities: Float32Array
-    sides: Float32Array
+        columns: tuple[Any, ...] = self.boxes, self.probabilities, self.shares, self.vehicles
+        return Windows(*(column[keep] for column in columns))
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,12 +91,10 @@ class WindowGrid:
     @property
     def boxes(self) -> Int32Array:
         """The windows row by row from the top left, int32 `(rows · columns, 4)`."""
-        x = np.array([round(self.left + i * self.step) for i in range(self.columns)], np.int32)
-        y = np.array([round(self.top + j * self.step) for j in range(self.rows)], np.int32)
-        boxes = np.full((self.rows, self.columns, 4), self.size, np.int32)
-        boxes[:, :, 0] = x
-        boxes[:, :, 1] = y[:, np.newaxis]
-        return boxes.reshape(-1, 4)
+        x = [round(self.left + i * self.step) for i in range(self.columns)]
+        y = [round(self.top + j * self.step) for j in range(self.rows)]
+        boxes = [(i, j, self.size, self.size) for j in y for i in x]
+        return np.array(boxes, np.int32).reshape(-1, 4)
 
     @property
     def share(self) -> float:
@@ -216,6 +201,6 @@ def lay_perspective(
         wanted = round((_LOWEST - _HIGHEST) * cells) + 1
         rows = min(wanted, (height - top - size) // step + 1)
         if size <= width and min(columns, rows) >= 1 and size not in {grid.size for grid in grids}:
-            left = -beyond * step
-            grids.append(WindowGrid(size, step, left, Fraction(top), int(columns), int(rows)))
+            place = -beyond * step, Fraction(top)
+            grids.append(WindowGrid(size, step, *place, int(columns), int(rows)))
     return grids

@@ -19,7 +19,7 @@ from pathlib import Path, PurePosixPath
 
 import cv2
 
-from vdet.archives import ArchiveError, list_members, open_archive, read_member, store
+from vdet.archives import ArchiveError, is_hidden, list_members, open_archive, read_member, store
 from vdet.boxes import Image
 from vdet.errors import DataError, escaped, printable
 from vdet.files import read_whole, staged
@@ -102,8 +102,7 @@ def _find_in(source: Path) -> list[PatchFile]:
 def _patch_file(source: Path, name: str, boxes: Mapping[str, Sides]) -> PatchFile | None:
     """Return the patch of a file name in a source; None if it is not a patch."""
     path = PurePosixPath(name)
-    hidden = any(part.startswith((".", "__MACOSX")) for part in path.parts)
-    if hidden or path.suffix.lower() not in PICTURE_SUFFIXES:
+    if is_hidden(path) or path.suffix.lower() not in PICTURE_SUFFIXES:
         return None
     sides = boxes.get(name)
     known = CLASSES | ({BOXED: True} if sides else {})

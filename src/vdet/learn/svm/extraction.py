@@ -47,6 +47,11 @@ class LabelledVectors:
     files: Sequence[PatchFile]
 
     @property
+    def is_boxed(self) -> BoolArray:
+        """Which patches belong to neither class, bool `(patches,)`; they have sides."""
+        return np.array([file.is_boxed for file in self.files])
+
+    @property
     def groups(self) -> npt.NDArray[np.str_]:
         """The group of each patch, str `(patches,)`."""
         return np.array([file.group for file in self.files], str)
@@ -106,25 +111,17 @@ def extract(
             yield [whole, *(augment(whole, rng) if augmented else ())]
 
     def describe(same: Sequence[PatchSample]) -> Float32Array:
-        return extractor.describe_all(
-            to_patch(patch_sample.image, features.patch) for patch_sample in same
-        )
+        return extractor.describe_all(to_patch(item.image, features.patch) for item in same)
 
-    vectors = [describe([])]
+    vectors: list[Float32Array] = []
     labels: list[tuple[bool, Float32Array, int]] = []
     with map_ordered(describe, samples(), jobs or core_count()) as results:
         for number, (same, described) in enumerate(results):
             vectors.append(described)
-            labels += [(patch_sample.vehicle, patch_sample.sides, number) for patch_sample in same]
+            labels += [(item.vehicle, item.sides, number) for item in same]
             progress(1)
-    vehicle, sides, origins = zip(*labels, strict=True) if labels else ((), (), ())
-    return LabelledVectors(
-        np.concatenate(vectors),
-        np.array(vehicle, bool),
-        np.reshape(sides, (-1, 4)).astype(np.float32),
-        np.array(origins, np.intp),
-        files,
-    )
+    vehicle, sides, origins = map(np.array, zip(*labels, strict=True))
+    return LabelledVectors(np.concatenate(vectors), vehicle, sides, origins, files)
 
 
 def hold_out(groups: npt.NDArray[np.str_]) -> BoolArray:

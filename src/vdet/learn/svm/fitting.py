@@ -9,7 +9,6 @@ Optimization", 1989; of the calibration, Platt, "Probabilistic outputs for suppo
 """
 
 import logging
-from collections.abc import Sequence
 
 import numpy as np
 from scipy.optimize import minimize
@@ -121,16 +120,16 @@ def _fit_sigmoid(scores: Float64Array, vehicle: BoolArray) -> tuple[float, float
 
 
 def fit_boxes(
-    sets: Sequence[LabelledVectors], held: Sequence[BoolArray], hog_length: int
+    data: LabelledVectors, held: BoolArray, hog_length: int
 ) -> tuple[BoxRegression | None, float | None]:
     """Fit on the patches that are not held out and measure the error on the others.
 
     Parameters
     ----------
-    sets
+    data
         Patches of which some have known sides.
     held
-        Of each set, which patches are held out, bool `(patches,)`.
+        Which patches are held out, bool `(patches,)`.
     hog_length
         Number of features of HOG, which come first.
 
@@ -139,21 +138,13 @@ def fit_boxes(
     The regression, and the mean absolute error on the known sides of patches that are held out, as
     a fraction of the patch's side. Either is None if it has no patches.
     """
-    hogs, sides, tested_hogs, tested_sides = [], [], [], []
-    for data, out in zip(sets, held, strict=True):
-        known: BoolArray = np.asarray(np.isfinite(data.sides).any(axis=1))
-        learnt, tested = known & ~out[data.origins], data.patches[out]
-        tested = tested[known[tested]]
-        hogs.append(data.vectors[learnt, :hog_length])
-        sides.append(data.sides[learnt])
-        tested_hogs.append(data.vectors[tested, :hog_length])
-        tested_sides.append(data.sides[tested])
-    if not sum(map(len, sides)):
+    known: BoolArray = np.asarray(np.isfinite(data.sides).any(axis=1))
+    learnt, tested = known & ~held[data.origins], data.patches[held & known[data.patches]]
+    if not learnt.any():
         return None, None
-    regression = fit_sides(np.concatenate(hogs), np.concatenate(sides))
-    truth = np.concatenate(tested_sides)
-    errors = abs(regression.sides(np.concatenate(tested_hogs)) - truth)
-    return regression, round(float(np.nanmean(errors)), 4) if len(truth) else None
+    regression = fit_sides(data.vectors[learnt, :hog_length], data.sides[learnt])
+    errors = abs(regression.sides(data.vectors[tested, :hog_length]) - data.sides[tested])
+    return regression, round(float(np.nanmean(errors)), 4) if len(tested) else None
 
 
 def fit_sides(hogs: Float32Array, sides: Float32Array) -> BoxRegression:

@@ -12,11 +12,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
-from vdet.boxes import Image
 from vdet.config.schema import Settings
 from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.features import cut_window, to_patch
@@ -27,7 +25,7 @@ from vdet.labels.reading import read_truth
 from vdet.labels.roles import Roles
 from vdet.learn.svm.choosing import MOST, Most, PatchKind, choose_windows, cut_sides
 from vdet.learn.svm.dataset import patch_archive
-from vdet.media import Picture
+from vdet.media import Frame, Picture
 from vdet.media.reader import VideoReader
 from vdet.progress import Progress, Steps, no_steps
 from vdet.run.loop import named_errors, peek
@@ -43,13 +41,8 @@ _FOLDERS: dict[PatchKind, str] = {
 }
 
 
-class LabelledFrame(NamedTuple):
-    """A frame, its number counted from 0, with its windows and its labels."""
-
-    number: int
-    image: Image
-    windows: Windows
-    labels: LabelledVideo
+LabelledFrame = tuple[Frame, Windows, LabelledVideo]
+"""A frame with its windows and its labels."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,8 +91,8 @@ class VideoSource:
                 vehicles = labels.boxes[~labels.ignored]
                 cuts_off = any(cut_sides(box, info.width).any() for box in vehicles)
                 if number in regular or (number >= self.first and cuts_off):
-                    windows = detector.search(Picture(frame.image), None).windows
-                    yield LabelledFrame(frame.index, frame.image, windows, labels)
+                    windows, _ = detector.search(Picture(frame.image), None)
+                    yield frame, windows, labels
                 advance(1)
         if number < last:
             truth.check_end(self.truth, number)
@@ -156,17 +149,15 @@ def mine(
     with patch_archive(output, overwrite=overwrite) as add:
         for stem, source in zip(names, sources, strict=True):
             progress = partial(steps, source.path.name)
-            for frame in source.frames(model, settings, progress):
+            for frame, windows, labels in source.frames(model, settings, progress):
                 searched += 1
-                rng = np.random.default_rng(frame.number)
-                labels, width = frame.labels, frame.image.shape[1]
-                for chosen in choose_windows(
-                    frame.windows, labels.boxes, labels.ignored, width, rng, most=most
-                ):
+                rng, width = np.random.default_rng(frame.index), frame.picture.width
+                boxes = labels.boxes, labels.ignored
+                for chosen in choose_windows(windows, *boxes, width, rng, most=most):
                     x, y, side, _ = chosen.box.xywh
                     patch = to_patch(cut_window(frame.image, x, y, side, side), PATCH)
                     folder = _FOLDERS[chosen.kind].format(stem)
-                    name = f"{folder}/frame{frame.number + 1:06}_x{x:04}_y{y:04}_s{side:04}.png"
+                    name = f"{folder}/frame{frame.index + 1:06}_x{x:04}_y{y:04}_s{side:04}.png"
                     add(name, patch, chosen.sides)
                     counts[chosen.kind] += 1
         if not counts:

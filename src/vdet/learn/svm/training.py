@@ -47,21 +47,15 @@ class Classification:
     @classmethod
     def of(cls, vehicle: BoolArray, predicted: BoolArray, groups: npt.NDArray[np.str_]) -> Self:
         """Compare the truth, bool `(n,)`, with the prediction, bool `(n,)`; groups are `(n,)`."""
-        right = vehicle == predicted
-        found, missed, alarms, others = (
-            int(np.count_nonzero((vehicle == truth) & (predicted == answer)))
-            for truth in (True, False)
-            for answer in (True, False)
-        )
+        right, cells = vehicle == predicted, 2 * ~vehicle + ~predicted
+        found, missed, alarms, others = np.bincount(cells, minlength=4).tolist()
         return cls(
             patches=len(right),
             accuracy=float(right.mean()),
             precision=found / (found + alarms) if found + alarms else None,
             recall=found / (found + missed) if found + missed else None,
             confusion=[[found, missed], [alarms, others]],
-            groups={
-                name: float(right[groups == name].mean()) for name in sorted(set(groups.tolist()))
-            },
+            groups={str(name): float(right[groups == name].mean()) for name in np.unique(groups)},
         )
 
     def lines(self) -> Iterator[str]:
@@ -143,20 +137,15 @@ def train(
     DataError
         Patches are unreadable, or there are too few to learn from.
     """
-    features, augmented = settings.svm.features, settings.train.svm.augmentation
-    boxed = [file for file in files if file.is_boxed]
     data, held, model = _fit_part(files, settings, jobs=jobs, steps=steps)
-    progress = steps("computing features of patches with boxes", len(boxed))
-    of_boxed = extract(boxed, features, augmented=augmented, jobs=jobs, progress=progress)
+    learnt, tested = ~(held | data.is_boxed), held & ~data.is_boxed
     steps("fitting the sides of boxes", None)
-    regression, box_error = fit_boxes(
-        (data, of_boxed), (held, hold_out(of_boxed.groups)), features.hog_length
-    )
+    regression, box_error = fit_boxes(data, held, settings.svm.features.hog_length)
     metrics = TrainingMetrics(
         groups=dict(Counter(file.group for file in files)),
-        samples=int(np.count_nonzero(~held[data.origins])),
-        train_accuracy=_classify(model, data, ~held).accuracy,
-        test=_classify(model, data, held),
+        samples=int(np.count_nonzero(learnt[data.origins])),
+        train_accuracy=_classify(model, data, learnt).accuracy,
+        test=_classify(model, data, tested),
         box_error=box_error,
     )
     provenance = {
@@ -179,10 +168,10 @@ def evaluate_patches(
 
     Parameters and errors are those of `train`.
     """
+    files = [file for file in files if not file.is_boxed]
     if model is None:
         data, held, model = _fit_part(files, settings, jobs=jobs, steps=steps)
         return _classify(model, data, held)
-    files = [file for file in files if not file.is_boxed]
     progress = steps("describing patches", len(files))
     data = extract(files, model.features, augmented=False, jobs=jobs, progress=progress)
     return _classify(model, data, np.ones(len(files), np.bool_))
@@ -191,21 +180,20 @@ def evaluate_patches(
 def _fit_part(
     files: Sequence[PatchFile], settings: Settings, *, jobs: int | None, steps: Steps
 ) -> tuple[LabelledVectors, BoolArray, LinearModel]:
-    """Describe the patches of both classes and fit a model to those that are not held out.
+    """Describe the patches, and fit a model to those of both classes that are not held out.
 
     Returns
     -------
     The patches, which of them are held out, bool `(patches,)`, and the model.
     """
-    files = [file for file in files if not file.is_boxed]
     progress = steps("describing patches", len(files))
     augmented = settings.train.svm.augmentation
     data = extract(files, settings.svm.features, augmented=augmented, jobs=jobs, progress=progress)
     held = hold_out(data.groups)
-    if not held.any():
+    if not (held & ~data.is_boxed).any():
         raise DataError("no folder has two patches, so none can be held out; add more")
     steps("fitting the classifier", None)
-    return data, held, fit(data.of(~held), settings)
+    return data, held, fit(data.of(~(held | data.is_boxed)), settings)
 
 
 def _classify(model: LinearModel, data: LabelledVectors, chosen: BoolArray) -> Classification:
