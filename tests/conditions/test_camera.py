@@ -29,14 +29,13 @@ def view(x: float, y: float, degrees: float) -> Image:
 def watched(place: Callable[[float], Place], seconds: float = 20.0) -> CameraWatch:
     watch = CameraWatch()
     for time in np.arange(0, seconds, 0.25).tolist():
-        watch.add(time, view(*place(time)), [])
+        watch.add(time, view(*place(time)), [], is_clear=True)
     return watch
 
 
 def codes(watch: CameraWatch) -> list[tuple[str, float]]:
     """Return the code and the start of each finding."""
-    is_clear = np.ones(len(watch._times), bool)
-    return [(finding.code, finding.spans[0][0]) for finding in watch.findings(is_clear)]
+    return [(finding.code, finding.spans[0][0]) for finding in watch.findings()]
 
 
 def test_a_camera_that_stands_or_trembles_a_little_is_still() -> None:
@@ -48,7 +47,7 @@ def test_a_camera_that_stands_or_trembles_a_little_is_still() -> None:
 def test_a_camera_that_is_bumped_stands_differently_from_then_on() -> None:
     watch = watched(lambda time: (0, 0, 0) if time < 8 else (6, -3, 1.5))
     assert codes(watch) == [("camera-moved", 8.0)]
-    (finding,) = watch.findings(np.ones(len(watch._times), bool))
+    (finding,) = watch.findings()
     assert finding.spans == ((8.0, 19.75),)
     assert finding.value == pytest.approx(np.hypot(6, 3) / WIDTH, rel=0.15)
     assert "moved at 0:08" in finding.text
@@ -71,9 +70,24 @@ def test_a_camera_that_moves_is_reported_from_its_start(place: Callable[[float],
     assert not watch.is_still
 
 
-def test_what_hides_the_view_for_a_moment_does_not_move_the_camera() -> None:
+@pytest.mark.parametrize(
+    ("back", "span"), [(20, (5, 19.75)), (12, (5, 11.75))], ids=["for good", "and back"]
+)
+def test_a_camera_that_is_turned_away_is_reported_until_its_view_is_back(
+    back: float, span: tuple[float, float]
+) -> None:
+    watch = watched(lambda time: (180, 80, 0) if 5 <= time < back else (0, 0, 0))
+    (finding,) = watch.findings()
+    assert (finding.code, finding.spans) == ("camera-moves", (span,))
+    assert "out of its view" in finding.text
+
+
+@pytest.mark.parametrize(("end", "is_clear"), [(6, True), (40, False)], ids=["lorry", "fog"])
+def test_what_hides_the_view_does_not_move_the_camera(end: float, is_clear: bool) -> None:
     watch = CameraWatch()
-    for time in np.arange(0, 10, 0.25).tolist():
-        hidden = np.random.default_rng(1).integers(0, 256, (HEIGHT, WIDTH), np.uint8)
-        watch.add(time, hidden if 4 <= time < 6 else view(0, 0, 0), [])
+    hidden = np.random.default_rng(1).integers(0, 256, (HEIGHT, WIDTH), np.uint8)
+    for time in np.arange(0, 50, 0.25).tolist():
+        is_hidden = 4 <= time < end
+        plane = hidden if is_hidden else view(0, 0, 0)
+        watch.add(time, plane, [], is_clear=is_clear or not is_hidden)
     assert codes(watch) == []

@@ -1,34 +1,45 @@
 """Findings on a drawn road that changes: the right one in time, and none without a change."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from benchmarks.conditions import EXPECTED, SETTINGS, Changed, drawn_road
+from benchmarks.conditions import EXPECTED, SETTINGS, Road, is_right
 
 from vdet import load_settings
 from vdet.boxes import NO_BOXES
-from vdet.conditions.visibility import Sight, findings
-from vdet.conditions.watch import Conditions, small_luma
-from vdet.config.schema import ConditionSettings, Settings
+from vdet.conditions.visibility import findings
+from vdet.conditions.watch import Conditions, planes_of
+from vdet.config.schema import Code, ConditionSettings, Settings
 from vdet.media import Picture
 from vdet.media.frame import Coding, Planes
 
 
 @pytest.fixture(scope="module")
-def road() -> Changed:
-    return drawn_road(1)
+def road() -> Road:
+    return Road.drawn(1)
 
 
-@pytest.mark.parametrize("kind", EXPECTED)
-def test_the_right_finding_is_there_in_time(road: Changed, kind: str) -> None:
-    assert road.is_right(kind), road.findings(kind)
+@pytest.mark.parametrize(("kind", "code"), EXPECTED.items())
+def test_the_right_finding_is_there_in_time_and_can_be_ignored(
+    road: Road, kind: str, code: Code | None
+) -> None:
+    conditions = road.watched(kind)
+    findings = conditions.findings()
+    assert is_right(kind, findings), findings
+    ignoring = ConditionSettings(ignore=(code,) if code else ())
+    conditions._settings = SETTINGS.model_copy(update={"conditions": ignoring})
+    others = tuple(item for item in findings.found if item.code != code)
+    assert conditions.findings() == replace(findings, found=others)
 
 
 def test_drops_are_reported_while_they_are_on_the_lens() -> None:
-    sharp = Sight(100, 15, 0.5, (-4.0, -4.4, -2.0, 0.55), weak=0.1, sure=0.8)
-    soft_everywhere = Sight(100, 15, 0.5, (-4.8, -4.6, -0.9, 0.35), weak=0.5, sure=0.45)
-    times = [number / 4 for number in range(60)]
-    sights = [soft_everywhere if 5 <= time < 10 else sharp for time in times]
-    (finding,) = findings(times, sights, is_shipped=True)
+    seen = (*np.log((105, 15, 0.5)),)
+    sharp = *seen, -4.0, -4.4, -2.0, 0.55, 0.1, 0.8
+    soft_everywhere = *seen, -4.8, -4.6, -0.9, 0.35, 0.5, 0.45
+    times = np.arange(60) / 4
+    looks = np.array([soft_everywhere if 5 <= time < 10 else sharp for time in times])
+    (finding,) = findings(times, looks, is_shipped=True)
     assert (finding.code, finding.severity) == ("drops", "warning")
     assert finding.spans == ((5.0, 9.75),)
     assert "on the lens from 0:05 to 0:09" in finding.text
@@ -39,7 +50,7 @@ def found(settings: Settings, width: int = 640, unknown: tuple[str, ...] = ()) -
     image = np.full((90, width, 3), 90, np.uint8)
     for number in range(10):
         conditions.add(number / 2, Picture(image), NO_BOXES, ())
-    return [finding.code for finding in conditions.findings()]
+    return [finding.code for finding in conditions.findings().found]
 
 
 def test_what_the_settings_make_doubtful_is_said() -> None:
@@ -55,15 +66,19 @@ def test_a_camera_that_is_described_has_metres() -> None:
     assert found(described) == []
 
 
-def test_findings_are_left_out_by_their_codes() -> None:
-    ignoring = ConditionSettings(ignore=("lane-geometry", "small-frames"))
+@pytest.mark.parametrize("code", ["lane-geometry", "classes", "small-frames"])
+def test_each_of_them_can_be_ignored(code: Code) -> None:
     lanes = load_settings((), ["lanes.enabled=true"])
-    assert found(lanes.model_copy(update={"conditions": ignoring}), width=300) == []
+    ignoring = lanes.model_copy(update={"conditions": ConditionSettings(ignore=(code,))})
+    every = found(lanes, width=300, unknown=("tram",))
+    assert every == ["lane-geometry", "classes", "small-frames"]
+    rest = [item for item in every if item != code]
+    assert found(ignoring, width=300, unknown=("tram",)) == rest
 
 
 def test_a_plane_is_the_same_from_a_decoder_and_from_an_image() -> None:
     image = np.random.default_rng(1).integers(40, 200, (90, 160, 3), np.uint8)
     image = np.repeat(np.repeat(image, 4, axis=0), 4, axis=1)
-    decoded = small_luma(Picture(Planes.of_image(image, Coding())))
-    assert decoded.shape == (180, 320)
-    np.testing.assert_allclose(decoded.astype(float), small_luma(Picture(image)), atol=3)
+    decoded, half = planes_of(Picture(Planes.of_image(image, Coding())))
+    assert (decoded.shape, half.shape) == ((180, 320), (90, 160))
+    np.testing.assert_allclose(decoded.astype(float), planes_of(Picture(image))[0], atol=3)

@@ -54,7 +54,9 @@ def test_a_batch_says_it_in_the_manifest_and_in_the_index(
     assert TEXT in found.err
     (record,) = map(json.loads, (tmp_path / "found" / "manifest.jsonl").read_text().splitlines())
     assert record["facts"]["conditions"] == [FINDING]
-    assert f"<td>{TEXT}</td>" in (tmp_path / "found" / "index.html").read_text()
+    index = (tmp_path / "found" / "index.html").read_text()
+    assert f"<td>{TEXT}</td>" in index
+    assert f'<span title="{TEXT}"> ⚠</span>' in index
 
 
 def test_python_gets_it_too(clip: Path, config: Path, tmp_path: Path) -> None:

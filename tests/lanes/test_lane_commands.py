@@ -1,6 +1,7 @@
 """Lanes through the commands, on a clip with strong lens distortion."""
 
 import json
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
@@ -39,6 +40,8 @@ LENS = LensSettings(
 CAR = Box.sized(500, 300, 64, 56)  # in the distorted frame, near its edge
 CORNER = np.s_[400:, 600:]
 """Pixels without drawings."""
+PLACE = "distance", "lane"
+"""Keys of the place of a vehicle."""
 STAGES = [
     "1-windows.png", "2-hits.png", "3-heat.png", "4-boxes.png",
     "5-road.png", "6-above.png", "7-mask.png", "8-fit.png",
@@ -239,6 +242,33 @@ def test_without_a_camera_the_lane_has_no_metres_and_one_warning_says_so(
     assert result.err.count("warning") == 1
     assert "lanes: no values in metres without camera.lens" in result.err
     assert (read_image(out / "bare.png") == read_image(files.bare)).all()
+
+
+def test_without_a_camera_no_output_of_a_video_has_metres(
+    run: Run, files: Files, tmp_path: Path, road: Scene
+) -> None:
+    renderer, clip, out = Renderer(road), tmp_path / "plain.mp4", tmp_path / "out.mp4"
+    write_video(clip, [with_car(renderer.image(i)) for i in range(COUNT)])
+    tracks, vehicles, page = (tmp_path / name for name in ("t.jsonl", "v.json", "v.page"))
+    outputs = "--tracks", tracks, "--sink", f"vehicles={vehicles}", "--page", page
+    result = run("detect-video", clip, out, *outputs, *files.red, "--lanes")
+    assert (result.code, result.err.count("warning")) == (0, 1)
+    assert "lanes: no values in metres without camera.lens [lane-geometry]" in result.err
+    records = [json.loads(line) for line in tracks.read_text().splitlines()]
+    metres = ("radius", "offset", "width")
+    assert [record["lane"][key] for record in records for key in metres] == [None] * 3 * COUNT
+    assert all(len(record["lane"][side]) > 1 for record in records for side in ("left", "right"))
+    places = [track[key] for record in records for track in record["tracks"] for key in PLACE]
+    assert places
+    assert set(places) == {None}
+    (vehicle,) = json.loads(vehicles.read_text())
+    speeds = ("metres", "speed", "speed_85", "speed_sd")
+    assert {vehicle[key] for key in (*speeds, *PLACE)} == {None}
+    text = re.sub(r"<(script|style).*?</\1>", "", (page / "page.html").read_text(), flags=re.DOTALL)
+    assert not re.search(r"\d\s*(m|km/h)\b", re.sub("<[^>]*>", " ", text))
+    for old, new in zip(video_images(clip), video_images(out), strict=True):
+        assert np.abs(new[:60] - old[:60].astype(int)).mean() < 2, "no text about the lane"
+        assert np.abs(new[300:] - old[300:].astype(int)).mean() > 5, "the lane is drawn"
 
 
 def test_pictures_of_the_stages_are_written(run: Run, files: Files, tmp_path: Path) -> None:

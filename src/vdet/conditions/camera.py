@@ -9,7 +9,7 @@ from collections.abc import Iterable
 import cv2
 import numpy as np
 
-from vdet.boxes import BoolArray, Box, Float32Array, Float64Array, Image
+from vdet.boxes import Box, Float32Array, Float64Array, Image
 from vdet.conditions.finding import Finding, joined, when
 from vdet.errors import clock
 
@@ -21,15 +21,12 @@ _AGREEING = 0.5
 """Fraction of the corners that must agree with a similarity."""
 _ERROR = 0.3
 """Displacement that is only an error of measurement, pixels of a plane."""
-_RENEWED, _GIVEN_UP = 30.0, 5.0
-"""Seconds after which corners are chosen anew: while they are found, and while they are not."""
-_GAP = 2.0
-"""Seconds of rest that end a movement."""
+_RENEWED = 30.0
+"""Seconds after which corners that are found are chosen anew: the light changes."""
 _LOST = 3.0
 """Seconds after which a view that is not found again is another view: no lorry hides it all."""
 _STILL = 0.9
 """Fraction of the planes in which a still camera stands as in the plane before."""
-_UNKNOWN = np.full((4, 2), np.nan)
 
 
 class CameraWatch:
@@ -41,35 +38,33 @@ class CameraWatch:
         self._times: list[float] = []
         self._places: list[Float64Array] = []
         """How far the corners of the frame are from where they were at first, `(4, 2)` each, as
-        fractions of the width; NaN where that is not known.
+        fractions of the width: infinite in another view, NaN where that is not known.
         """
-        self._lost: list[bool] = []
         self._stood: list[bool] = []
         self._plane: Image | None = None
         self._points = np.empty((0, 1, 2), np.float32)
         self._place = np.zeros((4, 2))
-        self._since = self._found = 0.0
+        self._since = 0.0
 
-    def add(self, time: float, plane: Image, boxes: Iterable[Box]) -> bool:
+    def add(self, time: float, plane: Image, boxes: Iterable[Box], *, is_clear: bool) -> bool:
         """Add the next plane, uint8 `(h, w)`; return whether the camera stands as before.
 
-        `boxes` are those of vehicles, in pixels of the plane.
+        `boxes` are those of vehicles, in pixels of the plane. `is_clear` says whether one sees
+        well: otherwise a view that is not found may be the same.
         """
         plane = np.asarray(self._even.apply(plane), np.uint8)
-        moved = _moved(self._plane, plane, self._points) if self._times else np.zeros((4, 2))
-        before = self._places[-1] if self._times else self._place
-        is_found = bool(np.isfinite(moved).all())
+        moved = self._moved(plane, np.inf if is_clear else np.nan)
+        place = self._place + moved / plane.shape[1]
+        before = self._places[-1] if self._places else place
+        with np.errstate(invalid="ignore"):  # another view may follow another
+            self._stood.append(bool(np.abs(place - before).max() <= _LIMIT / 2))
         self._times.append(time)
-        self._places.append(self._place + moved / plane.shape[1])
-        self._lost.append(not is_found and len(self._points) >= _FEWEST)
-        self._stood.append(bool(np.abs(self._places[-1] - before).max() <= _LIMIT / 2))
-        self._found = time if is_found else self._found
-        late = time - self._since > _RENEWED if is_found else time - self._found > _GIVEN_UP
-        if self._plane is None or late:
-            if is_found and np.abs(moved).max() > _ERROR:  # small errors do not add up
-                self._place = self._places[-1]
-            self._plane, self._since, self._found = plane, time, time
-            self._points = _corners(plane, boxes)
+        self._places.append(place)
+        is_old = time - self._since > _RENEWED and np.isfinite(place).all()
+        if is_old or len(self._points) < _FEWEST:
+            if np.abs(moved).max() > _ERROR:  # small errors do not add up
+                self._place = place
+            self._plane, self._since, self._points = plane, time, _corners(plane, boxes)
         return self._stood[-1]
 
     @property
@@ -77,65 +72,59 @@ class CameraWatch:
         """Whether it has stood still most of the time."""
         return len(self._stood) > 1 and float(np.mean(self._stood)) >= _STILL
 
-    def findings(self, is_clear: BoolArray) -> list[Finding]:
-        """Return from when to when it moved, or when it was moved for good.
-
-        `is_clear` says in which planes one sees well, `(n,)`: in others a view may not be found.
-        """
-        if not self._times:
-            return []
+    def findings(self) -> list[Finding]:
+        """Return from when to when it moved, or when it was moved for good."""
         times, places = np.array(self._times), np.array(self._places)
-        off = _distances(places, np.nanmedian(places[:5], axis=0))  # the first is known
-        away = np.array(self._lost) & is_clear | (off > _LIMIT)
-        spans = []
-        for first, last in joined(times[away].tolist(), _GAP):
-            measured = np.isfinite(off[(times >= first) & (times <= last)]).sum()
-            if measured > 1 or last - first >= _LOST:
-                spans.append((first, last))
+        is_known = np.isfinite(places).all(axis=(1, 2))
+        off = _distances(places, places[is_known][:5])
+        spans = [
+            (first, last)
+            for first, last in joined(times[off > _LIMIT].tolist())
+            if last - first >= _LOST or (is_known & (times >= first) & (times <= last)).sum() > 1
+        ]
         if not spans:
             return []
-        size = float(np.nanmax(off))
+        size = float(off[is_known].max())
         much = f"by up to {size:.1%} of the width" if size > _LIMIT else "out of its view"
         start, end = spans[-1]
-        after = places[(times > start + 1) & np.isfinite(off)]
-        if end == times[-1] and len(after) > 3:
-            spread = _distances(after, np.median(after, axis=0))
-            if np.quantile(spread, 0.95) <= _LIMIT:
-                text = (
-                    f"the camera moved at {clock(int(start))}, {much}: lines, zones and regions "
-                    "fit only before or after; process both parts separately"
-                )
-                return [Finding("camera-moved", text, ((start, end),), value=size)]
-        text = (
-            f"the camera moves {when(spans)}, {much}: lines, zones, regions and ground points do "
-            "not fit the view; do not trust counts and speeds of these times"
-        )
+        after = places[is_known & (times > start + 1)]
+        rests = len(after) > 3 and np.quantile(_distances(after, after), 0.95) <= _LIMIT
+        if rests and end == times[-1]:
+            what = f"the camera moved at {clock(int(start))}, {much}"
+            text = f"{what}: lines, zones and regions fit only before or after; process both apart"
+            return [Finding("camera-moved", text, ((start, end),), value=size)]
+        what = f"the camera moves {when(spans)}, {much}"
+        text = f"{what}: lines, zones and regions do not fit then; do not trust counts and speeds"
         return [Finding("camera-moves", text, tuple(spans), value=size)]
 
+    def _moved(self, plane: Image, lost: float) -> Float64Array:
+        """Return how far the corners of the frame have moved in a plane, `(4, 2)` pixels.
 
-def _distances(places: Float64Array, base: Float64Array) -> Float64Array:
-    """Return the mean distance of the corners from their places in `base`, `(n,)`."""
-    return np.asarray(np.hypot(*np.moveaxis(places - base, -1, 0)).mean(axis=1))
+        It is `lost` if the view is not found.
+        """
+        if self._plane is None:
+            return np.zeros((4, 2))
+        if len(self._points) < _FEWEST:
+            return np.full((4, 2), np.nan)
+        found, status, _ = cv2.calcOpticalFlowPyrLK(
+            self._plane, plane, self._points, np.empty(0), winSize=(9, 9), maxLevel=2
+        )
+        seen = status.ravel() > 0
+        if seen.sum() >= _FEWEST:
+            matrix, agreeing = cv2.estimateAffinePartial2D(
+                self._points[seen], found[seen], ransacReprojThreshold=0.7, maxIters=200
+            )
+            if agreeing.sum() >= _AGREEING * len(seen):
+                height, width = plane.shape
+                corners = np.array([(0, 0), (width, 0), (0, height), (width, height)])
+                return np.asarray(corners @ matrix[:, :2].T + matrix[:, 2] - corners)
+        return np.full((4, 2), lost)
 
 
-def _moved(earlier: Image | None, plane: Image, points: Float32Array) -> Float64Array:
-    """Return how far the corners of a frame are from those of an earlier plane, `(4, 2)` pixels."""
-    if earlier is None or len(points) < _FEWEST:
-        return _UNKNOWN
-    found, status, _ = cv2.calcOpticalFlowPyrLK(
-        earlier, plane, points, np.empty(0), winSize=(9, 9), maxLevel=2
-    )
-    seen = status.ravel() > 0
-    if seen.sum() < _FEWEST:
-        return _UNKNOWN
-    matrix, agreeing = cv2.estimateAffinePartial2D(
-        points[seen], found[seen], ransacReprojThreshold=0.7, maxIters=200
-    )
-    if matrix is None or agreeing.sum() < _AGREEING * len(points):
-        return _UNKNOWN
-    height, width = plane.shape
-    corners = np.array([(0, 0), (width, 0), (0, height), (width, height)], np.float64)
-    return np.asarray(corners @ matrix[:, :2].T + matrix[:, 2] - corners)
+def _distances(places: Float64Array, usual: Float64Array) -> Float64Array:
+    """Return the mean distance of the corners from their median in usual places, `(n,)`."""
+    x, y = np.moveaxis(places - np.median(usual, axis=0), -1, 0)
+    return np.asarray(np.hypot(x, y).mean(axis=1))
 
 
 def _corners(plane: Image, boxes: Iterable[Box]) -> Float32Array:

@@ -10,6 +10,8 @@ from vdet.errors import clock
 Span = tuple[float, float]
 """From when to when, seconds as in the tracks."""
 Severity = Literal["warning", "note"]
+_GAP = 2.0
+"""Seconds between two times that end a span."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,15 +76,15 @@ class Findings:
         return "\n".join(f"{finding.text} [{finding.code}]" for finding in warnings)
 
 
-def joined(times: Iterable[float], gap: float) -> list[Span]:
-    """Return the spans of ascending times that are at most `gap` seconds apart."""
+def joined(times: Iterable[float], shortest: float = 0.0) -> list[Span]:
+    """Return the spans of ascending times that are near to each other, but no shorter ones."""
     spans: list[Span] = []
     for time in times:
-        if spans and time - spans[-1][1] <= gap:
+        if spans and time - spans[-1][1] <= _GAP:
             spans[-1] = spans[-1][0], time
         else:
             spans.append((time, time))
-    return spans
+    return [(first, last) for first, last in spans if last - first >= shortest]
 
 
 def when(spans: Sequence[Span]) -> str:

@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 import cv2
 import numpy as np
 
-from vdet.boxes import Box, Float32Array, Image
-from vdet.conditions.finding import Finding, Span, joined, when
+from vdet.boxes import Box, Image
+from vdet.conditions.finding import Finding, joined, when
 from vdet.polygons import Point
 
 _RATE = 8.0
@@ -35,11 +35,9 @@ _REACH = 1.5
 """How far it moves to the next plane, as a multiple of its size."""
 _FEWEST, _FRACTION = 2, 0.15
 """Number of things, and fraction of all that travelled, from which a finding is reported."""
-_GAP = 5.0
-"""Seconds between two of them that end a span."""
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class Mover:
     """What moved: when, where (pixels of a plane), and how large it was last.
 
@@ -58,41 +56,38 @@ class Mover:
         return len(self.places) >= _PLANES and math.dist(self.places[0], self.places[-1]) >= minimum
 
 
-@dataclass(slots=True)
 class MotionWatch:
     """Follows what moves through the planes of one video."""
 
-    _ended: list[Span] = field(default_factory=list)
-    _movers: list[Mover] = field(default_factory=list)
-    _starts: dict[int, Point] = field(default_factory=dict)
-    _driven: set[int] = field(default_factory=set)
-    _background: Float32Array | None = None
-    _usual: Float32Array = field(default_factory=lambda: np.empty((0, 0), np.float32))
-    _covered: Image = field(default_factory=lambda: np.empty((0, 0), np.uint8))
-    _time: float = 0.0
+    def __init__(self) -> None:
+        self._ended: list[list[float]] = []
+        self._movers: list[Mover] = []
+        self._starts: dict[int, Point] = {}
+        self._driven: set[int] = set()
+        self._background = self._usual = np.empty((0, 0), np.float32)
+        self._covered = np.empty((0, 0), np.uint8)
+        self._time = 0.0
 
-    def reset(self) -> None:
-        """Begin anew: the camera has moved."""
-        self._background, self._movers = None, []
+    def add(self, time: float, plane: Image, boxes: Mapping[int, Box], *, stood: bool) -> None:
+        """Add the next plane, uint8 `(h, w)`; `boxes` are those of vehicles by id, its pixels.
 
-    def add(self, time: float, plane: Image, boxes: Mapping[int, Box]) -> None:
-        """Add the next plane, uint8 `(h, w)`; `boxes` are those of vehicles by id, its pixels."""
-        step, self._time = time - self._time, time
+        `stood` says whether the camera stands as in the plane before.
+        """
+        follow, self._time = np.float32(min(1.0, time - self._time) * _RATE), time
         before, self._covered = self._covered, np.zeros_like(plane)
         for number, box in boxes.items():
             box.cut(self._covered)[:] = 1
             start = self._starts.setdefault(number, box.center)
             if math.dist(start, box.center) >= _TRAVEL * plane.shape[1]:
                 self._driven.add(number)
-        if self._background is None:
-            self._background = plane.astype(np.float32)
+        if not stood or not self._background.size:
+            self._background, self._movers = plane.astype(np.float32), []
             self._usual = np.full(plane.shape, _CONTRAST / _NOISE, np.float32)
             return
         difference = plane - self._background
         difference -= np.median(difference[::2, ::2])
         size = np.abs(difference)
         differs = size > np.maximum(_CONTRAST, _NOISE * self._usual)
-        follow = np.float32(min(1.0, step) * _RATE)
         self._background += np.clip(difference, -follow, follow)
         self._usual += np.clip(size - self._usual, -follow / 8, follow / 8)
         self._link(time, differs.astype(np.uint8), before)
@@ -103,16 +98,14 @@ class MotionWatch:
         fraction = len(left) / max(1, len(left) + len(self._driven))
         if len(left) < _FEWEST or fraction < _FRACTION:
             return []
-        spans = joined(sorted(itertools.chain.from_iterable(left)), _GAP)
-        text = (
-            f"{fraction:.0%} of the moving objects are not detected vehicles, mostly "
-            f"{when(spans)}: poor visibility, or classes that are not detected"
-        )
+        spans = joined(sorted(itertools.chain.from_iterable(left)))
+        what = f"{fraction:.0%} of the moving objects are not detected vehicles, mostly"
+        text = f"{what} {when(spans)}: poor visibility, or classes that are not detected"
         return [Finding("unexplained-motion", text, tuple(spans), value=fraction)]
 
     def _link(self, time: float, differs: Image, before: Image) -> None:
         """Continue the movers; `before` is where boxes were in the plane before."""
-        left, going = list(self._movers), []
+        left, self._movers = self._movers, []
         for center, size in self._things(differs):
             mover = min(left, key=lambda item: math.dist(item.places[-1], center), default=None)
             if mover and math.dist(mover.places[-1], center) < _REACH * size:
@@ -122,34 +115,32 @@ class MotionWatch:
             mover.size = size
             mover.times.append(time)
             mover.places.append(center)
-            going.append(mover)
+            self._movers.append(mover)
         for mover in left:
             mover.is_found |= _is_in(mover.places[-1], self._covered)
         self._ended += self._unexplained(left)
-        self._movers = going
 
-    def _unexplained(self, movers: Iterable[Mover]) -> list[Span]:
-        """Return from when to when there were those that travelled and were not found."""
+    def _unexplained(self, movers: Iterable[Mover]) -> list[list[float]]:
+        """Return the times of each that travelled and was not found."""
         width = self._covered.shape[1]
-        travelled = (item for item in movers if not item.is_found and item.has_travelled(width))
-        return [(item.times[0], item.times[-1]) for item in travelled]
+        return [item.times for item in movers if not item.is_found and item.has_travelled(width)]
 
     def _things(self, differs: Image) -> list[tuple[Point, float]]:
         """Return the middle and the size of what differs outside the boxes, the largest first."""
-        joined_up = cv2.morphologyEx(differs, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
-        _, labels, stats, _ = cv2.connectedComponentsWithStats(joined_up)
+        closed = cv2.morphologyEx(differs, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
+        _, labels, stats, _ = cv2.connectedComponentsWithStats(closed)
+        labels[self._covered > 0] = 0
+        areas = stats[:, cv2.CC_STAT_AREA]
+        fewest, most = _SMALLEST * differs.size, _LARGEST * differs.size
         things = []
-        for number in np.argsort(-stats[1:, cv2.CC_STAT_AREA]) + 1:
-            x, y, width, height, area = stats[number].tolist()
-            if not _SMALLEST <= area / differs.size <= _LARGEST:
-                continue
-            part = np.s_[y : y + height, x : x + width]
-            rows, columns = np.nonzero((labels[part] == number) & (self._covered[part] == 0))
-            if len(rows) >= max(_OUTSIDE * area, _SMALLEST * differs.size):
-                center = x + float(columns.mean()), y + float(rows.mean())
-                things.append((center, float(max(np.ptp(rows), np.ptp(columns)) + 1)))
+        for number in np.argsort(-areas).tolist():
+            if number and fewest <= areas[number] <= most:
+                rows, columns = np.nonzero(labels == number)
+                if len(rows) >= max(_OUTSIDE * areas[number], fewest):
+                    center = float(columns.mean()), float(rows.mean())
+                    things.append((center, float(max(np.ptp(rows), np.ptp(columns)) + 1)))
         return things
 
 
 def _is_in(point: Point, covered: Image) -> bool:
-    return bool(covered.size) and bool(covered[int(point[1]), int(point[0])])
+    return bool(covered[int(point[1]), int(point[0])])

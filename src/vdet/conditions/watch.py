@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-from vdet.boxes import Box, Boxes, Image
+from vdet.boxes import Box, Boxes, Float64Array, Image
 from vdet.conditions import visibility
 from vdet.conditions.camera import CameraWatch
-from vdet.conditions.finding import Finding
+from vdet.conditions.finding import Finding, Findings
 from vdet.conditions.motion import MotionWatch
 from vdet.config.schema import Settings
 from vdet.media import Picture
@@ -39,76 +39,57 @@ class Conditions:
         self._unknown = unknown
         self._camera, self._motion = CameraWatch(), MotionWatch()
         self._times: list[float] = []
-        self._sights: list[visibility.Sight] = []
-
-    @property
-    def is_still(self) -> bool:
-        """Whether the camera stood still."""
-        return self._camera.is_still
+        self._looks: list[Float64Array] = []
 
     def add(self, time: float, picture: Picture, found: Boxes, tracks: Sequence[Track]) -> None:
         """Add a frame that was searched, with its detections and the vehicles that are shown."""
         if self._times and time - self._times[-1] < _STEP:
             return
-        fine_plane = small_luma(picture)
-        plane = halved(fine_plane)
-        scores = np.array([item.score for item in found], np.float64)
-        self._sights.append(visibility.Sight.of(fine_plane, plane, scores))
+        fine_plane, plane = planes_of(picture)
         scale = plane.shape[1] / picture.width
         boxes = {track.id: _enlarged(track.box, scale) for track in tracks}
         self._times.append(time)
-        if not self._camera.add(time, plane, boxes.values()):
-            self._motion.reset()
-        self._motion.add(time, plane, boxes)
+        self._looks.append(visibility.look(fine_plane, plane, found.scores))
+        is_clear = not visibility.reasons(self._looks[-1][np.newaxis])[0]
+        stood = self._camera.add(time, plane, boxes.values(), is_clear=is_clear)
+        self._motion.add(time, plane, boxes, stood=stood)
 
-    def findings(self) -> tuple[Finding, ...]:
+    def findings(self) -> Findings:
         """Return what was found out so far, but for what the settings leave out."""
-        settings, found = self._settings, self._of_settings()
-        if settings.traffic or settings.regions or settings.camera.ground:
-            is_clear = np.array([sight.code is None for sight in self._sights], bool)
-            found += self._camera.findings(is_clear)
-        if self.is_still:
-            found += self._motion.findings()
-        detector = settings.detector
-        is_shipped = detector.kind == "net" and detector.model is None
-        found += visibility.findings(self._times, self._sights, is_shipped=is_shipped)
-        return tuple(item for item in found if item.code not in settings.conditions.ignore)
-
-    def _of_settings(self) -> list[Finding]:
-        """Return what the settings and the size of the frames make doubtful."""
-        found, settings = [], self._settings
+        settings, detector = self._settings, self._settings.detector
+        found = []
         if settings.lack_of_metres:
             found.append(Finding("lane-geometry", settings.lack_of_metres))
         if self._unknown:
             text = f"detector.classes: the network does not know {', '.join(self._unknown)}"
             found.append(Finding("classes", text))
         if self._width < _NARROW:
-            text = (
-                f"frames are {self._width} pixels wide, fewer than in measurements of the detectors"
-            )
+            text = f"frames are {self._width} pixels wide; detectors were measured on wider ones"
             found.append(Finding("small-frames", text, severity="note"))
-        return found
+        if self._times:
+            times, looks = np.array(self._times), np.array(self._looks)
+            if settings.traffic or settings.regions or settings.camera.ground:
+                found += self._camera.findings()
+            if self._camera.is_still:
+                found += self._motion.findings()
+            is_shipped = detector.kind == "net" and detector.model is None
+            found += visibility.findings(times, looks, is_shipped=is_shipped)
+        ignored = settings.conditions.ignore
+        chosen = tuple(item for item in found if item.code not in ignored)
+        return Findings(chosen, self._camera.is_still)
 
 
-def halved(plane: Image) -> Image:
-    """Return a plane of half the width and height."""
-    height, width = plane.shape
-    half = max(1, round(width / 2)), max(1, round(height / 2))
-    return np.asarray(cv2.resize(plane, half, interpolation=cv2.INTER_AREA), np.uint8)
-
-
-def small_luma(picture: Picture) -> Image:
-    """Return the luma of a picture, full range, at most `_WIDTH` pixels wide, uint8 `(h, w)`."""
-    width = min(_WIDTH, picture.width)
-    size = width, max(1, round(picture.height * width / picture.width))
-    planes = picture.planes
-    pixels = planes.luma if planes else picture.image
-    small = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)
-    if planes is None:
-        small = cv2.cvtColor(small, cv2.COLOR_BGR2GRAY)
-    elif not planes.coding.full_range:
-        small = cv2.convertScaleAbs(small, alpha=255 / 219, beta=-16 * 255 / 219)
-    return np.asarray(small, np.uint8)
+def planes_of(picture: Picture) -> tuple[Image, Image]:
+    """Return the luma of a picture, full range, uint8: a plane, and one of half its size."""
+    planes, width = picture.planes, min(_WIDTH, picture.width)
+    height = max(1, round(picture.height * width / picture.width))
+    luma = planes.luma if planes else cv2.cvtColor(picture.image, cv2.COLOR_BGR2GRAY)
+    fine = cv2.resize(luma, (width, height), interpolation=cv2.INTER_AREA)
+    if planes and not planes.coding.full_range:
+        fine = cv2.convertScaleAbs(fine, alpha=255 / 219, beta=-16 * 255 / 219)
+    half = max(1, width // 2), max(1, height // 2)
+    plane = cv2.resize(fine, half, interpolation=cv2.INTER_AREA)
+    return np.asarray(fine, np.uint8), np.asarray(plane, np.uint8)
 
 
 def _enlarged(box: Box, scale: float) -> Box:

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
-from vdet.conditions.finding import Findings
 from vdet.config.schema import Settings
 from vdet.media import Frame, VideoInfo
 from vdet.plugins import STEPS, load_plugin
@@ -171,5 +170,4 @@ class ConditionStep:
 
     def finish(self) -> Facts:
         """Return what was found out about the video."""
-        found = Findings(self._conditions.findings(), self._conditions.is_still)
-        return {CONDITIONS: found}
+        return {CONDITIONS: self._conditions.findings()}
