@@ -192,6 +192,18 @@ def times_of(spec: dict[str, Any]) -> list[Fraction]:
     ]
 
 
+def sound_of(path: Path, track: int = 0) -> list[tuple[Fraction, bytes]]:
+    """Return the packets of a sound, with their times after the first picture in seconds."""
+    with av.open(str(path)) as container:
+        stream, picture = container.streams.audio[track], container.streams.video[0]
+        begin = (picture.start_time or 0) * (picture.time_base or 0)
+        return [
+            ((packet.pts or 0) * packet.time_base - begin, bytes(packet))
+            for packet in container.demux(stream)
+            if packet.size
+        ]
+
+
 def joined(path: Path, *parts: Path) -> Path:
     """Write a file of the bytes of others, one after the other."""
     path.write_bytes(b"".join(part.read_bytes() for part in parts))

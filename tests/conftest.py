@@ -52,16 +52,17 @@ def logs() -> Iterator[None]:
 
 @pytest.fixture
 def run(capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
-    """Run `vdet` with arguments, in this process."""
+    """Run `vdet` with arguments, in this process; it must end with `code`, if that is given."""
     monkeypatch.delenv("VDET_DEBUG", raising=False)
 
-    def run_it(*arguments: str | Path) -> Outcome:
+    def run_it(*arguments: str | Path, code: int | None = None) -> Outcome:
         with pytest.raises(SystemExit) as ended:
             main([str(argument) for argument in arguments])
         captured = capfd.readouterr()
-        code = ended.value.code
-        assert isinstance(code, int)
-        return Outcome(code, captured.out, captured.err)
+        found = ended.value.code
+        assert isinstance(found, int)
+        assert code in (None, found), captured.err
+        return Outcome(found, captured.out, captured.err)
 
     return run_it
 

@@ -56,16 +56,8 @@ def draw_patches(count: int, rng: np.random.Generator, *, vehicles: bool) -> lis
     return kept
 
 
-def write_patches(
-    folder: Path, *, seed: int, vehicles: int, non_vehicles: int, overwrite: bool = False
-) -> None:
-    """Write `vehicles/<group>/image0001.png` … and `non-vehicles/<group>/…` below a folder.
-
-    Raises
-    ------
-    OutputError
-        A folder or file cannot be written.
-    """
+def write_patches(folder: Path, *, seed: int, vehicles: int, non_vehicles: int) -> None:
+    """Write `vehicles/<group>/image0001.png` … and `non-vehicles/<group>/…` below a folder."""
     rng = np.random.default_rng(seed)
     drawn = {
         "vehicles": draw_patches(vehicles, rng, vehicles=True),
@@ -77,7 +69,7 @@ def write_patches(
             numbers[group] += 1
             make_folder(folder / name / group)
             path = folder / name / group / f"image{numbers[group]:04}.png"
-            write_image(path, patch, overwrite=overwrite)
+            write_image(path, patch)
 
 
 def _vehicle_samples(rng: np.random.Generator) -> Iterator[_Sample]:

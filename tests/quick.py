@@ -24,15 +24,8 @@ QUICK_OPTIONS = tuple(word for assignment in QUICK for word in ("--set", assignm
 
 def only_windows(settings: str) -> tuple[str, ...]:
     """Return the options for one set of windows and no others."""
-    none = "detector.search.perspective.sizes=[]"
-    return (
-        "--set",
-        "detector.kind=svm",
-        "--set",
-        f"detector.search.windows=[{{{settings}}}]",
-        "--set",
-        none,
-    )
+    search = f"{{perspective: {{sizes: []}}, windows: [{{{settings}}}]}}"
+    return ("--set", "detector.kind=svm", "--set", f"detector.search={search}")
 
 
 FEW_OPTIONS = ("--set", "tracker.confirm_seconds=5", "--set", "output.preset=ultrafast")

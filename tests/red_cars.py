@@ -30,7 +30,6 @@ SCALE = REFERENCE_HEIGHT / HEIGHT
 CAR = Box.sized(96, 120, 64, 48)
 BINS = 8
 COLOUR = FeatureSettings(halved=(), histogram=HistogramSettings(bins=BINS))
-BAND = WindowSettings(size=32, overlap=0.75, top=96, bottom=192)
 SETTINGS = Settings(
     detector=SvmSettings(
         stride=1,

@@ -1,5 +1,6 @@
 """The program as a separate process, that tests can watch, signal and kill."""
 
+import csv
 import os
 import resource
 import signal
@@ -62,6 +63,12 @@ def frames_of(path: Path | None) -> int:
     assert path is not None
     with VideoReader(path) as reader:
         return sum(1 for _ in reader)
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    """Read a table."""
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
 
 
 def until(condition: Callable[[], bool], seconds: float = SOON) -> None:

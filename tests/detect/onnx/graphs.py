@@ -104,12 +104,10 @@ def write_network(
     pixel: tuple[int, int],
     *,
     metadata: Mapping[str, str] | None = None,
-    dynamic: bool = False,
     batch: int = 1,
 ) -> Path:
     """Write a network with one input of `size` whose score is the red of `pixel` of the input."""
     width, height = size
-    sides = ["H", "W"] if dynamic else [height, width]
     nodes, constants = _redness("images", pixel, form.red_channel, form.red)
     hot = np.zeros((1, *form.table.shape), np.float32)
     hot[0, form.score_row, form.score_column] = 1
@@ -118,7 +116,7 @@ def write_network(
         helper.make_node("Mul", ["red", "hot"], ["score"]),
         helper.make_node("Add", ["table", "score"], ["output0"]),
     ]
-    inputs = [helper.make_tensor_value_info("images", TensorProto.FLOAT, [batch, 3, *sides])]
+    inputs = [helper.make_tensor_value_info("images", TensorProto.FLOAT, [batch, 3, height, width])]
     outputs = [helper.make_tensor_value_info("output0", TensorProto.FLOAT, None)]
     return write_graph(path, nodes, inputs, outputs, constants, metadata)
 

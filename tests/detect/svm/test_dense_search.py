@@ -17,14 +17,8 @@ from vdet.detect.svm.windows import WINDOW_SIDES, WindowGrid
 from vdet.media import Picture
 
 FEATURES = FeatureSettings(patch=64, halved=(), hog=HogSettings(cell=8))
-GRIDS = [  # whole cells, one and a half, and other distances
-    (64, 8),
-    (64, 16),
-    (64, 12),
-    (128, 24),
-    (128, 25),
-    (80, 13),
-]
+GRIDS = [(64, 8), (64, 16), (64, 12), (128, 24), (128, 25), (80, 13)]
+"""Sizes and steps: whole cells, one and a half, and other distances."""
 
 
 def texture(side: int) -> Image:

@@ -11,8 +11,6 @@ from red_cars import CAR, HEIGHT, SETTINGS, THREE_SETS, WIDTH, by_perspective, r
 from vdet.boxes import Box, Boxes, Image
 from vdet.config.schema import SvmSettings
 from vdet.detect.svm.detector import SvmModel, Trace
-from vdet.detect.svm.heat import HotRegion
-from vdet.detect.svm.search import FrameSearch
 from vdet.media import Picture
 
 MODEL = red_finder()
@@ -116,18 +114,6 @@ class TestDefaultSettings:
 class TestStillPictures:
     """A still picture equals the last of `heat.frames` equal frames of a video."""
 
-    @pytest.mark.parametrize(
-        ("strength", "shown"), [(2.0, CAR), (0.5, Box.sized(104, 124, 30, 20))]
-    )
-    def test_of_boxes_in_one_another_the_strongest_is_shown(
-        self, monkeypatch: pytest.MonkeyPatch, strength: float, shown: Box
-    ) -> None:
-        part = Box.sized(104, 124, 30, 20)
-        assert part.intersection(CAR) == part
-        regions = [HotRegion(CAR, CAR.center, strength), HotRegion(part, part.center, 1.0)]
-        monkeypatch.setattr("vdet.detect.svm.detector.split_regions", lambda *_: regions)
-        assert rounded(detect_still(road(CAR), DEFAULT)) == [shown]
-
     @pytest.mark.parametrize("frames", [1, 2, 5])
     def test_a_still_picture_is_as_hot_as_a_video_of_the_same_frame(self, frames: int) -> None:
         settings = but(ROWS, "heat", frames=frames)
@@ -135,21 +121,6 @@ class TestStillPictures:
         still = detect_still(road(CAR), settings)
         np.testing.assert_allclose(trace_of(still).heat.values, trace_of(video).heat.values)
         assert rounded(still) == rounded(video)
-
-    @pytest.mark.parametrize("settings", [ROWS, DEFAULT], ids=["rows", "default"])
-    def test_a_still_picture_is_searched_once(
-        self, settings: SvmSettings, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        calls = []
-        search = FrameSearch.search
-
-        def counted(self: FrameSearch, picture: Picture) -> Any:
-            calls.append(picture)
-            return search(self, picture)
-
-        monkeypatch.setattr(FrameSearch, "search", counted)
-        detect_still(road(CAR), but(settings, "heat", frames=6))
-        assert len(calls) == 1
 
     @pytest.mark.parametrize("settings", [ROWS, DEFAULT], ids=["rows", "default"])
     def test_a_detection_is_shown_if_it_is_large_and_strong_enough(

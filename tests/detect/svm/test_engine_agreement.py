@@ -33,9 +33,9 @@ FEW = 0.92
 """Minimum fraction of equal decisions in a small grid, where a few near 0.5 are some percent."""
 
 
-def assert_agree(results: EngineResults, correlation: float = 0.99, same: float = 0.97) -> None:
+def assert_agree(results: EngineResults, same: float = 0.97) -> None:
     assert (results.patch > 0).any(), "nothing is found: decisions cannot differ"
-    assert results.correlation >= correlation
+    assert results.correlation >= 0.99
     assert results.same >= same
 
 

@@ -4,23 +4,10 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from seed import SEED
-from vdet.config.detector import FeatureSettings
-from vdet.detect.svm.features import (
-    FeatureExtractor,
-    cut_window,
-    halve,
-    histogram,
-    split,
-    to_patch,
-)
+from vdet.detect.svm.features import FeatureExtractor, cut_window, halve, histogram, split, to_patch
 
 PATCH = np.random.default_rng(0).integers(0, 256, (64, 64, 3), dtype=np.uint8)
 FEATURES = SEED.svm.features
-
-
-def seed_but(**changes: object) -> FeatureSettings:
-    """Give the seed's features with some sections or values replaced."""
-    return FEATURES.model_copy(update=changes)
 
 
 def test_a_vector_of_the_seed_is_the_hog_of_opencv_and_the_histogram_of_numpy() -> None:
@@ -35,7 +22,7 @@ def test_a_vector_of_the_seed_is_the_hog_of_opencv_and_the_histogram_of_numpy() 
 
 
 def test_a_halved_channel_is_described_at_half_its_size() -> None:
-    features = seed_but(halved=(1, 2))
+    features = FEATURES.model_copy(update={"halved": (1, 2)})
     _, red, blue = split(PATCH, FEATURES)
     descriptor = cv2.HOGDescriptor((32, 32), (8, 8), (4, 4), (4, 4), 8)
     hogs = [np.ravel(descriptor.compute(halve(channel))) for channel in (red, blue)]

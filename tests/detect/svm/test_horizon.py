@@ -10,29 +10,17 @@ from vdet.boxes import Image
 from vdet.detect.svm.horizon import find_horizon
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.random_scenes import demo_scene, empty_road
-from vdet.synthetic.render import Renderer, frames
+from vdet.synthetic.render import frames
 
 STEP = 0.01  # between the rows that get votes
 RNG = np.random.default_rng(0)
 
 
-def road(
-    horizon: float,
-    *,
-    size: tuple[int, int] = (640, 360),
-    curvature: float = 0,
-    lane: int = 0,
-    lanes: int = 3,
-    count: int = 3,
-) -> list[Image]:
-    """Draw consecutive frames of an empty road."""
-    width, height = size
-    camera = PinholeCamera(
-        width, height, 0.6 * width + 0.6 * height, horizon * height, 1.3, curvature
-    )
+def road(horizon: float, *, curvature: float = 0, lane: int = 0, lanes: int = 3) -> list[Image]:
+    """Draw three frames of an empty road."""
+    camera = PinholeCamera(640, 360, 600, horizon * 360, 1.3, curvature)
     scene = empty_road(np.random.default_rng(7), camera, lane=lane, lanes=lanes, seed=7)
-    renderer = Renderer(replace(scene, frames=count))
-    return [renderer.image(index) for index in range(count)]
+    return [frame.image for frame in frames(replace(scene, frames=3))]
 
 
 @pytest.mark.parametrize("horizon", [0.35, 0.4, 0.45, 0.5, 0.55, 0.6, 0.65])
@@ -71,14 +59,13 @@ def test_without_lines_there_is_no_horizon(image: Image) -> None:
     assert find_horizon([image]) is None
 
 
-def fan(*slopes: float, meeting: float = 0.45, upward: bool = False) -> Image:
-    """Draw lines of these slopes from where they meet in the middle of a picture, down or up."""
+def fan(*slopes: float) -> Image:
+    """Draw lines of these slopes from where they meet in the middle of row 162, down."""
     image = np.full((360, 640, 3), 90, np.uint8)
     for slope in slopes:
-        side, drop = np.sign(slope), -abs(slope) if upward else abs(slope)
-        for near, far in ((60, 110), (130, 180)):
+        for span in ((60, 110), (130, 180)):
             start, end = (
-                (round(320 + side * x), round(360 * meeting + drop * x)) for x in (near, far)
+                (round(320 + np.sign(slope) * x), round(162 + abs(slope) * x)) for x in span
             )
             cv2.line(image, start, end, (240, 240, 240), 3, cv2.LINE_AA)
     return image

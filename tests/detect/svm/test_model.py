@@ -16,9 +16,7 @@ from vdet.errors import ModelError
 
 # 4 × 4 cells, each a block of its own, 2 directions: 96 features, and 24 of the histogram
 SMALL = FeatureSettings(
-    patch=16,
-    hog=HogSettings(cell=4, block=1, orientations=2),
-    histogram=HistogramSettings(bins=8),
+    patch=16, hog=HogSettings(cell=4, block=1, orientations=2), histogram=HistogramSettings(bins=8)
 )
 
 
@@ -37,8 +35,8 @@ def model_with_boxes() -> LinearModel:
     return replace(model_of(2), box_regression=boxes)
 
 
-def header_of(asked: FeatureSettings = SMALL, **changes: Any) -> dict[str, Any]:
-    features = asked.model_dump(mode="json")
+def header_of(**changes: Any) -> dict[str, Any]:
+    features = SMALL.model_dump(mode="json")
     header = {"format": "vdet model", "version": 2, "features": features, "provenance": {}}
     return header | changes
 

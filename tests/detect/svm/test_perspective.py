@@ -29,45 +29,40 @@ def rows_of(grid: WindowGrid) -> tuple[int, int]:
     return int(boxes[0, 1]), int(boxes[-1, 1] + boxes[-1, 3])
 
 
-class TestRows:
-    @pytest.mark.parametrize("horizon", [0.35, 0.5, 0.6])
-    def test_windows_end_below_the_horizon_by_0_6_to_1_1_of_their_sides(
-        self, horizon: float
-    ) -> None:
-        grids = laid(height=2000, horizon=horizon)
-        assert len(grids) == len(SIZES)
-        for grid in grids:
-            rounding = max(1, grid.size / FEATURES.patch) / 2
-            top, bottom = rows_of(grid)
-            first, last = top + grid.size - horizon * 2000, bottom - horizon * 2000
-            assert abs(first - 0.6 * grid.size) <= rounding
-            assert abs(last - 1.1 * grid.size) <= rounding + grid.step / 2
+@pytest.mark.parametrize("horizon", [0.35, 0.5, 0.6])
+def test_windows_end_below_the_horizon_by_0_6_to_1_1_of_their_sides(horizon: float) -> None:
+    grids = laid(height=2000, horizon=horizon)
+    assert len(grids) == len(SIZES)
+    for grid in grids:
+        rounding = max(1, grid.size / FEATURES.patch) / 2
+        top, bottom = rows_of(grid)
+        first, last = top + grid.size - horizon * 2000, bottom - horizon * 2000
+        assert abs(first - 0.6 * grid.size) <= rounding
+        assert abs(last - 1.1 * grid.size) <= rounding + grid.step / 2
 
 
-class TestBeyondTheSides:
-    def test_windows_reach_beyond_both_sides_by_whole_steps_of_at_most_0_7(self) -> None:
-        for grid in laid():
-            x = grid.boxes[:, 0]
-            beyond = 5 / 8 * grid.size
-            assert x.min() == -beyond
-            over = int(x.max()) + grid.size - 1280
-            assert beyond - grid.step < over <= beyond
+def test_windows_reach_beyond_both_sides_by_whole_steps_of_at_most_0_7() -> None:
+    for grid in laid():
+        x = grid.boxes[:, 0]
+        beyond = 5 / 8 * grid.size
+        assert x.min() == -beyond
+        over = int(x.max()) + grid.size - 1280
+        assert beyond - grid.step < over <= beyond
 
 
-class TestHalving:
-    @pytest.mark.parametrize(("width", "height"), FRAMES)
-    @pytest.mark.parametrize("horizon", [0.4, 0.57, 0.61])
-    def test_windows_lie_at_whole_pixels_of_every_halved_frame(
-        self, width: int, height: int, horizon: float
-    ) -> None:
-        for grid in laid(width, height, horizon):
-            halved = grid.size
-            divisor = 1
-            while halved > 2 * FEATURES.patch:
-                divisor *= 2
-                halved = grid.size // divisor
-            lengths = (grid.size, grid.left, grid.top, grid.step)
-            assert [Fraction(length) % divisor for length in lengths] == [0, 0, 0, 0]
+@pytest.mark.parametrize(("width", "height"), FRAMES)
+@pytest.mark.parametrize("horizon", [0.4, 0.57, 0.61])
+def test_windows_lie_at_whole_pixels_of_every_halved_frame(
+    width: int, height: int, horizon: float
+) -> None:
+    for grid in laid(width, height, horizon):
+        halved = grid.size
+        divisor = 1
+        while halved > 2 * FEATURES.patch:
+            divisor *= 2
+            halved = grid.size // divisor
+        lengths = (grid.size, grid.left, grid.top, grid.step)
+        assert [Fraction(length) % divisor for length in lengths] == [0, 0, 0, 0]
 
 
 @pytest.mark.parametrize(

@@ -26,11 +26,6 @@ def pictures_of(image: Image, settings: SvmSettings = ROWS) -> dict[str, Image]:
     return detector.stage_pictures(image, detector.detect(detector.search(Picture(image), None)))
 
 
-def with_windows(*sets: WindowSettings) -> SvmSettings:
-    search = ROWS.search.model_copy(update={"windows": sets})
-    return ROWS.model_copy(update={"search": search})
-
-
 def test_hits_are_drawn_around_the_car_alone() -> None:
     changed = (pictures_of(road(CAR))["hits"] != road(CAR)).any(axis=2)
     rows, columns = np.nonzero(changed)
@@ -43,7 +38,9 @@ def test_every_window_set_has_a_grid_of_its_own_colour() -> None:
         picture = pictures_of(road(), settings)["windows"]
         return {tuple(color) for color in picture[100:160].reshape(-1, 3).tolist()}
 
-    one, two = colors(ROWS), colors(with_windows(*ROWS.search.windows, SMALLER_SET))
+    sets = (*ROWS.search.windows, SMALLER_SET)
+    more = ROWS.model_copy(update={"search": ROWS.search.model_copy(update={"windows": sets})})
+    one, two = colors(ROWS), colors(more)
     assert any(max(color) == 255 for color in one)
     assert sum(max(color) == 255 for color in two) > sum(max(color) == 255 for color in one)
 
@@ -60,13 +57,9 @@ def test_windows_beyond_the_sides_are_drawn_as_far_as_they_are_visible(x: int) -
         assert rows.sum() > 6
 
 
-def flat(value: float) -> Heat:
-    return Heat(np.full((24, 32), value, np.float32))
-
-
 class TestHeat:
     def test_heat_is_white_at_its_peak_and_red_below(self) -> None:
-        heat = flat(0)
+        heat = Heat(np.zeros((24, 32), np.float32))
         heat.values[5, 7], heat.values[9, 9] = 8.0, 2.0
         blended = blend_heat(np.zeros((24, 32, 3), np.uint8), heat)
         assert blended[5, 7].min() > 190

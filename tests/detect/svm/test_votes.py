@@ -50,17 +50,12 @@ def boxes(regions: list[HotRegion]) -> list[Box]:
     return [region.box for region in regions]
 
 
-class TestVehicles:
-    def test_a_vehicle_is_where_its_votes_agree(self) -> None:
-        (vehicle,) = split(around(LEFT))
-        assert vehicle.box.iou(LEFT) > 0.9
-
-    def test_two_vehicles_that_overlap_are_told_apart(self) -> None:
-        found = split(around(LEFT, seed=1) + around(RIGHT, seed=2), LEFT.union(RIGHT))
-        assert len(found) == 2
-        left, right = sorted(boxes(found), key=lambda box: box.x1)
-        assert left.iou(LEFT) > 0.9
-        assert right.iou(RIGHT) > 0.9
+def test_two_vehicles_that_overlap_are_told_apart() -> None:
+    found = split(around(LEFT, seed=1) + around(RIGHT, seed=2), LEFT.union(RIGHT))
+    assert len(found) == 2
+    left, right = sorted(boxes(found), key=lambda box: box.x1)
+    assert left.iou(LEFT) > 0.9
+    assert right.iou(RIGHT) > 0.9
 
 
 class TestWeights:

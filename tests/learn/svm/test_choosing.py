@@ -10,7 +10,6 @@ from vdet.learn.svm.choosing import (
     ChosenWindow,
     Most,
     PatchKind,
-    WindowComparison,
     choose_windows,
     compare_windows,
 )
@@ -45,10 +44,7 @@ def windows(*boxes: Box, probability: float = 1.0) -> Windows:
 
 
 def chosen(
-    found: Windows,
-    labels: Truth,
-    most: Most = GENEROUS,
-    seed: int = 0,
+    found: Windows, labels: Truth, most: Most = GENEROUS, seed: int = 0
 ) -> list[ChosenWindow]:
     rng = np.random.default_rng(seed)
     return list(choose_windows(found, *labels, WIDTH, rng, most=most))
@@ -61,12 +57,7 @@ def kinds(choices: list[ChosenWindow]) -> dict[Box, str]:
 def test_windows_become_patches_of_their_kind() -> None:
     fits, shows, part, false = about(450), about(470), about(450, 36), about(100)
     choices = chosen(windows(fits, shows, part, false), truth(CAR))
-    assert kinds(choices) == {
-        fits: "vehicle",
-        shows: "box",
-        part: "part",
-        false: "false alarm",
-    }
+    assert kinds(choices) == {fits: "vehicle", shows: "box", part: "part", false: "false alarm"}
     assert {choice.box: choice.sides for choice in choices if choice.sides} == {
         fits: (-0.5, -0.35, 0.5, 0.35),
         shows: (-0.7, -0.35, 0.3, 0.35),
@@ -88,13 +79,10 @@ def test_nothing_is_taken_from_ignore_regions() -> None:
         assert kinds(chosen(windows(item), truth(ignored=(region,)))) == expected
 
 
-def many() -> Windows:
-    return windows(*(about(x, side) for x in range(60, 940, 5) for side in (36, 80, 100, 120)))
-
-
 def test_each_vehicle_and_the_frame_give_no_more_than_the_settings_allow() -> None:
     most = Most(per_vehicle=4, false_alarms=7, parts=3, probability=0)
-    choices = chosen(many(), truth(CAR, OTHER), most)
+    many = (about(x, side) for x in range(60, 940, 5) for side in (36, 80, 100, 120))
+    choices = chosen(windows(*many), truth(CAR, OTHER), most)
     counted = [choice.kind for choice in choices]
     kinds_in_order: tuple[PatchKind, ...] = ("vehicle", "box", "false alarm", "part")
     assert [counted.count(kind) for kind in kinds_in_order] == [8, 8, 7, 3]
@@ -111,13 +99,10 @@ def window(side: float, x: float = MIDDLE[0], y: float = MIDDLE[1]) -> tuple[flo
     return (x - side / 2, y - side / 2, side, side)
 
 
-def compare(*windows: tuple[float, ...], vehicle: tuple[float, ...] = VEHICLE) -> WindowComparison:
-    return compare_windows(from_sizes(np.array(windows)), from_sizes(np.array([vehicle]))[0], WIDTH)
-
-
 def flags(*windows: tuple[float, ...], vehicle: tuple[float, ...] = VEHICLE) -> str:
     """Return the flags that are set for each window as a word, "-" where none is."""
-    found = compare(*windows, vehicle=vehicle)
+    (box,) = from_sizes(np.array([vehicle]))
+    found = compare_windows(from_sizes(np.array(windows)), box, WIDTH)
     words = []
     for i in range(len(windows)):
         values = {"fits": found.fits[i], "shows": found.shows[i], "part": found.part[i]}

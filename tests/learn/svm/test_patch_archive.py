@@ -36,12 +36,3 @@ def test_what_is_written_is_read_back(tmp_path: Path) -> None:
 
 def test_the_same_patches_give_the_same_bytes(tmp_path: Path) -> None:
     assert write(tmp_path / "a.zip").read_bytes() == write(tmp_path / "b.zip").read_bytes()
-
-
-def test_after_an_error_an_earlier_archive_is_unchanged(tmp_path: Path) -> None:
-    path = tmp_path / "a.zip"
-    path.write_bytes(b"precious")
-    with pytest.raises(UnicodeEncodeError), patch_archive(path) as add:
-        add("vehicles/\udc80.png", patch(0), None)
-    assert path.read_bytes() == b"precious"
-    assert list(tmp_path.iterdir()) == [path]

@@ -10,13 +10,12 @@ import pytest
 from vdet.config.detector import FeatureSettings, HistogramSettings
 from vdet.config.schema import Settings, SvmSettings, SvmTrainingSettings, TrainSettings
 from vdet.learn.svm.dataset import find_patches
-from vdet.learn.svm.training import evaluate_patches, train
+from vdet.learn.svm.training import evaluate_patches
 from vdet.media.images import write_image
 
 FEATURES = FeatureSettings(patch=16, histogram=HistogramSettings(bins=8))
 SETTINGS = Settings(
-    detector=SvmSettings(features=FEATURES),
-    train=TrainSettings(svm=SvmTrainingSettings(C=1)),
+    detector=SvmSettings(features=FEATURES), train=TrainSettings(svm=SvmTrainingSettings(C=1))
 )
 
 
@@ -53,9 +52,3 @@ def test_a_new_model_is_tested_on_the_last_patches_of_each_folder(bright_and_dar
     assert (found.patches, found.accuracy) == (8, 7 / 8)
     assert found.groups["non-vehicles/b"] == 0.5
     assert steps == [("describing patches", 48), ("fitting the classifier", None)]
-
-
-def test_a_ready_model_is_tested_on_all_patches(bright_and_dark: Path) -> None:
-    files = find_patches([bright_and_dark])
-    model, _ = train(files, SETTINGS, jobs=1)
-    assert evaluate_patches(files, SETTINGS, model, jobs=1).patches == 48

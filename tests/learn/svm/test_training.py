@@ -19,19 +19,11 @@ from vdet.learn.svm.training import train
 from vdet.media.images import read_image, write_image
 
 SIZE = 16
-GROUPS = {
-    "vehicles/far": 12,
-    "vehicles/near": 20,
-    "non-vehicles/road": 15,
-    "non-vehicles/sky": 10,
-}
+GROUPS = {"vehicles/far": 12, "vehicles/near": 20, "non-vehicles/road": 15, "non-vehicles/sky": 10}
 SETTINGS = Settings(
     detector=SvmSettings(
         features=FeatureSettings(
-            patch=SIZE,
-            halved=(),
-            hog=HogSettings(cell=4),
-            histogram=HistogramSettings(bins=8),
+            patch=SIZE, halved=(), hog=HogSettings(cell=4), histogram=HistogramSettings(bins=8)
         )
     ),
     train=TrainSettings(svm=SvmTrainingSettings(C=0.1)),
@@ -91,21 +83,6 @@ def test_several_threads_give_the_same_as_one(files: list[PatchFile]) -> None:
     for name in ("vectors", "vehicle", "sides", "origins"):
         np.testing.assert_array_equal(getattr(one, name), getattr(three, name))
     np.testing.assert_array_equal(one.groups, three.groups)
-
-
-def test_only_the_kept_patches_and_the_samples_made_of_them_are_used() -> None:
-    vectors = np.array([0, 10, 20, 30, 40, 1, 11, 12, 21, 41], np.float32)[:, np.newaxis]
-    vehicle = np.array([True, False] * 5)
-    sides = np.arange(40, dtype=np.float32).reshape(10, 4)
-    files = [PatchFile(Path(), f"{row}.png", "vehicles", True) for row in range(5)]
-    origins = np.array([0, 1, 2, 3, 4, 0, 1, 1, 2, 4])
-    rows = LabelledVectors(vectors, vehicle, sides, origins, files)
-    kept = rows.of(np.array([False, True, True, False, True]))
-    assert kept.vectors[:, 0].tolist() == [10, 20, 40, 11, 12, 21, 41]
-    assert kept.sides[:, 0].tolist() == [4, 8, 16, 24, 28, 32, 36]
-    assert kept.vehicle.tolist() == [False, True, True, True, False, True, False]
-    assert kept.origins.tolist() == [0, 1, 2, 0, 0, 1, 2]
-    assert list(kept.files) == [files[1], files[2], files[4]]
 
 
 def test_broken_patches_are_an_error_that_names_the_first(
