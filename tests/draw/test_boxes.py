@@ -48,16 +48,15 @@ def letters(image: Image) -> int:
     return int((image.max(axis=2) < 110).sum())
 
 
-class TestBox:
-    @pytest.mark.parametrize("height", HEIGHTS)
-    def test_the_outline_lies_just_inside_the_box(self, height: int) -> None:
-        image = blank(400, height)
-        box = Box.sized(50, 60, 100, 80)
-        draw_box(image, box, (0, 0, 0))
-        rows, columns = np.nonzero(touched(image))
-        assert (columns.min(), rows.min()) == (box.x1, box.y1)
-        assert (columns.max() + 1, rows.max() + 1) == (box.x2, box.y2)
-        assert not (touched(image) & covered(shrunk(box, line_width(image) + 2), image)).any()
+@pytest.mark.parametrize("height", HEIGHTS)
+def test_the_outline_lies_just_inside_the_box(height: int) -> None:
+    image = blank(400, height)
+    box = Box.sized(50, 60, 100, 80)
+    draw_box(image, box, (0, 0, 0))
+    rows, columns = np.nonzero(touched(image))
+    assert (columns.min(), rows.min()) == (box.x1, box.y1)
+    assert (columns.max() + 1, rows.max() + 1) == (box.x2, box.y2)
+    assert not (touched(image) & covered(shrunk(box, line_width(image) + 2), image)).any()
 
 
 class TestLabels:
@@ -90,21 +89,20 @@ def runs(line: npt.NDArray[np.bool_]) -> list[int]:
     return [int(length) for length in edges[1::2] - edges[::2]]
 
 
-class TestDashedBox:
-    @pytest.mark.parametrize("height", HEIGHTS)
-    def test_has_several_dashes_and_gaps_on_each_side_at_any_frame_height(
-        self, height: int
-    ) -> None:
-        image = blank(2 * height, height)
-        box = Box.sized(height // 4, height // 4, height // 5, height // 6)
-        draw_box(image, box, BLACK, dashed=True)
-        top = box.cut(touched(image))[0]
-        left = box.cut(touched(image))[:, 0]
-        for side in (top, left):
-            assert len(runs(side)) >= 3
-            assert 0.4 < side.mean() < 0.75
-            assert side[0]
-            assert side[-1]
+@pytest.mark.parametrize("height", HEIGHTS)
+def test_a_dashed_box_has_several_dashes_and_gaps_on_each_side_at_any_frame_height(
+    height: int,
+) -> None:
+    image = blank(2 * height, height)
+    box = Box.sized(height // 4, height // 4, height // 5, height // 6)
+    draw_box(image, box, BLACK, dashed=True)
+    top = box.cut(touched(image))[0]
+    left = box.cut(touched(image))[:, 0]
+    for side in (top, left):
+        assert len(runs(side)) >= 3
+        assert 0.4 < side.mean() < 0.75
+        assert side[0]
+        assert side[-1]
 
 
 def contrast(one: Color, other: Color) -> float:
@@ -153,8 +151,7 @@ class TestLabel:
         assert not above[101:].any()
 
 
-class TestColor:
-    def test_neighbouring_ids_differ_clearly(self) -> None:
-        colors = [np.array(color_of(number)) for number in range(100)]
-        pairs = [*itertools.pairwise(colors), *zip(colors, colors[2:], strict=False)]
-        assert min(int(abs(a - b).max()) for a, b in pairs) > 100
+def test_neighbouring_ids_differ_clearly() -> None:
+    colors = [np.array(color_of(number)) for number in range(100)]
+    pairs = [*itertools.pairwise(colors), *zip(colors, colors[2:], strict=False)]
+    assert min(int(abs(a - b).max()) for a, b in pairs) > 100

@@ -1,13 +1,10 @@
 """Which pictures a pattern or a folder names, and when each was taken."""
 
-import tempfile
 from fractions import Fraction
 from pathlib import Path
 
 import cv2
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from clips import draw_frame, read_number
 from vdet.config.schema import InputSettings
@@ -88,22 +85,6 @@ def test_no_pictures_and_a_gap_are_refused(
 )
 def test_a_name_that_is_no_pattern_is_a_file(name: str, tmp_path: Path) -> None:
     assert find_sequence(tmp_path / name) is None
-
-
-@given(
-    before=st.text(st.sampled_from("ab-[(.*"), max_size=4),
-    digits=st.none() | st.integers(1, 9),
-    first=st.integers(0, 2000),
-    count=st.integers(1, 4),
-)
-def test_a_pattern_matches_the_names_that_printf_makes(
-    before: str, digits: int | None, first: int, count: int
-) -> None:
-    name = f"{before}_%{'' if digits is None else f'0{digits}'}d.png"
-    names = [name % number for number in range(first, first + count)]
-    with tempfile.TemporaryDirectory() as folder:
-        make(Path(folder), *names)
-        assert names_of(Path(folder) / name) == names
 
 
 NAMES = ["cam_20260501_070040.png", "cam_20260501_070050.png", "cam_20260501_070120.png"]

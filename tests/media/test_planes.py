@@ -55,20 +55,19 @@ class TestCoding:
         assert Coding.of(decoded(matrix=matrix)) is None
 
 
-class TestCopy:
-    @in_any_coding
-    def test_has_the_same_values_and_coding_in_memory_of_its_own(self, coding: Coding) -> None:
-        original = Planes.of_image(slopes(64, 48), coding)
-        copied = original.copy()
-        assert copied.is_own
-        assert (copied.shape, copied.coding) == (original.shape, coding)
-        for ours, theirs in zip(copied.layers, original.layers, strict=True):
-            np.testing.assert_array_equal(ours, theirs)
-        before = [layer.copy() for layer in original.layers]
-        for layer in copied.layers:
-            layer[:] = 0
-        for layer, expected in zip(original.layers, before, strict=True):
-            np.testing.assert_array_equal(layer, expected)
+@in_any_coding
+def test_a_copy_has_the_same_values_and_coding_in_memory_of_its_own(coding: Coding) -> None:
+    original = Planes.of_image(slopes(64, 48), coding)
+    copied = original.copy()
+    assert copied.is_own
+    assert (copied.shape, copied.coding) == (original.shape, coding)
+    for ours, theirs in zip(copied.layers, original.layers, strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+    before = [layer.copy() for layer in original.layers]
+    for layer in copied.layers:
+        layer[:] = 0
+    for layer, expected in zip(original.layers, before, strict=True):
+        np.testing.assert_array_equal(layer, expected)
 
 
 class TestOfImage:
@@ -127,25 +126,20 @@ def blocks_of_any_colour(width: int, height: int, coding: Coding) -> Planes:
     return planes
 
 
-class TestToImage:
-    @in_any_coding
-    @pytest.mark.parametrize("size", [(64, 48), (33, 48), (64, 47), (7, 5)])
-    def test_is_what_the_standard_says(self, coding: Coding, size: tuple[int, int]) -> None:
-        width, height = size
-        planes = blocks_of_any_colour(width, height, coding)
-        image = planes.to_image()
-        assert image.shape == (height, width, 3)
-        assert image.dtype == np.uint8
-        differences = np.abs(image - exact_image(planes))
-        assert differences.max() < 3.5
-        assert differences.mean() < 1
+@in_any_coding
+@pytest.mark.parametrize("size", [(64, 48), (33, 48), (64, 47), (7, 5)])
+def test_an_image_is_what_the_standard_says(coding: Coding, size: tuple[int, int]) -> None:
+    width, height = size
+    planes = blocks_of_any_colour(width, height, coding)
+    image = planes.to_image()
+    assert image.shape == (height, width, 3)
+    assert image.dtype == np.uint8
+    differences = np.abs(image - exact_image(planes))
+    assert differences.max() < 3.5
+    assert differences.mean() < 1
 
 
 # `Coding.to_common`: planes of all codings have the values that the models were trained with.
-
-
-def common(image: Image, coding: Coding) -> Layers:
-    return coding.to_common(Planes.of_image(image, coding).layers)
 
 
 def apart(ours: Layers, other: Layers) -> list[npt.NDArray[np.int64]]:
@@ -170,7 +164,8 @@ def test_colours_become_those_of_opencv(coding: Coding) -> None:
     image = squares()
     luma, red, blue = cv2.split(cv2.cvtColor(image[8::16, 8::16], cv2.COLOR_BGR2YCrCb))
     expected = tuple(np.asarray(item, np.uint8) for item in (luma, blue, red))
-    for item in apart(middles(common(image, coding)), (expected[0], expected[1], expected[2])):
+    found = middles(coding.to_common(Planes.of_image(image, coding).layers))
+    for item in apart(found, (expected[0], expected[1], expected[2])):
         assert item.max() <= 2
         assert item.mean() < 1
 

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from clips import read_number, write_clip
+from clips import ODD, read_number, write_clip
 from vdet.config.schema import InputSettings
 from vdet.errors import VideoError
 from vdet.media import Frame
@@ -75,34 +75,33 @@ def write_transparent(path: Path, codec: str) -> Path:
     return path
 
 
-class TestRange:
-    @pytest.mark.parametrize(
-        ("limits", "expected"),
-        [
-            ({}, range(12)),
-            ({"start": Fraction(3, 25)}, range(3, 12)),
-            ({"end": Fraction(3, 25)}, range(3)),
-            ({"start": Fraction(1, 10), "end": Fraction(1, 5)}, range(3, 5)),
-            ({"frames": 4}, range(4)),
-            ({"start": Fraction(2, 25), "frames": 1}, range(2, 3)),
-            ({"start": Fraction(2, 25), "end": Fraction(4, 25), "frames": 5}, range(2, 4)),
-            ({"frames": 0}, range(0)),
-            ({"start": Fraction(9)}, range(0)),
-        ],
-    )
-    @pytest.mark.parametrize("suffix", ["mp4", "ts"])
-    def test_frames_from_start_to_before_end(
-        self, limits: dict[str, Any], expected: range, suffix: str, *, tmp_path: Path
-    ) -> None:
-        path = write_clip(tmp_path / f"clip.{suffix}")  # the first frame of a .ts is not at 0
-        with VideoReader(path, **limits) as reader:
-            read = list(reader)
-            assert reader.expected == len(expected)
-        assert [frame.index for frame in read] == list(expected)
-        assert [read_number(frame.image) for frame in read] == list(expected)
-        assert [frame.time for frame in read] == [
-            reader.info.start + Fraction(index, 25) for index in expected
-        ]
+@pytest.mark.parametrize(
+    ("limits", "expected"),
+    [
+        ({}, range(12)),
+        ({"start": Fraction(3, 25)}, range(3, 12)),
+        ({"end": Fraction(3, 25)}, range(3)),
+        ({"start": Fraction(1, 10), "end": Fraction(1, 5)}, range(3, 5)),
+        ({"frames": 4}, range(4)),
+        ({"start": Fraction(2, 25), "frames": 1}, range(2, 3)),
+        ({"start": Fraction(2, 25), "end": Fraction(4, 25), "frames": 5}, range(2, 4)),
+        ({"frames": 0}, range(0)),
+        ({"start": Fraction(9)}, range(0)),
+    ],
+)
+@pytest.mark.parametrize("suffix", ["mp4", "ts"])
+def test_frames_from_start_to_before_end(
+    limits: dict[str, Any], expected: range, suffix: str, *, tmp_path: Path
+) -> None:
+    path = write_clip(tmp_path / f"clip.{suffix}")  # the first frame of a .ts is not at 0
+    with VideoReader(path, **limits) as reader:
+        read = list(reader)
+        assert reader.expected == len(expected)
+    assert [frame.index for frame in read] == list(expected)
+    assert [read_number(frame.image) for frame in read] == list(expected)
+    assert [frame.time for frame in read] == [
+        reader.info.start + Fraction(index, 25) for index in expected
+    ]
 
 
 def set_matrix(path: Path, a: float, b: float, c: float, d: float) -> Path:
@@ -186,53 +185,47 @@ def pictures_of(path: Path) -> list[av.VideoFrame]:
         return list(container.decode(video=0))
 
 
-PLANAR: dict[str, tuple[str, dict[str, Any], Coding]] = {
-    "untagged": ("mp4", {}, Coding()),
-    "BT.601": ("mp4", {"matrix": 5}, Coding()),
-    "BT.709": ("mp4", {"matrix": 1}, Coding("bt709")),
-    "full range": ("mp4", {"full_range": True}, Coding(full_range=True)),
-    "BT.709, full range": (
-        "mp4",
-        {"matrix": 1, "full_range": True},
-        Coding("bt709", full_range=True),
-    ),
-    "motion jpeg": ("avi", {"codec": "mjpeg", "pix_fmt": "yuvj420p"}, Coding(full_range=True)),
-    "odd sides": ("mkv", {"size": (153, 97), "codec": "ffv1"}, Coding()),
-    "grey": ("mp4", {"pix_fmt": "gray"}, Coding()),
-    "mpeg-4": ("avi", {"codec": "mpeg4", "options": {"bf": "2"}}, Coding()),
-    "vp9": ("webm", {"codec": "libvpx-vp9", "options": {"deadline": "realtime"}}, Coding()),
+PLANAR = {
+    "constant rate": Coding(),
+    "BT.601": Coding(),
+    "BT.709": Coding("bt709"),
+    "full range": Coding(full_range=True),
+    "BT.709, full range": Coding("bt709", full_range=True),
+    "motion jpeg": Coding(full_range=True),
+    "odd sides, 4:2:0": Coding(),
+    "grey": Coding(),
+    "mpeg-4 with b-frames": Coding(),
+    "vp9": Coding(),
 }
-"""Suffix and arguments of `write_clip` for clips that are read as planes, and their coding."""
+"""How the odd clips are coded that are read as planes."""
 
 
-class TestPlanes:
+@pytest.mark.parametrize("kind", PLANAR)
+@pytest.mark.parametrize("start", [None, Fraction(5, 25)])
+def test_planes_are_those_of_the_decoder(
+    kind: str, start: Fraction | None, *, tmp_path: Path
+) -> None:
     """Frames that need no conversion are given as they were decoded; others are BGR."""
-
-    @pytest.mark.parametrize("kind", PLANAR)
-    @pytest.mark.parametrize("start", [None, Fraction(5, 25)])
-    def test_are_those_of_the_decoder(
-        self, kind: str, start: Fraction | None, *, tmp_path: Path
-    ) -> None:
-        suffix, spec, coding = PLANAR[kind]
-        path = write_clip(tmp_path / f"clip.{suffix}", **spec)
-        pictures = pictures_of(path)
-        with VideoReader(path, start=start) as reader:
-            assert reader.info.coding == coding
-            frames = list(reader)
-        assert len(frames) == (12 if start is None else 7)
-        for frame in frames:
-            planes = frame.picture.planes
-            assert planes is not None
-            assert planes.coding == coding
-            assert not planes.is_own, "the decoder may need it for the next frames"
-            height, width = planes.shape
-            assert (reader.info.width, reader.info.height) == (width, height)
-            decoded = pictures[frame.index]
-            for layer, plane in zip(planes.layers, decoded.planes, strict=True):
-                rows = np.frombuffer(bytes(plane), np.uint8).reshape(-1, plane.line_size)
-                np.testing.assert_array_equal(layer, rows[: layer.shape[0], : layer.shape[1]])
-            other = decoded.to_ndarray(format="bgr24").astype(int)
-            assert np.abs(frame.image - other).mean() < 3
+    coding, (suffix, spec) = PLANAR[kind], ODD[kind]
+    path = write_clip(tmp_path / f"clip.{suffix}", **spec | {"count": 12})
+    pictures = pictures_of(path)
+    with VideoReader(path, start=start) as reader:
+        assert reader.info.coding == coding
+        frames = list(reader)
+    assert len(frames) == (12 if start is None else 7)
+    for frame in frames:
+        planes = frame.picture.planes
+        assert planes is not None
+        assert planes.coding == coding
+        assert not planes.is_own, "the decoder may need it for the next frames"
+        height, width = planes.shape
+        assert (reader.info.width, reader.info.height) == (width, height)
+        decoded = pictures[frame.index]
+        for layer, plane in zip(planes.layers, decoded.planes, strict=True):
+            rows = np.frombuffer(bytes(plane), np.uint8).reshape(-1, plane.line_size)
+            np.testing.assert_array_equal(layer, rows[: layer.shape[0], : layer.shape[1]])
+        other = decoded.to_ndarray(format="bgr24").astype(int)
+        assert np.abs(frame.image - other).mean() < 3
 
 
 def test_info_is_what_the_file_declares(tmp_path: Path) -> None:

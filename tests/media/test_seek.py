@@ -8,7 +8,7 @@ import av
 import numpy as np
 import pytest
 
-from clips import write_clip
+from clips import joined, write_clip
 from vdet.media import Frame
 from vdet.media.decoder import Damage
 from vdet.media.reader import VideoReader
@@ -96,8 +96,7 @@ def test_where_frames_cannot_be_counted_all_are_decoded(
 
 def test_a_start_after_a_clock_that_restarts(tmp_path: Path) -> None:
     clip = write_clip(tmp_path / "clip.ts", sounds=["aac"], **GOPS)
-    path = tmp_path / "joined.ts"
-    path.write_bytes(clip.read_bytes() * 2)
+    path = joined(tmp_path / "joined.ts", clip, clip)
     assert_part(read(path, Fraction(4)), read(path), Fraction(4))
 
 

@@ -1,12 +1,11 @@
 """The video writer: what it writes, and that a staged file appears complete or not at all."""
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
 
 import av
 import numpy as np
@@ -18,7 +17,7 @@ from vdet.config.schema import OutputSettings
 from vdet.errors import OutputError, VideoError
 from vdet.files import staged
 from vdet.media import ColorTags, Frame, Picture, VideoInfo
-from vdet.media.frame import Coding, Planes, Tags
+from vdet.media.frame import Coding, Tags
 from vdet.media.reader import VideoReader
 from vdet.media.writer import VideoWriter, may_replace_video
 
@@ -74,11 +73,6 @@ class TestMark:
         path = write_clip(tmp_path / f"in{suffix}", count=60)
         path.write_bytes(path.read_bytes()[: int(path.stat().st_size * share)])
         assert not may_replace_video(path)
-
-    @pytest.mark.parametrize("content", [b"", b"notes", bytes(1000)])
-    def test_what_is_no_video_may_be_replaced(self, content: bytes, tmp_path: Path) -> None:
-        (tmp_path / "out.mp4").write_bytes(content)
-        assert may_replace_video(tmp_path / "out.mp4")
 
 
 class TestFile:
@@ -155,54 +149,6 @@ class TestFile:
     def test_any_file_name_works(self, name: str, frames: list[Frame], tmp_path: Path) -> None:
         assert len(read(write(tmp_path / name, frames))) == 12
         assert listing(tmp_path) == [name]
-
-
-CODINGS: dict[str, tuple[dict[str, Any], int, str]] = {
-    "untagged": ({}, 2, "yuv420p"),
-    "BT.601": ({"matrix": 5}, 6, "yuv420p"),
-    "BT.709": ({"matrix": 1}, 1, "yuv420p"),
-    "full range": ({"full_range": True}, 2, "yuvj420p"),
-    "BT.601, full range": ({"matrix": 5, "full_range": True}, 6, "yuvj420p"),
-    "BT.709, full range": ({"matrix": 1, "full_range": True}, 1, "yuvj420p"),
-}
-"""Arguments of `write_clip`, and the code of the matrix and the pixels of what is written."""
-LOSSLESS = OutputSettings(preset="ultrafast", crf=0)
-
-
-def copied(
-    source: Path,
-    target: Path,
-    settings: OutputSettings,
-    change: Callable[[Picture], Picture] = lambda picture: picture,
-) -> list[Frame]:
-    """Write the frames of a video to another one; return those of the source."""
-    with VideoReader(source) as reader, VideoWriter(target, reader.info, settings) as writer:
-        frames = list(reader)
-        for frame in frames:
-            writer.write(replace(frame, picture=change(frame.picture)))
-    return frames
-
-
-def planes_of(frame: Frame) -> Planes:
-    planes = frame.picture.planes
-    assert planes is not None
-    return planes
-
-
-class TestPlanes:
-    """Planes are encoded as they are, and described as they are."""
-
-    @pytest.mark.parametrize("kind", CODINGS)
-    def test_are_not_converted(self, kind: str, tmp_path: Path) -> None:
-        spec, matrix, pixels = CODINGS[kind]
-        source = write_clip(tmp_path / "in.mp4", **spec)
-        before = copied(source, tmp_path / "out.mp4", LOSSLESS)
-        for one, other in zip(before, read(tmp_path / "out.mp4"), strict=True):
-            for layer, kept in zip(planes_of(one).layers, planes_of(other).layers, strict=True):
-                np.testing.assert_array_equal(kept, layer)
-        with av.open(str(tmp_path / "out.mp4")) as container:
-            context = container.streams.video[0].codec_context
-            assert (context.colorspace, context.pix_fmt) == (matrix, pixels)
 
 
 def write_on(writer: VideoWriter, frames: Iterable[Frame]) -> None:

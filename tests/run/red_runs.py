@@ -9,7 +9,7 @@ from typing import Any
 from red_cars import CAR, HEIGHT, SETTINGS, WIDTH, red_finder, road
 from vdet.boxes import NO_BOXES, Box, Boxes, Image
 from vdet.config.schema import Settings
-from vdet.detect.protocol import DetectorModel, StagePictures
+from vdet.detect.protocol import StagePictures
 from vdet.detect.svm.detector import SvmModel
 from vdet.files import OutputFiles
 from vdet.lanes.road import Road
@@ -40,13 +40,6 @@ def model_for(settings: Settings) -> SvmModel:
     return SvmModel(red_finder(), settings.svm)
 
 
-def with_search(settings: Settings, **changes: Any) -> Settings:
-    """Replace some settings of the section `detector.search`."""
-    search = settings.svm.search.model_copy(update=changes)
-    detector = settings.svm.model_copy(update={"search": search})
-    return settings.model_copy(update={"detector": detector})
-
-
 def outputs(**paths: Path) -> tuple[Output, ...]:
     """Return outputs by the names of their sinks: `video=…`, `tracks=…`."""
     return tuple(Output(sink, path) for sink, path in paths.items())
@@ -58,18 +51,11 @@ def run_red(job: Run, settings: Settings = SETTINGS, **options: Any) -> RunTotal
 
 
 def follow(
-    frames: Iterable[Frame],
-    settings: Settings = SETTINGS,
-    *,
-    width: int = WIDTH,
-    height: int = HEIGHT,
-    model: DetectorModel | None = None,
-    threads: int = 1,
+    frames: Iterable[Frame], settings: Settings = SETTINGS, *, threads: int = 1
 ) -> Iterator[FrameResult]:
     """Find and follow red cars through some frames."""
     images, frames = peek(frames)
-    model = model_for(settings) if model is None else model
-    pipeline = build(model, settings, video_info(width, height), images)
+    pipeline = build(model_for(settings), settings, VIDEO, images)
     return pipeline.follow(frames, VIDEO.path, threads=threads)
 
 

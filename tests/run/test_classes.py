@@ -1,6 +1,5 @@
 """The setting `classes`: only vehicles of some classes are shown and counted."""
 
-import csv
 import json
 from pathlib import Path
 
@@ -9,7 +8,7 @@ import pytest
 from boxing import moved_to
 from red_cars import CAR, NullDetector, car_at
 from run.red_runs import outputs
-from running import names
+from running import names, rows_of
 from vdet.boxes import Boxes
 from vdet.config.loading import load_settings
 from vdet.config.places import LineSettings, TrafficSettings
@@ -32,11 +31,6 @@ class TwoVehicles:
         box, kind = car_at(round(25 * time)), "truck" if time > 1.7 else "car"
         below = moved_to(CAR, box.x1, box.y1 + 60)
         return [Track(1, box, 0.9, "detected", kind), Track(2, below, 0.9, "detected", "car")]
-
-
-def rows_of(path: Path) -> list[dict[str, str]]:
-    with path.open() as file:
-        return list(csv.DictReader(file))
 
 
 def test_boxes_go_by_the_class_so_far_and_all_else_by_the_last_one(

@@ -2,7 +2,7 @@
 
 import gc
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from itertools import count
@@ -12,8 +12,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conftest import Run
-from quick import QUICK_OPTIONS
 from red_cars import (
     HEIGHT,
     PERSPECTIVE,
@@ -25,12 +23,7 @@ from red_cars import (
     red_model,
     road,
 )
-from run.red_runs import (
-    COUNT,
-    follow,
-    outputs,
-    run_red,
-)
+from run.red_runs import COUNT, follow, outputs, run_red
 from running import write_drive
 from vdet.boxes import Image
 from vdet.config.schema import Settings
@@ -42,7 +35,6 @@ from vdet.run import video
 from vdet.run.loop import FIRST_FRAMES
 from vdet.run.threads import map_ordered
 from vdet.run.video import run_video
-from vdet.track.rules.tracker import RulesTracker
 
 QUEUED = 24
 """Largest number of frames that a run may hold at a time."""
@@ -78,53 +70,39 @@ class TestFollowFrames:
             np.testing.assert_array_equal(heat, same)
 
 
-class TestFirstFrames:
-    """The first frames tell the detector where the horizon is; they are searched like all others.
+def test_the_horizon_is_looked_for_in_the_first_frames_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked: list[list[Image]] = []
 
-    The horizon is looked for only where it is not set.
-    """
+    def find(images: Sequence[Image]) -> float:
+        asked.append(list(images))
+        return 0.35
 
-    FREE = by_perspective(None, 0.15, 0.2)
-
-    @pytest.fixture
-    def asked(self, monkeypatch: pytest.MonkeyPatch) -> list[list[Image]]:
-        """The pictures in which the horizon is looked for; it is always found at 0.35."""
-        asked: list[list[Image]] = []
-
-        def find(images: Sequence[Image]) -> float:
-            asked.append(list(images))
-            return 0.35
-
-        monkeypatch.setattr("vdet.detect.svm.detector.find_horizon", find)
-        return asked
-
-    def test_the_horizon_is_looked_for_in_the_first_frames_once(
-        self, asked: list[list[Image]]
-    ) -> None:
-        list(follow(drive(12), self.FREE))
-        ((*images,),) = asked
-        assert len(images) == FIRST_FRAMES == 2
-        for index, image in enumerate(images):
-            np.testing.assert_array_equal(image, road(car_at(index)))
+    monkeypatch.setattr("vdet.detect.svm.detector.find_horizon", find)
+    list(follow(drive(12), by_perspective(None, 0.15, 0.2)))
+    (images,) = asked
+    assert len(images) == FIRST_FRAMES == 2
+    for index, image in enumerate(images):
+        np.testing.assert_array_equal(image, road(car_at(index)))
 
 
-class TestMemory:
-    def test_a_whole_run_holds_few_frames_at_a_time(self, red_clip: Path, tmp_path: Path) -> None:
-        def frames_alive() -> int:
-            return sum(isinstance(item, Frame) for item in gc.get_objects())
+def test_a_whole_run_holds_few_frames_at_a_time(red_clip: Path, tmp_path: Path) -> None:
+    def frames_alive() -> int:
+        return sum(isinstance(item, Frame) for item in gc.get_objects())
 
-        others = frames_alive()  # of tests before this one
-        calls = count()
-        held: list[int] = []
+    others = frames_alive()  # of tests before this one
+    calls = count()
+    held: list[int] = []
 
-        def advance(_: int) -> None:
-            if next(calls) % 6 == 5:  # looking takes a while
-                held.append(frames_alive() - others)
+    def advance(_: int) -> None:
+        if next(calls) % 6 == 5:  # looking takes a while
+            held.append(frames_alive() - others)
 
-        wanted = outputs(video=tmp_path / "out.mp4", tracks=tmp_path / "out.csv")
-        run_red(video.Run(red_clip, wanted, threads=2), progress=lambda _: advance)
-        assert held
-        assert 0 < max(held) <= QUEUED
+    wanted = outputs(video=tmp_path / "out.mp4", tracks=tmp_path / "out.csv")
+    run_red(video.Run(red_clip, wanted, threads=2), progress=lambda _: advance)
+    assert held
+    assert 0 < max(held) <= QUEUED
 
 
 class TestRun:
@@ -177,42 +155,14 @@ def _breaking(method: Callable[..., object], error: BaseException) -> Callable[.
     return call
 
 
-class TestBreakage:
-    @pytest.fixture
-    def job(self, red_clip: Path, tmp_path: Path) -> Iterator[video.Run]:
-        """A job of which, after the test, nothing may be left: neither files nor threads."""
-        threads = threading.active_count()
-        wanted = outputs(video=tmp_path / "out.mp4", tracks=tmp_path / "out.csv")
-        yield video.Run(red_clip, wanted)
-        assert list(tmp_path.iterdir()) == []
-        assert threading.active_count() == threads
-
-    @pytest.fixture
-    def breaks(self, monkeypatch: pytest.MonkeyPatch) -> Callable[[BaseException], None]:
-        """Let the tracker break with an error."""
-
-        def breaks(error: BaseException) -> None:
-            monkeypatch.setattr(RulesTracker, "update", _breaking(RulesTracker.update, error))
-
-        return breaks
-
-    def test_the_reader_breaks(self, job: video.Run, monkeypatch: pytest.MonkeyPatch) -> None:
-        error = VideoError("its pixels cannot be converted")
-        monkeypatch.setattr("vdet.media.reader.Planes", _breaking(Planes, error))
-        with pytest.raises(VdetError, match="its pixels"):
-            run_red(job)
-
-    def test_the_command_is_interrupted(
-        self,
-        run: Run,
-        clip_path: Path,
-        model_path: Path,
-        tmp_path: Path,
-        breaks: Callable[[BaseException], None],
-    ) -> None:
-        breaks(KeyboardInterrupt())
-        wanted = (tmp_path / "out.mp4", "--tracks", tmp_path / "out.csv")
-        result = run("detect-video", clip_path, *wanted, "--model", model_path, *QUICK_OPTIONS)
-        assert result.code == 130
-        assert "interrupted" in result.err
-        assert list(tmp_path.iterdir()) == []
+def test_when_the_reader_breaks_neither_files_nor_threads_are_left(
+    red_clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    threads = threading.active_count()
+    wanted = outputs(video=tmp_path / "out.mp4", tracks=tmp_path / "out.csv")
+    error = VideoError("its pixels cannot be converted")
+    monkeypatch.setattr("vdet.media.reader.Planes", _breaking(Planes, error))
+    with pytest.raises(VdetError, match="its pixels"):
+        run_red(video.Run(red_clip, wanted))
+    assert list(tmp_path.iterdir()) == []
+    assert threading.active_count() == threads

@@ -10,7 +10,6 @@ import pytest
 from red_cars import CAR, SETTINGS, road
 from run.conftest import Register
 from run.red_runs import model_for
-from vdet.config.schema import Settings
 from vdet.errors import ImageError, OutputError
 from vdet.media.images import write_image
 from vdet.run.pictures import (
@@ -32,28 +31,26 @@ def touch(*paths: Path) -> None:
 
 
 class TestFindingImages:
-    def test_a_folder_gives_its_pictures_by_name(self, tmp_path: Path) -> None:
-        touch(*(tmp_path / name for name in ("b.png", "a.JPG", "c.webp", "notes.txt")))
-        assert [path.name for path in find_images([tmp_path])] == ["a.JPG", "b.png", "c.webp"]
-
     def test_each_picture_below_a_folder_has_its_place(self, tmp_path: Path) -> None:
-        touch(tmp_path / "b.png", tmp_path / "a" / "b.png", tmp_path / ".thumbs" / "b.png")
-        places = (Path("a/b.png"), Path("b.png"))
-        assert find_images([tmp_path]) == {tmp_path / place: place for place in places}
+        names = ("b.png", "a/b.png", "a.JPG", "c.webp", "notes.txt", ".thumbs/b.png")
+        touch(*(tmp_path / name for name in names))
+        found = find_images([tmp_path])
+        assert list(found) == [tmp_path / name for name in ("a/b.png", "a.JPG", "b.png", "c.webp")]
+        assert found == {tmp_path / place: place for place in found.values()}
 
     def test_a_picture_that_is_named_twice_is_taken_once(self, tmp_path: Path) -> None:
         touch(tmp_path / "a.png", tmp_path / "b.png")
         found = find_images([tmp_path / "b.png", tmp_path, tmp_path / "a.png"])
         assert [path.name for path in found] == ["b.png", "a.png"]
 
-    def test_a_folder_without_pictures_is_named(self, tmp_path: Path) -> None:
+    @pytest.mark.parametrize(
+        ("name", "words"),
+        [("in", r"in: contains no images \(.*\.png"), ("none.png", r"none\.png: not found")],
+    )
+    def test_what_has_no_picture_is_named(self, tmp_path: Path, name: str, words: str) -> None:
         touch(tmp_path / "in" / "notes.txt")
-        with pytest.raises(ImageError, match=r"in: contains no images \(.*\.png"):
-            find_images([tmp_path / "in"])
-
-    def test_what_is_not_there_is_named(self, tmp_path: Path) -> None:
-        with pytest.raises(ImageError, match=r"none\.png: not found"):
-            find_images([tmp_path / "none.png"])
+        with pytest.raises(ImageError, match=words):
+            find_images([tmp_path / name])
 
 
 def placed(folder: Path, *names: str) -> dict[Path, Path]:
@@ -72,11 +69,6 @@ class TestPlan:
         assert [job.outputs for job in jobs] == [
             (Output("picture", tmp_path / "out" / place),) for place in sources.values()
         ]
-
-    def test_without_an_output_no_picture_is_written(self, tmp_path: Path) -> None:
-        sources = placed(tmp_path, "a.png")
-        (job,) = plan_pictures(sources, None, tmp_path / "stages", overwrite=False)
-        assert [output.sink for output in job.outputs] == ["stages"]
 
     def test_stages_of_several_go_into_a_folder_each(self, tmp_path: Path) -> None:
         sources = placed(tmp_path, "a.png", "b.png")
@@ -99,25 +91,13 @@ class TestPlan:
             plan_pictures(sources, tmp_path / "out", None, overwrite=True)
 
 
-def run_red(source: Path, settings: Settings = SETTINGS, **paths: Path) -> FrameResult:
-    """Search a picture for red cars, and write outputs by the names of their sinks."""
-    wanted = tuple(Output(sink, path) for sink, path in paths.items())
-    return run_picture(PictureJob(source, wanted), PictureSearch(model_for(settings), settings))
-
-
-class TestRun:
-    @pytest.fixture
-    def source(self, tmp_path: Path) -> Path:
-        path = tmp_path / "road.png"
-        write_image(path, road(CAR))
-        return path
-
-    def test_a_picture_that_is_too_small_is_named(self, tmp_path: Path) -> None:
-        source = tmp_path / "tiny.png"
-        write_image(source, road(CAR)[:, :20])
-        with pytest.raises(ImageError, match=r"tiny\.png: no search window fits"):
-            run_red(source, picture=tmp_path / "out.png")
-        assert not (tmp_path / "out.png").exists()
+def test_a_picture_that_is_too_small_is_named(tmp_path: Path) -> None:
+    source, out = tmp_path / "tiny.png", tmp_path / "out.png"
+    write_image(source, road(CAR)[:, :20])
+    job = PictureJob(source, (Output("picture", out),))
+    with pytest.raises(ImageError, match=r"tiny\.png: no search window fits"):
+        run_picture(job, PictureSearch(model_for(SETTINGS), SETTINGS))
+    assert not out.exists()
 
 
 class Fails:

@@ -1,6 +1,5 @@
 """Threads keep the order of items, and end with their block, also after an error in it."""
 
-import signal
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
@@ -8,12 +7,8 @@ from itertools import islice
 
 import pytest
 
-from running import SOON, until
-from vdet.run.threads import (
-    map_ordered,
-    prefetch,
-    write_async,
-)
+from running import SOON
+from vdet.run.threads import map_ordered, prefetch, write_async
 
 PLACES = ("source", "function", "taker")
 Errors = pytest.mark.parametrize("kind", [ValueError, KeyboardInterrupt, SystemExit])
@@ -24,38 +19,6 @@ def no_thread_is_left(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     monkeypatch.setattr("vdet.run.threads.JOIN_TIMEOUT", SOON)
     yield
     assert threads_of_vdet() == []
-
-
-@pytest.fixture
-def ctrl_c() -> Iterator[Callable[[], None]]:
-    """A call interrupts the main thread, as the keyboard does, and returns when that is done."""
-    interrupted = threading.Event()
-
-    def interrupt(*_: object) -> None:
-        interrupted.set()
-        raise KeyboardInterrupt
-
-    before = signal.signal(signal.SIGINT, interrupt)
-    main = threading.main_thread().ident
-    assert main is not None
-
-    def press() -> None:
-        signal.pthread_kill(main, signal.SIGINT)
-        assert interrupted.wait(SOON)
-
-    yield press
-    signal.signal(signal.SIGINT, before)
-
-
-@pytest.fixture
-def hang(no_thread_is_left: None, monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
-    """An event that lets a thread wait until the end of the test; nobody waits for that thread."""
-    assert no_thread_is_left is None
-    monkeypatch.setattr("vdet.run.threads.JOIN_TIMEOUT", 0.1)
-    event = threading.Event()
-    yield event
-    event.set()
-    until(lambda: threads_of_vdet() == [])
 
 
 def threads_of_vdet() -> list[str]:
@@ -78,16 +41,6 @@ def recording(items: Iterable[int], seen: list[int]) -> Iterator[int]:
         yield item
 
 
-def after(event: threading.Event, items: Iterable[int]) -> Iterator[int]:
-    assert event.wait(SOON)
-    yield from items
-
-
-def setting(event: threading.Event, items: Iterable[int]) -> Iterator[int]:
-    event.set()
-    yield from items
-
-
 class TestPrefetch:
     @pytest.mark.parametrize("take", [1, 3])
     def test_a_generator_is_closed_by_the_thread_that_ran_it(self, take: int) -> None:
@@ -105,46 +58,26 @@ class TestPrefetch:
         opened, closed = threads
         assert opened is closed is not threading.current_thread()
 
-    def test_ctrl_c_ends_the_wait_for_a_source_that_hangs(
-        self, hang: threading.Event, ctrl_c: Callable[[], None]
-    ) -> None:
-        asked = threading.Event()
 
-        def items() -> Iterator[int]:
-            asked.wait()
-            ctrl_c()
-            hang.wait()
-            yield 1
+@Errors
+def test_an_error_of_the_giver_is_an_error_in_the_context_too(kind: type[BaseException]) -> None:
+    error = kind("giver")
+    seen: list[BaseException] = []
 
-        with pytest.raises(KeyboardInterrupt), prefetch(items()) as given:
-            next(setting(asked, given))
+    @contextmanager
+    def within() -> Iterator[None]:
+        try:
+            yield
+        except BaseException as inside:
+            seen.append(inside)
+            raise
 
-
-class TestWriteAsync:
-    @Errors
-    def test_an_error_of_the_giver_is_an_error_in_the_context_too(
-        self, kind: type[BaseException]
-    ) -> None:
-        error = kind("giver")
-        seen: list[BaseException] = []
-
-        @contextmanager
-        def within() -> Iterator[None]:
-            try:
-                yield
-            except BaseException as inside:
-                seen.append(inside)
-                raise
-
-        taken: list[int] = []
-        with (
-            pytest.raises(kind) as caught,
-            write_async(taken.append, within=within()) as hand_over,
-        ):
-            hand_all(failing(error, after=2), hand_over)
-        assert caught.value is error
-        assert taken == [0, 1]
-        assert len(seen) == 1
+    taken: list[int] = []
+    with pytest.raises(kind) as caught, write_async(taken.append, within=within()) as hand_over:
+        hand_all(failing(error, after=2), hand_over)
+    assert caught.value is error
+    assert taken == [0, 1]
+    assert len(seen) == 1
 
 
 class TestMapOrdered:

@@ -66,8 +66,7 @@ def process(run: Run, tmp_path: Path) -> Process:
         folder = tmp_path / "out"
         folder.mkdir()
         out = folder / f"out.{suffix}"
-        result = run("detect-video", source, out, *FEW_OPTIONS, *options)
-        assert result.code == 0, result.err
+        result = run("detect-video", source, out, *FEW_OPTIONS, *options, code=0)
         assert [path.name for path in folder.iterdir()] == [out.name]
         return _read(out, result.err)
 

@@ -8,7 +8,7 @@ import pytest
 from av.stream import Disposition
 
 from clips import joined, write_clip
-from strange.conftest import Process, Shown, assert_whole
+from strange.conftest import Process, assert_whole
 
 
 def test_a_cover_picture_is_not_the_video(tmp_path: Path, process: Process) -> None:
@@ -76,25 +76,20 @@ def test_frames_that_change_size_are_scaled_to_the_first_with_a_warning(
     assert "both.h264: frames of other sizes are scaled to the first" in warning
 
 
-def _tiny(path: Path, size: tuple[int, int]) -> Path:
-    return write_clip(path, size=size, count=5, codec="ffv1", pix_fmt="bgr0")
-
-
-def assert_complete(shown: Shown, size: tuple[int, int]) -> None:
-    """Assert shape and times; frames so small do not show their numbers."""
-    width, height = size
-    shape = (height + height % 2, width + width % 2, 3)
-    assert [image.shape for image in shown.images] == [shape] * 5
-    assert shown.times == [Fraction(index, 25) for index in range(5)]
-
-
 @pytest.mark.parametrize("size", [(1, 1), (2, 2), (2, 200), (200, 2)])
 def test_frames_too_small_for_any_window_pass_with_a_warning(
     size: tuple[int, int], tmp_path: Path, process: Process
 ) -> None:
-    shown = process(_tiny(tmp_path / "tiny.mkv", size), "-c", "svm")
-    assert_complete(shown, size)
-    (warning,) = [warning for warning in shown.warnings if "horizon" not in warning]
+    tracks, stages = tmp_path / "t.csv", tmp_path / "stages"
+    wanted = ("--tracks", str(tracks), "--stages", str(stages), "--at", "0")
+    clip = write_clip(tmp_path / "tiny.mkv", size=size, count=5, codec="ffv1", pix_fmt="bgr0")
+    shown = process(clip, "-c", "svm", *wanted)
     width, height = size
+    shape = (height + height % 2, width + width % 2, 3)
+    assert [image.shape for image in shown.images] == [shape] * 5
+    assert shown.times == [Fraction(index, 25) for index in range(5)]
+    assert len(tracks.read_text().splitlines()) == 1, "the heading"
+    assert [path.name for path in stages.iterdir()] == ["1-boxes.png"]
+    (warning,) = [warning for warning in shown.warnings if "horizon" not in warning]
     assert "tiny.mkv: gets no boxes: no search window fits into" in warning
     assert f"{width}×{height}" in warning

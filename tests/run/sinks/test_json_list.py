@@ -45,10 +45,14 @@ def read(text: str) -> list[dict[str, Any]]:
     return items
 
 
-def test_there_is_an_item_a_picture_with_a_list_of_boxes(tmp_path: Path) -> None:
+def test_there_is_an_item_a_picture_with_a_list_of_boxes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     path = tmp_path / "boxes.json"
-    write(Output("json", path), RESULTS, video=None)
+    for target in (path, Path("-")):
+        write(Output("json", target), RESULTS, video=None)
     assert read(path.read_text(encoding="utf-8")) == list(ITEMS)
+    assert read(capsys.readouterr().out) == list(ITEMS)
 
 
 def test_with_lanes_boxes_have_their_distance_and_lane(tmp_path: Path) -> None:
@@ -61,8 +65,3 @@ def test_with_lanes_boxes_have_their_distance_and_lane(tmp_path: Path) -> None:
     [item] = read(path.read_text(encoding="utf-8"))
     assert item["lane"] is None
     assert [(box["distance"], box["lane"]) for box in item["boxes"]] == [(23.46, -1), (None, None)]
-
-
-def test_a_dash_is_standard_output(capsys: pytest.CaptureFixture[str]) -> None:
-    write(Output("json", Path("-")), RESULTS, video=None)
-    assert read(capsys.readouterr().out) == list(ITEMS)

@@ -57,12 +57,6 @@ def road_seen(camera: LensSettings | None) -> Road:
     return finder.update(finder.observe(Picture(road(CAR))))
 
 
-def test_without_lanes_vehicles_are_drawn_where_they_are() -> None:
-    expected = road(CAR)
-    draw_box(expected, CAR, color_of(1), "#1")
-    np.testing.assert_array_equal(drawn_on(result_of(CAR)), expected)
-
-
 def test_lost_vehicles_are_drawn_dashed() -> None:
     seen, lost = (Track(1, CAR, 0.9, state) for state in ("detected", "predicted"))
     expected = road(CAR)
@@ -76,10 +70,12 @@ def test_lost_vehicles_are_drawn_dashed() -> None:
     assert 0.2 < gaps.mean() < 0.8
 
 
-def test_with_lanes_vehicles_are_drawn_where_they_are_in_the_frame() -> None:
+@pytest.mark.parametrize("camera", [None, LENS], ids=["without lanes", "with lanes"])
+def test_vehicles_are_drawn_where_they_are_in_the_frame(camera: LensSettings | None) -> None:
+    found = road_seen(camera) if camera else None
     expected = road(CAR)
     draw_box(expected, CAR, color_of(1), "#1")
-    np.testing.assert_array_equal(drawn_on(result_of(CAR, found=road_seen(LENS))), expected)
+    np.testing.assert_array_equal(drawn_on(result_of(CAR, found=found)), expected)
 
 
 @pytest.mark.parametrize("settings", [{}, {"trails": 1.0}])
@@ -109,11 +105,7 @@ def white(width: int, height: int) -> Image:
 
 @pytest.mark.parametrize(
     ("label", "text"),
-    [
-        (("class", "id"), "car #3"),
-        (("score",), "0.90"),
-        (("distance", "score"), "24 m 0.90"),
-    ],
+    [(("class", "id"), "car #3"), (("score",), "0.90"), (("distance", "score"), "24 m 0.90")],
 )
 def test_a_label_shows_what_is_asked_for_in_this_order(label: tuple[str, ...], text: str) -> None:
     track = Track(3, CAR, 0.9, state="detected", class_name="car", distance=23.6)
@@ -122,10 +114,10 @@ def test_a_label_shows_what_is_asked_for_in_this_order(label: tuple[str, ...], t
     np.testing.assert_array_equal(drawn_on(result_of(track), label=label), expected)
 
 
-def test_a_still_picture_shows_scores_without_ids() -> None:
+def test_a_still_picture_shows_scores_without_ids_or_trails() -> None:
     expected = road(CAR)
     draw_box(expected, CAR, color_of(1), "0.90")
-    np.testing.assert_array_equal(drawn_on(result_of(CAR), video=None), expected)
+    np.testing.assert_array_equal(drawn_on(result_of(CAR), video=None, trails=2.0), expected)
 
 
 # Boxes
@@ -171,9 +163,3 @@ def test_a_trail_is_the_path_of_the_feet_in_the_last_seconds() -> None:
     assert abs(min(columns) - (end - 100)) <= 4
     assert columns == list(range(min(columns), max(columns) + 1)), "without a gap"
     assert abs(min(trail_columns(0.4)) - (end - 40)) <= 4
-
-
-def test_a_still_picture_has_no_trail() -> None:
-    plain = drawn_on(result_of(CAR), video=None)
-    asked = drawn_on(result_of(CAR), video=None, trails=2.0)
-    np.testing.assert_array_equal(asked, plain)

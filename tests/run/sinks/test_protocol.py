@@ -3,32 +3,20 @@
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from fractions import Fraction
 from pathlib import Path
 from typing import Self
 
-import numpy as np
 import pytest
 
-from red_cars import HEIGHT, SETTINGS
+from red_cars import SETTINGS
 from run.conftest import Register
 from run.red_runs import COUNT, outputs, read, run_red, video_info
 from vdet.boxes import Image
 from vdet.conditions.finding import Findings
-from vdet.config.schema import OutputSettings
 from vdet.errors import OutputError
 from vdet.files import OutputFiles
-from vdet.media import Frame, Picture, VideoInfo
-from vdet.media.writer import VideoWriter
 from vdet.run.result import FrameResult
-from vdet.run.sinks.protocol import (
-    BaseSink,
-    Output,
-    SinkContext,
-    SinkKind,
-    check_sinks,
-    open_sink,
-)
+from vdet.run.sinks.protocol import BaseSink, Output, SinkContext, SinkKind, check_sinks, open_sink
 from vdet.run.video import Run
 
 MOMENTS = ("open", "enter", "first", "middle", "end")
@@ -167,31 +155,6 @@ class TestFailure:
         assert str(raised.value) == f"{path}: cannot be written: No space left on device"
 
 
-def test_frames_too_small_to_be_searched_get_no_boxes_but_every_output(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture, collect: Callable[[str], Collects]
-) -> None:
-    source, (width, height) = tmp_path / "tiny.mp4", (16, HEIGHT)
-    info = VideoInfo(source, width, height, rate := Fraction(25), 1 / rate, frames=5)
-    with VideoWriter(source, info, OutputSettings()) as writer:
-        for index in range(5):
-            image = np.full((height, width, 3), 90, np.uint8)
-            writer.write(Frame(index, index / rate, Picture(image)))
-    sink = collect("collects")
-    wanted = outputs(
-        video=tmp_path / "out.mp4",
-        tracks=tmp_path / "out.csv",
-        stages=tmp_path / "stages",
-        collects=tmp_path / "collects",
-    )
-    totals = run_red(Run(source, wanted))
-    assert (totals.frames, totals.tracks) == (5, 0)
-    assert f"{source}: gets no boxes: no search window fits into" in caplog.text
-    assert [len(result.detections) for result in sink.results] == [0] * 5
-    assert len(read(tmp_path / "out.mp4")) == 5
-    assert len((tmp_path / "out.csv").read_text().splitlines()) == 1
-    assert [path.name for path in (tmp_path / "stages").iterdir()] == ["1-boxes.png"]
-
-
 @pytest.mark.parametrize(
     ("sink", "name", "is_video", "words"),
     [
@@ -259,9 +222,8 @@ def test_what_a_step_finds_out_of_a_video_reaches_its_sinks_totals_and_warnings(
     assert f"{red_clip}: shows 1 vehicle at once" in caplog.messages
 
 
-class TestCheck:
-    def test_a_folder_that_was_written_before_is_refused(self, tmp_path: Path) -> None:
-        (tmp_path / "3-boxes.png").touch()
-        with pytest.raises(OutputError, match=r"3-boxes\.png: already exists"):
-            check_sinks([Output("stages", tmp_path)], overwrite=False)
-        check_sinks([Output("stages", tmp_path)], overwrite=True)
+def test_a_folder_that_was_written_before_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "3-boxes.png").touch()
+    with pytest.raises(OutputError, match=r"3-boxes\.png: already exists"):
+        check_sinks([Output("stages", tmp_path)], overwrite=False)
+    check_sinks([Output("stages", tmp_path)], overwrite=True)

@@ -68,17 +68,10 @@ def test_pictures_of_any_detector_come_first_in_its_order(tmp_path: Path) -> Non
     np.testing.assert_array_equal(read_image(tmp_path / "2-a-second.png"), 255 - road(CAR))
 
 
-class TestBoxes:
-    """The picture of the detections and the shown vehicles."""
-
-    def picture(self, folder: Path, result: FrameResult) -> Image:
-        before = result.frame.image.copy()
-        name = stages(folder, Fraction(0), result)[-1]
-        np.testing.assert_array_equal(result.frame.image, before)
-        return read_image(folder / name)
-
-    def test_detections_are_drawn_even_where_no_vehicle_is_shown(self, tmp_path: Path) -> None:
-        result = detected()
-        (box,) = rounded(result.detections)
-        picture = self.picture(tmp_path, result)
-        assert (Box(box.x1, box.y1, box.x1 + 1, box.y2).cut(picture)[:, 0] == 255).all()
+def test_detections_are_drawn_even_where_no_vehicle_is_shown(tmp_path: Path) -> None:
+    result = detected()
+    before = result.frame.image.copy()
+    (box,) = rounded(result.detections)
+    picture = read_image(tmp_path / stages(tmp_path, Fraction(0), result)[-1])
+    assert (Box(box.x1, box.y1, box.x1 + 1, box.y2).cut(picture)[:, 0] == 255).all()
+    np.testing.assert_array_equal(result.frame.image, before)

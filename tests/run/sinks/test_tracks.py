@@ -13,7 +13,7 @@ import pytest
 from run.red_runs import result_of, write
 from vdet.boxes import Box
 from vdet.config.schema import LaneSettings
-from vdet.lanes.road import Lane, Road, RoadFinder
+from vdet.lanes.road import Lane, RoadFinder
 from vdet.media import Picture
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output
@@ -94,22 +94,14 @@ def test_standard_output_gets_each_frame_at_once(monkeypatch: pytest.MonkeyPatch
     assert lines == [1, 2, 3]
 
 
-def road(lane: Lane | None) -> Road:
-    image = np.zeros((36, 64, 3), np.uint8)
-    finder = RoadFinder(None, LaneSettings(), 64, 36)
-    return replace(finder.update(finder.observe(Picture(image))), lane=lane)
-
-
-def written_with_lanes(path: Path) -> str:
-    lanes = (LANE, None, None)
-    found = [
-        replace(one, facts={"lane": road(lane)}) for one, lane in zip(RESULTS, lanes, strict=True)
-    ]
-    return written(path, found)
-
-
 def test_json_lines_tell_the_lane_where_it_was_looked_for(tmp_path: Path) -> None:
-    with_lanes = written_with_lanes(tmp_path / "with.jsonl").splitlines()
+    finder = RoadFinder(None, LaneSettings(), 64, 36)
+    road = finder.update(finder.observe(Picture(np.zeros((36, 64, 3), np.uint8))))
+    found = [
+        replace(result, facts={"lane": replace(road, lane=lane)})
+        for result, lane in zip(RESULTS, (LANE, None, None), strict=True)
+    ]
+    with_lanes = written(tmp_path / "with.jsonl", found).splitlines()
     without = written(tmp_path / "without.jsonl").splitlines()
     lanes = []
     for line, other in zip(with_lanes, without, strict=True):

@@ -1,6 +1,5 @@
 """The sinks `vehicles` and `crops` in a run."""
 
-import csv
 from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
@@ -9,7 +8,7 @@ import pytest
 
 from red_cars import CAR, WIDTH
 from run.red_runs import COUNT, outputs, result_of, run_red, write
-from running import names
+from running import names, rows_of
 from vdet.boxes import Box
 from vdet.media.images import read_image
 from vdet.run.result import FrameResult
@@ -22,10 +21,8 @@ def test_a_run_writes_the_record_and_the_picture_of_its_car(red_clip: Path, tmp_
         vehicles=tmp_path / "a.csv", crops=tmp_path / "crops", tracks=tmp_path / "tracks.csv"
     )
     run_red(Run(red_clip, wanted))
-    with (tmp_path / "tracks.csv").open() as file:
-        tracks = list(csv.DictReader(file))
-    with (tmp_path / "a.csv").open() as file:
-        (row,) = csv.DictReader(file)
+    tracks = rows_of(tmp_path / "tracks.csv")
+    (row,) = rows_of(tmp_path / "a.csv")
     assert (row["id"], row["class"]) == ("1", "")
     assert float(row["first"]) == float(tracks[0]["time"])
     assert float(row["last"]) == float(tracks[-1]["time"])
@@ -55,11 +52,7 @@ def test_a_better_picture_replaces_that_of_a_vehicle_that_was_gone(tmp_path: Pat
 
 def test_pictures_of_an_earlier_run_go(tmp_path: Path) -> None:
     write(Output("crops", tmp_path), [result_of(CAR, CAR)])
-    mine = [
-        "vehicle-0001-car-at-0.000s.txt",
-        "vehicle-0002-at-home.jpg",
-        "vehicle-list.txt",
-    ]
+    mine = ["vehicle-0001-car-at-0.000s.txt", "vehicle-0002-at-home.jpg", "vehicle-list.txt"]
     for name in mine:
         (tmp_path / name).write_text("mine")
     write(Output("crops", tmp_path), [result_of(CAR, time=Fraction(3))])
