@@ -28,13 +28,8 @@ class Cluster:
     gate: Gate
 
 
-def dask(
-    kind: str, *options: str, folder: Path, allowed_failures: int = 0
-) -> "subprocess.Popen[bytes]":
-    """Start a scheduler or workers.
-
-    By default, Dask itself does not repeat an item whose worker was killed: so vdet has to.
-    """
+def dask(kind: str, *options: str, folder: Path) -> "subprocess.Popen[bytes]":
+    """Start a scheduler or workers. Dask does not repeat an item whose worker was killed."""
     program = (sys.executable, "-m", f"distributed.cli.dask_{kind}", "--no-dashboard")
     with (folder / f"{kind}.log").open("wb") as log:
         return subprocess.Popen(
@@ -45,19 +40,16 @@ def dask(
             env=with_modules(folder)
             | {
                 "DASK_TEMPORARY_DIRECTORY": str(folder),
-                "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": str(allowed_failures),
+                "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "0",
             },
         )
 
 
 @contextmanager
-def scheduler(
-    folder: Path, allowed_failures: int = 0
-) -> "Iterator[tuple[Cluster, subprocess.Popen[bytes]]]":
+def scheduler(folder: Path) -> "Iterator[tuple[Cluster, subprocess.Popen[bytes]]]":
     """Start a scheduler; give its cluster, and its process."""
     gate = Gate(folder)
-    options = ("--host", "127.0.0.1", "--port", "0")
-    process = dask("scheduler", *options, folder=folder, allowed_failures=allowed_failures)
+    process = dask("scheduler", "--host", "127.0.0.1", "--port", "0", folder=folder)
     try:
         until((folder / "scheduler.json").exists)
         until(lambda: (folder / "scheduler.json").read_text().endswith("}"))
@@ -78,8 +70,7 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
     """A scheduler with two workers."""
     folder = tmp_path_factory.mktemp("cluster")
     with scheduler(folder) as (cluster, _):
-        options = ("--nworkers", "2", "--nthreads", "1")
-        workers = dask("worker", *options, folder=folder)
+        workers = dask("worker", "--nworkers", "2", "--nthreads", "1", folder=folder)
         try:
             until(lambda: registered(folder) == 2)
             yield cluster

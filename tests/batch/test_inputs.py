@@ -21,6 +21,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         "clips/day1/c.avi",
         "clips/day1/evening/d.ts",
         "clips/day2/c.avi",
+        "clips/notes.txt",
         "odd [1].mp4",
         "camera.raw",
     ):
@@ -61,6 +62,8 @@ class TestFound:
             ("clips/day?/c.avi", ["day1/c.avi", "day2/c.avi"]),
             ("clips/**/*.avi", ["day1/c.avi", "day2/c.avi"]),
             ("clips/day*", ["day1/c.avi", "day1/evening/d.ts", "day2/c.avi"]),
+            ("clips/*", ["a.MOV", "b.mp4", "day1/c.avi", "day1/evening/d.ts", "day2/c.avi"]),
+            ("clips/*.txt", ["notes.txt"]),
             ("*.raw", ["camera.raw"]),
         ],
     )
@@ -104,19 +107,6 @@ class TestPictures:
     def test_a_pattern_of_numbered_pictures_is_a_video_with_the_name_of_the_folder(self) -> None:
         pictures(Path("frames"), 3, 4)
         assert found("frames/%010d.png") == [("frames/%010d.png", "frames.png")]
-
-
-@pytest.mark.usefixtures("folder")
-def test_a_pattern_without_a_suffix_takes_videos_only() -> None:
-    (Path("clips") / "notes.txt").touch()
-    assert [place for _, place in found("clips/*")] == [
-        "a.MOV",
-        "b.mp4",
-        "day1/c.avi",
-        "day1/evening/d.ts",
-        "day2/c.avi",
-    ]
-    assert found("clips/*.txt") == [("clips/notes.txt", "notes.txt")]
 
 
 @pytest.mark.usefixtures("folder")

@@ -89,15 +89,6 @@ def test_warnings_are_recorded(
     assert "frames damaged" not in capfd.readouterr().err
 
 
-def test_an_error_is_recorded_without_numbers(job: Run, tmp_path: Path) -> None:
-    job.source.write_bytes(b"no video")
-    record = process_file(job, folder=tmp_path / "out")
-    assert record.error is not None
-    assert record.error.startswith(f"{job.source}: cannot be opened, is not a video")
-    assert (record.width, record.height, record.frames, record.tracks) == (None,) * 4
-    assert record.outputs == ()
-
-
 def test_the_digest_changes_with_the_time_zone(job: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     """Clocks without a zone are those of this computer."""
     digests = set()

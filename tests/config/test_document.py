@@ -37,6 +37,10 @@ def test_any_text_is_a_document_or_refused_line_by_line(text: str) -> None:
         assert all(line.startswith("my.yaml:") and line.isprintable() for line in lines)
     else:
         assert isinstance(document.values, dict)
+    try:
+        parse_assignment(text)
+    except ConfigError as error:
+        assert str(error).startswith("--set")  # noqa: PT017
 
 
 def test_every_key_has_the_place_where_it_or_the_nearest_thing_around_it_stands() -> None:

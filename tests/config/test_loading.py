@@ -1,15 +1,11 @@
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 
 from vdet.config.detector import HeatSettings, PerspectiveSettings, SearchSettings
 from vdet.config.loading import find_config, load_settings
 from vdet.config.schema import Settings, SvmSettings, SvmTrainingSettings, TrainSettings
 from vdet.errors import ConfigError
-
-SVM = Settings(detector=SvmSettings())
 
 
 @pytest.fixture
@@ -114,49 +110,6 @@ def test_a_mistake_in_an_assignment_is_explained_in_one_line(
 ) -> None:
     (line,) = refusal(path, "", assignment)
     assert line.startswith(f"--set: {message}")
-
-
-_NAMES = st.sampled_from(
-    [
-        *("detector", "kind", "features", "hog", "channels", "search", "windows", "size", "heat"),
-        *("frames", "tracker", "kind", "x"),
-    ]
-)
-_SCALARS = st.one_of(
-    st.sampled_from(
-        [
-            "1", "0x1f", "0b1", "017", "1_000", "1e9999", "-.inf", ".nan", "1:30:30.5", "~", "yes",
-            "2001-01-01", "2001-12-14t21:59:43.10-05:00", "<<", "=", "*a", "&a 1", "!!int x",
-            "!!timestamp x", "!!python/object:x {}", "? a", "- a", "|\n x", ">-\n x", "%", "@", "`",
-            "'", '"\\x', '"\\ud800"', "\t", "\x07", "#", "9" * 5000, "[", "{", "]", "}", ",",
-        ]
-    ),
-    st.text(max_size=6),
-)  # fmt: skip
-_YAML = st.recursive(
-    _SCALARS,
-    lambda inner: st.one_of(
-        st.lists(inner, max_size=3).map(lambda items: f"[{', '.join(items)}]"),
-        st.lists(st.tuples(_NAMES, inner), max_size=3).map(
-            lambda pairs: "{" + ", ".join(f"{key}: {value}" for key, value in pairs) + "}"
-        ),
-    ),
-    max_leaves=8,
-)
-_ASSIGNMENTS = st.tuples(st.lists(_NAMES).map(".".join), _YAML).map("=".join)
-
-
-@given(_YAML | st.text() | st.lists(_SCALARS).map("\n".join), st.text() | _ASSIGNMENTS)
-@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
-def test_any_text_gives_settings_or_a_config_error(path: Path, text: str, assignment: str) -> None:
-    path.write_text(text, encoding="utf-8", errors="surrogatepass")
-    for paths, assignments, name in (([path], [], str(path)), ([], [assignment], "--set")):
-        try:
-            loaded = load_settings(paths, assignments)
-        except ConfigError as error:
-            assert str(error).startswith(name)  # noqa: PT017
-        else:
-            assert isinstance(loaded, Settings)
 
 
 def test_a_shipped_config_is_found_by_its_name_and_another_by_its_path(

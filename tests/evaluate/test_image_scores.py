@@ -79,21 +79,19 @@ def test_only_boxes_of_the_score_and_above_count() -> None:
     assert found.ap50 == pytest.approx(1), "the average precision takes all scores"
 
 
-class TestLeastWidth:
-    COUNTING = Counting(score=0.5, min_width=0.05)
-
-    def test_a_narrower_vehicle_need_not_be_found(self) -> None:
-        result = scores(Searched([at(0), at(300, 49)], []), counting=self.COUNTING)
-        assert result.vehicles == 1
-
-    def test_a_narrower_box_is_not_wrong(self) -> None:
-        found = [(0.9, at(0)), (0.8, at(300, 49)), (0.7, at(600, 50))]
-        result = scores(Searched([at(0)], found), counting=self.COUNTING)
-        assert (result.matches, result.false_positives) == (1, 1)
-
-    def test_a_narrower_box_may_find_a_wider_vehicle(self) -> None:
-        result = scores(Searched([at(0, 60)], [(0.9, at(0, 45))]), counting=self.COUNTING)
-        assert (result.matches, result.false_positives) == (1, 0)
+@pytest.mark.parametrize(
+    ("true", "found", "counts"),
+    [
+        ([at(0), at(300, 49)], [], (1, 0, 0)),  # a narrower vehicle need not be found
+        ([at(0)], [(0.9, at(0)), (0.8, at(300, 49)), (0.7, at(600, 50))], (1, 1, 1)),
+        ([at(0, 60)], [(0.9, at(0, 45))], (1, 1, 0)),  # a narrower box may find a wider vehicle
+    ],
+)
+def test_vehicles_and_boxes_narrower_than_the_minimum_do_not_count(
+    true: list[Box], found: list[tuple[float, Box]], counts: tuple[int, int, int]
+) -> None:
+    result = scores(Searched(true, found), counting=Counting(score=0.5, min_width=0.05))
+    assert (result.vehicles, result.matches, result.false_positives) == counts
 
 
 class TestBestF1:

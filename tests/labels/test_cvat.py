@@ -135,10 +135,7 @@ class TestWriting:
         (track(BOX.replace("10", "NaN")), "track 3: 'NaN' is not a number"),
         (track(BOX.replace("/>", ' rotation="30"/>')), "track 3: the box is rotated"),
         (task(0, 9_000_000, BOX).decode(), "meta: has more than 1,000,000 frames; cut the video"),
-        (
-            task(0, 9, BOX, "step=x").decode(),
-            "meta: unknown frame filter 'step=x'; only step=",
-        ),
+        (task(0, 9, BOX, "step=x").decode(), "meta: unknown frame filter 'step=x'; only step="),
         (
             task(1, 9, BOX, "step=2").decode(),
             "track 3: the task has no frame 0; it has every 2. frame from 1 to 9",

@@ -5,19 +5,13 @@ import pytest
 from labels.saving import car, frame, written
 from vdet.errors import TruthError
 from vdet.labels.kitti import KITTI, read_kitti
-from vdet.labels.label import Label
 from vdet.labels.reading import read_tracks
 
-FILE = Path("0000.txt")
 REST = "1.5 1.6 4.0 2.0 1.5 20.0 -1.6"
 
 
 def kitti_line(frame: int, track: int, name: str, box: str = "10.5 20 40.5 60") -> str:
     return f"{frame} {track} {name} 0 2 -1.57 {box} {REST}"
-
-
-def rows(text: str) -> tuple[Label, ...]:
-    return read_kitti(FILE, text.encode()).labels
 
 
 def test_what_is_not_known_is_written_as_the_format_says() -> None:
@@ -52,5 +46,5 @@ def test_read_as_tracks_regions_are_left_out_and_types_are_classes(tmp_path: Pat
 )
 def test_a_wrong_line_is_refused_with_its_number(second: str, message: str) -> None:
     with pytest.raises(TruthError) as caught:
-        rows(kitti_line(0, 3, "Car") + "\n" + second)
+        read_kitti(Path("0000.txt"), f"{kitti_line(0, 3, 'Car')}\n{second}".encode())
     assert str(caught.value).startswith(f"0000.txt:2: {message}")

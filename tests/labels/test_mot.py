@@ -4,15 +4,8 @@ import pytest
 
 from labels.saving import car, frame, written
 from vdet.errors import TruthError
-from vdet.labels.label import Label
 from vdet.labels.mot import MOT, read_mot
 from vdet.labels.reading import read_tracks, read_truth
-
-FILE = Path("gt.txt")
-
-
-def rows(text: str) -> tuple[Label, ...]:
-    return read_mot(FILE, text.encode()).labels
 
 
 def test_truth_of_the_older_form_has_ten_columns_and_a_flag(tmp_path: Path) -> None:
@@ -49,5 +42,5 @@ def test_truth_can_be_read_as_tracks_without_its_ignore_regions(tmp_path: Path) 
 )
 def test_a_wrong_line_is_refused_with_its_number(second: str, message: str) -> None:
     with pytest.raises(TruthError) as caught:
-        rows(f"1,7,1,1,20,10,1,3,1\n\n{second}\n")
+        read_mot(Path("gt.txt"), f"1,7,1,1,20,10,1,3,1\n\n{second}\n".encode())
     assert str(caught.value).startswith(f"gt.txt:3: {message}")

@@ -209,11 +209,7 @@ def test_what_other_programs_say_of_an_image_does_not_matter(tmp_path: Path) -> 
         ("annotations", {"bbox": [1, 2, 3, 1e9]}, "annotations.1.bbox.3: Input should be"),
         ("annotations", {"iscrowd": 2}, "annotations.1.iscrowd: Input should be"),
         ("images", {"file_name": "a.png"}, "has the image a.png twice"),
-        (
-            "images",
-            {"file_name": "../a.png"},
-            "file_name: ../a.png points outside the set",
-        ),
+        ("images", {"file_name": "../a.png"}, "file_name: ../a.png points outside the set"),
         ("images", {"file_name": "/a.png"}, "file_name: /a.png points outside the set"),
         ("images", {"file_name": "x" * 300}, "xx…: not found, but "),
         ("images", {"file_name": "a\u202eb"}, "a\\u202"),

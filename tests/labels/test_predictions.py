@@ -11,17 +11,7 @@ HEADER = "frame,time,id,x,y,width,height,state\n"
 SCORED = "frame,time,id,x,y,width,height,score\n0,0.0,1,10,20,30,40,{}\n"
 TXT = "1,1,11,21,30,40,1,-1,-1,-1\n3,1,12,21,30,40,1,-1,-1,-1\n"
 CSV = f"{HEADER}0,0.0,1,10,20,30,40,detected\n2,0.08,1,11,20,30,40,predicted\n"
-JSONL = "".join(
-    json.dumps({"frame": frame, "time": frame * 0.04, "tracks": tracks}) + "\n"
-    for frame, tracks in enumerate(
-        [
-            [{"id": 1, "x": 10, "y": 20, "width": 30, "height": 40, "state": "detected"}],
-            [],
-            [{"id": 1, "x": 11, "y": 20, "width": 30, "height": 40, "state": "predicted"}],
-            [],
-        ]
-    )
-)
+JSONL = "".join(f'{{"frame": {n}, "time": {n / 25}, "tracks": []}}\n' for n in range(4))
 
 
 def read(folder: Path, suffix: str, content: str) -> LabelledVideo:

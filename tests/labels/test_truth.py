@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from labels.saving import car, checked_video, frame, row, written
+from labels.test_kitti import kitti_line
 from vdet.errors import TruthError
 from vdet.evaluate.comparison import compare
 from vdet.evaluate.report import mistakes
@@ -13,9 +14,7 @@ from vdet.labels.label import spread_frames
 from vdet.labels.reading import read_truth
 
 MOT = "1,7,11,21,30,40,1,3,1\n2,7,11,21,30,40,1,3,1\n"
-KITTI = "".join(
-    f"{frame} 7 Car 0 0 -1 10 20 40 60 1.5 1.6 4.0 2.0 1.5 20.0 -1.6\n" for frame in (0, 1)
-)
+KITTI = "".join(f"{kitti_line(frame, 7, 'Car')}\n" for frame in (0, 1))
 CVAT = (
     '<annotations><track id="7" label="car">\n'
     + "".join(
@@ -46,24 +45,14 @@ def test_mixed_formats_are_refused_where_the_second_begins(tmp_path: Path, conte
         read_truth(write(tmp_path, content))
 
 
-KITTI_REST = "1.5 1.6 4.0 2.0 1.5 20.0 -1.6"
-
-
-def kitti(*names: str) -> str:
-    """Return KITTI labels of a frame with a box for each name."""
-    lines = [
-        f"0 {-1 if name == 'DontCare' else number} {name} 0 2 -1.57 10.5 20 40.5 60 {KITTI_REST}\n"
-        for number, name in enumerate(names)
-    ]
-    return "".join(lines)
-
-
 def cvat(label: str, occluded: int = 0) -> str:
     box = f'<box frame="0" outside="0" occluded="{occluded}" xtl="1" ytl="2" xbr="4" ybr="6"/>'
     return f'<annotations>\n<track id="3" label="{label}">{box}</track></annotations>'
 
 
-@pytest.mark.parametrize("content", [kitti("Car", "Spaceship"), cvat("cow")])
+@pytest.mark.parametrize(
+    "content", [f"{kitti_line(0, 0, 'Car')}\n{kitti_line(0, 1, 'Spaceship')}", cvat("cow")]
+)
 def test_an_unknown_label_is_refused_with_its_line(tmp_path: Path, content: str) -> None:
     with pytest.raises(
         TruthError,

@@ -2,7 +2,6 @@
 
 import json
 import re
-from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -13,7 +12,8 @@ import numpy as np
 import pytest
 import yaml
 
-from conftest import Outcome, Run
+from conftest import Run
+from lanes.roads import make_road, settings_for
 from red_cars import SETTINGS, red_finder
 from vdet.boxes import Box, Image
 from vdet.config.camera import LensSettings
@@ -42,10 +42,6 @@ CORNER = np.s_[400:, 600:]
 """Pixels without drawings."""
 PLACE = "distance", "lane"
 """Keys of the place of a vehicle."""
-STAGES = [
-    "1-windows.png", "2-hits.png", "3-heat.png", "4-boxes.png",
-    "5-road.png", "6-above.png", "7-mask.png", "8-fit.png",
-]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -81,7 +77,7 @@ def undistorter() -> Undistorter:
 
 
 @pytest.fixture(scope="module")
-def road(make_road: Callable[..., Scene]) -> Scene:
+def road() -> Scene:
     return make_road(curvature=1 / 500, size=(WIDTH, HEIGHT), frames=COUNT)
 
 
@@ -89,7 +85,6 @@ def road(make_road: Callable[..., Scene]) -> Scene:
 def files(
     road: Scene,
     undistorter: Undistorter,
-    settings_for: Callable[[PinholeCamera], LaneSettings],
     tmp_path_factory: pytest.TempPathFactory,
 ) -> Files:
     folder = tmp_path_factory.mktemp("lanes")
@@ -164,6 +159,14 @@ def check_lane(lane: dict[str, Any], camera: PinholeCamera, lens: Undistorter) -
         assert (np.diff(y) < 0).all()
 
 
+def check_place(item: dict[str, Any], camera: PinholeCamera, lens: Undistorter) -> None:
+    """Compare the distance and the lane of a vehicle with those of its foot on the road."""
+    [[x, y]] = lens.points(np.array([item["foot"]]) - 0.5).tolist()
+    metres = camera.focal * camera.above_ground / (y - camera.horizon)
+    assert item["distance"] == pytest.approx(metres, rel=0.1)
+    assert item["lane"] == round((x - 320) * metres / camera.focal / 3.7)
+
+
 def sits_on(box: Box, car: Box) -> bool:
     """Tell whether a box encloses a car and has the same middle."""
     (x, y), (car_x, car_y) = box.center, car.center
@@ -182,18 +185,11 @@ def has_outline(image: Image, box: Box, color: tuple[int, int, int]) -> bool:
     return bool((np.abs(side - color).max(axis=1) < 90).mean() > 0.8)
 
 
-def read_json(result: Outcome) -> list[dict[str, Any]]:
-    assert result.code == 0, result.err
-    items: list[dict[str, Any]] = json.loads(result.out)
-    return items
-
-
 def test_the_lane_and_the_boxes_of_a_video_are_reported_and_drawn_in_its_frames(
     run: Run, files: Files, tmp_path: Path, road: Scene, undistorter: Undistorter
 ) -> None:
     out, tracks = tmp_path / "out.mp4", tmp_path / "t.jsonl"
-    result = run("detect-video", files.clip, out, "--tracks", tracks, *files.lanes)
-    assert result.code == 0, result.err
+    run("detect-video", files.clip, out, "--tracks", tracks, *files.lanes, code=0)
     records = [json.loads(line) for line in tracks.read_text().splitlines()]
     for record in records:
         check_lane(record["lane"], road.camera, undistorter)
@@ -205,6 +201,7 @@ def test_the_lane_and_the_boxes_of_a_video_are_reported_and_drawn_in_its_frames(
     for old, new in zip(before, after, strict=True):
         assert np.abs(new[CORNER] - old[CORNER].astype(int)).mean() < 2
     (track,) = records[-1]["tracks"]
+    check_place(track, road.camera, undistorter)
     assert has_outline(after[-1], box_of(track), color_of(track["id"]))
     for side in ("left", "right"):
         assert all(is_red(after[-1], *point) for point in records[-1]["lane"][side][:20])
@@ -215,15 +212,11 @@ def test_the_lane_and_the_boxes_of_a_picture_are_reported_and_drawn(
 ) -> None:
     out = tmp_path / "out.png"
     options = ("-o", out, "--json", "-", *files.lanes)
-    (item,) = read_json(run("detect-image", files.picture, *options))
+    (item,) = json.loads(run("detect-image", files.picture, *options, code=0).out)
     check_lane(item["lane"], road.camera, undistorter)
     (reported,) = map(box_of, item["boxes"])
     assert sits_on(reported, CAR)
-    [[x, y]] = undistorter.points(np.array([[reported.center[0], reported.y2]]) - 0.5).tolist()
-    camera = road.camera
-    metres = camera.focal * camera.above_ground / (y - camera.horizon)
-    assert item["boxes"][0]["distance"] == pytest.approx(metres, rel=0.1)
-    assert item["boxes"][0]["lane"] == round((x - 320) * metres / camera.focal / 3.7)
+    check_place(item["boxes"][0], road.camera, undistorter)
     drawn = read_image(out)
     assert has_outline(drawn, reported, color_of(1))
     assert (drawn[CORNER] == read_image(files.picture)[CORNER]).all()
@@ -233,8 +226,9 @@ def test_without_a_camera_the_lane_has_no_metres_and_one_warning_says_so(
     run: Run, files: Files, tmp_path: Path
 ) -> None:
     pictures, out = (files.plain, files.bare), tmp_path / "out"
-    result = run("detect-image", *pictures, "-o", out, "--json", "-", *files.red, "--lanes")
-    plain, bare = read_json(result)
+    options = ("-o", out, "--json", "-", *files.red, "--lanes")
+    result = run("detect-image", *pictures, *options, code=0)
+    plain, bare = json.loads(result.out)
     assert [plain["lane"].pop(key) for key in ("radius", "offset", "width")] == [None] * 3
     assert set(plain["lane"]) == {"left", "right"}
     assert plain["boxes"] == []
@@ -269,19 +263,3 @@ def test_without_a_camera_no_output_of_a_video_has_metres(
     for old, new in zip(video_images(clip), video_images(out), strict=True):
         assert np.abs(new[:60] - old[:60].astype(int)).mean() < 2, "no text about the lane"
         assert np.abs(new[300:] - old[300:].astype(int)).mean() > 5, "the lane is drawn"
-
-
-def test_pictures_of_the_stages_are_written(run: Run, files: Files, tmp_path: Path) -> None:
-    assert run("detect-image", files.picture, "--stages", tmp_path / "s", *files.lanes).code == 0
-    assert sorted(path.name for path in (tmp_path / "s").iterdir()) == STAGES
-
-
-def test_a_picture_of_another_aspect_ratio_does_not_stop_the_others(
-    run: Run, files: Files, tmp_path: Path
-) -> None:
-    other, out = tmp_path / "other.png", tmp_path / "out"
-    write_image(other, read_image(files.plain)[:400])
-    result = run("detect-image", other, files.picture, "-o", out, *files.lanes)
-    assert result.code == 3
-    assert "other.png: camera.lens: is for 640×480" in result.err
-    assert [path.name for path in out.iterdir()] == ["frame.png"]

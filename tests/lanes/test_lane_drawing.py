@@ -3,12 +3,8 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
-from vdet.boxes import Image
-from vdet.config.schema import LaneSettings
-from vdet.lanes.road import Lane, RoadFinder, draw_lane, lane_text, stage_pictures
-from vdet.media import Picture
+from vdet.lanes.road import Lane, draw_lane, lane_text
 
 LANE = Lane(
     curvature=-1 / 812.34567,
@@ -19,11 +15,6 @@ LANE = Lane(
     right=np.array([[1000.0, 650.0], [830.0, 550.0], [690.0, 460.0]]),
 )
 STRAIGHT = replace(LANE, curvature=1 / 9000, radius=None, offset=0.1)
-
-
-@pytest.fixture
-def frame() -> Image:
-    return np.full((720, 1280, 3), 100, np.uint8)
 
 
 def test_a_record_has_millimetres_and_tenths_of_pixels() -> None:
@@ -38,7 +29,8 @@ def test_a_record_has_millimetres_and_tenths_of_pixels() -> None:
     assert STRAIGHT.record() == record | {"radius": None, "offset": 0.1}
 
 
-def test_area_and_lines_are_drawn_and_nothing_beside_them(frame: Image) -> None:
+def test_area_and_lines_are_drawn_and_nothing_beside_them() -> None:
+    frame = np.full((720, 1280, 3), 100, np.uint8)
     draw_lane(frame, LANE)
     blue, green, red = frame[600, 640].tolist()
     assert green > max(blue, red)
@@ -53,14 +45,3 @@ def test_the_text_describes_the_bend_and_the_place_of_the_camera() -> None:
     bend = ("lane 3.7 m wide, bends left, radius 812 m", "0.25 m left of its middle")
     assert lane_text(LANE) == bend
     assert lane_text(STRAIGHT) == ("lane 3.7 m wide, straight", "0.10 m right of its middle")
-
-
-@pytest.mark.parametrize("lane", [LANE, None])
-def test_every_stage_has_a_picture_with_and_without_a_lane(frame: Image, lane: Lane | None) -> None:
-    finder = RoadFinder(None, LaneSettings(), 1280, 720)
-    pictures = stage_pictures(replace(finder.update(finder.observe(Picture(frame))), lane=lane))
-    assert list(pictures) == ["road", "above", "mask", "fit"]
-    assert pictures["road"].shape == frame.shape
-    assert pictures["above"].shape == pictures["mask"].shape == pictures["fit"].shape
-    assert (pictures["fit"] != pictures["above"]).any() == (lane is not None)
-    assert (frame == 100).all()

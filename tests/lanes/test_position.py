@@ -1,6 +1,5 @@
 """Where vehicles are on the road: metres and lanes from the pixels at which they stand."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -10,15 +9,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lanes import chessboards
+from lanes.roads import make_road, settings_for
 from vdet.boxes import Box
-from vdet.config.schema import LaneSettings
 from vdet.lanes.camera import TopView, Undistorter
 from vdet.lanes.curves import LaneCurves
 from vdet.lanes.road import Road, RoadFinder, RoadPosition, position_on_road
 from vdet.media import Picture
+from vdet.run.steps import with_positions
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.render import render
-from vdet.synthetic.scene import Scene
+from vdet.track.track import Track
 
 CAMERA = PinholeCamera.dashboard(1280, 720)
 STRAIGHT = LaneCurves(bend=0, heading=0, left=-1.85, right=1.85, pitch=0)
@@ -88,9 +88,7 @@ def test_where_a_row_is_worth_too_many_metres_the_distance_is_not_known() -> Non
 
 
 @pytest.fixture(scope="module")
-def road(
-    make_road: Callable[..., Scene], settings_for: Callable[[PinholeCamera], LaneSettings]
-) -> Road:
+def road() -> Road:
     """A bend of 600 m radius, without a lens."""
     scene = make_road(curvature=1 / 600, size=(640, 480), frames=1)
     finder = RoadFinder(None, settings_for(scene.camera), 640, 480)
@@ -128,3 +126,21 @@ def test_feet_are_undistorted(road: Road) -> None:
 )
 def test_the_edges_beside_and_below_cut_boxes(road: Road, box: Box, *, cut: bool) -> None:
     assert road.cuts(box) is cut
+
+
+@pytest.mark.parametrize(
+    "box",
+    [
+        Box.sized(300, 420, 60, 60),
+        Box.sized(0, 310, 60, 60),
+        Box.sized(580, 310, 60, 60),
+        Box.sized(300, 190, 9, 9),
+    ],
+    ids=["below", "left", "right", "above the horizon"],
+)
+def test_a_vehicle_whose_foot_is_not_on_the_road_in_the_frame_has_no_place(
+    road: Road, box: Box
+) -> None:
+    old = Track(1, box, 0.9, state="detected", distance=1.0, lane=1)
+    [track] = with_positions([old], road, 0)
+    assert track == replace(old, distance=None, lane=None)

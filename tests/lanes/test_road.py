@@ -8,16 +8,14 @@ import cv2
 import numpy as np
 import pytest
 
+from lanes.roads import drive, make_road, settings_for
 from vdet.boxes import Float64Array, Image
 from vdet.config.schema import LaneSettings
 from vdet.lanes.road import CARRY, Lane, RoadFinder
 from vdet.media import Picture
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.render import render
-from vdet.synthetic.scene import LaneLine, Light, Scene, Shadow
-
-MakeRoad = Callable[..., Scene]
-Drive = Callable[..., list[Lane | None]]
+from vdet.synthetic.scene import LaneLine, Light, Shadow
 
 SHADOWS = tuple(
     Shadow(station, 8.0, 0.45, dappled)
@@ -33,16 +31,14 @@ def lateral_ends(line: Float64Array, camera: PinholeCamera) -> tuple[float, floa
     return near, far
 
 
-def check(
-    lane: Lane | None, camera: PinholeCamera, left: float = -1.85, right: float = 1.85
-) -> None:
+def check(lane: Lane | None, camera: PinholeCamera) -> None:
     assert lane is not None
-    for line, truth in ((lane.left, left), (lane.right, right)):
+    for line, truth in ((lane.left, -1.85), (lane.right, 1.85)):
         near, far = lateral_ends(line, camera)
         assert near == pytest.approx(truth, abs=0.10)
         assert far == pytest.approx(truth, abs=0.30)
-    assert lane.width == pytest.approx(right - left, abs=0.10)
-    assert lane.offset == pytest.approx(-(left + right) / 2, abs=0.10)
+    assert lane.width == pytest.approx(3.7, abs=0.10)
+    assert lane.offset == pytest.approx(0, abs=0.10)
     if camera.curvature:
         assert lane.curvature == pytest.approx(camera.curvature, rel=0.2)
         assert lane.radius == pytest.approx(1 / abs(camera.curvature), rel=0.25)
@@ -75,9 +71,7 @@ WORN = LaneLine(-1.85, PALE), LaneLine(1.85, PALE, dash=3.0)
         {"size": (1920, 1080), "curvature": -1 / 700},
     ],
 )
-def test_finds_lanes_of_all_kinds(
-    make_road: MakeRoad, drive: Drive, changes: dict[str, Any]
-) -> None:
+def test_finds_lanes_of_all_kinds(changes: dict[str, Any]) -> None:
     scene = make_road(**changes)
     lanes = drive(scene)
     assert all(lanes)
@@ -85,16 +79,14 @@ def test_finds_lanes_of_all_kinds(
 
 
 @pytest.mark.parametrize("missing", [-1.85, 1.85])
-def test_no_lane_is_found_if_one_line_was_never_seen(
-    make_road: MakeRoad, drive: Drive, missing: float
-) -> None:
+def test_no_lane_is_found_if_one_line_was_never_seen(missing: float) -> None:
     scene = make_road(lines=(LaneLine(-missing),))
     assert drive(scene) == [None] * scene.frames
 
 
 @pytest.mark.parametrize("missing", [-1.85, 1.85])
 def test_a_line_that_ends_is_kept_for_a_while_and_then_the_lane_is_lost_until_it_reappears(
-    make_road: MakeRoad, drive: Drive, missing: float
+    missing: float,
 ) -> None:
     whole = make_road(curvature=1 / 900, size=(640, 360))
     one = (LaneLine(-missing),)
@@ -106,7 +98,7 @@ def test_a_line_that_ends_is_kept_for_a_while_and_then_the_lane_is_lost_until_it
     check(lanes[-1], whole.camera)  # found again
 
 
-def test_a_lane_change_ends_in_the_other_lane(make_road: MakeRoad, drive: Drive) -> None:
+def test_a_lane_change_ends_in_the_other_lane() -> None:
     moves = np.arange(0, 3.75, 0.15)  # metres a frame; a quick change at ten frames a second
     scenes = []
     for moved in moves.tolist():
@@ -119,9 +111,7 @@ def test_a_lane_change_ends_in_the_other_lane(make_road: MakeRoad, drive: Drive)
     assert offsets[-1] < 0 < offsets[1]
 
 
-def test_a_pitching_camera_keeps_the_lane_and_its_width(
-    make_road: MakeRoad, settings_for: Callable[[PinholeCamera], LaneSettings]
-) -> None:
+def test_a_pitching_camera_keeps_the_lane_and_its_width() -> None:
     scene = make_road(curvature=1 / 800)
     camera = scene.camera
     finder = RoadFinder(None, settings_for(camera), camera.width, camera.height)

@@ -1,28 +1,20 @@
 """The top view: ground, rows, columns and pixels agree."""
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from lanes.roads import settings_for
 from vdet.config.schema import LaneSettings
 from vdet.lanes.camera import TopView
 from vdet.synthetic.camera import PinholeCamera
 
-SettingsFor = Callable[[PinholeCamera], LaneSettings]
 CAMERA = PinholeCamera.dashboard(1280, 720)
 
 
-@pytest.fixture
-def top_view(settings_for: SettingsFor) -> TopView:
-    return TopView(settings_for(CAMERA), CAMERA.width, CAMERA.height)
-
-
-def test_the_trapezoid_may_be_measured_away_from_the_middle_of_the_lane(
-    settings_for: SettingsFor,
-) -> None:
+def test_the_trapezoid_may_be_measured_away_from_the_middle_of_the_lane() -> None:
     middle = settings_for(CAMERA)
     shift = 0.5 * CAMERA.focal / CAMERA.width  # half a metre; divide by the distance
     corners = zip(middle.points, (6, 6, 42, 42), strict=True)

@@ -1,16 +1,10 @@
 """The page over the videos of a batch."""
 
 import json
-import re
-import shutil
-import subprocess
-from html import unescape
 from pathlib import Path
 from typing import Any
 
-import pytest
-
-from pages.html import Elements
+from pages.html import Elements, needs_chromium, title_in_chromium
 from vdet.pages.batch import NO_STILL, VideoFacts, write_index
 from vdet.pages.vehicles import VehicleRow
 
@@ -94,7 +88,7 @@ def test_of_no_video_it_says_so(tmp_path: Path) -> None:
     assert "No video was processed." in Elements(index(tmp_path, {})).text
 
 
-@pytest.mark.skipif(not shutil.which("chromium"), reason="needs Chromium")
+@needs_chromium
 def test_its_table_is_filtered_and_sorted(tmp_path: Path) -> None:
     acts = """<script>
 const shownRows = () => [...document.querySelectorAll("#found tbody tr")].map(
@@ -123,12 +117,7 @@ document.title = JSON.stringify(seen);
 </script></body>"""
     html = index(tmp_path, VIDEOS).replace("</body>", acts)
     (tmp_path / "acts.html").write_text(html, encoding="utf-8")
-    command = ["chromium", "--headless", "--no-sandbox", "--disable-gpu", "--dump-dom"]
-    done = subprocess.run(
-        [*command, (tmp_path / "acts.html").as_uri()], capture_output=True, check=True, timeout=60
-    )
-    (title,) = re.findall("<title>(.*?)</title>", done.stdout.decode())
-    assert json.loads(unescape(title)) == {
+    assert json.loads(title_in_chromium(tmp_path / "acts.html")) == {
         "all": [
             ["", "#1", "car", "a", "page.html#t=0.000", "1.5", "52", "north → south", "-1", "18",
              "drove"],

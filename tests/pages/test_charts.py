@@ -9,14 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vdet.errors import clock
-from vdet.pages.charts import (
-    interval_plot,
-    level_plot,
-    number_axis,
-    pack,
-    time_axis,
-    time_text,
-)
+from vdet.pages.charts import interval_plot, level_plot, number_axis, pack, time_axis, time_text
 
 
 @pytest.mark.parametrize(

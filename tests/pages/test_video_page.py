@@ -2,12 +2,9 @@
 
 import json
 import re
-import shutil
-import subprocess
 from collections.abc import Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
-from html import unescape
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -15,7 +12,7 @@ from urllib.parse import unquote
 import numpy as np
 import pytest
 
-from pages.html import Elements
+from pages.html import Elements, needs_chromium, title_in_chromium
 from run.red_runs import video_info
 from traffic.passing import HEIGHT, WIDTH, frame, passing, summarize, track
 from vdet.boxes import Box
@@ -272,7 +269,7 @@ class TestDoubts:
         assert made.facts.vehicles == 1
 
 
-@pytest.mark.skipif(not shutil.which("chromium"), reason="needs Chromium")
+@needs_chromium
 @pytest.mark.parametrize("player", [VIDEO, None])
 def test_the_times_of_its_vehicles_seek_the_player(tmp_path: Path, player: Player | None) -> None:
     path = tmp_path / "page.html"
@@ -280,17 +277,13 @@ def test_the_times_of_its_vehicles_seek_the_player(tmp_path: Path, player: Playe
       .slice(1).map(row => [row.querySelector("img") !== null,
         row.querySelector("a")?.dataset.time ?? null, row.innerText.trim()]))</script></body>"""
     path.write_text(page(player=player).html().replace("</body>", reads), "utf-8")
-    options = ("--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path}")
-    command = ["chromium", *options, "--dump-dom", path.as_uri()]
-    html = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    title, *_ = re.findall("<title>(.*?)</title>", html, re.DOTALL)
     times = ["0.000", "2.000"] if player else [None, None]
-    assert json.loads(unescape(title)) == [
+    assert json.loads(title_in_chromium(path)) == [
         [True, times[0], "#1\tvehicle\t0:00:00\t2.0"], [False, times[1], "#2\ttruck\t0:00:02\t0.1"],
     ]  # fmt: skip
 
 
-@pytest.mark.skipif(not shutil.which("chromium"), reason="needs Chromium")
+@needs_chromium
 def test_a_narrow_browser_needs_no_sideways_scrolling(tmp_path: Path) -> None:
     measures = "<script>document.title = document.documentElement.scrollWidth</script></body>"
     path = tmp_path / "page.html"
@@ -298,8 +291,4 @@ def test_a_narrow_browser_needs_no_sideways_scrolling(tmp_path: Path) -> None:
     frame = f'<iframe src="{path.name}" style="width: 390px; height: 9000px"></iframe>'
     reads = "<script>onload = () => document.title = frames[0].document.title</script>"
     path.with_name("narrow.html").write_text(frame + reads, "utf-8")
-    options = ("--headless", "--no-sandbox", "--disable-gpu", "--allow-file-access-from-files")
-    address = path.with_name("narrow.html").as_uri()
-    command = ["chromium", *options, f"--user-data-dir={tmp_path}", "--dump-dom", address]
-    html = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    assert "<title>390</title>" in html
+    assert title_in_chromium(path.with_name("narrow.html")) == "390"

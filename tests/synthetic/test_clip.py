@@ -1,21 +1,18 @@
-from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from synthetic.scenes import make_scene, parked
 from vdet.media.reader import VideoReader
 from vdet.synthetic.render import frames, write_clip
-from vdet.synthetic.scene import Scene, SceneVehicle
+from vdet.synthetic.scene import Scene
 from vdet.synthetic.truth import true_boxes, write_truth
-
-MakeScene = Callable[..., Scene]
-Parked = Callable[[int, float, float], SceneVehicle]
 
 
 @pytest.fixture
-def scene(make_scene: MakeScene, parked: Parked) -> Scene:
+def scene() -> Scene:
     """Three frames: a vehicle in full view, one hidden behind it, one too small."""
     vehicles = parked(1, 10.0, 0.0), parked(2, 30.0, 0.0), parked(3, 90.0, 9.0)
     return make_scene(*vehicles, size=(640, 360), frames=3)

@@ -1,14 +1,12 @@
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from synthetic.scenes import make_scene
 from vdet.synthetic.random_scenes import demo_scene
 from vdet.synthetic.render import Renderer, render
-from vdet.synthetic.scene import Scene, Shadow
-
-MakeScene = Callable[..., Scene]
+from vdet.synthetic.scene import Shadow
 
 
 def test_the_same_seed_gives_the_same_pixels_in_any_order() -> None:
@@ -18,7 +16,7 @@ def test_the_same_seed_gives_the_same_pixels_in_any_order() -> None:
     assert np.array_equal(forward, backward[::-1])
 
 
-def test_the_road_moves_and_repeats_after_its_period(make_scene: MakeScene) -> None:
+def test_the_road_moves_and_repeats_after_its_period() -> None:
     renderer = Renderer(replace(make_scene(size=(640, 360)), speed=50.0))
     start = renderer.image(0)
     assert not np.array_equal(start, renderer.image(1))
@@ -27,9 +25,7 @@ def test_the_road_moves_and_repeats_after_its_period(make_scene: MakeScene) -> N
 
 
 @pytest.mark.parametrize("curvature", [-1 / 400, 0.0, 1 / 400])
-def test_a_solid_line_is_drawn_where_the_projection_puts_it(
-    make_scene: MakeScene, curvature: float
-) -> None:
+def test_a_solid_line_is_drawn_where_the_projection_puts_it(curvature: float) -> None:
     scene = make_scene(curvature=curvature)
     camera, image = scene.camera, render(scene, 0)
     for row in (440, 460, 500, 580):
@@ -41,7 +37,7 @@ def test_a_solid_line_is_drawn_where_the_projection_puts_it(
         assert left + bright.mean() == pytest.approx(u, abs=1)
 
 
-def test_a_shadow_darkens_the_road_where_it_lies(make_scene: MakeScene) -> None:
+def test_a_shadow_darkens_the_road_where_it_lies() -> None:
     scene = make_scene()
     shadow = Shadow(station=10.0, length=5.0, strength=0.5, dappled=False)
     shaded = replace(scene, light=replace(scene.light, shadows=(shadow,)))

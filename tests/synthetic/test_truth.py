@@ -1,5 +1,4 @@
 import math
-from collections.abc import Callable
 from dataclasses import replace
 
 import cv2
@@ -8,14 +7,12 @@ import numpy.typing as npt
 import pytest
 from benchmarks.drawn_traffic import true_places
 
+from synthetic.scenes import make_scene, parked
 from vdet.boxes import Box
 from vdet.synthetic.render import render
-from vdet.synthetic.scene import Scene, SceneVehicle, Waypoint
+from vdet.synthetic.scene import Scene, Waypoint
 from vdet.synthetic.truth import TrueBox, must_be_found, true_boxes
 from vdet.synthetic.vehicle import STANDS
-
-MakeScene = Callable[..., Scene]
-Parked = Callable[[int, float, float], SceneVehicle]
 
 SIZES = [(1280, 720), (640, 360), (1242, 375)]
 
@@ -33,11 +30,7 @@ def drawn_box(scene: Scene) -> Box:
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize(("ahead", "lateral"), [(9.0, 0.0), (12.0, 3.7), (25.0, -3.7)])
 def test_the_true_box_bounds_what_is_drawn(
-    make_scene: MakeScene,
-    parked: Parked,
-    size: tuple[int, int],
-    ahead: float,
-    lateral: float,
+    size: tuple[int, int], ahead: float, lateral: float
 ) -> None:
     scene = make_scene(parked(1, ahead, lateral), size=size)
     [found] = true_boxes(scene, 0)
@@ -46,9 +39,7 @@ def test_the_true_box_bounds_what_is_drawn(
 
 
 @pytest.mark.parametrize("heading", [math.pi / 2, math.pi, -2.0])
-def test_a_vehicle_may_drive_in_any_direction(
-    make_scene: MakeScene, parked: Parked, heading: float
-) -> None:
+def test_a_vehicle_may_drive_in_any_direction(heading: float) -> None:
     turned = replace(parked(1, 15.0, 0.0), path=(Waypoint(0.0, 18.0, -1.0, heading),))
     [found] = true_boxes(make_scene(turned), 0)
     assert found.box.pixels == pytest.approx(drawn_box(make_scene(turned)).pixels, abs=2)
@@ -56,9 +47,7 @@ def test_a_vehicle_may_drive_in_any_direction(
     assert found.box.width / found.box.height > 1 + length / 5
 
 
-def test_a_vehicle_right_behind_a_nearer_one_is_hidden_but_keeps_its_box(
-    make_scene: MakeScene, parked: Parked
-) -> None:
+def test_a_vehicle_right_behind_a_nearer_one_is_hidden_but_keeps_its_box() -> None:
     alone = true_boxes(make_scene(parked(2, 30.0, 0.0)), 0)[0]
     front, back = true_boxes(make_scene(parked(1, 10.0, 0.0), parked(2, 30.0, 0.0)), 0)
     assert back.box == alone.box
@@ -66,9 +55,7 @@ def test_a_vehicle_right_behind_a_nearer_one_is_hidden_but_keeps_its_box(
     assert front.hidden == 0
 
 
-def test_hidden_is_the_share_of_the_farther_vehicle_that_the_nearer_one_covers(
-    make_scene: MakeScene, parked: Parked
-) -> None:
+def test_hidden_is_the_share_of_the_farther_vehicle_that_the_nearer_one_covers() -> None:
     near, far = parked(1, 12.0, 0.0), parked(2, 30.0, 2.0)
     front, back = drawn(make_scene(near)), drawn(make_scene(far))
     covered = (front & back).sum() / back.sum()
@@ -77,9 +64,7 @@ def test_hidden_is_the_share_of_the_farther_vehicle_that_the_nearer_one_covers(
     assert found.hidden == pytest.approx(covered, abs=0.05)
 
 
-def test_places_are_those_of_the_rear_tyres_and_lanes_are_counted_by_lines(
-    make_scene: MakeScene, parked: Parked
-) -> None:
+def test_places_are_those_of_the_rear_tyres_and_lanes_are_counted_by_lines() -> None:
     vehicles = [(5, 10.0, 0.3), (1, 30.0, -3.7), (2, 25.0, 2.0), (7, -8.0, 3.7)]
     scene = make_scene(*(parked(*vehicle) for vehicle in vehicles))
     found = {

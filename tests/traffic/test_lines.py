@@ -76,11 +76,10 @@ class TestEnds:
         assert events(feet((1, 1), (2, 2)), line((0, 0), (0, 8)), size=(128, 72)) == ()
 
 
-class TestJumps:
-    def test_a_jump_over_the_line_in_one_frame(self) -> None:
-        found = events(feet(*[(600.0, 300.0)] * 10, *[(600.0, 500.0)] * 10))
-        assert ways(found) == ["here"]
-        assert found[0].frame == 10
+def test_a_jump_over_the_line_in_one_frame() -> None:
+    found = events(feet(*[(600.0, 300.0)] * 10, *[(600.0, 500.0)] * 10))
+    assert ways(found) == ["here"]
+    assert found[0].frame == 10
 
 
 @pytest.mark.parametrize("rate", [10, 25, 30, 60])

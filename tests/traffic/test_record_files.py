@@ -1,9 +1,9 @@
 """Files of records, and the file over those of many videos."""
 
-import csv
 import json
 from pathlib import Path
 
+from running import rows_of
 from traffic.passing import WIDTH, frame, passing, summarize, track
 from vdet.boxes import Box
 from vdet.track.track import FrameTracks
@@ -57,7 +57,7 @@ class TestJoined:
     def test_each_row_has_its_video(self, tmp_path: Path) -> None:
         text = self.join(tmp_path, ".csv")
         assert text.startswith(f"video,{HEADING}a,{FIRST}a,2,bus,")
-        rows = list(csv.DictReader(text.splitlines(keepends=True)))
+        rows = rows_of(tmp_path / "all.csv")
         assert [row["video"] for row in rows] == [name for name in self.NAMES for _ in range(2)]
 
     def test_no_cell_is_a_formula(self, tmp_path: Path) -> None:
@@ -65,7 +65,7 @@ class TestJoined:
         tracks = (track(number, BOX, class_name=name) for number, name in enumerate(names))
         path = tmp_path / "all.csv"
         join_records({"=1+1": records_content(summarize([frame(0, *tracks)], WIDTH), path)}, path)
-        rows = list(csv.DictReader((tmp_path / "all.csv").read_text().splitlines()))
+        rows = rows_of(path)
         assert [row["class"] for row in rows] == [f"'{name}" for name in names]
         assert {row["video"] for row in rows} == {"'=1+1"}
         assert {row["start_x"] for row in rows} == {"-15.0"}, "numbers stay numbers"

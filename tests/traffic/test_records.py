@@ -51,13 +51,12 @@ def test_the_smallest_distance_and_the_usual_lane_are_kept() -> None:
     assert (unknown.distance, unknown.lane) == (None, None)
 
 
-class TestTime:
-    def test_a_vehicle_that_is_hidden_for_a_while_is_shown_for_less_than_its_span(self) -> None:
-        found = record(frame(0, track(1, PLACE)), *map(frame, range(1, 10)), *(
-            frame(n, track(1, PLACE)) for n in (10, 11)
-        ))  # fmt: skip
-        assert (found.first, found.last) == (0, 11 / RATE)
-        assert found.seconds == pytest.approx(3 / RATE)
+def test_a_vehicle_that_is_hidden_for_a_while_is_shown_for_less_than_its_span() -> None:
+    found = record(frame(0, track(1, PLACE)), *map(frame, range(1, 10)), *(
+        frame(n, track(1, PLACE)) for n in (10, 11)
+    ))  # fmt: skip
+    assert (found.first, found.last) == (0, 11 / RATE)
+    assert found.seconds == pytest.approx(3 / RATE)
 
 
 class TestPath:

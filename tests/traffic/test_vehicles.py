@@ -92,17 +92,16 @@ def test_times_that_no_video_has_are_refused(times: tuple[float, float]) -> None
         counts(video, LineSettings(name="line", start=(0, 450), end=(1280, 450)))
 
 
-class TestClasses:
-    def test_a_class_that_flips_on_the_line_does_not_split_the_history(self) -> None:
-        video = [
-            replace(
-                frame,
-                tracks=tuple(
-                    replace(t, class_name="truck" if 1.8 < frame.time < 2.2 else "car")
-                    for t in frame.tracks
-                ),
-            )
-            for frame in frames(DOWN)
-        ]
-        (event,) = events(video)
-        assert event.class_name == "car"
+def test_a_class_that_flips_on_the_line_does_not_split_the_history() -> None:
+    video = [
+        replace(
+            frame,
+            tracks=tuple(
+                replace(t, class_name="truck" if 1.8 < frame.time < 2.2 else "car")
+                for t in frame.tracks
+            ),
+        )
+        for frame in frames(DOWN)
+    ]
+    (event,) = events(video)
+    assert event.class_name == "car"

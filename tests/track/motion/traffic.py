@@ -137,7 +137,6 @@ def track_scores(
     noise: Noise,
     seed: int = 0,
     *,
-    size: tuple[int, int] = (WIDTH, HEIGHT),
     stride: int = 1,
 ) -> Scores:
     """Track a clip of `rate` frames a second with the default settings, and score the tracks.
@@ -145,7 +144,7 @@ def track_scores(
     Every `stride` frames one is searched.
     """
     rng = np.random.default_rng(seed)
-    tracker = MotionTracker(MotionTrackerSettings(), *size)
+    tracker = MotionTracker(MotionTrackerSettings(), WIDTH, HEIGHT)
     true, shown = [], []
     for number, vehicles in enumerate(clip, start=1):
         for vehicle in vehicles:

@@ -6,10 +6,8 @@ from boxing import moved_to
 from seed import SEED_TRACKER
 from textured_road import textured_road
 from vdet.boxes import Box, Image
-from vdet.config.tracker import RulesTrackerSettings
 from vdet.track.rules.association import Association, Car, Region
 
-SETTINGS = SEED_TRACKER
 LEFT, RIGHT = Box.sized(100, 200, 100, 80), Box.sized(320, 200, 100, 80)
 
 
@@ -18,7 +16,7 @@ def road(*boxes: Box | None) -> Image:
 
 
 def a_car(box: Box, frame: Image, shown_as: int | None = None) -> Car:
-    car = Car(SETTINGS, shown_as)
+    car = Car(SEED_TRACKER, shown_as)
     car.see(region(box), frame)
     return car
 
@@ -28,14 +26,10 @@ def region(box: Box, peak: float = 2.0) -> Region:
 
 
 def associate(
-    cars: list[Car],
-    boxes: list[Box],
-    frame: Image | None = None,
-    settings: RulesTrackerSettings = SETTINGS,
-    peak: float = 2.0,
+    cars: list[Car], boxes: list[Box], frame: Image | None = None, peak: float = 2.0
 ) -> Association:
     frame = road() if frame is None else frame
-    return Association(cars, [region(box, peak) for box in boxes], frame, settings)
+    return Association(cars, [region(box, peak) for box in boxes], frame, SEED_TRACKER)
 
 
 def boxes_of(association: Association) -> dict[Car, Box]:

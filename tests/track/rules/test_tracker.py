@@ -60,26 +60,16 @@ def test_a_region_has_the_strength_of_its_detection_as_its_peak() -> None:
 
 # Rule 12
 
-ONE_PLACE = tracker_but(history=1)  # so that a car's rectangle is its latest one
 BUS = Box.sized(230, 200, 120, 100)
 BOTH = Box.sized(90, 190, 270, 120)
 
 
-def see_side_by_side(cars: RulesTracker, frames: int) -> None:
-    for _ in range(frames):
-        update(cars, road(SEDAN, BUS), SEDAN, BUS)
-
-
-def hide_sedan_behind_bus(cars: RulesTracker) -> list[Track]:
-    """One region over both places, of which only the bus is to be seen."""
-    return update(cars, road(None, BUS), BOTH)
-
-
 def test_a_shown_car_left_inside_another_is_absorbed_which_is_shown_at_once() -> None:
-    cars = RulesTracker(ONE_PLACE)
+    cars = RulesTracker(tracker_but(history=1))  # so that a car's rectangle is its latest one
     show(cars, SEDAN)
-    see_side_by_side(cars, frames=2)
-    (track,) = hide_sedan_behind_bus(cars)
+    for _ in range(2):
+        update(cars, road(SEDAN, BUS), SEDAN, BUS)
+    (track,) = update(cars, road(None, BUS), BOTH)  # only the bus is to be seen
     assert track.box == BOTH
 
 
