@@ -29,8 +29,7 @@ def test_draws_finds_counts_trains_and_compares(
     monkeypatch.setattr("vdet.demo.ROADS", 1)
     monkeypatch.setattr("vdet.demo.demo_scene", short_clip)
     folder = tmp_path / "new" / "demo"
-    result = run("demo", folder)
-    assert result.code == 0, result.err
+    result = run("demo", folder, code=0)
     assert {path.name for path in folder.iterdir()} == NAMES
     assert len(list((folder / "training").iterdir())) == 2, "a road and its truth"
     with VideoReader(folder / "found.mp4") as reader:

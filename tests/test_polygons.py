@@ -3,22 +3,16 @@
 import pytest
 from hypothesis import strategies as st
 
-from vdet.polygons import (
-    Point,
-    crosses_itself,
-    meeting,
-    side_of,
-)
+from vdet.polygons import Point, crosses_itself, meeting, side_of
 
 SQUARE = ((0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0))
 whole = st.integers(-50, 50).map(float)
 points = st.tuples(whole, whole)
 
 
-class TestSides:
-    def test_right_is_below_a_line_to_the_right(self) -> None:
-        assert side_of((0, 0), (10, 0), (3, 2)) == 2
-        assert side_of((10, 0), (0, 0), (3, 2)) == -2
+def test_right_is_below_a_line_to_the_right() -> None:
+    assert side_of((0, 0), (10, 0), (3, 2)) == 2
+    assert side_of((10, 0), (0, 0), (3, 2)) == -2
 
 
 class TestMeeting:

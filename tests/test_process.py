@@ -38,10 +38,7 @@ def running() -> Iterator[list[Running]]:
 
 
 def test_nothing_in_the_current_folder_is_imported(
-    batch: tuple[str, ...],
-    running: list[Running],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    batch: tuple[str, ...], running: list[Running], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder = tmp_path / "current"
     folder.mkdir()

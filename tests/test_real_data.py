@@ -92,8 +92,7 @@ def test_nothing_is_found_on_an_empty_road(real_data: Path, shipped: Shipped, in
 
 
 @pytest.mark.parametrize(
-    ("index", "car"),
-    [(299, Box.sized(1005, 406, 214, 102)), (499, Box.sized(892, 406, 122, 67))],
+    ("index", "car"), [(299, Box.sized(1005, 406, 214, 102)), (499, Box.sized(892, 406, 122, 67))]
 )
 def test_the_white_car_is_found(real_data: Path, shipped: Shipped, index: int, car: Box) -> None:
     assert any(is_on(box, car) for box in shipped.find(frame(real_data, index)))
@@ -114,8 +113,7 @@ def test_the_seed_finds_the_white_and_the_black_car_apart(real_data: Path) -> No
 
 @pytest.mark.parametrize("config", ["default", "svm", "seed"])
 def test_every_photograph_is_searched(run: Run, real_data: Path, config: str) -> None:
-    result = run("detect-image", real_data / "test_images", "--json", "-", "-c", config)
-    assert result.code == 0, result.err
+    result = run("detect-image", real_data / "test_images", "--json", "-", "-c", config, code=0)
     items = json.loads(result.out)
     assert [Path(item["image"]).name for item in items] == [f"test{i}.jpg" for i in range(1, 7)]
     for item in items:
@@ -138,8 +136,7 @@ def test_both_cars_are_followed_through_the_video(
         "--start", str(first / 25), "--frames", str(count),
         "-c", config, *faster,
     )  # fmt: skip
-    result = run("detect-video", real_data / "project_video.mp4", *options)
-    assert result.code == 0, result.err
+    run("detect-video", real_data / "project_video.mp4", *options, code=0)
     records = [json.loads(line) for line in (tmp_path / "tracks.jsonl").read_text().splitlines()]
     assert [record["frame"] for record in records] == list(range(first, first + count))
     places = {
@@ -170,8 +167,7 @@ def test_vehicles_are_found_once_and_tightly(
     if truth is None:
         pytest.skip("the truth of the video is not here; data/README.md tells what it is")
     video = real_data / "project_video.mp4"
-    result = run("eval", "video", video, "--truth", truth, "--json", "-", "-c", config)
-    assert result.code == 0, result.err
+    result = run("eval", "video", video, "--truth", truth, "--json", "-", "-c", config, code=0)
     scores = json.loads(result.out)["total"]
     assert scores["f1"] >= f1
     assert scores["mean_iou"] >= iou

@@ -17,14 +17,18 @@ def ending_with(**changes: Any) -> list[Sample]:
     return [*STEADY[:-2], *(replace(sample, **changes) for sample in STEADY[-2:])]
 
 
-def test_nothing_grows_in_a_steady_run() -> None:
-    assert find_growth(STEADY) == []
-    assert tenths(STEADY) == pytest.approx((100, 100))
-
-
-def test_growth_before_the_500th_frame_does_not_count() -> None:
-    cold = [replace(s, files=3, threads=1) if s.frames < 500 else s for s in STEADY]
-    assert find_growth(cold) == []
+@pytest.mark.parametrize(
+    "samples",
+    [
+        STEADY,
+        [replace(s, files=3, threads=1) if s.frames < 500 else s for s in STEADY],
+        [*STEADY[:-1], replace(STEADY[-1], files=19, threads=11)],
+    ],
+    ids=["steady", "cold before the 500th frame", "the reader closes its files at the end"],
+)
+def test_nothing_grows_in_a_steady_run(samples: list[Sample]) -> None:
+    assert find_growth(samples) == []
+    assert tenths(samples) == pytest.approx((100, 100))
 
 
 @pytest.mark.parametrize(
@@ -41,10 +45,6 @@ def test_growth_before_the_500th_frame_does_not_count() -> None:
 )
 def test_what_grows_is_named(changes: dict[str, Any], words: list[str]) -> None:
     assert find_growth(ending_with(**changes)) == words
-
-
-def test_the_reader_may_close_its_files_and_threads_at_the_end() -> None:
-    assert find_growth([*STEADY[:-1], replace(STEADY[-1], files=19, threads=11)]) == []
 
 
 @pytest.mark.parametrize(("speed", "slow"), [(84.0, True), (86.0, False)])

@@ -13,6 +13,7 @@ from boxing import rounded
 from red_cars import PERSPECTIVE, SETTINGS, drive, red_finder
 from vdet.api import Tracker
 from vdet.boxes import Boxes, Image
+from vdet.config.loading import load_settings
 from vdet.config.schema import MotionTrackerSettings, Settings
 from vdet.config.tracker import RulesTrackerSettings
 from vdet.detect.svm.detector import SvmModel
@@ -47,10 +48,14 @@ def test_both_trackers_pass(settings: MotionTrackerSettings | RulesTrackerSettin
         ("vehicles", "out.json"),
         ("crops", "crops"),
         ("page", "page"),
+        ("counts", "out.csv"),
+        ("counts", "out.json"),
     ],
 )
 def test_every_sink_passes(name: str, file: str, tmp_path: Path) -> None:
-    check_sink(sink_kind(name), tmp_path / file, still=name == "picture")
+    lines = ["traffic.lines=[{name: a, start: [0, 0.5], end: [1, 1]}]"]
+    settings = load_settings((), lines if name == "counts" else [])
+    check_sink(sink_kind(name), tmp_path / file, settings, still=name == "picture")
 
 
 class Wrong:

@@ -8,10 +8,7 @@ from pathlib import Path
 import pytest
 
 from conftest import Run
-from red_cars import SETTINGS, red_finder
-from running import write_drive
-from vdet.config.rendering import render
-from vdet.detect.svm.model import save_model
+from running import rows_of, write_drive
 
 LINES = """
 camera: {size: [320, 240]}
@@ -25,34 +22,26 @@ traffic:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a clip of the red car, what finds it, and lines."""
+    """A folder with a clip of the red car, and lines."""
     folder = tmp_path_factory.mktemp("red")
     write_drive(folder / "red.mp4", 60)
-    save_model(red_finder(), folder / "red.npz")
-    (folder / "red.yaml").write_text(render(SETTINGS))
     (folder / "lines.yaml").write_text(LINES)
     return folder
 
 
-def options(folder: Path) -> tuple[str | Path, ...]:
-    return ("--model", folder / "red.npz", "-c", folder / "red.yaml")
-
-
 def events_of(path: Path) -> list[tuple[str, ...]]:
-    with path.open() as file:
-        keys = ("frame", "name", "direction", "id", "score", "vehicle")
-        return [tuple(row[key] for key in keys) for row in csv.DictReader(file)]
+    keys = ("frame", "name", "direction", "id", "score", "vehicle")
+    return [tuple(row[key] for key in keys) for row in rows_of(path)]
 
 
 @pytest.mark.parametrize("form", ["csv", "jsonl", "txt"])
 def test_counting_a_file_of_tracks_gives_what_the_run_gave(
-    run: Run, folder: Path, tmp_path: Path, form: str
+    run: Run, folder: Path, tmp_path: Path, red: tuple[str, ...], form: str
 ) -> None:
     tracks, live, again = tmp_path / f"t.{form}", tmp_path / "live.csv", tmp_path / "again.csv"
     lines = ("-c", folder / "lines.yaml")
     wanted = ("--no-video", "--tracks", tracks, "--counts", live, *lines)
-    result = run("detect-video", folder / "red.mp4", *options(folder), *wanted)
-    assert result.code == 0, result.err
+    run("detect-video", folder / "red.mp4", *red, *wanted, code=0)
     rate = ("--rate", "25") if form == "txt" else ()
     result = run("count", tracks, *lines, "--counts", again, *rate)
     assert (result.code, result.err) == (0, "")
@@ -61,7 +50,7 @@ def test_counting_a_file_of_tracks_gives_what_the_run_gave(
 
 @pytest.mark.parametrize("form", ["csv", "jsonl"])
 def test_flows_have_clock_times_live_and_from_tracks(
-    run: Run, folder: Path, tmp_path: Path, form: str
+    run: Run, folder: Path, tmp_path: Path, red: tuple[str, ...], form: str
 ) -> None:
     clip = tmp_path / "v_20260501_065959.mp4"
     clip.write_bytes((folder / "red.mp4").read_bytes())
@@ -73,7 +62,7 @@ def test_flows_have_clock_times_live_and_from_tracks(
         asked = ("--flows", out, "--flows", out.with_suffix(".json"), *lines)
         if name == "live":
             wanted = ("--no-video", "--tracks", tracks, *asked)
-            result = run("detect-video", clip, *options(folder), *wanted)
+            result = run("detect-video", clip, *red, *wanted)
         else:
             result = run("count", tracks, *asked)
         assert result.code == 0, result.err
@@ -99,8 +88,7 @@ def write_tracks(path: Path, *, shift: int = 0) -> Path:
 
 def test_it_prints_the_totals(run: Run, folder: Path, tmp_path: Path) -> None:
     tracks = write_tracks(tmp_path / "t.csv")
-    result = run("count", tracks, "-c", folder / "lines.yaml")
-    assert result.code == 0, result.err
+    result = run("count", tracks, "-c", folder / "lines.yaml", code=0)
     assert [line.split()[1:4] for line in result.out.splitlines()[:3]] == [
         ["name", "direction", "count"], ["gate", "out", "1"], ["gate", "in", "0"],
     ]  # fmt: skip
@@ -124,7 +112,9 @@ def test_of_a_video_it_says_what_to_run_first(run: Run, folder: Path) -> None:
     assert result.err.endswith(f"red.mp4: is a video; run first: {first}\n")
 
 
-def test_a_line_in_the_wrong_place_is_reported(run: Run, folder: Path, tmp_path: Path) -> None:
+def test_a_line_in_the_wrong_place_is_reported(
+    run: Run, folder: Path, tmp_path: Path, red: tuple[str, ...]
+) -> None:
     lines = tmp_path / "lines.yaml"
     lines.write_text(LINES.replace("[100, 0], end: [100, 240]", "[0, 50], end: [320, 50]"))
     out = tmp_path / "c.json"
@@ -133,7 +123,7 @@ def test_a_line_in_the_wrong_place_is_reported(run: Run, folder: Path, tmp_path:
     (warning,) = json.loads(out.read_text())["warnings"]
     assert warning == "gate: no path crosses this line; move it"
     wanted = ("--no-video", "--flows", tmp_path / "f.csv", "-c", lines)
-    result = run("detect-video", folder / "red.mp4", *options(folder), *wanted)
+    result = run("detect-video", folder / "red.mp4", *red, *wanted)
     assert result.err.count("gate: no path crosses this line") == 1
 
 
@@ -142,8 +132,7 @@ def test_several_files_are_counted_each_and_together(
 ) -> None:
     files = [write_tracks(tmp_path / f"{n}.csv", shift=30 * n) for n in (0, 1)]
     out = tmp_path / "all.json"
-    result = run("count", *files, "-c", folder / "lines.yaml", "--counts", out)
-    assert result.code == 0, result.err
+    result = run("count", *files, "-c", folder / "lines.yaml", "--counts", out, code=0)
     assert "all files" in result.out
     whole = json.loads(out.read_text())
     assert list(whole["videos"]) == [str(file) for file in files]
@@ -159,8 +148,7 @@ def test_shares_need_the_size_of_the_frames(run: Run, tmp_path: Path) -> None:
     result = run("count", tracks, "-c", lines)
     assert result.code == 1
     assert "pass --size, as in 1280x720" in result.err
-    result = run("count", tracks, "-c", lines, "--size", "320x240")
-    assert result.code == 0, result.err
+    result = run("count", tracks, "-c", lines, "--size", "320x240", code=0)
     assert result.out.split()[6:9] == ["gate", "left", "1"]
 
 
@@ -170,20 +158,12 @@ def test_shares_need_the_size_of_the_frames(run: Run, tmp_path: Path) -> None:
         (["t.csv"], 2, "no lines or zones to count at; add a settings file with -c FILE"),
         (["t.csv", "-c", "none.yaml"], 1, "none.yaml: not found"),
         (["t.csv", "-c", "l.yaml", "--size", "320x200"], 1, "for frames of 320×240"),
-        (
-            ["t.csv", "-c", "l.yaml", "--size", "big"],
-            2,
-            "'big' is not two numbers",
-        ),
+        (["t.csv", "-c", "l.yaml", "--size", "big"], 2, "'big' is not two numbers"),
         (["t.csv", "-c", "l.yaml", "--counts", "c.txt"], 1, "must end in .csv, .json"),
         (["t.csv", "-c", "l.yaml", "--counts", "t.csv"], 1, "is the input itself"),
         (["t.txt", "-c", "l.yaml"], 1, "has no times; pass the frame rate"),
         (["none.csv", "-c", "l.yaml"], 1, "none.csv"),
-        (
-            ["t.csv", "-c", "short.yaml"],
-            1,
-            "short.yaml:1:1: traffic: gate: is shorter than 1 %",
-        ),
+        (["t.csv", "-c", "short.yaml"], 1, "short.yaml:1:1: traffic: gate: is shorter than 1 %"),
         (["t.csv", "-c", "l.yaml", "--interval", "7min"], 1, "7min does not divide a day"),
         (["t.csv", "-c", "l.yaml", "--begin", "now"], 1, "'now' is not a time"),
         (
@@ -224,7 +204,7 @@ def test_mistakes_are_refused(
 
 
 def test_each_video_of_a_batch_has_its_counts_and_all_have_a_total(
-    run: Run, folder: Path, tmp_path: Path
+    run: Run, folder: Path, tmp_path: Path, red: tuple[str, ...]
 ) -> None:
     clips = tmp_path / "clips" / "day"
     clips.mkdir(parents=True)
@@ -233,30 +213,27 @@ def test_each_video_of_a_batch_has_its_counts_and_all_have_a_total(
     outputs = ("--counts", ".counts.csv", "--flows", ".flows.matrix.csv")
     wanted = ("--no-video", *outputs, "-c", folder / "lines.yaml")
     out = tmp_path / "found"
-    result = run("detect-video", clips.parent, "-d", out, *options(folder), *wanted, "--jobs", "1")
-    assert result.code == 0, result.err
+    run("detect-video", clips.parent, "-d", out, *red, *wanted, "--jobs", "1", code=0)
     own = events_of(out / "day" / "a.counts.csv")
     assert own == events_of(out / "day" / "b.counts.csv")
-    with (out / "all.counts.csv").open() as file:
-        videos = [row["video"] for row in csv.DictReader(file)]
+    videos = [row["video"] for row in rows_of(out / "all.counts.csv")]
     assert videos == ["day/a"] * len(own) + ["day/b"] * len(own)
     heading, *rows = (out / "all.flows.matrix.csv").read_text().splitlines()
     assert heading == "video,from,gate,yard,(none)"
     assert rows == ["day/a,gate,0,1,0", "day/a,yard,0,0,0", "day/b,gate,0,1,0", "day/b,yard,0,0,0"]
 
 
-class TestRegions:
-    @pytest.mark.parametrize(
-        "command",
-        [
-            ("eval", "images", "pictures"),
-            ("mine", "red.mp4", "--truth", "gt.txt", "-o", "mined.zip"),
-        ],
-    )
-    def test_a_command_that_looks_at_whole_frames_refuses_them(
-        self, run: Run, command: tuple[str, ...]
-    ) -> None:
-        outline = "points: [[0, 0], [1, 0], [1, 1]]"
-        result = run(*command, "--set", f"regions=[{{name: a, {outline}}}]")
-        assert result.code == 1
-        assert "regions: this command uses whole frames" in result.err
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("eval", "images", "pictures"),
+        ("mine", "red.mp4", "--truth", "gt.txt", "-o", "mined.zip"),
+    ],
+)
+def test_a_command_that_looks_at_whole_frames_refuses_them(
+    run: Run, command: tuple[str, ...]
+) -> None:
+    outline = "points: [[0, 0], [1, 0], [1, 1]]"
+    result = run(*command, "--set", f"regions=[{{name: a, {outline}}}]")
+    assert result.code == 1
+    assert "regions: this command uses whole frames" in result.err

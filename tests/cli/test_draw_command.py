@@ -90,13 +90,13 @@ def test_a_part_of_saved_tracks_is_used(run: Run) -> None:
 
 def test_the_picture_for_a_report_has_lines_flows_and_numbers(run: Run) -> None:
     given = ("frame.png", "--tracks-from", "tracks.csv", "-c", "lines.yaml")
-    assert run("draw", *given, "-o", "place.png").code == 0
+    run("draw", *given, "-o", "place.png", code=0)
     image = cv2.imread("place.png")
     assert image is not None
     changed = (image != 90).any(axis=2)
     assert changed[40:200, 100].all()
     assert changed[60:180, 110:180].any(axis=0).all()  # the arrow of the flow
-    assert run("draw", *given, "-o", "place.svg").code == 0
+    run("draw", *given, "-o", "place.svg", code=0)
     drawn = Elements(Path("place.svg").read_text("utf-8"))
     assert drawn.text.split() == ["6", "gate", "left", "6", "right", "0"]
 

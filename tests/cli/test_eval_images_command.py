@@ -29,10 +29,7 @@ def write_set(folder: Path, form: str = "COCO", truth: str = "car") -> Path:
     WRITERS[form](
         folder, {"a": Labelled(WIDTH, HEIGHT, boxes), "b": Labelled(WIDTH, HEIGHT, boxes)}
     )
-    show(
-        next(folder.rglob("a.png")),
-        road(CAR),
-    )
+    show(next(folder.rglob("a.png")), road(CAR))
     show(next(folder.rglob("b.png")), road())
     return folder
 
@@ -42,8 +39,7 @@ def test_a_set_of_each_form_has_the_same_scores(
     run: Run, tmp_path: Path, red: tuple[str | Path, ...], form: str
 ) -> None:
     folder = write_set(tmp_path / "set", form)
-    result = run("eval", "images", folder, *red, "--json", "-")
-    assert result.code == 0, result.err
+    result = run("eval", "images", folder, *red, "--json", "-", code=0)
     values = json.loads(result.out)
     (source,) = values["sources"]
     assert (source["vehicles"], source["matches"], source["false_positives"]) == (2, 1, 0)
@@ -79,8 +75,7 @@ def test_several_sets_a_table_and_a_page(
     sets = [write_set(tmp_path / "one"), write_set(tmp_path / "two", "YOLO")]
     folder = tmp_path / "page"
     options = ("--page", folder, "--set", "detector.search.probability=0.6")
-    result = run("eval", "images", *sets, *red, *options)
-    assert result.code == 0, result.err
+    result = run("eval", "images", *sets, *red, *options, code=0)
     first, second, *_ = result.out.splitlines()
     assert first.startswith(f"vdet {vdet.__version__}, detector svm, model red.npz, ")
     assert first.endswith("red.yaml detector.search.probability=0.6")

@@ -19,31 +19,19 @@ def found(tmp_path: Path) -> Path:
     return write(tmp_path / "found.txt", range(3, 13), "1,-1,-1,-1")
 
 
-@pytest.fixture
-def truth(tmp_path: Path) -> Path:
-    return write(tmp_path / "gt.txt", range(1, 11), "1,3,1")
-
-
-def test_prints_a_table(run: Run, found: Path, truth: Path) -> None:
-    result = run("eval", "tracks", found, truth, "--until", "10")
+def test_prints_a_table_and_writes_numbers_and_a_page(
+    run: Run, found: Path, tmp_path: Path
+) -> None:
+    truth = write(tmp_path / "gt.txt", range(1, 11), "1,3,1")
+    results = ("--json", tmp_path / "a.json", "--page", tmp_path / "page")
+    result = run("eval", "tracks", found, truth, "--until", "10", *results)
     assert (result.code, result.err) == (0, "")
     assert result.out.splitlines()[3].split()[5:10] == ["1.000", "0", "2", "0.800", "0.889"]
     assert "missed vehicle 1" in result.out
-
-
-def test_json_has_plain_keys(run: Run, found: Path, truth: Path) -> None:
-    result = run("eval", "tracks", found, truth, "--until", "10", "--json", "-")
-    values = json.loads(result.out)
-    assert values["precision"] == 1
-    assert values["recall"] == 0.8
+    values = json.loads((tmp_path / "a.json").read_text())
+    assert (values["precision"], values["recall"], values["mistakes"][0]["last"]) == (1, 0.8, 2)
     keys = "f1 ap50 ap50_95 mean_iou mota motp idf1 hota deta assa id_switches fragmentations"
     assert set(keys.split()) <= set(values)
-    assert values["mistakes"][0]["last"] == 2
-
-
-def test_writes_a_page(run: Run, found: Path, truth: Path, tmp_path: Path) -> None:
-    result = run("eval", "tracks", found, truth, "--page", tmp_path / "page")
-    assert result.code == 0, result.err
     html = (tmp_path / "page" / "page.html").read_text()
     for words in ("worst errors in", "missed vehicle 1", "frames 1–10 compared"):
         assert words in html

@@ -15,13 +15,10 @@ def test_scores_agree_with_those_of_the_tracks_written(
 ) -> None:
     tracks, folder = tmp_path / "found.jsonl", tmp_path / "page"
     common = ("--model", model_path, *QUICK_OPTIONS)
-    made = run(
-        "detect-video", clip_path, "--no-video", "--tracks", tracks, "--frames", "8", *common
-    )
-    assert made.code == 0, made.err
+    made = ("--no-video", "--tracks", tracks, "--frames", "8")
+    run("detect-video", clip_path, *made, *common, code=0)
     options = ("--truth", truth_path, "--json", "-", "--page", folder)
-    from_video = run("eval", "video", clip_path, *options, *common)
-    assert from_video.code == 0, from_video.err
+    from_video = run("eval", "video", clip_path, *options, *common, code=0)
     total = json.loads(from_video.out)["total"]
     again = run("eval", "tracks", tracks, truth_path, "--json", "-")
     from_tracks = json.loads(again.out)
@@ -36,9 +33,8 @@ def test_several_videos_and_a_sweep(
     videos = (clip_path, clip_path, "--truth", truth_path, "--truth", truth_path, "--until", "4")
     sweeps = ("--sweep", "detector.heat.threshold=0.1,5000", "--sweep", "tracker.history=5,10")
     target, folder = tmp_path / "s.json", tmp_path / "page"
-    results = ("--json", target, "--page", folder)
-    result = run("eval", "video", *videos, *sweeps, *results, "--model", model_path, *QUICK_OPTIONS)
-    assert result.code == 0, result.err
+    options = ("--json", target, "--page", folder, "--model", model_path, *QUICK_OPTIONS)
+    result = run("eval", "video", *videos, *sweeps, *options, code=0)
     runs = json.loads(target.read_text())["sweep"]
     heat, history = ("detector.heat.threshold=0.1", "detector.heat.threshold=5000"), (5, 10)
     assert [run["settings"] for run in runs] == [

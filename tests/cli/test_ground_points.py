@@ -1,6 +1,5 @@
 """Points of the ground in the commands that measure."""
 
-import csv
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -9,7 +8,7 @@ import pytest
 
 from conftest import Run
 from lanes.poles import CORNERS, HEIGHT, WIDTH, ground_text, seen
-from running import write_drive
+from running import rows_of, write_drive
 from vdet.boxes import Float64Array
 from vdet.media.images import write_image
 
@@ -46,8 +45,7 @@ def ahead(speed: float, aside: float = 1.0) -> Float64Array:
 
 
 def test_a_file_is_checked_with_what_a_pixel_is_worth(run: Run) -> None:
-    result = run("info", "-c", "gate.yaml")
-    assert result.code == 0, result.err
+    result = run("info", "-c", "gate.yaml", code=0)
     for text in (
         "lines: near; far",
         "ground: 4 points, off by 0.00 m (0.0 px, root mean square), over 38 m",
@@ -68,10 +66,8 @@ def test_bad_points_are_refused_in_words(run: Run) -> None:
 
 def test_counts_have_the_speeds_at_their_lines(run: Run) -> None:
     write_tracks([ahead(12), ahead(9.0, -2.0)])
-    result = run("count", "tracks.csv", "-c", "gate.yaml", "--counts", "counts.csv")
-    assert result.code == 0, result.err
-    with Path("counts.csv").open() as file:
-        rows = [row for row in csv.DictReader(file) if row["id"] == "1"]
+    run("count", "tracks.csv", "-c", "gate.yaml", "--counts", "counts.csv", code=0)
+    rows = [row for row in rows_of(Path("counts.csv")) if row["id"] == "1"]
     assert [row["name"] for row in rows] == ["near", "far"]
     for row in rows:
         assert float(row["speed"]) == pytest.approx(43.2, rel=0.03)
@@ -88,10 +84,8 @@ def test_records_of_vehicles_have_speeds(run: Run, red: tuple[str, ...]) -> None
     )
     Path("plan.yaml").write_text(f"camera:\n  size: [320, 240]\n  ground:\n{points}")
     outputs = ("--no-video", "--vehicles", "cars.csv")
-    result = run("detect-video", "in.mp4", *outputs, *red, "-c", "plan.yaml")
-    assert result.code == 0, result.err
-    with Path("cars.csv").open() as file:
-        [row] = csv.DictReader(file)
+    run("detect-video", "in.mp4", *outputs, *red, "-c", "plan.yaml", code=0)
+    [row] = rows_of(Path("cars.csv"))
     assert float(row["speed"]) == pytest.approx(3.6 * 2.5, rel=0.2)  # a pixel a frame, 0.1 m
     assert float(row["metres"]) == pytest.approx(0.1 * float(row["length"]), rel=0.3)
     assert float(row["speed_85"]) >= float(row["speed"])

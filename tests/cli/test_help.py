@@ -43,8 +43,7 @@ EXAMPLES = [(names, text) for names, _, text in OPTIONS if "for example" in text
 def test_every_command_has_help_and_a_line_in_the_list_that_is_not_cut(
     run: Run, names: tuple[str, ...]
 ) -> None:
-    result = run(*names, "--help")
-    assert result.code == 0
+    result = run(*names, "--help", code=0)
     assert COMMANDS[names].help
     assert "..." not in re.sub(r"[A-Z]\]?\.\.\.", "", result.out), "a line is cut"
 

@@ -40,8 +40,7 @@ def test_a_shipped_model_says_what_it_was_trained_on(
 def test_another_network_says_what_it_was_taken_for(run: Run, tmp_path: Path) -> None:
     form = ultralytics((128, 64), RedBox(64, 32, 16, 8), 80)
     path = write_network(tmp_path / "their.onnx", form, (128, 64), (0, 0))
-    result = run("info", path)
-    assert result.code == 0
+    result = run("info", path, code=0)
     assert "form: Ultralytics v8 or later" in result.out
     assert "classes: person; bicycle; car; motorcycle; bus; truck\n" in result.out
     assert "other classes: airplane; train; boat; " in result.out
@@ -49,14 +48,8 @@ def test_another_network_says_what_it_was_taken_for(run: Run, tmp_path: Path) ->
 
 def test_a_video_is_described(run: Run, tmp_path: Path) -> None:
     path = write_clip(tmp_path / "in.mov", size=(160, 96), rotation=90, sounds=["aac", "pcm_mulaw"])
-    result = run("info", path, "--json", tmp_path / "facts.json")
-    assert result.code == 0
-    for line in (
-        "rotation: 90",
-        "frames: 12",
-        "sounds: aac; pcm_mulaw",
-        "horizon: unknown",
-    ):
+    result = run("info", path, "--json", tmp_path / "facts.json", code=0)
+    for line in ("rotation: 90", "frames: 12", "sounds: aac; pcm_mulaw", "horizon: unknown"):
         assert line in result.out
     values = json.loads((tmp_path / "facts.json").read_text())
     assert (values["width"], values["height"], values["declared_frames"]) == (160, 96, 12)
@@ -100,8 +93,7 @@ def test_a_pipe_is_refused(run: Run, tmp_path: Path) -> None:
 
 
 def test_without_a_file_the_machine_is_checked(run: Run) -> None:
-    result = run("info", "--json", "-")
-    assert result.code == 0
+    result = run("info", "--json", "-", code=0)
     values = json.loads(result.out)
     assert values["works"]
     assert not [text for text in map(str, values.values()) if text.startswith("broken")]

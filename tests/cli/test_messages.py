@@ -12,7 +12,6 @@ from conftest import Run
 from running import until, write_drive
 from vdet.cli.main import cli
 from vdet.cli.messages import is_quiet, progress_steps
-from vdet.errors import counted
 
 
 class Terminal(io.StringIO):
@@ -94,8 +93,3 @@ def test_there_is_no_bar_with_quiet(terminal: Terminal) -> None:
     with click.Context(cli, obj=True).scope(), progress_steps("") as steps:
         steps("fitting", None)
     assert terminal.getvalue() == ""
-
-
-@pytest.mark.parametrize(("number", "text"), [(0, "0 files"), (1, "1 file"), (2, "2 files")])
-def test_a_number_has_its_noun(number: int, text: str) -> None:
-    assert counted(number, "file") == text

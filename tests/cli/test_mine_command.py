@@ -53,8 +53,7 @@ def test_mines_patches_that_train_learns_from(
     tmp_path: Path,
 ) -> None:
     target, model_path = tmp_path / "mined.zip", tmp_path / "m.npz"
-    result = run("mine", clip_path, "--truth", truth_path, "-o", target, *options)
-    assert result.code == 0, result.err
+    result = run("mine", clip_path, "--truth", truth_path, "-o", target, *options, code=0)
     files = find_patches([target])
     counts = Counter(file.group for file in files)
     assert set(counts) == {
@@ -70,8 +69,7 @@ def test_mines_patches_that_train_learns_from(
         f"{counts['non-vehicles/mined_road_parts']} more on parts of vehicles; from 3 frames\n"
     )
     quick = ("--jobs", "1")
-    learnt = run("train", patches_path, target, "-o", model_path, *quick)
-    assert learnt.code == 0, learnt.err
+    learnt = run("train", patches_path, target, "-o", model_path, *quick, code=0)
     for group, count in counts.items():
         assert re.search(rf"{group} +{count} patches", learnt.out)
     model = load_model(model_path)
@@ -83,7 +81,7 @@ def test_a_patch_is_its_window_and_its_box_is_that_of_the_truth(
     run: Run, clip_path: Path, truth_path: Path, options: tuple[str, ...], tmp_path: Path
 ) -> None:
     target = tmp_path / "mined.zip"
-    assert run("mine", clip_path, "--truth", truth_path, "-o", target, *options).code == 0
+    run("mine", clip_path, "--truth", truth_path, "-o", target, *options, code=0)
     with VideoReader(clip_path) as reader:
         frames = [frame.image for frame in reader]
     truth = read_truth(truth_path)
@@ -116,10 +114,8 @@ def test_a_frame_gives_the_same_patches_whatever_other_frames_are_used(
         ("c.zip", ("--from", "5", "--until", "8")),
         ("d.zip", ("--every", "1", "--from", "5", "--until", "6")),
     ):
-        result = run(
-            "mine", clip_path, "--truth", truth_path, "-o", tmp_path / name, *options, *chosen
-        )
-        assert result.code == 0, result.err
+        wanted = ("--truth", truth_path, "-o", tmp_path / name, *options, *chosen)
+        run("mine", clip_path, *wanted, code=0)
     assert (tmp_path / "a.zip").read_bytes() == (tmp_path / "b.zip").read_bytes()
     whole, fifth, both = (_patches(tmp_path / f"{name}.zip") for name in "acd")
     assert fifth == {name: data for name, data in whole.items() if "frame000005" in name}
@@ -133,8 +129,7 @@ def test_frames_that_cut_a_vehicle_off_are_used_too(
     truth, target = tmp_path / "cut.txt", tmp_path / "mined.zip"
     rows = ["3,99,1,101,30,25,1,3,1", "4,99,9,101,30,25,1,3,1", "5,99,291,101,30,25,1,3,1"]
     truth.write_text("\n".join([truth_path.read_text().strip(), *rows]) + "\n")
-    result = run("mine", clip_path, "--truth", truth, "-o", target, *options, "--from", "2")
-    assert result.code == 0, result.err
+    result = run("mine", clip_path, "--truth", truth, "-o", target, *options, "--from", "2", code=0)
     assert result.out.endswith("from 4 frames\n")
     numbers = {int(name.partition("/frame")[2][:6]) for name in _patches(target)}
     assert numbers == {2, 3, 5, 6}

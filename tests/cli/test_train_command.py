@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import pytest
+
 from conftest import Run
 from vdet.detect.svm.model import load_model
 
@@ -9,8 +11,7 @@ QUICK = ("--jobs", "1")
 
 
 def test_makes_a_model_with_its_metrics(run: Run, patches_path: Path, tmp_path: Path) -> None:
-    result = run("train", patches_path, "-o", tmp_path / "m.npz", *QUICK)
-    assert result.code == 0, result.err
+    result = run("train", patches_path, "-o", tmp_path / "m.npz", *QUICK, code=0)
     model = load_model(tmp_path / "m.npz")
     assert model.weights.shape == (1, 4800)
     report = model.provenance["report"]
@@ -23,16 +24,14 @@ def test_makes_a_model_with_its_metrics(run: Run, patches_path: Path, tmp_path: 
         assert words in result.out
 
 
-def test_an_earlier_model_is_not_lost(run: Run, patches_path: Path, tmp_path: Path) -> None:
-    model = tmp_path / "m.npz"
-    model.write_bytes(b"precious")
-    result = run("train", patches_path, "-o", model, *QUICK)
-    assert result.code == 1
-    assert "--overwrite" in result.err
-    assert model.read_bytes() == b"precious"
-
-
-def test_a_model_is_named_npz(run: Run, patches_path: Path, tmp_path: Path) -> None:
-    result = run("train", patches_path, "-o", tmp_path / "m.json")
-    assert result.code == 1
-    assert "models must end in .npz" in result.err
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [("old.npz", "already exists; use --overwrite"), ("m.json", "models must end in .npz")],
+)
+def test_an_output_that_cannot_be_is_refused(
+    run: Run, patches_path: Path, tmp_path: Path, name: str, words: str
+) -> None:
+    (tmp_path / "old.npz").write_bytes(b"precious")
+    result = run("train", patches_path, "-o", tmp_path / name, *QUICK)
+    assert (result.code, words in result.err) == (1, True)
+    assert (tmp_path / "old.npz").read_bytes() == b"precious"

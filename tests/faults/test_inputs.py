@@ -57,7 +57,8 @@ def test_a_file_that_is_removed_before_its_turn_is_recorded(job: Run, tmp_path: 
     job.source.unlink()
     record = process_file(replace(job, settings=red_settings(tmp_path)), folder=tmp_path / "out")
     assert record.error == f"{job.source}: not found; check the name"
-    assert record.frames is None
+    assert (record.width, record.height, record.frames, record.tracks) == (None,) * 4
+    assert record.outputs == ()
 
 
 def test_a_file_that_shrinks_is_read_as_far_as_it_goes_with_a_warning(

@@ -10,8 +10,6 @@ from labels.writers import Boxed, Labelled, show, write_coco, write_yolo
 from red_cars import CAR, HEIGHT, WIDTH, road
 from running import write_drive
 
-KEPT = "is the input itself; use another output"
-
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
@@ -26,6 +24,10 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         show(tmp_path / "frames" / f"img_{number:04d}.png", road(CAR))
     shutil.copy(tmp_path / "frames" / "img_0001.png", tmp_path / "mask.png")
     (tmp_path / "settings.yaml").write_text("regions: [{name: road, mask: mask.png}]\n")
+    (tmp_path / "out").mkdir()
+    (tmp_path / "again").symlink_to("out")  # as a second mount of the folder
+    line = "{name: a, start: [0, 0.5], end: [1, 0.5]}"
+    (tmp_path / "out" / "in.json").write_text(f"traffic: {{lines: [{line}]}}")
     (tmp_path / "link.png").symlink_to("mask.png")
     write_drive(tmp_path / "in.mp4", 3)
     return tmp_path
@@ -49,10 +51,17 @@ def contents(folder: Path) -> dict[Path, bytes]:
         "detect-image set/a.png -c settings.yaml --json link.png",
         "detect-video in.mp4 in.mp4",
         "detect-video frames --no-video -c settings.yaml --sink picture=mask.png",
+        "detect-video in.mp4 --no-video -c out/in.json --counts out/in.json",
+        "detect-video in.mp4 --no-video -c out/in.json --counts again/in.json",
+        "detect-video in.mp4 --no-video -c out/in.json --counts .json -d out",
     ],
 )
 def test_inputs_are_kept_also_with_overwrite(run: Run, folder: Path, arguments: str) -> None:
     before = contents(folder)
     result = run(*arguments.split(), "--overwrite")
     assert contents(folder) == before, "files were changed, or others were left"
-    assert (result.code, KEPT in result.err) == (1, True), result.err
+    batch = "-d" in arguments.split()
+    kept = (
+        "an input itself; use another folder" if batch else "the input itself; use another output"
+    )
+    assert (result.code, f"is {kept}" in result.err) == (1, True), result.err

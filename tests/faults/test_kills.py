@@ -89,8 +89,7 @@ def test_a_file_that_always_kills_its_process_is_the_only_one_that_fails(
     for name in ("kills", "intact"):
         os.link(clips / "short.mp4", tmp_path / "in" / f"{name}.mp4")
     running = launch(
-        *("detect-video", tmp_path / "in", "-d", tmp_path / "out", "--jobs", "2"),
-        modules=tmp_path,
+        *("detect-video", tmp_path / "in", "-d", tmp_path / "out", "--jobs", "2"), modules=tmp_path
     )
     result = running.finish()
     assert result.code == 3, result.err

@@ -15,15 +15,13 @@ import numpy.typing as npt
 import pytest
 
 from hostile.mutations import mutated, with_other_words
-from hostile.trials import broken_promises, files_in, try_all
+from hostile.trials import try_files
 from vdet.config.detector import FeatureSettings, HistogramSettings, HogSettings
 from vdet.detect.svm.model import FORMAT_VERSION, load_model
 from vdet.errors import ModelError
 
 FEATURES = FeatureSettings(
-    patch=16,
-    hog=HogSettings(orientations=4, cell=8, block=1),
-    histogram=HistogramSettings(bins=8),
+    patch=16, hog=HogSettings(orientations=4, cell=8, block=1), histogram=HistogramSettings(bins=8)
 )
 HEADER = json.dumps(
     {
@@ -113,34 +111,25 @@ def bad_models() -> Iterator[bytes]:
 
 
 def test_damaged_models_are_used_or_refused(tmp_path: Path) -> None:
-    picture, inside, out = tmp_path / "picture.png", tmp_path / "in", tmp_path / "out"
+    picture = tmp_path / "picture.png"
     noise = np.random.default_rng(0).integers(0, 256, (90, 160, 3), dtype=np.uint8)
     cv2.imwrite(str(picture), noise)
-    inside.mkdir()
-    out.mkdir()
-    for number, data in enumerate(bad_models()):
-        (inside / f"{number}.npz").write_bytes(data)
-    before = files_in(inside)
-    assert len(before) == 200
-    trials = try_all(
-        [
-            ["detect-image", picture, "--model", path, "-o", out / f"{path.stem}.png"]
-            for path in before
+    contents = {f"{number}.npz": data for number, data in enumerate(bad_models())}
+    assert len(contents) == 200
+    trials = try_files(
+        tmp_path,
+        contents,
+        lambda path, out: [
+            "detect-image",
+            picture,
+            "--model",
+            path,
+            "-o",
+            out / f"{path.stem}.png",
         ],
         seconds=SECONDS,
     )
-    assert broken_promises(trials) == []
-    assert files_in(inside) == before
-    assert {path.parent for path in tmp_path.rglob("*")} == {tmp_path, inside, out}
     assert 8 < sum(trial.code == 0 for trial in trials) < 100
-
-
-def claiming(data: bytes, size: int) -> bytes:
-    """Return a zip file of one member that claims another size than it has."""
-    changed = bytearray(data)
-    struct.pack_into("<I", changed, 22, size)
-    struct.pack_into("<I", changed, data.find(b"PK\x01\x02") + 24, size)
-    return bytes(changed)
 
 
 def bombs() -> dict[str, tuple[bytes, str]]:
@@ -152,34 +141,18 @@ def bombs() -> dict[str, tuple[bytes, str]]:
         "hog": {"orientations": 32, "cell": 2, "block": 8},
     }
     asking = json.dumps(json.loads(HEADER) | {"features": many})
-    file = io.BytesIO()
-    with zipfile.ZipFile(file, "w", zipfile.ZIP_LZMA) as archive:
-        archive.writestr("header.npy", bytes(300_000_000))
+    damaged = "is not a vdet model, or is damaged"
     return {
-        "a billion features, claimed": (
-            zipped(whole | {"weights": billion + bytes(100)}),
-            "is not a vdet model, or is damaged",
-        ),
+        "a billion features, claimed": (zipped(whole | {"weights": billion + bytes(100)}), damaged),
         "a billion features, packed": (
             zipped(whole | {"weights": billion + bytes(65_000_000)}),
-            "is not a vdet model, or is damaged",
+            damaged,
         ),
         "ninety million features, asked for": (
             zipped(members(asking)),
             r"its weights are damaged, or not of shape \(1, 89\d{6}\)",
         ),
-        "more than it claims to be": (
-            claiming(zipped({"header": bytes(300_000_000)}), 1000),
-            "is not a vdet model, or is damaged",
-        ),
-        "packed in another way": (
-            claiming(file.getvalue(), 1000),
-            "is not a vdet model, or is damaged",
-        ),
-        "a header like a book": (
-            zipped(members('{"a": ' * 100_000)),
-            "is not a vdet model, or is damaged",
-        ),
+        "a header like a book": (zipped(members('{"a": ' * 100_000)), damaged),
     }
 
 

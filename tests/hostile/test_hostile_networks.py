@@ -12,7 +12,7 @@ from onnx import TensorProto, helper, numpy_helper
 
 from detect.onnx.graphs import write_graph
 from hostile.mutations import mutated
-from hostile.trials import broken_promises, try_all
+from hostile.trials import Trial, broken_promises, try_all
 from vdet.detect.onnx.detector import SHIPPED
 
 SECONDS = 20.0
@@ -126,15 +126,17 @@ def noise(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_wicked_networks_are_used_or_refused(tmp_path: Path, noise: Path) -> None:
-    paths = [
-        write(tmp_path / f"{number}.onnx") for number, (write, _) in enumerate(NETWORKS.values())
-    ]
-    trials = try_all(
-        [["detect-image", noise, "--model", path, "--json", "-"] for path in paths],
-        seconds=SECONDS,
-    )
+def try_networks(paths: list[Path], noise: Path) -> list[Trial]:
+    runs = [("detect-image", noise, "--model", path, "--json", "-") for path in paths]
+    trials = try_all(runs, seconds=SECONDS)
     assert broken_promises(trials) == []
+    return trials
+
+
+def test_wicked_networks_are_used_or_refused(tmp_path: Path, noise: Path) -> None:
+    writers = enumerate(NETWORKS.values())
+    paths = [write(tmp_path / f"{number}.onnx") for number, (write, _) in writers]
+    trials = try_networks(paths, noise)
     for trial, (name, (_, words)) in zip(trials, NETWORKS.items(), strict=True):
         assert trial.code == (1 if words else 0), (name, trial.err)
         assert re.search(words, trial.err), (name, trial.err)
@@ -145,8 +147,4 @@ def test_damaged_networks_are_used_or_refused(tmp_path: Path, noise: Path) -> No
     for number, data in enumerate(mutated(SHIPPED.read_bytes(), seed=1, count=60)):
         paths.append(tmp_path / f"{number}.onnx")
         paths[-1].write_bytes(data)
-    trials = try_all(
-        [["detect-image", noise, "--model", path, "--json", "-"] for path in paths],
-        seconds=SECONDS,
-    )
-    assert broken_promises(trials) == []
+    try_networks(paths, noise)

@@ -6,7 +6,7 @@ from typing import Any
 
 from clips import write_clip
 from hostile.mutations import mutated
-from hostile.trials import Trial, broken_promises, files_in, try_all
+from hostile.trials import Trial, try_files
 from quick import FEW_OPTIONS
 
 CLIPS: dict[str, dict[str, Any]] = {
@@ -22,24 +22,15 @@ SECONDS = 20.0
 
 
 def outcomes(folder: Path, contents: dict[str, bytes]) -> list[Trial]:
-    """Run the program on files of these contents; return the runs, after checks that hold for all.
-
-    Only whole outputs are written, and no input is changed.
-    """
-    inside, out = folder / "in", folder / "out"
-    inside.mkdir()
-    out.mkdir()
-    for name, data in contents.items():
-        (inside / name).write_bytes(data)
-    before = files_in(inside)
-    runs: list[list[str | Path]] = [
-        ["-q", "detect-video", path, out / f"{path.name}.mp4", *FEW_OPTIONS] for path in before
-    ]
-    trials = try_all(runs, seconds=SECONDS)
-    assert broken_promises(trials) == []
-    assert files_in(inside) == before
-    written = {f"{path.name}.mp4" for path, t in zip(before, trials, strict=True) if t.code == 0}
-    assert {path.name for path in out.iterdir()} == written
+    """Run the program on files of these contents; only whole outputs are written."""
+    trials = try_files(
+        folder,
+        contents,
+        lambda path, out: ["-q", "detect-video", path, out / f"{path.name}.mp4", *FEW_OPTIONS],
+        seconds=SECONDS,
+    )
+    written = {f"{name}.mp4" for name, t in zip(contents, trials, strict=True) if t.code == 0}
+    assert {path.name for path in (folder / "out").iterdir()} == written
     return trials
 
 

@@ -13,7 +13,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import FrameType
@@ -51,6 +51,33 @@ def try_all(runs: Sequence[Sequence[str | Path]], *, seconds: float) -> list[Tri
     assert done.returncode == 0, f"the process died ({done.returncode}): {done.stderr[-2000:]}"
     records = [json.loads(line) for line in done.stdout.splitlines()]
     return [Trial(**{**record, "arguments": tuple(record["arguments"])}) for record in records]
+
+
+def try_files(
+    folder: Path,
+    contents: Mapping[str, bytes],
+    arguments: Callable[[Path, Path], Sequence[str | Path]],
+    *,
+    seconds: float,
+    lines: int = 1,
+) -> list[Trial]:
+    """Run the program on files of these contents; return the runs, after checks that hold for all.
+
+    `arguments` returns those for a file and the folder of outputs. No promise is broken, no input
+    is changed, and nothing is written elsewhere.
+    """
+    inside, out = folder / "in", folder / "out"
+    inside.mkdir(parents=True)
+    out.mkdir()
+    for name, data in contents.items():
+        (inside / name).write_bytes(data)
+    others = {path.parent for path in folder.rglob("*")}
+    runs = [arguments(inside / name, out) for name in contents]
+    trials = try_all(runs, seconds=seconds)
+    assert broken_promises(trials, lines=lines) == []
+    assert files_in(inside) == {inside / name: data for name, data in contents.items()}
+    assert {path.parent for path in folder.rglob("*")} <= others | {out}
+    return trials
 
 
 def broken_promises(trials: Sequence[Trial], *, lines: int = 1) -> list[str]:

@@ -45,12 +45,11 @@ def box(*sides: float) -> Tensor:
     return torch.tensor([sides], dtype=torch.float32)
 
 
-class TestLosses:
-    def test_overlaps_of_boxes_that_share_a_third_and_of_boxes_apart(self) -> None:
-        assert paired_iou(box(0, 0, 2, 2), box(1, 0, 3, 2)).item() == pytest.approx(1 / 3)
-        assert giou(box(0, 0, 2, 2), box(1, 0, 3, 2)).item() == pytest.approx(1 / 3)
-        # Union 2, smallest box around both 3: 0 - 1/3.
-        assert giou(box(0, 0, 1, 1), box(2, 0, 3, 1)).item() == pytest.approx(-1 / 3)
+def test_overlaps_of_boxes_that_share_a_third_and_of_boxes_apart() -> None:
+    assert paired_iou(box(0, 0, 2, 2), box(1, 0, 3, 2)).item() == pytest.approx(1 / 3)
+    assert giou(box(0, 0, 2, 2), box(1, 0, 3, 2)).item() == pytest.approx(1 / 3)
+    # Union 2, smallest box around both 3: 0 - 1/3.
+    assert giou(box(0, 0, 1, 1), box(2, 0, 3, 1)).item() == pytest.approx(-1 / 3)
 
 
 class TestAssignment:

@@ -32,14 +32,12 @@ def write_set(folder: Path, form: str = "COCO", *boxes: Boxed) -> Path:
 @pytest.mark.parametrize("form", WRITERS)
 def test_it_learns_from_pictures_labelled_in_each_form(run: Run, tmp_path: Path, form: str) -> None:
     folder, output = write_set(tmp_path / "my_set", form), tmp_path / "net.onnx"
-    result = run("train-net", folder, "-o", output, *QUICK)
-    assert result.code == 0, result.err
+    result = run("train-net", folder, "-o", output, *QUICK, code=0)
     assert result.out.splitlines()[0] == "my_set: 2 images; 2 car"
     assert trained_on(output) == ("my_set",)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["my_set", "net.onnx"]
     picture = next(folder.rglob("a.png"))
-    found = run("detect-image", picture, "-c", "net", "--model", output, "--json", "-")
-    assert found.code == 0, found.err
+    run("detect-image", picture, "-c", "net", "--model", output, "--json", "-", code=0)
 
 
 def test_a_network_that_is_there_is_kept_unless_it_may_be_replaced(
@@ -50,7 +48,7 @@ def test_a_network_that_is_there_is_kept_unless_it_may_be_replaced(
     refused = run("train-net", folder, "-o", output, *QUICK)
     assert refused.code == 1
     assert output.read_text() == "mine"
-    assert run("train-net", folder, "-o", output, *QUICK, "--overwrite").code == 0
+    run("train-net", folder, "-o", output, *QUICK, "--overwrite", code=0)
     assert output.stat().st_size > 100_000
 
 
@@ -74,10 +72,9 @@ def test_a_training_that_was_stopped_before_its_end_is_written_without_a_step(
 
 def test_a_network_has_learnt_from_the_sets_of_its_base_too(run: Run, tmp_path: Path) -> None:
     base, output = tmp_path / "base.onnx", tmp_path / "net.onnx"
-    assert run("train-net", write_set(tmp_path / "one"), "-o", base, *QUICK).code == 0
+    run("train-net", write_set(tmp_path / "one"), "-o", base, *QUICK, code=0)
     command = ("train-net", write_set(tmp_path / "two"), "-o", output, *QUICK)
-    result = run(*command, "--base", base)
-    assert result.code == 0, result.err
+    run(*command, "--base", base, code=0)
     assert trained_on(output) == ("two", "one")
 
 
@@ -104,8 +101,7 @@ def test_it_says_what_becomes_of_each_label(run: Run, tmp_path: Path) -> None:
     ]
     labels.write_text(json.dumps(document), encoding="utf-8")
     classes = ("--set", 'train.net.classes=["car","bicycle","bus"]')
-    result = run("train-net", pictures, "-o", tmp_path / "net.onnx", *QUICK, *classes)
-    assert result.code == 0, result.err
+    result = run("train-net", pictures, "-o", tmp_path / "net.onnx", *QUICK, *classes, code=0)
     assert result.out.splitlines()[:4] == [
         "set: 1 image; 2 car, 1 bus, 1 vehicle",
         "  not labelled, so not background: bicycle",
