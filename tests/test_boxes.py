@@ -147,11 +147,7 @@ class TestBoxes:
         ],
     )
     def test_what_cannot_be_is_refused(self, changes: dict[str, Any], message: str) -> None:
-        given: dict[str, Any] = {
-            "sides": SIDES,
-            "scores": SCORES,
-            "names": ("car", "lorry"),
-        } | changes
+        given: dict[str, Any] = {"sides": SIDES, "scores": SCORES, "names": ("car", "lorry")}
         with pytest.raises(ValueError, match=f"^{message}"):
             Boxes(**given | changes)
 

@@ -14,6 +14,7 @@ from doc_pages import blocks
 from labels.writers import Boxed, Labelled, show, write_coco
 from red_cars import CAR, HEIGHT, WIDTH, car_at, drive
 from running import frames_of, write_drive
+from vdet.boxes import Box
 from vdet.config.schema import Settings
 from vdet.media.images import write_image
 from vdet.testing import check_detector, check_sink, check_tracker
@@ -93,13 +94,7 @@ def test_the_detector_and_the_sink_run_through_detect_image(package: Path, tmp_p
     )
     (item,) = json.loads(boxes.read_text())
     (box,) = item["boxes"]
-    car = car_at(0)
-    assert (box["x"], box["y"], box["width"], box["height"]) == (
-        car.x1,
-        car.y1,
-        car.width,
-        car.height,
-    )
+    assert Box.sized(*(box[side] for side in ("x", "y", "width", "height"))) == car_at(0)
     assert box["score"] == pytest.approx(0.9)
     assert tally.read_text() == "0 1\n"
 

@@ -77,20 +77,6 @@ def test_what_appears_during_the_run_is_kept(
     assert path.is_symlink() or path.read_text() == ("theirs" if kind == "file" else "")
 
 
-def test_of_three_runs_to_one_output_one_succeeds(tmp_path: Path) -> None:
-    path = tmp_path / "out.txt"
-    runs = [OutputFiles() for _ in range(3)]
-    for number, files in enumerate(runs):
-        files.stage(path).write_text(str(number))
-    with runs[1]:
-        pass
-    for files in (runs[0], runs[2]):
-        with pytest.raises(OutputError, match="appeared during"), files:
-            pass
-    assert path.read_text() == "1"
-    assert names(tmp_path) == ["out.txt"]
-
-
 def test_a_link_is_replaced_and_not_what_it_leads_to(tmp_path: Path) -> None:
     (tmp_path / "precious").write_text("precious")
     (tmp_path / "out.txt").symlink_to("precious")

@@ -38,21 +38,14 @@ def test_both_trackers_pass(settings: MotionTrackerSettings | RulesTrackerSettin
 
 
 @pytest.mark.parametrize(
-    ("name", "file"),
+    "output",
     [
-        ("video", "out.mp4"),
-        ("tracks", "out.csv"),
-        ("stages", "stages"),
-        ("picture", "out.png"),
-        ("json", "out.json"),
-        ("vehicles", "out.json"),
-        ("crops", "crops"),
-        ("page", "page"),
-        ("counts", "out.csv"),
-        ("counts", "out.json"),
+        *("video=out.mp4", "tracks=out.csv", "stages=stages", "picture=out.png", "json=out.json"),
+        *("vehicles=out.json", "crops=crops", "page=page", "counts=out.csv", "counts=out.json"),
     ],
 )
-def test_every_sink_passes(name: str, file: str, tmp_path: Path) -> None:
+def test_every_sink_passes(output: str, tmp_path: Path) -> None:
+    name, _, file = output.partition("=")
     lines = ["traffic.lines=[{name: a, start: [0, 0.5], end: [1, 1]}]"]
     settings = load_settings((), lines if name == "counts" else [])
     check_sink(sink_kind(name), tmp_path / file, settings, still=name == "picture")

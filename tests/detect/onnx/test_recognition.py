@@ -175,14 +175,10 @@ def test_only_the_classes_that_are_asked_for_count(tmp_path: Path) -> None:
         assert class_names(found) == expected
 
 
-def test_a_network_of_one_class_without_a_name_finds_vehicles(tmp_path: Path) -> None:
-    form = ultralytics(SIZE, RedBox(64, 32, 16, 8), 1)
-    path = write_network(tmp_path / "net.onnx", form, SIZE, (64, 32))
-    found = detect(path, frame_with_red(128, 128))
-    assert class_names(found) == ["vehicle"]
-
-
-def test_names_can_be_given(tmp_path: Path) -> None:
+def test_names_can_be_given_and_one_class_without_a_name_is_of_vehicles(tmp_path: Path) -> None:
+    nameless = ultralytics(SIZE, RedBox(64, 32, 16, 8), 1)
+    path = write_network(tmp_path / "one.onnx", nameless, SIZE, (64, 32))
+    assert class_names(detect(path, frame_with_red(128, 128))) == ["vehicle"]
     form = ultralytics(SIZE, RedBox(64, 32, 16, 8, 1), 2)
     path = write_network(tmp_path / "net.onnx", form, SIZE, (64, 32))
     with pytest.raises(ModelError, match=r"does not name its 2 classes; set detector\.class_names"):
