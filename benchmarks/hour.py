@@ -31,7 +31,7 @@ def seconds_of_count(folder: Path, suffix: str) -> float:
     tracks, lines = folder / f"hour{suffix}", folder / "lines.yaml"
     write_hour(tracks)
     lines.write_text(_lines(), encoding="utf-8")
-    command = [sys.executable, "-m", "vdet", "--quiet", "count", str(tracks), "--lines", str(lines)]
+    command = [sys.executable, "-m", "vdet", "--quiet", "count", str(tracks), "-c", str(lines)]
     before = os.times()
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     user, system = (b - a for a, b in zip(before[2:4], os.times()[2:4], strict=True))
@@ -42,10 +42,11 @@ def _lines() -> str:
     rows = [((100, y), (1180, y + 20)) for y in (300, 350, 400, 470, 560)]
     columns = [((x, 200), (x + 20, 700)) for x in (200, 400, 640, 850, 1080)]
     lines = [
-        f"  - {{name: line {number}, start: {list(start)}, end: {list(end)}}}\n"
+        f"    - {{name: line {number}, start: {list(start)}, end: {list(end)}}}\n"
         for number, (start, end) in enumerate(rows + columns)
     ]
-    return f"size: [{WIDTH}, {HEIGHT}]\nlines:\n" + "".join(lines)
+    camera = f"camera: {{size: [{WIDTH}, {HEIGHT}]}}\n"
+    return camera + "traffic:\n  lines:\n" + "".join(lines)
 
 
 def write_hour(path: Path, seed: int = 0) -> None:

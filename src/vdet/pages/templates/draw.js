@@ -9,9 +9,10 @@ const MIN_BAND = 0.003; // of the frame's height
 const AT_EDGE = 0.002; // of the frame's side: points so near to the edge lie on it
 const MAX_AT_EDGE = 0.005;
 const INSIDE = 0.01; // pixels
+const STRIDE = 16; // rows of a path that have one box
 
 const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
-const sidesOf = corners => corners.map((corner, i) => [corners.at(i - 1), corner]);
+const segmentsOf = corners => corners.map((corner, i) => [corners.at(i - 1), corner]);
 
 /** Return where the way from a to b meets the segment from c to d, from 0 to 1, or null. */
 function meeting([ax, ay], [bx, by], [[cx, cy], [dx, dy]]) {
@@ -23,20 +24,15 @@ function meeting([ax, ay], [bx, by], [[cx, cy], [dx, dy]]) {
   return along >= 0 && along <= 1 && across >= 0 && across <= 1 ? along : null;
 }
 
-/** Return whether a point lies in a polygon, given its sides. */
-function isInside(sides, x, y) {
-  let inside = false;
-  for (const side of sides) {
-    const a = side[0], b = side[1];
-    if ((a[1] > y) !== (b[1] > y) && x < a[0] + (y - a[1]) * ((b[0] - a[0]) / (b[1] - a[1]))) inside = !inside;
-  }
-  return inside;
+/** Return a side of a polygon, or a line, as numbers: its ends, the way from one to the other, and its box. */
+function edgeOf([[ax, ay], [bx, by]]) {
+  const [left, top, right, bottom] = boundsOf([[ax, ay], [bx, by]]), wx = bx - ax, wy = by - ay;
+  return { ax, ay, by, wx, wy, slope: wx / wy, square: wx * wx + wy * wy, left, top, right, bottom };
 }
 
-function distanceTo(segment, x, y) {
-  const a = segment[0], b = segment[1], wx = b[0] - a[0], wy = b[1] - a[1];
-  const at = clamp(((x - a[0]) * wx + (y - a[1]) * wy) / (wx * wx + wy * wy), 0, 1);
-  const dx = x - a[0] - at * wx, dy = y - a[1] - at * wy;
+function distanceTo(side, x, y) {
+  const at = clamp(((x - side.ax) * side.wx + (y - side.ay) * side.wy) / side.square, 0, 1);
+  const dx = x - side.ax - at * side.wx, dy = y - side.ay - at * side.wy;
   return Math.sqrt(dx * dx + dy * dy); // Math.hypot is ten times as slow
 }
 
@@ -60,114 +56,151 @@ function placeLine(line, size) {
   const dx = -wx * (size[0] + size[1]) / length, dy = -wy * (size[0] + size[1]) / length;
   const atEdge = point => point.some((value, i) => value === 0 || value === size[i]);
   const reach = [atEdge(start) ? [start[0] - dx, start[1] - dy] : start, atEdge(end) ? [ax + dx, ay + dy] : end];
+  const distance = (x, y) => (wx * (y - ay) - wy * (x - ax)) / length;
   return {
-    isZone: false, name: line.name, directions: [line.left, line.right], start, end, length, size,
-    bounds: boundsOf(reach),
-    distance: (x, y) => (wx * (y - ay) - wy * (x - ax)) / length,
+    isZone: false, name: line.name, directions: [line.left, line.right], start, end, length, size, edge: edgeOf([start, end]),
+    isPositive: (x, y) => distance(x, y) >= 0,
+    away: (x, y) => Math.abs(distance(x, y)),
+    cuts: ([left, top, right, bottom]) => Math.abs(distance((left + right) / 2, (top + bottom) / 2)) <=
+      INSIDE + (Math.abs(wx) * (bottom - top) + Math.abs(wy) * (right - left)) / (2 * length),
     meeting: (a, b) => meeting(a, b, reach),
   };
 }
 
 /** Place a zone, whose positive side is the inside; at the frame's edge it goes on beyond. */
 function placeZone(zone, size) {
-  const corners = zone.points.map(point => snapped(point, size)), bounds = boundsOf(corners);
-  const every = sidesOf(corners), isAtEdge = ([a, b], i) => a[i] === b[i] && (a[i] === 0 || a[i] === size[i]);
-  const sides = every.filter(side => !isAtEdge(side, 0) && !isAtEdge(side, 1));
-  const right = size[0] - INSIDE, bottom = size[1] - INSIDE;
+  const corners = zone.points.map(point => snapped(point, size));
+  const isAtEdge = ([a, b], i) => a[i] === b[i] && (a[i] === 0 || a[i] === size[i]);
+  const segments = segmentsOf(corners).filter(segment => !isAtEdge(segment, 0) && !isAtEdge(segment, 1));
+  const [right, bottom] = size.map(side => side - INSIDE), sides = segments.map(edgeOf);
   const inFrame = ([x, y]) => [clamp(x, INSIDE, right), clamp(y, INSIDE, bottom)];
   return {
-    isZone: true, name: zone.name, directions: ["enter", "exit", "appear", "vanish"], corners, size, bounds,
-    distance(x, y, height) {
-      x = clamp(x, INSIDE, right);
-      y = clamp(y, INSIDE, bottom);
-      const away = Math.max(bounds[0] - x, x - bounds[2], bounds[1] - y, y - bounds[3]);
-      let distance = Infinity;
-      if (away > height + 10) return -away; // the rule asks no more than whether it is that far
-      for (const side of sides) distance = Math.min(distance, distanceTo(side, x, y));
-      return isInside(every, x, y) ? distance : -distance;
-    },
+    isZone: true, name: zone.name, directions: ["enter", "exit", "appear", "vanish"], corners, size,
+    ...polygonOf(corners, INSIDE, right, bottom),
+    away: (x, y) => sides.reduce((least, side) =>
+      Math.min(least, distanceTo(side, clamp(x, INSIDE, right), clamp(y, INSIDE, bottom))), Infinity),
     meeting(a, b) {
-      const met = sides.map(side => meeting(inFrame(a), inFrame(b), side)).filter(share => share !== null);
+      const met = segments.map(segment => meeting(inFrame(a), inFrame(b), segment)).filter(share => share !== null);
       return met.length ? Math.max(...met) : 1;
     },
   };
 }
 
-/** Return whether a path comes near a border at all; most paths do not. */
-function mayMeet(path, border) {
-  const [left, top, right, bottom] = border.bounds, [width, height] = border.size;
-  let [x1, y1, x2, y2] = path.bounds ??= boundsOf(Array.from(path.xs, (x, i) => [x, path.ys[i]]));
-  if (border.isZone) {
-    [x1, x2] = [x1, x2].map(x => clamp(x, 0, width));
-    [y1, y2] = [y1, y2].map(y => clamp(y, 0, height));
-  }
-  return x1 <= right && x2 >= left && y1 <= bottom && y2 >= top;
+/** Return what tells which points lie in a polygon, and which boxes its sides cut; those outside the frame are moved in. */
+function polygonOf(corners, low, right, bottom) {
+  const sides = segmentsOf(corners).map(edgeOf);
+  return {
+    isPositive(x, y) {
+      x = clamp(x, low, right);
+      y = clamp(y, low, bottom);
+      let inside = false;
+      for (const side of sides) {
+        if ((side.ay > y) !== (side.by > y) && x < side.ax + (y - side.ay) * side.slope) inside = !inside;
+        if (x >= side.left && x <= side.right && y >= side.top && y <= side.bottom && distanceTo(side, x, y) === 0) return true;
+      }
+      return inside;
+    },
+    cuts(box) {
+      const left = clamp(box[0], low, right), top = clamp(box[1], low, bottom);
+      const width = clamp(box[2], low, right) - left, height = clamp(box[3], low, bottom) - top;
+      return sides.some(side =>
+        side.left <= left + width && side.right >= left && side.top <= top + height && side.bottom >= top &&
+        2 * Math.abs(side.wx * (top + height / 2 - side.ay) - side.wy * (left + width / 2 - side.ax)) <=
+        Math.abs(side.wx) * (height + INSIDE) + Math.abs(side.wy) * (width + INSIDE));
+    },
+  };
 }
 
-/** Return what a vehicle does at a border, in order: time, row, direction, and for a zone seconds. */
+/** Add boxes to a path, each around STRIDE rows and the row after them: left, top, right, bottom. */
+function withBoxes(path) {
+  const boxes = [];
+  for (let row = 0; row < path.xs.length - 1; row += STRIDE) {
+    const xs = path.xs.slice(row, row + STRIDE + 1), ys = path.ys.slice(row, row + STRIDE + 1);
+    boxes.push([Math.min(...xs), Math.min(...ys), Math.max(...xs), Math.max(...ys)]);
+  }
+  return { ...path, boxes };
+}
+
+/** Return the rows of a path before which it changes the side of a border; most boxes tell that it cannot. */
+function turnsOf({ xs, ys, boxes }, border) {
+  const turns = [];
+  for (let first = 0; first < xs.length - 1; first += STRIDE) {
+    if (!border.cuts(boxes[first / STRIDE])) continue;
+    let before = border.isPositive(xs[first], ys[first]);
+    for (let row = first + 1; row <= first + STRIDE && row < xs.length; row++) {
+      const side = border.isPositive(xs[row], ys[row]);
+      if (side !== before) turns.push(row);
+      before = side;
+    }
+  }
+  return turns;
+}
+
+/** Return what a vehicle does at a border, in order: time, row, direction. */
 function crossings(path, border) {
-  if (!mayMeet(path, border)) return [];
-  const found = changes(path, border);
-  if (!border.isZone || !found.length) return found;
-  for (let i = 1; i < found.length; i++)
-    if (found[i].direction === "exit") found[i].seconds = found[i].time - found[i - 1].time;
-  const last = path.seen - 1, final = found.at(-1);
-  if (final.direction !== "exit") {
-    const time = Math.max(path.times[last], final.time); // it may enter where it drives on
-    found.push({ time, row: last, direction: "vanish", seconds: time - final.time });
-  }
-  return found;
-}
-
-/** Return the changes of the settled side, and where it begins in a zone. */
-function changes(path, border) {
-  const { times, xs, ys, heights } = path, count = times.length, found = [];
-  const distances = new Float64Array(count), isPositive = row => distances[row] >= 0;
-  let turns = 0;
-  for (let row = 0; row < count; row++) {
-    distances[row] = border.distance(xs[row], ys[row], heights[row]);
-    if (row && isPositive(row) !== isPositive(row - 1)) turns++;
-  }
-  if (!turns && !(border.isZone && isPositive(0))) return found;
-  const { settles, isClear } = settle(path, border, distances);
+  const { times, xs, ys } = path, ends = turnsOf(path, border), begins = border.isPositive(xs[0], ys[0]), found = [];
+  if (!ends.length && !(border.isZone && begins)) return found; // as for most paths
+  ends.push(times.length);
   let settled = null, crossed = null; // the side, and where it crossed last
-  for (let row = 0, end; row < count; row = end) {
-    const side = isPositive(row), rows = [];
-    for (end = row; end < count && isPositive(end) === side; end++) if (settles[end]) rows.push(end);
-    if (!rows.length || settled === side) continue;
-    if (settled !== null) {
+  for (let i = 0; i < ends.length; i++) {
+    const row = ends[i - 1] ?? 0, side = begins === (i % 2 === 0);
+    if (side === settled) continue;
+    if (settled === null) {
+      if (!settles(path, border, row, ends[i], Infinity)) continue;
+      if (side && border.isZone) found.push({ time: times[0], row: 0, direction: "appear" });
+    } else {
       const a = [xs[row - 1], ys[row - 1]], b = [xs[row], ys[row]];
       const share = border.meeting(a, b), along = share ?? 1;
-      const place = [0, 1].map(i => a[i] + along * (b[i] - a[i]));
+      const place = [a[0] + along * (b[0] - a[0]), a[1] + along * (b[1] - a[1])];
       const way = crossed ? Math.hypot(crossed[0] - place[0], crossed[1] - place[1]) : Infinity;
-      if (!rows.some(each => isClear[each] || heights[each] <= way)) continue; // back, but not far
+      if (!settles(path, border, row, ends[i], way)) continue; // back, but not far
       crossed = share === null ? null : place;
       const time = times[row - 1] + along * (times[row] - times[row - 1]);
       if (share !== null) found.push({ time, row: share ? row : row - 1, direction: border.directions[side ? 0 : 1] });
-    } else if (side && border.isZone) {
-      found.push({ time: times[0], row: 0, direction: "appear" });
     }
     settled = side;
   }
+  const last = path.seen - 1;
+  if (border.isZone && settled) // it may enter where it drives on
+    found.push({ time: Math.max(times[last], found.at(-1).time), row: last, direction: "vanish" });
   return found;
 }
 
-/** Return the rows that settle the side, and those one height of the box away from the border. */
-function settle({ times, heights }, border, distances) {
-  const count = distances.length, settles = new Uint8Array(count), isClear = new Uint8Array(count);
+/** Return whether rows on one side of a border settle it: one height of the box away, or after a long enough `way`. */
+function settles({ times, xs, ys, heights }, border, first, end, way) {
   let since = 0, wasOff = false, wasFar = false;
-  for (let row = 0; row < count; row++) {
-    const away = Math.abs(distances[row]);
-    const isOff = away > Math.max(BAND * heights[row], MIN_BAND * border.size[1]);
-    const isFar = isOff && away >= heights[row];
-    const isSame = row > 0 && (distances[row] >= 0) === (distances[row - 1] >= 0);
-    if (!(isOff && wasOff && isSame)) since = times[row];
-    const far = wasFar && isSame, seconds = Math.round(1e4 * (times[row] - since)) / 1e4;
-    settles[row] = far || (isOff && seconds >= SETTLED) || (row === count - 1 && isFar);
-    isClear[row] = isFar || far;
+  for (let row = first; row < end; row++) {
+    const height = heights[row], away = border.away(xs[row], ys[row]);
+    const isOff = away > Math.max(BAND * height, MIN_BAND * border.size[1]), isFar = isOff && away >= height;
+    if (!isOff || !wasOff) since = times[row];
+    const isLong = isOff && Math.round(1e4 * (times[row] - since)) / 1e4 >= SETTLED;
+    const isSettled = wasFar || isLong || (isFar && row === times.length - 1);
+    if (isSettled && (isFar || wasFar || height <= way)) return true;
     [wasOff, wasFar] = [isOff, isFar];
   }
-  return { settles, isClear };
+  return false;
+}
+
+/** Return the parts of paths inside the regions; paths of which nothing is left are gone. */
+function inRegions(paths, regions, [width, height]) {
+  const polygons = regions.map(each =>
+    ({ value: each.kind === "exclude" ? 0 : 1, ...polygonOf(each.points, 0, width - 1, height - 1) }));
+  polygons.sort((a, b) => b.value - a.value); // what is excluded is so in any region
+  const isOpen = polygons.every(polygon => !polygon.value);
+  return paths.map(path => {
+    const rows = new Uint8Array(path.xs.length).fill(isOpen);
+    for (const polygon of polygons) {
+      let from = 0, isInside = polygon.isPositive(path.xs[0], path.ys[0]);
+      for (const end of [...turnsOf(path, polygon), rows.length]) {
+        if (isInside) rows.fill(polygon.value, from, end);
+        [from, isInside] = [end, !isInside];
+      }
+    }
+    if (!rows.includes(0)) return path;
+    const kept = path.times.map((_, row) => row).filter(row => rows[row]), seen = kept.filter(row => row < path.seen).length;
+    const [times, xs, ys, heights] = [path.times, path.xs, path.ys, path.heights].map(values => kept.map(row => values[row]));
+    return seen && withBoxes({ ...path, seen, times, xs, ys, heights });
+  }).filter(path => path);
 }
 
 // ---------------------------------------------------------------- what follows from crossings
@@ -179,7 +212,7 @@ function warningsOf(line, visits, paths, span) {
   const crossed = new Set(visits.map(([path]) => path)), few = FEW * visits.length;
   const isMissed = path => !crossed.has(path) && [0, path.seen - 1].some(row =>
     path.times[row] > span[0] && path.times[row] < span[1] &&
-    distanceTo([line.start, line.end], path.xs[row], path.ys[row]) <= NEAR * path.heights[row]);
+    distanceTo(line.edge, path.xs[row], path.ys[row]) <= NEAR * path.heights[row]);
   const missed = paths.filter(isMissed).length, again = visits.filter(([, some]) => some.length > 1).length;
   const heights = visits.flatMap(([path, some]) => some.map(each => path.heights[each.row]));
   return [
@@ -213,26 +246,17 @@ function flowsOf(found) {
 }
 
 // ---------------------------------------------------------------- the road plane
-/** Solve a system of linear equations by Gaussian elimination; null where it has no solution. */
+/** Solve normal equations by Gaussian elimination; null where they have no solution. */
 function solve(rows, values) {
   const size = rows.length, table = rows.map((row, i) => [...row, values[i]]);
   for (let column = 0; column < size; column++) {
-    const best = table.reduce((best, row, at) =>
-      at > column && Math.abs(row[column]) > Math.abs(table[best][column]) ? at : best, column);
-    [table[column], table[best]] = [table[best], table[column]];
-    if (Math.abs(table[column][column]) < 1e-12) return null;
+    if (table[column][column] < 1e-12) return null;
     for (let row = 0; row < size; row++) {
       const factor = row === column ? 0 : table[row][column] / table[column][column];
       for (let at = column; factor && at <= size; at++) table[row][at] -= factor * table[column][at];
     }
   }
   return table.map((row, i) => row[size] / row[i]);
-}
-
-function inverse(h) {
-  const [a, b, c, d, e, f, g, i, j] = h;
-  return [e * j - f * i, c * i - b * j, b * f - c * e, f * g - d * j, a * j - c * g, c * d - a * f,
-    d * i - e * g, b * g - a * i, a * e - b * d];
 }
 
 /** Move and scale points so that they lie around 0 at a distance of about 1. */
@@ -242,33 +266,30 @@ function normalized(points) {
   return { middle, scale, points: points.map(point => point.map((value, i) => (value - middle[i]) / scale)) };
 }
 
-/** Fit the road plane to points (Hartley and Zisserman, ch. 4); null where they do not fix one. */
-function fitGround(points) {
-  if (points.length < 4) return null;
-  const pixels = normalized(points.map(each => each.pixel)), metres = normalized(points.map(each => each.metres));
-  const equations = points.flatMap((_, n) => {
-    const [x, y] = metres.points[n], [u, v] = pixels.points[n];
+/** Return the homography from some points to others (Hartley and Zisserman, ch. 4); null where they do not fix one. */
+function homography(from, to) {
+  const source = normalized(from), target = normalized(to);
+  const equations = source.points.flatMap(([x, y], n) => {
+    const [u, v] = target.points[n];
     return [[[x, y, 1, 0, 0, 0, -u * x, -u * y], u], [[0, 0, 0, x, y, 1, -v * x, -v * y], v]];
   });
   const sum = (i, j) => equations.reduce((total, [row, value]) => total + row[i] * (j < 8 ? row[j] : value), 0);
   const rows = Array.from({ length: 8 }, (_, i) => Array.from({ length: 8 }, (_, j) => sum(i, j)));
   const h = solve(rows, rows.map((_, i) => sum(i, 8)));
-  if (!h) return null;
-  const toPixels = oriented([...h, 1], metres.points), toMetres = oriented(inverse([...h, 1]), pixels.points);
-  if (!toPixels || !toMetres) return null;
-  const via = (from, matrix, to) => point => { // null for what would be behind the camera
-    const [x, y] = point.map((value, i) => (value - from.middle[i]) / from.scale);
-    const [u, v, depth] = [0, 3, 6].map(i => matrix[i] * x + matrix[i + 1] * y + matrix[i + 2]);
-    return depth > 1e-9 ? [u, v].map((value, i) => to.middle[i] + to.scale * value / depth) : null;
+  const map = point => { // null for what would be behind the camera
+    const [x, y] = point.map((value, i) => (value - source.middle[i]) / source.scale);
+    const depth = h[6] * x + h[7] * y + 1;
+    return depth > 1e-9 ? [0, 1].map(i => target.middle[i] +
+      target.scale * (h[3 * i] * x + h[3 * i + 1] * y + h[3 * i + 2]) / depth) : null;
   };
-  return { toMetres: via(pixels, toMetres, metres), toPixels: via(metres, toPixels, pixels) };
+  return h && from.every(map) ? map : null;
 }
 
-/** Return a homography with positive depths at points; null where the horizon is between them. */
-function oriented(h, points) {
-  const signs = new Set(points.map(([x, y]) => Math.sign(h[6] * x + h[7] * y + h[8])));
-  const [sign] = signs;
-  return signs.size === 1 && sign ? h.map(value => sign * value) : null;
+/** Fit the road plane to points; null where they do not fix one. */
+function fitGround(points) {
+  const pixels = points.map(each => each.pixel), metres = points.map(each => each.metres);
+  const [toMetres, toPixels] = points.length < 4 ? [] : [homography(pixels, metres), homography(metres, pixels)];
+  return toMetres && toPixels ? { toMetres, toPixels } : null;
 }
 
 /** Return points of the plane from two lengths along a straight lane, each from near to far; null where they do not
@@ -373,7 +394,7 @@ function problemsOf({ lines, zones, regions, ground }, size) {
 }
 
 function crossesItself(corners) {
-  const sides = sidesOf(corners);
+  const sides = segmentsOf(corners);
   return sides.some((side, i) => sides.some((other, j) =>
     j > i + 1 && !(i === 0 && j === sides.length - 1) && meeting(...side, other) !== null));
 }
@@ -388,15 +409,15 @@ async function readPaths(packed) {
   return packed.vehicles.map(([vehicle, kind, start, seen, length]) => {
     const [times, xs, ys, heights] = [0, 1, 2, 3].map(column => {
       let at = column * count / 4 + first, step = 0, value = 0;
-      return Float64Array.from({ length }, () => {
+      return Array.from({ length }, () => {
         step += planes[at] | planes[count + at] << 8 | planes[2 * count + at] << 16 | planes[3 * count + at] << 24;
         at++;
         return value += step;
       });
     });
     first += length;
-    return { vehicle, kind, seen, heights, times: times.map(time => Math.round(1e6 * start + time) / 1e6),
-      xs: xs.map(x => x / 100), ys: ys.map(y => y / 100) };
+    return withBoxes({ vehicle, kind, seen, heights, times: times.map(time => Math.round(1e6 * start + time) / 1e6),
+      xs: xs.map(x => x / 100), ys: ys.map(y => y / 100) });
   });
 }
 
@@ -430,7 +451,7 @@ async function openPage(data) {
   let tool = "select", selected = null; // what is selected: kind, index, and the number of a point
   let drawn = [], pointer = null, drag = null, hovered = null;
   let paths = every, found = []; // those inside the regions, and what they do at each line and zone
-  const known = new Map(); // results by geometry
+  let known = new Map(); // what was last found, by geometry
 
   const unit = () => width / Math.max(1, stage.clientWidth); // pixels of the frame in one of the screen
   const item = () => selected && places[selected.kind][selected.index];
@@ -490,47 +511,26 @@ async function openPage(data) {
 
   // ------------------------------------------------ counts
   function recount() {
-    const regions = places.regions.filter(each => each.points);
-    const visits = (key, work) => {
-      if (known.size > 50) known.clear();
-      if (!known.has(key)) known.set(key, work());
-      return known.get(key);
-    };
+    const regions = places.regions.filter(each => each.points), before = known;
+    known = new Map(); // only what has changed is counted again
+    const remembered = (key, work) => known.set(key, before.get(key) ?? work()).get(key);
     const area = JSON.stringify(regions.map(each => [each.kind, each.points]));
-    paths = visits(area, () => every.map(path => within(path, regions)).filter(path => path));
+    paths = remembered(area, () => inRegions(every, regions, size));
     found = [...places.lines.map(each => placeLine(each, size)), ...places.zones.map(each => placeZone(each, size))]
       .map(border => {
         const key = area + JSON.stringify([border.start, border.end, border.corners, border.directions]);
         const find = () => paths.map(path => [path, crossings(path, border)]).filter(([, some]) => some.length);
-        return { border, visits: visits(key, find) };
+        return { border, visits: remembered(key, find) };
       });
-  }
-
-  /** Return the part of a path inside the regions; null where nothing is left. */
-  function within(path, regions) {
-    if (!regions.length) return path;
-    const [shown, left] = [false, true].map(isLeft =>
-      regions.filter(each => (each.kind === "exclude") === isLeft).map(each => sidesOf(each.points)));
-    const rows = [...path.times.keys()].filter(row => {
-      const [x, y] = [clamp(path.xs[row], 0, width - 1), clamp(path.ys[row], 0, height - 1)];
-      const has = sides => isInside(sides, x, y);
-      return (!shown.length || shown.some(has)) && !left.some(has);
-    });
-    if (rows.length === path.times.length) return path;
-    const [times, xs, ys, heights] = [path.times, path.xs, path.ys, path.heights].map(values =>
-      Float64Array.from(rows, row => values[row]));
-    const seen = rows.filter(row => row < path.seen).length;
-    return seen && { ...path, bounds: undefined, seen, times, xs, ys, heights };
   }
 
   /** Return how many vehicles go in a direction, and as text how many of each class. */
   function countOf({ visits }, direction) {
-    const counts = {};
+    const counts = new Map();
     for (const [{ kind }, some] of visits)
-      for (const each of some) if (each.direction === direction) counts[kind] = (counts[kind] ?? 0) + 1;
-    const classes = Object.entries(counts).sort(([, a], [, b]) => b - a).map(([kind, count]) => `${count} ${kind}`);
-    const total = Object.values(counts).reduce((sum, count) => sum + count, 0);
-    return { total, classes: hasClasses ? classes.join(", ") : "" };
+      for (const each of some) if (each.direction === direction) counts.set(kind, (counts.get(kind) ?? 0) + 1);
+    const kinds = [...counts].sort(([, a], [, b]) => b - a), total = kinds.reduce((sum, [, count]) => sum + count, 0);
+    return { total, classes: hasClasses ? kinds.map(([kind, count]) => `${count} ${kind}`).join(", ") : "" };
   }
 
   // ------------------------------------------------ what is drawn
@@ -669,22 +669,19 @@ async function openPage(data) {
   }
 
   function showList() {
-    const rows = Object.keys(KINDS).flatMap(kind => places[kind].map((each, index) => {
+    const ground = fitGround(places.ground), rows = Object.keys(KINDS).flatMap(kind => places[kind].map((each, index) => {
       const result = { lines: found[index], zones: found[places.lines.length + index] }[kind];
       const counts = result?.border.directions.map(name => ({ name, ...countOf(result, name) }))
         .filter(({ total }, i) => i < 2 || total)
         .map(({ name, total, classes }) => `${name} ${total}${classes && ` (${classes})`}`).join(" · ");
-      const note = each.metres ? metresOf(each) + errorOf(each) : each.mask ? `mask ${each.mask}` : each.kind ?? "include";
+      const there = each.metres && places.ground.length > 4 && ground?.toMetres(each.pixel);
+      const error = there ? `, off by ${Math.hypot(there[0] - each.metres[0], there[1] - each.metres[1]).toFixed(2)} m` : "";
+      const note = each.metres ? metresOf(each) + error : each.mask ? `mask ${each.mask}` : each.kind ?? "include";
       const choose = () => { selected = { kind, index, point: null }; refresh(); };
       return el("button", { class: "row", "aria-pressed": each === item(), onclick: choose },
         el("b", {}, each.name ?? `ground ${index + 1}`), el("span", {}, counts ?? note));
     }));
     get("list").replaceChildren(...(rows.length ? rows : [el("p", {}, "Nothing drawn yet.")]));
-  }
-
-  function errorOf({ pixel, metres }) {
-    const there = places.ground.length > 4 && fitGround(places.ground)?.toMetres(pixel);
-    return there ? `, off by ${Math.hypot(there[0] - metres[0], there[1] - metres[1]).toFixed(2)} m` : "";
   }
 
   function showResults() {
@@ -729,9 +726,7 @@ async function openPage(data) {
     recount();
     drawMarks();
     showList();
-    if (isDragging) return;
-    showDetails();
-    showResults();
+    if (!isDragging) showDetails(), showResults();
   }
 
   // ------------------------------------------------ pointer and keys
