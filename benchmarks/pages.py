@@ -79,9 +79,7 @@ GRIPS = {
     "a large zone": (300, 500),
     "a region": (60, 600),
 }
-DRAGS = (
-    f"<script>const grips = {json.dumps(GRIPS)};</script>"
-    + """
+DRAGS = """
 <iframe id="hold"></iframe>
 <script>
 get("hold").contentDocument.open(); // the page has loaded when it is closed
@@ -109,12 +107,11 @@ const whole = setInterval(() => {
   if (document.body.dataset.ready !== "yes") return;
   clearInterval(whole);
   const taken = {};
-  for (const [name, from] of Object.entries(grips)) taken[name] = drag(from);
+  for (const [name, from] of Object.entries(GRIPS)) taken[name] = drag(from);
   document.title = JSON.stringify(taken);
   get("hold").contentDocument.close();
 }, 50);
 </script></body>"""
-)
 
 
 def index_page(path: Path, videos: int = 10_000, each: int = 10) -> None:
@@ -194,10 +191,8 @@ def hour_of_paths(vehicles: int = 3000) -> list[VehiclePath]:
         heights = np.rint(np.clip(20 + points[:, 1] / 12, 12, 80))
         name = CLASSES[rng.integers(len(CLASSES))]
         times, empty = first + np.arange(seen) / 12.5, np.zeros(seen)
-        path = VehiclePath(
-            number, name, ((first, number),), seen, times, points, heights, empty, empty
-        )
-        paths.append(path)
+        rows = times, points, heights, empty, empty
+        paths.append(VehiclePath(number, name, ((first, number),), seen, *rows, heights.max()))
     return paths
 
 
@@ -231,8 +226,9 @@ def main() -> None:
                 print(f"  {what}: {taken:.0f} ms")
         page.write_text(draw_page(), "utf-8")
         print(f"drawing of 3,000 vehicles: {page.stat().st_size / 1e6:.1f} MB")
+        acts = DRAGS.replace("GRIPS", json.dumps(GRIPS))
         if shutil.which("chromium"):
-            for what, (middle, most) in in_chromium(page, DRAGS).items():
+            for what, (middle, most) in in_chromium(page, acts).items():
                 print(f"  a drag of {what}: {middle:.1f} ms, at most {most:.1f} ms")
     video_page()  # the first one loads packages
     begin = time.process_time()

@@ -273,6 +273,22 @@ def test_warnings_are_those_of_a_run(window: Browser, tmp_path: Path) -> None:
     assert len(shown) > 2
 
 
+def test_vehicles_that_stand_are_drawn_and_not_counted(window: Browser, tmp_path: Path) -> None:
+    visit = through((0, 200, 420), (2, 700, 420), (7, 702, 421), (9, 1000, 420))
+    parked = [through((0, x, 400), (5, x + 20, 404), (10, x, 402)) for x in (500, 600, 700)]
+    settings = settings_for(ZONE)
+    video = list(frames(visit, *parked))
+    values = json.loads(settings.model_dump_json())
+    window.open(written(tmp_path, drawing(video, values, settings)))
+    assert window.text("#list") == "zoneenter 1 · exit 1"
+    totals = count_frames(video, settings, (WIDTH, HEIGHT)).totals
+    assert [total.count for total in totals] == [1, 1, 0, 0]
+    window.type("i")  # only where it stands, which is what a run would see of it
+    window.click((685, 300), (708, 300), (708, 500), (685, 500))
+    window.type(ENTER, ENTER)
+    assert window.text("#list") == "zoneenter 0 · exit 0region 1include"
+
+
 def test_drawn_scenes_have_the_same_counts_and_flows(window: Browser, tmp_path: Path) -> None:
     scene = pole_scene("turning", 8.0, seed=1)
     video = list(scene.true_tracks(every=2))

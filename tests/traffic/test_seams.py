@@ -20,7 +20,7 @@ SETTINGS = settings_for(
 )
 GOES_EAST = through((0, 100, 400), (20, 1100, 400))  # at 600 at the seam
 ON_THE_LINE = through((0, 100, 300), (10, 199, 300), (20, 300, 300))
-STANDS = through((2, 600, 600), (18, 601, 600))
+STANDS = through((2, 540, 600), (4, 600, 600), (18, 601, 600))
 
 
 def write_halves(folder: File, names: Sequence[str], *paths: Path) -> list[File]:

@@ -4,6 +4,7 @@ import pytest
 
 from traffic.scenes import (
     HEIGHT,
+    LINE,
     WIDTH,
     ZONE,
     counts,
@@ -11,10 +12,12 @@ from traffic.scenes import (
     frames,
     joined,
     numbered,
+    settings_for,
     through,
     ways,
 )
 from vdet.config.places import ZoneSettings
+from vdet.traffic.counter import VehicleCounter
 
 ACROSS = through((0, 200, 400), (8, 1000, 400))  # 100 pixels a second; in from 2 s to 6 s
 
@@ -43,6 +46,37 @@ def test_a_new_id_inside_goes_on_with_the_stay() -> None:
     found = events(joined(old, new), ZONE)
     assert [(event.id, event.direction) for event in found] == [(1, "enter"), (2, "exit")]
     assert found[1].seconds == pytest.approx(4, abs=0.02)
+
+
+PARKED = through((0, 600, 400), (3, 612, 404), (7, 590, 398), (10, 604, 402))  # its box trembles
+
+
+def test_a_vehicle_that_stands_the_whole_time_is_not_counted_and_one_that_parks_is_one_visit() -> (
+    None
+):
+    visit = through((0, 200, 420), (2, 700, 420), (7, 702, 421), (9, 1000, 420))
+    found = counts(frames(PARKED, visit), ZONE, LINE)
+    assert [(event.vehicle, event.direction) for event in found.events] == [
+        (2, "enter"),
+        (2, "exit"),
+    ]
+    [flow] = [row for row in found.flows() if row.count]
+    assert (flow.origin, flow.destination) == ("zone", None)
+    [use] = found.zone_use()
+    assert (use.entered, use.left, use.most) == (1, 1, 1)
+    assert found.warnings == counts(frames(visit), ZONE, LINE).warnings
+
+
+def test_a_vehicle_that_stands_is_counted_in_a_run_as_soon_as_it_drives() -> None:
+    path = through((0, 600, 400), (4, 604, 402), (8, 1000, 400))
+    counter = VehicleCounter(settings_for(ZONE).traffic, WIDTH, HEIGHT)
+    appeared = []
+    for frame in frames(path, seconds=7):
+        counter.update(frame)
+        appeared.append(counter.so_far()["zone", "appear"])
+    assert appeared[: 4 * 25] == [0] * 100
+    assert appeared[-1] == 1
+    assert counter.counts().events[0].time == 0
 
 
 def test_a_vehicle_is_in_one_of_two_zones_side_by_side() -> None:

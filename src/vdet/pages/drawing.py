@@ -174,7 +174,10 @@ def pack(paths: Sequence[VehiclePath]) -> dict[str, Any]:
     joined = np.concatenate([np.empty(0), *(part for column in columns for part in column)])
     planes = joined.astype("<i4").view(np.uint8).reshape(-1, 4).T
     vehicles = [
-        (path.vehicle, path.class_name or UNKNOWN, path.times[0], path.seen, len(path.times))
+        (
+            *(path.vehicle, path.class_name or UNKNOWN, path.size),
+            *(path.times[0], path.seen, len(path.times)),
+        )
         for path in paths
     ]
     return {

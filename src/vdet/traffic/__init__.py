@@ -13,8 +13,9 @@ The counts of a video follow from its tracks alone (`FrameTracks`), live or from
    line.
 5. A way back counts only one height of the box away from the line, or where it meets the line one
    height or more from where the vehicle crossed before.
-6. Vehicles that are seen for less than `traffic.min_seen_seconds` do not count. Once a vehicle is
-   confirmed, its earlier events count too.
+6. Vehicles that are seen for less than `traffic.min_seen_seconds` do not count, nor those that
+   stand the whole time: that are never half their size away from where they are first seen. Once
+   a vehicle counts, its earlier events count too.
 7. The class of a vehicle is that of the last frame of its track; of several tracks, of the one
    that shows it largest.
 8. A vehicle that is first seen within a second after another was last seen, and near the place

@@ -132,11 +132,13 @@ class VehicleCounter:
         return self._so_far
 
     def _passages(self, paths: Iterable[VehiclePath]) -> list[_Passage]:
-        """Return what vehicles do that count: of the classes, and not seen too shortly."""
+        """Return what vehicles do that count: of the classes, seen long enough, and not parked."""
         return [
             self._passage(path)
             for path in paths
-            if path.seconds >= self._confirmed and is_chosen(path.class_name, self._classes)
+            if path.seconds >= self._confirmed
+            and path.has_driven
+            and is_chosen(path.class_name, self._classes)
         ]
 
     def _passage(self, path: VehiclePath) -> _Passage:

@@ -18,6 +18,8 @@ GAP = 1.0
 """Longest time between the end of a track and the start of one that continues it, seconds."""
 REMEMBERED = 10.0
 """Seconds for which a vehicle that is not shown is remembered; trackers keep ids for less."""
+MOVED = 0.5
+"""Distance by which a vehicle that drives has moved, as a multiple of its size."""
 DURATION_DIGITS = 4
 """Decimals of a duration in seconds that are compared: times are rounded."""
 
@@ -73,6 +75,8 @@ class VehiclePath:
         Of its box, pixels.
     scores, frames
         Scores of its tracks, and numbers of the frames.
+    size
+        Largest mean of the width and the height of its box, pixels.
     """
 
     vehicle: int
@@ -84,6 +88,13 @@ class VehiclePath:
     heights: Float64Array
     scores: Float64Array
     frames: Float64Array
+    size: float
+
+    @property
+    def has_driven(self) -> bool:
+        """Whether it moved while it was seen, and did not stand the whole time."""
+        ways = self.points[: self.seen] - self.points[0]
+        return bool(np.hypot(*ways.T).max() >= MOVED * self.size)
 
     @property
     def seconds(self) -> float:
@@ -165,6 +176,7 @@ class TrackLinker:
         self._vehicles[key] = _Vehicle(
             self.begun, vehicle.box, self._now, vehicle.tracks.copy(), vehicle.rows[at:]
         )
+        self._vehicles[key].size = vehicle.size
         del vehicle.rows[at:]
         return vehicle.path(self._now)
 
@@ -183,6 +195,8 @@ class _Vehicle:
         All that was seen of it, one frame after the other: see `_table`.
     classes
         By track its largest height, pixels, and its class so far.
+    size
+        That of `VehiclePath`.
     back
         Where in `rows` it came back after it was out of sight, until it is clear who that is.
     """
@@ -193,6 +207,7 @@ class _Vehicle:
     tracks: list[tuple[float, int]] = field(default_factory=list)
     rows: "array[float]" = field(default_factory=lambda: array("d"))
     classes: dict[int, tuple[int, str | None]] = field(default_factory=dict)
+    size: float = 0.0
     back: int | None = None
 
     def see(self, track: Track, time: float, frame: int) -> None:
@@ -200,6 +215,7 @@ class _Vehicle:
         if time - self.shown > _OUT_OF_SIGHT:
             self.back = len(self.rows)
         self.box, self.shown = track.box, time
+        self.size = max(self.size, sum(track.box.xywh[2:]) / 2)
         self.rows.extend((time, *track.foot, self.box.y1, self.box.y2, track.score, frame))
         if len(self.rows) % (_STAY * _COLUMNS) == 0 and self.back is None:
             stay = _table(self.rows[-_STAY * _COLUMNS :])
@@ -247,9 +263,10 @@ class _Vehicle:
         seen, last = len(rows), rows[-1]
         if now - last[0] > GAP and math.dist(last[1:3], rows[0, 1:3]) > last[3]:
             rows = np.concatenate([rows, self.onward(*np.add(last[0], _ONWARD))[1:]])
-        columns = rows[:, 0], rows[:, 1:3], *rows[:, 3:].T
+        times, points, (heights, scores, frames) = rows[:, 0], rows[:, 1:3], rows[:, 3:].T
         _, name = max(reversed(self.classes.values()), key=itemgetter(0))
-        return VehiclePath(self.number, name, tuple(self.tracks), seen, *columns)
+        who = self.number, name, tuple(self.tracks), seen
+        return VehiclePath(*who, times, points, heights, scores, frames, self.size)
 
 
 def _table(rows: "array[float]") -> Float64Array:

@@ -12,6 +12,7 @@ from vdet.media import Picture
 from vdet.polygons import Point
 from vdet.track.track import FrameTracks, State, Track
 from vdet.traffic.clock import Clock
+from vdet.traffic.linking import MOVED
 from vdet.traffic.tables import VIDEO, is_json, join_tables, plain_moment, write_content
 
 if TYPE_CHECKING:  # most runs measure no speed
@@ -34,8 +35,6 @@ _COLUMNS = (
 largest box, speeds are km/h, `distance` is the smallest one from the camera, metres.
 """
 
-_MOVED = 0.5
-"""Distance by which a vehicle has moved, as a multiple of its size."""
 _STANDING = 60.0
 """Seconds after which a vehicle that has not moved is standing."""
 _MIDDLING = 0.6
@@ -152,7 +151,7 @@ class VehicleRecord:
         size = (self.largest.width + self.largest.height) / 2
         way = max(math.dist(self.path[0], point) for point in self.path)
         stood: Motion = "standing" if self.seconds >= _STANDING else "unknown"
-        self.motion = "drove" if way >= _MOVED * size else stood
+        self.motion = "drove" if way >= MOVED * size else stood
 
     def _go_to(self, point: Point) -> None:
         """Continue the path; its last point stays only if it is a step away from the one before."""

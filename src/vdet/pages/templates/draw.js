@@ -9,6 +9,7 @@ const MIN_BAND = 0.003; // of the frame's height
 const AT_EDGE = 0.002; // of the frame's side: points so near to the edge lie on it
 const MAX_AT_EDGE = 0.005;
 const INSIDE = 0.01; // pixels
+const MOVED = 0.5; // of the largest size of its box: a vehicle that moved less stood the whole time
 const STRIDE = 16; // rows of a path that have one box
 
 const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
@@ -138,22 +139,21 @@ function turnsOf({ xs, ys, boxes }, border) {
 
 /** Return what a vehicle does at a border, in order: time, row, direction. */
 function crossings(path, border) {
-  const { times, xs, ys } = path, ends = turnsOf(path, border), begins = border.isPositive(xs[0], ys[0]), found = [];
-  if (!ends.length && !(border.isZone && begins)) return found; // as for most paths
-  ends.push(times.length);
+  const { times, xs, ys } = path, turns = turnsOf(path, border), begins = border.isPositive(xs[0], ys[0]), found = [];
+  if (!turns.length && !(border.isZone && begins)) return found; // as for most paths
   let settled = null, crossed = null; // the side, and where it crossed last
-  for (let i = 0; i < ends.length; i++) {
-    const row = ends[i - 1] ?? 0, side = begins === (i % 2 === 0);
+  for (let i = 0; i <= turns.length; i++) {
+    const row = turns[i - 1] ?? 0, end = turns[i] ?? times.length, side = begins === (i % 2 === 0);
     if (side === settled) continue;
     if (settled === null) {
-      if (!settles(path, border, row, ends[i], Infinity)) continue;
+      if (!settles(path, border, row, end, Infinity)) continue;
       if (side && border.isZone) found.push({ time: times[0], row: 0, direction: "appear" });
     } else {
       const a = [xs[row - 1], ys[row - 1]], b = [xs[row], ys[row]];
       const share = border.meeting(a, b), along = share ?? 1;
       const place = [a[0] + along * (b[0] - a[0]), a[1] + along * (b[1] - a[1])];
       const way = crossed ? Math.hypot(crossed[0] - place[0], crossed[1] - place[1]) : Infinity;
-      if (!settles(path, border, row, ends[i], way)) continue; // back, but not far
+      if (!settles(path, border, row, end, way)) continue; // back, but not far
       crossed = share === null ? null : place;
       const time = times[row - 1] + along * (times[row] - times[row - 1]);
       if (share !== null) found.push({ time, row: share ? row : row - 1, direction: border.directions[side ? 0 : 1] });
@@ -179,6 +179,11 @@ function settles({ times, xs, ys, heights }, border, first, end, way) {
     [wasOff, wasFar] = [isOff, isFar];
   }
   return false;
+}
+
+/** Return whether a vehicle moved while it was seen. */
+function hasDriven({ xs, ys, seen, largest }) {
+  return xs.some((x, row) => row < seen && Math.hypot(x - xs[0], ys[row] - ys[0]) >= MOVED * largest);
 }
 
 /** Return the parts of paths inside the regions; paths of which nothing is left are gone. */
@@ -406,7 +411,7 @@ async function readPaths(packed) {
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
   const planes = new Uint8Array(await new Response(stream).arrayBuffer()), count = planes.length / 4;
   let first = 0;
-  return packed.vehicles.map(([vehicle, kind, start, seen, length]) => {
+  return packed.vehicles.map(([vehicle, kind, largest, start, seen, length]) => {
     const [times, xs, ys, heights] = [0, 1, 2, 3].map(column => {
       let at = column * count / 4 + first, step = 0, value = 0;
       return Array.from({ length }, () => {
@@ -416,7 +421,7 @@ async function readPaths(packed) {
       });
     });
     first += length;
-    return withBoxes({ vehicle, kind, seen, heights, times: times.map(time => Math.round(1e6 * start + time) / 1e6),
+    return withBoxes({ vehicle, kind, largest, seen, heights, times: times.map(time => Math.round(1e6 * start + time) / 1e6),
       xs: xs.map(x => x / 100), ys: ys.map(y => y / 100) });
   });
 }
@@ -450,7 +455,7 @@ async function openPage(data) {
   let { places, rest } = data, past = [], future = [], saved = JSON.stringify(places);
   let tool = "select", selected = null; // what is selected: kind, index, and the number of a point
   let drawn = [], pointer = null, drag = null, hovered = null;
-  let paths = every, found = []; // those inside the regions, and what they do at each line and zone
+  let paths = every, found = []; // those inside the regions that drive, and what they do at each line and zone
   let known = new Map(); // what was last found, by geometry
 
   const unit = () => width / Math.max(1, stage.clientWidth); // pixels of the frame in one of the screen
@@ -515,7 +520,7 @@ async function openPage(data) {
     known = new Map(); // only what has changed is counted again
     const remembered = (key, work) => known.set(key, before.get(key) ?? work()).get(key);
     const area = JSON.stringify(regions.map(each => [each.kind, each.points]));
-    paths = remembered(area, () => inRegions(every, regions, size));
+    paths = remembered(area, () => inRegions(every, regions, size).filter(hasDriven));
     found = [...places.lines.map(each => placeLine(each, size)), ...places.zones.map(each => placeZone(each, size))]
       .map(border => {
         const key = area + JSON.stringify([border.start, border.end, border.corners, border.directions]);
