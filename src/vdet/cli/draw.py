@@ -101,7 +101,11 @@ def draw(
                 files.stage(path).write_bytes(drawing.output(path, name))
     print_lines(
         *(f"{path}: {counted(len(drawing.paths), 'vehicle')}" for path in outputs),
-        *(f"{line.name}: {counted(line.vehicles, 'vehicle')}" for line in drawing.proposals),
+        *(
+            f"{line.name}: {counted(line.vehicles, 'vehicle')}"
+            for line in drawing.proposals
+            if propose
+        ),
     )
 
 

@@ -39,6 +39,8 @@ _SCALES = (1, 2, 5, 10, 20, 50, 100)
 """Lengths of a scale, metres."""
 _SCALE = 0.2
 """Longest scale, as a fraction of the frame's width."""
+_LOWEST = 0.96
+"""Row of a scale, at most, as a fraction of the frame's height."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +88,7 @@ def place_marks(
             wide = max(2, round(_WIDEST * size[0] * len(trips) / most))
             label, at = str(len(trips)), path[len(path) // 2]
             marks.insert(0, Mark(path, boxes.color_of(number), wide, label, at, is_arrow=True))
-    return [*marks, *(_scale(ground, size[0]) if ground else ())]
+    return [*marks, *(_scale(ground, size) if ground else ())]
 
 
 def path_marks(records: Iterable[VehicleRecord], size: tuple[int, int]) -> Iterator[Mark]:
@@ -122,7 +124,8 @@ def border_marks(border: Border, totals: Mapping[Way, int], text: str = "") -> I
         yield Mark(border.corners, boxes.ZONE, width, border.name + text, top, is_closed=True)
         return
     (ax, ay), (bx, by) = border.start, border.end
-    yield Mark((border.start, border.end), boxes.LINE, width, border.name, border.end)
+    middle = (ax + bx) / 2, (ay + by) / 2
+    yield Mark((border.start, border.end), boxes.LINE, width, border.name, middle)
     left = (by - ay) / border.length, (ax - bx) / border.length
     for reach, direction in zip((_SIDE, -_SIDE), border.directions, strict=True):
         tip = ax + reach * height * left[0], ay + reach * height * left[1]
@@ -130,9 +133,12 @@ def border_marks(border: Border, totals: Mapping[Way, int], text: str = "") -> I
         yield Mark((border.start, tip), boxes.LINE, width, label, tip, is_arrow=True)
 
 
-def _scale(ground: Ground, columns: int) -> Iterator[Mark]:
-    """Yield a scale across the picture in the middle of the calibrated area."""
-    x, y = ground.pixels(ground.area.mean(axis=0, keepdims=True))[0].tolist()
+def _scale(ground: Ground, size: tuple[int, int]) -> Iterator[Mark]:
+    """Yield a scale across the nearest part of the calibrated area."""
+    columns, rows = size
+    pixels = ground.pixels(ground.area)
+    x = min(max(pixels[:, 0].mean().item(), _SCALE * columns), (1 - _SCALE) * columns)
+    y = min(pixels[:, 1].max().item(), _LOWEST * rows)
     metres = math.dist(*ground.place(np.array([(x, y), (x + 1, y)])))
     if metres > 0:
         lengths = [scale for scale in _SCALES if scale <= _SCALE * columns * metres]
