@@ -1,6 +1,7 @@
 """Lines that are proposed for drawn pole cameras, compared with the streams of their traffic.
 
     python -m benchmarks.proposals               # from the true boxes of the thirty scenes
+    python -m benchmarks.proposals found         # from what the default detector finds in them
 
 A stream is the trips of vehicles from one line of the scene to another, of those that can be
 followed. It has a line where a proposed one counts at least 70 % of its vehicles in one direction,
@@ -9,12 +10,16 @@ or for one that has a line.
 """
 
 import math
+import sys
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from benchmarks.pole_cameras import HEIGHT, WIDTH, PoleScene, pole_scenes
+from benchmarks.pole_cameras import HEIGHT, WIDTH, PoleScene, detected, pole_scenes
 from vdet.config.places import LineSettings, TrafficSettings
 from vdet.config.schema import Settings
+from vdet.detect.factory import load_detector
+from vdet.track.track import FrameTracks
 from vdet.traffic.counting import count_frames
 from vdet.traffic.linking import link_tracks
 from vdet.traffic.proposals import propose_lines
@@ -37,11 +42,11 @@ class Proposed:
     useless: int
 
 
-def proposed(scene: PoleScene) -> Proposed:
-    """Compare the proposed lines of a scene with its streams."""
+def proposed(scene: PoleScene, found: Sequence[FrameTracks] = ()) -> Proposed:
+    """Compare the lines proposed from what was found, else from the truth, with the streams."""
     frames = list(scene.true_tracks())
     paths = link_tracks(frames, WIDTH, HEIGHT)
-    lines = propose_lines(paths, WIDTH, HEIGHT)
+    lines = propose_lines(link_tracks(found or frames, WIDTH, HEIGHT), WIDTH, HEIGHT)
     size = Counter(
         scene.trips[path.tracks[0][1]].flow
         for path in paths
@@ -69,8 +74,8 @@ def proposed(scene: PoleScene) -> Proposed:
             for event in events
             if (event.name, event.direction) == (line.name, "left")
         )
-        flow, found = next(iter(counted.most_common(1)), (None, 0))
-        fits = flow and found >= ALL * size[flow] and found >= MOST * counted.total()
+        flow, most = next(iter(counted.most_common(1)), (None, 0))
+        fits = flow and most >= ALL * size[flow] and most >= MOST * counted.total()
         if flow is None or not fits or flow in used:
             useless += 1
         else:
@@ -81,8 +86,9 @@ def proposed(scene: PoleScene) -> Proposed:
 def main() -> None:
     """Print a row for each scene, and the fractions of all."""
     rows = []
+    model = load_detector(Settings().detector) if sys.argv[1:] == ["found"] else None
     for scene in pole_scenes():
-        rows.append(proposed(scene))
+        rows.append(proposed(scene, detected(scene, model) if model else ()))
         print(scene.name, "|", rows[-1], flush=True)
     streams, found = sum(row.streams for row in rows), sum(row.found for row in rows)
     lines, useless = sum(row.lines for row in rows), sum(row.useless for row in rows)
