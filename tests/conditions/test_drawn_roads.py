@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from benchmarks.conditions import EXPECTED, SETTINGS, Road, is_right
+from benchmarks.conditions import EXPECTED, SETTINGS, Road
 
 from vdet import load_settings
 from vdet.boxes import NO_BOXES
@@ -26,7 +26,7 @@ def test_the_right_finding_is_there_in_time_and_can_be_ignored(
 ) -> None:
     conditions = road.watched(kind)
     findings = conditions.findings()
-    assert is_right(kind, findings), findings
+    assert road.is_right(kind, findings), findings
     ignoring = ConditionSettings(ignore=(code,) if code else ())
     conditions._settings = SETTINGS.model_copy(update={"conditions": ignoring})
     others = tuple(item for item in findings.found if item.code != code)
