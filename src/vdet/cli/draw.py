@@ -99,13 +99,10 @@ def draw(
             with output_errors(path):
                 name = Path((choice.configs or [path.name])[-1]).with_suffix(".yaml").name
                 files.stage(path).write_bytes(drawing.output(path, name))
+    lines = drawing.proposals if propose else ()
     print_lines(
         *(f"{path}: {counted(len(drawing.paths), 'vehicle')}" for path in outputs),
-        *(
-            f"{line.name}: {counted(line.vehicles, 'vehicle')}"
-            for line in drawing.proposals
-            if propose
-        ),
+        *(f"{line.name}: {counted(line.vehicles, 'vehicle')}" for line in lines),
     )
 
 
