@@ -11,15 +11,13 @@ from vdet.pages.vehicles import VehicleRow
 NASTY = "</script><b>"
 
 
-def facts(*rows: VehicleRow) -> VideoFacts:
-    return VideoFacts(
-        seconds=2.08, frames=52, vehicles=len(rows), most=1, still=NO_STILL, rows=rows
-    )
+def facts(*rows: VehicleRow, start: float = 0.0) -> VideoFacts:
+    numbers = {"seconds": 2.08, "frames": 52, "vehicles": len(rows), "most": 1}
+    return VideoFacts(start=start, **numbers, still=NO_STILL, rows=rows)
 
 
 def row(number: int, kind: str | None, first: float, **more: Any) -> VehicleRow:
-    moment = f"{first:.3f}"
-    return VehicleRow(id=number, class_name=kind, first=first, moment=moment, seconds=1.5, **more)
+    return VehicleRow(id=number, class_name=kind, first=first, seconds=1.5, **more)
 
 
 VIDEOS = {
@@ -35,7 +33,7 @@ VIDEOS = {
         ),
         row(2, None, 1.0, picture="../a.crops/vehicle-0002.jpg"),
     ),
-    "day/b #1": facts(row(1, NASTY, 3.5), row(2, "car", 2.0)),
+    "day/b #1": facts(row(1, NASTY, 3.5), row(2, "car", 2.0), start=0.5),
 }
 
 
@@ -61,22 +59,23 @@ def test_its_table_has_every_vehicle(tmp_path: Path) -> None:
     html = index(tmp_path, VIDEOS)
     start = html.index(">", html.index('id="vehicles"')) + 1
     assert json.loads(html[start : html.index("</script>", start)]) == {
-        "videos": [
-            {"name": "a", "page": "a.page/page.html"},
-            {"name": "day/b #1", "page": "day/b%20%231.page/page.html"},
-        ],
-        "classes": ["", "car", "vehicle", NASTY],
-        "ways": ["", "north → south"],
-        "video": [0, 0, 1, 1],
-        "class": [1, 2, 3, 1],
-        "way": [1, 0, 0, 0],
-        "states": ["", "drove"],
-        "state": [1, 0, 0, 0],
+        "names": ["a", "day/b #1"],
+        "pages": ["a.page/page.html", "day/b%20%231.page/page.html"],
+        "starts": [0.0, 0.5],
+        "counts": [2, 2],
+        "zero": 1777618802,
+        "texts": {
+            "class": ["car", "vehicle", NASTY],
+            "way": ["north → south", ""],
+            "state": ["drove", ""],
+        },
+        "class": [0, 1, 2, 0],
+        "way": [0, 1, 1, 1],
+        "state": [0, 1, 1, 1],
         "id": [1, 2, 1, 2],
         "first": [0.0, 1.0, 3.5, 2.0],
-        "moment": ["0.000", "1.000", "3.500", "2.000"],
         "seconds": [1.5] * 4,
-        "clock": [1777618802, None, None, None],
+        "clock": [0, None, None, None],
         "speed": [51.5, None, None, None],
         "distance": [18.2, None, None, None],
         "lane": [-1, None, None, None],
@@ -84,13 +83,29 @@ def test_its_table_has_every_vehicle(tmp_path: Path) -> None:
     }
 
 
+def test_columns_in_which_nothing_is_known_are_left_out(tmp_path: Path) -> None:
+    html = index(tmp_path, {"a": facts(row(1, "car", 0.0))})
+    start = html.index(">", html.index('id="vehicles"')) + 1
+    table = json.loads(html[start : html.index("</script>", start)])
+    assert {name for name in table if name not in ("names", "pages", "starts", "counts")} == {
+        "zero", "texts", "class", "id", "first", "seconds",
+    }  # fmt: skip
+
+
 def test_of_no_video_it_says_so(tmp_path: Path) -> None:
     assert "No video was processed." in Elements(index(tmp_path, {})).text
 
 
+def seen(html: str, acts: str, folder: Path) -> Any:
+    """Return the value of `seen` after some acts in the page."""
+    acts = f"<script>{acts}document.title = JSON.stringify(seen);</script></body>"
+    (folder / "acts.html").write_text(html.replace("</body>", acts), encoding="utf-8")
+    return json.loads(title_in_chromium(folder / "acts.html"))
+
+
 @needs_chromium
 def test_its_table_is_filtered_and_sorted(tmp_path: Path) -> None:
-    acts = """<script>
+    acts = """
 const shownRows = () => [...document.querySelectorAll("#found tbody tr")].map(
   row => [...row.children].map(cell => cell.querySelector("a")?.href.split("/").pop()
     ?? cell.textContent));
@@ -101,7 +116,7 @@ const change = (name, value) => {
 const seen = { all: shownRows() };
 [...document.querySelectorAll("#found th button")].find(b => b.textContent === "class").click();
 seen.sorted = shownRows().map(row => row[2]);
-change("class", "1");
+change("class", "0");
 seen.cars = shownRows().map(row => row[3]);
 change("video", "B #");
 seen.both = shownRows().map(row => row[3]);
@@ -113,17 +128,14 @@ change("lane", "-1");
 seen.left = shownRows().map(row => row[1]);
 change("distance-max", "18");
 seen.near = shownRows();
-document.title = JSON.stringify(seen);
-</script></body>"""
-    html = index(tmp_path, VIDEOS).replace("</body>", acts)
-    (tmp_path / "acts.html").write_text(html, encoding="utf-8")
-    assert json.loads(title_in_chromium(tmp_path / "acts.html")) == {
+"""
+    assert seen(index(tmp_path, VIDEOS), acts, tmp_path) == {
         "all": [
             ["", "#1", "car", "a", "page.html#t=0.000", "1.5", "52", "north → south", "-1", "18",
              "drove"],
             ["", "#2", "vehicle", "a", "page.html#t=1.000", "1.5", "–", "", "–", "–", ""],
-            ["", "#1", NASTY, "day/b #1", "page.html#t=3.500", "1.5", "–", "", "–", "–", ""],
-            ["", "#2", "car", "day/b #1", "page.html#t=2.000", "1.5", "–", "", "–", "–", ""],
+            ["", "#1", NASTY, "day/b #1", "page.html#t=3.000", "1.5", "–", "", "–", "–", ""],
+            ["", "#2", "car", "day/b #1", "page.html#t=1.500", "1.5", "–", "", "–", "–", ""],
         ],
         "sorted": [NASTY, "car", "car", "vehicle"],
         "cars": ["a", "day/b #1"],
@@ -132,3 +144,27 @@ document.title = JSON.stringify(seen);
         "left": ["#1"],
         "near": [],
     }  # fmt: skip
+
+
+@needs_chromium
+def test_it_is_printed_with_all_that_passes_the_filters_and_says_which(tmp_path: Path) -> None:
+    acts = """
+const state = () => [body.children.length, document.getElementById("range").textContent,
+  [...form.querySelectorAll("label:not(.unprinted)")].map(label => label.textContent.trim())];
+document.getElementById("next").click();
+const seen = { screen: state() };
+form.elements["seconds-max"].value = "2";
+form.dispatchEvent(new Event("input"));
+dispatchEvent(new Event("beforeprint"));
+seen.paper = state();
+dispatchEvent(new Event("afterprint"));
+seen.after = state();
+"""
+    rows = [row(number, "car", number) for number in range(2500)]
+    long = [item.model_copy(update={"seconds": 3.0}) for item in rows[:300]]
+    html = index(tmp_path, {"a": facts(*rows, *long)})
+    assert seen(html, acts, tmp_path) == {
+        "screen": [100, "101–200 of 2,800", []],
+        "paper": [2000, "1–2,000 of 2,500 (2,800 without filters)", ["Seconds  –"]],
+        "after": [100, "1–100 of 2,500 (2,800 without filters)", ["Seconds  –"]],
+    }

@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from vdet.files import write_text
 from vdet.pages.render import PAGE_NAME, link_to, render
-from vdet.pages.vehicles import VehicleRow, table_json
+from vdet.pages.vehicles import Part, VehicleRow, table_json
 
 NO_STILL = "data:image/jpeg;base64,"
 """The still of a video without a frame."""
@@ -19,11 +19,12 @@ class VideoFacts(BaseModel):
 
     `seconds` is how much of the video was searched, `most` how many vehicles were shown at once.
     `counts` are by name, `conditions` say what makes them doubtful; `still` is a small picture as a
-    data URI.
+    data URI. The player of its page begins at `start`, seconds in the video.
     """
 
     model_config = ConfigDict(frozen=True)
 
+    start: float = 0.0
     seconds: float = Field(ge=0)
     frames: int = Field(ge=0)
     vehicles: int = Field(ge=0)
@@ -40,6 +41,10 @@ def write_index(videos: Sequence[tuple[str, Path, VideoFacts]], target: Path) ->
     for _, _, facts in videos:
         counts.update(facts.counts)
     linked = [(name, link_to(page, Path()), facts) for name, page, facts in videos]
-    parts = [(name, page, page.removesuffix(PAGE_NAME), facts.rows) for name, page, facts in linked]
-    table = table_json(parts)
+    table = table_json(
+        [
+            Part(name, page, facts.start, page.removesuffix(PAGE_NAME), facts.rows)
+            for name, page, facts in linked
+        ]
+    )
     write_text(target, render("index.html", videos=linked, counts=counts, table=table))

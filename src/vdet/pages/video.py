@@ -15,7 +15,7 @@ from vdet.pages.batch import NO_STILL, VideoFacts
 from vdet.pages.charts import Axis, Plot, Span, Timeline
 from vdet.pages.place import path_marks, traffic_part, with_marks
 from vdet.pages.render import jpeg_uri, render
-from vdet.pages.vehicles import VehicleRow, table_json
+from vdet.pages.vehicles import Part, VehicleRow, table_json
 from vdet.traffic.clock import Clock, Intervals
 from vdet.traffic.counts import Counts
 from vdet.traffic.crossings import Border
@@ -109,6 +109,7 @@ class VideoPage:
     def facts(self) -> VideoFacts:
         """The video in numbers."""
         return VideoFacts(
+            start=self.player.start if self.player else 0.0,
             seconds=max(0.0, self.seconds),
             frames=self.frames,
             vehicles=self._vehicles,
@@ -152,7 +153,6 @@ class VideoPage:
             id=record.id,
             class_name=record.class_name,
             first=round(record.first, 3),
-            moment=self.player.moment(record.first) if self.player else "0",
             seconds=round(record.seconds, 1),
             clock=self.clock and self.clock.at(record.first).isoformat(timespec="seconds"),
             speed=round(KMH * record.speeds.quantile(0.5), 1) if record.speeds else None,
@@ -172,6 +172,7 @@ class VideoPage:
         rows = self._rows({item.id: known[item.id] for item in shown if item.id in known})
         speeds = [row.speed for row in rows if row.speed is not None]
         title = "Vehicles by their median speed"
+        page, start = ("", self.player.start) if self.player else (None, 0.0)
         return render(
             "video.html",
             page=self,
@@ -184,7 +185,7 @@ class VideoPage:
             traffic=self.counts
             and traffic_part(self.counts, self.records, self.poster, self.borders, self.ground),
             paths=self._paths(),
-            table=table_json([("", "" if self.player else None, "", rows)]),
+            table=table_json([Part("", page, start, "", rows)]),
         )
 
     @property

@@ -1,34 +1,44 @@
 // The table of the vehicles of a page: filtered, sorted, and shown some rows at a time.
 "use strict";
 
-const data = JSON.parse(document.getElementById("vehicles").textContent);
 const PER_PAGE = 100;
+const PRINTED = 2000;
+
+const data = JSON.parse(document.getElementById("vehicles").textContent);
+data.video = new Int32Array(data.class.length);
+for (let video = 0, row = 0; video < data.counts.length; video += 1) {
+  data.video.fill(video, row, row += data.counts[video]);
+}
+const known = new Set(Object.keys(data));
+if (data.names.length < 2) known.delete("video");
+for (const name of ["way", "state", "speed", "distance", "lane", "clock", "picture"]) {
+  data[name] ??= new Array(data.class.length).fill(null);
+}
 
 // Columns: heading, text of a cell, and what rows are sorted by (numbers sort with nulls last).
 const columns = [
   { name: "id", text: i => `#${data.id[i]}`, key: i => data.id[i] },
-  { name: "class", text: i => data.classes[data.class[i]], key: i => data.classes[data.class[i]] },
-  { name: "video", text: i => data.videos[data.video[i]].name, key: i => data.video[i], used: "video" },
+  { name: "class", text: i => text("class", i), key: i => text("class", i) },
+  { name: "video", text: i => data.names[data.video[i]], key: i => data.video[i], used: "video" },
   { name: "time", text: timeText, key: i => data.clock[i] ?? data.first[i], link: true },
   { name: "seconds", text: i => data.seconds[i].toFixed(1), key: i => data.seconds[i] },
   { name: "km/h", text: i => number(data.speed[i]), key: i => data.speed[i], used: "speed" },
-  { name: "lines", text: i => data.ways[data.way[i]], key: i => data.ways[data.way[i]], used: "way" },
+  { name: "lines", text: i => text("way", i), key: i => text("way", i), used: "way" },
   { name: "lane", text: i => data.lane[i] ?? "–", key: i => data.lane[i], used: "lane" },
   { name: "metres", text: i => number(data.distance[i]), key: i => data.distance[i], used: "distance" },
-  { name: "moves", text: i => data.states[data.state[i]], key: i => data.state[i], used: "state" },
-].filter(column => !column.used || isUsed(column.used));
-
-// Return whether a column says something: numbers of texts and of videos are 0 for nothing else.
-function isUsed(name) {
-  const coded = ["video", "class", "way", "state"].includes(name);
-  return data[name].some(value => coded ? value > 0 : value !== null);
-}
+  { name: "moves", text: i => text("state", i), key: i => text("state", i), used: "state" },
+].filter(column => !column.used || known.has(column.used));
 
 const form = document.getElementById("filters");
 const body = document.querySelector("#found tbody");
 let rows = [];
+let limit = PER_PAGE;
 let page = 0;
 let sort = { column: null, descending: false };
+
+function text(name, i) {
+  return data.texts[name][data[name][i]];
+}
 
 function number(value) {
   return value === null ? "–" : value.toFixed(0);
@@ -38,10 +48,15 @@ function pad(value) {
   return String(value).padStart(2, "0");
 }
 
+function thousands(value) {
+  return String(value).replace(/\B(?=(\d{3})+$)/g, ",");
+}
+
 function timeText(i) {
   if (data.clock[i] !== null) {
     // The clock is in seconds as the camera shows them: it is printed without a shift.
-    return new Date(1000 * data.clock[i]).toISOString().slice(0, 19).replace("T", " ");
+    const moment = new Date(1000 * (data.zero + data.clock[i]));
+    return moment.toISOString().slice(0, 19).replace("T", " ");
   }
   const seconds = Math.floor(data.first[i]);
   return `${Math.floor(seconds / 3600)}:${pad(Math.floor(seconds / 60) % 60)}:${pad(seconds % 60)}`;
@@ -51,29 +66,24 @@ function timeText(i) {
 function filtered() {
   const values = Object.fromEntries(new FormData(form));
   const tests = [];
-  const choice = (name, column) => {
-    if (values[name]) tests.push(i => column[i] === Number(values[name]));
+  const choice = name => {
+    if (values[name]) tests.push(i => data[name][i] === Number(values[name]));
   };
-  const limits = (name, column) => {
-    const [low, high] = [values[`${name}-min`], values[`${name}-max`]];
+  const limits = (column, low, high) => {
     if (low) tests.push(i => column[i] !== null && column[i] >= Number(low));
     if (high) tests.push(i => column[i] !== null && column[i] <= Number(high));
   };
-  choice("class", data.class);
-  choice("way", data.way);
-  choice("state", data.state);
-  limits("seconds", data.seconds);
-  limits("speed", data.speed);
-  limits("distance", data.distance);
-  if (values.lane) tests.push(i => data.lane[i] === Number(values.lane));
+  const moment = value => value && String(Date.parse(`${value}Z`) / 1000 - data.zero);
+  ["class", "way", "state", "lane"].forEach(choice);
+  for (const name of ["seconds", "speed", "distance"]) {
+    limits(data[name], values[`${name}-min`], values[`${name}-max`]);
+  }
+  limits(data.clock, moment(values.from), moment(values.until));
   if (values.video) {
-    const text = values.video.toLowerCase();
-    const named = data.videos.map(video => video.name.toLowerCase().includes(text));
+    const part = values.video.toLowerCase();
+    const named = data.names.map(name => name.toLowerCase().includes(part));
     tests.push(i => named[data.video[i]]);
   }
-  const moment = text => Date.parse(`${text}Z`) / 1000;
-  if (values.from) tests.push(i => data.clock[i] !== null && data.clock[i] >= moment(values.from));
-  if (values.until) tests.push(i => data.clock[i] !== null && data.clock[i] <= moment(values.until));
   const found = [];
   for (let i = 0; i < data.class.length; i += 1) {
     if (tests.every(test => test(i))) found.push(i);
@@ -97,11 +107,12 @@ function sorted(found) {
 
 function cell(column, i) {
   const element = document.createElement("td");
-  const { page } = data.videos[data.video[i]];
-  if (column.link && page !== null) {
+  const address = data.pages[data.video[i]];
+  if (column.link && address !== null) {
     const link = element.appendChild(document.createElement("a"));
-    link.href = `${page}#t=${data.moment[i]}`;
-    if (!page) link.dataset.time = data.moment[i];
+    const moment = Math.max(0, data.first[i] - data.starts[data.video[i]]).toFixed(3);
+    link.href = `${address}#t=${moment}`;
+    if (!address) link.dataset.time = moment;
     link.textContent = column.text(i);
   } else {
     element.textContent = column.text(i);
@@ -119,20 +130,19 @@ function picture(i) {
 }
 
 function show() {
-  const last = Math.max(0, Math.ceil(rows.length / PER_PAGE) - 1);
+  const last = Math.max(0, Math.ceil(rows.length / limit) - 1);
   page = Math.min(Math.max(0, page), last);
-  const shown = rows.slice(page * PER_PAGE, (page + 1) * PER_PAGE);
-  const hasPictures = data.picture.some(Boolean);
+  const shown = rows.slice(page * limit, (page + 1) * limit);
   body.replaceChildren(...shown.map(i => {
     const row = document.createElement("tr");
-    if (hasPictures) row.append(picture(i));
+    if (known.has("picture")) row.append(picture(i));
     row.append(...columns.map(column => cell(column, i)));
     return row;
   }));
-  const first = rows.length ? page * PER_PAGE + 1 : 0;
-  document.getElementById("range").textContent =
-    `${first.toLocaleString("en")}–${(first && first + shown.length - 1).toLocaleString("en")}`
-    + ` of ${rows.length.toLocaleString("en")} (${data.class.length.toLocaleString("en")} in all)`;
+  const [first, all] = [page * limit, data.class.length];
+  document.getElementById("range").textContent = !rows.length ? "No vehicle matches the filters."
+    : `${thousands(first + 1)}–${thousands(first + shown.length)} of ${thousands(rows.length)}`
+      + (rows.length < all ? ` (${thousands(all)} without filters)` : "");
   document.getElementById("previous").disabled = page === 0;
   document.getElementById("next").disabled = page === last;
 }
@@ -141,6 +151,10 @@ function update() {
   rows = sorted(filtered());
   page = 0;
   show();
+  for (const label of form.querySelectorAll("label")) {
+    const isSet = [...label.querySelectorAll("input, select")].some(input => input.value);
+    label.classList.toggle("unprinted", !isSet);
+  }
 }
 
 function heading(column) {
@@ -165,18 +179,21 @@ function fill(name, values) {
 }
 
 const head = document.querySelector("#found thead tr");
-if (data.picture.some(Boolean)) head.append(document.createElement("th"));
+if (known.has("picture")) head.append(document.createElement("th"));
 head.append(...columns.map(heading));
-fill("class", data.classes);
-fill("way", data.ways);
-fill("state", data.states);
+for (const name of ["class", "way", "state"]) fill(name, data.texts[name]);
 const lanes = [...new Set(data.lane)].filter(lane => lane !== null).sort((a, b) => a - b);
 form.elements.lane.append(...lanes.map(lane => new Option(lane)));
 for (const element of form.querySelectorAll("[data-needs]")) {
-  element.hidden = !isUsed(element.dataset.needs);
+  element.hidden = !known.has(element.dataset.needs);
 }
 form.addEventListener("input", update);
 form.addEventListener("reset", () => setTimeout(update));
 document.getElementById("previous").addEventListener("click", () => { page -= 1; show(); });
 document.getElementById("next").addEventListener("click", () => { page += 1; show(); });
+
+// On paper, the table goes on over the pages of the screen.
+let left = 0;
+addEventListener("beforeprint", () => { [left, page, limit] = [page, 0, PRINTED]; show(); });
+addEventListener("afterprint", () => { [page, limit] = [left, PER_PAGE]; show(); });
 update();
