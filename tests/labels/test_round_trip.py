@@ -3,7 +3,7 @@
 import math
 import zipfile
 from collections.abc import Callable, Iterator
-from dataclasses import astuple, replace
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import get_args
@@ -19,9 +19,9 @@ from vdet.detect.classes import OUR_NAMES, UNKNOWN
 from vdet.errors import TruthError
 from vdet.labels.coco import COCO, read_coco_pictures
 from vdet.labels.cvat import CVAT, read_cvat_pictures
-from vdet.labels.formats import Format, track_formats
+from vdet.labels.formats import Format, PictureTracks, track_formats
 from vdet.labels.kitti import KITTI
-from vdet.labels.label import Label, SavedTracks
+from vdet.labels.label import SavedTracks
 from vdet.labels.mot import MOT
 from vdet.labels.ottrk import OTTRK
 from vdet.labels.pictures import LabelledPicture
@@ -162,18 +162,17 @@ def test_a_box_may_reach_out_of_the_frame(tmp_path: Path, form: Format) -> None:
 
 
 @st.composite
-def labelled(draw: st.DrawFn) -> list[LabelledPicture]:
+def labelled(draw: st.DrawFn) -> list[PictureTracks]:
     """Give pictures with boxes, some in folders; no two boxes of one are the same."""
     names = st.sampled_from(["a.png", "b/a.png", "b/c d/é & <e>.jpg", "b/2.jpg"])
     return [
-        LabelledPicture(
+        PictureTracks(
             Path(name),
-            Path(),
-            tuple(
-                Label("", astuple(box), draw(CLASSES) or UNKNOWN, score=0.5)
-                for box in draw(st.sets(boxes(), max_size=4))
-            ),
             (VIDEO.width, VIDEO.height),
+            [
+                replace(car(number, box), class_name=draw(CLASSES))
+                for number, box in enumerate(draw(st.sets(boxes(), max_size=4)), start=1)
+            ],
         )
         for name in sorted(draw(st.sets(names, min_size=1)))
     ]
@@ -186,7 +185,7 @@ def test_every_format_that_pictures_are_written_in_is_read() -> None:
 @pytest.mark.parametrize("form", READERS, ids=lambda form: form.name)
 @settings(max_examples=20)
 @given(pictures=labelled())
-def test_labels_of_pictures_are_read_again(form: Format, pictures: list[LabelledPicture]) -> None:
+def test_labels_of_pictures_are_read_again(form: Format, pictures: list[PictureTracks]) -> None:
     assert form.pictures is not None
     with TemporaryDirectory() as name:
         folder = Path(name)
@@ -201,7 +200,9 @@ def test_labels_of_pictures_are_read_again(form: Format, pictures: list[Labelled
                 archive.extractall(folder)
         found = list(READERS[form](path))
     expected = {
-        images / picture.path: sorted((label.box, label.name) for label in picture.labels)
+        images / picture.path: sorted(
+            (track.box.pixels, track.class_name or UNKNOWN) for track in picture.tracks
+        )
         for picture in pictures
     }
     read = {

@@ -132,12 +132,8 @@ def make_plan(
 
 
 def _path(place: Path, output: OutputSuffix) -> Path:
-    if output.suffix is not None:
-        return place.with_suffix(output.suffix)
-    writable = sink_kind(output.sink).endings
-    if not writable or place.suffix.lower() in writable:
-        return place
-    return place.with_suffix(writable[0])
+    suffix = output.suffix
+    return place.with_suffix(sink_kind(output.sink).suffix_for(place) if suffix is None else suffix)
 
 
 def _refuse_nested(clips: Iterable[Path], sources: Iterable[InputVideo], folder: Path) -> None:

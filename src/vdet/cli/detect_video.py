@@ -200,10 +200,9 @@ def _in_and_out(
 
 
 def _beside(source: Path) -> Path:
-    from vdet.media.writer import VIDEO_SUFFIXES
+    from vdet.run.sinks.protocol import sink_kind
 
-    suffix = source.suffix if source.suffix.lower() in VIDEO_SUFFIXES else VIDEO_SUFFIXES[0]
-    return source.with_name(f"{source.stem}.vdet{suffix}")
+    return source.with_name(f"{source.stem}.vdet{sink_kind('video').suffix_for(source)}")
 
 
 def _process_one(run: "Run") -> bool:

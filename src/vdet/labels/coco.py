@@ -23,7 +23,7 @@ from vdet.detect.classes import UNKNOWN
 from vdet.errors import TruthError
 from vdet.files import record_input
 from vdet.labels.documents import json_values
-from vdet.labels.formats import Format, SourceVideo, last_classes
+from vdet.labels.formats import Format, PictureTracks, SourceVideo, last_classes
 from vdet.labels.label import (
     MAX_LABELS,
     NO_ID,
@@ -105,15 +105,14 @@ def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) ->
     writer.end(file)
 
 
-def _write_pictures(file: BinaryIO, pictures: Sequence[LabelledPicture]) -> None:
+def _write_pictures(file: BinaryIO, pictures: Sequence[PictureTracks]) -> None:
     writer = _Writer("images")
     for number, picture in enumerate(pictures, start=1):
-        width, height = picture.size or (None, None)
-        name = picture.path.as_posix()
+        (width, height), name = picture.size, picture.path.as_posix()
         writer.add("images", id=number, file_name=name, width=width, height=height)
-        for label in picture.labels:
-            category = writer.category(label.name or UNKNOWN)
-            writer.add_box(number, Box(*label.box), category, label.score)
+        for track in picture.tracks:
+            category = writer.category(track.class_name or UNKNOWN)
+            writer.add_box(number, track.box, category, track.score)
     writer.end(file)
 
 

@@ -20,7 +20,7 @@ from vdet.boxes import Box
 from vdet.detect.classes import UNKNOWN
 from vdet.errors import TruthError, escaped
 from vdet.labels.documents import attribute, read_xml, size_of, text_of
-from vdet.labels.formats import Format, SourceVideo, last_classes
+from vdet.labels.formats import Format, PictureTracks, SourceVideo, last_classes
 from vdet.labels.label import Corners, Label, SavedTracks, known_size, limited, line_error
 from vdet.labels.parsing import (
     archive_members,
@@ -57,16 +57,16 @@ def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) ->
     file.write(b"</annotations>\n")
 
 
-def _write_pictures(file: BinaryIO, pictures: Sequence[LabelledPicture]) -> None:
-    names = [escaped(label.name or UNKNOWN) for item in pictures for label in item.labels]
+def _write_pictures(file: BinaryIO, pictures: Sequence[PictureTracks]) -> None:
+    names = [escaped(track.class_name or UNKNOWN) for item in pictures for track in item.tracks]
     _write_head(file, f"<size>{len(pictures)}</size><mode>annotation</mode>", names)
     for number, picture in enumerate(pictures):
-        (width, height), path = picture.size or (0, 0), escaped(picture.path.as_posix())
+        (width, height), path = picture.size, escaped(picture.path.as_posix())
         size = f'width="{width}" height="{height}"'
         file.write(f'  <image id="{number}" name={quoteattr(path)} {size}>\n'.encode())
-        for label in picture.labels:
-            name = quoteattr(escaped(label.name or UNKNOWN))
-            text = f'source="auto" occluded="0" {_corners(Box(*label.box))} z_order="0"'
+        for track in picture.tracks:
+            name = quoteattr(escaped(track.class_name or UNKNOWN))
+            text = f'source="auto" occluded="0" {_corners(track.box)} z_order="0"'
             file.write(f"    <box label={name} {text}></box>\n".encode())
         file.write(b"  </image>\n")
     file.write(b"</annotations>\n")

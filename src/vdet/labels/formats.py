@@ -11,11 +11,10 @@ from typing import BinaryIO
 
 from vdet.detect.classes import UNKNOWN
 from vdet.errors import TruthError
-from vdet.labels.label import SavedTracks
+from vdet.labels.label import SavedTracks, Size
 from vdet.labels.parsing import numbered_lines
-from vdet.labels.pictures import LabelledPicture
 from vdet.plugins import FORMATS, load_plugin, plugin_names
-from vdet.track.track import FrameTracks
+from vdet.track.track import FrameTracks, Track
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,14 +40,26 @@ class SourceVideo:
     begin: datetime | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class PictureTracks:
+    """The vehicles of a still picture.
+
+    `path` is its name in the file of labels, `size` its width and height in pixels.
+    """
+
+    path: Path
+    size: Size
+    tracks: Sequence[Track]
+
+
 Lines = Callable[[FrameTracks], Iterable[str]]
 """Returns the lines of a frame, each with its end."""
 
 WriteWhole = Callable[[BinaryIO, SourceVideo, Sequence[FrameTracks]], None]
 """Writes all frames of a video into a binary file."""
 
-WritePictures = Callable[[BinaryIO, Sequence[LabelledPicture]], None]
-"""Writes labelled pictures, whose paths are their names in the file, into a binary file."""
+WritePictures = Callable[[BinaryIO, Sequence[PictureTracks]], None]
+"""Writes the labels of pictures into a binary file."""
 
 
 @dataclass(frozen=True, slots=True)

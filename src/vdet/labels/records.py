@@ -6,8 +6,9 @@ JSON lines have a record for each frame, even one without a box. CSV has a row f
 import csv
 import io
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping
 from datetime import datetime, timedelta
+from itertools import islice
 from operator import itemgetter
 from pathlib import Path
 from typing import Annotated, Any, NotRequired
@@ -30,9 +31,6 @@ CLOCK = "clock"
 """Name of the fact and of the column that has the moment of a frame, in ISO 8601."""
 
 _OF_TRACK = tuple(KINDS)[2:]
-
-_Clock = tuple[int, str | None, float | str]
-"""The number of a line, the moment that it has, and its time in seconds."""
 
 
 class _Record(TypedDict):
@@ -87,11 +85,12 @@ def read_json_lines(path: Path, data: bytes) -> SavedTracks:
         The file is empty, a line is not such a record, frames do not ascend, or a time is wrong.
     """
     frames: Times = {}
-    clocks: list[_Clock] = []
-    labels, times = read_rows(path, _json_rows(path, data, frames, clocks), frames)
+    labels, times = read_rows(path, _json_rows(path, data, frames), frames)
     if not times:
         raise TruthError(f"{path}: is empty; it should have a record for every frame")
-    return SavedTracks(labels, tuple(times), times, begin=_begin(path, clocks))
+    line, first = next(numbered_lines(path, data))
+    begin = _begin(path, line, _RECORD.validate_json(first))
+    return SavedTracks(labels, tuple(times), times, begin=begin)
 
 
 def read_csv(path: Path, data: bytes) -> SavedTracks:
@@ -105,23 +104,26 @@ def read_csv(path: Path, data: bytes) -> SavedTracks:
         A column is missing or appears twice, a row has another number of cells, a cell is not what
         its column needs, or a time is wrong.
     """
-    clocks: list[_Clock] = []
-    labels, times = read_rows(path, _csv_rows(path, data, clocks))
-    return SavedTracks(labels, times=times, begin=_begin(path, clocks))
+    labels, times = read_rows(path, _csv_rows(path, data))
+    (_, head), *rows = islice(numbered_lines(path, data), 2)
+    begin = None
+    for line, row in rows:
+        cells = (_cells(path, line, text) for text in (head, row))
+        begin = _begin(path, line, dict(zip(*cells, strict=True)))
+    return SavedTracks(labels, times=times, begin=begin)
 
 
-def _begin(path: Path, clocks: Sequence[_Clock]) -> datetime | None:
-    """Return the moment of time 0 from the clock of the first row."""
-    for line, clock, time in clocks[:1]:
-        try:
-            return moment(clock) - timedelta(seconds=float(time)) if clock else None
-        except (ValueError, OverflowError) as error:
-            raise line_error(path, line, f"clock: {error}") from error
-    return None
+def _begin(path: Path, line: int, first: Mapping[str, Any]) -> datetime | None:
+    """Return the moment of time 0 from the time and the clock of the first line."""
+    clock = first.get(CLOCK)
+    try:
+        return moment(clock) - timedelta(seconds=float(first["time"])) if clock else None
+    except (ValueError, OverflowError) as error:
+        raise line_error(path, line, f"clock: {error}") from error
 
 
-def _json_rows(path: Path, data: bytes, times: Times, clocks: list[_Clock]) -> Iterator[Row]:
-    """Yield the boxes of every record, and put the time and the clock of its frame into lists."""
+def _json_rows(path: Path, data: bytes, times: Times) -> Iterator[Row]:
+    """Yield the boxes of every record, and put the time of its frame into `times`."""
     last = -1
     for line, content in numbered_lines(path, data):
         try:
@@ -132,17 +134,12 @@ def _json_rows(path: Path, data: bytes, times: Times, clocks: list[_Clock]) -> I
             raise line_error(path, line, f"frame {record['frame']} comes after frame {last}")
         last, time = record["frame"], record["time"]
         times[last] = line, time
-        if not clocks:
-            clocks.append((line, record.get("clock"), time))
         for track in record["tracks"]:
             yield line, (last, time, *map(track.get, _OF_TRACK))
 
 
-def _csv_rows(path: Path, data: bytes, clocks: list[_Clock]) -> Iterator[Row]:
-    """Yield the rows of a table; an empty cell is None, and so is one of a missing column.
-
-    `clocks` gets that of the first row.
-    """
+def _csv_rows(path: Path, data: bytes) -> Iterator[Row]:
+    """Yield the rows of a table; an empty cell is None, and so is one of a missing column."""
     lines = numbered_lines(path, data)
     names = _cells(path, *next(lines, (1, "")))
     if any(names.count(name) != 1 for name in _NEEDED):
@@ -155,9 +152,6 @@ def _csv_rows(path: Path, data: bytes, clocks: list[_Clock]) -> Iterator[Row]:
             what = f"has {len(cells)} cells, but the header has {len(names)}"
             raise line_error(path, line, f"this line {what}")
         cells.append("")
-        if not clocks:
-            clock = cells[names.index(CLOCK)] if CLOCK in names else None
-            clocks.append((line, clock, cells[names.index("time")]))
         row: list[Any] = [cell or None for cell in pick(cells)]
         row[_FOOT] = [None if None in row[_FOOT] else row[_FOOT]]
         yield line, row

@@ -24,7 +24,7 @@ from vdet.boxes import Box
 from vdet.config.document import MAX_BYTES, parse_document
 from vdet.detect.classes import UNKNOWN
 from vdet.errors import ConfigError, ImageError, OutputError, TruthError, escaped, printable
-from vdet.labels.formats import Format, SourceVideo
+from vdet.labels.formats import Format, PictureTracks, SourceVideo
 from vdet.labels.label import Label, SavedTracks, Size, limited
 from vdet.labels.parsing import (
     LIMIT,
@@ -34,7 +34,7 @@ from vdet.labels.parsing import (
     parse_whole,
     read_bytes,
 )
-from vdet.labels.pictures import LabelledPicture, Parse, PictureFormat
+from vdet.labels.pictures import Parse, PictureFormat
 from vdet.media.images import read_header
 from vdet.track.track import FrameTracks
 
@@ -60,7 +60,7 @@ def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) ->
         store(archive, _DATA, _description("train.txt", classes) + sides)
 
 
-def _write_pictures(file: BinaryIO, pictures: Sequence[LabelledPicture]) -> None:
+def _write_pictures(file: BinaryIO, pictures: Sequence[PictureTracks]) -> None:
     """Write the archive, which is unpacked beside the folder `images` with the pictures."""
     classes: dict[str, int] = {}
     texts: dict[str, str] = {}
@@ -69,8 +69,7 @@ def _write_pictures(file: BinaryIO, pictures: Sequence[LabelledPicture]) -> None
         if name in texts:
             what = "YOLO needs pictures with different names; this one occurs with two endings"
             raise OutputError(f"{picture.path.with_suffix('')}: {what}")
-        size = picture.size or (1, 1)
-        lines = (_line(Box(*label.box), label.name, size, classes) for label in picture.labels)
+        lines = (_line(t.box, t.class_name, picture.size, classes) for t in picture.tracks)
         texts[name] = "".join(lines)
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, text in texts.items():

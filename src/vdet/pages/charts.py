@@ -9,6 +9,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from time import gmtime, strftime
 
 import numpy as np
 
@@ -137,8 +138,7 @@ def _time_text(seconds: float, zero: float | None) -> str:
     """Write a time in the video, or the time of the day where it is known."""
     if zero is None:
         return time_text(seconds)
-    minutes, rest = divmod(round(seconds + zero) % 86400, 60)
-    return f"{minutes // 60:02}:{minutes % 60:02}" + (f":{rest:02}" if rest else "")
+    return strftime("%H:%M:%S", gmtime(round(seconds + zero))).removesuffix(":00")
 
 
 def number_axis(

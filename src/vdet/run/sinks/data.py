@@ -6,23 +6,21 @@ Times are in seconds and those of the input. Pixels are those of the input frame
 import json
 import sys
 from collections.abc import Callable
-from dataclasses import astuple, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, BinaryIO, Self
 
-from vdet.detect.classes import UNKNOWN
 from vdet.errors import OutputError
 from vdet.files import print_now
 from vdet.labels.formats import (
+    PictureTracks,
     SourceVideo,
     TrackWriter,
     format_for,
     picture_suffixes,
     track_suffixes,
 )
-from vdet.labels.label import Label
-from vdet.labels.pictures import LabelledPicture
 from vdet.labels.records import CLOCK, JSON_LINES, track_record
 from vdet.run.result import FrameResult, findings_in
 from vdet.run.sinks.protocol import STANDARD_OUTPUT, BaseSink, BatchTotal, SinkContext, SinkKind
@@ -91,7 +89,7 @@ class LabelSink(BaseSink):
 
     def __init__(self, path: Path, context: SinkContext) -> None:
         super().__init__(path, context)
-        self._pictures: list[LabelledPicture] = []
+        self._pictures: list[PictureTracks] = []
 
     def finish(self) -> None:
         """Write the file."""
@@ -105,11 +103,7 @@ class LabelSink(BaseSink):
         """Add a picture."""
         place = self.context.places.get(result.source, Path(result.source.name))
         size = result.frame.picture.width, result.frame.picture.height
-        labels = tuple(
-            Label("", astuple(track.box), track.class_name or UNKNOWN, score=track.score)
-            for track in result.tracks
-        )
-        self._pictures.append(LabelledPicture(place, self.path, labels, size))
+        self._pictures.append(PictureTracks(place, size, result.tracks))
 
 
 LABELS = SinkKind(LabelSink, picture_suffixes, "labels of pictures", takes="pictures")

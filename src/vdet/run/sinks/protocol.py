@@ -194,6 +194,11 @@ class SinkKind:
         """What the name of the output may end in; empty for any."""
         return self.suffixes() if callable(self.suffixes) else self.suffixes
 
+    def suffix_for(self, video: Path) -> str:
+        """Return the ending of its output for a video: that of the video if it can write it."""
+        is_known = not self.endings or video.suffix.lower() in self.endings
+        return video.suffix if is_known else self.endings[0]
+
     def takes_name(self, name: str) -> bool:
         """Return whether an output may have this name, without its folder."""
         if self.writes_standard_output and name == STANDARD_OUTPUT.name:
