@@ -1,0 +1,153 @@
+"""The figures of vdet in docs/comparison.md: counts, clips and the start of the program.
+
+    python -m benchmarks.comparison
+
+With `pip install supervision trackers`, the rows of LineZone and ByteTrack are measured too. The
+page has the commands of the other programs. F1 on held-out cameras is not measured here.
+"""
+
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import astuple, replace
+from importlib.util import find_spec
+from pathlib import Path
+from statistics import fmean
+from typing import Any
+
+import vdet
+from vdet.config.detector import NetworkSettings
+from vdet.config.places import LineSettings, TrafficSettings
+from vdet.config.schema import Settings
+from vdet.evaluate.scores import Scores, score
+from vdet.labels.label import Label, LabelledVideo
+from vdet.labels.reading import read_truth
+from vdet.run.result import FrameResult
+from vdet.synthetic.random_scenes import pole_scene
+from vdet.synthetic.render import write_clip
+from vdet.synthetic.scene import Scene, SceneVehicle
+from vdet.synthetic.truth import write_truth
+
+SEEDS = (1, 2, 3, 4)
+LINES = (
+    LineSettings(name="north", start=(0.2, 0.45), end=(0.9, 0.45), left="out", right="in"),
+    LineSettings(name="south", start=(0.02, 0.8), end=(0.98, 0.8), left="in", right="out"),
+)
+EVERY_FRAME = Settings(detector=NetworkSettings(stride=1), traffic=TrafficSettings(lines=LINES))
+START = "import vdet; vdet.Detector()"
+
+Row = tuple[int, Scores | None]
+"""Crossings that were counted, and the scores of the tracks."""
+
+
+def rows_of_road(seed: int, folder: Path) -> Iterator[tuple[str, Row]]:
+    """Yield the name and the figures of each way to count on a road."""
+    scene, clip, truth = pole_scene(seed), folder / f"{seed}.mp4", folder / f"{seed}.txt"
+    write_clip(clip, scene)
+    write_truth(truth, scene)
+    true, followed = read_truth(truth), vdet.follow(clip, settings=EVERY_FRAME)
+    results = list(followed)
+    shown = [result.frame_tracks.boxes for result in results]
+    assert followed.counts is not None
+    crossings = sum(total.count for total in followed.counts.totals)
+    yield "vdet", (crossings, score(_labels(shown), true))
+    if not (find_spec("supervision") and find_spec("trackers")):
+        return
+    import supervision
+
+    feet = [supervision.Position.BOTTOM_CENTER]
+    tracks = [boxes.to_supervision() for boxes in shown]
+    yield "vdet, LineZone", (crossings_of(tracks, scene), None)
+    yield "vdet, LineZone with feet", (crossings_of(tracks, scene, triggering_anchors=feet), None)
+    for name, limits in (
+        ("ByteTrack", {}),
+        ("ByteTrack, 0.4", {"track_activation_threshold": 0.4, "high_conf_det_threshold": 0.4}),
+    ):
+        tracks = list(byte_tracks(results, float(scene.rate), **limits))
+        boxes = [vdet.Boxes.from_supervision(frame) for frame in tracks]
+        count = crossings_of(tracks, scene, triggering_anchors=feet)
+        yield name, (count, score(_labels(boxes), true))
+
+
+def byte_tracks(results: Sequence[FrameResult], rate: float, **limits: float) -> Iterator[Any]:
+    """Yield what ByteTrack follows in the detections of each frame."""
+    from trackers import ByteTrackTracker
+
+    tracker = ByteTrackTracker(frame_rate=rate, **limits)
+    for result in results:
+        found = tracker.update(result.detections.to_supervision())
+        yield found[found.tracker_id != -1] if len(found) else found
+
+
+def crossings_of(tracks: Sequence[Any], scene: Scene, **options: Any) -> int:
+    """Return the crossings that LineZone counts at all lines."""
+    import supervision as sv
+
+    size, count = (scene.camera.width, scene.camera.height), 0
+    for line in LINES:
+        ends = (
+            sv.Point(*(a * b for a, b in zip(end, size, strict=True)))
+            for end in (line.start, line.end)
+        )
+        zone = sv.LineZone(*ends, **options)
+        for frame in tracks:
+            if len(frame):
+                zone.trigger(frame)
+        count += zone.in_count + zone.out_count
+    return count
+
+
+def _labels(frames: Sequence[vdet.Boxes]) -> LabelledVideo:
+    return LabelledVideo.of(
+        Label(0, astuple(box.box), frame=number, id=box.id or 0, score=box.score)
+        for number, boxes in enumerate(frames, start=1)
+        for box in boxes
+    )
+
+
+def pause_scene() -> Scene:
+    """Return 80 s of a road with vehicles from second 20 and from second 50 on."""
+
+    def later(seed: int, seconds: float, number: int) -> Iterator[SceneVehicle]:
+        for vehicle in pole_scene(seed).vehicles:
+            path = tuple(replace(point, time=point.time + seconds) for point in vehicle.path)
+            yield replace(vehicle, id=vehicle.id + number, path=path)
+
+    vehicles = (*later(1, 20, 0), *later(2, 50, 8))
+    return replace(pole_scene(1), vehicles=vehicles, frames=1000)
+
+
+def seconds_of(*command: str) -> float:
+    """Return the processor time of a Python program."""
+    before = os.times()
+    subprocess.run([sys.executable, *command], check=True, stdout=subprocess.DEVNULL)
+    return sum(b - a for a, b in zip(before[2:4], os.times()[2:4], strict=True))
+
+
+def main() -> None:
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        rows: dict[str, list[Row]] = {}
+        for seed in SEEDS:
+            for way, row in rows_of_road(seed, folder):
+                rows.setdefault(way, []).append(row)
+        for way, found in rows.items():
+            scores = [some for _, some in found if some]
+            text = f"{way:<26}{sum(count for count, _ in found):>3} crossings"
+            if scores:
+                means = (fmean(getattr(some, key) for some in scores) for key in ("f1", "idf1"))
+                text += "   F1 {:.3f}   IDF1 {:.3f}".format(*means)
+                text += f"   {sum(some.id_switches for some in scores)} id switches"
+            print(text, flush=True)
+        clip, clips = folder / "pause.mp4", folder / "clips"
+        write_clip(clip, pause_scene())
+        command = ("-m", "vdet", "-q", "detect-video", str(clip), "--no-video", "--clips")
+        print(f"clips: {seconds_of(*command, str(clips)):.1f} s of processor time,", end=" ")
+        print(*sorted(path.name for path in clips.iterdir()))
+    print(f"start: {seconds_of('-c', START):.1f} s of processor time")
+
+
+if __name__ == "__main__":
+    main()
