@@ -257,12 +257,12 @@ class TestFiles:
         }
         join_counts(content, tmp_path / "all.wide.csv")
         assert (tmp_path / "all.wide.csv").read_text() == (
-            'video,start,end,"west: left, car","west: left, all",'
-            '"west: right, car","west: right, all",all,"west: left, truck","west: right, truck"\n'
-            "car,0.0,10.0,1,1,0,0,1,,\n"
-            "car,all,,1,1,0,0,1,,\n"
-            "truck,0.0,10.0,,1,,0,1,1,0\n"
-            "truck,all,,,1,,0,1,1,0\n"
+            'video,start,end,"west: left, car","west: left, truck","west: left, all",'
+            '"west: right, car","west: right, truck","west: right, all",all\n'
+            "car,0.0,10.0,1,0,1,0,0,0,1\n"
+            "car,all,,1,0,1,0,0,0,1\n"
+            "truck,0.0,10.0,0,1,1,0,0,0,1\n"
+            "truck,all,,0,1,1,0,0,0,1\n"
         )
 
     def test_json_has_flows_matrix_and_the_beginning(self, tmp_path: Path) -> None:

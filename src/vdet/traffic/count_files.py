@@ -155,7 +155,10 @@ def join_flows(videos: Mapping[str, Any], path: Path) -> None:
 
 
 def _join(videos: Mapping[str, Any], path: Path, table: str, columns: Sequence[str]) -> None:
-    content = _joined(table, columns[2:-1], videos) if is_json(path) else join_tables(videos)
+    if is_json(path):
+        content: Any = _joined(table, columns[2:-1], videos)
+    else:
+        content = join_tables(videos, missing=0)
     write_content(path, content)
 
 

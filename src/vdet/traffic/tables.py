@@ -93,15 +93,25 @@ def write_content(path: Path, content: Any) -> None:
         write_table(path, heading, rows)
 
 
-def join_tables(tables: Mapping[str, Sequence[Sequence[Any]]]) -> list[Sequence[Any]]:
+def join_tables(
+    tables: Mapping[str, Sequence[Sequence[Any]]], missing: Any = None
+) -> list[Sequence[Any]]:
     """Return one table over those of many videos, by their names, with the name in each row.
 
-    It has the columns of all of them; a cell of a column that its table lacks is empty.
+    It has the columns of all of them, in their order; `missing` is the cell of a column that a
+    table lacks.
     """
-    columns = dict.fromkeys(column for table in tables.values() for column in table[0])
+    columns: list[str] = []
+    for heading, *_ in tables.values():
+        place = len(columns)
+        for column in reversed(heading):
+            if column in columns:
+                place = columns.index(column)
+            else:
+                columns.insert(place, column)
     rows = (
-        [name, *map(dict(zip(table[0], row, strict=True)).get, columns)]
-        for name, table in tables.items()
-        for row in table[1:]
+        [name, *(known.get(column, missing) for column in columns)]
+        for name, (heading, *body) in tables.items()
+        for known in (dict(zip(heading, row, strict=True)) for row in body)
     )
     return [[VIDEO, *columns], *rows]
