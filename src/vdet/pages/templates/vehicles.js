@@ -6,9 +6,11 @@ const PRINTED = 2000;
 
 const data = JSON.parse(document.getElementById("vehicles").textContent);
 data.video = new Int32Array(data.class.length);
-for (let video = 0, row = 0; video < data.counts.length; video += 1) {
-  data.video.fill(video, row, row += data.counts[video]);
-}
+let begin = 0;
+data.counts.forEach((count, video) => {
+  data.video.fill(video, begin, begin + count);
+  begin += count;
+});
 const known = new Set(Object.keys(data));
 if (data.names.length < 2) known.delete("video");
 for (const name of ["way", "state", "speed", "distance", "lane", "clock", "picture"]) {
