@@ -219,6 +219,7 @@ class Counts:
             axes.bar(list(found), list(found.values()), bottom=bottom, label=part)
             heights.update(found)
         axes.set_ylabel("vehicles")
+        axes.yaxis.get_major_locator().set_params(integer=True)
         axes.legend()
         return axes
 
