@@ -14,6 +14,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder as a camera leaves it; it is the current folder."""
     for name in (
         "clips/b.mp4",
+        "clips/b.vdet.mp4",
         "clips/a.MOV",
         "clips/a.srt",
         "clips/._a.MOV",
@@ -46,7 +47,7 @@ class TestFound:
             ("camera.raw", "camera.raw"),
         ]
 
-    def test_a_folder_gives_the_videos_in_it_and_below_but_no_hidden_ones(self) -> None:
+    def test_a_folder_gives_the_videos_in_it_and_below_but_no_hidden_or_drawn_ones(self) -> None:
         assert found("clips") == [
             ("clips/a.MOV", "a.MOV"),
             ("clips/b.mp4", "b.mp4"),

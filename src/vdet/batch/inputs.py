@@ -20,6 +20,9 @@ VIDEO_INPUT_SUFFIXES = frozenset((
 ))  # fmt: skip
 """Suffixes of videos in a folder. A file that is named may have any suffix."""
 
+DRAWN = ".vdet"
+"""What the name of a video that is written beside its source has before the suffix."""
+
 
 @dataclass(frozen=True, slots=True)
 class InputVideo:
@@ -41,6 +44,8 @@ def find_sources(clips: Sequence[Path]) -> list[InputVideo]:
       and those in the folders that match. Their places are below the last folder of the pattern
       that has no such character. If the pattern ends in a suffix, as ``*.raw`` does, all files that
       match are taken for videos.
+
+    Videos that vdet wrote beside their sources are left out, unless they are named.
 
     Numbered pictures of which one is missing are left out with a warning (logger "vdet").
 
@@ -81,7 +86,7 @@ def _matching(pattern: Path) -> Iterator[InputVideo]:
         path = Path(name)
         if path.is_dir():
             yield from _below(path, plain[0])
-        elif takes_all or _is_video(path):
+        elif _is_video(path) or (takes_all and not path.stem.endswith(DRAWN)):
             yield InputVideo(path, path.relative_to(plain[0]))
 
 
@@ -110,7 +115,8 @@ def _pictures_in(folder: Path, base: Path) -> Iterator[InputVideo]:
 
 
 def _is_video(path: Path) -> bool:
-    return path.suffix.lower() in VIDEO_INPUT_SUFFIXES and not path.name.startswith(".")
+    is_left_out = path.name.startswith(".") or path.stem.endswith(DRAWN)
+    return path.suffix.lower() in VIDEO_INPUT_SUFFIXES and not is_left_out
 
 
 def _refuse_unreadable(error: OSError) -> None:

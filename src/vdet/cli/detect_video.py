@@ -200,9 +200,10 @@ def _in_and_out(
 
 
 def _beside(source: Path) -> Path:
+    from vdet.batch.inputs import DRAWN
     from vdet.run.sinks.protocol import sink_kind
 
-    return source.with_name(f"{source.stem}.vdet{sink_kind('video').suffix_for(source)}")
+    return source.with_name(f"{source.stem}{DRAWN}{sink_kind('video').suffix_for(source)}")
 
 
 def _process_one(run: "Run") -> bool:
