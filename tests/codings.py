@@ -4,11 +4,10 @@ import pytest
 
 from vdet.media.frame import Coding
 
-LIMITED, FULL, HD = Coding(), Coding(full_range=True), Coding("bt709")
 CODINGS = {
-    "BT.601": LIMITED,
-    "BT.601, full range": FULL,
-    "BT.709": HD,
+    "BT.601": Coding(),
+    "BT.601, full range": Coding(full_range=True),
+    "BT.709": Coding("bt709"),
     "BT.709, full range": Coding("bt709", full_range=True),
 }
 in_any_coding = pytest.mark.parametrize("coding", CODINGS.values(), ids=CODINGS)

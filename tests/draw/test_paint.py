@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from codings import in_any_coding
 from vdet.boxes import Box
 from vdet.config.places import LineSettings, TrafficSettings, ZoneSettings
 from vdet.draw.boxes import (
@@ -29,17 +30,14 @@ from vdet.traffic.crossings import place
 Mask = NDArray[np.bool_]
 WIDTH, HEIGHT = 320, 240
 RED: Color = (40, 30, 230)
-CODINGS = [Coding(matrix, full) for matrix in ("bt601", "bt709") for full in (False, True)]
-NAMES = [f"{coding.matrix} {'full' if coding.full_range else 'limited'}" for coding in CODINGS]
-each_coding = pytest.mark.parametrize("coding", CODINGS, ids=NAMES)
 
 
-def ground(coding: Coding, width: int = WIDTH, height: int = HEIGHT) -> Planes:
-    """Return planes of soft colours; unlike `Planes.of_image` it takes odd sides."""
-    planes = Planes(av.VideoFrame(width, height, "yuv420p"), coding, is_own=True)
+def ground(coding: Coding) -> Planes:
+    """Return planes of soft colours."""
+    planes = Planes(av.VideoFrame(WIDTH, HEIGHT, "yuv420p"), coding, is_own=True)
     for layer, base in zip(planes.layers, (90, 120, 130), strict=True):
         y, x = np.mgrid[: layer.shape[0], : layer.shape[1]]
-        layer[:] = base + 20 * x // width + 20 * y // height
+        layer[:] = base + 20 * x // WIDTH + 20 * y // HEIGHT
     return planes
 
 
@@ -96,7 +94,7 @@ def grown(mask: Mask) -> Mask:
     return np.asarray(cv2.dilate(mask.astype(np.uint8), np.ones((3, 3))) > 0)
 
 
-@each_coding
+@in_any_coding
 @pytest.mark.parametrize("name", DRAWINGS)
 def test_planes_look_like_the_same_drawing_in_an_image(name: str, coding: Coding) -> None:
     """Nothing else is changed: of chroma, only values next to those that are drawn on."""

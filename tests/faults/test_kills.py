@@ -57,11 +57,8 @@ def test_when_a_worker_is_killed_its_file_is_done_again(
     result = running.finish()
     assert result.code == 0, result.err
     assert names(tmp_path) == ["a.mp4", "b.mp4", "manifest.jsonl", "short.mp4"]
-    assert {name: r["frames"] for name, r in records_of(tmp_path).items()} == {
-        "a.mp4": 300,
-        "b.mp4": 300,
-        "short.mp4": 5,
-    }
+    frames = {name: record["frames"] for name, record in records_of(tmp_path).items()}
+    assert frames == {"a.mp4": 300, "b.mp4": 300, "short.mp4": 5}
     until(running.is_alone)
     assert "Traceback" not in result.err
 

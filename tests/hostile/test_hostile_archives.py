@@ -15,7 +15,6 @@ from hostile.mutations import mutated
 from hostile.trials import Trial, try_files
 
 SMALL = (*("--set", "detector.features={patch: 16, histogram: {bins: 8}}"), *("--jobs", "1"))
-SECONDS = 20.0
 EACH = 12  # patches of each class
 Members = list[tuple[zipfile.ZipInfo | str, bytes]]
 
@@ -147,7 +146,6 @@ def trials(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Trial]:
         folder / "a",
         {f"{number}.zip": data for number, data in enumerate(sets.values())},
         lambda path, out: ["train", path, "-o", out / f"{path.stem}.npz", *SMALL],
-        seconds=SECONDS,
     )
     assert {path.suffix for path in (folder / "a" / "out").iterdir()} == {".npz"}
     assert list(folder.iterdir()) == [folder / "a"]

@@ -12,10 +12,9 @@ from onnx import TensorProto, helper, numpy_helper
 
 from detect.onnx.graphs import write_graph
 from hostile.mutations import mutated
-from hostile.trials import Trial, broken_promises, try_all
+from hostile.trials import broken_promises, try_all, try_files
 from vdet.detect.onnx.detector import SHIPPED
 
-SECONDS = 20.0
 CELLS = 84  # of an input of 64×64
 Write = Callable[[Path], Path]
 
@@ -126,25 +125,18 @@ def noise(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def try_networks(paths: list[Path], noise: Path) -> list[Trial]:
-    runs = [("detect-image", noise, "--model", path, "--json", "-") for path in paths]
-    trials = try_all(runs, seconds=SECONDS)
-    assert broken_promises(trials) == []
-    return trials
-
-
 def test_wicked_networks_are_used_or_refused(tmp_path: Path, noise: Path) -> None:
     writers = enumerate(NETWORKS.values())
     paths = [write(tmp_path / f"{number}.onnx") for number, (write, _) in writers]
-    trials = try_networks(paths, noise)
+    trials = try_all([("detect-image", noise, "--model", path, "--json", "-") for path in paths])
+    assert broken_promises(trials) == []
     for trial, (name, (_, words)) in zip(trials, NETWORKS.items(), strict=True):
         assert trial.code == (1 if words else 0), (name, trial.err)
         assert re.search(words, trial.err), (name, trial.err)
 
 
 def test_damaged_networks_are_used_or_refused(tmp_path: Path, noise: Path) -> None:
-    paths = []
-    for number, data in enumerate(mutated(SHIPPED.read_bytes(), seed=1, count=60)):
-        paths.append(tmp_path / f"{number}.onnx")
-        paths[-1].write_bytes(data)
-    try_networks(paths, noise)
+    damaged = enumerate(mutated(SHIPPED.read_bytes(), seed=1, count=60))
+    contents = {f"{number}.onnx": data for number, data in damaged}
+    use = ("detect-image", noise, "--json", "-", "--model")
+    assert len(try_files(tmp_path, contents, lambda path, _: [*use, path])) == 60

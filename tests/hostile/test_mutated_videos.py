@@ -18,7 +18,6 @@ CLIPS: dict[str, dict[str, Any]] = {
     "gif": {"codec": "gif", "pix_fmt": "rgb8"},
 }
 EACH = 20
-SECONDS = 20.0
 
 
 def outcomes(folder: Path, contents: dict[str, bytes]) -> list[Trial]:
@@ -27,7 +26,6 @@ def outcomes(folder: Path, contents: dict[str, bytes]) -> list[Trial]:
         folder,
         contents,
         lambda path, out: ["-q", "detect-video", path, out / f"{path.name}.mp4", *FEW_OPTIONS],
-        seconds=SECONDS,
     )
     written = {f"{name}.mp4" for name, t in zip(contents, trials, strict=True) if t.code == 0}
     assert {path.name for path in (folder / "out").iterdir()} == written

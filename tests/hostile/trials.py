@@ -24,6 +24,7 @@ MEMORY = 1_000_000_000
 _ADDRESSES = 4_000_000_000  # bytes; protects the machine
 _OF_LIBTIFF = ("ZIPDecode: ", "PredictorSetup: ", "tempfile.tif: ")
 """Beginnings of lines that libtiff writes to standard error itself."""
+_SECONDS = 20.0  # of processor time, for each run
 _PATIENCE = 3000  # seconds for all runs, on a very busy machine; usually some 10 s
 
 
@@ -41,10 +42,10 @@ class Trial:
     memory: int
 
 
-def try_all(runs: Sequence[Sequence[str | Path]], *, seconds: float) -> list[Trial]:
-    """Run the program with each list of arguments, each for at most `seconds` of processor time."""
+def try_all(runs: Sequence[Sequence[str | Path]]) -> list[Trial]:
+    """Run the program with each list of arguments, each for at most 20 s of processor time."""
     orders = json.dumps([[str(word) for word in words] for words in runs])
-    command = [sys.executable, __file__, str(seconds)]
+    command = [sys.executable, __file__]
     done = subprocess.run(
         command, input=orders, capture_output=True, text=True, timeout=_PATIENCE, check=False
     )
@@ -58,7 +59,6 @@ def try_files(
     contents: Mapping[str, bytes],
     arguments: Callable[[Path, Path], Sequence[str | Path]],
     *,
-    seconds: float,
     lines: int = 1,
 ) -> list[Trial]:
     """Run the program on files of these contents; return the runs, after checks that hold for all.
@@ -73,7 +73,7 @@ def try_files(
         (inside / name).write_bytes(data)
     others = {path.parent for path in folder.rglob("*")}
     runs = [arguments(inside / name, out) for name in contents]
-    trials = try_all(runs, seconds=seconds)
+    trials = try_all(runs)
     assert broken_promises(trials, lines=lines) == []
     assert files_in(inside) == {inside / name: data for name, data in contents.items()}
     assert {path.parent for path in folder.rglob("*")} <= others | {out}
@@ -124,21 +124,18 @@ def _main() -> None:
     resource.setrlimit(resource.RLIMIT_AS, (_ADDRESSES, _ADDRESSES))
     signal.signal(signal.SIGPROF, _give_up)
     report = os.fdopen(os.dup(1), "w", encoding="utf-8")
-    seconds = float(sys.argv[1])
     with tempfile.TemporaryFile() as said, Path(os.devnull).open("w", encoding="utf-8") as nowhere:
         os.dup2(nowhere.fileno(), 1)
         os.dup2(said.fileno(), 2)
         for arguments in json.load(sys.stdin):
-            trial = _try(main, arguments, seconds, said)
+            trial = _try(main, arguments, said)
             print(json.dumps(asdict(trial)), file=report, flush=True)
 
 
-def _try(
-    main: Callable[[Sequence[str]], NoReturn], arguments: list[str], seconds: float, said: IO[bytes]
-) -> Trial:
+def _try(main: Callable[[Sequence[str]], NoReturn], arguments: list[str], said: IO[bytes]) -> Trial:
     began = time.process_time()
     code: int | None = None
-    signal.setitimer(signal.ITIMER_PROF, seconds)
+    signal.setitimer(signal.ITIMER_PROF, _SECONDS)
     try:
         main(arguments)
     except SystemExit as end:
