@@ -79,16 +79,10 @@ def test_damaged_pictures_are_read_or_refused(tmp_path: Path) -> None:
     )
     assert len(trials) == MUTATIONS * len(FORMATS) + len(BOMBS)
     assert {trial.code for trial in trials} == {0, 1}
+    for trial in trials[: len(BOMBS)]:
+        assert "has more than 33,554,432 pixels, or a side of more than" in trial.err
     written = sum(trial.code == 0 for trial in trials)
     assert len(list((tmp_path / "out").iterdir())) == written > 12
-
-
-@pytest.mark.parametrize("name", BOMBS)
-def test_the_error_names_a_picture_of_too_many_pixels(tmp_path: Path, name: str) -> None:
-    path = tmp_path / name
-    path.write_bytes(BOMBS[name])
-    with pytest.raises(ImageError, match="has more than 33,554,432 pixels, or a side of more than"):
-        read_image(path)
 
 
 def test_an_endless_file_is_read_up_to_the_limit() -> None:

@@ -10,10 +10,9 @@ from red_cars import SETTINGS
 from run.red_runs import outputs, read, result_of, run_red, write
 from running import rows_of
 from vdet.boxes import Box
-from vdet.config.camera import CameraSettings
 from vdet.config.places import LineSettings, TrafficSettings, ZoneSettings
 from vdet.config.schema import Settings
-from vdet.errors import OutputError, VideoError
+from vdet.errors import OutputError
 from vdet.pages.render import PAGE_NAME
 from vdet.run.sinks.data import COUNTS
 from vdet.run.sinks.protocol import Output
@@ -79,14 +78,6 @@ def test_running_counts_are_drawn_if_asked_for(red_clip: Path, tmp_path: Path) -
 def test_without_lines_there_is_nothing_to_count_at(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="no lines or zones to count at"):
         write(Output("counts", tmp_path / "c.csv"), [result_of(Box.sized(1, 1, 9, 9))])
-
-
-def test_lines_for_another_shape_are_refused(red_clip: Path, tmp_path: Path) -> None:
-    path = tmp_path / "c.csv"
-    settings = with_counts().model_copy(update={"camera": CameraSettings(size=(320, 180))})
-    with pytest.raises(VideoError, match=r"red\.mp4: camera\.size: points are for .*320×180"):
-        run_red(Run(red_clip, outputs(counts=path)), settings)
-    assert not path.exists()
 
 
 def test_a_batch_has_a_file_over_all_videos(red_clip: Path, tmp_path: Path) -> None:
