@@ -101,6 +101,12 @@ WICKED = {
     "a huge number": ("t.jsonl", '{"frame": ' + "9" * 100_000 + "}", ":1: "),
     "no end of tracks": ("t.jsonl", '{"frame": 0, "time": 0, "tracks": [' + "{}," * 99_999, ":1: "),
     "deep COCO": ("t.coco.json", '{"images": ' + "[" * DEEP, "is not JSON: nested too deeply"),
+    "deep COCO with brackets in its keys": (
+        "t.coco.json",
+        '{"]": ' * DEEP,
+        "is not JSON: nested too deeply",
+    ),
+    "a long key in COCO": ("t.coco.json", '{"' + "k" * 17 * DEEP, "has an entry of more than"),
     "no numbers in COCO": (
         "t.coco.json",
         '{"images": [], "categories": [], "annotations": [{"bbox": [1e999, NaN, 1, 1]}]}',

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
@@ -24,13 +24,16 @@ MAX_NAMES = 1000
 MAX_ENTRY = 16_000_000
 """Largest number of bytes between two values that are read from a JSON document."""
 
-_CHUNK = 8192  # bytes
-_NESTING = {b"[": 1, b"{": 1, b"]": -1, b"}": -1}
+_CHUNK = 65_536  # bytes; a text that goes on in the next chunk is read again from its start
 _MAX_DEPTH = 1000
+_STARTS: dict[str, Callable[[], Any]] = {"start_map": dict, "start_array": list}
+_ENDS = ("end_map", "end_array")
 
 _SIZES = {b"<": 100, b"=": 130}
 """Bytes that an element takes, half of them at its end, and an attribute."""
-_NAME = re.compile(rb"<([^\s/<>]{1,1000}+)|(?<=\s)([^\s\"'=<>]{1,1000}+)\s*+=")
+_ELEMENT = re.compile(rb"<([^\s/<>]{1,1000}+)")
+_EMAN = re.compile(rb"=\s*+([^\s\"'=<>]{1,1000}+)(?=\s)")
+"""The name of an attribute in a reversed text, whose "=" is found at once."""
 
 
 def json_values(
@@ -47,39 +50,73 @@ def json_values(
         It is not JSON, is nested too deeply, has more than `MAX_ENTRY` bytes without such a value,
         or more than `most` in all.
     """
-    found = {place: ijson.sendable_list() for place in places}
-    readers = {
-        place: ijson.items_coro(values, place, use_float=True) for place, values in found.items()
-    }
-    size = 0
-    for chunk in _chunks(path, file, most):
-        size += len(chunk)
+    events, finder, total, size = ijson.sendable_list(), _Finder(places), 0, 0
+    parser = ijson.basic_parse_coro(events, use_float=True)
+    while chunk := file.read(_CHUNK):
+        total, size = total + len(chunk), size + len(chunk)
+        if total > most:
+            raise TruthError(f"{path}: is larger than {most:,} bytes; cut it into parts")
         if size > MAX_ENTRY:
             raise TruthError(f"{path}: has an entry of more than {MAX_ENTRY:,} bytes")
         with _json_errors(path):
-            for reader in readers.values():
-                reader.send(chunk)
-        for place, values in found.items():
-            size = 0 if values else size
-            yield from ((place, value) for value in values)
-            if values and not place.endswith(".item"):
-                del readers[place]  # each takes the time of a whole one
-            values.clear()
+            parser.send(chunk)
+            values = list(finder.values(events))
+        events.clear()
+        size = 0 if values else size
+        yield from values
     with _json_errors(path):
-        for reader in readers.values():
-            reader.close()
+        parser.close()
 
 
-def _chunks(path: Path, file: IO[bytes], most: float) -> Iterator[bytes]:
-    total = depth = 0
-    while chunk := file.read(_CHUNK):
-        total += len(chunk)
-        depth += sum(chunk.count(part) * step for part, step in _NESTING.items())
-        if total > most:
-            raise TruthError(f"{path}: is larger than {most:,} bytes; cut it into parts")
-        if depth > _MAX_DEPTH:  # each level takes the memory of all above it
-            raise TruthError(f"{path}: is not JSON: nested too deeply")
-        yield chunk
+class _Finder:
+    """Builds the values at some places of a JSON document from its events."""
+
+    def __init__(self, places: Iterable[str]) -> None:
+        self._places = {tuple(place.split(".")): place for place in places}
+        self._deepest = max(map(len, self._places))
+        self._keys: list[str] = []  # of each open map the last key, of each open list "item"
+        self._parts: list[Any] = []  # the open maps and lists of the value that is built
+
+    def values(self, events: Iterable[tuple[str, Any]]) -> Iterator[tuple[str, Any]]:
+        """Yield each value that some further events complete, with its place.
+
+        Raises `ValueError` where the document is nested too deeply.
+        """
+        keys, parts = self._keys, self._parts
+        for event, value in events:
+            if event == "map_key":
+                keys[-1] = value
+            elif event in _STARTS:
+                self._open(event)
+            elif event in _ENDS:
+                keys.pop()
+                part = parts.pop() if parts else None
+                if part is not None and not parts:
+                    yield self._places[(*keys,)], part
+            elif parts:
+                self._add(value)
+            elif self._is_wanted():
+                yield self._places[(*keys,)], value
+
+    def _is_wanted(self) -> bool:
+        return len(self._keys) <= self._deepest and (*self._keys,) in self._places
+
+    def _open(self, event: str) -> None:
+        value = _STARTS[event]()
+        if self._parts:
+            self._add(value)
+        if self._parts or self._is_wanted():
+            self._parts.append(value)
+        self._keys.append("item" if event == "start_array" else "")
+        if len(self._keys) > _MAX_DEPTH:
+            raise ValueError("nested too deeply")
+
+    def _add(self, value: Any) -> None:
+        parent = self._parts[-1]
+        if isinstance(parent, list):
+            parent.append(value)
+        else:
+            parent[self._keys[-1]] = value
 
 
 @contextmanager
@@ -118,14 +155,15 @@ def read_xml(path: Path, data: bytes, root: str) -> ET.Element:
 
 def _check_memory(path: Path, data: bytes) -> None:
     """Refuse a document whose elements would take too much memory, before it is parsed."""
-    text = 0 if data.isascii() else 4 * len(data)  # one wide character makes all of them wide
-    if text + sum(data.count(part) * size for part, size in _SIZES.items()) > MAX_MEMORY:
+    wide = 0 if data.isascii() else 4 * len(data)  # one wide character makes all of them wide
+    if wide + sum(data.count(part) * size for part, size in _SIZES.items()) > MAX_MEMORY:
         raise TruthError(f"{path}: would take more than 1 GB of memory; cut it into parts")
-    names: set[bytes] = set()
-    for found in _NAME.finditer(data):
-        names.add(found[found.lastindex or 0])
-        if len(names) > MAX_NAMES:
-            raise TruthError(f"{path}: has more than {MAX_NAMES:,} different names of values")
+    for text, pattern in ((data, _ELEMENT), (data[::-1], _EMAN)):
+        names: set[bytes] = set()
+        for found in pattern.finditer(text):
+            names.add(found[1])
+            if len(names) > MAX_NAMES:
+                raise TruthError(f"{path}: has more than {MAX_NAMES:,} different names of values")
 
 
 def attribute(element: ET.Element, name: str) -> str:
