@@ -102,7 +102,12 @@ _batch_options = options.bundle(
 @options.short_form(
     "--margin SECONDS", "clips.margin", "Time added to a clip before and after.", float
 )
-@options.short_form("--exact", "clips.exact", "Cut clips at exact frames, which encodes them.")
+@options.short_form(
+    "--exact",
+    "clips.exact",
+    "Cut clips at exact frames, which encodes them; without it, whole key-frame intervals are "
+    "copied.",
+)
 @counting_options(" With -d, only the ending of the names.")
 @options.sink_option
 @options.start_option

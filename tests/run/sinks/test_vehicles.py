@@ -32,8 +32,8 @@ def test_a_run_writes_the_record_and_the_picture_of_its_car(red_clip: Path, tmp_
     assert float(row["length_share"]) == pytest.approx(float(row["length"]) / WIDTH, abs=1e-3)
     assert float(row["length"]) == pytest.approx(COUNT, abs=COUNT / 4), "a pixel a frame"
     (name,) = names(tmp_path / "crops")
-    assert name.startswith("vehicle-0001-vehicle-at-")
-    time = float(name.removeprefix("vehicle-0001-vehicle-at-").removesuffix("s.jpg"))
+    assert name.startswith("vehicle-0001-at-")
+    time = float(name.removeprefix("vehicle-0001-at-").removesuffix("s.jpg"))
     assert time in {round(float(track["time"]), 3) for track in tracks}
     blue, _, red = read_image(tmp_path / "crops" / name).reshape(-1, 3).mean(axis=0)
     assert red > blue + 50
@@ -47,7 +47,7 @@ def test_a_better_picture_replaces_that_of_a_vehicle_that_was_gone(tmp_path: Pat
         result_of(large, index=2, time=Fraction(2)),
     ]
     write(Output("crops", tmp_path), results)
-    assert names(tmp_path) == ["vehicle-0001-vehicle-at-2.000s.jpg"]
+    assert names(tmp_path) == ["vehicle-0001-at-2.000s.jpg"]
 
 
 def test_pictures_of_an_earlier_run_go(tmp_path: Path) -> None:
@@ -56,7 +56,7 @@ def test_pictures_of_an_earlier_run_go(tmp_path: Path) -> None:
     for name in mine:
         (tmp_path / name).write_text("mine")
     write(Output("crops", tmp_path), [result_of(CAR, time=Fraction(3))])
-    assert names(tmp_path) == sorted(["vehicle-0001-vehicle-at-3.000s.jpg", *mine])
+    assert names(tmp_path) == sorted(["vehicle-0001-at-3.000s.jpg", *mine])
 
 
 def test_thousands_of_vehicles_do_not_need_thousands_of_open_files(tmp_path: Path) -> None:

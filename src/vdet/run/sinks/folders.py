@@ -9,7 +9,7 @@ from typing import Any
 
 from vdet.boxes import Image
 from vdet.config.rendering import render
-from vdet.detect.classes import in_file_name
+from vdet.detect.classes import UNKNOWN, in_file_name
 from vdet.draw.boxes import WHITE, color_of, draw_box, draw_label, draw_regions
 from vdet.errors import OutputError, clock
 from vdet.files import write_text
@@ -112,7 +112,9 @@ class CropSink(BaseSink):
 
 
 def _crop_name(vehicle: VehicleRecord, time: float) -> str:
-    return f"vehicle-{vehicle.id:04d}-{in_file_name(vehicle.class_name)}-at-{time:.3f}s.jpg"
+    kind = in_file_name(vehicle.class_name)
+    parts = ["vehicle", f"{vehicle.id:04d}", *([] if kind == UNKNOWN else [kind])]
+    return f"{'-'.join(parts)}-at-{time:.3f}s.jpg"
 
 
 CROPS = SinkKind(CropSink, what="pictures of vehicles", marker="vehicle-*-at-*s.*", takes="videos")
