@@ -118,7 +118,7 @@ def train_network(
     """Train a network and return it with the moving average of its weights.
 
     The same sources and settings give the same network on the same machine. A training that was
-    stopped resumes from its last checkpoint. Torch uses one thread in this process from then on.
+    stopped resumes from its last checkpoint. Until it ends, torch uses one thread.
 
     Parameters
     ----------
@@ -147,14 +147,15 @@ def train_network(
         "base": str(base),
         **settings.model_dump(),
     }
+    threads = torch.get_num_threads()
     torch.set_num_threads(1)  # two threads that wait for each other are slower than one
     torch.set_flush_denormal(True)
-    training = _Training(sources, settings, learnt_with)
-    if checkpoint.exists():
-        training.restore(checkpoint)
-    elif base is not None:
-        training.start_from(base, next(_batches(sources, settings, 0)))
     try:
+        training = _Training(sources, settings, learnt_with)
+        if checkpoint.exists():
+            training.restore(checkpoint)
+        elif base is not None:
+            training.start_from(base, next(_batches(sources, settings, 0)))
         with prefetch(_batches(sources, settings, training.step)) as batches:
             for batch in batches:
                 loss = training.learn(batch)
@@ -163,6 +164,7 @@ def train_network(
                     training.save(checkpoint)
     finally:
         torch.set_flush_denormal(False)
+        torch.set_num_threads(threads)
     return training.averaged.eval()
 
 
