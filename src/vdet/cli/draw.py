@@ -166,5 +166,8 @@ def _saved(tracks: Path, rate: float | None, run: "Run") -> "list[FrameTracks]":
     saved = read_tracks(tracks, rate)
     if not saved.has_times:
         raise TruthError(f"{tracks}: has no times; CLIP must be the video")
-    start, end = run.start or -math.inf, run.end or math.inf
+    start, end = (
+        limit if moment is None else moment
+        for moment, limit in ((run.start, -math.inf), (run.end, math.inf))
+    )
     return [frame for frame in saved if start <= frame.time < end]
