@@ -130,13 +130,17 @@ def test_the_format_is_written_counted_and_compared(
 
 
 def test_the_step_changes_what_all_outputs_get(package: Path, clip: Path, tmp_path: Path) -> None:
-    tally, tracks = tmp_path / "tally.txt", tmp_path / "t.csv"
-    options = ("--no-video", "--tracks", tracks, "--sink", f"tally={tally}", *CHOSEN)
+    tally, tracks, cars = (tmp_path / name for name in ("tally.txt", "t.csv", "cars.json"))
+    ground = ((0, 0.25, 0, 40), (1, 0.25, 20, 40), (1, 1, 15, 5), (0, 1, 5, 5))
+    points = (f"{{pixel: [{x}, {y}], metres: [{e}, {n}]}}" for x, y, e, n in ground)
+    speeds = ("--vehicles", cars, "--set", f"camera.ground=[{', '.join(points)}]")
+    options = ("--no-video", "--tracks", tracks, "--sink", f"tally={tally}", *speeds, *CHOSEN)
     narrow = ("--set", "steps=[wide]")
     vdet(package, "detect-video", clip, *options, *narrow)
     assert CAR.width < WIDTH / 4
     assert tally.read_text() == "".join(f"{number} 0\n" for number in range(FRAMES))
     assert len(tracks.read_text().splitlines()) == 1, "the heading alone"
+    assert json.loads(cars.read_text()) == []
     again = (*options, "--overwrite", "--set", "steps=[none]")
     unknown = vdet(package, "detect-video", clip, *again, code=1)
     assert "none: unknown step; known: wide" in unknown.stderr

@@ -123,6 +123,21 @@ def test_a_frame_gives_the_same_patches_whatever_other_frames_are_used(
     assert any("frame000006" in name for name in both)
 
 
+def test_only_frames_that_the_truth_is_about_are_used(
+    run: Run, clip_path: Path, options: tuple[str, ...], tmp_path: Path
+) -> None:
+    truth, target = tmp_path / "task.xml", tmp_path / "mined.zip"
+    truth.write_text(
+        "<annotations><meta><task><start_frame>1</start_frame><stop_frame>7</stop_frame>"
+        '<frame_filter>step=3</frame_filter></task></meta><track id="1" label="car">'
+        '<box frame="1" outside="0" xtl="100" ytl="101" xbr="130" ybr="126"/></track></annotations>'
+    )
+    wanted = ("--truth", truth, "-o", target, "--every", "1")
+    result = run("mine", clip_path, *wanted, *options, code=0)
+    assert result.out.endswith("from 3 frames\n")
+    assert {int(name.partition("/frame")[2][:6]) for name in _patches(target)} == {2, 5, 8}
+
+
 def test_frames_that_cut_a_vehicle_off_are_used_too(
     run: Run, clip_path: Path, truth_path: Path, options: tuple[str, ...], tmp_path: Path
 ) -> None:

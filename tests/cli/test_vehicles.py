@@ -1,5 +1,6 @@
 """`--vehicles`, `--crops` and `--page` of `vdet detect-video`, for one video and for many."""
 
+import json
 from pathlib import Path
 from urllib.parse import unquote
 
@@ -23,6 +24,16 @@ def clips(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
+def addresses_in(page: Path) -> list[str]:
+    """Return where a page leads to, also by the links that its script makes."""
+    html = page.read_text(encoding="utf-8")
+    text = html.partition('id="vehicles"')[2].partition(">")[2].partition("</script>")[0]
+    table = json.loads(text)
+    made = [*(video["page"] for video in table["videos"]), *table["picture"]]
+    every = [*Elements(html).addresses(), *filter(None, made)]
+    return [address for address in every if not address.startswith("data:")]
+
+
 def test_many_videos_have_their_own_and_a_table_and_a_page_over_all(
     run: Run, clips: Path, tmp_path: Path, red: tuple[str, ...]
 ) -> None:
@@ -41,9 +52,10 @@ def test_many_videos_have_their_own_and_a_table_and_a_page_over_all(
     }
     assert [row["video"] for row in rows_of(Path("found/all.cars.csv"))] == [NASTY, "day/a"]
     for page in Path("found").rglob("*.html"):
-        every = Elements(page.read_text(encoding="utf-8")).addresses()
-        addresses = [address for address in every if not address.startswith("data:")]
+        addresses = addresses_in(page)
         assert addresses
+        if page.name == "index.html":
+            assert sum(".crops/" in address for address in addresses) == len(crops)
         for address in addresses:
             assert (page.parent / unquote(address.partition("#")[0])).is_file(), address
 

@@ -281,6 +281,12 @@ class TestYolo:
         assert image.classes == ("car", "truck")
         assert image.boxes[1].tolist() == [0.25 * WIDTH, 0.5 * HEIGHT, 0.5 * WIDTH, HEIGHT]
 
+    def test_what_lies_less_than_a_pixel_outside_is_moved_to_the_side(self, tmp_path: Path) -> None:
+        path = write_yolo(tmp_path, SCENE)
+        path.write_text("0 1.000001 0.5 0.125 1.01\n", encoding="utf-8")
+        (box,) = read_labelled_pictures(tmp_path).pictures[0].boxes.tolist()
+        assert box == [0.9375 * WIDTH, 0, 1.0625 * WIDTH, HEIGHT]
+
     @pytest.mark.parametrize(
         ("text", "words"),
         [

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from clips import ODD, read_number, write_clip
+from clips import ODD, joined, read_number, write_clip
 from vdet.config.schema import InputSettings
 from vdet.errors import VideoError
 from vdet.media import Frame
@@ -284,6 +284,16 @@ class TestFaults:
             assert [read_number(frame.image) for frame in reader] == list(range(10, 60))
             assert reader.length == 2
         assert warnings() == []
+
+    @pytest.mark.parametrize("kind", ["mp4", "mov"])
+    def test_of_videos_that_were_joined_byte_by_byte_the_first_is_read_with_a_warning(
+        self, kind: str, tmp_path: Path, warnings: Warnings
+    ) -> None:
+        part = write_clip(tmp_path / f"part.{kind}", count=12)
+        path = joined(tmp_path / f"in.{kind}", part, part, part)
+        with VideoReader(path) as reader:
+            assert [read_number(frame.image) for frame in reader] == list(range(12))
+        assert warnings() == [f"{path}: 3 videos are joined in one file; only the first is read"]
 
     def test_an_mp4_without_its_index_is_refused(self, tmp_path: Path) -> None:
         path = cut_off(write_clip(tmp_path / "cut.mp4", **GOPS), 0.3)

@@ -33,7 +33,8 @@ def touch(*paths: Path) -> None:
 class TestFindingImages:
     def test_each_picture_below_a_folder_has_its_place(self, tmp_path: Path) -> None:
         names = ("b.png", "a/b.png", "a.JPG", "c.webp", "notes.txt", ".thumbs/b.png")
-        touch(*(tmp_path / name for name in names))
+        hidden = ("__MACOSX/a/b.png", "a/._b.png", "Thumbs.db", ".DS_Store")
+        touch(*(tmp_path / name for name in (*names, *hidden)))
         found = find_images([tmp_path])
         assert list(found) == [tmp_path / name for name in ("a/b.png", "a.JPG", "b.png", "c.webp")]
         assert found == {tmp_path / place: place for place in found.values()}

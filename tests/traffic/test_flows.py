@@ -177,8 +177,9 @@ class TestIntervals:
             ("07:00", 1, pytest.approx(0.4, abs=0.01)), ("07:05", 0, 0), ("07:15", 0, 0),
         ]  # fmt: skip
 
-    def test_a_video_without_a_box_beside_one_with_some(self) -> None:
-        first, night = at(counts(frames(GOES_EAST), ZONE)), at(counts([], ZONE))
+    @pytest.mark.parametrize("boxes", [[], [*frames(TURNS_BACK)][:1]], ids=["none", "one"])
+    def test_a_video_with_hardly_a_box_beside_one_with_many(self, boxes: list[FrameTracks]) -> None:
+        first, night = at(counts(frames(GOES_EAST), ZONE)), at(counts(boxes, ZONE))
         rows = zone_table(
             [first, replace(night, clock=Clock(BEGINS + timedelta(hours=3), "", BEGINS.tzinfo))],
             3600,
