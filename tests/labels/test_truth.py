@@ -8,6 +8,7 @@ from labels.test_kitti import kitti_line
 from vdet.errors import TruthError
 from vdet.evaluate.comparison import compare
 from vdet.evaluate.report import mistakes
+from vdet.evaluate.video import score_files
 from vdet.labels import mot
 from vdet.labels.formats import Format, track_formats
 from vdet.labels.label import spread_frames
@@ -106,3 +107,13 @@ def test_only_frames_that_the_truth_is_about_are_compared(tmp_path: Path, name: 
     assert (missed.what, missed.first, missed.last, missed.boxes) == ("missed vehicle", 6, 6, 1)
     assert truth.known is not None
     assert spread_frames(truth.known.tolist(), 4, 1, 11) == {1, 6, 11}
+
+
+def test_what_is_found_after_the_last_vehicle_is_false(tmp_path: Path) -> None:
+    path, found = tmp_path / "gt.xml", tmp_path / "found.txt"
+    path.write_text(STEPPED["cvat"].replace('frame="5" outside="0"', 'frame="5" outside="1"'))
+    found.write_text("".join(f"{n},1,2,2,8,8,1,-1,-1,-1\n" for n in (1, 6, 11)))
+    path.write_text(path.read_text().replace('frame="10" outside="0"', 'frame="10" outside="1"'))
+    result = score_files(found, path)
+    assert (result.until, result.scores.false_positives, result.scores.vehicle_boxes) == (11, 2, 1)
+    assert read_truth(path).until(8).last_frame == 8

@@ -288,8 +288,9 @@ class LabelledVideo:
 
     @property
     def last_frame(self) -> int:
-        """Number of the last known frame of the video; 0 if there is none."""
-        return max(self.frame_count or 0, int(self.frames[-1]) if len(self) else 0)
+        """Number of the last known frame of the video, also without a box; 0 if there is none."""
+        ends = [self.frame_count or 0, *self.frames[-1:].tolist()]
+        return max(ends if self.known is None else [*ends, *self.known[-1:].tolist()])
 
     def check_end(self, path: Path, frames: int) -> None:
         """Refuse boxes of the file `path` beyond a video's last frame. Raises `TruthError`."""
@@ -305,7 +306,8 @@ class LabelledVideo:
 
     def until(self, last: int) -> "LabelledVideo":
         """Return the frames 1 to `last` as a video of that many frames."""
-        return replace(self.where(self.frames <= last), frame_count=last)
+        known = None if self.known is None else self.known[self.known <= last]
+        return replace(self.where(self.frames <= last), frame_count=last, known=known)
 
     def where(self, rows: slice | BoolArray) -> "LabelledVideo":
         """Return only these rows, in their order."""
