@@ -289,8 +289,10 @@ class LabelledVideo:
     @property
     def last_frame(self) -> int:
         """Number of the last known frame of the video, also without a box; 0 if there is none."""
-        ends = [self.frame_count or 0, *self.frames[-1:].tolist()]
-        return max(ends if self.known is None else [*ends, *self.known[-1:].tolist()])
+        known = self.frames if self.known is None else self.known
+        return max(
+            self.frame_count or 0, *(int(end) for end in (*self.frames[-1:], *known[-1:], 0))
+        )
 
     def check_end(self, path: Path, frames: int) -> None:
         """Refuse boxes of the file `path` beyond a video's last frame. Raises `TruthError`."""
