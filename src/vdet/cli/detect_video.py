@@ -105,7 +105,7 @@ _batch_options = options.bundle(
 @options.short_form(
     "--exact",
     "clips.exact",
-    "Cut clips at exact frames, which encodes them; without it, whole key-frame intervals are "
+    "Cut clips at exact frames, which encodes them. By default, whole key-frame intervals are "
     "copied.",
 )
 @counting_options(" With -d, only the ending of the names.")

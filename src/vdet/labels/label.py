@@ -290,9 +290,7 @@ class LabelledVideo:
     def last_frame(self) -> int:
         """Number of the last known frame of the video, also without a box; 0 if there is none."""
         known = self.frames if self.known is None else self.known
-        return max(
-            self.frame_count or 0, *(int(end) for end in (*self.frames[-1:], *known[-1:], 0))
-        )
+        return max([self.frame_count or 0, *map(int, (*self.frames[-1:], *known[-1:]))])
 
     def check_end(self, path: Path, frames: int) -> None:
         """Refuse boxes of the file `path` beyond a video's last frame. Raises `TruthError`."""
