@@ -202,9 +202,10 @@ function inRegions(paths, regions, [width, height]) {
       }
     }
     if (!rows.includes(0)) return path;
+    if (path.rows && rows.every((value, row) => value === path.rows[row])) return path.part; // as before
     const kept = path.times.map((_, row) => row).filter(row => rows[row]), seen = kept.filter(row => row < path.seen).length;
     const [times, xs, ys, heights] = [path.times, path.xs, path.ys, path.heights].map(values => kept.map(row => values[row]));
-    return seen && withBoxes({ ...path, seen, times, xs, ys, heights });
+    return Object.assign(path, { rows, part: seen && withBoxes({ ...path, part: null, seen, times, xs, ys, heights }) }).part;
   }).filter(path => path);
 }
 
@@ -518,14 +519,13 @@ async function openPage(data) {
   function recount() {
     const regions = places.regions.filter(each => each.points), before = known;
     known = new Map(); // only what has changed is counted again
-    const remembered = (key, work) => known.set(key, before.get(key) ?? work()).get(key);
     const area = JSON.stringify(regions.map(each => [each.kind, each.points]));
-    paths = remembered(area, () => inRegions(every, regions, size).filter(hasDriven));
+    paths = known.set(area, before.get(area) ?? inRegions(every, regions, size).filter(hasDriven)).get(area);
     found = [...places.lines.map(each => placeLine(each, size)), ...places.zones.map(each => placeZone(each, size))]
       .map(border => {
-        const key = area + JSON.stringify([border.start, border.end, border.corners, border.directions]);
-        const find = () => paths.map(path => [path, crossings(path, border)]).filter(([, some]) => some.length);
-        return { border, visits: remembered(key, find) };
+        const key = JSON.stringify([border.start, border.end, border.corners, border.directions]), last = before.get(key);
+        known.set(key, new Map(paths.map(path => [path, last?.get(path) ?? crossings(path, border)])));
+        return { border, visits: [...known.get(key)].filter(([, some]) => some.length) };
       });
   }
 
