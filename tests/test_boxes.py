@@ -81,14 +81,9 @@ def test_of_two_boxes_in_one_another_the_one_with_the_lower_score_is_nested(
 SIDES: list[list[float]] = [[10, 20, 40, 60], [0.5, 1.5, 3.25, 4.75], [-5, -6, 7, 8]]
 SCORES: list[float] = [0.9, 0.5, 0.125]
 FOUND = Boxes(
-    SIDES,
-    SCORES,
-    classes=[1, 0, 1],
-    names=("car", "lorry"),
-    ids=[4, 5, 6],
-    data={"strength": [7, 8, 9], "centroid": [[1, 2], [3, 4], [5, 6]]},
-    trace="trace",
-)
+    SIDES, SCORES, classes=[1, 0, 1], names=("car", "lorry"), ids=[4, 5, 6],
+    data={"strength": [7, 8, 9], "centroid": [[1, 2], [3, 4], [5, 6]]}, trace="trace",
+)  # fmt: skip
 COLUMNS = ("sides", "scores", "classes", "ids")
 
 

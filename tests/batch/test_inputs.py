@@ -13,19 +13,10 @@ from vdet.errors import BatchError
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder as a camera leaves it; it is the current folder."""
     for name in (
-        "clips/b.mp4",
-        "clips/b.vdet.mp4",
-        "clips/a.MOV",
-        "clips/a.srt",
-        "clips/._a.MOV",
-        "clips/.trash/old.mp4",
-        "clips/day1/c.avi",
-        "clips/day1/evening/d.ts",
-        "clips/day2/c.avi",
-        "clips/notes.txt",
-        "odd [1].mp4",
-        "camera.raw",
-    ):
+        "clips/b.mp4", "clips/b.vdet.mp4", "clips/a.MOV", "clips/a.srt", "clips/._a.MOV",
+        "clips/.trash/old.mp4", "clips/day1/c.avi", "clips/day1/evening/d.ts", "clips/day2/c.avi",
+        "clips/notes.txt", "odd [1].mp4", "camera.raw",
+    ):  # fmt: skip
         path = tmp_path / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.touch()

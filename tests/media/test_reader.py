@@ -186,17 +186,11 @@ def pictures_of(path: Path) -> list[av.VideoFrame]:
 
 
 PLANAR = {
-    "constant rate": Coding(),
-    "BT.601": Coding(),
-    "BT.709": Coding("bt709"),
-    "full range": Coding(full_range=True),
-    "BT.709, full range": Coding("bt709", full_range=True),
-    "motion jpeg": Coding(full_range=True),
-    "odd sides, 4:2:0": Coding(),
-    "grey": Coding(),
-    "mpeg-4 with b-frames": Coding(),
-    "vp9": Coding(),
-}
+    "constant rate": Coding(), "BT.601": Coding(), "BT.709": Coding("bt709"),
+    "full range": Coding(full_range=True), "BT.709, full range": Coding("bt709", full_range=True),
+    "motion jpeg": Coding(full_range=True), "odd sides, 4:2:0": Coding(), "grey": Coding(),
+    "mpeg-4 with b-frames": Coding(), "vp9": Coding(),
+}  # fmt: skip
 """How the odd clips are coded that are read as planes."""
 
 

@@ -40,18 +40,11 @@ class TestSearchesASecond:
     @pytest.mark.parametrize(
         ("searches", "rate", "apart"),
         [
-            (OF_NETWORK, 25, 2),
-            (OF_SVM, 25, 3),
-            (OF_NETWORK, 30, 2),
-            (OF_SVM, 30, 3),
-            (OF_NETWORK, Fraction(24000, 1001), 2),
-            (OF_NETWORK, Fraction(60000, 1001), 5),
-            (OF_NETWORK, 60, 5),
-            (OF_SVM, 50, 6),
-            (OF_SVM, 15, 1),
-            (OF_NETWORK, 5, 1),
+            (OF_NETWORK, 25, 2), (OF_SVM, 25, 3), (OF_NETWORK, 30, 2), (OF_SVM, 30, 3),
+            (OF_NETWORK, Fraction(24000, 1001), 2), (OF_NETWORK, Fraction(60000, 1001), 5),
+            (OF_NETWORK, 60, 5), (OF_SVM, 50, 6), (OF_SVM, 15, 1), (OF_NETWORK, 5, 1),
         ],
-    )
+    )  # fmt: skip
     @pytest.mark.parametrize("unit", [None, 1000], ids=["exact", "milliseconds"])
     def test_of_a_steady_rate_every_nth_frame_is_searched(
         self, searches: float, rate: Fraction, apart: int, unit: int | None

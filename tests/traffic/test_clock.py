@@ -49,14 +49,10 @@ def test_a_time_that_is_given_is_taken() -> None:
 @pytest.mark.parametrize(
     "name",
     [
-        "Gate_FR20_2026-05-01_07-00-00.mp4",
-        "20260501_070000.mp4",
-        "cam1-2026.05.01 07.00.00.ts",
-        "REC2026-05-01T07-00-00.jsonl",
-        "99999999_999999_20260501_070000.mp4",
-        "DJI_20260501070000_0001_D.MP4",
+        *("Gate_FR20_2026-05-01_07-00-00.mp4", "20260501_070000.mp4"),
+        *("cam1-2026.05.01 07.00.00.ts", "REC2026-05-01T07-00-00.jsonl", "20260501T050000Z.mp4"),
+        *("99999999_999999_20260501_070000.mp4", "DJI_20260501070000_0001_D.MP4"),
         "2026_0501_070000_0001F.MP4",
-        "20260501T050000Z.mp4",
     ],
 )
 def test_a_time_in_the_name_is_local_time_or_utc_after_a_z(name: str, created: str | None) -> None:

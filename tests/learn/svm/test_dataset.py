@@ -57,14 +57,9 @@ def test_each_class_may_be_a_zip_file_of_its_own(tmp_path: Path) -> None:
 @pytest.mark.parametrize("make", [make_folder, make_zip])
 def test_other_files_than_patches_are_skipped(tmp_path: Path, make: Maker) -> None:
     junk = [
-        "__MACOSX/vehicles/far/._1.png",
-        "vehicles/far/._1.png",
-        "vehicles/.DS_Store",
-        "vehicles/far/notes.txt",
-        "vehicles/.cache/1.png",
-        "elsewhere/1.png",
-        "Vehicles/1.png",
-    ]
+        "__MACOSX/vehicles/far/._1.png", "vehicles/far/._1.png", "vehicles/.DS_Store",
+        "vehicles/far/notes.txt", "vehicles/.cache/1.png", "elsewhere/1.png", "Vehicles/1.png",
+    ]  # fmt: skip
     assert listed(make(tmp_path / "set", [*BOTH, *junk])) == BOTH[::-1]
 
 
