@@ -1,8 +1,6 @@
 """The demo: drawn roads, both detectors on them, and what they find against the truth."""
 
-import json
 from collections.abc import Callable
-from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 
@@ -16,7 +14,7 @@ from vdet.detect.svm.model import save_model
 from vdet.errors import OutputError
 from vdet.evaluate.output import table
 from vdet.evaluate.scores import score
-from vdet.files import make_folder, staged, write_json, write_whole
+from vdet.files import make_folder, staged, write_whole
 from vdet.labels.reading import read_predictions, read_truth
 from vdet.learn.svm.choosing import Most
 from vdet.learn.svm.dataset import find_patches
@@ -41,8 +39,8 @@ ROAD, TRUTH = "road.mp4", "truth.txt"
 POLE, POLE_TRUTH, GATE = "pole.mp4", "pole.txt", "gate.yaml"
 """The same from a pole, and the lines at which vehicles are counted."""
 
-PATCHES, MODEL, METRICS = "patches.zip", "model.npz", "model.json"
-"""The patches for the linear model, the model, and the metrics of its training."""
+PATCHES, MODEL = "patches.zip", "model.npz"
+"""The patches for the linear model, and the model, which has the metrics of its training."""
 
 _GATE = """\
 # The lines of the demo, as fractions of the frame.
@@ -113,13 +111,12 @@ def run_demo(
         draw(busy_road(rng), source.path, source.truth)
     model = load_svm(linear.svm, None)  # only the places of its windows matter
     mine(sources, folder / PATCHES, linear, model, most=_MOST, overwrite=overwrite, steps=steps)
-    learnt, metrics = train(find_patches([folder / PATCHES]), linear, steps=steps)
+    learnt, _ = train(find_patches([folder / PATCHES]), linear, steps=steps)
     with staged(folder / MODEL, overwrite=overwrite) as temporary:
         save_model(learnt, temporary)
-    write_json(asdict(metrics), str(folder / METRICS), overwrite=overwrite)
     announce("4/4 finding the vehicles with the linear model …")
-    model_file = f"detector.model={json.dumps(str(folder / MODEL))}"
-    find(ROAD, _BY_MODEL, load_settings(assignments=[model_file]))
+    chosen = linear.svm.model_copy(update={"model": str(folder / MODEL)})
+    find(ROAD, _BY_MODEL, linear.model_copy(update={"detector": chosen}))
     truth, scores = read_truth(folder / TRUTH), []
     for name, outputs in (("network", _BY_NETWORK), (f"linear model {MODEL}", _BY_MODEL)):
         found = score(read_predictions(folder / outputs["tracks"]), truth)

@@ -6,20 +6,18 @@ Each check raises `AssertionError`, which says what is wrong.
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import astuple
 from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 
-from vdet.boxes import NO_BOXES, Box, Boxes, Image, visible
+from vdet.boxes import NO_BOXES, Boxes, Image, visible
 from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel, VideoDetector, stage_pictures_of
 from vdet.files import OutputFiles
 from vdet.media import Frame, Picture, VideoInfo
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import SinkContext, SinkKind
-from vdet.run.steps import StepContext, make_steps
 from vdet.track.track import TimedTracker, Track, VideoTracker
 from vdet.traffic.live import LiveTraffic
 
@@ -41,16 +39,16 @@ def check_detector(model: DetectorModel, images: Sequence[Image]) -> None:
     """
     height, width = images[0].shape[:2]
     first, second = (model.for_video(width, height, images) for _ in range(2))
+    pictures = [Picture(image.copy()) for image in images]
     with ThreadPoolExecutor(2) as pool:
-        pictures = [Picture(image.copy()) for image in images]
         candidates = list(pool.map(second.search, pictures, range(len(images))))
     for index, (image, searched) in enumerate(zip(images, candidates, strict=True)):
         found, again = _found(first, image, index), second.detect(searched)
         is_same = len(found) == len(again) and np.allclose(found.sides, again.sides, atol=1e-4)
         assert is_same, "boxes differ between two detectors: they share something"
-    image = images[0]
-    still = model.for_video(width, height, [image])
-    for name, picture in stage_pictures_of(still)(image, _found(still, image, None)).items():
+    still = model.for_video(width, height, images[:1])
+    found = _found(still, images[0], None)
+    for name, picture in stage_pictures_of(still)(images[0], found).items():
         is_image = picture.dtype == np.uint8 and picture.ndim == 3
         assert is_image, f"stage picture {name} is not uint8 of shape (H, W, 3)"
 
@@ -59,7 +57,7 @@ def _found(detector: VideoDetector, image: Image, index: int | None) -> Boxes:
     before = image.copy()
     found = detector.detect(detector.search(Picture(image), index))
     assert np.array_equal(image, before), "the detector changed a frame"
-    inside = visible(found.sides, (image.shape[1], image.shape[0]))
+    inside = visible(found.sides, image.shape[1::-1])
     assert np.array_equal(inside, found.sides), "a box lies outside the frame"
     return found
 
@@ -77,17 +75,18 @@ def check_tracker(make: Callable[[int, int], VideoTracker]) -> None:
     first, second = make(WIDTH, HEIGHT), make(WIDTH, HEIGHT)
     ids: set[int] = set()
     for index in range(3 * RATE):
-        time, picture = index / RATE, Picture(_scene(index))
-        tracks = list(first.update(_detections(index), time, picture))
+        picture = Picture(_scene(index))
+        tracks, again = (
+            list(tracker.update(_detections(index), index / RATE, picture))
+            for tracker in (first, second)
+        )
         _check_tracks(tracks)
-        again = list(second.update(_detections(index), time, picture))
         assert again == tracks, "two trackers differ: they share something"
         assert (picture.image == _scene(index)).all(), "the tracker changed the frame"
         ids |= {track.id for track in tracks}
     assert len(tracks) == 2, f"{len(tracks)} of 2 vehicles are shown"
-    assert all(track.state == "detected" for track in tracks), (
-        "a detected vehicle is not called detected"
-    )
+    states = {track.state for track in tracks}
+    assert states == {"detected"}, "a detected vehicle is not called detected"
     assert len(ids) == 2, "a vehicle that is always detected changed its id"
     if isinstance(second, TimedTracker):
         later = second.at(3.0)
@@ -134,19 +133,13 @@ def check_sink(
 
 def _write(kind: SinkKind, path: Path, settings: Settings, *, still: bool, fails: bool) -> None:
     """Write a picture or three frames through the sink; the run may end with an error."""
-    rate = Fraction(RATE)
-    video = None if still else VideoInfo(Path("check.mp4"), WIDTH, HEIGHT, rate, 1 / rate, frames=3)
-    steps = make_steps(StepContext(settings, WIDTH, HEIGHT, video))
+    count, rate, traffic = 1 if still else 3, Fraction(RATE), LiveTraffic(settings, WIDTH, HEIGHT)
+    info = VideoInfo(Path("check.mp4"), WIDTH, HEIGHT, rate, 1 / rate, frames=count)
     with OutputFiles() as files:
-        traffic = LiveTraffic(settings, WIDTH, HEIGHT)
-        context = SinkContext(
-            files, settings, video, traffic=traffic, stage_pictures=lambda i, _: {"frame": i}
-        )
+        context = SinkContext(files, settings, None if still else info, traffic=traffic)
         with kind.open(path, context) as sink:
-            for index in range(1 if still else 3):
+            for index in range(count):
                 result = _result(index)
-                for step in steps:
-                    result = step.apply(result)
                 traffic.add(result.frame_tracks)
                 sink.write(result)
                 assert (result.frame.image == _scene(index)).all(), "the sink changed the frame"
@@ -162,27 +155,25 @@ def _content(path: Path) -> list[Path]:
     return [file for file in files if file.exists() and ".vdet-" not in file.name]
 
 
-def _boxes(index: int) -> list[Box]:
-    """Return two vehicles that drive in lanes of their own."""
-    return [Box.sized(60 + 2 * index, 180, 90, 70), Box.sized(500 - 3 * index, 40, 80, 60)]
-
-
 def _detections(index: int) -> Boxes:
-    sides = [astuple(box) for box in _boxes(index)]
+    """Return two vehicles that drive in lanes of their own."""
+    x, other = 60 + 2 * index, 500 - 3 * index
+    sides = [(x, 180, x + 90, 250), (other, 40, other + 80, 100)]
     return Boxes(sides, [0.9, 0.95], data={"strength": [9.0, 9.5]})
 
 
 def _scene(index: int) -> Image:
     """Draw the vehicles with a texture of their own on a grey road."""
     image = np.full((HEIGHT, WIDTH, 3), 90, np.uint8)
-    for number, box in enumerate(_boxes(index)):
-        part = box.cut(image)
+    for number, found in enumerate(_detections(index)):
+        part = found.box.cut(image)
         part[:] = np.random.default_rng(number).integers(0, 256, part.shape)
     return image
 
 
 def _result(index: int) -> FrameResult:
     frame = Frame(index, Fraction(index, RATE), Picture(_scene(index)))
-    left, right = _boxes(index)
+    detections = _detections(index)
+    left, right = (found.box for found in detections)
     tracks = (Track(1, left, 0.9, "detected"), Track(2, right, 0.9, "predicted"))
-    return FrameResult(Path("check.mp4"), frame, _detections(index), tracks)
+    return FrameResult(Path("check.mp4"), frame, detections, tracks)

@@ -21,7 +21,7 @@ def demo(folder: Path, seed: int, overwrite: bool) -> None:
     other synthetic roads and finds the vehicles too. All results are compared with the ground
     truth. All files are written into DIR, by default demo.
     """
-    from vdet.demo import METRICS, TRUTH, run_demo
+    from vdet.demo import MODEL, TRUTH, run_demo
 
     with progress_steps("") as steps:
         result = run_demo(folder, seed=seed, overwrite=overwrite, announce=announce, steps=steps)
@@ -34,6 +34,6 @@ def demo(folder: Path, seed: int, overwrite: bool) -> None:
         f"  {folder / 'page' / 'page.html'}  its page; {folder / 'flows.csv'} has the flows",
         f"  {folder / 'found.csv'}  the tracks; {folder / TRUTH} has the ground truth",
         f"  {folder / 'stages'}/  every stage of the linear model in one frame",
-        f"  {folder / METRICS}  the metrics of the training",
+        f"  {folder / MODEL}  the linear model; vdet info --json prints its metrics",
         "Next, try your own video:  vdet detect-video in.mp4 out.mp4",
     )

@@ -70,8 +70,7 @@ def calibrate(paths: Iterable[Path], pattern: Pattern) -> Calibration:
     boards = {path: _find_board(path, pattern) for path in paths}
     skipped = {path: board for path, board in boards.items() if isinstance(board, str)}
     photos = [board for board in boards.values() if isinstance(board, BoardPhoto)]
-    sizes = Counter(photo.size for photo in photos)
-    size = max(sizes, key=sizes.__getitem__, default=(0, 0))
+    (size, _), *_ = *Counter(photo.size for photo in photos).most_common(1), ((0, 0), 0)
     for photo in photos:
         if np.abs(np.subtract(photo.size, size)).max() > SIZE_TOLERANCE:
             skipped[photo.path] = f"is {_text(photo.size)}, the others are {_text(size)}"
@@ -97,8 +96,7 @@ def find_corners(image: Image, pattern: Pattern) -> Float32Array | None:
     """Return the inner corners of a board to a fraction of a pixel, `(n, 2)`; None without one."""
     gray = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
     scale = min(1.0, math.sqrt(MAX_SEARCH_PIXELS / gray.size))
-    method = cv2.INTER_AREA
-    small = cv2.resize(gray, None, fx=scale, fy=scale, interpolation=method) if scale < 1 else gray
+    small = cv2.resize(gray, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
     found, corners = cv2.findChessboardCorners(small, pattern)
     if not found:
         return None

@@ -149,9 +149,8 @@ def find_base(mask: Image, top_view: TopView) -> tuple[float, float] | None:
     spread = round(FINE_MARGIN * ACROSS) | 1
     histogram = np.asarray(cv2.blur(counts[None], (spread, 1)), np.float64).ravel()
     expected = top_view.lane_width
-    minimum, most = (
-        round((expected + off) * ACROSS) for off in (-WIDTH_TOLERANCE, WIDTH_TOLERANCE)
-    )
+    widths = expected - WIDTH_TOLERANCE, expected + WIDTH_TOLERANCE
+    minimum, most = (round(width * ACROSS) for width in widths)
     best, base = 0.0, None
     for gap in range(max(1, minimum), most + 1):
         left, right = top_view.laterals[:-gap], top_view.laterals[gap:]
@@ -266,9 +265,8 @@ def add_earlier(equations: Equations, earlier: Equations, memory: float) -> Equa
 
 def normal_equations(left: LinePaint, right: LinePaint, guess: LaneCurves) -> Equations:
     """Return the equations that the paint of both lines gives; `guess` linearizes the pitch."""
-    rows = np.concatenate(
-        [_rows(left, (1, 0), guess.left, guess), _rows(right, (0, 1), guess.right, guess)]
-    )
+    of_left = _rows(left, (1, 0), guess.left, guess)
+    rows = np.concatenate([of_left, _rows(right, (0, 1), guess.right, guess)])
     return np.asarray(rows[:, :-1].T @ rows)
 
 
@@ -331,14 +329,12 @@ def _fit(mask: Image, top_view: TopView, positions: LinePositions, guess: LaneCu
         positions = guess.at(top_view.distances)
     if not _is_plausible(guess, top_view):
         return FrameFit(guess, equations, (False, False))
-    left_seen = _is_seen(left, top_view, positions[0])
-    right_seen = _is_seen(right, top_view, positions[1])
-    if left_seen != right_seen:  # fit again without the paint near the unseen line
+    seen = _is_seen(left, top_view, positions[0]), _is_seen(right, top_view, positions[1])
+    if seen[0] != seen[1]:  # fit again without the paint near the unseen line
         none = LinePaint(np.empty(0), np.empty(0))
-        left, right = left if left_seen else none, right if right_seen else none
-        equations = normal_equations(left, right, guess)
+        equations = normal_equations(left if seen[0] else none, right if seen[1] else none, guess)
         guess = solve(equations, width)
-    return FrameFit(guess, equations, (left_seen, right_seen))
+    return FrameFit(guess, equations, seen)
 
 
 def _is_plausible(curves: LaneCurves, top_view: TopView) -> bool:

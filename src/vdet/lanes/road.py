@@ -78,11 +78,9 @@ class Lane:
         `left` and `right` are `[[x, y], …]`, pixels, rounded to tenths.
         """
         metres = {"radius": self.radius, "offset": self.offset, "width": self.width}
-        record: dict[str, Any] = {
-            key: None if value is None else round(value, 3) for key, value in metres.items()
-        }
-        lines = {"left": self.left, "right": self.right}
-        return record | {side: np.round(line, 1).tolist() for side, line in lines.items()}
+        rounded = {name: value and round(value, 3) for name, value in metres.items()}
+        left, right = (np.round(line, 1).tolist() for line in (self.left, self.right))
+        return {**rounded, "left": left, "right": right}
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,8 +221,7 @@ class RoadFinder:
             no_red = np.full_like(blue, 128)  # saves time; roads and paint have little red
             luma, blue, _ = planes.coding.to_common((luma, blue, no_red))
         else:
-            top = warped(picture.image, of_frame)
-            luma, _, blue = to_ycrcb(top)
+            luma, _, blue = to_ycrcb(warped(picture.image, of_frame))
         return FrameView(picture, paint_mask(luma, blue))
 
     def update(self, view: FrameView, vehicles: Iterable[Box] = ()) -> Road:
@@ -297,13 +294,10 @@ def lane_text(lane: Lane) -> tuple[str, ...]:
     """
     if lane.width is None or lane.offset is None:
         return ()
-    side = "left" if lane.curvature < 0 else "right"
+    side, place = ("left" if way else "right" for way in (lane.curvature < 0, lane.offset <= 0))
     bend = f"bends {side}, radius {lane.radius:.0f} m" if lane.radius else "straight"
-    place = "right" if lane.offset > 0 else "left"
-    return (
-        f"lane {lane.width:.1f} m wide, {bend}",
-        f"{abs(lane.offset):.2f} m {place} of its middle",
-    )
+    middle = f"{abs(lane.offset):.2f} m {place} of its middle"
+    return f"lane {lane.width:.1f} m wide, {bend}", middle
 
 
 def stage_pictures(road: Road) -> dict[str, Image]:

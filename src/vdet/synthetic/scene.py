@@ -6,7 +6,7 @@ surface and the plants beside it repeat every `PERIOD` metres, so a clip may hav
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from fractions import Fraction
 
 import numpy as np
@@ -114,10 +114,9 @@ class SceneVehicle:
 
     def position(self, time: float) -> Waypoint | None:
         """Return where it is at `time`, or None while it does not exist."""
-        times = [point.time for point in self.path]
+        times, *places = zip(*map(astuple, self.path), strict=True)
         if not times[0] <= time <= times[-1]:
             return None
-        places = zip(*((item.ahead, item.lateral, item.heading) for item in self.path), strict=True)
         return Waypoint(time, *(float(np.interp(time, times, place)) for place in places))
 
 

@@ -86,15 +86,13 @@ def _facets(body: Body, color: Color) -> tuple[Float64Array, Int64Array, list[Co
 
 def _underside(body: Body) -> list[_Facet]:
     half, top = body.width / 2, _SILL + 0.05
-    parts = []
-    for side, z in ((-1, body.length - STANDS), (1, STANDS)):  # seen from ahead, and from behind
-        for left, right, bottom, color in (
-            (-half + 0.1, half - 0.1, 0.1, _UNDERSIDE),
-            (-half + 0.04, -half + 0.28, 0.0, _TYRE),
-            (half - 0.28, half - 0.04, 0.0, _TYRE),
-        ):
-            parts.append((_upright(side * left, side * right, bottom, top, z), color))
-    return parts
+    panels = [(-half + 0.1, half - 0.1, 0.1, _UNDERSIDE)]
+    panels += [(x, x + 0.24, 0.0, _TYRE) for x in (-half + 0.04, half - 0.28)]
+    return [
+        (_upright(side * left, side * right, bottom, top, z), color)
+        for side, z in ((-1, body.length - STANDS), (1, STANDS))  # seen from ahead, and from behind
+        for left, right, bottom, color in panels
+    ]
 
 
 def _lower_body(body: Body, color: Color) -> list[_Facet]:
@@ -113,14 +111,13 @@ def _lower_body(body: Body, color: Color) -> list[_Facet]:
 
 def _wheels(body: Body, color: Color) -> list[_Facet]:
     """Paint arches, tyres and rims onto both sides."""
-    parts = []
-    for side in (-1, 1):
-        x = side * (body.width / 2 + 0.005)
-        for axle in (_REAR_AXLE, body.length - 0.9):
-            parts.append((_disc(x, axle, _WHEEL + 0.06), shaded(color, 0.3)))
-            parts.append((_disc(x, axle, _WHEEL), _TYRE))
-            parts.append((_disc(x, axle, 0.62 * _WHEEL), _RIM))
-    return parts
+    discs = (_WHEEL + 0.06, shaded(color, 0.3)), (_WHEEL, _TYRE), (0.62 * _WHEEL, _RIM)
+    return [
+        (_disc(side * (body.width / 2 + 0.005), axle, radius), painted)
+        for side in (-1, 1)
+        for axle in (_REAR_AXLE, body.length - 0.9)
+        for radius, painted in discs
+    ]
 
 
 def _ends(body: Body, color: Color) -> list[_Facet]:
@@ -159,11 +156,9 @@ def _cabin(body: Body, color: Color) -> list[_Facet]:
     rear = np.array([left[0], left[1], right[1], right[0]])
     parts = [(np.array([left[1], left[2], right[2], right[1]]), shaded(color, 1.1))]
     for side in (left[::-1], right):
-        parts.append((side, shaded(color, 0.85)))
-        parts.append((_inset(side, 0.08, 0.47), shaded(_GLASS, 0.8)))
-        parts.append((_inset(side, 0.53, 0.92), shaded(_GLASS, 0.8)))
-    front = np.array([right[3], right[2], left[2], left[3]])
-    for end in (rear, front):
+        windows = _inset(side, 0.08, 0.47), _inset(side, 0.53, 0.92)
+        parts += [(side, shaded(color, 0.85)), *((glass, shaded(_GLASS, 0.8)) for glass in windows)]
+    for end in (rear, np.array([right[3], right[2], left[2], left[3]])):
         parts += [(end, shaded(color, 0.95)), (_inset(end, 0.1, 0.9), _GLASS)]
     return parts
 
@@ -188,8 +183,7 @@ def _inset(quad: Float64Array, left: float, right: float) -> Float64Array:
 
     The corners of a quad are lower left, upper left, upper right, lower right.
     """
-    across = np.array([[left], [left], [right], [right]])
-    up = np.array([[0.14], [0.86], [0.86], [0.14]])
+    across, up = np.array([(left, 0.14), (left, 0.86), (right, 0.86), (right, 0.14)]).T[..., None]
     lower = quad[0] + across * (quad[3] - quad[0])
     upper = quad[1] + across * (quad[2] - quad[1])
     return np.asarray(lower + up * (upper - lower))
