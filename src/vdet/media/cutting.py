@@ -1,5 +1,6 @@
 """Cut parts out of a video: whole key-frame intervals are copied, without encoding them again."""
 
+import math
 from collections.abc import Iterable, Iterator
 from fractions import Fraction
 from pathlib import Path
@@ -69,23 +70,20 @@ def _moved_to_zero(
 
     `pictures` is the index of the stream with key frames. The first one is moved to second 0.
     """
-    begin: Fraction | None = None
-    stop: Fraction | None = None
+    begin: Fraction | float = math.inf
+    stop: Fraction | float = math.inf
     for packet in found:
         if packet.pts is None or packet.dts is None:
             continue
         time, is_picture = packet.pts * packet.time_base, packet.stream_index == pictures
         if is_picture and packet.is_keyframe:
-            begin = time if begin is None else begin
-            stop = time if stop is None and time >= end else stop
-        if is_picture and stop is not None and time > stop + _SOUND_LAG:
+            begin, stop = min(begin, time), min(stop, time if time >= end else math.inf)
+        if is_picture and time > stop + _SOUND_LAG:
             return
-        is_over = stop is not None and (is_picture or time >= stop)
-        if begin is None or time < begin or is_over:
-            continue
-        shift = round(begin / packet.time_base)
-        packet.pts, packet.dts = packet.pts - shift, packet.dts - shift
-        yield packet
+        if begin <= time < stop and not (is_picture and stop < math.inf):
+            shift = round(begin / packet.time_base)
+            packet.pts, packet.dts = packet.pts - shift, packet.dts - shift
+            yield packet
 
 
 def encode_part(

@@ -1,5 +1,6 @@
 """A frame of a video: its picture (BGR, or the planes of a decoder), its time, and its video."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
@@ -76,10 +77,8 @@ class Coding:
 
 
 def _looked_up(layers: Layers, for_luma: Image, for_chroma: Image) -> Layers:
-    tables = for_luma, for_chroma, for_chroma
-    luma, blue, red = (
-        np.asarray(cv2.LUT(*item), np.uint8) for item in zip(layers, tables, strict=True)
-    )
+    pairs = zip(layers, (for_luma, for_chroma, for_chroma), strict=True)
+    luma, blue, red = (np.asarray(cv2.LUT(*pair), np.uint8) for pair in pairs)
     return luma, blue, red
 
 
@@ -94,24 +93,18 @@ def _from_rgb(matrix: str) -> Float64Array:
 
 _FROM_BT709 = _from_rgb("bt601") @ np.linalg.inv(_from_rgb("bt709"))
 _TO_BT709 = np.linalg.inv(_FROM_BT709)
+_KINDS = cv2.CV_16S, cv2.CV_8U, cv2.CV_8U  # of a change of luma, of blue and red chroma
 
 
 def _recoded(layers: Layers, matrix: Float64Array) -> Layers:
     """Convert full-range values to another matrix; luma changes only by a fraction of chroma."""
-    luma, *chroma = layers
-    (_, *added), *mixed = matrix.tolist()
-    change = _mixture(chroma, added, -128 * sum(added), cv2.CV_16S)
-    blue, red = (
-        np.asarray(_mixture(chroma, shares, 128 * (1 - sum(shares)), cv2.CV_8U), np.uint8)
-        for _, *shares in mixed
-    )
+    luma, first, second = layers
+    mixed = []
+    for (_, a, b), zero, kind in zip(matrix.tolist(), (0, 128, 128), _KINDS, strict=True):
+        offset = zero - 128 * (a + b)
+        mixed.append(np.asarray(cv2.addWeighted(first, a, second, b, offset, dtype=kind)))
+    change, blue, red = mixed
     return np.asarray(cv2.add(luma, _as_large(change, luma), dtype=cv2.CV_8U), np.uint8), blue, red
-
-
-def _mixture(
-    chroma: list[Image], shares: list[float], offset: float, kind: int
-) -> cv2.typing.MatLike:
-    return cv2.addWeighted(chroma[0], shares[0], chroma[1], shares[1], offset, dtype=kind)
 
 
 def _as_large(values: npt.NDArray[Any], luma: Image) -> npt.NDArray[Any]:
@@ -154,11 +147,8 @@ class Planes:
             height, width = image.shape[:2]
         luma, red, blue = to_ycrcb(image)
         luma, *chroma = coding.from_common((luma, blue, red))
-        half = width // 2, height // 2
-        blue, red = (
-            np.asarray(cv2.resize(item, half, interpolation=cv2.INTER_AREA), np.uint8)
-            for item in chroma
-        )
+        half, area = (width // 2, height // 2), cv2.INTER_AREA
+        blue, red = (cv2.resize(item, half, interpolation=area) for item in chroma)
         return cls.blank(width, height, coding)._filled((luma, blue, red))
 
     @classmethod
@@ -169,7 +159,7 @@ class Planes:
         picture.color_range = ColorRange.JPEG if coding.full_range else ColorRange.MPEG
         return cls(picture, coding, is_own=True)
 
-    def _filled(self, layers: Layers) -> "Planes":
+    def _filled(self, layers: Iterable[cv2.typing.MatLike]) -> "Planes":
         for target, source in zip(self.layers, layers, strict=True):
             target[:] = source
         return self
@@ -186,10 +176,8 @@ class Planes:
         """
         height, width = self.shape
         if self.coding == Coding() and not (height % 2 or width % 2):  # OpenCV is faster
-            stacked = np.concatenate([layer.ravel() for layer in self.layers])
-            return np.asarray(
-                cv2.cvtColor(stacked.reshape(-1, width), cv2.COLOR_YUV2BGR_I420), np.uint8
-            )
+            stacked = np.concatenate([layer.ravel() for layer in self.layers]).reshape(-1, width)
+            return np.asarray(cv2.cvtColor(stacked, cv2.COLOR_YUV2BGR_I420), np.uint8)
         return self.coding.to_bgr(self.layers)
 
     @property

@@ -266,8 +266,6 @@ class StillTracker:
     def update(self, detections: Boxes, *_: object) -> list[Track]:
         """Return a track for each detection, with ids from 1."""
         return [
-            Track(
-                number, detection.box, detection.score, "detected", class_name=detection.class_name
-            )
-            for number, detection in enumerate(detections, start=1)
+            Track(number, found.box, found.score, "detected", found.class_name)
+            for number, found in enumerate(detections, start=1)
         ]

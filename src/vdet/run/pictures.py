@@ -53,12 +53,11 @@ def find_images(paths: Sequence[Path]) -> dict[Path, Path]:
             if not places:
                 names = ", ".join(sorted(PICTURE_SUFFIXES))
                 raise ImageError(f"{path}: contains no images ({names})")
-            for picture, place in places.items():
-                found.setdefault(picture, place)
         elif path.exists():
-            found.setdefault(path, Path(path.name))
+            places = {path: Path(path.name)}
         else:
             raise ImageError(f"{path}: not found")
+        found |= {source: place for source, place in places.items() if source not in found}
     record_input(*found)
     return found
 
@@ -115,25 +114,11 @@ class PictureSearch:
         Each detection becomes a track, with ids from 1. `source` is the name of the picture in
         messages. Raises `ImageError` if it cannot be searched.
         """
-        return self.begin(source, image)()
-
-    def begin(self, source: Path, image: Image) -> Callable[[], FrameResult]:
-        """Search a picture; return a function that returns the result.
-
-        Threads may call this at once. The functions are called in the order of the pictures:
-        detectors may remember what they have seen.
-        """
         frame = Frame(0, Fraction(0), Picture(image))
         with named_errors(source, ImageError):
             pipeline = build(self.model, self.settings, None, [image])
-            candidates = pipeline.search((frame, True))
-
-        def finish() -> FrameResult:
-            with named_errors(source, ImageError):
-                result = pipeline.complete(pipeline.observe(frame, candidates, source))
-                return result.of_classes(self.settings.classes)
-
-        return finish
+            (result,) = pipeline.follow([frame], source)
+        return result.of_classes(self.settings.classes)
 
     @contextmanager
     def open_sinks(
@@ -142,7 +127,7 @@ class PictureSearch:
         """Yield the sinks of outputs of some pictures; they appear together after the block."""
 
         def stage_pictures(image: Image, detections: Boxes) -> dict[str, Image]:
-            detector = build(self.model, self.settings, None, [image]).detector
+            detector = self.model.for_video(image.shape[1], image.shape[0], [image])
             return stage_pictures_of(detector)(image, detections)
 
         with OutputFiles(overwrite=overwrite) as files:
@@ -176,29 +161,26 @@ def run_pictures(
         An output cannot be written.
     """
 
-    def begin(job: PictureJob) -> Callable[[], FrameResult] | ImageError:
+    def find(job: PictureJob) -> FrameResult | ImageError:
         try:
-            return search.begin(job.source, read_image(job.source))
+            return search.detect(job.source, read_image(job.source))
         except ImageError as error:
             return error
 
     failures: list[ImageError] = []
     with (
         search.open_sinks(shared, jobs, overwrite=overwrite) as sinks,
-        map_ordered(begin, jobs, threads) as results,
+        map_ordered(find, jobs, threads) as results,
     ):
         advance = progress(len(jobs))
-        for job, searched in results:
-            try:
-                if isinstance(searched, ImageError):
-                    raise searched
-                result = searched()
+        for job, found in results:
+            if isinstance(found, ImageError):
+                failures.append(found)
+            else:
                 with search.open_sinks(job.outputs, [job], overwrite=overwrite) as own:
-                    own.write(result)
-                    sinks.write(result)
-                on_result(result)
-            except ImageError as error:
-                failures.append(error)
+                    own.write(found)
+                    sinks.write(found)
+                on_result(found)
             advance(1)
     return failures
 

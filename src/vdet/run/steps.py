@@ -133,9 +133,8 @@ def with_positions(tracks: Sequence[Track], road: "Road", foot: float) -> tuple[
         x, y = track.foot
         tyres = x, y - foot * track.box.height
         position = None if road.cuts(track.box) else road.position(tyres)
-        if position is None:
-            return replace(track, distance=None, lane=None)
-        return replace(track, distance=position.distance, lane=position.lane)
+        distance, lane = (position.distance, position.lane) if position else (None, None)
+        return replace(track, distance=distance, lane=lane)
 
     return tuple(map(placed, tracks))
 
@@ -163,9 +162,8 @@ class ConditionStep:
     def apply(self, result: FrameResult) -> FrameResult:
         """Look at a frame that was searched."""
         if result.searched:
-            frame = result.frame
-            found = float(frame.time), frame.picture, result.detections, result.tracks
-            self._conditions.add(*found)
+            time, picture = float(result.frame.time), result.frame.picture
+            self._conditions.add(time, picture, result.detections, result.tracks)
         return result
 
     def finish(self) -> Facts:

@@ -6,7 +6,8 @@ from boxing import moved_to
 from seed import SEED_TRACKER
 from textured_road import textured_road
 from vdet.boxes import Box, Image
-from vdet.track.rules.association import Association, Car, Region
+from vdet.track.rules.car import Car, Region
+from vdet.track.rules.tracker import RulesTracker
 
 LEFT, RIGHT = Box.sized(100, 200, 100, 80), Box.sized(320, 200, 100, 80)
 
@@ -27,13 +28,15 @@ def region(box: Box, peak: float = 2.0) -> Region:
 
 def associate(
     cars: list[Car], boxes: list[Box], frame: Image | None = None, peak: float = 2.0
-) -> Association:
-    frame = road() if frame is None else frame
-    return Association(cars, [region(box, peak) for box in boxes], frame, SEED_TRACKER)
+) -> RulesTracker:
+    tracker = RulesTracker(SEED_TRACKER)
+    tracker.cars = list(cars)
+    tracker.associate([region(box, peak) for box in boxes], road() if frame is None else frame)
+    return tracker
 
 
-def boxes_of(association: Association) -> dict[Car, Box]:
-    return {car: place.box for car, place in association.places.items()}
+def boxes_of(tracker: RulesTracker) -> dict[Car, Box]:
+    return {car: place.box for car, place in tracker.places.items()}
 
 
 # Rule 2

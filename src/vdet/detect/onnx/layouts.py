@@ -47,7 +47,8 @@ def our_cells(
     table = outputs[0][0]
     if len(table) != len(cells[1]):
         raise ValueError("not one row per cell")
-    slopes, offsets = calibration[table[:, 5:].argmax(axis=1)].T
+    best = table[:, 5:].argmax(axis=1)
+    slopes, offsets = calibration[best].T
     logits = slopes * table[:, 0] + offsets
     rows = np.flatnonzero(logits >= math.log(minimum / (1 - minimum)))
     centers, strides = cells
@@ -55,7 +56,7 @@ def our_cells(
     middle = centers[rows]
     boxes = np.concatenate([middle - lengths[:, :2], middle + lengths[:, 2:]], axis=1)
     classes = np.exp(table[rows, 5:] - table[rows, 5:].max(axis=1, keepdims=True))
-    return _raw(boxes, 1 / (1 + np.exp(-logits[rows])), classes.argmax(axis=1), classes)
+    return _raw(boxes, 1 / (1 + np.exp(-logits[rows])), best[rows], classes)
 
 
 def center_columns(outputs: Sequence[Array], minimum: float) -> RawBoxes:

@@ -7,7 +7,6 @@ vehicle: two would be in the same place.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from enum import Enum, auto
 
 import numpy as np
@@ -137,17 +136,13 @@ class Case(Enum):
     """It was apart, and follows the vehicle now that hides its own: it is lost."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Overlap:
-    """How the box of a track lies to that of another one.
+_Overlap = tuple[float, float, bool]
+"""How the box of a track lies to that of another one.
 
-    `inside` is the fraction of it in the other box. `one` is how much the two show one vehicle: the
-    fraction of the smaller one in the other if they are level, 1 if they are `alike`, or else 0.
-    """
-
-    inside: float
-    one: float
-    alike: bool
+Which fraction of it is inside the other box; how much the two show one vehicle, which is the
+fraction of the smaller one in the other if they are level, 1 if they are alike, or else 0; and
+whether they are alike.
+"""
 
 
 def without_duplicates(vehicles: Sequence[Vehicle], boxes: Float64Array) -> list[Vehicle]:
@@ -180,7 +175,7 @@ def without_duplicates(vehicles: Sequence[Vehicle], boxes: Float64Array) -> list
             other = vehicles[at]
             if other.unseen or not other.confirmed:
                 continue
-            overlap = _Overlap(inside[row, at], one[row, at], alike[row, at])
+            overlap = inside[row, at], one[row, at], alike[row, at]
             match _case(vehicle, other, overlap, hidden):
                 case Case.DUPLICATE:
                     other.merge(vehicle)
@@ -198,16 +193,17 @@ def without_duplicates(vehicles: Sequence[Vehicle], boxes: Float64Array) -> list
 
 def _case(vehicle: Vehicle, other: Vehicle, overlap: _Overlap, hidden: Sequence[Vehicle]) -> Case:
     """Return what a track is beside another one, higher in rank, that it overlaps; both see."""
+    inside, one, alike = overlap
     if min(vehicle.age, other.age) > _APART:
-        if not overlap.alike:
+        if not alike:
             return Case.APART
         return Case.HIDDEN if vehicle.confirmed else Case.PART
     if vehicle.confirmed:
         fraction = PART if max(vehicle.age, other.age) > _APART else _LEVEL_OVERLAP
-        return Case.DUPLICATE if overlap.one > fraction else Case.APART
-    if vehicle.scores.value <= other.scores.value and overlap.one > _LEVEL_OVERLAP:
+        return Case.DUPLICATE if one > fraction else Case.APART
+    if vehicle.scores.value <= other.scores.value and one > _LEVEL_OVERLAP:
         return Case.PART
-    if overlap.inside > PART:
+    if inside > PART:
         return Case.EMERGING if _comes_out(vehicle, other, hidden) else Case.PART
     return Case.APART
 

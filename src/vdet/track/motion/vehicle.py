@@ -88,9 +88,9 @@ class History:
 
     def forget(self, before: float) -> None:
         """Drop the moments that say nothing of times after `before`, but keep a detection."""
-        moments, last = self.moments, self.last_seen
-        while len(moments) > 1 and moments[1].time <= before and moments[0] is not last:
-            del moments[0]
+        last = self.last_seen
+        while self.moments[0] is not last and self.moments[1].time <= before:
+            del self.moments[0]
             self._smoothed = None
 
     def join(self, earlier: "History") -> None:
