@@ -329,14 +329,18 @@ def print_now(text: str) -> None:
     sys.stdout.flush()
 
 
+def json_text(values: Any) -> str:
+    """Return values as JSON, indented."""
+    return json.dumps(values, indent=2, allow_nan=False) + "\n"
+
+
 def write_json(values: Any, target: str, *, overwrite: bool = False) -> None:
     """Write to the file `target`, or to standard output for `-`. Raises `OutputError`."""
-    text = json.dumps(values, indent=2, allow_nan=False) + "\n"
     if target == "-":
         with output_errors(Path("standard output")):
-            print_now(text)
+            print_now(json_text(values))
     else:
-        write_whole(Path(target), text, overwrite=overwrite)
+        write_whole(Path(target), json_text(values), overwrite=overwrite)
 
 
 def read_whole(path: Path, *, most: int, what: str, error: type[VdetError]) -> bytes:

@@ -1,6 +1,5 @@
 """Where a command puts what it found out: text, JSON, a page, and tables of counts."""
 
-import json
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +11,7 @@ from vdet.cli import options
 from vdet.cli.messages import print_lines, progress_steps
 from vdet.cli.options import F, bundle, option, overwrite_option, short_form
 from vdet.errors import OutputError
-from vdet.files import OutputFiles, check_output, output_errors, write_json, write_text
+from vdet.files import OutputFiles, check_output, json_text, output_errors, write_json, write_text
 
 if TYPE_CHECKING:
     from vdet.config.schema import Settings
@@ -65,7 +64,7 @@ class Results:
         print_lines(*lines, err=to_stderr)
         texts: dict[Path, str] = {}
         if self._json_file:
-            texts[self._json_file] = json.dumps(values, indent=2, allow_nan=False) + "\n"
+            texts[self._json_file] = json_text(values)
         if self._page_file:
             with progress_steps("") as steps:
                 steps("writing the page", None)

@@ -9,7 +9,7 @@ import av
 from av.packet import Packet
 from av.stream import Stream
 
-from vdet.config.schema import InputSettings, OutputSettings
+from vdet.config.schema import Settings
 from vdet.errors import OutputError
 from vdet.media.demux import ClockUnwrapper, is_pipe, open_input, packets, picture_stream
 from vdet.media.images import is_picture_name
@@ -87,13 +87,7 @@ def _moved_to_zero(
 
 
 def encode_part(
-    source: Path,
-    start: Fraction,
-    end: Fraction,
-    target: Path,
-    *,
-    reading: InputSettings,
-    writing: OutputSettings,
+    source: Path, start: Fraction, end: Fraction, target: Path, settings: Settings
 ) -> None:
     """Encode a part of a video, exact to the frame, with its sound.
 
@@ -105,8 +99,8 @@ def encode_part(
     Errors as of `VideoReader` and `VideoWriter`.
     """
     with (
-        VideoReader(source, start=start, end=end, settings=reading) as reader,
-        VideoWriter(target, reader.info, writing, whole_sound=False) as writer,
+        VideoReader(source, start=start, end=end, settings=settings.input) as reader,
+        VideoWriter(target, reader.info, settings.output, whole_sound=False) as writer,
     ):
         for frame in reader:
             writer.write(frame)

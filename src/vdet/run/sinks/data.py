@@ -3,7 +3,6 @@
 Times are in seconds and those of the input. Pixels are those of the input frame, counted from 0.
 """
 
-import json
 import sys
 from collections.abc import Callable
 from dataclasses import replace
@@ -12,7 +11,7 @@ from pathlib import Path
 from typing import Any, BinaryIO, Self
 
 from vdet.errors import OutputError
-from vdet.files import print_now
+from vdet.files import json_text, print_now, write_text
 from vdet.labels.formats import (
     PictureTracks,
     SourceVideo,
@@ -122,25 +121,18 @@ class JsonSink(BaseSink):
 
     def finish(self) -> None:
         """Write the list."""
-        if not self._items:
-            return
-        text = json.dumps(self._items, indent=2, allow_nan=False) + "\n"
-        if self.path == STANDARD_OUTPUT:
-            print_now(text)
-        else:
-            self.context.files.stage(self.path).write_text(text, encoding="utf-8")
+        if self._items and self.path == STANDARD_OUTPUT:
+            print_now(json_text(self._items))
+        elif self._items:
+            write_text(self.context.files.stage(self.path), json_text(self._items))
 
     def write(self, result: FrameResult) -> None:
         """Add the item of a picture."""
-        item: dict[str, Any] = {
-            "image": str(result.source),
-            "width": result.frame.picture.width,
-            "height": result.frame.picture.height,
-            "boxes": [track_record(track) for track in result.tracks],
-        }
-        for box in item["boxes"]:
+        picture, boxes = result.frame.picture, list(map(track_record, result.tracks))
+        for box in boxes:
             del box["id"], box["state"]  # they say nothing in a still picture
-        self._items.append(item | dict(result.frame_tracks.facts))
+        item = {"image": str(result.source), "width": picture.width, "height": picture.height}
+        self._items.append({**item, "boxes": boxes, **result.frame_tracks.facts})
 
 
 JSON = SinkKind(JsonSink, what="lists of boxes", writes_standard_output=True, takes="pictures")

@@ -73,14 +73,12 @@ class Overlay:
             return
         for track in shown:
             self._trails.setdefault(track.id, []).append((now, track.foot))
-        for number, points in list(self._trails.items()):
-            self._trails[number] = [point for point in points if now - point[0] <= self._longest]
-            if not self._trails[number]:
-                del self._trails[number]
-        width = boxes.line_width(surface)
+        since, trails = now - self._longest, self._trails.items()
+        kept = {number: [item for item in points if item[0] >= since] for number, points in trails}
+        self._trails = {number: points for number, points in kept.items() if points}
         for track in shown:
             path = [point for _, point in self._trails[track.id]]
-            draw_lines(surface, path, self._color(track), width)
+            draw_lines(surface, path, self._color(track), boxes.line_width(surface))
 
     def _draw_vehicles(self, surface: Surface, shown: Sequence[Track]) -> None:
         colors = [self._color(track) for track in shown]
@@ -90,21 +88,16 @@ class Overlay:
         boxes.draw_labels(surface, [track.box for track in shown], texts, colors)
 
     def _color(self, track: Track) -> Color:
-        match self._draw.colors:
-            case "id":
-                number = track.id
-            case "class":
-                number = _class_number(track.class_name)
-            case "one":
-                return boxes.GREEN
+        if self._draw.colors == "one":
+            return boxes.GREEN
+        number = track.id if self._draw.colors == "id" else _class_number(track.class_name)
         return boxes.color_of(number) if number else boxes.WHITE
 
 
 def label_text(track: Track, parts: Sequence[str]) -> str:
     """Return the text of a label: those of its parts that are known of the vehicle."""
-    distance = None if track.distance is None else f"{track.distance:.0f} m"
     texts = {"id": f"#{track.id}", "class": track.class_name, "score": f"{track.score:.2f}"}
-    texts["distance"] = distance
+    texts["distance"] = None if track.distance is None else f"{track.distance:.0f} m"
     return " ".join(text for part in parts if (text := texts[part]))
 
 

@@ -184,14 +184,10 @@ class PageSink(BaseSink):
 
     def _pictures(self) -> dict[int, str]:
         """Return the addresses of the pictures of `crops`, where this run writes them."""
-        folder = next(
-            (output.path for output in self.context.outputs if output.sink == "crops"), None
-        )
-        if folder is None:
-            return {}
         times = {number: time for number, (time, _) in self._thumbnails.items()}
         return {
             vehicle.id: link_to(folder / _crop_name(vehicle, times[vehicle.id]), self.path)
+            for folder in self._paths_of("crops")[:1]
             for vehicle in self.traffic.vehicles
             if vehicle.id in times
         }
@@ -199,11 +195,15 @@ class PageSink(BaseSink):
     def _player(self) -> Player | None:
         """Return the video that this run writes; else the source, if it is a video file."""
         source = self.video.path
-        drawn = [output.path for output in self.context.outputs if output.sink == "video"]
+        drawn = self._paths_of("video")
         if not drawn and (not source.is_file() or is_picture_name(source)):
             return None
         path, start = (drawn[0], self._start) if drawn else (source, float(self.video.start))
         return Player(path.name, link_to(path, self.path), bool(drawn), start)
+
+    def _paths_of(self, sink: str) -> list[Path]:
+        """Return the outputs of a sink in this run."""
+        return [output.path for output in self.context.outputs if output.sink == sink]
 
 
 def _write_index(summaries: Mapping[str, dict[str, Any]], target: Path) -> None:
@@ -235,13 +235,12 @@ def scenes(records: Iterable[VehicleRecord], margin: float) -> list[Scene]:
     """Return the times of vehicles with `margin` seconds around them; those that touch are one."""
     found: list[Scene] = []
     for record in sorted(records, key=lambda record: record.first):
-        start, end = record.first - margin, record.last + margin
-        if found and start <= found[-1].end:
+        scene = Scene(record.first - margin, record.last + margin, (record,))
+        if found and scene.start <= found[-1].end:
             last = found.pop()
-            start, end = last.start, max(end, last.end)
-            found.append(Scene(start, end, (*last.vehicles, record)))
-        else:
-            found.append(Scene(start, end, (record,)))
+            vehicles = (*last.vehicles, record)
+            scene = Scene(last.start, max(scene.end, last.end), vehicles)
+        found.append(scene)
     return found
 
 
@@ -263,32 +262,23 @@ class ClipSink(BaseSink):
             if copies:
                 copy_part(source, start, end, target)
             else:
-                first = self.video.start
-                encode_part(
-                    source,
-                    max(start - first, Fraction(0)),
-                    end - first,
-                    target,
-                    reading=settings.input,
-                    writing=settings.output,
-                )
+                part = max(start - self.video.start, Fraction(0)), end - self.video.start
+                encode_part(source, *part, target, settings)
 
     def _chosen(self) -> Sequence[VehicleRecord]:
-        records = self.traffic.vehicles
-        counts = self.traffic.counts()
+        records, counts = self.traffic.vehicles, self.traffic.counts()
         if counts is None:
             return records
         counted = {event.id for event in counts.events}
         return [record for record in records if record.id in counted]
 
     def _name(self, scene: Scene) -> str:
-        first, when = scene.vehicles[0], self.context.clock
+        (first, *others), when = scene.vehicles, self.context.clock
         moment = clock(int(first.first), hours=True).zfill(8).replace(":", "-")
         if when:
             moment = when.at(first.first).strftime("%Y-%m-%dT%H-%M-%S")
-        kind = in_file_name(first.class_name)
-        others = f"+{len(scene.vehicles) - 1}" if len(scene.vehicles) > 1 else ""
-        return f"clip-{moment}-{kind}-{first.id}{others}"
+        more = f"+{len(others)}" if others else ""
+        return f"clip-{moment}-{in_file_name(first.class_name)}-{first.id}{more}"
 
 
 def _exact(seconds: float) -> Fraction:
