@@ -178,7 +178,7 @@ def test_numbers_below_one_are_refused_by_name(clip_path: Path, number: dict[str
 def test_a_run_has_its_own_part_and_settings(clip_path: Path) -> None:
     run = vdet.Run(clip_path, frames=3)
     assert len(list(vdet.follow(run))) == 3
-    with pytest.raises(ValueError, match="start, end, frames: a Run has its own"):
+    with pytest.raises(ValueError, match="frames: a Run has its own"):
         next(vdet.follow(run, frames=2))
     with pytest.raises(ValueError, match="settings: a Run has its own"):
         vdet.detect_video(run, settings=vdet.load_settings())

@@ -206,9 +206,10 @@ def follow(
     The video is opened for the first frame; `VideoError` is raised then if it cannot be read or
     searched.
     """
-    run = _run(source, start=_exact(start), end=_exact(end), frames=frames, threads=1)
-    chosen, loaded, tracker = _resolved(_settings(source, settings), detector, tracker)
-    return Results(replace(run, settings=chosen), loaded, tracker, steps)
+    part = {"start": _exact(start), "end": _exact(end), "frames": frames}
+    run, loaded, tracker = _run(source, settings, detector, tracker, **part)
+    threads = run.threads if isinstance(source, Run) else 1
+    return Results(replace(run, threads=threads), loaded, tracker, steps)
 
 
 def vehicles(source: PathName | Run, **options: Any) -> tuple[VehicleRecord, ...]:
@@ -258,16 +259,10 @@ def detect_video(
 
     The others are those of `follow`, and the errors those of the command `vdet detect-video`.
     """
-    chosen, loaded, tracker = _resolved(_settings(source, settings), detector, tracker)
-    run = _run(source)
+    run, loaded, tracker = _run(source, settings, detector, tracker)
     wanted = _outputs({"video": video or (), "tracks": tracks, **(outputs or {})})
-    run = replace(
-        run,
-        settings=chosen,
-        outputs=run.outputs + wanted,
-        overwrite=overwrite or run.overwrite,
-    )
-    check_masks(chosen.regions)
+    run = replace(run, outputs=run.outputs + wanted, overwrite=overwrite or run.overwrite)
+    check_masks(run.settings.regions)
     reported = reporting(progress) if progress else no_progress
     return run_video(run, loaded, tracker=tracker, steps=steps, progress=reported)
 
@@ -336,21 +331,23 @@ def evaluate_tracks(tracks: PathName, truth: PathName, *, until: int | None = No
     return score_files(Path(tracks), Path(truth), until).scores
 
 
-def _run(source: PathName | Run, **part: Any) -> Run:
-    """Return a run; `part` is that of a video, not of a `Run`."""
-    if not isinstance(source, Run):
-        return Run(Path(source), **part)
-    if any(value is not None for name, value in part.items() if name != "threads"):
-        raise ValueError("start, end, frames: a Run has its own; remove them")
-    return source
-
-
-def _settings(source: PathName | Run, settings: Settings | None) -> Settings | None:
-    if not isinstance(source, Run):
-        return settings
-    if settings is not None:
-        raise ValueError("settings: a Run has its own; remove them")
-    return source.settings
+def _run(
+    source: PathName | Run,
+    settings: Settings | None,
+    detector: AnyDetector | None,
+    tracker: AnyTracker | None,
+    **part: Any,
+) -> tuple[Run, DetectorModel, VideoTracker | None]:
+    """Return a run, its detector and its tracker; `part` is that of a video, not of a `Run`."""
+    if isinstance(source, Run):
+        for name, value in {"settings": settings, **part}.items():
+            if value is not None:
+                raise ValueError(f"{name}: a Run has its own; remove it")
+        settings, run = source.settings, source
+    else:
+        run = Run(Path(source), **part)
+    settings, loaded, tracker = _resolved(settings, detector, tracker)
+    return replace(run, settings=settings), loaded, tracker
 
 
 def _resolved(

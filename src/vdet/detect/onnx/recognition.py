@@ -166,12 +166,11 @@ def _ours(session: Session, header: Header, size: tuple[int, int]) -> Recognized
 
 
 def _rt_detr(session: Session, names: Sequence[str]) -> Recognized:
-    places = {name: place for place, name in enumerate(session.output_names)}
-    if not {"labels", "boxes", "scores"} <= set(places):
-        raise _unknown(session, f"it has an input {_SIZES}, but outputs {', '.join(places)}")
-    layout = partial(
-        layouts.named_columns, order=(places["labels"], places["boxes"], places["scores"])
-    )
+    outputs = session.output_names
+    if not {"labels", "boxes", "scores"} <= set(outputs):
+        raise _unknown(session, f"it has an input {_SIZES}, but outputs {', '.join(outputs)}")
+    order = tuple(map(outputs.index, ("labels", "boxes", "scores")))
+    layout = partial(layouts.named_columns, order=order)
     form = replace(_form(session, None), fit="stretch")
     found = Recognized(session, "RT-DETR", tuple(names) or COCO, form, layout)
     found.find(Picture(form.grey), 0)  # raises where the shapes are others
@@ -227,12 +226,10 @@ def _names(session: Session, names: tuple[str, ...], count: int | None) -> tuple
         return names or COCO
     if names and len(names) != count:
         raise ModelError(f"{session.path}: has {count} classes, not {len(names)}; name them all")
-    usual = {len(COCO): COCO, 1: ("vehicle",)}
-    if not names and count not in usual:
-        raise ModelError(
-            f"{session.path}: does not name its {count} classes; set detector.class_names"
-        )
-    return names or usual[count]
+    if known := names or {len(COCO): COCO, 1: ("vehicle",)}.get(count):
+        return known
+    lack = f"does not name its {count} classes; set detector.class_names"
+    raise ModelError(f"{session.path}: {lack}")
 
 
 class _Metadata(NamedTuple):
@@ -282,13 +279,11 @@ def _form(session: Session, size: tuple[int, int] | None) -> InputForm:
 
 def _outputs(session: Session, form: InputForm, values: Array) -> list[Array]:
     """Return the outputs for a prepared input. Raises `ModelError` where it does not run."""
-    size = [[form.width, form.height]]
-    return session.run(
-        {
-            slot.name: np.array(size, TYPES[slot.type]) if slot.name == _SIZES else values
-            for slot in session.inputs
-        }
-    )
+    inputs = {slot.name: values for slot in session.inputs}
+    for slot in session.inputs:
+        if slot.name == _SIZES:
+            inputs[_SIZES] = np.array([[form.width, form.height]], TYPES[slot.type])
+    return session.run(inputs)
 
 
 def _shapes(outputs: Sequence[Array]) -> str:

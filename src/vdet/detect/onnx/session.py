@@ -75,10 +75,10 @@ class Session:
             self.output_shapes = [output.shape for output in outputs]
         except Exception as error:  # onnxruntime raises kinds of its own, and plain ones
             raise ModelError(f"{path}: onnxruntime cannot load it: {_in_words(error)}") from error
-        for input_ in self.inputs:
-            if input_.type not in TYPES:
+        for slot in self.inputs:
+            if slot.type not in TYPES:
                 raise ModelError(
-                    f"{path}: its input {input_.name:.40} is a {input_.type}, not an image"
+                    f"{path}: its input {slot.name:.40} is a {slot.type}, not an image"
                 )
         if any(len(value) > _MAX_METADATA for value in self.metadata.values()):
             raise ModelError(f"{path}: has metadata of more than {_MAX_METADATA:,} characters")
@@ -87,8 +87,7 @@ class Session:
         """Return all outputs. Raises `ModelError` if it fails, or takes too much time or memory."""
         options, outputs = self._new_options(), Future[list[Array]]()
         options.log_severity_level = _SILENT
-        # One long operation cannot be stopped: its thread is left behind.
-        call = inputs, options, outputs
+        call = inputs, options, outputs  # one long operation cannot be stopped: it is left behind
         threading.Thread(target=self._run, args=call, name="vdet-network", daemon=True).start()
         for _ in range(MAX_SECONDS):  # seconds in which this process was stopped do not count
             with suppress(TimeoutError):

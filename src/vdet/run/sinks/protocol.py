@@ -226,7 +226,9 @@ def check_sinks(outputs: Sequence[Output], *, overwrite: bool, makes_folder: boo
     """
     seen: set[Path] = set()
     for output in outputs:
-        kind, path = _kind_for(output), output.path
+        kind, path = sink_kind(output.sink), output.path
+        if not kind.takes_name(path.name):
+            raise OutputError(f"{path}: {kind.what} must end in {', '.join(kind.endings)}")
         kind.check(path)
         if path.resolve() in seen:
             raise OutputError(f"{path}: is used for two outputs; rename one")
@@ -236,11 +238,8 @@ def check_sinks(outputs: Sequence[Output], *, overwrite: bool, makes_folder: boo
         if kind.marker:
             written = path.glob(kind.marker) if os.path.isdir(path) else ()  # noqa: PTH112
             path = min(written, default=path / kind.marker)
-        check_output(
-            path,
-            overwrite=overwrite,
-            makes_folder=makes_folder or bool(kind.marker),
-        )
+        makes = makes_folder or bool(kind.marker)
+        check_output(path, overwrite=overwrite, makes_folder=makes)
         if os.path.lexists(path) and not kind.may_replace(path):
             what = "was not written by vdet and will not be replaced; choose another name"
             raise OutputError(f"{path}: {what}")
@@ -266,12 +265,11 @@ def open_sink(output: Output, context: SinkContext) -> Iterator[Sink]:
     Raises
     ------
     OutputError
-        The sink does not take such results, the suffix is not one of the sink's, or the output
-        cannot be written.
+        The sink does not take such results, or the output cannot be written.
     ConfigError
         There is no sink with that name.
     """
-    kind = _kind_for(output)
+    kind = sink_kind(output.sink)
     source = "pictures" if context.video is None else "videos"
     if kind.takes not in ("both", source):
         raise OutputError(f"{output.path}: the sink {output.sink} is for {kind.takes}")
@@ -304,12 +302,3 @@ def open_sinks(outputs: Iterable[Output], context: SinkContext) -> Iterator[Sink
         yield Sinks(
             {output.path: stack.enter_context(open_sink(output, context)) for output in outputs}
         )
-
-
-def _kind_for(output: Output) -> SinkKind:
-    """Return the kind of an output's sink; refuse a suffix that is not one of the sink's."""
-    kind, path = sink_kind(output.sink), output.path
-    if not kind.takes_name(path.name):
-        names = ", ".join(kind.endings)
-        raise OutputError(f"{path}: {kind.what} must end in {names}")
-    return kind
