@@ -137,18 +137,18 @@ def joined_videos(path: Path) -> int:
     """Return how many MP4 or MOV videos, each with an index, were joined byte by byte."""
     if not path.is_file() or path.suffix.lower() not in {".mp4", ".mov", ".m4v"}:
         return 1
-    position, found, size = 0, 0, path.stat().st_size
+    position = found = 0
     with path.open("rb") as file:
         for _ in range(_MAX_BOXES):
             file.seek(position)
             head = file.read(16)
-            length, kind = int.from_bytes(head[:4]), head[4:8]
+            found += head[4:8] == b"moov"
+            length = int.from_bytes(head[:4])
             if length == 1:  # it follows, in 64 bits
-                length = int.from_bytes(head[8:16])
-            found += kind == b"moov"
-            position += length
-            if length < 8 or position >= size:
+                length = int.from_bytes(head[8:])
+            if length < 8:  # at the end of the file, too
                 break
+            position += length
     return found
 
 

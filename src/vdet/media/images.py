@@ -5,7 +5,7 @@ import logging
 import math
 import re
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
@@ -65,8 +65,8 @@ class Orientation:
     @classmethod
     def of_exif(cls, number: int) -> "Orientation":
         """Return the orientation for an EXIF number, 1 to 8 (CIPA DC-008, 4.6.4)."""
-        rotation = (0, 0, 180, 180, 90, 270, 270, 90)[number - 1]
-        return cls(rotation, mirrored=number in (2, 4, 5, 7))
+        turns = {1: 0, 2: 0, 3: 180, 4: 180, 5: 90, 6: 270, 7: 270, 8: 90}
+        return cls(turns[number], mirrored=number in (2, 4, 5, 7))
 
     @classmethod
     def of_frame(cls, picture: av.VideoFrame) -> "Orientation":
@@ -146,13 +146,11 @@ def decode_image(data: bytes) -> Image | None:
 
 def encode_image(image: Image, path: Path) -> bytes:
     """Encode a picture in the format that the suffix of `path` names. Raises `ImageError`."""
-    try:
+    with suppress(cv2.error):
         written, data = cv2.imencode(path.suffix, image)
-    except cv2.error:
-        written = False
-    if not written:
-        raise ImageError(f"{path}: images must end in {', '.join(sorted(PICTURE_SUFFIXES))}")
-    return data.tobytes()
+        if written:
+            return data.tobytes()
+    raise ImageError(f"{path}: images must end in {', '.join(sorted(PICTURE_SUFFIXES))}")
 
 
 def write_image(path: Path, image: Image, *, overwrite: bool = False) -> None:
@@ -199,12 +197,10 @@ def _open(data: bytes, path: Path) -> ImageFile:
 
 
 def _orientation(picture: ImageFile) -> Orientation:
-    try:
+    with suppress(Exception):  # of many kinds, where the EXIF data are damaged
         # The method of a PNG picture would decode it, in search of EXIF data behind it.
-        number = pillow.Image.getexif(picture).get(_ORIENTATION, 1)
-    except Exception:  # of many kinds, where the EXIF data are damaged
-        return Orientation()
-    return Orientation.of_exif(number) if number in range(1, 9) else Orientation()
+        return Orientation.of_exif(pillow.Image.getexif(picture).get(_ORIENTATION, 1))
+    return Orientation()
 
 
 def _decode(data: bytes, path: Path) -> Image:
@@ -283,17 +279,14 @@ def find_sequence(path: Path) -> PictureSequence | None:
         return None
     folder, form = (path.parent, _form(*pattern.groups())) if pattern else (path, _LAST_NUMBER)
     try:
-        matches = [(file, form.fullmatch(file.name)) for file in folder.iterdir()]
+        matches = [(form.fullmatch(file.name), file) for file in folder.iterdir()]
     except OSError as error:
         raise VideoError(f"{path}: {folder} cannot be read: {error.strerror}") from error
-    found = sorted(
-        (int(match[1]), file)
-        for file, match in matches
-        if match and (pattern or is_picture_name(file))
-    )
-    numbers, files = [number for number, _ in found], tuple(file for _, file in found)
-    if not files:
+    named = [(match, file) for match, file in matches if pattern or is_picture_name(file)]
+    found = sorted((int(match[1]), file) for match, file in named if match)
+    if not found:
         raise VideoError(f"{path}: no numbered images found; use a video, or -d DIR for a folder")
+    numbers, files = zip(*found, strict=True)
     record_input(*files)
     if by_the_clock := _by_the_clock(files):
         return by_the_clock
@@ -304,9 +297,8 @@ def find_sequence(path: Path) -> PictureSequence | None:
     step = min(steps, default=1)
     for number, gap in zip(numbers, steps, strict=False):
         if gap != step:
-            raise VideoError(
-                f"{path}: image {number + step} is missing; copy image {number} in its place"
-            )
+            lack = f"image {number + step} is missing; copy image {number} in its place"
+            raise VideoError(f"{path}: {lack}")
     return PictureSequence(files)
 
 

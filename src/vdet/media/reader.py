@@ -86,10 +86,9 @@ class VideoReader:
         self._pictures = self._decoder.pictures()
         first = next(self._pictures, None)
         if first is None or max(first.width, first.height) > _MAX_SIDE:
-            raise VideoError(
-                f"{path}: no frame can be decoded; use a file that plays, with frames of "
-                f"at most {demux.MAX_PIXELS // 10**6} million pixels and sides of {_MAX_SIDE}"
-            )
+            limits = f"{demux.MAX_PIXELS // 10**6} million pixels and sides of {_MAX_SIDE}"
+            advice = f"use a file that plays, with frames of at most {limits}"
+            raise VideoError(f"{path}: no frame can be decoded; {advice}")
         stream = self._decoder.stream
         self.info: VideoInfo = demux.describe(path, stream, first)
         self.length: Fraction | None = None
@@ -175,13 +174,11 @@ class VideoReader:
     def _upright(self, picture: av.VideoFrame) -> Picture:
         """Return a picture as its planes if these need no conversion, else as BGR."""
         info = self.info
-        has_same_form = (
-            info.orientation == Orientation()
-            and not self._to_standard
-            and Coding.of(picture) == info.coding
-            and (picture.width, picture.height) == (info.width, info.height)
-        )
-        return Picture(Planes(picture, info.coding) if has_same_form else self._image(picture))
+        form = Coding.of(picture), picture.width, picture.height
+        has_same_form = form == (info.coding, info.width, info.height)
+        if has_same_form and info.orientation == Orientation() and not self._to_standard:
+            return Picture(Planes(picture, info.coding))
+        return Picture(self._image(picture))
 
     def _image(self, picture: av.VideoFrame) -> Image:
         info = self.info
@@ -191,10 +188,8 @@ class VideoReader:
                 picture = self._to_standard.vpull()
             image = bgr_of(picture)
         except (av.FFmpegError, ValueError) as error:
-            pixels = picture.format.name
-            raise VideoError(
-                f"{info.path}: its pixels ({pixels}) cannot be converted; convert it to H.264 first"
-            ) from error
+            fault = f"its pixels ({picture.format.name}) cannot be converted"
+            raise VideoError(f"{info.path}: {fault}; convert it to H.264 first") from error
         image = upright(image, info.orientation)
         size = info.width, info.height
         if image.shape[1::-1] == size:
@@ -221,9 +216,8 @@ class VideoReader:
         if damaged:
             self._faults.insert(0, f"{damaged} of {total} frames damaged or lost")
         if damaged > math.ceil(self._settings.max_damaged * total):
-            raise VideoError(
-                f"{self.info.path}: {self._faults[0]}, more than input.max_damaged allows; raise it"
-            )
+            limit = "more than input.max_damaged allows; raise it"
+            raise VideoError(f"{self.info.path}: {self._faults[0]}, {limit}")
         if restarts := self._decoder.clock.restarts:
             self._faults.append(f"its clock restarts {restarts}×; the parts follow one another")
         if (videos := demux.joined_videos(self.info.path)) > 1:

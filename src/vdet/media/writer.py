@@ -72,14 +72,14 @@ class SoundCopy:
 
     def _add_streams(self) -> dict[int, AudioStream]:
         """Add those streams to the target that it can hold, by their index in the source."""
-        streams, codecs = {}, self._target.supported_codecs
+        streams, target = {}, self._target
         for stream in self._source.streams.audio:
             codec = stream.codec_context
-            if codec and codec.sample_rate and codec.name in codecs:
-                streams[stream.index] = self._target.add_stream_from_template(stream)
+            if codec and codec.sample_rate and codec.name in target.supported_codecs:
+                streams[stream.index] = target.add_stream_from_template(stream)
             else:
                 name = codec.name if codec else "unknown codec"
-                fault = f"its sound ({name}) is empty, or cannot go into {self._target.format.name}"
+                fault = f"its sound ({name}) is empty, or cannot go into {target.format.name}"
                 _log.warning("%s: %s; left out", self._path, fault)
         return streams
 
@@ -202,13 +202,12 @@ class VideoWriter:
         self._sound: SoundCopy | None = None
         self._failure: OutputError | None = None
         self.size = 0
+        flags = {"movflags": "+faststart"}
         with self._naming_the_file():
-            self._container = av.open(
-                str(path.absolute()), mode="w", container_options={"movflags": "+faststart"}
-            )
+            self._container = av.open(str(path.absolute()), mode="w", container_options=flags)
         tags = {name: value for name, value in asdict(info.tags).items() if value}
         self._container.metadata.update(tags, comment=f"{_MARK} {__version__}")
-        self._stream = self._add_picture(info, settings, threads)
+        self._stream = self._add_picture(settings, threads)
 
     def write(self, frame: Frame) -> None:
         """Encode the next frame, and copy the sound up to it; times must increase.
@@ -224,8 +223,7 @@ class VideoWriter:
             last, self._last = self._last, max(self._last + 1, round(since / self._time_base))
             self._check_pause((self._last - last) * self._time_base)
             picture = _to_encode(frame.picture, self._info.coding)
-            picture.pts = self._last
-            picture.time_base = self._time_base
+            picture.pts, picture.time_base = self._last, self._time_base
             picture.duration = round(self._period / self._time_base)
             packets = self._stream.encode(picture)
             self.size += sum(packet.size for packet in packets)
@@ -273,25 +271,19 @@ class VideoWriter:
             self._failure = OutputError(f"{self._name}: cannot be written: {error.strerror}")
             raise self._failure from error
 
-    def _add_picture(
-        self, info: VideoInfo, settings: OutputSettings, threads: int | None
-    ) -> av.VideoStream:
+    def _add_picture(self, settings: OutputSettings, threads: int | None) -> av.VideoStream:
         options = {"preset": settings.preset, "crf": str(settings.crf), "x264-params": _X264}
+        info, color = self._info, self._info.color
         stream = self._container.add_stream("libx264", rate=info.rate, options=options)
         context = stream.codec_context
-        context.width = info.width + info.width % 2
-        context.height = info.height + info.height % 2
-        context.thread_count = threads or 0
+        context.width, context.height = info.width + info.width % 2, info.height + info.height % 2
+        context.thread_count, context.pix_fmt = threads or 0, "yuv420p"
         is_small = context.width * context.height <= _LARGEST_AT_ONCE
         context.thread_type = "FRAME" if is_small else "SLICE"
-        context.pix_fmt = "yuv420p"
-        context.time_base = self._time_base
-        context.sample_aspect_ratio = info.pixel_aspect
-        context.color_primaries = info.color.primaries
-        context.color_trc = info.color.transfer
-        if info.color.matrix != UNSPECIFIED:
-            context.colorspace = _MATRICES[info.coding.matrix]
-            context.color_range = ColorRange.MPEG
+        context.time_base, context.sample_aspect_ratio = self._time_base, info.pixel_aspect
+        context.color_primaries, context.color_trc = color.primaries, color.transfer
+        if color.matrix != UNSPECIFIED:
+            context.colorspace, context.color_range = _MATRICES[info.coding.matrix], ColorRange.MPEG
         if info.coding.full_range:
             context.color_range = ColorRange.JPEG
         return stream
