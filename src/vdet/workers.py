@@ -32,23 +32,17 @@ ENVIRONMENT = {
 
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3  # of malloc.h
 
-_GROUPS = Path("/sys/fs/cgroup")
-QUOTAS = (
-    (_GROUPS / "cpu.max",),
-    (_GROUPS / "cpu/cpu.cfs_quota_us", _GROUPS / "cpu/cpu.cfs_period_us"),
-)
-"""The files of quota and period of this process's control group: version 2, version 1."""
+QUOTA = Path("/sys/fs/cgroup/cpu.max")
+"""The file of quota and period of this process's control group, version 2."""
 
 
 def core_count() -> int:
     """Return how many cores this process may use: its affinity and its control group limit them."""
     has_affinity = hasattr(os, "sched_getaffinity")
     cores = len(os.sched_getaffinity(0)) if has_affinity else os.cpu_count() or 1
-    for files in QUOTAS:
-        with contextlib.suppress(OSError, ValueError):  # ValueError: "max", no limit
-            quota, period = map(int, " ".join(map(Path.read_text, files)).split())
-            if quota > 0:
-                cores = min(cores, math.ceil(quota / period))
+    with contextlib.suppress(OSError, ValueError):  # ValueError: "max", no limit
+        quota, period = map(int, QUOTA.read_text("utf-8").split())
+        return min(cores, math.ceil(quota / period))
     return cores
 
 
@@ -105,10 +99,10 @@ def call_all(
     """
     suspects: list[T] = []
     for item, result in _call(function, items, workers):
-        if result is None:
-            suspects.append(item)
-        else:
+        if result is not None:
             yield item, result
+        else:
+            suspects.append(item)
     for item in suspects:
         yield from _call(function, [item], workers)
 
@@ -155,9 +149,8 @@ class LocalProcesses:
         """Start the processes; at the end of the block they are killed."""
         from loky import ProcessPoolExecutor
 
-        executor = ProcessPoolExecutor(
-            self.at_once, initializer=_initialize, initargs=(os.getpid(),), env=ENVIRONMENT
-        )
+        begin = {"initializer": _initialize, "initargs": (os.getpid(),), "env": ENVIRONMENT}
+        executor = ProcessPoolExecutor(self.at_once, **begin)
 
         def submit(*call: Any) -> Future[Any]:
             future: Future[Any] = executor.submit(*call)
@@ -216,15 +209,12 @@ class DaskCluster:
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # errors are raised
         with contextlib.ExitStack() as stack:
             try:
-                client = stack.enter_context(
-                    Client(self.address, timeout=self.timeout, set_as_default=False)
-                )
-                client.wait_for_workers(1, timeout=self.timeout)
+                client = Client(self.address, timeout=self.timeout, set_as_default=False)
+                stack.enter_context(client).wait_for_workers(1, timeout=self.timeout)
             except (OSError, ValueError) as error:  # ValueError: not the form of an address
-                raise ClusterError(
-                    f"{self.address}: no Dask scheduler with a worker answers; start them with "
-                    "`dask scheduler` and `dask worker`"
-                ) from error
+                advice = "start them with `dask scheduler` and `dask worker`"
+                lack = f"no Dask scheduler with a worker answers; {advice}"
+                raise ClusterError(f"{self.address}: {lack}") from error
             try:
                 yield client.get_executor(pure=False).submit
             except CancelledError as error:

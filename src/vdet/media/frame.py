@@ -148,8 +148,8 @@ class Planes:
         luma, red, blue = to_ycrcb(image)
         luma, *chroma = coding.from_common((luma, blue, red))
         half, area = (width // 2, height // 2), cv2.INTER_AREA
-        blue, red = (cv2.resize(item, half, interpolation=area) for item in chroma)
-        return cls.blank(width, height, coding)._filled((luma, blue, red))
+        halves = (cv2.resize(item, half, interpolation=area) for item in chroma)
+        return cls.blank(width, height, coding)._filled((luma, *halves))
 
     @classmethod
     def blank(cls, width: int, height: int, coding: Coding) -> "Planes":

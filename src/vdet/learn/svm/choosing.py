@@ -7,7 +7,7 @@ of its other side is unknown.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal, cast
+from typing import Any, Literal
 
 import numpy as np
 
@@ -79,20 +79,15 @@ def choose_windows(
     boxes, vehicles = from_sizes(windows.boxes[first]), labelled[~ignored]
     is_hit = windows.probabilities[first] >= most.probability
     comparisons = [compare_windows(boxes, vehicle, frame_width) for vehicle in vehicles]
-    distances = [np.full(len(boxes), np.inf)]  # of no vehicle
-    distances += [
-        np.where(comparison.near, comparison.distances, np.inf) for comparison in comparisons
-    ]
-    nearest = np.argmin(distances, axis=0) - 1
+    of_none = np.full(len(boxes), np.inf)
+    nearest = np.argmin([of_none, *(item.distances for item in comparisons)], axis=0) - 1
     is_covered = coverage(boxes, np.concatenate([vehicles, labelled[ignored]])) > _MAX_COVERED
     is_alarm = is_hit & (nearest < 0) & ~is_covered.any(axis=1)
     is_part = np.zeros(len(boxes), np.bool_)
 
-    def some(
-        kind: PatchKind, flags: BoolArray, most: int, sides: Float64Array | None = None
-    ) -> Iterator[ChosenWindow]:
+    def some(kind: PatchKind, flags: BoolArray, most: int, sides: Any = None) -> Iterator[Any]:
         for row in sorted(rng.permutation(np.flatnonzero(flags))[:most].tolist()):
-            seen = None if sides is None else cast("Sides", tuple(sides[row].tolist()))
+            seen = None if sides is None else tuple(sides[row].tolist())
             yield ChosenWindow(kind, Box(*boxes[row].tolist()), seen)
 
     for number, comparison in enumerate(comparisons):
@@ -113,7 +108,8 @@ class WindowComparison:
     sides
         float64 `(n, 4)`: left, top, right, bottom of the vehicle, NaN where the frame cuts it off.
     distances
-        float64 `(n,)`: distance of the two centres, the larger of across and down.
+        float64 `(n,)`: distance of the two centres, the larger of across and down; infinite where
+        the window neither fits nor shows the vehicle, nor overlaps it otherwise.
     fits
         bool `(n,)`: the window is a good picture of the vehicle.
     shows
@@ -121,8 +117,6 @@ class WindowComparison:
     part
         bool `(n,)`: the window lies in the vehicle, which is far too large for it. It counts as no
         picture of a vehicle, even if it `shows` one.
-    near
-        bool `(n,)`: the window fits or shows the vehicle, or overlaps it otherwise.
     """
 
     sides: Float64Array
@@ -130,7 +124,6 @@ class WindowComparison:
     fits: BoolArray
     shows: BoolArray
     part: BoolArray
-    near: BoolArray
 
 
 def compare_windows(
@@ -169,8 +162,8 @@ def compare_windows(
     part = (covered > 0.5) & ((width > 2.5) | (height > 1.3)) & ~fits
     overlaps = _between(width, 0.4, 3) & (across < 0.75) & (down < 0.4) & (covered > 0.12)
     sides[:, [0, 2]] = np.where(cut, np.nan, sides[:, [0, 2]])
-    distances = np.maximum(across, down)
-    return WindowComparison(sides, distances, fits, shows & ~fits, part, overlaps | fits | shows)
+    distances = np.where(overlaps | fits | shows, np.maximum(across, down), np.inf)
+    return WindowComparison(sides, distances, fits, shows & ~fits, part)
 
 
 def _between(values: Float64Array, low: float, high: float) -> BoolArray:

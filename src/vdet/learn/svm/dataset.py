@@ -157,7 +157,7 @@ def _read_table(source: Path) -> dict[str, Sides]:
 
 def _sides(values: Sequence[str]) -> Sides:
     left, top, right, bottom = (float(value or "nan") for value in values)
-    if any(map(math.isinf, (left, top, right, bottom))):
+    if math.inf in map(abs, (left, top, right, bottom)):
         raise ValueError("a side is infinite")
     return left, top, right, bottom
 
@@ -181,9 +181,8 @@ def patch_archive(path: Path, *, overwrite: bool = False) -> Iterator[AddPatch]:
         def add(name: str, patch: Image, sides: Sides | None) -> None:
             store(file, name, cv2.imencode(".png", patch)[1].tobytes())
             if sides is not None:
-                rows.writerow(
-                    [name, *("" if math.isnan(side) else f"{side:.4f}" for side in sides)]
-                )
+                known = ("" if math.isnan(side) else f"{side:.4f}" for side in sides)
+                rows.writerow([name, *known])
 
         yield add
         store(file, TABLE, table.getvalue())

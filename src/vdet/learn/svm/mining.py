@@ -141,11 +141,10 @@ def mine(
         The zip file cannot be written.
     """
     names = [source.path.resolve().stem for source in sources]
-    for name, count in Counter(names).items():
-        if count > 1:
-            raise DataError(f"{count} sources are named {name}; rename them, or mine one at a time")
-    searched = 0
-    counts: Counter[PatchKind] = Counter()
+    (name, count), *_ = Counter(names).most_common()
+    if count > 1:
+        raise DataError(f"{count} sources are named {name}; rename them, or mine one at a time")
+    searched, counts = 0, Counter[PatchKind]()
     with patch_archive(output, overwrite=overwrite) as add:
         for stem, source in zip(names, sources, strict=True):
             progress = partial(steps, source.path.name)

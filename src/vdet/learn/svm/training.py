@@ -63,13 +63,11 @@ class Classification:
         yield f"patches tested: {self.patches}"
         for name in ("accuracy", "precision", "recall"):
             yield f"{name} {share(getattr(self, name), 4)}"
-        yield ""
-        names = ("is vehicle", "is non-vehicle")
-        rows = [[name, *map(str, row)] for name, row in zip(names, self.confusion, strict=True)]
-        yield from table(("", "predicted vehicle", "predicted non-vehicle"), rows)
-        yield ""
+        found, others = ([*map(str, row)] for row in self.confusion)
+        rows = [["is vehicle", *found], ["is non-vehicle", *others]]
+        yield from ("", *table(("", "predicted vehicle", "predicted non-vehicle"), rows))
         by_group = [[name, share(accuracy, 4)] for name, accuracy in self.groups.items()]
-        yield from table(("group", "accuracy"), by_group)
+        yield from ("", *table(("group", "accuracy"), by_group))
 
 
 @dataclass(frozen=True, slots=True)
