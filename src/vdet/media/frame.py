@@ -99,7 +99,7 @@ _KINDS = cv2.CV_16S, cv2.CV_8U, cv2.CV_8U  # of a change of luma, of blue and re
 def _recoded(layers: Layers, matrix: Float64Array) -> Layers:
     """Convert full-range values to another matrix; luma changes only by a fraction of chroma."""
     luma, first, second = layers
-    mixed = []
+    mixed: list[Any] = []
     for (_, a, b), zero, kind in zip(matrix.tolist(), (0, 128, 128), _KINDS, strict=True):
         offset = zero - 128 * (a + b)
         mixed.append(np.asarray(cv2.addWeighted(first, a, second, b, offset, dtype=kind)))

@@ -58,11 +58,11 @@ def demo_scene(seed: int, *, width: int = 960, height: int = 540) -> Scene:
         ((3.0, -8.0, near), (5.0, 7.0, near), (6.5, 13.0, near), (10.0, 26.0, near)),
     )
     paints = rng.permutation(len(_PAINTS))
-    vehicles = []
-    for number, path in enumerate(paths, start=1):
-        points = tuple(Waypoint(*point) for point in path)
-        vehicles.append(SceneVehicle(number, points, _PAINTS[paints[number]], random_body(rng)))
-    return replace(scene, vehicles=tuple(vehicles), frames=250)
+    vehicles = tuple(
+        SceneVehicle(n, tuple(Waypoint(*at) for at in path), _PAINTS[paints[n]], random_body(rng))
+        for n, path in enumerate(paths, start=1)
+    )
+    return replace(scene, vehicles=vehicles, frames=250)
 
 
 def pole_scene(seed: int) -> Scene:
@@ -90,8 +90,7 @@ def busy_road(rng: np.random.Generator) -> Scene:
     The camera is so fast that consecutive frames show different places.
     """
     lanes = int(rng.integers(2, 5))
-    lane = int(rng.integers(lanes))
-    seed = int(rng.integers(2**31))
+    lane, seed = int(rng.integers(lanes)), int(rng.integers(2**31))
     height, curvature = rng.uniform(1.1, 1.6), rng.uniform(-1, 1) / 600
     camera = PinholeCamera(960, 320, 864.0, 120.0, height, curvature)
     road = empty_road(rng, camera, lane=lane, lanes=lanes, seed=seed)
@@ -119,10 +118,8 @@ def empty_road(
     right = left + lanes * LANE_WIDTH
     dashed = [LaneLine(left + number * LANE_WIDTH, dash=3.0) for number in range(1, lanes)]
     lines = (LaneLine(left, _YELLOW), *dashed, LaneLine(right))
-    grey = int(rng.integers(58, 120))
-    asphalt = (grey + 4, grey, grey - 3)
-    verge = _VERGES[rng.integers(len(_VERGES))]
-    road = Carriageway(left - 1.5, right + 2.0, lines, asphalt, verge)
+    grey, verge = int(rng.integers(58, 120)), _VERGES[rng.integers(len(_VERGES))]
+    road = Carriageway(left - 1.5, right + 2.0, lines, (grey + 4, grey, grey - 3), verge)
     light = _random_light(rng)
     sides = ((-1, left - 3), (1, right + 4)) * 28
     plants = tuple(_random_plant(rng, side, edge) for side, edge in sides)
@@ -157,8 +154,7 @@ def _random_plant(rng: np.random.Generator, side: int, edge: float) -> Plant:
     """Return a tree or a bush."""
     tall = rng.random() < 0.6
     height = rng.uniform(4, 9) if tall else rng.uniform(1.0, 2.0)
-    green = int(rng.integers(60, 110))
-    station = rng.uniform(0, PERIOD)
+    green, station = int(rng.integers(60, 110)), rng.uniform(0, PERIOD)
     lateral = edge + side * (rng.uniform(6, 28) if tall else rng.uniform(1, 12))
     width = height * (rng.uniform(0.6, 1.1) if tall else rng.uniform(1.0, 1.8))
     color = (green - int(rng.integers(10, 40)), green, green - int(rng.integers(-10, 30)))

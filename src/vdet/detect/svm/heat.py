@@ -98,15 +98,12 @@ def find_regions(heat: Heat, threshold: float) -> list[HotRegion]:
 
 def _region(heat: Heat, hot: npt.NDArray[np.uint8], contour: cv2.typing.MatLike) -> HotRegion:
     x, y, width, height = cv2.boundingRect(contour)
-    inside = np.zeros((height, width), np.uint8)
+    inside, part = np.zeros((height, width), np.uint8), np.s_[y : y + height, x : x + width]
     cv2.drawContours(inside, [contour], -1, 1, cv2.FILLED, offset=(-x, -y))
-    inside &= hot[y : y + height, x : x + width]
-    peak = float(heat.values[y : y + height, x : x + width][inside > 0].max())
-    n = heat.shrink
+    peak = float(heat.values[part][(inside & hot[part]) > 0].max())
+    n, moments = heat.shrink, cv2.moments(contour)
     box = Box.sized(n * x, n * y, n * width, n * height)
-    moments = cv2.moments(contour)
-    area = moments["m00"]
-    if not area:
+    if not (area := moments["m00"]):
         return HotRegion(box, box.center, peak)
     offset = (n - 1) / 2  # from the first pixel of a value to their middle
     centroid = (n * moments["m10"] / area + offset, n * moments["m01"] / area + offset)

@@ -36,9 +36,7 @@ def find_horizon(images: Sequence[Image]) -> float | None:
     -------
     0.30 to 0.74 in steps of 0.01; None where too few lines run along the road.
     """
-    if not images:
-        return None
-    height, width = images[0].shape[:2]
+    height, width = images[0].shape[:2] if images else (1, 0)
     if height > _MAX_ASPECT * width:
         return None
     ends = np.concatenate([_segment_ends(image) for image in images])
@@ -49,11 +47,9 @@ def find_horizon(images: Sequence[Image]) -> float | None:
         return None
     left, right = (_sum_votes(side, height / width) for side in sides)
     both = np.minimum(left, right)  # a vanishing point has lines on both sides
-    if not both.any():
-        return None
     votes = both + 0.2 * (left + right)
     row, _ = np.unravel_index(int(votes.argmax()), votes.shape)
-    return round(float(_ROWS[row]), 2)
+    return round(float(_ROWS[row]), 2) if both.any() else None
 
 
 def _segment_ends(image: Image) -> Float64Array:
@@ -80,8 +76,7 @@ def _sum_votes(ends: Float64Array, aspect: float) -> Float64Array:
     normals = np.stack([-directions[:, 1], directions[:, 0]], axis=1) / lengths[:, np.newaxis]
     middles = (ends[:, :2] + ends[:, 2:]) / 2
     x, y = np.meshgrid(_COLUMNS, _ROWS * aspect)
-    dx = x[..., np.newaxis] - middles[:, 0]
-    dy = y[..., np.newaxis] - middles[:, 1]
+    dx, dy = x[..., np.newaxis] - middles[:, 0], y[..., np.newaxis] - middles[:, 1]
     sines = abs(dx * normals[:, 0] + dy * normals[:, 1]) / (np.hypot(dx, dy) + 1e-9)
     votes = lengths * np.maximum(0, 1 - (sines / _MAX_SINE) ** 2) * (dy < 0)
     return np.asarray(votes.sum(axis=-1))

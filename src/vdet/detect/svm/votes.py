@@ -66,8 +66,7 @@ class Votes:
         shares = np.concatenate([hit.shares for hit in hits], dtype=np.float64)
         probabilities = np.concatenate([hit.probabilities for hit in hits], dtype=np.float64)
         bounded = np.clip(probabilities, 1 - _MAX_PROBABILITY, _MAX_PROBABILITY)
-        position = (-np.log1p(-bounded)) ** _SHARPNESS
-        inside = visible(boxes, size)
+        position, inside = (-np.log1p(-bounded)) ** _SHARPNESS, visible(boxes, size)
         seen = (inside[:, 2:] - inside[:, :2] >= 1).all(axis=1)
         return Votes(inside[seen], (probabilities * shares)[seen], position[seen])
 
@@ -100,8 +99,8 @@ def split_regions(regions: Sequence[HotRegion], votes: Votes, minimum: float) ->
     parts: BoolArray = coverage(boxes, boxes) > _INSIDE
     parts &= area(boxes) > area(boxes)[:, np.newaxis]
     parts &= _FAR_STRONGER * position > position[:, np.newaxis]
-    kept = zip(boxes.tolist(), found, np.any(parts, axis=1).tolist(), strict=True)
-    pairs = [(Box(*box), presence) for box, (_, _, presence), is_part in kept if not is_part]
+    kept = [found[row] for row in np.flatnonzero(~parts.any(axis=1))]
+    pairs = [(Box(*sides.tolist()), presence) for sides, _, presence in kept]
     return [HotRegion(box.rounded, box.center, presence) for box, presence in pairs]
 
 
@@ -142,7 +141,6 @@ def _vehicles(votes: Votes, minimum: float) -> Iterator[tuple[Float64Array, floa
 def _average(boxes: Float64Array, weights: Float64Array, overlaps: Float64Array) -> Float64Array:
     """Average the boxes that agree; a better overlap counts more."""
     shares = np.where(overlaps > _AGREEMENT, weights * overlaps**2, 0)
-    total = shares.sum()
-    if not total:
+    if not (total := shares.sum()):
         return np.asarray(boxes[int(overlaps.argmax())])
     return np.asarray(shares @ boxes / total)

@@ -49,7 +49,7 @@ def buffered_iou(
     return iou(_widened(expected[:, np.newaxis], fractions), _widened(found, fractions))
 
 
-def _widened(boxes: Float64Array, fractions: Float64Array) -> Float64Array:
+def _widened(boxes: Float64Array, fractions: Float64Array | float) -> Float64Array:
     near, far = boxes[..., :2], boxes[..., 2:]
     margin = (far - near) * fractions
     return np.concatenate([near - margin, far + margin], axis=-1)
@@ -71,8 +71,7 @@ def appearances(picture: Picture | None, boxes: Float64Array) -> Float64Array:
     """
     if picture is None or not len(boxes):
         return np.full((len(boxes), 2, 3), np.nan)
-    sides = _MARGIN * (boxes[:, 2:] - boxes[:, :2])
-    inner = boxes + np.concatenate([sides, -sides], axis=1)
+    inner = _widened(boxes, -_MARGIN)
     halves = np.stack([inner, inner], axis=1)
     halves[:, 0, 3] = halves[:, 1, 1] = inner[:, [1, 3]].mean(axis=1)
     means = [_mean(picture, half) for half in halves.reshape(-1, 4)]
