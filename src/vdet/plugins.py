@@ -35,19 +35,13 @@ _BUILT_IN: dict[str, dict[str, str]] = {
     DETECTORS: {"svm": "vdet.detect.svm.detector:SVM", "net": "vdet.detect.onnx.detector:NET"},
     TRACKERS: {"motion": "vdet.track.factory:MOTION", "rules": "vdet.track.factory:RULES"},
     SINKS: {
-        "video": "vdet.run.sinks.drawn:VIDEO",
-        "tracks": "vdet.run.sinks.data:TRACKS",
-        "stages": "vdet.run.sinks.folders:STAGES",
-        "picture": "vdet.run.sinks.drawn:PICTURE",
-        "json": "vdet.run.sinks.data:JSON",
-        "labels": "vdet.run.sinks.data:LABELS",
-        "vehicles": "vdet.run.sinks.data:VEHICLES",
-        "crops": "vdet.run.sinks.folders:CROPS",
-        "clips": "vdet.run.sinks.folders:CLIPS",
-        "page": "vdet.run.sinks.folders:PAGE",
-        "counts": "vdet.run.sinks.data:COUNTS",
-        "flows": "vdet.run.sinks.data:FLOWS",
-        "conditions": "vdet.run.sinks.data:CONDITIONS",
+        name: f"vdet.run.sinks.{module}:{name.upper()}"
+        for module, names in {
+            "drawn": ("video", "picture"),
+            "data": ("tracks", "json", "labels", "vehicles", "counts", "flows", "conditions"),
+            "folders": ("stages", "crops", "clips", "page"),
+        }.items()
+        for name in names
     },
     FORMATS: {
         "mot": "vdet.labels.mot:MOT",

@@ -1,6 +1,6 @@
 """Detectors of any kind, loaded from settings and a model file."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -42,15 +42,13 @@ def load_detector(settings: DetectorSettings) -> DetectorModel:
     ModelError
         The model file cannot be used.
     """
-    kind, model = None, Path(settings.model) if settings.model else None
-    if model:
+    model = Path(settings.model) if settings.model else None
+    if model and settings.model_suffix:
         from vdet.config.kinds import kind_of_model  # it imports YAML
 
-        kind = kind_of_model(model)
-    if kind and settings.model_suffix and kind != settings.kind:
-        raise ConfigError(
-            f"{model}: is for detector.kind: {kind}, not {settings.kind}; remove one of them"
-        )
+        if (kind := kind_of_model(model)) not in (None, settings.kind):
+            advice = f"is for detector.kind: {kind}, not {settings.kind}; remove one of them"
+            raise ConfigError(f"{model}: {advice}")
     return _kind(settings).load(settings, model)
 
 
@@ -70,29 +68,21 @@ DetectorObject = DetectorModel | VideoDetector | Callable[[Image], Boxes]
 
 def as_model(detector: DetectorObject) -> DetectorModel:
     """Return a detector object as one that any video can be searched with."""
-    if isinstance(detector, DetectorModel):
-        return detector
-    return _Shared(detector if isinstance(detector, VideoDetector) else _Function(detector))
+    return detector if isinstance(detector, DetectorModel) else _Shared(detector)
 
 
 @dataclass(frozen=True, slots=True)
 class _Shared:
-    """A detector that is used as it is for every video."""
+    """A detector, or a function of an image, that is used as it is for every video."""
 
-    detector: VideoDetector
+    detector: Any
 
-    def for_video(self, width: int, height: int, images: Sequence[Image]) -> VideoDetector:  # noqa: ARG002
-        return self.detector
-
-
-@dataclass(frozen=True, slots=True)
-class _Function:
-    """A detector that is a function of an image."""
-
-    find: Callable[[Image], Boxes]
+    def for_video(self, *_: object) -> VideoDetector:
+        return self.detector if isinstance(self.detector, VideoDetector) else self
 
     def search(self, picture: Picture, index: int | None) -> Boxes:  # noqa: ARG002
-        return self.find(picture.image)
+        found: Boxes = self.detector(picture.image)
+        return found
 
     def detect(self, candidates: Boxes) -> Boxes:
         return candidates
