@@ -6,6 +6,8 @@ import sys
 from functools import partial
 from pathlib import Path
 
+import cv2
+
 from benchmarks.plain import transcode
 from benchmarks.rounds import Task, measure_both
 from vdet.config.camera import CameraSettings, GroundPoint
@@ -14,7 +16,6 @@ from vdet.config.places import LineSettings, RegionSettings, TrafficSettings, Zo
 from vdet.config.schema import DrawSettings, InputSettings, Settings, SvmSettings
 from vdet.detect.factory import load_detector
 from vdet.detect.protocol import DetectorModel
-from vdet.media.images import write_image
 from vdet.media.reader import VideoReader
 from vdet.run.sinks.protocol import Output
 from vdet.run.video import Run, run_video
@@ -98,7 +99,7 @@ def start_times(path: Path, folder: Path, rounds: int) -> dict[str, tuple[float,
     """
     picture = folder / "picture.jpg"
     with VideoReader(path, frames=1) as reader:
-        write_image(picture, next(iter(reader)).image)
+        cv2.imwrite(str(picture), next(iter(reader)).image)
     plain = (
         "from pathlib import Path; from benchmarks.plain import transcode; "
         f"transcode(Path({str(path)!r}), Path({str(folder / 'plain.mp4')!r}), 25)"

@@ -24,11 +24,11 @@ from red_cars import HEIGHT, WIDTH, car_at, drive
 from running import frames_of, write_drive
 from vdet.boxes import Image
 from vdet.detect.onnx.detector import SHIPPED
-from vdet.media.images import write_image
 from vdet.media.reader import VideoReader
 from vdet.synthetic.render import render
 from vdet.synthetic.scene import Scene
 from vdet.traffic.records import records_content
+from writing import write_image
 
 
 @pytest.fixture(scope="module")

@@ -16,8 +16,8 @@ from red_cars import CAR, HEIGHT, WIDTH, car_at, drive
 from running import frames_of, write_drive
 from vdet.boxes import Box
 from vdet.config.schema import Settings
-from vdet.media.images import write_image
 from vdet.testing import check_detector, check_sink, check_tracker
+from writing import write_image
 
 FRAMES = 30
 CHOSEN = ("--set", "detector.kind=red", "--set", "tracker.kind=nearest")

@@ -9,8 +9,8 @@ import pytest
 from vdet.config.places import RegionSettings
 from vdet.config.schema import Settings
 from vdet.errors import ConfigError, ImageError
-from vdet.media.images import write_image
 from vdet.regions import Regions, check_masks, lay_regions
+from writing import write_image
 
 ROAD = {"name": "road", "points": [[0.5, 0.5], [1, 0.5], [1, 1], [0.25, 1]]}
 BUSH = {"name": "bush", "points": [[0.8, 0.6], [0.9, 0.6], [0.9, 0.8], [0.8, 0.8]]}

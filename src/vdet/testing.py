@@ -57,7 +57,7 @@ def _found(detector: VideoDetector, image: Image, index: int | None) -> Boxes:
     before = image.copy()
     found = detector.detect(detector.search(Picture(image), index))
     assert np.array_equal(image, before), "the detector changed a frame"
-    inside = visible(found.sides, image.shape[1::-1])
+    inside = visible(found.sides, (image.shape[1], image.shape[0]))
     assert np.array_equal(inside, found.sides), "a box lies outside the frame"
     return found
 

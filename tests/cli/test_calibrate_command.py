@@ -8,7 +8,7 @@ import pytest
 from conftest import Run
 from lanes.chessboards import CAMERA, photographs
 from vdet.config.loading import load_settings
-from vdet.media.images import write_image
+from writing import write_image
 
 
 @pytest.fixture(scope="session")

@@ -12,7 +12,7 @@ from conftest import Run
 from pages.html import Elements
 from running import write_drive
 from vdet.config.loading import load_settings
-from vdet.media.images import write_image
+from writing import write_image
 
 LINES = """
 camera: {size: [320, 240]}

@@ -10,7 +10,7 @@ from conftest import Run
 from lanes.poles import CORNERS, HEIGHT, WIDTH, ground_text, seen
 from running import rows_of, write_drive
 from vdet.boxes import Float64Array
-from vdet.media.images import write_image
+from writing import write_image
 
 LINES = "\ntraffic:\n  lines:\n" + "".join(
     f"  - {{name: {name}, start: {start}, end: {end}}}\n"

@@ -13,7 +13,7 @@ from clips import write_clip
 from conftest import Run
 from detect.onnx.graphs import RedBox, ultralytics, write_network
 from vdet.errors import ModelError
-from vdet.media.images import write_image
+from writing import write_image
 
 MODELS = Path(__file__).parents[2] / "src" / "vdet" / "models"
 

@@ -7,7 +7,8 @@ import pytest
 from conftest import Run
 from red_cars import CAR, road
 from running import names, write_drive
-from vdet.media.images import read_image, write_image
+from vdet.media.images import read_image
+from writing import write_image
 
 FRAMES = 15
 KNOWN = "known: video, tracks, stages, picture, json, labels, vehicles, crops, clips, page, counts"

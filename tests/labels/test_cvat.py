@@ -13,8 +13,8 @@ from vdet.labels.cvat import CVAT, read_cvat, read_cvat_pictures
 from vdet.labels.formats import SourceVideo
 from vdet.labels.label import Label
 from vdet.labels.pictures import LabelledPicture
-from vdet.media.images import write_image
 from vdet.track.track import FrameTracks
+from writing import write_image
 
 FILE = Path("annotations.xml")
 BOX = '<box frame="0" outside="0" occluded="0" xtl="10" ytl="20" xbr="40.5" ybr="60"/>'

@@ -27,8 +27,8 @@ from vdet.labels.ottrk import OTTRK
 from vdet.labels.pictures import LabelledPicture
 from vdet.labels.records import CSV, JSON_LINES
 from vdet.labels.yolo import YOLO, YOLO_PICTURES
-from vdet.media.images import write_image
 from vdet.track.track import FrameTracks, State, Track
+from writing import write_image
 
 WHOLE = {CSV, JSON_LINES}
 """Formats that keep all that is known of a track."""

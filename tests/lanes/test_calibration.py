@@ -13,7 +13,8 @@ from vdet.config.camera import LensSettings
 from vdet.errors import ImageError
 from vdet.lanes.calibration import calibrate, find_corners
 from vdet.lanes.camera import Undistorter
-from vdet.media.images import read_image, write_image
+from vdet.media.images import read_image
+from writing import write_image
 
 LARGE = LensSettings(
     size=(2560, 1920),

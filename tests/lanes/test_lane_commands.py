@@ -24,12 +24,13 @@ from vdet.detect.svm.model import save_model
 from vdet.draw.boxes import color_of
 from vdet.lanes.camera import Undistorter, save_camera
 from vdet.media import Frame, Picture, VideoInfo
-from vdet.media.images import read_image, write_image
+from vdet.media.images import read_image
 from vdet.media.reader import VideoReader
 from vdet.media.writer import VideoWriter
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.render import Renderer
 from vdet.synthetic.scene import Scene
+from writing import write_image
 
 WIDTH, HEIGHT, COUNT = 640, 480, 10
 LENS = LensSettings(

@@ -12,7 +12,7 @@ from PIL import Image as pillow  # noqa: N813
 
 from vdet.boxes import Image
 from vdet.errors import ImageError
-from vdet.media.images import decode_image, read_header, read_image, write_image
+from vdet.media.images import decode_image, encode_image, read_header, read_image
 from vdet.media.reader import VideoReader
 
 PICTURE = np.random.default_rng(0).integers(0, 256, (24, 32, 3), dtype=np.uint8)
@@ -31,14 +31,14 @@ def encoded(suffix: str, image: np.ndarray) -> bytes:
 @pytest.mark.parametrize("suffix", [".png", ".bmp", ".tiff", ".PNG"])
 def test_a_written_picture_is_read_back_the_same(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"picture{suffix}"
-    write_image(path, PICTURE)
+    path.write_bytes(encode_image(PICTURE, path))
     np.testing.assert_array_equal(read_image(path), PICTURE)
 
 
 @pytest.mark.parametrize("suffix", [".jpg", ".jpeg", ".webp"])
 def test_a_compressed_picture_is_read_back_nearly_the_same(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"picture{suffix}"
-    write_image(path, smooth())
+    path.write_bytes(encode_image(smooth(), path))
     image = read_image(path)
     assert image.dtype == np.uint8
     np.testing.assert_allclose(image, smooth(), atol=12)
@@ -164,7 +164,6 @@ def test_a_pipe_is_refused_at_once(tmp_path: Path, read: Callable[[Path], object
 
 
 @pytest.mark.parametrize("name", ["picture.xyz", "picture", "picture.txt"])
-def test_the_error_for_an_unknown_suffix_lists_the_known_ones(tmp_path: Path, name: str) -> None:
+def test_the_error_for_an_unknown_suffix_lists_the_known_ones(name: str) -> None:
     with pytest.raises(ImageError, match=r"must end in .*\.jpg, .*\.png"):
-        write_image(tmp_path / name, PICTURE)
-    assert list(tmp_path.iterdir()) == []
+        encode_image(PICTURE, Path(name))

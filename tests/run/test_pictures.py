@@ -11,7 +11,6 @@ from red_cars import CAR, SETTINGS, road
 from run.conftest import Register
 from run.red_runs import model_for
 from vdet.errors import ImageError, OutputError
-from vdet.media.images import write_image
 from vdet.run.pictures import (
     PictureJob,
     PictureSearch,
@@ -22,6 +21,7 @@ from vdet.run.pictures import (
 )
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output, SinkContext, SinkKind
+from writing import write_image
 
 
 def touch(*paths: Path) -> None:

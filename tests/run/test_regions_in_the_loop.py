@@ -14,10 +14,11 @@ from vdet.boxes import Box
 from vdet.config.camera import CameraSettings
 from vdet.config.schema import Settings
 from vdet.errors import ImageError, VideoError
-from vdet.media.images import read_image, write_image
+from vdet.media.images import read_image
 from vdet.run.pictures import PictureJob, PictureSearch, run_picture
 from vdet.run.sinks.protocol import Output
 from vdet.run.video import Run
+from writing import write_image
 
 RIGHT = [[100 / 320, 0], [1, 0], [1, 1], [100 / 320, 1]]
 
@@ -83,5 +84,5 @@ def test_a_mask_that_is_drawn_anew_makes_results_out_of_date(tmp_path: Path) -> 
     write_image(mask, np.zeros((24, 32, 3), np.uint8))
     before = result_digest(run)
     assert before == result_digest(run)
-    write_image(mask, np.full((24, 32, 3), 255, np.uint8), overwrite=True)
+    write_image(mask, np.full((24, 32, 3), 255, np.uint8))
     assert before != result_digest(run)

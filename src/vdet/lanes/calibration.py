@@ -70,7 +70,8 @@ def calibrate(paths: Iterable[Path], pattern: Pattern) -> Calibration:
     boards = {path: _find_board(path, pattern) for path in paths}
     skipped = {path: board for path, board in boards.items() if isinstance(board, str)}
     photos = [board for board in boards.values() if isinstance(board, BoardPhoto)]
-    (size, _), *_ = *Counter(photo.size for photo in photos).most_common(1), ((0, 0), 0)
+    sizes = [*Counter(photo.size for photo in photos).most_common(1), ((0, 0), 0)]
+    size = sizes[0][0]
     for photo in photos:
         if np.abs(np.subtract(photo.size, size)).max() > SIZE_TOLERANCE:
             skipped[photo.path] = f"is {_text(photo.size)}, the others are {_text(size)}"

@@ -21,7 +21,7 @@ from PIL.ImageFile import ImageFile
 from vdet.boxes import Image
 from vdet.config.camera import ClockSettings
 from vdet.errors import ImageError, VideoError
-from vdet.files import read_whole, record_input, staged
+from vdet.files import read_whole, record_input
 
 MAX_PICTURE_PIXELS = 2**25
 """A picture of more pixels is not read: an 8K frame has fewer, a decompression bomb far more."""
@@ -151,13 +151,6 @@ def encode_image(image: Image, path: Path) -> bytes:
         if written:
             return data.tobytes()
     raise ImageError(f"{path}: images must end in {', '.join(sorted(PICTURE_SUFFIXES))}")
-
-
-def write_image(path: Path, image: Image, *, overwrite: bool = False) -> None:
-    """Write a picture in the format that the suffix names. Raises `ImageError`, `OutputError`."""
-    data = encode_image(image, path)
-    with staged(path, overwrite=overwrite) as temporary:
-        temporary.write_bytes(data)
 
 
 def from_16_bits(values: npt.NDArray[np.uint16]) -> Image:

@@ -11,7 +11,7 @@ from vdet.config.detector import FeatureSettings, HistogramSettings
 from vdet.config.schema import Settings, SvmSettings, SvmTrainingSettings, TrainSettings
 from vdet.learn.svm.dataset import find_patches
 from vdet.learn.svm.training import evaluate_patches
-from vdet.media.images import write_image
+from writing import write_image
 
 FEATURES = FeatureSettings(patch=16, histogram=HistogramSettings(bins=8))
 SETTINGS = Settings(

@@ -16,7 +16,8 @@ from vdet.errors import DataError
 from vdet.learn.svm.dataset import PatchFile, find_patches
 from vdet.learn.svm.extraction import LabelledVectors, extract, hold_out
 from vdet.learn.svm.training import train
-from vdet.media.images import read_image, write_image
+from vdet.media.images import read_image
+from writing import write_image
 
 SIZE = 16
 GROUPS = {"vehicles/far": 12, "vehicles/near": 20, "non-vehicles/road": 15, "non-vehicles/sky": 10}
@@ -118,7 +119,7 @@ def test_neither_test_patches_nor_samples_made_of_them_are_learned_from(
         held = hold_out(groups)
         for row in np.flatnonzero(held):
             flat = np.full((SIZE, SIZE, 3), row, np.uint8)
-            write_image(spoilt / some[row].name, flat, overwrite=True)
+            write_image(spoilt / some[row].name, flat)
     one, _ = train(files, SETTINGS, jobs=1)
     other, report = train(find_patches([spoilt]), SETTINGS, jobs=1)
     np.testing.assert_array_equal(one.weights, other.weights)

@@ -15,9 +15,10 @@ from run.red_runs import COUNT, outputs, result_of, run_red, video_info, write
 from running import names
 from vdet.boxes import Image
 from vdet.config.places import RegionSettings
-from vdet.media.images import decode_image, write_image
+from vdet.media.images import decode_image
 from vdet.run.sinks.protocol import Output
 from vdet.run.video import Run
+from writing import write_image
 
 
 def page_of(folder: Path) -> Elements:

@@ -169,8 +169,8 @@ def _rt_detr(session: Session, names: Sequence[str]) -> Recognized:
     outputs = session.output_names
     if not {"labels", "boxes", "scores"} <= set(outputs):
         raise _unknown(session, f"it has an input {_SIZES}, but outputs {', '.join(outputs)}")
-    order = tuple(map(outputs.index, ("labels", "boxes", "scores")))
-    layout = partial(layouts.named_columns, order=order)
+    labels, boxes, scores = map(outputs.index, ("labels", "boxes", "scores"))
+    layout = partial(layouts.named_columns, order=(labels, boxes, scores))
     form = replace(_form(session, None), fit="stretch")
     found = Recognized(session, "RT-DETR", tuple(names) or COCO, form, layout)
     found.find(Picture(form.grey), 0)  # raises where the shapes are others
