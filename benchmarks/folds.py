@@ -21,7 +21,6 @@ from vdet.config.loading import load_settings
 from vdet.config.schema import Settings
 from vdet.detect.svm.detector import Candidates, SvmDetector, SvmModel
 from vdet.detect.svm.model import LinearModel
-from vdet.detect.svm.search import FrameSearch
 from vdet.detect.svm.windows import Windows
 from vdet.evaluate.scores import score
 from vdet.labels.label import Label, LabelledVideo
@@ -193,7 +192,7 @@ def _sweep(
 def _tracks(searched: SearchedVideo, model: LinearModel, settings: Settings) -> LabelledVideo:
     """Detect and follow vehicles in windows that were searched before; any model will do."""
     size = searched.width, searched.height
-    detector = SvmDetector(FrameSearch(model, settings.svm, *size), settings.svm, size)
+    detector = SvmDetector(model, settings.svm, *size)
     tracker = make_tracker(settings, searched.width, searched.height)
     unseen = Picture(np.zeros((1, 1, 3), np.uint8))
     frames = (Frame(n, n / searched.rate, unseen) for n in range(searched.frames))

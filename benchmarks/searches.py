@@ -13,7 +13,8 @@ from benchmarks.patch_search import PatchSearch
 from benchmarks.rounds import Task, measure
 from vdet.config.schema import DetectorSettings, NetworkSettings, SvmSettings
 from vdet.detect.factory import load_detector
-from vdet.detect.svm.search import DenseSearch, FrameSearch
+from vdet.detect.svm.detector import SvmDetector
+from vdet.detect.svm.search import DenseSearch
 from vdet.media import Picture, Planes
 from vdet.media.frame import Coding
 
@@ -58,11 +59,11 @@ def search_times(
 def _search(config: ShippedConfig, pictures: Sequence[Picture], engine: type = DenseSearch) -> Task:
     """Search the pictures."""
     width, height = pictures[0].width, pictures[0].height
-    search = FrameSearch(config.model, config.settings.svm, width, height, engine=engine)
+    search = SvmDetector(config.model, config.settings.svm, width, height, engine=engine)
 
     def run() -> None:
         for picture in pictures:
-            search.search(picture)
+            search.search(picture, 0)
 
     return run
 

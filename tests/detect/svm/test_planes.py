@@ -7,7 +7,7 @@ from detect.svm.engine_comparison import fitted, log_odds, road
 from vdet.boxes import Image
 from vdet.config.detector import FeatureSettings
 from vdet.config.schema import SvmSettings
-from vdet.detect.svm.search import FrameSearch
+from vdet.detect.svm.detector import SvmDetector
 from vdet.media import Picture, Planes
 from vdet.media.frame import Coding
 
@@ -23,9 +23,10 @@ def both_forms(image: Image, coding: Coding) -> tuple[Picture, Picture]:
 
 @in_any_coding
 def test_windows_have_about_the_same_probabilities(coding: Coding) -> None:
-    search = FrameSearch(fitted(FeatureSettings()), SvmSettings(), 1280, 720, horizon=HORIZON)
+    search = SvmDetector(fitted(FeatureSettings()), SvmSettings(), 1280, 720, horizon=HORIZON)
     ours, expected = (
-        log_odds(search.search(picture).probabilities) for picture in both_forms(road(), coding)
+        log_odds(search.search(picture, 0)[0].probabilities)
+        for picture in both_forms(road(), coding)
     )
     assert (expected > 0).any(), "nothing is found: decisions cannot differ"
     assert np.corrcoef(ours, expected)[0, 1] > 0.97

@@ -14,8 +14,8 @@ from vdet.config.detector import (
 )
 from vdet.config.schema import SvmSettings
 from vdet.config.section import scale_lengths
+from vdet.detect.svm.detector import SvmDetector
 from vdet.detect.svm.model import BoxRegression, LinearModel
-from vdet.detect.svm.search import FrameSearch
 from vdet.detect.svm.windows import Windows, lay_grids
 from vdet.errors import FrameSizeError, ImageError
 from vdet.media import Picture
@@ -37,9 +37,9 @@ def model_of(features: FeatureSettings) -> LinearModel:
     return LinearModel(features, weights.astype(np.float32), 0 * one, -one, 0 * one)
 
 
-def search_of(features: FeatureSettings) -> FrameSearch:
+def search_of(features: FeatureSettings) -> SvmDetector:
     settings = SvmSettings(features=features, search=scale_lengths(fixed(*SETS), 720 / 120))
-    return FrameSearch(model_of(features), settings, 160, 120)
+    return SvmDetector(model_of(features), settings, 160, 120)
 
 
 def fixed(*sets: WindowSettings) -> SearchSettings:
@@ -53,21 +53,21 @@ PERSPECTIVE = SvmSettings(
 )
 
 
-def by_perspective() -> FrameSearch:
+def by_perspective() -> SvmDetector:
     """Return a search with four sets that follow the perspective."""
-    return FrameSearch(model_of(SMALL), PERSPECTIVE, 160, 120, horizon=0.3)
+    return SvmDetector(model_of(SMALL), PERSPECTIVE, 160, 120, horizon=0.3)
 
 
-def with_sides(sides: Sides) -> FrameSearch:
+def with_sides(sides: Sides) -> SvmDetector:
     """Return a search whose regression gives equal sides for all hits, half of the windows."""
     boxes = BoxRegression(np.zeros((4, SMALL.hog_length), np.float32), np.array(sides, np.float32))
     search = fixed(*SETS).model_copy(update={"probability": MEDIAN})
     settings = SvmSettings(features=SMALL, search=scale_lengths(search, 720 / 120))
-    return FrameSearch(replace(model_of(SMALL), box_regression=boxes), settings, 160, 120)
+    return SvmDetector(replace(model_of(SMALL), box_regression=boxes), settings, 160, 120)
 
 
-def search_all(search: FrameSearch, image: Image = FRAME) -> Windows:
-    return search.search(Picture(image))
+def search_all(search: SvmDetector, image: Image = FRAME) -> Windows:
+    return search.search(Picture(image), 0)[0]
 
 
 MEDIAN = float(np.median(search_all(search_of(SMALL)).probabilities))
@@ -96,7 +96,7 @@ class TestSearching:
         sizes = tuple(size * 160 / 208 for size in PERSPECTIVE.search.perspective.sizes)
         search = SearchSettings(perspective=PerspectiveSettings(sizes=sizes))
         settings = PERSPECTIVE.model_copy(update={"search": search})
-        found = search_all(FrameSearch(model_of(SMALL), settings, 208, 120, horizon=0.3), wide)
+        found = search_all(SvmDetector(model_of(SMALL), settings, 208, 120, horizon=0.3), wide)
         moved = (found.boxes - [24, 0, 0, 0]).tolist()
         expected = dict(zip(map(tuple, moved), found.probabilities.tolist(), strict=True))
         ours = search_all(by_perspective())
@@ -138,12 +138,12 @@ class TestVehicles:
 @pytest.mark.parametrize(("width", "height"), [(63, 720), (1, 1), (2, 2), (40, 2000)])
 def test_a_frame_without_room_for_any_window_is_refused(width: int, height: int) -> None:
     with pytest.raises(FrameSizeError, match=rf"no search window fits .* {width}×{height} pixels"):
-        FrameSearch(model_of(COLOUR), SEED.svm, width, height)
+        SvmDetector(model_of(COLOUR), SEED.svm, width, height)
 
 
 def test_a_frame_with_too_many_windows_is_refused() -> None:
     settings = SvmSettings(search=fixed(WindowSettings(size=8, overlap=0.8, top=0, bottom=720)))
     with pytest.raises(ImageError, match=r"^907,649 windows in 1280×720") as error:
-        FrameSearch(model_of(COLOUR), settings, 1280, 720)
+        SvmDetector(model_of(COLOUR), settings, 1280, 720)
     assert not isinstance(error.value, FrameSizeError)
     assert "use larger steps" in str(error.value)

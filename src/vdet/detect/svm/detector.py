@@ -2,9 +2,10 @@
 
 import logging
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -16,11 +17,12 @@ from vdet.detect.factory import DetectorKind
 from vdet.detect.svm.heat import Heat, HotRegion, find_regions, sum_heat
 from vdet.detect.svm.horizon import DEFAULT_HORIZON, find_horizon
 from vdet.detect.svm.model import LinearModel, load_model
-from vdet.detect.svm.search import FrameSearch
+from vdet.detect.svm.pyramid import FramePyramid
+from vdet.detect.svm.search import DenseSearch, vehicle_boxes
 from vdet.detect.svm.votes import Votes, split_regions
-from vdet.detect.svm.windows import WindowGrid, Windows
+from vdet.detect.svm.windows import WindowGrid, Windows, lay_grids
 from vdet.draw.boxes import GREEN, WHITE, color_of, draw_box, draw_label
-from vdet.errors import ModelError
+from vdet.errors import FrameSizeError, ImageError, ModelError
 from vdet.media import Picture
 
 log = logging.getLogger("vdet")
@@ -61,8 +63,7 @@ class SvmModel:
             Too many windows fit into such a frame.
         """
         horizon = self._horizon(images)
-        search = FrameSearch(self.model, self.settings, width, height, horizon=horizon)
-        return SvmDetector(search, self.settings, (width, height))
+        return SvmDetector(self.model, self.settings, width, height, horizon=horizon)
 
     def _horizon(self, images: Sequence[Image]) -> float:
         """Return the row of the horizon, as a fraction of the height, and report it."""
@@ -80,23 +81,75 @@ class SvmModel:
         return horizon
 
 
+MAX_WINDOWS = 100_000
+"""Maximum number of windows in a frame; more take minutes. The shipped settings lay about 2,700."""
+
+_ALIGNMENT = 16
+"""The searched part begins at a multiple of this many pixels of the frame, so that it can be halved
+as the windows in it are."""
+
+
 class SvmDetector:
     """Finds vehicles in consecutive frames of one size: a `VideoDetector`.
 
     Parameters
     ----------
-    size
-        Width and height of the frames, pixels.
+    width, height
+        Size of the frames, pixels.
+    horizon
+        Row of the horizon, fraction of the frames' height, for the sets that follow the
+        perspective.
+    engine
+        Makes the search of a grid.
+
+    Attributes
+    ----------
+    grids
+        The window sets, laid over the frame.
+
+    Raises
+    ------
+    FrameSizeError
+        No window fits into such a frame.
+    ImageError
+        More than `MAX_WINDOWS` windows fit.
     """
 
-    def __init__(self, search: FrameSearch, settings: SvmSettings, size: tuple[int, int]) -> None:
-        self._search, self._settings, self._size = search, settings, size
-        self._heat = settings.heat
-        self._recent: deque[Windows] = deque(maxlen=self._heat.frames)
+    def __init__(
+        self,
+        model: LinearModel,
+        settings: SvmSettings,
+        width: int,
+        height: int,
+        *,
+        horizon: float = DEFAULT_HORIZON,
+        engine: Callable[[LinearModel, WindowGrid], Any] = DenseSearch,
+    ) -> None:
+        self._settings, self._features, self._size = settings, model.features, (width, height)
+        self._recent: deque[Windows] = deque(maxlen=settings.heat.frames)
+        self.grids = tuple(lay_grids(settings, model.features, width, height, horizon=horizon))
+        if not self.grids:
+            raise FrameSizeError(f"no search window fits into {width}×{height} pixels")
+        if (count := sum(map(len, self.grids))) > MAX_WINDOWS:
+            many = f"{count:,} windows in {width}×{height} pixels are too many"
+            raise ImageError(f"{many}; use larger steps")
+        self._searches = [engine(model, grid) for grid in self.grids]
+        self._boxes = np.concatenate([grid.boxes for grid in self.grids])
+        shares = np.array([grid.share for grid in self.grids], np.float32)
+        self._shares = np.repeat(shares, list(map(len, self.grids)))
+        left, top = self._boxes[:, :2].min(axis=0).tolist()
+        right, bottom = (self._boxes[:, :2] + self._boxes[:, 2:]).max(axis=0).tolist()
+        margin = -(-max(-left, right - width, 0) // _ALIGNMENT) * _ALIGNMENT
+        self._searched = top // _ALIGNMENT * _ALIGNMENT, bottom, margin
 
     def search(self, picture: Picture, index: int | None) -> Candidates:
-        """Search the windows of a frame; several threads may call this at once."""
-        return self._search.search(picture), index is None
+        """Search the windows of a frame, in the order of `grids`; threads may call this at once."""
+        frame = FramePyramid(picture, self._features, *self._searched)
+        probability = self._settings.search.probability
+        results = (search.search(frame, probability) for search in self._searches)
+        probabilities, sides = map(np.concatenate, zip(*results, strict=True))
+        vehicles = vehicle_boxes(self._boxes.astype(np.float32), sides)
+        return Windows(self._boxes, probabilities, self._shares, vehicles), index is None
 
     def detect(self, candidates: Candidates) -> Boxes:
         """Add the hits of the next frame to the heat, and return what is hot.
@@ -106,8 +159,8 @@ class SvmDetector:
         """
         windows, is_still = candidates
         hits = windows.hits(self._settings.search.probability)
-        self._recent.extend([hits] * (self._heat.frames if is_still else 1))
-        heat = sum_heat(self._recent, self._size, self._heat)
+        self._recent.extend([hits] * (self._settings.heat.frames if is_still else 1))
+        heat = sum_heat(self._recent, self._size, self._settings.heat)
         regions = self._regions(heat)
         found = Boxes(
             np.reshape([astuple(region.box) for region in regions], (-1, 4)),
@@ -116,7 +169,7 @@ class SvmDetector:
                 "centroid": np.reshape([region.centroid for region in regions], (-1, 2)),
                 "strength": [region.strength for region in regions],
             },
-            trace=Trace(hits, heat, self._search.grids),
+            trace=Trace(hits, heat, self.grids),
         )
         return self._shown_in_still(found) if is_still else found
 
@@ -137,10 +190,9 @@ class SvmDetector:
         return {"windows": windows, "hits": hits, "heat": heat}
 
     def _regions(self, heat: Heat) -> list[HotRegion]:
-        regions = find_regions(heat, self._heat.threshold)
-        if self._heat.votes is not None:
-            votes = Votes.of(self._recent, self._size)
-            regions = split_regions(regions, votes, self._heat.votes)
+        regions = find_regions(heat, self._settings.heat.threshold)
+        if (minimum := self._settings.heat.votes) is not None:
+            regions = split_regions(regions, Votes.of(self._recent, self._size), minimum)
         inside = (replace(region, box=region.box.clipped(*self._size)) for region in regions)
         return [region for region in inside if region.box.area]
 
