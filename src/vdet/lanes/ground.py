@@ -68,7 +68,7 @@ class Ground:
 
     def pixels(self, metres: Float64Array) -> Float64Array:
         """Return where in the frame places `(n, 2)` are; NaN for those behind the camera."""
-        back = np.linalg.inv(self.to_metres)
+        back = np.asarray(np.linalg.inv(self.to_metres), np.float64)
         return self.undistorter.distorted(_mapped(back, metres)) + 0.5
 
 
@@ -111,7 +111,8 @@ def fit_ground(pixels: Float64Array, metres: Float64Array, undistorter: Undistor
         raise ConfigError("camera.ground: the horizon is between the points; two may be swapped")
     to_metres = np.asarray(inverse * np.sign(depths[0]), np.float64)
     off = np.hypot(*(_mapped(to_metres, straight) - metres).T)
-    pixel_off = np.hypot(*(_mapped(np.linalg.inv(to_metres), metres) - straight).T)
+    back = np.asarray(np.linalg.inv(to_metres), np.float64)
+    pixel_off = np.hypot(*(_mapped(back, metres) - straight).T)
     area = cv2.convexHull(metres.astype(np.float32))[:, 0].astype(np.float64)
     error, pixel_error = (float(np.sqrt(np.mean(item**2))) for item in (off, pixel_off))
     if error > _MAX_ERROR * _length(area):
