@@ -274,14 +274,9 @@ def test_follow_takes_objects_and_names(red_clip: Path, detector: Any, tracker: 
 def test_detect_video_takes_what_the_command_takes(red_clip: Path, tmp_path: Path) -> None:
     seen: list[tuple[int, int | None]] = []
     changes = ["lanes.enabled=true", "input.begin='2026-05-01 07:00+02:00'"]
-    run = vdet.Run(
-        red_clip,
-        settings=vdet.load_settings(assignments=changes),
-        start=Fraction("0.08"),
-        end=Fraction("0.4"),
-        frames=6,
-        at=Fraction("0.2"),
-    )
+    settings = vdet.load_settings(assignments=changes)
+    begin, end, at = Fraction("0.08"), Fraction("0.4"), Fraction("0.2")
+    run = vdet.Run(red_clip, settings=settings, start=begin, end=end, frames=6, at=at)
     totals = vdet.detect_video(
         run,
         tracks=[tmp_path / "a.csv", tmp_path / "a.jsonl"],
@@ -321,19 +316,13 @@ def test_follow_and_files_have_the_same_counts_vehicles_and_findings(
         "  - {name: gate, start: [100, 0], end: [100, 240]}\n"
     )
     settings = vdet.load_settings([lines], ["detector.stride=1", "lanes.enabled=true"])
-    results = vdet.follow(red_clip, detector=red_boxes, tracker=Latest(), settings=settings)
+    given: dict[str, Any] = {"detector": red_boxes, "tracker": Latest(), "settings": settings}
+    results = vdet.follow(red_clip, **given)
     assert (results.counts, results.vehicles, results.findings) == (None, (), ())
     frames = list(results)
     tracks = tmp_path / "t.jsonl"
     outputs = {name: tmp_path / f"{name}.json" for name in ("counts", "vehicles", "conditions")}
-    vdet.detect_video(
-        red_clip,
-        tracks=tracks,
-        outputs=outputs,
-        detector=red_boxes,
-        tracker=Latest(),
-        settings=settings,
-    )
+    vdet.detect_video(red_clip, tracks=tracks, outputs=outputs, **given)
     from_file = vdet.count(tracks, settings)
     assert sum(total.count for total in from_file.totals) == 1
     assert from_file == results.counts == vdet.count(frames, settings)
@@ -343,8 +332,7 @@ def test_follow_and_files_have_the_same_counts_vehicles_and_findings(
     assert records_content(results.vehicles, outputs["vehicles"]) == in_files["vehicles"]
     assert results.findings
     assert [finding.record() for finding in results.findings] == in_files["conditions"]
-    known = vdet.vehicles(red_clip, detector=red_boxes, tracker=Latest(), settings=settings)
-    assert known == results.vehicles
+    assert vdet.vehicles(red_clip, **given) == results.vehicles
 
 
 def test_tracks_are_compared_with_the_truth(red_clip: Path, tmp_path: Path) -> None:

@@ -15,12 +15,8 @@ BOTH = Settings(
 """Settings with every frame length: window sets over fixed rows, and the rules."""
 LENGTHS = {
     *(f"detector.search.windows.0.{key}" for key in ("size", "top", "bottom")),
-    "tracker.min_region",
-    "tracker.near",
-    "tracker.wide",
-    "tracker.max_combined",
-    "tracker.merge_overlap",
-    "tracker.match_distance",
+    *(f"tracker.{key}" for key in ("min_region", "near", "wide", "max_combined")),
+    *("tracker.merge_overlap", "tracker.match_distance"),
 }
 
 

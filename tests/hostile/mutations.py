@@ -119,13 +119,5 @@ def _move(data: bytearray, rng: random.Random) -> None:
 
 
 _FAULTS: tuple[_Fault, ...] = (
-    _flip_bits,
-    _flip_bits,
-    _set_field,
-    _set_field,
-    _zero,
-    _cut_out,
-    _cut_off,
-    _double,
-    _move,
-)
+    _flip_bits, _flip_bits, _set_field, _set_field, _zero, _cut_out, _cut_off, _double, _move,
+)  # fmt: skip

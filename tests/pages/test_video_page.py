@@ -46,16 +46,10 @@ def page(
     *, source: Path = Path("clips/a.mp4"), player: Player | None = VIDEO, end: float = 2.08
 ) -> VideoPage:
     return VideoPage(
-        video=replace(video_info(WIDTH, HEIGHT), path=source),
-        frames=52,
-        start=0.0,
-        end=end,
-        records=TWO,
-        thumbnails={1: (1.25, jpeg_uri(STILL))},
-        poster=STILL,
-        player=player,
+        video=replace(video_info(WIDTH, HEIGHT), path=source), frames=52, start=0.0, end=end,
+        records=TWO, thumbnails={1: (1.25, jpeg_uri(STILL))}, poster=STILL, player=player,
         settings="output:\n  crf: 25\n",
-    )
+    )  # fmt: skip
 
 
 def counted(*events: tuple[Any, ...]) -> Counts:
