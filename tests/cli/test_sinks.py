@@ -11,7 +11,8 @@ from vdet.media.images import read_image
 from writing import write_image
 
 FRAMES = 15
-KNOWN = "known: video, tracks, stages, picture, json, labels, vehicles, crops, clips, page, counts"
+NAMES = "video picture tracks json labels vehicles counts flows conditions stages crops clips page"
+KNOWN = f"known: {', '.join(NAMES.split())}"
 
 
 @pytest.fixture
