@@ -1,11 +1,9 @@
 """Labelled videos under several settings: what is shared, and which frames are read."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal, Protocol
 
-import numpy as np
 import pytest
 
 from quick import QUICK
@@ -14,12 +12,9 @@ from vdet.config.schema import DetectorSettings, MotionTrackerSettings, Settings
 from vdet.detect.factory import load_detector
 from vdet.detect.svm.detector import Candidates, SvmDetector
 from vdet.errors import TruthError
-from vdet.evaluate.video import Variant, evaluate_clip, follow_together, open_clip
-from vdet.media import Frame, Picture, VideoInfo
-from vdet.media.reader import VideoReader
+from vdet.evaluate.video import ClipResult, Variant, evaluate_clip, open_clip
+from vdet.media import Picture
 from vdet.progress import no_progress
-from vdet.run.loop import build, peek
-from vdet.run.result import FrameResult
 from vdet.synthetic.scene import Scene
 from vdet.synthetic.truth import write_truth
 
@@ -58,7 +53,7 @@ def truth_path(scene: Scene, tmp_path: Path) -> Path:
 
 
 def test_settings_side_by_side_give_what_each_gives_alone(
-    clip_path: Path, variant: OfModel
+    clip_path: Path, truth_path: Path, variant: OfModel
 ) -> None:
     motion = settings().model_copy(update={"tracker": MotionTrackerSettings()})
     variants = [
@@ -72,27 +67,25 @@ def test_settings_side_by_side_give_what_each_gives_alone(
         variant("detector.heat.votes=0.02"),
         replace(variant(), settings=motion),
     ]
-    with VideoReader(clip_path, frames=FRAMES) as reader:
-        frames, info = list(reader), reader.info
-    together = list(follow_together(variants, frames, info))
-    for results, frame in zip(together, frames, strict=True):
-        assert all(result.frame is frame for result in results)
-        assert all(result.source == info.path for result in results)
-    alone = [follow_alone(frames, variant, info) for variant in variants]
-    for item, others in zip(zip(*together, strict=True), alone, strict=True):
-        assert [result.tracks for result in item] == [result.tracks for result in others]
-        for one, other in zip(item, others, strict=True):
-            np.testing.assert_array_equal(one.detections.sides, other.detections.sides)
-            np.testing.assert_array_equal(one.detections.scores, other.detections.scores)
-    found = {str([result.tracks for result in item]) for item in alone}
-    assert len(found) > 1, "the settings should differ in what they find"
+    clip = open_clip(clip_path, truth_path)
+    together = [boxes_of(result) for result in evaluate_clip(clip, variants)]
+    alone = [boxes_of(result) for one in variants for result in evaluate_clip(clip, [one])]
+    assert together == alone
+    assert len(set(alone)) > 1, "the settings should differ in what they find"
 
 
-def follow_alone(frames: Sequence[Frame], variant: Variant, info: VideoInfo) -> list[FrameResult]:
-    """Follow the vehicles under one of the settings, as a run of the pipeline does."""
-    images, frames_again = peek(frames)
-    pipeline = build(variant.model, variant.settings, info, images)
-    return list(pipeline.follow(frames_again, info.path))
+def boxes_of(result: ClipResult) -> str:
+    """Return the boxes that were found in each frame, with their ids and scores."""
+    frames = result.comparison.frames
+    return repr(
+        [
+            (
+                frame.number,
+                *(item.tolist() for item in (frame.tracks, frame.track_boxes, frame.scores)),
+            )
+            for frame in frames
+        ]
+    )
 
 
 @pytest.fixture
@@ -111,7 +104,7 @@ def searched(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 
 def test_settings_that_search_alike_share_the_search(
-    clip_path: Path, variant: OfModel, searched: list[int]
+    clip_path: Path, truth_path: Path, variant: OfModel, searched: list[int]
 ) -> None:
     motion = replace(variant(), settings=settings().model_copy(update={"tracker": AHEAD}))
     variants = [
@@ -121,9 +114,7 @@ def test_settings_that_search_alike_share_the_search(
         motion,
         variant("detector.search.probability=0.9"),
     ]
-    with VideoReader(clip_path, frames=FRAMES) as reader:
-        results = list(follow_together(variants, reader, reader.info))
-    assert [len(result) for result in results] == [5] * FRAMES
+    assert len(evaluate_clip(open_clip(clip_path, truth_path), variants)) == 5
     twice = [index for index in range(FRAMES) for _ in range(2)]
     assert sorted(searched) == twice, "two searches a frame for five settings"
 
@@ -135,12 +126,13 @@ class ListingSettings(DetectorSettings):
     weights: dict[str, list[float]]
 
 
-def test_settings_of_a_plug_in_may_hold_lists(clip_path: Path, variant: OfModel) -> None:
+def test_settings_of_a_plug_in_may_hold_lists(
+    clip_path: Path, truth_path: Path, variant: OfModel
+) -> None:
     detector = ListingSettings(weights={"car": [1.0]})
     listing = replace(variant(), settings=settings().model_copy(update={"detector": detector}))
-    with VideoReader(clip_path, frames=3) as reader:
-        results = list(follow_together([listing, listing], reader, reader.info))
-    assert [len(result) for result in results] == [2, 2, 2]
+    results = evaluate_clip(open_clip(clip_path, truth_path), [listing, listing])
+    assert [result.until for result in results] == [FRAMES, FRAMES]
 
 
 def test_only_the_frames_that_the_truth_covers_are_read(

@@ -33,9 +33,9 @@ class RunName:
         return {"program": f"vdet {__version__}", **asdict(self), "model": model}
 
 
-def figure(value: float | None) -> str:
-    """Write a count or a ratio; a dash for None."""
-    return str(value) if isinstance(value, int) else share(value)
+def figure(value: float | str | None) -> str:
+    """Write a text, a count or a ratio; a dash for None."""
+    return str(value) if isinstance(value, int | str) else share(value)
 
 
 def table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:

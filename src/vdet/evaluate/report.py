@@ -81,14 +81,10 @@ def mistakes(comparison: Comparison) -> tuple[Mistake, ...]:
     """
     seen: dict[tuple[str, int], list[_Seen]] = defaultdict(list)
     for frame in comparison.frames:
-        vehicles, tracks = (
-            comparison.vehicle_ids[frame.vehicles],
-            comparison.track_ids[frame.tracks],
-        )
-        for what, ids, boxes, iou, paired in (
-            ("missed vehicle", vehicles, frame.vehicle_boxes, frame.iou, frame.rows),
-            ("false alarm, track", tracks, frame.track_boxes, frame.iou.T, frame.columns),
-        ):
+        missed = comparison.vehicle_ids[frame.vehicles], frame.vehicle_boxes, frame.iou, frame.rows
+        false = comparison.track_ids[frame.tracks], frame.track_boxes, frame.iou.T, frame.columns
+        for what, sides in (("missed vehicle", missed), ("false alarm, track", false)):
+            ids, boxes, iou, paired = sides
             for row in np.setdiff1d(np.arange(len(ids)), paired).tolist():
                 overlap = float(iou[row].max(initial=0))
                 seen[what, int(ids[row])].append((frame.number, boxes[row], overlap))
@@ -175,7 +171,11 @@ _OF_VIDEO = (
     *(("missed", "misses"), ("MOTA", "mota"), ("IDF1", "idf1"), ("HOTA", "hota")),
     *(("switches", "id_switches"), ("false tracks", "false_tracks"), ("delay", "mean_delay")),
 )
-"""The headings of scores, and the attributes of `ImageScores` or `Scores` below them."""
+_OF_CLASSES = (
+    *(("vehicles", "vehicles"), ("found", "found"), ("named right", "right")),
+    *(*_OF_BOXES[:3], ("confused with", "confused")),
+)
+"""The headings of scores, and the attributes of the scores below them."""
 
 _MOST_MISTAKES = 10  # listed for a video
 
@@ -296,20 +296,7 @@ def _score_table(
 
 def _class_table(classes: Iterable[ClassResult]) -> Table:
     """Return a row for each class."""
-    headings = "class", "vehicles", "found", "named right", "precision", "recall", "F1"
-    rows = []
-    for class_ in classes:
-        counts = (
-            class_.vehicles,
-            class_.found,
-            class_.right,
-            class_.precision,
-            class_.recall,
-            class_.f1,
-        )
-        wrong = (f"{name} {count}" for name, count in class_.named.items() if name != class_.name)
-        rows.append([class_.name, *map(figure, counts), ", ".join(wrong)])
-    return (*headings, "confused with"), rows
+    return _score_table("class", _OF_CLASSES, [(class_.name, class_) for class_ in classes])
 
 
 def _mistake_table(clip: ClipResult) -> Table:

@@ -9,18 +9,8 @@ import numpy as np
 
 from vdet.boxes import BoolArray, Float64Array
 from vdet.detect.classes import OUR_NAMES
-from vdet.evaluate.comparison import (
-    UNKNOWN,
-    ComparedFrame,
-    Comparison,
-    compare,
-    counts,
-    fragmentations,
-    hota,
-    id_switches,
-    identity_matches,
-)
-from vdet.evaluate.comparison import delays as vehicle_delays
+from vdet.evaluate import comparison as metrics
+from vdet.evaluate.comparison import UNKNOWN, ComparedFrame, Comparison, compare, counts
 from vdet.labels.label import LabelledVideo
 
 IOU_THRESHOLDS = np.linspace(0.5, 0.95, 10)
@@ -131,24 +121,18 @@ def score_comparison(comparison: Comparison) -> Scores:
     boxes, vehicles = int(lengths.sum()), len(lengths)
     found = counts((frame.found for frame in comparison.frames), vehicles) / lengths
     tracked, lost = int(np.sum(found > _MOSTLY_TRACKED)), int(np.sum(found < _MOSTLY_LOST))
-    delays = vehicle_delays(comparison)
+    delays = metrics.delays(comparison)
     known = [delay for delay in delays if delay is not None]
-    switches, agreeing = id_switches(comparison), identity_matches(comparison)
-    return Scores(
-        *detection,
-        *rank_predictions(comparison).average_precisions(),
-        ratio(matches - alarms - switches, boxes),
-        overlap,
-        switches,
-        fragmentations(comparison),
-        *(tracked, vehicles - tracked - lost, lost),
-        *(ratio(2 * agreeing, boxes + shown), ratio(agreeing, shown), ratio(agreeing, boxes)),
-        *hota(comparison),
-        *(vehicles, boxes, len(comparison.track_ids), shown),
-        delays,
-        fmean(known) if known else None,
-        len(comparison.false_tracks()),
-    )
+    switches, agreeing = metrics.id_switches(comparison), metrics.identity_matches(comparison)
+    precisions = rank_predictions(comparison).average_precisions()
+    mota, gaps = ratio(matches - alarms - switches, boxes), metrics.fragmentations(comparison)
+    covered = tracked, vehicles - tracked - lost, lost
+    identity = ratio(2 * agreeing, boxes + shown), ratio(agreeing, shown), ratio(agreeing, boxes)
+    sizes = vehicles, boxes, len(comparison.track_ids), shown
+    waits = delays, fmean(known) if known else None
+    matched = *detection, *precisions, mota, overlap, switches, gaps, *covered, *identity
+    false = len(comparison.false_tracks())
+    return Scores(*matched, *metrics.hota(comparison), *sizes, *waits, false)
 
 
 def ratio(part: float, whole: float) -> float:
@@ -254,6 +238,11 @@ class ClassResult:
     recall: float
     f1: float
     named: dict[str, int]
+
+    @property
+    def confused(self) -> str:
+        """The other classes by which vehicles are named, with their numbers."""
+        return ", ".join(f"{name} {n}" for name, n in self.named.items() if name != self.name)
 
 
 def class_results(comparison: Comparison) -> tuple[ClassResult, ...]:

@@ -1,12 +1,11 @@
 """Scores of labelled videos, whose vehicles are found under one or several settings.
 
-The search takes nearly all the time, so settings that search alike share it: every frame is
-searched once for them, and only what follows the search runs for each.
+The search takes nearly all the time, so settings that search alike share it: what is found in each
+frame is kept for the next ones, and only what follows the search runs for each.
 """
 
-import itertools
-import threading
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -16,14 +15,14 @@ import numpy as np
 
 from vdet.boxes import Box, Boxes
 from vdet.config.schema import Settings
-from vdet.detect.protocol import DetectorModel
+from vdet.detect.protocol import DetectorModel, VideoDetector
 from vdet.errors import VideoError
 from vdet.evaluate.comparison import Comparison, compare, pool
 from vdet.evaluate.scores import Scores, score_comparison
 from vdet.labels.label import Label, LabelledVideo
 from vdet.labels.reading import read_predictions, read_truth
 from vdet.labels.roles import Roles
-from vdet.media import Frame, Picture, VideoInfo
+from vdet.media import Picture
 from vdet.media.reader import VideoReader
 from vdet.progress import Progress, no_progress
 from vdet.regions import Regions, lay_regions
@@ -131,7 +130,7 @@ def score_files(
 def evaluate_clips(
     clips: Sequence[Clip], variants: Sequence[Variant], progress: Progress = no_progress
 ) -> list[RunResult]:
-    """Find the vehicles in every clip, in one pass for all settings, and score each.
+    """Find the vehicles in every clip under each of the settings, and score them.
 
     Arguments and errors as of `evaluate_clip`, which is called for each clip.
     """
@@ -143,15 +142,15 @@ def evaluate_clips(
 def evaluate_clip(
     clip: Clip, variants: Sequence[Variant], progress: Progress = no_progress
 ) -> list[ClipResult]:
-    """Find the vehicles of a clip under each of the settings, in one pass, and score them.
+    """Find the vehicles of a clip under each of the settings, and score them.
 
     Vehicles of the truth that stand outside the regions are ignored.
 
     Parameters
     ----------
     progress
-        Called with the expected number of frames (None: unknown); what it returns is called with
-        the number of frames done since the last call.
+        Called for each of the settings with the expected number of frames (None: unknown); what it
+        returns is called with the number of frames done since the last call.
 
     Raises
     ------
@@ -160,24 +159,51 @@ def evaluate_clip(
     TruthError
         The truth covers frames beyond the end of the video.
     """
-    rows: list[list[Label]] = [[] for _ in variants]
-    source, last, frames = variants[0].settings.input, clip.truth.last_frame, 0
-    with VideoReader(clip.video, frames=last or None, settings=source) as reader:
-        advance, info = progress(reader.expected), reader.info
-        with named_errors(clip.video, VideoError):
-            for results in follow_together(variants, reader, info):
-                for labels, result in zip(rows, results, strict=True):
-                    labels.extend(_labels(result))
-                frames += 1
-                advance(1)
-    clip.truth.check_end(clip.truth_path, frames)
-    truth = clip.truth.until(frames)
-    scored = []
-    for variant, labels in zip(variants, rows, strict=True):
-        regions = lay_regions(variant.settings.regions, info.width, info.height)
-        comparison = compare(LabelledVideo.of(labels), _in_regions(truth, regions))
-        scored.append(ClipResult(str(clip.video), comparison, frames, video=clip.video))
-    return scored
+    candidates = defaultdict[str, dict[int | None, Any]](dict)
+    results = []
+    for variant in variants:
+        settings = variant.settings
+        source, last = settings.input, clip.truth.last_frame or None
+        labels, frames = list[Label](), 0
+        with VideoReader(clip.video, frames=last, settings=source) as reader:
+            advance, info = progress(reader.expected), reader.info
+            with named_errors(clip.video, VideoError):
+                images, read = peek(reader)
+                own = build(variant.model, settings, info, images)
+                del images  # else they stay in memory for the whole run
+                detector = _Sharing(own.detector, candidates[_search_key(settings)])
+                for result in replace(own, detector=detector).follow(read, clip.video):
+                    labels += _labels(result)
+                    frames += 1
+                    advance(1)
+        clip.truth.check_end(clip.truth_path, frames)
+        regions = lay_regions(settings.regions, info.width, info.height)
+        truth = _in_regions(clip.truth.until(frames), regions)
+        comparison = compare(LabelledVideo.of(labels), truth)
+        results.append(ClipResult(str(clip.video), comparison, frames, video=clip.video))
+    return results
+
+
+def _search_key(settings: Settings) -> str:
+    """Return what the candidates of a frame depend on."""
+    detector = settings.detector
+    return repr((detector.search_key, detector.model, detector.stride, settings.regions))
+
+
+@dataclass(frozen=True, slots=True)
+class _Sharing:
+    """A detector that searches only frames of which `candidates` are not known yet."""
+
+    own: VideoDetector
+    candidates: dict[int | None, Any]
+
+    def search(self, picture: Picture, index: int | None) -> Any:
+        if index not in self.candidates:
+            self.candidates[index] = self.own.search(picture, index)
+        return self.candidates[index]
+
+    def detect(self, candidates: Any) -> Boxes:
+        return self.own.detect(candidates)
 
 
 def _labels(result: FrameResult) -> Iterator[Label]:
@@ -192,60 +218,3 @@ def _in_regions(truth: LabelledVideo, regions: Regions | None) -> LabelledVideo:
         return truth
     outside = [not regions.contains(Box(*sides).foot) for sides in truth.boxes.tolist()]
     return replace(truth, ignored=truth.ignored | np.array(outside, np.bool_))
-
-
-def follow_together(
-    variants: Sequence[Variant], frames: Iterable[Frame], video: VideoInfo
-) -> Iterator[tuple[FrameResult, ...]]:
-    """Yield for each frame the results under all settings.
-
-    Errors as of `vdet.run.loop.build`.
-    """
-    images, read = peek(frames)
-    pipelines = [build(variant.model, variant.settings, video, images) for variant in variants]
-    del images  # else they stay in memory for the whole run
-    keys = [  # what a search depends on
-        (variant.settings.detector.search_key, variant.settings.regions, own.rate)
-        for variant, own in zip(variants, pipelines, strict=True)
-    ]
-    searches = [
-        _shared(own.detector.search, keys.count(key))
-        for own, key in zip(pipelines, keys, strict=True)
-    ]
-    runs = []
-    for own, key, copy in zip(pipelines, keys, itertools.tee(read, len(keys)), strict=True):
-        search = searches[keys.index(key)]  # that of the first variant that searches alike
-        detector = _Sharing(search, own.detector.detect)
-        runs.append(replace(own, detector=detector).follow(copy, video.path))
-    yield from zip(*runs, strict=True)
-
-
-_Search = Callable[[Picture, int | None], Any]
-
-
-@dataclass(frozen=True, slots=True)
-class _Sharing:
-    """A detector that shares its search with others."""
-
-    search: _Search
-    detect: Callable[[Any], Boxes]
-
-
-def _shared(search: _Search, users: int) -> _Search:
-    """Return a search that runs once for each frame, also if several threads ask for it.
-
-    What it finds is kept until all users have asked for it.
-    """
-    lock = threading.Lock()
-    found: dict[int | None, list[Any]] = {}  # candidates, once for each user who will still ask
-
-    def locked(picture: Picture, index: int | None) -> Any:
-        with lock:
-            if index not in found:
-                found[index] = [search(picture, index)] * users
-            candidates = found[index].pop()
-            if not found[index]:
-                del found[index]
-            return candidates
-
-    return locked
