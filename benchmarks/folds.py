@@ -202,8 +202,7 @@ def _tracks(searched: SearchedVideo, model: LinearModel, settings: Settings) -> 
         for result in Pipeline(found, tracker, rate=searched.searches).follow(frames)
         for track in result.tracks
     ]
-    rate = float(searched.rate)
-    return LabelledVideo.of(rows, frame_count=searched.frames, rate=rate)
+    return LabelledVideo.of(rows)
 
 
 def _f1_by_block(found: LabelledVideo, truth: LabelledVideo) -> list[float]:

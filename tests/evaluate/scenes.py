@@ -11,6 +11,6 @@ def drive(id_: int, frames: range, x: float = 0, width: float = 100) -> list[Lab
     return [row(0, frame, id_, x, 0, width, 100) for frame in frames]
 
 
-def video(*tracks: list[Label], rate: float | None = None) -> LabelledVideo:
+def video(*tracks: list[Label]) -> LabelledVideo:
     """Return the rows of all tracks as a video."""
-    return checked_video([row for track in tracks for row in track], rate=rate)
+    return checked_video([row for track in tracks for row in track])

@@ -31,16 +31,9 @@ def row(
     return Label(place, box, frame=number, id=id_, score=score, **known)
 
 
-def checked_video(
-    rows: Iterable[Label],
-    path: Path = Path("scene"),
-    *,
-    frame_count: int | None = None,
-    rate: float | None = None,
-) -> LabelledVideo:
+def checked_video(rows: Iterable[Label], path: Path = Path("scene")) -> LabelledVideo:
     """Return checked labels as a video."""
-    checked = checked_labels(path, rows)
-    return LabelledVideo.of(checked, frame_count=frame_count, rate=rate)
+    return LabelledVideo.of(checked_labels(path, rows))
 
 
 def frame(index: int, *tracks: Track) -> FrameTracks:

@@ -7,20 +7,15 @@ import pytest
 
 from labels.saving import checked_video, row
 from vdet.errors import TruthError
-from vdet.labels.label import NO_ID, Label, LabelledVideo, SavedTracks
+from vdet.labels.label import NO_ID, Label, SavedTracks
 from vdet.labels.parsing import numbered_lines, parse_number
 
 
-def scene(frame_count: int | None = None) -> LabelledVideo:
-    rows = [row(0, frame, id_, 10 * id_, 0, 5, 5) for frame in (2, 3, 5) for id_ in (1, 2)]
-    return checked_video(rows, Path("scene"), frame_count=frame_count, rate=25)
-
-
 def test_until_keeps_the_frames_up_to_the_last() -> None:
-    part = scene(frame_count=9).until(3)
+    rows = [row(0, frame, id_, 10 * id_, 0, 5, 5) for frame in (2, 3, 5) for id_ in (1, 2)]
+    part = checked_video(rows).until(4)
     assert part.frames.tolist() == [2, 2, 3, 3]
-    assert part.last_frame == 3
-    assert part.rate == 25
+    assert part.last_frame == 4
 
 
 FILE = Path("gt.txt")

@@ -47,7 +47,8 @@ class _Writer:
 
     def __init__(self, *names: str) -> None:
         # Entries are kept as text, which is smaller than dictionaries.
-        self._lists: dict[str, list[str]] = {name: [] for name in (*names, "annotations")}
+        lists = *names, "annotations", "categories"
+        self._lists: dict[str, list[str]] = {name: [] for name in lists}
         self._categories: dict[str, int] = {}
 
     def add(self, name: str, /, **entry: Any) -> None:
@@ -57,27 +58,20 @@ class _Writer:
     def add_box(self, image: int, box: Box, category: int, score: float, **more: Any) -> None:
         """Add an annotation; its `score` is one that other programs ignore."""
         x, y, width, height = box.xywh
-        self.add(
-            "annotations",
-            id=len(self._lists["annotations"]) + 1,
-            image_id=image,
-            category_id=category,
-            bbox=[x, y, width, height],
-            area=width * height,
-            iscrowd=0,
-            score=round(score, 4),
-            **more,
-        )
+        whose = {"id": len(self._lists["annotations"]) + 1, "image_id": image}
+        sides = {"bbox": [x, y, width, height], "area": width * height, "iscrowd": 0}
+        more = {"category_id": category, **sides, "score": round(score, 4), **more}
+        self.add("annotations", **whose, **more)
 
     def category(self, name: str) -> int:
         """Return the id of a category, a new one where it has none."""
-        return self._categories.setdefault(name, len(self._categories) + 1)
+        if name not in self._categories:
+            self._categories[name] = len(self._categories) + 1
+            self.add("categories", id=self._categories[name], name=name)
+        return self._categories[name]
 
     def end(self, file: BinaryIO) -> None:
         """Write the document."""
-        self._lists["categories"] = []
-        for name, number in self._categories.items():
-            self.add("categories", id=number, name=name)
         parts = (f'"{name}": [\n' + ",\n".join(some) + "\n]" for name, some in self._lists.items())
         file.write(("{\n" + ",\n".join(parts) + "\n}\n").encode())
 
@@ -155,22 +149,20 @@ _LISTS: dict[str, TypeAdapter[Any]] = {
     "images": TypeAdapter(_Image),
     "categories": TypeAdapter(_Category),
     "annotations": TypeAdapter(_Annotation),
+    "info.unlabelled_classes": TypeAdapter(str),  # of our own: they may be there without a label
 }
-
-
-_UNLABELLED = "info.unlabelled_classes"  # of our own: they may be there without a label
 
 
 def _read(path: Path, file: BinaryIO) -> tuple[list[_Image], tuple[str, ...]]:
     """Return the images with their labels, and classes without labels. Raises `TruthError`."""
-    found: dict[str, list[Any]] = {name: [] for name in (*_LISTS, _UNLABELLED)}
+    found: dict[str, list[Any]] = {name: [] for name in _LISTS}
     for place, values in json_values(path, file, *(f"{name}.item" for name in found)):
         name = place.removesuffix(".item")
         entries = found[name]
         if len(entries) == MAX_LABELS:
             raise TruthError(f"{path}: has more than {MAX_LABELS:,} {name}; cut it into parts")
         try:
-            entries.append(_LISTS[name].validate_python(values) if name in _LISTS else str(values))
+            entries.append(_LISTS[name].validate_python(values))
         except ValidationError as error:
             entry = f"{name}.{len(entries)}" + (": ", ".")[bool(error.errors()[0]["loc"])]
             raise TruthError(f"{path}: is not COCO: {entry}{first_mistake(error)}") from error

@@ -52,16 +52,6 @@ class PictureTracks:
     tracks: Sequence[Track]
 
 
-Lines = Callable[[FrameTracks], Iterable[str]]
-"""Returns the lines of a frame, each with its end."""
-
-WriteWhole = Callable[[BinaryIO, SourceVideo, Sequence[FrameTracks]], None]
-"""Writes all frames of a video into a binary file."""
-
-WritePictures = Callable[[BinaryIO, Sequence[PictureTracks]], None]
-"""Writes the labels of pictures into a binary file."""
-
-
 @dataclass(frozen=True, slots=True)
 class Format:
     """A format of tracks.
@@ -77,21 +67,22 @@ class Format:
         `TruthError` with the place of the first mistake; the labels that it returns are not
         checked otherwise.
     lines, heading
-        For a format with lines for each frame: the function that returns them, and the first line
-        of the file.
+        For a format with lines for each frame: the function that returns them, each with its end,
+        and the first line of the file.
     whole
-        For a format that is written at the end: the function that writes it.
+        For a format that is written at the end: the function that writes all frames of a video.
     pictures
-        For a format that labels of still pictures have too: the function that writes them.
+        For a format that labels of still pictures have too: the function that writes them. Their
+        paths are their names in the file.
     """
 
     name: str
     suffix: str
     read: Callable[[Path, bytes], SavedTracks]
-    lines: Lines | None = None
+    lines: Callable[[FrameTracks], Iterable[str]] | None = None
     heading: str = ""
-    whole: WriteWhole | None = None
-    pictures: WritePictures | None = None
+    whole: Callable[[BinaryIO, SourceVideo, Sequence[FrameTracks]], None] | None = None
+    pictures: Callable[[BinaryIO, Sequence[PictureTracks]], None] | None = None
 
 
 class TrackWriter:

@@ -162,13 +162,6 @@ class SavedTracks:
     begin: datetime | None = None
 
     @property
-    def rate(self) -> float | None:
-        """Frames per second from the first time to the last; None if that is not known."""
-        first, last = min(self.times, default=0), max(self.times, default=0)
-        seconds = self.times[last] - self.times[first] if self.times else 0.0
-        return (last - first) / seconds if seconds > 0 else None
-
-    @property
     def has_times(self) -> bool:
         """Whether every frame has a time; if not, pass a rate to `at_rate`."""
         return all(index in self.times for index in self._indices())
@@ -235,8 +228,6 @@ class LabelledVideo:
         predictions: the row counts only if it finds a vehicle.
     frame_count
         Number of frames of the video, None if it is not known.
-    rate
-        Frames per second, None if they are not known.
     known
         int64: numbers of the frames that the labels are about, ascending; of the others nothing is
         known. None: all frames.
@@ -250,18 +241,11 @@ class LabelledVideo:
     scores: Float64Array
     ignored: BoolArray
     frame_count: int | None = None
-    rate: float | None = None
     known: Int64Array | None = None
     classes: Mapping[int, str] = field(default_factory=dict)
 
     @staticmethod
-    def of(
-        labels: Iterable[Label],
-        *,
-        frame_count: int | None = None,
-        rate: float | None = None,
-        known: Sequence[int] | None = None,
-    ) -> "LabelledVideo":
+    def of(labels: Iterable[Label], known: Sequence[int] | None = None) -> "LabelledVideo":
         """Order labels by frame, without checks; those of one frame keep their order.
 
         `known` are the frames that they are about, from 0.
@@ -273,8 +257,6 @@ class LabelledVideo:
             boxes=np.array([label.box for label in ordered], np.float64).reshape(-1, 4),
             scores=np.array([label.score for label in ordered], np.float64),
             ignored=np.array([label.ignored for label in ordered], np.bool_),
-            frame_count=frame_count,
-            rate=rate,
             known=None if known is None else np.array(known, np.int64) + 1,
             classes={
                 label.id: our_name(label.name) or label.name

@@ -54,23 +54,20 @@ def read_tracks(path: Path, rate: float | None = None) -> SavedTracks:
 def read_predictions(path: Path) -> LabelledVideo:
     """Read the tracks of a video as predictions, from any format.
 
-    Tracks without a score have score 1. Two different times give the frame rate, and the last frame
-    that is listed gives the number of frames. An empty `.txt` means that nothing was found.
+    Tracks without a score have score 1. An empty `.txt` means that nothing was found.
 
     Raises
     ------
     TruthError
         As `read_tracks`.
     """
-    saved = read_tracks(path)
-    count = saved.known[-1] + 1 if saved.known else None
-    return LabelledVideo.of(saved.labels, frame_count=count, rate=saved.rate)
+    return LabelledVideo.of(read_tracks(path).labels)
 
 
 def read_truth(path: Path, roles: Roles = DEFAULT_ROLES) -> LabelledVideo:
     """Read the truth of a video from any format of tracks, as `read_true_labels` does."""
     saved = read_true_labels(path, roles)
-    return LabelledVideo.of(saved.labels, known=saved.known)
+    return LabelledVideo.of(saved.labels, saved.known)
 
 
 def read_true_labels(path: Path, roles: Roles) -> SavedTracks:

@@ -160,5 +160,5 @@ def track_scores(
             box = track.box
             corners = box.x1, box.y1, box.x2, box.y2
             shown.append(Label(0, corners, frame=number, id=track.id, score=track.score))
-    videos = [LabelledVideo.of(rows, frame_count=len(clip), rate=rate) for rows in (shown, true)]
+    videos = [LabelledVideo.of(rows) for rows in (shown, true)]
     return score(*videos)
