@@ -52,9 +52,9 @@ def test_a_region_has_a_polygon_or_a_mask(shape: dict[str, Any]) -> None:
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"start": [1, 0.5]}, "start and end must differ"),
         ({"left": "up", "right": "up"}, "left and right must have different names"),
         ({"end": [1, 1.01]}, "a point is outside the frame"),
+        ({"start": [1, 0.5]}, "line: is shorter than 1 % of the frame"),
         ({"end": [0.009, 0.509]}, "line: is shorter than 1 % of the frame"),
         ({"name": ""}, "at least 1 character"),
     ],

@@ -149,7 +149,7 @@ class TestZone:
 
     @pytest.mark.parametrize("zone", ["Europe/Atlantis", "../etc/passwd", "", "Europe"])
     def test_an_unknown_one_is_refused(self, zone: str) -> None:
-        with pytest.raises(ValidationError, match="unknown time zone"):
+        with pytest.raises(ValidationError, match="invalid timezone"):
             ClockSettings(zone=zone)
 
 

@@ -111,7 +111,7 @@ class ClockSettings(Section):
     """Pattern of the time in file names, such as %Y%m%d_%H%M%S. null: a time in the name, else the
     creation time in the video.
     """
-    zone: str | None = Field(None, max_length=100)
+    zone: ZoneInfo | None = None
     """Time zone of file names and tables, such as Europe/Berlin. null: that of this computer."""
 
     @field_validator("pattern")
@@ -122,19 +122,6 @@ class ClockSettings(Section):
             if "%" in rest or pattern == rest:
                 raise ValueError(f"a pattern can only contain {', '.join(_CODES)} and other text")
         return pattern
-
-    @field_validator("zone")
-    @classmethod
-    def _is_known(cls, zone: str | None) -> str | None:
-        try:
-            return None if zone is None else ZoneInfo(zone).key
-        except (KeyError, ValueError, OSError):
-            raise ValueError(f"unknown time zone {zone!r}; use one such as Europe/Berlin") from None
-
-    @property
-    def time_zone(self) -> ZoneInfo | None:
-        """The time zone; None for that of this computer."""
-        return ZoneInfo(self.zone) if self.zone else None
 
     def time_in(self, name: str) -> datetime | None:
         """Return the time in the name of a file; None without one. It is in UTC after a ``Z``."""

@@ -2,7 +2,6 @@
 
 import re
 import reprlib
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -51,41 +50,52 @@ class _Loader(yaml.SafeLoader):
     """Safe YAML with text as keys, each once, and without aliases and tags.
 
     A few aliases can expand to billions of values, a tag can ask for any kind of value; settings
-    need neither.
+    need neither. `key_marks` are the places of all keys, each where its name stands.
     """
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self.key_marks: dict[Key, yaml.Mark] = {}
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
         event = self.peek_event()  # type: ignore[no-untyped-call]
         if self.check_event(yaml.AliasEvent):
-            refused = "aliases (*name)"
-        elif getattr(event, "tag", None):
-            refused = "tags (!name)"
-        else:
-            return super().compose_node(parent, index)
-        raise ConstructorError(None, None, f"{refused} are not accepted", event.start_mark)
+            raise _refused("aliases (*name) are not accepted", event)
+        if getattr(event, "tag", None):
+            raise _refused("tags (!name) are not accepted", event)
+        return super().compose_node(parent, index)
 
-    def construct_object(self, node: yaml.Node, deep: bool = False) -> Any:
+    def read(self, node: yaml.Node, key: Key) -> Any:
+        """Return the value of a node, and add the marks of it and of all that is in it."""
+        self.key_marks.setdefault(key, node.start_mark)
+        if isinstance(node, yaml.SequenceNode):
+            return [self.read(item, (*key, index)) for index, item in enumerate(node.value)]
+        if isinstance(node, yaml.MappingNode):
+            return self._mapping(node, key)
         try:
-            value = super().construct_object(node, deep)
-            if isinstance(value, int) and value.bit_length() > MAX_INTEGER_BITS:
-                raise OverflowError("the number is too large")
-        except (ValueError, OverflowError) as error:
-            raise ConstructorError(None, None, str(error), node.start_mark) from error
+            value = self.construct_object(node)
+        except ValueError as error:
+            raise _refused(str(error), node) from error
+        if isinstance(value, int) and value.bit_length() > MAX_INTEGER_BITS:
+            raise _refused("the number is too large", node)
         return value
 
-    def mapping(self, node: yaml.MappingNode) -> dict[str, Any]:
+    def _mapping(self, node: yaml.MappingNode, key: Key) -> dict[str, Any]:
         values: dict[str, Any] = {}
-        for key, value in node.value:
-            problem = None if isinstance(key, yaml.ScalarNode) else f"a {key.id} cannot be a key"
-            if problem is None and key.value in values:
-                problem = f"{printable(key.value)} appears twice; remove one"
-            if problem:
-                raise ConstructorError(None, None, problem, key.start_mark)
-            values[key.value] = self.construct_object(value, deep=True)
+        for name, value in node.value:
+            if not isinstance(name, yaml.ScalarNode):
+                raise _refused(f"a {name.id} cannot be a key", name)
+            if name.value in values:
+                raise _refused(f"{printable(name.value)} appears twice; remove one", name)
+            self.key_marks[(*key, name.value)] = name.start_mark
+            values[name.value] = self.read(value, (*key, name.value))
         return values
 
 
-_Loader.add_constructor("tag:yaml.org,2002:map", _Loader.mapping)
+def _refused(problem: str, what: Any) -> ConstructorError:
+    return ConstructorError(None, None, problem, what.start_mark)
+
+
 # In YAML 1.1 a number with an exponent needs a dot and a sign: `1.0e-3`.
 _Loader.add_implicit_resolver(
     "tag:yaml.org,2002:float",
@@ -143,10 +153,7 @@ def _parse(text: str, name: str) -> tuple[Any, dict[Key, str]]:
     try:
         loader = _Loader(text)
         node = loader.get_single_node()
-        if node is None:
-            return None, {}
-        value = loader.construct_document(node)
-        marks = dict(_marks(node, ()))
+        value = None if node is None else loader.read(node, ())
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         place = f"{name}:{mark.line + 1}:{mark.column + 1}" if mark else name
@@ -155,16 +162,5 @@ def _parse(text: str, name: str) -> tuple[Any, dict[Key, str]]:
         raise ConfigError(f"{name}: is not YAML: {' '.join(str(error).split())}") from error
     except RecursionError as error:
         raise ConfigError(f"{name}: is nested too deeply") from error
-    return value, {key: f"{name}:{mark.line + 1}:{mark.column + 1}" for key, mark in marks.items()}
-
-
-def _marks(node: yaml.Node, key: Key) -> Iterator[tuple[Key, yaml.Mark]]:
-    """Yield where a value and everything in it stands; a named one stands where its name does."""
-    yield key, node.start_mark
-    if isinstance(node, yaml.MappingNode):
-        for name, value in node.value:
-            yield from _marks(value, (*key, name.value))
-            yield (*key, name.value), name.start_mark
-    elif isinstance(node, yaml.SequenceNode):
-        for index, item in enumerate(node.value):
-            yield from _marks(item, (*key, index))
+    marks = loader.key_marks.items()
+    return value, {key: f"{name}:{mark.line + 1}:{mark.column + 1}" for key, mark in marks}

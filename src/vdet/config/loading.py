@@ -91,22 +91,23 @@ def given_values(paths: Sequence[Path]) -> dict[str, Any]:
     ConfigError
         A file cannot be read, or is not YAML.
     """
-    layers = [document.read_document(path) for path in paths]
-    for layer in layers:
-        to_fractions(layer.values)
-    return reduce(_with_kinds_over, layers, Document("settings", {})).values
+    return reduce(_with_kinds_over, map(_as_it_stands, paths), Document("settings", {})).values
+
+
+def _as_it_stands(path: Path) -> Document:
+    """Read a file as a layer: with fractions."""
+    layer = document.read_document(path)
+    to_fractions(layer.values)
+    return layer
 
 
 def _read_file(path: Path) -> Document:
     """Read a file as a layer: with fractions, and paths as seen from the working folder."""
-    layer = document.read_document(path)
-    to_fractions(layer.values)
-    for holder, key in (
-        *((region, "mask") for region in items(layer.values, "regions")),
-        (inside(layer.values, "detector"), "model"),
-    ):
-        if isinstance(holder, dict) and isinstance(holder.get(key), str):
-            holder[key] = str(path.parent / holder[key])
+    layer = _as_it_stands(path)
+    for section, key in (("regions", "mask"), ("detector", "model")):
+        for item in items(layer.values, section):
+            if isinstance(item.get(key), str):
+                item[key] = str(path.parent / item[key])
     return layer
 
 
@@ -132,7 +133,11 @@ def _with_kinds_over(below: Document, above: Document) -> Document:
     return _over(Document(below.name, values, below.places), above)
 
 
-_EXPECTED = {"model_type": "must be a section, key: value", "tuple_type": "must be a list"}
+_EXPECTED = {
+    "model_type": "must be a section, key: value",
+    "tuple_type": "must be a list",
+    "zoneinfo_str": "must be a time zone, such as Europe/Berlin",
+}
 
 
 def _describe(mistake: ErrorDetails, merged: Document) -> str:

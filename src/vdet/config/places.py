@@ -105,9 +105,7 @@ class LineSettings(Section):
     """Name of the direction to the right."""
 
     @model_validator(mode="after")
-    def _has_a_length_and_two_directions(self) -> "LineSettings":
-        if self.start == self.end:
-            raise ValueError("start and end must differ")
+    def _has_two_directions(self) -> "LineSettings":
         if self.left == self.right:
             raise ValueError("left and right must have different names")
         return self
@@ -172,14 +170,8 @@ class TrafficSettings(Section):
         return self
 
 
-_POINTS = {
-    ("regions",): {"points"},
-    ("traffic", "lines"): {"start", "end"},
-    ("traffic", "zones"): {"points"},
-    ("camera", "ground"): {"pixel"},
-    ("lanes",): {"points"},
-}
-"""The sections and lists of sections with points, and the keys of the points in each."""
+_POINTS = {"points", "start", "end", "pixel"}
+"""The keys of points, or lists of points, in all sections."""
 _DIGITS = 3  # of pixels
 
 
@@ -205,7 +197,9 @@ def _size(values: Mapping[str, Any]) -> Size | None:
         return None
 
 
-def _change(values: Mapping[str, Any], change: Any) -> None:
+def _change(values: Any, change: Any) -> None:
+    """Change the points in nested sections and lists of sections."""
+
     def changed(value: Any) -> Any:
         match value:
             case [int() | float() as x, int() | float() as y]:
@@ -214,10 +208,11 @@ def _change(values: Mapping[str, Any], change: Any) -> None:
                 return [changed(point) for point in points]
         return value
 
-    for places, keys in _POINTS.items():
-        for item in items(values, *places):
-            for key in keys & item.keys():
-                item[key] = changed(item[key])
+    if isinstance(values, dict):
+        values |= {key: changed(values[key]) for key in _POINTS & values.keys()}
+    for value in values.values() if isinstance(values, dict) else values:
+        if isinstance(value, dict | list):
+            _change(value, change)
 
 
 def inside(values: Any, *keys: str) -> Any:

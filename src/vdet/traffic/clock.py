@@ -55,11 +55,7 @@ class Clock:
 
 
 def find_clock(
-    path: Path,
-    settings: Settings,
-    created: str | None = None,
-    start: float = 0.0,
-    zero: datetime | None = None,
+    path: Path, settings: Settings, created: str | None, start: float, zero: datetime | None = None
 ) -> Clock | None:
     """Return the clock of a video; None if nothing says when it begins.
 
@@ -85,7 +81,7 @@ def find_clock(
         The name has no time as the pattern says.
     """
     clock = settings.camera.clock
-    zone: tzinfo | None = clock.time_zone
+    zone: tzinfo | None = clock.zone
     if zero and not (settings.input.begin or clock.pattern):
         return Clock(_utc(zero, zone), "from the file", zone or zero.tzinfo, start)
     if settings.input.begin:
@@ -100,7 +96,7 @@ def find_clock(
 
 def _found(path: Path, settings: Settings, created: str | None) -> tuple[datetime, str] | None:
     """Return when a video begins by its name and its metadata, and which of these says so."""
-    clock, zone = settings.camera.clock, settings.camera.clock.time_zone
+    clock, zone = settings.camera.clock, settings.camera.clock.zone
     sequence = find_sequence(path)
     named, written = clock.time_in((sequence.files[0] if sequence else path).name), None
     if clock.pattern and not named:
@@ -198,9 +194,10 @@ class Intervals:
             [(zero + first, zero + last) for first, last in spans]
             for zero, (_, spans) in zip(self._zeros, videos, strict=True)
         ]
-        every = [span for spans in self._spans for span in spans]
-        self._first, self._last = min(first for first, _ in every), max(last for _, last in every)
-        ranges = [(self.number_at(first), self.number_at(last)) for first, last in every]
+        self._every = [span for spans in self._spans for span in spans]
+        self._first = min(first for first, _ in self._every)
+        self._last = max(last for _, last in self._every)
+        ranges = [(self.number_at(first), self.number_at(last)) for first, last in self._every]
         self.numbers = sorted({n for first, last in ranges for n in range(first, last + 1)})
 
     def seconds(self, which: int, time: float) -> float:
@@ -222,27 +219,26 @@ class Intervals:
 
     def limits(self, number: int) -> Span:
         """Return the part of an interval between the first and the last frame of all videos."""
+        begin, end = self._ends(number)
+        return max(begin, self._first), min(end, self._last)
+
+    def _ends(self, number: int) -> Span:
         if self._length is None:
             return self._first, self._last
-        begin = number * self._length
-        return max(begin, self._first), min(begin + self._length, self._last)
+        return float(number * self._length), float((number + 1) * self._length)
 
     def start_in(self, which: int, number: int) -> float:
         """Return when an interval begins, in the time of one of the videos."""
-        begin = self._first if self._length is None else number * self._length
-        return round(begin - self._zeros[which], 3)
+        return round(self._ends(number)[0] - self._zeros[which], 3)
 
     def covered(self, number: int) -> float:
         """Return the seconds of video in an interval."""
         begin, end = self.limits(number)
-        every = [span for spans in self._spans for span in spans]
-        return sum(max(0.0, min(end, last) - max(begin, first)) for first, last in every)
+        return sum(max(0.0, min(end, last) - max(begin, first)) for first, last in self._every)
 
     def moments(self, number: int) -> tuple[Moment, Moment]:
         """Return the start and the end of an interval."""
-        start, end = self._first, self._last
-        if self._length is not None:
-            start, end = (float(item * self._length) for item in (number, number + 1))
+        start, end = self._ends(number)
         return self._moment(start), self._moment(end)
 
     def _moment(self, seconds: float) -> Moment:
