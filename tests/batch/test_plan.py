@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from vdet.batch.manifest import Record, Written, open_manifest
-from vdet.batch.run import OutputSuffix, Plan, make_plan
+from vdet.batch.run import Plan, make_plan
 from vdet.errors import BatchError, OutputError
 from vdet.files import recorded_inputs
 from vdet.run.sinks import data
@@ -41,6 +41,10 @@ def clips(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "clips"
 
 
+def endings(*wanted: tuple[str, str | None]) -> tuple[Output, ...]:
+    return tuple(Output(sink, Path(ending or "")) for sink, ending in wanted)
+
+
 def plan(
     *inputs: str,
     suffixes: Mapping[str, str | None] = VIDEO,
@@ -51,8 +55,7 @@ def plan(
     return make_plan(
         [Path(path) for path in inputs],
         Path(folder),
-        replace(COMMON, overwrite=overwrite),
-        [OutputSuffix(*suffix) for suffix in suffixes.items()],
+        replace(COMMON, overwrite=overwrite, outputs=endings(*suffixes.items())),
         skip_existing=skip_existing,
     )
 
@@ -102,8 +105,8 @@ class TestJobs:
         assert not Path("out").exists()
 
     def test_a_sink_may_write_several_outputs_of_each_video(self) -> None:
-        suffixes = [OutputSuffix("tracks", end) for end in (".txt", ".kitti.txt", ".coco.json")]
-        plan = make_plan([Path("clips/a.mp4")], Path("out"), COMMON, suffixes)
+        tracks = endings(*(("tracks", end) for end in (".txt", ".kitti.txt", ".coco.json")))
+        plan = make_plan([Path("clips/a.mp4")], Path("out"), replace(COMMON, outputs=tracks))
         assert outputs(plan.runs) == [["out/a.txt", "out/a.kitti.txt", "out/a.coco.json"]]
 
     def test_jobs_whose_outputs_are_all_there_and_up_to_date_are_skipped(self) -> None:

@@ -13,15 +13,15 @@ import pytest
 
 from red_cars import red_settings
 from running import names, write_drive
-from vdet.batch.run import OutputSuffix, Plan, make_plan, run_batch
+from vdet.batch.run import Plan, make_plan, run_batch
 from vdet.batch.task import process_file
 from vdet.errors import BatchError, OutputError
 from vdet.run.sinks import data
-from vdet.run.sinks.protocol import BatchTotal
+from vdet.run.sinks.protocol import BatchTotal, Output
 from vdet.run.video import Run
 from vdet.workers import Submit
 
-OUTPUTS = [OutputSuffix("tracks", ".csv"), OutputSuffix("vehicles", ".cars.json")]
+OUTPUTS = Output("tracks", Path(".csv")), Output("vehicles", Path(".cars.json"))
 
 
 MakePlan = Callable[..., Plan]
@@ -49,8 +49,8 @@ def clips(tmp_path: Path) -> Path:
 @pytest.fixture
 def plan(clips: Path) -> MakePlan:
     """A function that plans a batch of all clips into the folder `out`."""
-    common = Run(Path(), settings=red_settings(clips.parent), threads=1)
-    return partial(make_plan, [clips], clips.parent / "out", common, OUTPUTS)
+    common = Run(Path(), OUTPUTS, red_settings(clips.parent), threads=1)
+    return partial(make_plan, [clips], clips.parent / "out", common)
 
 
 def run(planned: Plan) -> list[str | None]:

@@ -71,7 +71,7 @@ def test_every_option_stands_under_a_heading_and_examples_can_be_run(
     for parameter in command.params:
         row = rf"^  (-\w, )?{parameter.opts[-1]}\b"
         assert isinstance(parameter, click.Argument) or re.search(row, shown, re.MULTILINE)
-    _, *examples = (command.epilog or "").split("\n")
+    examples = (command.epilog or "").split("\n")
     assert examples
     for example in examples:
         words = shlex.split(example.partition(" > ")[0])

@@ -2,7 +2,7 @@
 
 import json
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import asdict, astuple, replace
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -18,8 +18,9 @@ from vdet.config.places import LineSettings
 from vdet.errors import ConfigError
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Clock
-from vdet.traffic.count_files import counts_content, join_counts, write_counts, write_flows
+from vdet.traffic.count_files import counts_content, flows_content, join_counts
 from vdet.traffic.counts import Counts, count_table, flow_table, zone_table
+from vdet.traffic.tables import write_content
 
 WEST = LineSettings(name="west", start=(200, 200), end=(200, 600))
 EAST = LineSettings(name="east", start=(1000, 200), end=(1000, 600))
@@ -210,17 +211,21 @@ class TestIntervals:
 
 
 class TestFiles:
+    @staticmethod
+    def write(make: Callable[..., Any], path: Path, *arguments: Any) -> None:
+        write_content(path, make(path, *arguments))
+
     def test_the_table_of_flows_is_tidy_and_has_no_formulas(self, tmp_path: Path) -> None:
-        write_flows(tmp_path / "f.csv", {"v": at(crossing())}, 900)
+        self.write(flows_content, tmp_path / "f.csv", {"v": at(crossing())}, 900)
         assert rows_of(tmp_path / "f.csv")[-1] == {
             "start": "2026-05-01 07:00:00+02:00", "end": "2026-05-01 07:15:00+02:00",
             "from": "west", "to": "'=south", "class": "vehicle", "count": "1",
         }  # fmt: skip
-        write_flows(tmp_path / "g.csv", {"v": crossing(EAST)})
+        self.write(flows_content, tmp_path / "g.csv", {"v": crossing(EAST)})
         assert [row["to"] for row in rows_of(tmp_path / "g.csv")] == ["(none)"]
 
     def test_the_matrix_has_every_name_in_both_ways(self, tmp_path: Path) -> None:
-        write_flows(tmp_path / "f.matrix.csv", {"v": crossing()}, 5)
+        self.write(flows_content, tmp_path / "f.matrix.csv", {"v": crossing()}, 5)
         assert (tmp_path / "f.matrix.csv").read_text() == (
             "from,west,east,'=south,(none)\n"
             "west,1,1,1,0\n"
@@ -232,7 +237,7 @@ class TestFiles:
         cars = named(frames(GOES_EAST), "car")
         truck = named(numbered(frames(TURNS_BACK), 2), "truck")
         counted = {"v": counts(joined(cars, truck), WEST)}
-        write_flows(tmp_path / "f.wide.csv", counted, 5)
+        self.write(flows_content, tmp_path / "f.wide.csv", counted, 5)
         assert (tmp_path / "f.wide.csv").read_text() == (
             'start,end,"west to west, car","west to west, truck","west to west, all",'
             '"west to (none), car","west to (none), truck","west to (none), all",all\n'
@@ -241,7 +246,7 @@ class TestFiles:
             "10.0,15.0,0,0,0,0,0,0,0\n"
             "all,,0,1,1,1,0,1,2\n"
         )
-        write_counts(tmp_path / "c.wide.csv", counted)
+        self.write(counts_content, tmp_path / "c.wide.csv", counted)
         assert (tmp_path / "c.wide.csv").read_text() == (
             'start,end,"west: left, car","west: left, truck","west: left, all",'
             '"west: right, car","west: right, truck","west: right, all",all\n'
@@ -267,7 +272,7 @@ class TestFiles:
         )
 
     def test_json_has_flows_matrix_and_the_beginning(self, tmp_path: Path) -> None:
-        write_flows(tmp_path / "f.json", {"v": at(crossing(EAST))})
+        self.write(flows_content, tmp_path / "f.json", {"v": at(crossing(EAST))})
         whole = json.loads((tmp_path / "f.json").read_text())
         assert whole == {
             "interval": None,
@@ -284,11 +289,11 @@ class TestFiles:
 
     def test_counts_have_tables_of_totals_and_of_zones(self, tmp_path: Path) -> None:
         counted = {"v": counts(frames(GOES_EAST), WEST, ZONE)}
-        write_counts(tmp_path / "c.totals.csv", counted, 5)
+        self.write(counts_content, tmp_path / "c.totals.csv", counted, 5)
         rows = rows_of(tmp_path / "c.totals.csv")
         assert list(rows[0]) == ["start", "end", "name", "direction", "class", "count"]
         assert sum(int(row["count"]) for row in rows) == 3
-        write_counts(tmp_path / "c.zones.csv", counted, 5)
+        self.write(counts_content, tmp_path / "c.zones.csv", counted, 5)
         row, *_ = rows_of(tmp_path / "c.zones.csv")
         assert row == {
             "start": "0.0", "end": "5.0", "name": "zone", "entered": "1", "left": "0",
@@ -296,7 +301,7 @@ class TestFiles:
         }  # fmt: skip
 
     def test_events_have_clock_times(self, tmp_path: Path) -> None:
-        write_counts(tmp_path / "c.csv", {"v": at(crossing(EAST))})
+        self.write(counts_content, tmp_path / "c.csv", {"v": at(crossing(EAST))})
         (row,) = rows_of(tmp_path / "c.csv")
         assert row["time"].startswith("9.0")
         assert row["clock"].startswith("2026-05-01 07:05:06")

@@ -69,7 +69,7 @@ def test_a_vehicle_that_stands_the_whole_time_is_not_counted_and_one_that_parks_
 
 def test_a_vehicle_that_stands_is_counted_in_a_run_as_soon_as_it_drives() -> None:
     path = through((0, 600, 400), (4, 604, 402), (8, 1000, 400))
-    counter = VehicleCounter(settings_for(ZONE).traffic, WIDTH, HEIGHT)
+    counter = VehicleCounter(settings_for(ZONE), WIDTH, HEIGHT)
     appeared = []
     for frame in frames(path, seconds=7):
         counter.update(frame)

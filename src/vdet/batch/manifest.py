@@ -17,6 +17,7 @@ from typing import Any, BinaryIO
 
 from vdet.errors import OutputError
 from vdet.files import output_errors, remove_stale
+from vdet.run.result import CONDITIONS
 from vdet.system import lock
 from vdet.version import __version__
 
@@ -100,6 +101,12 @@ class Record:
     warnings: tuple[str, ...] = ()
     error: str | None = None
     program: str = f"vdet {__version__}"
+
+    @property
+    def is_doubtful(self) -> bool:
+        """Whether a result may be wrong."""
+        findings = self.facts.get(CONDITIONS, ())
+        return any(finding["severity"] == "warning" for finding in findings)
 
     @property
     def line(self) -> str:

@@ -27,23 +27,6 @@ from vdet.workers import Workers, call_all
 
 
 @dataclass(frozen=True, slots=True)
-class OutputSuffix:
-    """An output that every video of a batch gets.
-
-    Attributes
-    ----------
-    sink
-        The name of its sink.
-    suffix
-        The ending of its name, after that of the video. None: the video's own suffix if the sink
-        can write it, else the first that the sink can write.
-    """
-
-    sink: str
-    suffix: str | None = None
-
-
-@dataclass(frozen=True, slots=True)
 class Plan:
     """The runs to do and those that are left out; all their outputs lie in `folder`.
 
@@ -61,12 +44,7 @@ class Plan:
 
 
 def make_plan(
-    clips: Sequence[Path],
-    folder: Path,
-    common: Run,
-    suffixes: Sequence[OutputSuffix],
-    *,
-    skip_existing: bool = False,
+    clips: Sequence[Path], folder: Path, common: Run, *, skip_existing: bool = False
 ) -> Plan:
     """Plan a run for every video of `clips`; outputs lie in `folder` by the places of the videos.
 
@@ -75,9 +53,9 @@ def make_plan(
     Parameters
     ----------
     common
-        A run with what all runs have in common.
-    suffixes
-        The outputs of each video; a sink may come several times.
+        A run with what all runs have in common. The paths of its outputs are the endings of their
+        names, after that of the video, such as `.csv`. An empty one is the video's own suffix if
+        the sink can write it, else the first that the sink can write.
     skip_existing
         Skip runs whose outputs all exist, and are up to date as the manifest says. All outputs of
         the other runs are made again, but only those that vdet wrote are replaced.
@@ -101,17 +79,15 @@ def make_plan(
             common,
             settings=settings,
             source=source.path,
-            outputs=tuple(
-                Output(suffix.sink, _path(folder / source.place, suffix)) for suffix in suffixes
-            ),
+            outputs=tuple(_named(output, folder / source.place) for output in common.outputs),
         )
         for source in sources
     ]
     totals = {
         number: (folder / f"{total.name}{total.suffix or ending}", total, ending)
-        for number, suffix in enumerate(suffixes)
-        for ending in (suffix.suffix or "",)
-        if (total := sink_kind(suffix.sink).total)
+        for number, output in enumerate(common.outputs)
+        for ending in [output.path.name]
+        if (total := sink_kind(output.sink).total)
     }
     _refuse_shared(runs, [path for path, *_ in totals.values()], folder)
     manifest, skipped = folder / MANIFEST, []
@@ -131,9 +107,10 @@ def make_plan(
     return Plan(folder, tuple(runs), tuple(skipped), totals)
 
 
-def _path(place: Path, output: OutputSuffix) -> Path:
-    suffix = output.suffix
-    return place.with_suffix(sink_kind(output.sink).suffix_for(place) if suffix is None else suffix)
+def _named(output: Output, video: Path) -> Output:
+    """Return an output whose path is the ending of its name, named after a video."""
+    ending = output.path.name or sink_kind(output.sink).suffix_for(video)
+    return replace(output, path=video.with_suffix(ending))
 
 
 def _refuse_nested(clips: Iterable[Path], sources: Iterable[InputVideo], folder: Path) -> None:

@@ -135,23 +135,18 @@ def _written(run: Run, record: Record, files: OutputFiles) -> Record:
     digest = result_digest(run)
     chosen = pickle.dumps(run.settings.detector)  # settings of other packages may be unhashable
     totals = write_outputs(run, _kept_detector(chosen, record.model_sha256), files)
-    states = [output_state(output, files.place_of(output.path)) or (0, 0) for output in run.outputs]
+    written = []
+    for output in run.outputs:
+        state = output_state(output, files.place_of(output.path)) or (0, 0)
+        path, summary = str(output.path.absolute()), totals.summaries[output.path]
+        written.append(Written(output.sink, path, *state, digest, summary))
     return replace(
         record,
         seconds=round(totals.seconds, 3),
         **{name: getattr(totals, name) for name in ("width", "height", "frames", "tracks")},
         begin=str(totals.clock) if totals.clock else None,
         facts={name: fact.record() for name, fact in totals.facts.items()},
-        outputs=tuple(
-            Written(
-                output.sink,
-                str(output.path.absolute()),
-                *state,
-                digest,
-                totals.summaries[output.path],
-            )
-            for output, state in zip(run.outputs, states, strict=True)
-        ),
+        outputs=tuple(written),
     )
 
 

@@ -9,20 +9,14 @@ from vdet.cli import options
 from vdet.cli.command import command
 from vdet.cli.messages import print_lines, progress_steps
 from vdet.errors import counted
-from vdet.files import check_output
 
 log = logging.getLogger("vdet")
 
 
-@command("vdet calibrate chessboards/ -o camera.yaml --pattern 9x6")
+@command()
 @click.argument("photos", nargs=-1, required=True, type=options.PATH, metavar="PHOTO...")
-@options.output_file_option("Camera file to write, .yaml.")
-@options.option(
-    "--pattern NxM",
-    "Inner corners of the board per row and column, 3 to 999.",
-    options.parse_pair,
-    default="9x6",
-)
+@options.output_file_option
+@options.option("--pattern NxM", options.parse_pair, default="9x6")
 @options.overwrite_option
 def calibrate(
     photos: tuple[Path, ...], output: Path, pattern: tuple[int, int], overwrite: bool
@@ -31,6 +25,17 @@ def calibrate(
 
     Computes its focal length and lens distortion. Each PHOTO is a file, or a folder of files. Take
     ten or more photographs of the whole flat board from different angles.
+
+    Parameters
+    ----------
+    output
+        Camera file to write, .yaml.
+    pattern
+        Inner corners of the board per row and column, 3 to 999.
+
+    Examples
+    --------
+    vdet calibrate chessboards/ -o camera.yaml --pattern 9x6
     """
     from vdet.lanes.calibration import calibrate as fit
     from vdet.lanes.camera import save_camera
@@ -38,9 +43,8 @@ def calibrate(
 
     if not (3 <= min(pattern) <= max(pattern) <= 999):
         raise click.UsageError("--pattern: must be 3 to 999 inner corners, such as 9x6")
-    options.check_suffix(output, ".yaml", ".yml", what="cameras")
+    options.check_file(output, ".yaml", ".yml", what="cameras", overwrite=overwrite)
     found = list(find_images(photos))
-    check_output(output, overwrite=overwrite)
     with progress_steps("") as steps:
         steps(f"searching {counted(len(found), 'photograph')}", None)
         result = fit(found, pattern)

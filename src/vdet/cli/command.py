@@ -1,17 +1,21 @@
 """Commands whose help groups its options, and the program, which other packages extend."""
 
+import inspect
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
 import click
 
+from vdet.cli import options as shared
 from vdet.cli.messages import set_up_logs
 from vdet.errors import ConfigError
 from vdet.plugins import COMMANDS, built_in_names, load_plugin, plugin_names
 
 _OTHERS = "Input"
+_PARAMETERS, _EXAMPLES = "Parameters\n----------\n", "Examples\n--------\n"
+_PARAMETER = re.compile(r"^(\w+)\n((?:    .+\n)+)", re.MULTILINE)
 
 HEADINGS: Mapping[str, Sequence[str]] = {
     "Outputs": (
@@ -31,10 +35,20 @@ HEADINGS: Mapping[str, Sequence[str]] = {
 
 
 class Command(click.Command):
-    """A command of the program, which takes `-q` and `-v`; its help groups the options."""
+    """A command of the program, which takes `-q` and `-v`; its help groups the options.
+
+    The docstring is the help: what the command does, its options as `Parameters`, and command lines
+    as `Examples`. What `vdet.cli.options` says of an option holds where the command says nothing.
+    """
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
+        text, _, self.epilog = inspect.cleandoc(self.help or "").partition(_EXAMPLES)
+        self.help, _, listed = text.partition(_PARAMETERS)
+        texts = dict(_PARAMETER.findall(f"{shared.__doc__}\n{listed}"))
+        for option in self.params:
+            if isinstance(option, click.Option) and option.help is None:
+                option.help = " ".join(texts.get(option.name or "", "").split())
         self.params += verbosity_options()
         # click cuts only summaries that are not given.
         self.short_help = re.split(r"(?<=\.)\s", (self.help or "").strip())[0]
@@ -55,12 +69,11 @@ class Command(click.Command):
     def format_epilog(self, _: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the examples."""
         with formatter.section("Examples"):
-            formatter.write_text(self.epilog or "")
+            formatter.write_text(f"\b\n{self.epilog}")
 
 
-def command(*examples: str) -> Callable[[Callable[..., Any]], Command]:
-    """Return a decorator that makes a command, with command lines at the end of its help."""
-    return click.command(cls=Command, epilog="\n".join(("\b", *examples)))
+command = partial(click.command, cls=Command)
+"""Makes a command of a function and its docstring: see `Command`."""
 
 
 class Program(click.Group):

@@ -1,6 +1,5 @@
 """`vdet count`: count the vehicles of track files at lines and in zones."""
 
-import gc
 import logging
 import shlex
 from collections.abc import Mapping, Sequence
@@ -13,6 +12,7 @@ from vdet.cli import options
 from vdet.cli.command import command
 from vdet.cli.messages import announce, print_lines, progress_steps
 from vdet.cli.results import check_counting, counting_options
+from vdet.errors import counted
 from vdet.files import OutputFiles, output_errors
 
 if TYPE_CHECKING:
@@ -21,25 +21,13 @@ if TYPE_CHECKING:
 log = logging.getLogger("vdet")
 
 
-@command(
-    "vdet count tracks.jsonl -c gate.yaml",
-    "vdet count tracks.jsonl -c gate.yaml --flows flows.csv --interval 15min",
-    "vdet count found/*.tracks.csv -c gate.yaml --counts counts.json",
-)
+@command()
 @click.argument("tracks", nargs=-1, required=True, type=options.INPUT, metavar="TRACKS...")
-@counting_options()
+@counting_options
 @options.option(
-    "--size WIDTHxHEIGHT",
-    "Frame size of the video in pixels.",
-    options.parse_pair,
-    show_default="from TRACKS, else camera.size",
+    "--size WIDTHxHEIGHT", options.parse_pair, show_default="from TRACKS, else camera.size"
 )
-@options.option(
-    "--rate FPS",
-    "Frame rate of the video, for TRACKS without times.",
-    options.RATE,
-    show_default="from TRACKS",
-)
+@options.option("--rate FPS", click.FloatRange(min=0, min_open=True), show_default="from TRACKS")
 @options.class_option
 @options.settings_options("traffic.min_seen_seconds=0.5")
 @options.overwrite_option
@@ -55,6 +43,19 @@ def count(
     TRACKS are files of vdet detect-video --tracks. Vehicles are not detected again, and the counts
     are the same as those of detect-video --counts. If the clock times of TRACKS follow one another,
     a vehicle in two of them counts once.
+
+    Parameters
+    ----------
+    size
+        Frame size of the video in pixels.
+    rate
+        Frame rate of the video, for TRACKS without times.
+
+    Examples
+    --------
+    vdet count tracks.jsonl -c gate.yaml
+    vdet count tracks.jsonl -c gate.yaml --flows flows.csv --interval 15min
+    vdet count found/*.tracks.csv -c gate.yaml --counts counts.json
     """
     from vdet.batch.inputs import VIDEO_INPUT_SUFFIXES
 
@@ -67,18 +68,15 @@ def count(
         raise click.UsageError("no lines or zones to count at; add a settings file with -c FILE")
     check_counting(settings, several=len(tracks) > 1)
     from vdet.run.sinks.protocol import check_sinks
-    from vdet.traffic.count_files import write_counts, write_flows
+    from vdet.traffic.count_files import counts_content, flows_content
     from vdet.traffic.counting import count_files
+    from vdet.traffic.tables import write_content
 
     outputs = options.as_outputs(options.wanted_outputs())
     check_sinks(outputs, overwrite=overwrite)
-    gc.disable()  # it takes a third of the time, and finds nothing: boxes are in no circles
-    try:
-        with progress_steps(" files") as steps:
-            advance = steps("", len(tracks) if len(tracks) > 1 else None)
-            videos = count_files(tracks, settings, size, rate, advance=advance)
-    finally:
-        gc.enable()
+    with progress_steps(" files") as steps:
+        advance = steps("", len(tracks) if len(tracks) > 1 else None)
+        videos = count_files(tracks, settings, size, rate, advance=advance)
     for name, counts in videos.items():
         if counts.clock:
             announce(f"{name}: begins {counts.clock}")
@@ -86,15 +84,15 @@ def count(
             log.warning("%s: %s", name, warning)
     with OutputFiles(overwrite=overwrite) as files:
         for output in outputs:
-            write = {"counts": write_counts, "flows": write_flows}[output.sink]
+            make = {"counts": counts_content, "flows": flows_content}[output.sink]
+            content = make(output.path, videos, settings.traffic.seconds)
             with output_errors(output.path):
-                write(files.stage(output.path), videos, settings.traffic.seconds)
+                write_content(files.stage(output.path), content)
     print_lines(*_totals(videos), *_matrix(list(videos.values())))
 
 
 def _totals(videos: "Mapping[str, Counts]") -> list[str]:
     """Return the totals of all files, and of each where one has no clock."""
-    from vdet.errors import counted
     from vdet.evaluate.output import table
     from vdet.traffic.counts import direction_totals
 

@@ -9,9 +9,9 @@ from vdet.cli.messages import announce, print_lines, progress_steps
 from vdet.cli.options import PATH, option, overwrite_option
 
 
-@command("vdet demo", "vdet demo folder --seed 2 --overwrite")
+@command()
 @click.argument("folder", default=Path("demo"), type=PATH, metavar="[DIR]")
-@option("--seed N", "Seed of the random scenes.", click.IntRange(min=0), default=5)
+@option("--seed N", click.IntRange(min=0), default=5)
 @overwrite_option
 def demo(folder: Path, seed: int, overwrite: bool) -> None:
     """Try the whole program on synthetic roads.
@@ -20,6 +20,16 @@ def demo(folder: Path, seed: int, overwrite: bool) -> None:
     vehicles, and counts those seen from the pole. Then a linear model is trained on patches of
     other synthetic roads and finds the vehicles too. All results are compared with the ground
     truth. All files are written into DIR, by default demo.
+
+    Parameters
+    ----------
+    seed
+        Seed of the random scenes.
+
+    Examples
+    --------
+    vdet demo
+    vdet demo folder --seed 2 --overwrite
     """
     from vdet.demo import MODEL, TRUTH, run_demo
 

@@ -18,26 +18,12 @@ if TYPE_CHECKING:
 log = logging.getLogger("vdet")
 
 
-@command(
-    "vdet detect-image road.jpg",
-    "vdet detect-image road.jpg -o found.jpg --json -",
-    "vdet detect-image images/ -o found/ --json boxes.json",
-    "vdet detect-image images/ --labels images.coco.json",
-    "vdet detect-image road.jpg --stages stages",
-)
+@command()
 @click.argument("images", nargs=-1, required=True, type=options.PATH, metavar="IMAGE...")
-@options.option(
-    "-o, --output PATH",
-    "Write the image with its boxes. For several images, a folder, in which they keep their "
-    "names and folders.",
-    options.PATH,
-)
-@options.option("--stages DIR", "Write an image of every stage into DIR.")
-@options.output_option("--json FILE", "Write the boxes to FILE. With -, to standard output.")
-@options.output_option(
-    "--labels FILE",
-    "Write the boxes for labelling tools: .coco.json, .xml (CVAT), or .yolo.zip. Can be repeated.",
-)
+@options.option("-o, --output PATH", options.PATH)
+@options.option("--stages DIR")
+@options.output_option("--json FILE")
+@options.output_option("--labels FILE")
 @options.sink_option
 @options.class_option
 @options.lanes_option
@@ -54,6 +40,26 @@ def detect_image(
 
     Each IMAGE is a file, or a folder (searched recursively). Without an output option, prints the
     vehicles: class, score, and box in pixels as x, y, width and height.
+
+    Parameters
+    ----------
+    output
+        Write the image with its boxes. For several images, a folder, in which they keep their names
+        and folders.
+    stages
+        Write an image of every stage into DIR.
+    json
+        Write the boxes to FILE. With -, to standard output.
+    labels
+        Write the boxes for labelling tools: .coco.json, .xml (CVAT), or .yolo.zip. Can be repeated.
+
+    Examples
+    --------
+    vdet detect-image road.jpg
+    vdet detect-image road.jpg -o found.jpg --json -
+    vdet detect-image images/ -o found/ --json boxes.json
+    vdet detect-image images/ --labels images.coco.json
+    vdet detect-image road.jpg --stages stages
     """
     settings = choice.read()
     if settings.lack_of_metres:

@@ -12,7 +12,7 @@ from vdet.cli import options
 from vdet.cli.command import command
 from vdet.cli.messages import print_lines, progress_steps
 from vdet.errors import ConfigError, TruthError, VideoError, counted
-from vdet.files import OutputFiles, check_output, output_errors
+from vdet.files import OutputFiles, output_errors
 from vdet.progress import Steps
 
 if TYPE_CHECKING:
@@ -28,31 +28,15 @@ _STILL_FRAMES = 5000
 _OUTPUTS, _SETTINGS = (".html", ".jpg", ".png", ".svg"), (".yaml", ".yml")
 
 
-@command(
-    "vdet draw in.mp4 -o gate.html",
-    "vdet draw in.mp4 -c gate.yaml -o gate.html --tracks-from tracks.jsonl",
-    "vdet draw in.mp4 --propose gate.yaml",
-    "vdet draw in.mp4 -c gate.yaml -o place.jpg",
-)
+@command()
 @click.argument("clip", type=options.INPUT, metavar="CLIP")
-@options.option(
-    "-o, --output FILE",
-    "Page to write, .html, or image of the scene for a report, .jpg, .png or .svg.",
-    options.PATH,
-)
-@options.option(
-    "--propose FILE",
-    "Propose a line across each main stream and write the settings, .yaml.",
-    options.PATH,
-)
+@options.option("-o, --output FILE", options.PATH)
+@options.option("--propose FILE", options.PATH)
 @options.option(
     "--facing DIRECTION",
-    "Direction of the camera, such as N or SW, for the names of proposed lines.",
     click.Choice(("N", "NE", "E", "SE", "S", "SW", "W", "NW"), case_sensitive=False),
 )
-@options.option(
-    "--tracks-from FILE", "Read the tracks from FILE instead of detecting vehicles.", name="tracks"
-)
+@options.option("--tracks-from FILE", name="tracks")
 @options.start_option
 @options.end_option
 @options.settings_options("detector.stride=2", options.model_option)
@@ -72,6 +56,24 @@ def draw(
 
     CLIP is a video, or with --tracks-from also an image of one frame. The page shows live counts
     for each line, and saves settings for -c. It is one file and needs no network.
+
+    Parameters
+    ----------
+    output
+        Page to write, .html, or image of the scene for a report, .jpg, .png or .svg.
+    propose
+        Propose a line across each main stream and write the settings, .yaml.
+    facing
+        Direction of the camera, such as N or SW, for the names of proposed lines.
+    tracks
+        Read the tracks from FILE instead of detecting vehicles.
+
+    Examples
+    --------
+    vdet draw in.mp4 -o gate.html
+    vdet draw in.mp4 -c gate.yaml -o gate.html --tracks-from tracks.jsonl
+    vdet draw in.mp4 --propose gate.yaml
+    vdet draw in.mp4 -c gate.yaml -o place.jpg
     """
     from vdet.pages.drawing import Drawing
     from vdet.run.video import Run
@@ -82,8 +84,8 @@ def draw(
         raise click.UsageError("no output; use -o FILE or --propose FILE")
     for path, suffixes in ((output, _OUTPUTS), (propose, _SETTINGS)):
         if path:
-            options.check_suffix(path, *suffixes, what="pages" if path is output else "settings")
-            check_output(path, overwrite=overwrite)
+            what = "pages" if path is output else "settings"
+            options.check_file(path, *suffixes, what=what, overwrite=overwrite)
     if output and output.suffix.lower() != ".html" and not settings.traffic:
         raise ConfigError(f"{output}: nothing to draw; add lines or zones with -c FILE")
     with progress_steps(" frames") as steps:

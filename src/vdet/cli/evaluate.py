@@ -17,14 +17,9 @@ from vdet.errors import ConfigError
 _data = click.argument("data", nargs=-1, required=True, type=options.INPUT, metavar="DATA...")
 
 
-@command("vdet eval images city/ motorway/ --model their.onnx --min-width 0.03")
+@command()
 @_data
-@options.option(
-    "--min-width FRACTION",
-    "Ignore vehicles narrower than this fraction of the image width, 0 to 1.",
-    options.SHARE,
-    default=0.0,
-)
+@options.option("--min-width FRACTION", click.FloatRange(0, 1), default=0.0)
 @options.settings_options("detector.min_score_still=0.5", options.model_option)
 @results_options
 def images(
@@ -34,11 +29,19 @@ def images(
 
     Each DATA is a folder in COCO, KITTI, YOLO or Pascal VOC format, or a COCO file. Each image is
     searched on its own and compared with its labels.
+
+    Parameters
+    ----------
+    min_width
+        Ignore vehicles narrower than this fraction of the image width, 0 to 1.
+
+    Examples
+    --------
+    vdet eval images city/ motorway/ --model their.onnx --min-width 0.03
     """
     settings = choice.read_for_whole_frames()
-    from vdet.detect.factory import load_detector, model_file
+    from vdet.detect.factory import load_detector
     from vdet.evaluate.images import Counting, evaluate_images
-    from vdet.evaluate.output import RunName
     from vdet.evaluate.report import images_report
     from vdet.labels.reading import read_labelled_pictures
     from vdet.labels.roles import Roles
@@ -53,16 +56,14 @@ def images(
     with progress_steps(" images") as steps:
         progress = partial(steps, "")
         result = evaluate_images(sets, model, counting, threads=core_count(), progress=progress)
-    name = RunName(detector.kind, model_file(detector), choice.name, choice.assignments)
-    report = images_report(result, name)
-    results.print(report.lines(), report.values, report.page)
+    results.print_report(images_report(result, choice.run_name(settings)))
 
 
 _ON_LAST = "leak-free: a new model is tested on the last patches of each folder"
 _ON_ALL = "if the model was trained on some of these patches, the scores are too good"
 
 
-@command("vdet eval patches vehicles.zip non-vehicles.zip --json scores.json")
+@command()
 @_data
 @options.settings_options("train.svm.C=1e-4", options.model_option)
 @facts_options
@@ -71,11 +72,14 @@ def patches(data: tuple[Path, ...], choice: options.SettingsChoice, results: Res
 
     Each DATA is a folder or a zip file, as for vdet train. With --model, that model is tested on
     all of DATA. Otherwise a new model is trained, and tested on the last patches of each folder.
+
+    Examples
+    --------
+    vdet eval patches vehicles.zip non-vehicles.zip --json scores.json
     """
     settings = choice.read(detector="svm")
     from vdet.detect.svm.detector import requested_features
     from vdet.detect.svm.model import load_model
-    from vdet.evaluate.output import RunName
     from vdet.learn.svm.dataset import find_patches
     from vdet.learn.svm.training import evaluate_patches
 
@@ -85,13 +89,13 @@ def patches(data: tuple[Path, ...], choice: options.SettingsChoice, results: Res
     files = find_patches(data)
     with progress_steps("") as steps:
         result = evaluate_patches(files, settings, model, steps=steps)
-    name = RunName("svm", path, choice.name, choice.assignments)
+    name = choice.run_name(settings)
     meaning = _ON_ALL if model else _ON_LAST
     values = name.values | {"meaning": meaning, "test": asdict(result)}
     results.print([name.line, meaning, "", *result.lines()], values)
 
 
-@command("vdet eval tracks out.txt gt.txt --page page")
+@command()
 @click.argument("prediction", type=options.INPUT, metavar="PRED")
 @click.argument("truth", type=options.INPUT, metavar="TRUTH")
 @options.until_option
@@ -108,6 +112,10 @@ def tracks(
 
     PRED is a file of vdet detect-video --tracks. TRUTH is a MOTChallenge gt.txt, KITTI tracking
     labels, CVAT for video 1.1, COCO or YOLO with tracks, or a .csv or .jsonl of vdet.
+
+    Examples
+    --------
+    vdet eval tracks out.txt gt.txt --page page
     """
     from vdet.evaluate.report import tracks_report
     from vdet.evaluate.video import score_files
@@ -116,20 +124,14 @@ def tracks(
     with progress_steps("") as steps:
         steps("comparing", None)
         result = score_files(prediction, truth, until, choice.read())
-    report = tracks_report(result, truth)
-    results.print(report.lines(), report.values, report.page)
+    results.print_report(tracks_report(result, truth))
 
 
-@command("vdet eval video in.mp4 --truth gt.txt --sweep tracker.confirm_seconds=0.1,0.3")
+@command()
 @click.argument("videos", nargs=-1, required=True, type=options.INPUT, metavar="IN...")
 @options.truth_option
 @options.until_option
-@options.option(
-    "--sweep KEY=VALUE,VALUE",
-    "Compare values of a setting, for example tracker.confirm_seconds=0.1,0.3. Can be repeated.",
-    name="sweeps",
-    multiple=True,
-)
+@options.option("--sweep KEY=VALUE,VALUE", name="sweeps", multiple=True)
 @options.settings_options("tracker.confirm_seconds=0.3", options.model_option)
 @results_options
 def video(
@@ -144,14 +146,19 @@ def video(
 
     Tracks the vehicles in each video IN, and compares them with its ground truth. Vehicles outside
     the regions of the settings do not count.
+
+    Parameters
+    ----------
+    sweeps
+        Compare values of a setting, for example tracker.confirm_seconds=0.1,0.3. Can be repeated.
+
+    Examples
+    --------
+    vdet eval video in.mp4 --truth gt.txt --sweep tracker.confirm_seconds=0.1,0.3
     """
-    if (given := len(truths)) != len(videos):
-        raise click.UsageError(
-            f"pass one --truth for each video (videos: {len(videos)}, truths: {given})"
-        )
+    pairs = options.paired(videos, truths)
     base = choice.read()
-    from vdet.detect.factory import load_detector, model_file
-    from vdet.evaluate.output import RunName
+    from vdet.detect.factory import load_detector
     from vdet.evaluate.report import video_report
     from vdet.evaluate.video import Variant, evaluate_clips, open_clip
     from vdet.regions import check_masks
@@ -160,13 +167,10 @@ def video(
     swept = [(choice.read(*extra), extra) for extra in grid(sweeps)]
     variants = [Variant(one, load_detector(one.detector), extra) for one, extra in swept]
     results.check()
-    clips = [open_clip(*pair, until, base) for pair in zip(videos, truths, strict=True)]
+    clips = [open_clip(*pair, until, base) for pair in pairs]
     with progress_steps(" frames") as steps:
         runs = evaluate_clips(clips, variants, partial(steps, ""))
-    detector = variants[0].settings.detector
-    name = RunName(detector.kind, model_file(detector), choice.name, choice.assignments)
-    report = video_report(runs, name)
-    results.print(report.lines(), report.values, report.page)
+    results.print_report(video_report(runs, choice.run_name(base)))
 
 
 def grid(sweeps: Sequence[str]) -> list[tuple[str, ...]]:

@@ -26,7 +26,7 @@ _ANY_SIZE = 1000, 1000
 """Size of the frames, pixels, where points are fractions of them."""
 
 
-@command("vdet info in.mp4", "vdet info model.npz --json -", "vdet info -c gate.yaml", "vdet info")
+@command()
 @click.argument("path", type=INPUT, metavar="[FILE]", required=False)
 @facts_options
 @settings_options("camera.size=[960,540]")
@@ -38,6 +38,13 @@ def info(path: Path | None, results: Results, choice: SettingsChoice) -> int:
     lines, zones and ground points of the settings (-c), and prints the effect of an error of one
     pixel on speeds. With neither, checks packages, codecs and the shipped models; the exit code is
     1 if something that vdet needs does not work.
+
+    Examples
+    --------
+    vdet info in.mp4
+    vdet info model.npz --json -
+    vdet info -c gate.yaml
+    vdet info
     """
     from vdet.media.images import is_picture_name
 
@@ -59,13 +66,11 @@ def _machine() -> Facts:
     from vdet.config.loading import shipped_configs
     from vdet.workers import core_count
 
-    checks = {"codec h264": _codec}
-    checks |= {
-        f"settings {name}": partial(_shipped, path) for name, path in shipped_configs().items()
-    }
     found = {"vdet": f"{__version__}, on {core_count()} cores", **dict(_packages())}
     found["cv2"] = f"{_BROKEN}; {fault}" if (fault := opencv_fault()) else "ok"
-    found |= {name: _checked(check) for name, check in checks.items()}
+    found["codec h264"] = _checked(_codec)
+    for name, path in shipped_configs().items():
+        found[f"settings {name}"] = _checked(partial(_shipped, path))
     return found | {"works": not any(text.startswith(_BROKEN) for text in found.values())}
 
 
@@ -230,12 +235,17 @@ def _video(path: Path) -> Facts:
         }
 
 
-@command("vdet config > my.yaml", "vdet config -c seed --set output.crf=18")
+@command()
 @settings_options("tracker.kind=rules")
 def config(choice: SettingsChoice) -> None:
     """Print the effective settings as commented YAML.
 
     Save them, change what you like, and pass the file to a command with -c.
+
+    Examples
+    --------
+    vdet config > my.yaml
+    vdet config -c seed --set output.crf=18
     """
     from vdet.config.rendering import render
 

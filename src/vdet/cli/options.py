@@ -1,11 +1,54 @@
 """Options that several commands share, so that one flag means one thing everywhere.
 
 A *bundle* adds several options to a command, which gets their values as one argument.
+
+Parameters
+----------
+configs
+    Read settings from a YAML file, or from a shipped one: default, svm or seed. Can be repeated.
+    Later files win.
+model
+    Detector model: .npz from vdet train, or .onnx. It determines which detector runs
+    (`detector.model`).
+class
+    Keep only vehicles of this class, such as truck. Can be repeated (`classes`).
+lanes
+    Find and draw the lane (`lanes.enabled`).
+start
+    Start at this time, such as 90, 1:30 or 0:01:30.5.
+end
+    Stop before this time.
+until
+    Stop after this frame, counted from 1.
+truths
+    Ground truth: MOTChallenge, KITTI, CVAT, COCO, YOLO, .csv or .jsonl. Repeat for each video.
+counts
+    Write counts at lines and zones: .csv has the events, .totals.csv, .wide.csv and .zones.csv have
+    tables by interval, .json has everything. Can be repeated.
+flows
+    Write flows from one line or zone to another: .csv has a row for each interval, flow and class,
+    .wide.csv has a row for each interval, with sums, .matrix.csv has a matrix, .json has the flows
+    and the matrix. Can be repeated.
+interval
+    Interval of tables and charts, such as 5min, 15min or 1h (`traffic.interval`).
+begin
+    Start time of the video, such as '2026-05-01 07:00+02:00' (`input.begin`).
+json_target
+    Write the results to FILE. With -, to standard output, and the text to standard error.
+page
+    Write a report with charts, page.html, into DIR.
+sink
+    Write another output with the sink NAME. Can be repeated.
+overwrite
+    Replace existing outputs.
+scheduler
+    Address of a Dask scheduler, such as tcp://host:8786. Workers must see the files at the same
+    paths.
 """
 
 import json
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from fractions import Fraction
 from functools import wraps
@@ -16,10 +59,11 @@ import click
 from click.shell_completion import CompletionItem
 
 from vdet.errors import ConfigError, OutputError
-from vdet.files import record_input
+from vdet.files import check_output, record_input
 
 if TYPE_CHECKING:
     from vdet.config.schema import Settings
+    from vdet.evaluate.output import RunName
     from vdet.run.sinks.protocol import Output
 
 
@@ -37,8 +81,6 @@ INPUT = _Input(path_type=Path)
 POSITIVE = click.IntRange(1, 1_000_000_000)
 PROCESSES = click.IntRange(1, 256)
 """Number of threads or processes."""
-RATE = click.FloatRange(min=0, min_open=True)
-SHARE = click.FloatRange(0, 1)
 TIME_FORM = "[[HH:]MM:]SS"
 
 
@@ -93,18 +135,14 @@ def bundle(name: str, make: type[Any], *options: Callable[..., Any]) -> Callable
     return add
 
 
-def option(
-    shown: str, text: str, kind: Any = None, *, name: str = "", **more: Any
-) -> Callable[[F], F]:
-    """Return a decorator that adds an option to a command.
+def option(shown: str, kind: Any = None, *, name: str = "", **more: Any) -> Callable[[F], F]:
+    """Return a decorator that adds an option to a command: see `Command` for its help.
 
     Parameters
     ----------
     shown
         Flags and placeholder of the value as the help shows them, as in "-o, --output FILE". An
         option without a value has no placeholder.
-    text
-        Its help.
     kind
         Type of the value; None for text, for the path of an input where the placeholder is FILE,
         and for any path where it is DIR.
@@ -123,57 +161,39 @@ def option(
     if "default" in more:
         more["show_default"] = True
     names = [*flags, *([name] if name else [])]
-    return click.option(*names, help=text, type=kind, metavar=metavar or None, **more)
+    return click.option(*names, type=kind, metavar=metavar or None, **more)
 
 
-overwrite_option = option("--overwrite", "Replace existing outputs.")
-scheduler_option = option(
-    "--scheduler ADDRESS",
-    "Address of a Dask scheduler, such as tcp://host:8786. Workers must see the files at the same "
-    "paths.",
-)
-until_option = option(
-    "--until FRAME",
-    "Stop after this frame, counted from 1.",
-    POSITIVE,
-    show_default="last frame of the ground truth",
-)
-truth_option = option(
-    "--truth FILE",
-    "Ground truth: MOTChallenge, KITTI, CVAT, COCO, YOLO, .csv or .jsonl. Repeat for each video.",
-    name="truths",
-    multiple=True,
-)
-start_option = option(
-    f"--start {TIME_FORM}", "Start at this time, such as 90, 1:30 or 0:01:30.5.", parse_time
-)
-end_option = option(f"--end {TIME_FORM}", "Stop before this time.", parse_time)
+overwrite_option = option("--overwrite")
+scheduler_option = option("--scheduler ADDRESS")
+until_option = option("--until FRAME", POSITIVE, show_default="last frame of the ground truth")
+truth_option = option("--truth FILE", name="truths", multiple=True)
+start_option = option(f"--start {TIME_FORM}", parse_time)
+end_option = option(f"--end {TIME_FORM}", parse_time)
+jobs_option = option("--jobs N", PROCESSES, show_default="one per core")
+output_file_option = option("-o, --output FILE", PATH, required=True)
 
 
-def jobs_option(text: str) -> Callable[[F], F]:
-    """Add `--jobs N`."""
-    return option("--jobs N", text, PROCESSES, show_default="one per core")
+def paired(videos: Sequence[Path], truths: Sequence[Path]) -> list[tuple[Path, Path]]:
+    """Return each video with its ground truth. Raises `click.UsageError`."""
+    if len(videos) != len(truths):
+        given = f"videos: {len(videos)}, truths: {len(truths)}"
+        raise click.UsageError(f"pass one --truth for each video ({given})")
+    return list(zip(videos, truths, strict=True))
 
 
-def output_file_option(text: str) -> Callable[[F], F]:
-    """Add `-o FILE`, which is required."""
-    return option("-o, --output FILE", text, PATH, required=True)
-
-
-def check_suffix(output: Path, *suffixes: str, what: str) -> None:
-    """Refuse an output with another suffix. Raises `OutputError`."""
+def check_file(output: Path, *suffixes: str, what: str, overwrite: bool) -> None:
+    """Refuse an output with another suffix, or that cannot be written. Raises `OutputError`."""
     if output.suffix.lower() not in suffixes:
         raise OutputError(f"{output}: {what} must end in {suffixes[0]}")
+    check_output(output, overwrite=overwrite)
 
-
-Short = tuple[str, Any]
-"""A short form of a setting that was given: the key, and its value."""
 
 _SHORT = f"{__name__}.short"
 
 
 def short_form(
-    shown: str, key: str, text: str, kind: Any = None, *, multiple: bool = False
+    shown: str, key: str, kind: Any = None, *, multiple: bool = False
 ) -> Callable[[F], F]:
     """Add an option that is a short form of a setting: see `SettingsChoice`."""
 
@@ -181,23 +201,12 @@ def short_form(
         if given not in (None, ()) and given is not False:
             context.meta.setdefault(_SHORT, []).append((key, given))
 
-    words = f"{text.removesuffix('.')} (`{key}`)."
-    return option(shown, words, kind, expose_value=False, callback=keep, multiple=multiple)
+    return option(shown, kind, expose_value=False, callback=keep, multiple=multiple)
 
 
-model_option = short_form(
-    "--model FILE",
-    "detector.model",
-    "Detector model: .npz from vdet train, or .onnx. It determines which detector runs.",
-)
-class_option = short_form(
-    "--class NAME",
-    "classes",
-    "Keep only vehicles of this class, such as truck. Can be repeated.",
-    str,
-    multiple=True,
-)
-lanes_option = short_form("--lanes", "lanes.enabled", "Find and draw the lane.")
+model_option = short_form("--model FILE", "detector.model")
+class_option = short_form("--class NAME", "classes", str, multiple=True)
+lanes_option = short_form("--lanes", "lanes.enabled")
 
 
 @dataclass(frozen=True, slots=True)
@@ -224,8 +233,6 @@ class SettingsChoice:
         return load_settings(self._files(), assignments, detector=detector)
 
     def _files(self) -> list[Path]:
-        if not self.configs:
-            return []
         from vdet.config.loading import find_config
 
         return [find_config(name) for name in self.configs]
@@ -236,6 +243,14 @@ class SettingsChoice:
 
         shipped = set(shipped_configs().values())
         return given_values([path for path in self._files() if path not in shipped])
+
+    def run_name(self, settings: "Settings") -> "RunName":
+        """Return which detector these settings measure."""
+        from vdet.detect.factory import model_file
+        from vdet.evaluate.output import RunName
+
+        detector = settings.detector
+        return RunName(detector.kind, model_file(detector), self.name, self.assignments)
 
     @property
     def name(self) -> str | None:
@@ -256,18 +271,12 @@ def settings_options(example: str, *more: Callable[..., Any]) -> Callable[[F], F
     `example` is an assignment for the help text that changes what the command does.
     """
     config = option(
-        "-c, --config FILE",
-        "Read settings from a YAML file, or from a shipped one: default, svm or seed. Can be "
-        "repeated. Later files win.",
-        str,
-        name="configs",
-        multiple=True,
-        shell_complete=_complete_configs,
+        "-c, --config FILE", str, name="configs", multiple=True, shell_complete=_complete_configs
     )
     assign = option(
         "--set KEY=VALUE",
-        f"Change one setting, for example {example}. Can be repeated.",
         name="assignments",
+        help=f"Change one setting, for example {example}. Can be repeated.",
         multiple=True,
         shell_complete=_complete_keys,
     )
@@ -302,9 +311,9 @@ Wanted = tuple[str, Path]
 _WANTED = f"{__name__}.wanted"
 
 
-def output_option(shown: str, text: str) -> Callable[[F], F]:
+def output_option(shown: str) -> Callable[[F], F]:
     """Add the option of a sink, which asks for an output: see `wanted_outputs`."""
-    return option(shown, text, PATH, multiple=True, expose_value=False, callback=_want)
+    return option(shown, PATH, multiple=True, expose_value=False, callback=_want)
 
 
 def _want(context: click.Context, option: click.Parameter, given: tuple[Any, ...]) -> None:
@@ -320,12 +329,7 @@ def _parse_sink(text: str) -> Wanted:
 
 
 sink_option = option(
-    "--sink NAME=FILE",
-    "Write another output with the sink NAME. Can be repeated.",
-    _parse_sink,
-    multiple=True,
-    expose_value=False,
-    callback=_want,
+    "--sink NAME=FILE", _parse_sink, multiple=True, expose_value=False, callback=_want
 )
 
 

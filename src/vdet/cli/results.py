@@ -15,6 +15,7 @@ from vdet.files import OutputFiles, check_output, json_text, output_errors, writ
 
 if TYPE_CHECKING:
     from vdet.config.schema import Settings
+    from vdet.evaluate.report import Report
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +35,7 @@ class Results:
             A file already exists (and not `overwrite`), is an input, or cannot be written; or
             both outputs are one file.
         """
-        paths = [path for path in (self._json_file, self._page_file) if path]
+        paths = list(self._files.values())
         if len({path.resolve() for path in paths}) < len(paths):
             raise OutputError(f"{paths[0]}: is used for two outputs; rename one")
         for path in paths:
@@ -42,16 +43,13 @@ class Results:
             check_output(path, overwrite=self.overwrite, makes_folder=makes_folder)
 
     @property
-    def _json_file(self) -> Path | None:
-        return None if self.json_target in (None, "-") else Path(str(self.json_target))
-
-    @property
-    def _page_file(self) -> Path | None:
-        if self.page is None:
-            return None
+    def _files(self) -> dict[str, Path]:
+        """The files to write, by what they are."""
         from vdet.pages.render import PAGE_NAME
 
-        return self.page / PAGE_NAME
+        page = self.page and self.page / PAGE_NAME
+        targets = {"numbers": self.json_target, "page": page}
+        return {what: Path(to) for what, to in targets.items() if to not in (None, "-")}
 
     def print(
         self,
@@ -62,30 +60,24 @@ class Results:
         """Print lines of text, and write the files, which appear together. Raises `OutputError`."""
         to_stderr = self.json_target == "-"
         print_lines(*lines, err=to_stderr)
-        texts: dict[Path, str] = {}
-        if self._json_file:
-            texts[self._json_file] = json_text(values)
-        if self._page_file:
-            with progress_steps("") as steps:
-                steps("writing the page", None)
-                texts[self._page_file] = make_page()
         with OutputFiles(overwrite=self.overwrite) as files:
-            for path, text in texts.items():
-                with output_errors(path):
+            for what, path in self._files.items():
+                with progress_steps("") as steps, output_errors(path):
+                    steps(f"writing the {what}", None)
+                    text = make_page() if what == "page" else json_text(values)
                     write_text(files.stage_folder(path.parent) / path.name, text)
             if to_stderr:
                 write_json(values, "-")
-        if self._page_file:
-            print_lines("", f"{self._page_file}: the page", err=to_stderr)
+        if self.page:
+            print_lines("", f"{self._files['page']}: the page", err=to_stderr)
+
+    def print_report(self, report: "Report") -> None:
+        """Print and write what an evaluation found, as `print` does."""
+        self.print(report.lines(), report.values, report.page)
 
 
-_json_option = option(
-    "--json FILE",
-    "Write the results to FILE. With -, to standard output, and the text to standard error.",
-    str,
-    name="json_target",
-)
-_page_option = option("--page DIR", "Write a report with charts, page.html, into DIR.")
+_json_option = option("--json FILE", str, name="json_target")
+_page_option = option("--page DIR")
 
 facts_options = bundle("results", Results, _json_option, overwrite_option)
 """`--json FILE` and `--overwrite`."""
@@ -109,28 +101,8 @@ def check_counting(settings: "Settings", *, several: bool) -> None:
         )
 
 
-def counting_options(more: str = "") -> Callable[[F], F]:
-    """Add `--counts`, `--flows`, and the short forms `--interval` and `--begin`.
-
-    `more` ends the help of both outputs.
-    """
-    counts = options.output_option(
-        "--counts FILE",
-        "Write counts at lines and zones: .csv has the events, .totals.csv, .wide.csv and "
-        ".zones.csv have tables by interval, .json has everything. Can be repeated." + more,
-    )
-    flows = options.output_option(
-        "--flows FILE",
-        "Write flows from one line or zone to another: .csv has a row for each interval, flow and "
-        "class, .wide.csv has a row for each interval, with sums, .matrix.csv has a matrix, .json "
-        "has the flows and the matrix. Can be repeated." + more,
-    )
-    interval = short_form(
-        "--interval TIME",
-        "traffic.interval",
-        "Interval of tables and charts, such as 5min, 15min or 1h.",
-    )
-    begin = short_form(
-        "--begin TIME", "input.begin", "Start time of the video, such as '2026-05-01 07:00+02:00'."
-    )
-    return lambda command: counts(flows(interval(begin(command))))
+def counting_options(command: F) -> F:
+    """Add `--counts`, `--flows`, and the short forms `--interval` and `--begin`."""
+    counts, flows = map(options.output_option, ("--counts FILE", "--flows FILE"))
+    interval = short_form("--interval TIME", "traffic.interval")
+    return counts(flows(interval(short_form("--begin TIME", "input.begin")(command))))

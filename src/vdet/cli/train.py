@@ -11,14 +11,11 @@ from vdet.errors import DataError, counted
 from vdet.files import check_output, staged
 
 
-@command(
-    "vdet train vehicles.zip non-vehicles.zip mined.zip -o model.npz",
-    "vdet train patches/ -o model.npz --set train.svm.C=1e-3",
-)
+@command()
 @click.argument("data", nargs=-1, required=True, type=options.INPUT, metavar="DATA...")
-@options.output_file_option("Model file to write, .npz.")
+@options.output_file_option
 @options.settings_options("train.svm.C=1e-4")
-@options.jobs_option("Compute features in N threads.")
+@options.jobs_option
 @options.overwrite_option
 def train(
     data: tuple[Path, ...],
@@ -33,10 +30,21 @@ def train(
     A file boxes.csv beside these folders, such as vdet mine writes, has the box of the vehicle in
     each patch; with it the model also learns to find the sides of vehicles. The metrics are
     printed and stored in the model; vdet info --json reads them.
+
+    Parameters
+    ----------
+    output
+        Model file to write, .npz.
+    jobs
+        Compute features in N threads.
+
+    Examples
+    --------
+    vdet train vehicles.zip non-vehicles.zip mined.zip -o model.npz
+    vdet train patches/ -o model.npz --set train.svm.C=1e-3
     """
     settings = choice.read(detector="svm")
-    options.check_suffix(output, ".npz", what="models")
-    check_output(output, overwrite=overwrite)
+    options.check_file(output, ".npz", what="models", overwrite=overwrite)
     from vdet.detect.svm.model import save_model
     from vdet.learn.svm.dataset import find_patches
     from vdet.learn.svm.training import train as fit_model
@@ -49,21 +57,12 @@ def train(
     print_lines(*metrics.lines(), "", f"{output}: the model")
 
 
-@command(
-    "vdet mine in.mp4 --truth gt.txt -o mined.zip",
-    "vdet mine a.mp4 b.mp4 --truth a.txt --truth b.txt -o mined.zip",
-)
+@command()
 @click.argument("videos", nargs=-1, required=True, type=options.INPUT, metavar="IN...")
 @options.truth_option
-@options.output_file_option("Zip file to write.")
-@options.option("--every N", "Use every N-th frame of a video.", options.POSITIVE, default=4)
-@options.option(
-    "--from FRAME",
-    "Start at this frame, counted from 1.",
-    options.POSITIVE,
-    name="first",
-    default=1,
-)
+@options.output_file_option
+@options.option("--every N", options.POSITIVE, default=4)
+@options.option("--from FRAME", options.POSITIVE, name="first", default=1)
 @options.until_option
 @options.settings_options("labels.roles.tram=vehicle", options.model_option)
 @options.overwrite_option
@@ -82,22 +81,30 @@ def mine(
     Writes the labelled vehicles with their boxes, and false alarms: windows that the model
     classifies as vehicles although they contain none, or only a part of one. Ignore regions are
     skipped.
+
+    Parameters
+    ----------
+    output
+        Zip file to write.
+    every
+        Use every N-th frame of a video.
+    first
+        Start at this frame, counted from 1.
+
+    Examples
+    --------
+    vdet mine in.mp4 --truth gt.txt -o mined.zip
+    vdet mine a.mp4 b.mp4 --truth a.txt --truth b.txt -o mined.zip
     """
     if until is not None and until < first:
         raise click.UsageError("--until must not be before --from")
-    options.check_suffix(output, ".zip", what="patches")
+    options.check_file(output, ".zip", what="patches", overwrite=overwrite)
     settings = choice.read_for_whole_frames(detector="svm")
     from vdet.detect.svm.detector import load_svm
     from vdet.learn.svm import mining
 
-    check_output(output, overwrite=overwrite)
-    if len(videos) != len(truths):
-        given = f"videos: {len(videos)}, truths: {len(truths)}"
-        raise click.UsageError(f"pass one --truth for each video ({given})")
-    labelled = [
-        mining.VideoSource(video, truth, every, first, until)
-        for video, truth in zip(videos, truths, strict=True)
-    ]
+    pairs = options.paired(videos, truths)
+    labelled = [mining.VideoSource(*pair, every, first, until) for pair in pairs]
     model = load_svm(settings.svm, Path(settings.svm.model) if settings.svm.model else None)
     with progress_steps(" frames") as steps:
         frames, counts = mining.mine(
@@ -108,21 +115,11 @@ def mine(
     print_lines(f"{output}: {found}, {alarms}; from {counted(frames, 'frame')}")
 
 
-@command(
-    "vdet train-net pictures/city pictures/motorway -o mine.onnx",
-    "vdet train-net pictures/ -o mine.onnx --video drive.mp4 drive-truth.txt",
-)
+@command()
 @click.argument("data", nargs=-1, type=options.INPUT, metavar="[DATA]...")
-@options.output_file_option("Network to write, .onnx.")
-@options.option(
-    "--video CLIP TRUTH",
-    "Also train on every fourth frame of a labelled video. Can be repeated.",
-    options.INPUT,
-    name="clips",
-    nargs=2,
-    multiple=True,
-)
-@options.option("--base FILE", "Start from the weights of this network of vdet train-net.")
+@options.output_file_option
+@options.option("--video CLIP TRUTH", options.INPUT, name="clips", nargs=2, multiple=True)
+@options.option("--base FILE")
 @options.settings_options("train.net.steps=4000")
 @options.overwrite_option
 def train_net(
@@ -138,10 +135,24 @@ def train_net(
     Each DATA is a set of labelled images in COCO, KITTI, YOLO or Pascal VOC format. The state is
     saved beside the network, as .ckpt; if training stops, run the same command to resume.
     Requires torch and onnx: pip install torch onnx
+
+    Parameters
+    ----------
+    output
+        Network to write, .onnx.
+    clips
+        Also train on every fourth frame of a labelled video. Can be repeated.
+    base
+        Start from the weights of this network of vdet train-net.
+
+    Examples
+    --------
+    vdet train-net pictures/city pictures/motorway -o mine.onnx
+    vdet train-net pictures/ -o mine.onnx --video drive.mp4 drive-truth.txt
     """
     if not data and not clips:
         raise click.UsageError("nothing to learn from; pass DATA or --video")
-    options.check_suffix(output, ".onnx", what="networks")
+    options.check_file(output, ".onnx", what="networks", overwrite=overwrite)
     settings = choice.read()
     try:
         from vdet.learn.net.sources import clip_source, picture_source
@@ -153,7 +164,6 @@ def train_net(
     from vdet.workers import limit_library_threads
 
     limit_library_threads()
-    check_output(output, overwrite=overwrite)
     roles = Roles.for_training(settings)
     sources = [picture_source(read_labelled_pictures(path, roles), settings) for path in data]
     sources += [clip_source(clip, truth, settings) for clip, truth in clips]

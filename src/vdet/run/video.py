@@ -162,7 +162,7 @@ def open_video(
         def results() -> Generator[FrameResult]:
             with closing(pipeline.follow(frames, run.source, threads=threads)) as found:
                 for result in found:
-                    traffic.add(result.frame_tracks)
+                    traffic.add(replace(result, facts={}).frame_tracks)  # it reads no facts
                     yield result.of_classes(settings.classes)
             facts.update(pipeline.facts())
             traffic.end(is_still=findings_in(facts).is_still)

@@ -6,32 +6,24 @@ by interval; events have the name of their video.
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import astuple
+from dataclasses import astuple, fields
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from vdet.traffic.counts import (
-    CountRow,
-    Counts,
-    Event,
-    FlowRow,
-    count_table,
-    flow_table,
-    zone_table,
-)
+from vdet.traffic import counts as tables
+from vdet.traffic.counts import CountRow, Counts, Event, FlowRow, ZoneRow
 from vdet.traffic.tables import VIDEO, is_json, join_tables, plain_moment, write_content
 
-_EVENTS = (
-    *("time", "clock", "frame", "name", "direction"),
-    *("id", "vehicle", "class", "score", "seconds"),
-    *("speed", "speed_sd", "mean_speed"),
-)
-_TOTALS = ("start", "end", "name", "direction", "class", "count")
-_ZONES = (
-    *("start", "end", "name", "entered", "left"),
-    *("mean", "most", "mean_stay", "longest_stay"),
-)
-_FLOWS = ("start", "end", "from", "to", "class", "count")
+_HEADINGS = {"class_name": "class", "origin": "from", "destination": "to"}
+
+
+def _columns(row: type[Any]) -> tuple[str, ...]:
+    return tuple(_HEADINGS.get(field.name, field.name) for field in fields(row))
+
+
+_TOTALS, _ZONES, _FLOWS = map(_columns, (CountRow, ZoneRow, FlowRow))
+_EVENTS = ("time", "clock", *_columns(Event)[1:])
 
 NOWHERE = "(none)"
 """In tables, where a flow leads that ends at its first line or zone."""
@@ -46,8 +38,10 @@ Videos = Mapping[str, Counts]
 """The counts of videos by their names."""
 
 
-def write_counts(path: Path, videos: Videos, interval: int | None = None) -> None:
-    """Write the events, or what the ending of `path` says: totals (also wide), zones, all as JSON.
+def counts_content(path: Path, videos: Videos, interval: int | None = None) -> Any:
+    """Return the events, or what the ending of `path` says: totals (also wide), zones, all as JSON.
+
+    `write_content` takes it.
 
     Parameters
     ----------
@@ -59,44 +53,32 @@ def write_counts(path: Path, videos: Videos, interval: int | None = None) -> Non
     ConfigError
         As `count_table`.
     """
-    write_content(path, counts_content(path, videos, interval))
-
-
-def counts_content(path: Path, videos: Videos, interval: int | None = None) -> Any:
-    """Return what `write_counts` writes, as `write_content` takes it."""
     every = list(videos.values())
     if is_json(path):
-        tables = {
-            "totals": _items(_TOTALS, count_table(every, interval)),
-            "zones": _items(_ZONES, zone_table(every, interval)),
-        }
-        return _json(videos, interval, tables, events=True)
+        totals, zones = tables.count_table(every, interval), tables.zone_table(every, interval)
+        content = {"totals": _items(_TOTALS, totals), "zones": _items(_ZONES, zones)}
+        return _json(videos, interval, content, events=True)
     if _is_table(path, ".totals"):
-        return [_TOTALS, *map(_cells, count_table(every, interval))]
+        return [_TOTALS, *map(_cells, tables.count_table(every, interval))]
     if _is_table(path, ".wide"):
-        return wide_table(count_table(every, interval), ": ")
+        return wide_table(tables.count_table(every, interval), ": ")
     if _is_table(path, ".zones"):
-        return [_ZONES, *map(_cells, zone_table(every, interval))]
+        return [_ZONES, *map(_cells, tables.zone_table(every, interval))]
     alone = len(videos) == 1  # then the name is left out
     rows = [(name, *_event(video, e)) for name, video in videos.items() for e in video.events]
     return [(VIDEO, *_EVENTS)[alone:], *(row[alone:] for row in rows)]
 
 
-def write_flows(path: Path, videos: Videos, interval: int | None = None) -> None:
-    """Write the flows, or what the ending of `path` says: wide, their matrix, or all as JSON.
-
-    Parameters and errors as of `write_counts`.
-    """
-    write_content(path, flows_content(path, videos, interval))
-
-
 def flows_content(path: Path, videos: Videos, interval: int | None = None) -> Any:
-    """Return what `write_flows` writes, as `write_content` takes it."""
+    """Return the flows, or what the ending of `path` says: wide, their matrix, or all as JSON.
+
+    Parameters and errors as of `counts_content`.
+    """
     every = list(videos.values())
-    rows = flow_table(every, interval)
+    rows = tables.flow_table(every, interval)
     if is_json(path):
-        tables = {"flows": _items(_FLOWS, rows), "matrix": flow_matrix(every, rows)}
-        return _json(videos, interval, tables, events=False)
+        content = {"flows": _items(_FLOWS, rows), "matrix": flow_matrix(every, rows)}
+        return _json(videos, interval, content, events=False)
     if _is_table(path, ".wide"):
         return wide_table(rows, " to ")
     if _is_table(path, ".matrix"):
@@ -141,34 +123,23 @@ def _matrix_columns(videos: Iterable[Counts]) -> tuple[str, ...]:
     return ("from", *dict.fromkeys(name for video in videos for name, _ in video.ways), NOWHERE)
 
 
-def join_counts(videos: Mapping[str, Any], path: Path) -> None:
+def _join(table: str, videos: Mapping[str, Any], path: Path) -> None:
     """Write one file over the videos of a batch, from the content for each.
 
-    A row gets the name of its video; JSON has the totals over all videos, and the JSON of each.
+    A row gets the name of its video; JSON has the sums of a table over all videos and intervals,
+    and the JSON of each.
     """
-    _join(videos, path, "totals", _TOTALS)
-
-
-def join_flows(videos: Mapping[str, Any], path: Path) -> None:
-    """Write the flows of the videos of a batch into one file, as `join_counts` does."""
-    _join(videos, path, "flows", _FLOWS)
-
-
-def _join(videos: Mapping[str, Any], path: Path, table: str, columns: Sequence[str]) -> None:
-    if is_json(path):
-        content: Any = _joined(table, columns[2:-1], videos)
-    else:
-        content = join_tables(videos, missing=0)
-    write_content(path, content)
-
-
-def _joined(table: str, keys: Sequence[str], videos: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the JSON of many videos, with the sum of the rows of a table over all of them."""
-    counts: Counter[tuple[str, ...]] = Counter()
+    if not is_json(path):
+        write_content(path, join_tables(videos, missing=0))
+        return
+    found: Counter[tuple[tuple[str, Any], ...]] = Counter()
     for row in (row for video in videos.values() for row in video[table]):
-        counts[tuple(row[key] for key in keys)] += row["count"]
-    rows = [dict(zip(keys, key, strict=True)) | {"count": n} for key, n in counts.items()]
-    return {table: rows, "videos": videos}
+        found[tuple(row.items())[2:-1]] += row["count"]
+    sums = [dict(key) | {"count": count} for key, count in found.items()]
+    write_content(path, {table: sums, "videos": videos})
+
+
+join_counts, join_flows = partial(_join, "totals"), partial(_join, "flows")
 
 
 def _json(

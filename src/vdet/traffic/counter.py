@@ -2,11 +2,11 @@
 
 import math
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from statistics import median
 
-from vdet.config.places import TrafficSettings
+from vdet.config.schema import Settings
 from vdet.detect.classes import is_chosen
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Span, add_frame
@@ -49,8 +49,6 @@ class VehicleCounter:
     ----------
     begun
         Number of vehicles before the first one.
-    classes
-        Only vehicles of these classes are counted; none means all.
 
     Attributes
     ----------
@@ -67,20 +65,11 @@ class VehicleCounter:
         They are given for frames of another aspect ratio than `width` × `height` pixels.
     """
 
-    def __init__(
-        self,
-        settings: TrafficSettings,
-        width: int,
-        height: int,
-        *,
-        begun: int = 0,
-        classes: Collection[str] = (),
-    ) -> None:
-        self._classes = classes
-        self.lines, self.zones = place(settings, width, height)
+    def __init__(self, settings: Settings, width: int, height: int, begun: int = 0) -> None:
+        self._settings = settings
+        self.lines, self.zones = place(settings.traffic, width, height)
         self.spans: list[Span] = []
         self._borders: tuple[Border, ...] = (*self.lines, *self.zones)
-        self._confirmed = settings.min_seen_seconds
         self.linker = TrackLinker(width, height, begun)
         self._ended: list[_Passage] = []
         self._tally: Counter[Way] = Counter()  # of those
@@ -106,13 +95,10 @@ class VehicleCounter:
         passages = self._ended + self._passages(self.linker.open_paths())
         events = [event for passage in passages for event in passage.events]
         events.sort(key=lambda item: (item.time, item.frame, item.id, item.name))
-        return Counts(
-            tuple(events),
-            tuple((border.name, way) for border in self._borders for way in border.directions),
-            tuple(zone.name for zone in self.zones),
-            tuple(self.spans) or ((0.0, 0.0),),
-            warnings=tuple(_line_warnings(self.lines, passages)),
-        )
+        ways = tuple((border.name, way) for border in self._borders for way in border.directions)
+        zones, spans = tuple(zone.name for zone in self.zones), tuple(self.spans) or ((0.0, 0.0),)
+        warnings = tuple(_line_warnings(self.lines, passages))
+        return Counts(tuple(events), ways, zones, spans, warnings=warnings)
 
     def so_far(self) -> Counter[Way]:
         """Return how often each direction was counted; vehicles that are in a zone stay there.
@@ -136,9 +122,9 @@ class VehicleCounter:
         return [
             self._passage(path)
             for path in paths
-            if path.seconds >= self._confirmed
+            if path.seconds >= self._settings.traffic.min_seen_seconds
             and path.has_driven
-            and is_chosen(path.class_name, self._classes)
+            and is_chosen(path.class_name, self._settings.classes)
         ]
 
     def _passage(self, path: VehiclePath) -> _Passage:
@@ -147,34 +133,25 @@ class VehicleCounter:
         # Where it begins and ends, but for the ends of the video.
         rows = [row for row in (0, last) if start < path.times[row] < now]
         points, reach = path.points[rows], _NEAR * path.heights[rows]
-        return _Passage(
-            [_event(path, name, window) for name, some in found.items() for window in some],
-            {
-                name: path.heights[[window.row for window in some]].tolist()
-                for name, some in found.items()
-            },
-            [
-                line.name
-                for line in self.lines
-                if not found[line.name]
-                and (distances_to([(line.start, line.end)], points)[:, 0] <= reach).any()
-            ],
-        )
+        events, heights = list[Event](), {}
+        for name, some in found.items():
+            events += [_event(path, name, crossing) for crossing in some]
+            heights[name] = path.heights[[crossing.row for crossing in some]].tolist()
+        missed = [
+            line.name
+            for line in self.lines
+            if not found[line.name]
+            and (distances_to([(line.start, line.end)], points)[:, 0] <= reach).any()
+        ]
+        return _Passage(events, heights, missed)
 
 
 def _event(path: VehiclePath, name: str, crossing: Crossing) -> Event:
     row, stay = crossing.row, crossing.seconds
-    return Event(
-        round(crossing.time, 3),
-        int(path.frames[row]),
-        name,
-        crossing.direction,
-        path.track_at(row),
-        path.vehicle,
-        path.class_name,
-        round(float(path.scores[row]), 4),
-        None if stay is None else round(stay, 3),
-    )
+    time, frame, score = round(crossing.time, 3), int(path.frames[row]), float(path.scores[row])
+    known = path.track_at(row), path.vehicle, path.class_name, round(score, 4)
+    stay = None if stay is None else round(stay, 3)
+    return Event(time, frame, name, crossing.direction, *known, stay)
 
 
 def _line_warnings(lines: Sequence[PlacedLine], passages: Sequence[_Passage]) -> Iterator[str]:

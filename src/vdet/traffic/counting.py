@@ -76,9 +76,7 @@ def count_files(
 
 
 def count_frames(
-    frames: Iterable[FrameTracks],
-    settings: Settings,
-    size: tuple[int, int] | None = None,
+    frames: Iterable[FrameTracks], settings: Settings, size: tuple[int, int] | None = None
 ) -> Counts:
     """Count the vehicles in the tracks of each frame; arguments and errors as of `count_files`."""
     group = _Group(settings, _size(settings, size))
@@ -116,18 +114,11 @@ class _Video:
 class _Group:
     """Videos that follow one another, with one counter."""
 
-    def __init__(
-        self,
-        settings: Settings,
-        size: tuple[int, int],
-        begun: int = 0,
-    ) -> None:
+    def __init__(self, settings: Settings, size: tuple[int, int], begun: int = 0) -> None:
         settings.camera.check_frames(*size)
         self._size = size
         self._ground = ground_of(settings.camera, *size)
-        self.counter = VehicleCounter(
-            settings.traffic, *size, begun=begun, classes=settings.classes
-        )
+        self.counter = VehicleCounter(settings, *size, begun)
         self._videos: list[_Video] = []
 
     def goes_on(self, size: tuple[int, int], clock: Clock | None, first: float | None) -> bool:

@@ -297,11 +297,9 @@ def zone_table(videos: Sequence[Counts], interval: int | None = None) -> list[Zo
         visits: dict[int, list[_Visit]] = {number: [] for number in intervals.numbers}
         for which, video in enumerate(videos):
             for event in (event for event in video.events if event.name == name):
-                time, change = (
-                    intervals.seconds(which, event.time),
-                    1 if event.direction in _IN else -1,
-                )
-                visits[intervals.number_at(time)].append((time, change, event.seconds))
+                time = intervals.seconds(which, event.time)
+                visit = time, 1 if event.direction in _IN else -1, event.seconds
+                visits[intervals.number_at(time)].append(visit)
         inside = 0
         for number, some in visits.items():
             rows.append(_zone_row(name, intervals, number, some, inside))
@@ -324,16 +322,12 @@ def _zone_row(
     used = sum(n * (b - a) for n, (a, b) in zip(levels, pairwise(times), strict=True))
     covered = intervals.covered(number)  # nothing, where only one frame is in the interval
     stays = [stay for _, _, stay in visits if stay is not None]
-    return ZoneRow(
-        *intervals.moments(number),
-        name,
-        sum(change > 0 for _, change, _ in visits),
-        sum(change < 0 for _, change, _ in visits),
-        round(used / covered, 3) if covered else float(inside),
-        max(levels),
-        round(sum(stays) / len(stays), 3) if stays else None,
-        max(stays, default=None),
-    )
+    changes = sum(change > 0 for _, change, _ in visits), sum(change < 0 for _, change, _ in visits)
+    mean = round(used / covered, 3) if covered else float(inside)
+    stay = round(sum(stays) / len(stays), 3) if stays else None
+    ways = name, *changes, mean, max(levels), stay, max(stays, default=None)
+    start, until = intervals.moments(number)
+    return ZoneRow(start, until, *ways)
 
 
 def _intervals(videos: Sequence[Counts], interval: int | None) -> Intervals:

@@ -135,11 +135,8 @@ class TrackLinker:
         ended = [key for key, vehicle in self._vehicles.items() if vehicle.shown < oldest]
         paths = [self._vehicles.pop(key).path(self._now) for key in ended]
         shown = {track.id for track in frame.tracks}
-        lost = (
-            None
-            if shown <= self._vehicles.keys()
-            else _Lost(self._vehicles, shown, self._now, self._size)
-        )
+        is_new = not shown <= self._vehicles.keys()
+        lost = _Lost(self._vehicles, shown, self._now, self._size) if is_new else None
         for track in frame.tracks:
             vehicle = self._vehicles.get(track.id) or self._begin(track, lost)
             vehicle.see(track, self._now, frame.index)

@@ -1,18 +1,16 @@
 """What reads the tracks of a video while it is processed: records, counts and speeds."""
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from vdet.config.schema import Settings
 from vdet.detect.classes import is_chosen
+from vdet.lanes.ground import ground_of
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Clock
+from vdet.traffic.counter import VehicleCounter
+from vdet.traffic.counts import Counts
 from vdet.traffic.records import VehicleRecord, VehicleRecords
-
-if TYPE_CHECKING:  # most runs need neither
-    from vdet.traffic.counter import VehicleCounter
-    from vdet.traffic.counts import Counts
-    from vdet.traffic.speeds import SpeedMeter
+from vdet.traffic.speeds import SpeedMeter, with_speeds
 
 
 class LiveTraffic:
@@ -35,10 +33,10 @@ class LiveTraffic:
         The ground does not fit the frames, `width` × `height` pixels.
     """
 
-    counter: "VehicleCounter | None" = None
-    speeds: "SpeedMeter | None" = None
+    counter: VehicleCounter | None = None
+    speeds: SpeedMeter | None = None
     vehicles: tuple[VehicleRecord, ...] = ()
-    _final: "Counts | None" = None
+    _final: Counts | None = None
 
     def __init__(
         self, settings: Settings, width: int, height: int, clock: Clock | None = None
@@ -47,15 +45,9 @@ class LiveTraffic:
         self._records = VehicleRecords(width)
         self._classes = settings.classes
         if settings.traffic:
-            from vdet.traffic.counter import VehicleCounter
-
-            self.counter = VehicleCounter(settings.traffic, width, height, classes=self._classes)
-        if settings.camera.ground:
-            from vdet.lanes.ground import ground_of
-            from vdet.traffic.speeds import SpeedMeter
-
-            if ground := ground_of(settings.camera, width, height):
-                self.speeds = SpeedMeter(ground, width, height)
+            self.counter = VehicleCounter(settings, width, height)
+        if ground := ground_of(settings.camera, width, height):
+            self.speeds = SpeedMeter(ground, width, height)
 
     def add(self, frame: FrameTracks) -> None:
         """Add the tracks of the next frame."""
@@ -65,12 +57,10 @@ class LiveTraffic:
         if self.speeds:
             self.speeds.add(frame)
 
-    def counts(self) -> "Counts | None":
+    def counts(self) -> Counts | None:
         """Return all counts so far, with the speeds that are known."""
         if self._final or self.counter is None:
             return self._final
-        from vdet.traffic.speeds import with_speeds
-
         return with_speeds(replace(self.counter.counts(), clock=self.clock), self.speeds)
 
     def end(self, *, is_still: bool = False) -> None:

@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import Any, Literal, get_args
 
 from vdet.boxes import Box, Image
 from vdet.media import Picture
@@ -13,10 +13,8 @@ from vdet.polygons import Point
 from vdet.track.track import FrameTracks, State, Track
 from vdet.traffic.clock import Clock
 from vdet.traffic.linking import MOVED
+from vdet.traffic.speeds import KMH, SpeedMeter, Speeds
 from vdet.traffic.tables import VIDEO, is_json, join_tables, plain_moment, write_content
-
-if TYPE_CHECKING:  # most runs measure no speed
-    from vdet.traffic.speeds import SpeedMeter, Speeds
 
 PATH_STEP = 0.01
 """Distance after which a path gets its next point, as a fraction of the frame's width.
@@ -94,7 +92,7 @@ class VehicleRecord:
     class_name: str | None = None
     path: list[Point] = field(default_factory=list)
     followed: list[tuple[float, float]] = field(default_factory=list)
-    speeds: "Speeds | None" = None
+    speeds: Speeds | None = None
     motion: Motion | None = None
     distance: float | None = None
     lanes: Counter[int] = field(default_factory=Counter)
@@ -192,7 +190,7 @@ class VehicleRecords:
         self._latest = frame
 
     def end(
-        self, meter: "SpeedMeter | None" = None, *, is_still: bool = False
+        self, meter: SpeedMeter | None = None, *, is_still: bool = False
     ) -> tuple[VehicleRecord, ...]:
         """Return the records by id, with the speeds of a meter; call it once, at the end.
 
@@ -250,26 +248,12 @@ def _row(record: VehicleRecord, clock: Clock | None) -> dict[str, Any]:
     lengths = round(record.length, 1), round(record.share, 4)
     speeds: list[float | None] = [None] * 4
     if known := record.speeds:
-        from vdet.traffic.speeds import KMH
-
-        in_kmh = [
-            KMH * item for item in (known.quantile(0.5), known.quantile(0.85), known.deviation)
-        ]
-        speeds = [round(value, 1) for value in (known.metres, *in_kmh)]
-    who = record.id, record.class_name, begin
-    values = (
-        *who,
-        *times,
-        *states,
-        *scores,
-        *ends,
-        *lengths,
-        *record.largest.xywh,
-        *speeds,
-        record.motion,
-        None if record.distance is None else round(record.distance, 1),
-        record.lane,
-    )
+        measured = known.quantile(0.5), known.quantile(0.85), known.deviation
+        speeds = [round(value, 1) for value in (known.metres, *(KMH * item for item in measured))]
+    distance = None if record.distance is None else round(record.distance, 1)
+    seen = record.id, record.class_name, begin, *times, *states, *scores
+    places = *ends, *lengths, *record.largest.xywh
+    values = *seen, *places, *speeds, record.motion, distance, record.lane
     return dict(zip(_COLUMNS, values, strict=True))
 
 

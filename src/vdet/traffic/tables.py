@@ -3,7 +3,7 @@
 import csv
 import json
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -27,18 +27,6 @@ def is_json(path: Path) -> bool:
     return path.suffix.lower() == ".json"
 
 
-def write_table(path: Path, columns: Iterable[str], rows: Iterable[Iterable[Any]]) -> None:
-    """Write a table with a heading.
-
-    A text that a spreadsheet would take for a formula gets an apostrophe in front.
-    """
-    # The name of a video may be no valid text.
-    with path.open("w", encoding="utf-8", errors="backslashreplace", newline="") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(map(_plain_text, columns))
-        table.writerows(map(_plain_text, row) for row in rows)
-
-
 def _plain_text(cell: Any) -> Any:
     return f"'{cell}" if isinstance(cell, str) and _FORMULA.match(cell) else cell
 
@@ -50,23 +38,13 @@ def plain_moment(value: Any) -> Any:
     return value.isoformat(" ", "milliseconds" if value.microsecond else "seconds")
 
 
-def write_json(path: Path, value: Any) -> None:
-    """Write JSON, indented."""
-    text = json.dumps(value, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
-    write_text(path, text)
-
-
 def check_table(path: Path) -> None:
     """Refuse a table that needs a package that is not installed. Raises `OutputError`."""
-    if _is_parquet(path):
+    if path.suffix.lower() == ".parquet":
         try:
             import pyarrow.parquet  # noqa: F401
         except ImportError as error:
             raise OutputError(f"{path}: pyarrow is not installed; pip install pyarrow") from error
-
-
-def _is_parquet(path: Path) -> bool:
-    return path.suffix.lower() == ".parquet"
 
 
 def _write_parquet(path: Path, columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
@@ -83,14 +61,20 @@ def _write_parquet(path: Path, columns: Sequence[str], rows: Sequence[Sequence[A
 
 
 def write_content(path: Path, content: Any) -> None:
-    """Write JSON or a table (a list: heading, rows), as the suffix of `path` says."""
-    if is_json(path):
-        write_json(path, content)
-    elif _is_parquet(path):
-        _write_parquet(path, content[0], content[1:])
-    else:
-        heading, *rows = content
-        write_table(path, heading, rows)
+    """Write JSON or a table (a list: heading, rows), as the suffix of `path` says.
+
+    In `.csv`, a text that a spreadsheet would take for a formula gets an apostrophe in front.
+    """
+    match path.suffix.lower():
+        case ".json":
+            text = json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+            write_text(path, text)
+        case ".parquet":
+            _write_parquet(path, content[0], content[1:])
+        case _:  # the name of a video may be no valid text
+            with path.open("w", encoding="utf-8", errors="backslashreplace", newline="") as file:
+                rows = (map(_plain_text, row) for row in content)
+                csv.writer(file, lineterminator="\n").writerows(rows)
 
 
 def join_tables(
