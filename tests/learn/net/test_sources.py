@@ -31,14 +31,17 @@ def test_vehicles_of_a_labelled_video_keep_their_classes(tmp_path: Path) -> None
         "1,5,5,20,20,1,detected,lorry",
         "2,30,5,20,20,1,detected,vehicle",
         "3,5,30,20,20,1,detected,",
+        "4,40,40,20,20,1,detected,ignore",
     ]
     header = "frame,time,id,x,y,width,height,score,state,class"
     truth.write_text("\n".join([header, *(f"3,0.1,{row}" for row in rows)]))
     settings = Settings()
-    source, _ = clip_source(clip, truth, settings)
+    source, report = clip_source(clip, truth, settings)
     (sample,) = source.samples
     classes = settings.train.net.classes
-    assert sample.classes.tolist() == [classes.index("truck"), UNKNOWN, classes.index("car")]
+    truck, car = classes.index("truck"), classes.index("car")
+    assert sample.classes.tolist() == [truck, UNKNOWN, car, UNKNOWN]
+    assert report.ignored == {"vehicle": 1}
 
 
 def test_a_class_without_labels_makes_the_picture_an_ignore_region_for_it(tmp_path: Path) -> None:

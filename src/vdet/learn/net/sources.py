@@ -156,27 +156,32 @@ def clip_source(video: Path, truth: Path, settings: Settings) -> Source:
     VideoError
         The video cannot be read, or is too damaged.
     """
-    frames = _clip_frames(video, truth, Roles.for_training(settings), settings)
-    return _source(video.name, frames, LabelledPictures(video.name, ()), settings)
+    roles = Roles.for_training(settings)
+    saved = read_true_labels(truth, roles)
+    known = None if saved.known is None else [index + 1 for index in saved.known]
+    last = max((*(label.frame for label in saved.labels), *(known or ())), default=0)
+    used = spread_frames(known, EVERY, EVERY, last)
+    labels: dict[int, list[Label]] = defaultdict(list)
+    for label in saved.labels:
+        if label.frame in used:
+            name = roles.class_of(label.name or "car") or "vehicle"
+            labels[label.frame].append(label._replace(name=name))
+    ignored = Counter(
+        label.name or "" for some in labels.values() for label in some if label.ignored
+    )
+    labelled = LabelledPictures(video.name, (), ignored=tuple(ignored.most_common()))
+
+    def frames() -> _Frames:
+        with VideoReader(video, frames=last, settings=settings.input) as reader:
+            for number, frame in enumerate(reader, start=1):
+                if number in used:
+                    yield frame.image, LabelledPicture(video, truth, tuple(labels[number]))
+
+    return _source(video.name, frames(), labelled, settings)
 
 
 _Frames = Iterator[tuple[Image, LabelledPicture]]
 """Pictures, each with its labels."""
-
-
-def _clip_frames(video: Path, truth_file: Path, roles: Roles, settings: Settings) -> _Frames:
-    labels: dict[int, list[Label]] = defaultdict(list)
-    truth = read_true_labels(truth_file, roles)
-    for label in truth.labels:
-        name = roles.class_of(label.name or "car") or "vehicle"
-        labels[label.frame].append(label._replace(name=name))
-    last = max(labels, default=0)
-    known = None if truth.known is None else (index + 1 for index in truth.known)
-    used = spread_frames(known, EVERY, EVERY, last)
-    with VideoReader(video, frames=last, settings=settings.input) as reader:
-        for number, frame in enumerate(reader, start=1):
-            if number in used:
-                yield frame.image, LabelledPicture(video, truth_file, tuple(labels[number]))
 
 
 def _source(name: str, frames: _Frames, labelled: LabelledPictures, settings: Settings) -> Source:
