@@ -31,8 +31,12 @@ assert len(results) == 8 and results[-1].tracks
 for overwrite in (False, True):
     run = vdet.Run(clip, frames=8, overwrite=overwrite)
     vdet.detect_video(run, "out.mp4", tracks=["t.csv", "t.jsonl"])
-visits = vdet.count("t.csv", vdet.load_settings(lines)).totals
-assert max(total.count for total in visits) == len(results[-1].tracks)
+header = "frame,time,id,x,y,width,height,score,state,class"
+rows = [f"{i},{i / 25},1,{10 * i},80,30,20,1,detected,car" for i in range(20)]
+Path("moving.csv").write_text(chr(10).join([header, *rows]))
+visits = vdet.count("moving.csv", vdet.load_settings(lines)).totals
+counted = {visit.direction: visit.count for visit in visits if visit.count}
+assert counted == {"appear": 1, "vanish": 1}, counted
 vdet.evaluate_tracks("t.csv", "t.csv")
 """
 
@@ -66,5 +70,5 @@ def test_without_locks_limits_and_forks_vehicles_are_found_followed_and_counted(
             check=False,
         )
         assert (done.returncode, done.stderr) == (0, ""), done.stderr
-    made = {"out.mp4", "t.csv", "t.jsonl", "counts.csv"}
+    made = {"out.mp4", "t.csv", "t.jsonl", "moving.csv", "counts.csv"}
     assert set(names(tmp_path)) == made | {"in.mp4", "lines.yaml", "sitecustomize.py"}

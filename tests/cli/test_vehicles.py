@@ -29,7 +29,7 @@ def addresses_in(page: Path) -> list[str]:
     html = page.read_text(encoding="utf-8")
     text = html.partition('id="vehicles"')[2].partition(">")[2].partition("</script>")[0]
     table = json.loads(text)
-    made = [*(video["page"] for video in table["videos"]), *table["picture"]]
+    made = [*table["pages"], *table["picture"]]
     every = [*Elements(html).addresses(), *filter(None, made)]
     return [address for address in every if not address.startswith("data:")]
 
