@@ -185,7 +185,8 @@ def test_a_run_has_its_own_part_and_settings(clip_path: Path) -> None:
 
 
 def test_a_run_is_a_value() -> None:
-    one, other = (vdet.Run(Path("a.mp4"), settings=vdet.load_settings()) for _ in range(2))
+    paths: tuple[Any, ...] = Path("a.mp4"), "a.mp4"
+    one, other = (vdet.Run(path, settings=vdet.load_settings()) for path in paths)
     assert one == other
     assert len({one, other, pickle.loads(pickle.dumps(one))}) == 1
 

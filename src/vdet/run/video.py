@@ -70,6 +70,7 @@ class Run:
     threads: int | None = None
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "source", Path(self.source))  # notebooks pass text
         check_positive(frames=self.frames, threads=self.threads)
 
     @property
