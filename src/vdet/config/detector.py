@@ -64,7 +64,7 @@ class NetworkSettings(DetectorSettings):
     """net: a network."""
     searches_per_second: Searches = 12.0
     min_score_still: Share = 0.45
-    min_score: float = Field(0.1, gt=0, lt=1)
+    min_score: float = Field(0.03, gt=0, lt=1)
     """Ignore boxes with a lower score."""
     nms_iou: Share = 0.55
     """Remove a box if its intersection over union with a better one is higher."""
