@@ -146,7 +146,7 @@ class SvmDetector:
         """Search the windows of a frame, in the order of `grids`; threads may call this at once."""
         frame = FramePyramid(picture, self._features, *self._searched)
         probability = self._settings.search.probability
-        results = (search.search(frame, probability) for search in self._searches)
+        results = [search.search(frame, probability) for search in self._searches]
         probabilities, sides = map(np.concatenate, zip(*results, strict=True))
         vehicles = vehicle_boxes(self._boxes.astype(np.float32), sides)
         return Windows(self._boxes, probabilities, self._shares, vehicles), index is None
