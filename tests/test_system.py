@@ -19,7 +19,7 @@ for module, names in (
         delattr(module, name)
 """
 
-USES_THE_API = """
+USES_THE_API = r"""
 from pathlib import Path
 import numpy as np
 import vdet
@@ -33,7 +33,7 @@ for overwrite in (False, True):
     vdet.detect_video(run, "out.mp4", tracks=["t.csv", "t.jsonl"])
 header = "frame,time,id,x,y,width,height,score,state,class"
 rows = [f"{i},{i / 25},1,{10 * i},80,30,20,1,detected,car" for i in range(20)]
-Path("moving.csv").write_text(chr(10).join([header, *rows]))
+Path("moving.csv").write_text("\n".join([header, *rows]))
 visits = vdet.count("moving.csv", vdet.load_settings(lines)).totals
 counted = {visit.direction: visit.count for visit in visits if visit.count}
 assert counted == {"appear": 1, "vanish": 1}, counted

@@ -147,6 +147,13 @@ seen.near = shownRows();
 
 
 @needs_chromium
+def test_of_videos_without_vehicles_the_table_says_so(tmp_path: Path) -> None:
+    acts = 'const seen = document.getElementById("range").textContent;'
+    page = index(tmp_path, {"a": facts()})
+    assert seen(page, acts, tmp_path) == "No vehicle matches the filters."
+
+
+@needs_chromium
 def test_it_is_printed_with_all_that_passes_the_filters_and_says_which(tmp_path: Path) -> None:
     acts = """
 const state = () => [body.children.length, document.getElementById("range").textContent,

@@ -112,7 +112,8 @@ def table_json(parts: Sequence[Part]) -> str:
 
 
 def _is_known(values: Sequence[Any]) -> bool:
-    return any(value not in _UNKNOWN for value in values)
+    """Return whether a column says something; where there is no row, all columns are kept."""
+    return not values or any(value not in _UNKNOWN for value in values)
 
 
 def _numbered(values: Sequence[str]) -> list[int]:
