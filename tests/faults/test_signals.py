@@ -28,9 +28,9 @@ from vdet.detect.onnx.session import Session
 
 run = Session.run
 
-def shown(session, inputs):
+def shown(session, values):
     print("running", flush=True)
-    return run(session, inputs)
+    return run(session, values)
 
 Session.run = shown
 """

@@ -1,4 +1,4 @@
-"""Tiny ONNX files in the forms that the usual tools export; each gives boxes that a test chooses.
+"""Tiny ONNX files in the forms that vdet reads; each finds boxes that a test chooses.
 
 A box has the score of the red value (0 to 1) of one pixel of the input, so that a test sees which
 pixel of the frame lies there, and whether the channels and their range are right.
@@ -40,7 +40,7 @@ class RedBox:
 
 
 def cells(width: int, height: int) -> list[tuple[int, int, int]]:
-    """Return x, y and stride of all cells, as YOLOX and Ultralytics order them."""
+    """Return x, y and stride of all cells, as Ultralytics orders them."""
     return [
         (x, y, stride)
         for stride in (8, 16, 32)
@@ -51,42 +51,18 @@ def cells(width: int, height: int) -> list[tuple[int, int, int]]:
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """Where the parts of a box lie in a table `(rows, columns)`, and where it finds red."""
+    """Where the score of a box lies in a table `(rows, columns)`."""
 
     table: Array
     score_row: int
     score_column: int
-    red_channel: int = 0
-    red: float = 1.0
 
 
 def ultralytics(size: tuple[int, int], box: RedBox, classes: int) -> Form:
-    """v8 and v11: `(4 + classes, n)`."""
+    """v8 and later: `(4 + classes, n)`."""
     table = np.zeros((4 + classes, len(cells(*size))), np.float32)
     table[:4, 7] = box.x, box.y, box.width, box.height
     return Form(table, 4 + box.class_id, 7)
-
-
-def rt_detr_rows(size: tuple[int, int], box: RedBox, classes: int) -> Form:
-    """RT-DETR of Ultralytics: `(300, 4 + classes)`, middle and size as fractions of the input."""
-    table = np.zeros((300, 4 + classes), np.float32)
-    table[11, :4] = np.array([box.x, box.y, box.width, box.height]) / [*size, *size]
-    return Form(table, 11, 4 + box.class_id)
-
-
-def yolox(size: tuple[int, int], box: RedBox, classes: int, *, raw: bool) -> Form:
-    """YOLOX: `(n, 5 + classes)` for BGR from 0 to 255; `raw`: relative to the cells."""
-    grid = np.array(cells(*size), np.float32)
-    table = np.zeros((len(grid), 5 + classes), np.float32)
-    if not raw:
-        table[:, :2] = (grid[:, :2] + 0.5) * grid[:, 2:]
-    row = 9
-    stride = grid[row, 2]
-    middle, sides = np.array([box.x, box.y]), np.array([box.width, box.height])
-    table[row, :2] = middle / stride - grid[row, :2] if raw else middle
-    table[row, 2:4] = np.log(sides / stride) if raw else sides
-    table[row, 5 + box.class_id] = 1
-    return Form(table, row, 4, red_channel=2, red=255)
 
 
 def final(box: RedBox, rows: int = 300) -> Form:
@@ -108,7 +84,7 @@ def write_network(
 ) -> Path:
     """Write a network with one input of `size` whose score is the red of `pixel` of the input."""
     width, height = size
-    nodes, constants = _redness("images", pixel, form.red_channel, form.red)
+    nodes, constants = _redness("images", pixel)
     hot = np.zeros((1, *form.table.shape), np.float32)
     hot[0, form.score_row, form.score_column] = 1
     constants += [_constant(hot, "hot"), _constant(form.table[np.newaxis], "table")]
@@ -121,51 +97,20 @@ def write_network(
     return write_graph(path, nodes, inputs, outputs, constants, metadata)
 
 
-def write_rt_detr(path: Path, box: RedBox, size: tuple[int, int], pixel: tuple[int, int]) -> Path:
-    """Write a network with a second input for the size, and outputs labels, boxes and scores."""
-    nodes, constants = _redness("images", pixel, 0, 1)
-    shares = np.array(box.corners, np.float32) / np.array([*size, *size], np.float32)
-    constants += [
-        _constant(np.array([[box.class_id]], np.int64), "label"),
-        _constant(shares.reshape(1, 1, 4), "shares"),
-        _constant(np.array([1, 1], np.int64), "one"),
-    ]
-    nodes += [
-        helper.make_node("Identity", ["label"], ["labels"]),
-        helper.make_node("Cast", ["orig_target_sizes"], ["size"], to=TensorProto.FLOAT),
-        helper.make_node("Concat", ["size", "size"], ["scale"], axis=1),
-        helper.make_node("Mul", ["shares", "scale"], ["boxes"]),
-        helper.make_node("Reshape", ["red", "one"], ["scores"]),
-    ]
-    width, height = size
-    inputs = [
-        helper.make_tensor_value_info("images", TensorProto.FLOAT, [1, 3, height, width]),
-        helper.make_tensor_value_info("orig_target_sizes", TensorProto.INT64, [1, 2]),
-    ]
-    outputs = [
-        helper.make_tensor_value_info("labels", TensorProto.INT64, None),
-        helper.make_tensor_value_info("boxes", TensorProto.FLOAT, None),
-        helper.make_tensor_value_info("scores", TensorProto.FLOAT, None),
-    ]
-    return write_graph(path, nodes, inputs, outputs, constants)
-
-
 def _redness(
-    name: str, pixel: tuple[int, int], channel: int, red: float
+    name: str, pixel: tuple[int, int]
 ) -> tuple[list[onnx.NodeProto], list[onnx.TensorProto]]:
-    """Return the nodes that give `red`: the value of a pixel of an input, `(1, 1, 1)`."""
+    """Return the nodes that make `red`: the red of a pixel of an input, `(1, 1, 1)`."""
     x, y = pixel
     constants = [
-        _constant(np.array([channel, y, x], np.int64), "first"),
-        _constant(np.array([channel + 1, y + 1, x + 1], np.int64), "end"),
+        _constant(np.array([0, y, x], np.int64), "first"),
+        _constant(np.array([1, y + 1, x + 1], np.int64), "end"),
         _constant(np.array([1, 2, 3], np.int64), "axes"),
         _constant(np.array([1, 1, 1], np.int64), "cube"),
-        _constant(np.array([red], np.float32), "most"),
     ]
     nodes = [
         helper.make_node("Slice", [name, "first", "end", "axes"], ["value"]),
-        helper.make_node("Reshape", ["value", "cube"], ["shaped"]),
-        helper.make_node("Div", ["shaped", "most"], ["red"]),
+        helper.make_node("Reshape", ["value", "cube"], ["red"]),
     ]
     return nodes, constants
 

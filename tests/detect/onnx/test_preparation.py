@@ -1,21 +1,22 @@
 """What a network sees of a frame: its place in the input, from BGR and from planes."""
 
 from collections.abc import Callable
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 import pytest
 
 from codings import in_any_coding
 from vdet.boxes import Float64Array
-from vdet.detect.onnx.preparation import Fit, InputForm
+from vdet.detect.onnx.preparation import InputForm, Placement
 from vdet.media import Picture, Planes
 from vdet.media.frame import Coding
 from vdet.synthetic.random_scenes import demo_scene
 from vdet.synthetic.render import render
 
 ROAD = render(demo_scene(1, width=1280, height=720), 200)
-FITS = get_args(Fit)
+FORMS = pytest.mark.parametrize("dtype", [np.uint8, np.float32], ids=["ours", "others"])
+Dtype = type[np.generic]
 Measure = Callable[[Float64Array], np.floating[Any]]
 
 
@@ -23,34 +24,34 @@ def road(coding: Coding) -> Picture:
     return Picture(Planes.of_image(ROAD, coding))
 
 
-def inputs(form: InputForm, picture: Picture) -> tuple[Float64Array, ...]:
-    """Return what a network sees of planes, and of the same picture as BGR."""
-    (ours, place), (expected, place_of_bgr) = (
-        form.prepare(item) for item in (picture, Picture(picture.image))
-    )
-    assert place == place_of_bgr
-    assert ours.shape == expected.shape
-    assert ours.dtype == expected.dtype
-    return ours.astype(np.float64), expected.astype(np.float64)
+def seen(form: InputForm, picture: Picture) -> tuple[Float64Array, Placement]:
+    """Return what a network sees: `(3, height, width)`, BGR from 0 to 255."""
+    values, place = form.prepare(picture)
+    assert values.dtype == form.dtype
+    if form.dtype is np.uint8:
+        return values[0].transpose(2, 0, 1).astype(np.float64), place
+    return 255 * values[0, ::-1].astype(np.float64), place
 
 
 def of_channels(values: Float64Array, measure: Measure = np.mean) -> Float64Array:
     """Return the mean, or another measure, of each channel of an input."""
-    return np.array([measure(channel) for channel in values[0]])
+    return np.array([measure(channel) for channel in values])
 
 
 @in_any_coding
-@pytest.mark.parametrize("fit", FITS)
+@FORMS
 @pytest.mark.parametrize(
     ("width", "height"),
     [(96, 64), (160, 160), (416, 320), (95, 64), (96, 63), (95, 63)],
     ids=["smaller", "square", "larger", "odd width", "odd height", "odd"],
 )
-@pytest.mark.parametrize("is_rgb", [False, True], ids=["BGR", "RGB"])
 def test_planes_look_like_the_same_picture_as_bgr(
-    fit: Fit, width: int, height: int, is_rgb: bool, coding: Coding
+    dtype: Dtype, width: int, height: int, coding: Coding
 ) -> None:
-    ours, expected = inputs(InputForm(width, height, fit, is_rgb=is_rgb), road(coding))
+    picture, form = road(coding), InputForm(width, height, dtype)
+    ours, place = seen(form, picture)
+    expected, place_of_bgr = seen(form, Picture(picture.image))
+    assert place == place_of_bgr
     apart = np.abs(ours - expected)
     assert of_channels(apart).max() < 0.9
     assert np.percentile(apart, 99) <= 3
@@ -68,16 +69,16 @@ def test_planes_are_scaled_before_they_are_converted(
 
 
 @pytest.mark.parametrize("picture", [Picture(ROAD), road(Coding())], ids=["BGR", "planes"])
-@pytest.mark.parametrize(
-    ("fit", "rows"), [("stretch", slice(0, 96)), ("center", slice(21, 75)), ("corner", slice(54))]
-)
-def test_beyond_the_frame_the_input_is_grey(picture: Picture, fit: Fit, rows: slice) -> None:
-    values, place = InputForm(96, 96, fit).prepare(picture)
-    assert (place.left, place.top, *place.size) == (0, rows.start or 0, 96, rows.stop - place.top)
-    inside = np.zeros(96, bool)
-    inside[rows] = True
-    assert (values[:, :, ~inside] == 114).all()
-    assert (values[:, :, inside] != 114).any(axis=(0, 1, 3)).all()
+@FORMS
+def test_only_the_letterbox_of_other_networks_is_grey_beyond_the_frame(
+    dtype: Dtype, picture: Picture
+) -> None:
+    values, place = seen(InputForm(96, 96, dtype), picture)
+    top, height = (0, 96) if dtype is np.uint8 else (21, 54)
+    assert place == (0, top, (96 / 1280, height / 720))
+    is_frame = np.isin(np.arange(96), np.arange(top, top + height))
+    assert values[:, ~is_frame] == pytest.approx(114)
+    assert (values[:, is_frame].round() != 114).any(axis=(0, 2)).all()
 
 
 def test_planes_are_not_changed() -> None:

@@ -1,25 +1,16 @@
-"""Networks of the usual tools: recognised without a setting, and their boxes are right."""
+"""Networks of other tools: recognized without a setting, and their boxes are right."""
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 import pytest
+from onnx import TensorProto, helper
 
-from detect.onnx.graphs import (
-    Form,
-    RedBox,
-    final,
-    rt_detr_rows,
-    ultralytics,
-    write_network,
-    write_rt_detr,
-    yolox,
-)
+from detect.onnx.graphs import Form, RedBox, final, ultralytics, write_graph, write_network
 from vdet.boxes import Boxes, Image
 from vdet.config.schema import NetworkSettings
 from vdet.detect.onnx.detector import NetworkModel
@@ -40,9 +31,7 @@ ULTRALYTICS = {
     "names": str(dict(enumerate(COCO))),
     "imgsz": "[64, 128]",
     "stride": "32",
-    "args": "{'nms': False}",
 }
-FINAL = {**ULTRALYTICS, "args": "{'nms': True}"}
 
 
 def frame_with_red(x: int, y: int) -> Image:
@@ -68,7 +57,7 @@ def class_names(found: Boxes) -> list[str]:
     [
         (ultralytics(SIZE, BOX, 80), ULTRALYTICS, "Ultralytics v8 or later"),
         (ultralytics(SIZE, BOX, 80), None, "Ultralytics v8 or later"),
-        (final(BOX), FINAL, "boxes after suppression"),
+        (final(BOX), ULTRALYTICS, "boxes after suppression"),
         (final(BOX, rows=100), None, "boxes after suppression"),
     ],
     ids=["v8", "v8 bare", "end to end", "end to end bare"],
@@ -85,44 +74,6 @@ def test_a_centred_letterbox_in_rgb(
     assert len(detect(path, frame_with_red(64, 64))) == 1  # the dark grey of 60 has 0.24
     assert detect(path, frame_with_red(64, 64)).scores == pytest.approx([60 / 255], abs=0.01)
     assert recognize(Session(path)).name == name
-
-
-@pytest.mark.parametrize("raw", [True, False], ids=["raw", "decoded"])
-@pytest.mark.parametrize(("classes", "name"), [(80, "car"), (1, "vehicle")])
-def test_yolox_has_its_letterbox_at_the_top_left_in_bgr(
-    raw: bool, classes: int, name: str, tmp_path: Path
-) -> None:
-    """With one class, its table looks like one of boxes after suppression."""
-    form = yolox(SIZE, replace(BOX, class_id=min(2, classes - 1)), classes, raw=raw)
-    path = write_network(tmp_path / "net.onnx", form, SIZE, (40, 32))
-    found = detect(path, frame_with_red(160, 128))
-    # 64 of the 128 columns are the frame: the part beyond it does not count.
-    assert found.sides == pytest.approx(np.array([[224, 112, 256, 144]]), abs=0.01)
-    assert found.scores == pytest.approx([1.0], abs=0.01)
-    assert class_names(found) == [name]
-    assert recognize(Session(path)).name == "YOLOX"
-
-
-def test_rt_detr_stretches_the_frame(tmp_path: Path) -> None:
-    path = write_rt_detr(tmp_path / "net.onnx", BOX, SIZE, (64, 32))
-    found = detect(path, frame_with_red(128, 128))
-    assert found.sides == pytest.approx(np.array([[112, 112, 144, 144]]), abs=0.01)
-    assert found.scores == pytest.approx([1.0], abs=0.01)
-    assert recognize(Session(path)).name == "RT-DETR"
-
-
-@pytest.mark.parametrize("classes", [2, 80])
-def test_rt_detr_of_ultralytics_has_rows_of_fractions(classes: int, tmp_path: Path) -> None:
-    box = RedBox(x=64, y=32, width=16, height=8, class_id=1)
-    names = ["car", "bus"] if classes == 2 else COCO
-    metadata = {**ULTRALYTICS, "names": str(dict(enumerate(names)))}
-    metadata["description"] = "Ultralytics RT-DETR-l model"
-    form = rt_detr_rows(SIZE, box, classes)
-    path = write_network(tmp_path / "net.onnx", form, SIZE, (64, 32), metadata=metadata)
-    found = detect(path, frame_with_red(128, 128), classes=names)
-    assert found.sides == pytest.approx(np.array([[112, 112, 144, 144]]), abs=0.01)
-    assert class_names(found) == [names[1]]
-    assert recognize(Session(path)).name == "RT-DETR of Ultralytics"
 
 
 @pytest.mark.parametrize("make", [final, partial(ultralytics, SIZE, classes=80)])
@@ -170,7 +121,7 @@ def test_only_the_classes_that_are_asked_for_count(tmp_path: Path) -> None:
         (COCO.index("motorcycle"), ["motorcycle"], ["motorcycle"]),
     ):
         box = RedBox(64, 32, 16, 8, class_id)
-        path = write_network(tmp_path / "net.onnx", final(box), SIZE, (64, 32), metadata=FINAL)
+        path = write_network(tmp_path / "net.onnx", final(box), SIZE, (64, 32))
         found = detect(path, image, classes=classes)
         assert class_names(found) == expected
 
@@ -181,11 +132,11 @@ def test_names_can_be_given_and_one_class_without_a_name_is_of_vehicles(tmp_path
     assert class_names(detect(path, frame_with_red(128, 128))) == ["vehicle"]
     form = ultralytics(SIZE, RedBox(64, 32, 16, 8, 1), 2)
     path = write_network(tmp_path / "net.onnx", form, SIZE, (64, 32))
-    with pytest.raises(ModelError, match=r"does not name its 2 classes; set detector\.class_names"):
+    with pytest.raises(ModelError, match=r"has 2 classes and 0 names; set detector\.class_names"):
         detect(path, frame_with_red(128, 128))
     found = detect(path, frame_with_red(128, 128), class_names=["tree", "bus"])
     assert class_names(found) == ["bus"]
-    with pytest.raises(ModelError, match=r"has 2 classes, not 1"):
+    with pytest.raises(ModelError, match=r"has 2 classes and 1 names"):
         detect(path, frame_with_red(128, 128), class_names=["bus"])
 
 
@@ -200,10 +151,14 @@ def test_a_network_without_a_wanted_class_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("table", "metadata", "seen"),
     [
-        (np.zeros((10, 9)), None, r"for an input of 128×64 it gives \(1, 10, 9\)"),
+        (
+            np.zeros((300, 84)),
+            None,
+            r"its output is \(1, 300, 84\), not \(1, 4 \+ classes, 168\) or \(1, n, 6\); see docs",
+        ),
         (np.zeros((84, 168)), {**ULTRALYTICS, "task": "segment"}, "its task is segment"),
         (np.zeros((84, 168)), {**ULTRALYTICS, "names": "{0:"}, "its metadata cannot be read"),
-        (np.zeros((7, 168)), ULTRALYTICS, r"it gives \(1, 7, 168\)"),
+        (np.zeros((7, 168)), ULTRALYTICS, r"has 3 classes and 80 names"),
     ],
 )
 def test_what_is_not_known_is_refused_with_what_was_seen(
@@ -215,11 +170,32 @@ def test_what_is_not_known_is_refused_with_what_was_seen(
         detect(path, frame_with_red(128, 128))
 
 
+@pytest.mark.parametrize(
+    ("types", "seen"),
+    [
+        ([TensorProto.FLOAT, TensorProto.INT64], "it has 2 inputs, not one"),
+        ([TensorProto.UINT8], r"its input is a tensor\(uint8\), not a tensor\(float\)"),
+    ],
+)
+def test_other_inputs_are_refused(
+    types: Sequence[TensorProto.DataType], seen: str, tmp_path: Path
+) -> None:
+    inputs = [
+        helper.make_tensor_value_info(f"input{number}", kind, [1, 3, 64, 64])
+        for number, kind in enumerate(types)
+    ]
+    output = helper.make_tensor_value_info("output0", types[0], [1, 3, 64, 64])
+    copy = [helper.make_node("Identity", ["input0"], ["output0"])]
+    path = write_graph(tmp_path / "net.onnx", copy, inputs, [output], [])
+    with pytest.raises(ModelError, match=rf"has an unknown form: {seen}; see docs"):
+        recognize(Session(path))
+
+
 def test_the_score_of_a_box_is_calibrated_by_the_class_it_is_named() -> None:
     table = np.zeros((1, 21, 7), np.float32)  # 16 + 4 + 1 cells of two classes
     table[..., 0], table[0, 3, 6] = 0.5, 1.0
     calibration = np.array([[1, 0], [2, -3]], np.float32)
-    found = our_cells([table], 0.01, cells=cell_centers(32, 32), calibration=calibration)
+    found = our_cells(table, 0.01, cells=cell_centers(32, 32), calibration=calibration)
     assert found.classes.tolist() == [0, 0, 0, 1, *[0] * 17]
     expected = [1 / (1 + math.exp(-(1 * 0.5 + 0))), 1 / (1 + math.exp(-(2 * 0.5 - 3)))]
     assert found.scores[[0, 3]].tolist() == pytest.approx(expected, abs=1e-6)

@@ -25,7 +25,7 @@ def test_a_network_that_does_not_end_is_given_up(
     session = Session(write(tmp_path / "net.onnx"))
     picture = np.zeros((1, 3, side, side), np.float32)
     with pytest.raises(ModelError, match=r"net\.onnx: .* it took more than 1 s$"):
-        session.run({"images": picture})
+        session.run(picture)
     assert capfd.readouterr().err == ""
 
 

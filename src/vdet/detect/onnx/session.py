@@ -24,15 +24,6 @@ MAX_SECONDS = 60
 _MAX_MEMORY = 1_000_000_000  # bytes while it runs, for each core: so many pictures run at once
 _MAX_METADATA = 200_000  # characters of one value
 
-TYPES: dict[str, type[np.generic]] = {
-    "tensor(float)": np.float32,
-    "tensor(float16)": np.float16,
-    "tensor(uint8)": np.uint8,
-    "tensor(int64)": np.int64,
-    "tensor(int32)": np.int32,
-}
-"""What onnxruntime calls the types of inputs."""
-
 _SILENT = 4  # level of onnxruntime's own messages: every error is raised too
 
 
@@ -42,7 +33,7 @@ class Session:
     Attributes
     ----------
     inputs
-        Each has a `name`, a `shape` and a `type`, one of `TYPES`.
+        Each has a `name`, a `shape` and a `type`, such as `tensor(float)`.
     output_shapes
         As the file declares them; a length that depends on the input is a name.
 
@@ -70,24 +61,23 @@ class Session:
             )
             self.metadata: Mapping[str, str] = self._session.get_modelmeta().custom_metadata_map
             self.inputs = self._session.get_inputs()
-            outputs = self._session.get_outputs()
-            self.output_names = [output.name for output in outputs]
-            self.output_shapes = [output.shape for output in outputs]
+            self.output_shapes = [output.shape for output in self._session.get_outputs()]
         except Exception as error:  # onnxruntime raises kinds of its own, and plain ones
             raise ModelError(f"{path}: onnxruntime cannot load it: {_in_words(error)}") from error
-        for slot in self.inputs:
-            if slot.type not in TYPES:
-                raise ModelError(
-                    f"{path}: its input {slot.name:.40} is a {slot.type}, not an image"
-                )
         if any(len(value) > _MAX_METADATA for value in self.metadata.values()):
             raise ModelError(f"{path}: has metadata of more than {_MAX_METADATA:,} characters")
 
-    def run(self, inputs: Mapping[str, Array]) -> list[Array]:
-        """Return all outputs. Raises `ModelError` if it fails, or takes too much time or memory."""
+    def run(self, values: Array) -> list[Array]:
+        """Return all outputs for the values of the only input.
+
+        Raises
+        ------
+        ModelError
+            It fails, or takes too much time or memory.
+        """
         options, outputs = self._new_options(), Future[list[Array]]()
         options.log_severity_level = _SILENT
-        call = inputs, options, outputs  # one long operation cannot be stopped: it is left behind
+        call = values, options, outputs  # one long operation cannot be stopped: it is left behind
         threading.Thread(target=self._run, args=call, name="vdet-network", daemon=True).start()
         for _ in range(MAX_SECONDS):  # seconds in which this process was stopped do not count
             with suppress(TimeoutError):
@@ -95,9 +85,9 @@ class Session:
         options.terminate = True
         raise self._failed(f"it took more than {MAX_SECONDS} s")
 
-    def _run(self, inputs: Mapping[str, Array], options: Any, outputs: Future[list[Array]]) -> None:
+    def _run(self, values: Array, options: Any, outputs: Future[list[Array]]) -> None:
         try:
-            found = self._session.run(None, dict(inputs), options)
+            found = self._session.run(None, {self.inputs[0].name: values}, options)
             outputs.set_result([np.asarray(item) for item in found])
         except Exception as error:  # onnxruntime raises kinds of its own
             outputs.set_exception(self._failed(_in_words(error)))
