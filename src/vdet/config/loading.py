@@ -3,10 +3,11 @@
 import contextlib
 import difflib
 import reprlib
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from dataclasses import replace
 from functools import reduce
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
@@ -14,7 +15,7 @@ from pydantic_core import ErrorDetails
 from vdet.config import document
 from vdet.config.document import Document, Key
 from vdet.config.kinds import GROUPS, default_kind, kind_of_model, kind_settings
-from vdet.config.places import inside, items, to_fractions
+from vdet.config.places import inside, to_fractions, with_changed
 from vdet.config.schema import Section, Settings
 from vdet.errors import ConfigError
 from vdet.plugins import plugin_names
@@ -66,8 +67,7 @@ def load_settings(
         One line for each mistake, with file, line, column, key and what was expected.
     """
     assigned = reduce(_over, map(document.parse_assignment, assignments), Document("--set", {}))
-    layers = [*map(_read_file, paths), assigned]
-    to_fractions(assigned.values)
+    layers = [*map(_read_file, paths), _with_fractions(assigned)]
     models = [inside(layer.values, "detector", "model") for layer in layers]
     for model in filter(lambda model: isinstance(model, str), models):
         detector = kind_of_model(Path(model)) or detector
@@ -91,24 +91,22 @@ def given_values(paths: Sequence[Path]) -> dict[str, Any]:
     ConfigError
         A file cannot be read, or is not YAML.
     """
-    return reduce(_with_kinds_over, map(_as_it_stands, paths), Document("settings", {})).values
+    layers = (_with_fractions(document.read_document(path)) for path in paths)
+    return reduce(_with_kinds_over, layers, Document("settings", {})).values
 
 
-def _as_it_stands(path: Path) -> Document:
-    """Read a file as a layer: with fractions."""
-    layer = document.read_document(path)
-    to_fractions(layer.values)
-    return layer
+def _with_fractions(layer: Document) -> Document:
+    return replace(layer, values=to_fractions(layer.values))
 
 
 def _read_file(path: Path) -> Document:
     """Read a file as a layer: with fractions, and paths as seen from the working folder."""
-    layer = _as_it_stands(path)
-    for section, key in (("regions", "mask"), ("detector", "model")):
-        for item in items(layer.values, section):
-            if isinstance(item.get(key), str):
-                item[key] = str(path.parent / item[key])
-    return layer
+
+    def from_here(name: Any) -> Any:
+        return str(path.parent / name) if isinstance(name, str) else name
+
+    layer = _with_fractions(document.read_document(path))
+    return replace(layer, values=with_changed(layer.values, {"mask", "model"}, from_here))
 
 
 def _over(below: Document, above: Document) -> Document:
@@ -128,7 +126,7 @@ def _with_kinds_over(below: Document, above: Document) -> Document:
     values = dict(below.values)
     for name in GROUPS:
         kind = inside(above.values, name, "kind")
-        if kind is not None and kind != _kind_in(values, name):
+        if kind is not None and kind != (inside(values, name, "kind") or default_kind(name)):
             values[name] = {}
     return _over(Document(below.name, values, below.places), above)
 
@@ -143,13 +141,13 @@ _EXPECTED = {
 def _describe(mistake: ErrorDetails, merged: Document) -> str:
     key = tuple(mistake["loc"])
     named = f"{document.format_key(key)}: " if key else ""
-    return f"{merged.place_of(key)}: {named}{_expected(mistake, key, merged.values)}"
+    return f"{merged.place_of(key)}: {named}{_expected(mistake, key)}"
 
 
-def _expected(mistake: ErrorDetails, key: Key, values: dict[str, Any]) -> str:
+def _expected(mistake: ErrorDetails, key: Key) -> str:
     match mistake["type"]:
-        case "extra_forbidden" | "invalid_key":
-            return _other_kind(key, values) or f"unknown setting{_suggestion(key, values)}"
+        case "extra_forbidden":
+            return _unknown(key, mistake["input"])
         case "missing":
             return "is required"
         case "value_error":
@@ -159,41 +157,20 @@ def _expected(mistake: ErrorDetails, key: Key, values: dict[str, Any]) -> str:
     return f"{message} (got {reprlib.repr(mistake['input'])})"
 
 
-def _kind_in(values: dict[str, Any], section: str) -> str:
-    return inside(values, section, "kind") or default_kind(section)
+def _unknown(key: Key, section: type[Section]) -> str:
+    """Name the other kind that has an unknown key, or the key that is meant, or all known ones."""
+    name, group, known = str(key[-1]), str(key[0]), list(section.model_fields)
+    if len(key) == 2 and group in GROUPS:
+        owners = [kind for kind in plugin_names(GROUPS[group]) if name in _keys_of(group, kind)]
+        if owners:
+            words = f"belongs to {group}.kind: {' or '.join(owners)}, and has no effect with"
+            return f"{words} {section.model_fields['kind'].default}"
+    if close := difflib.get_close_matches(name, known, n=1):
+        return f"unknown setting; did you mean {close[0]}?"
+    return f"unknown setting; known settings: {', '.join(known)}"
 
 
-def _other_kind(key: Key, values: dict[str, Any]) -> str:
-    """Say which other kind a key belongs to; nothing where it belongs to none."""
-    section, *within = map(str, key)
-    if section not in GROUPS or not within:
-        return ""
-    owners = []
-    for kind in plugin_names(GROUPS[section]):
-        with contextlib.suppress(ConfigError):  # another package's kind that cannot be loaded
-            if within[0] in kind_settings(section, kind).model_fields:
-                owners.append(kind)
-    current = _kind_in(values, section)
-    if not owners or current in owners:
-        return ""
-    return f"belongs to {section}.kind: {' or '.join(owners)}, and has no effect with {current}"
-
-
-def _suggestion(key: Key, values: dict[str, Any]) -> str:
-    """Name the key that is meant, or all keys beside it; nothing where it is in no section."""
-    within: Any = Settings
-    for part in key[:-1]:
-        if part in GROUPS:
-            within = kind_settings(str(part), _kind_in(values, str(part)))
-        elif _is_section(within):
-            within = within.model_fields[str(part)].annotation
-        else:  # an item of a list
-            within = next(filter(_is_section, get_args(within)), None)
-    names = list(within.model_fields) if _is_section(within) else []
-    if close := difflib.get_close_matches(str(key[-1]), names, n=1):
-        return f"; did you mean {close[0]}?"
-    return f"; known settings: {', '.join(names)}" if names else ""
-
-
-def _is_section(annotation: Any) -> bool:
-    return isinstance(annotation, type) and issubclass(annotation, Section)
+def _keys_of(group: str, kind: str) -> Collection[str]:
+    with contextlib.suppress(ConfigError):  # another package's kind that cannot be loaded
+        return kind_settings(group, kind).model_fields
+    return ()

@@ -4,17 +4,10 @@ Points are fractions of the frame's width and height. In a file with `camera.siz
 of frames of that size, until `to_fractions` changes them.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable
 from typing import Annotated, Any, Literal
 
-from pydantic import (
-    AfterValidator,
-    Field,
-    TypeAdapter,
-    ValidationError,
-    field_validator,
-    model_validator,
-)
+from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from vdet.config.section import Section
 from vdet.polygons import Point, crosses_itself
@@ -175,44 +168,44 @@ _POINTS = {"points", "start", "end", "pixel"}
 _DIGITS = 3  # of pixels
 
 
-def to_fractions(values: Mapping[str, Any]) -> None:
-    """Turn the points of settings with `camera.size` into fractions of the frame.
+def to_fractions(values: dict[str, Any]) -> dict[str, Any]:
+    """Return settings with `camera.size` with the points as fractions of the frame.
 
     What is not a point, or not a size, stays: it is refused with all other mistakes.
     """
-    if size := _size(values):
-        _change(values, lambda x, y: [x / size[0], y / size[1]])
+    return _scaled(values, lambda value, side: value / side)
 
 
-def to_pixels(values: Mapping[str, Any]) -> None:
-    """Turn the points of settings with `camera.size` into pixels of such frames."""
-    if size := _size(values):
-        _change(values, lambda x, y: [round(x * size[0], _DIGITS), round(y * size[1], _DIGITS)])
+def to_pixels(values: dict[str, Any]) -> dict[str, Any]:
+    """Return settings with `camera.size` with the points as pixels of such frames."""
+    return _scaled(values, lambda value, side: round(value * side, _DIGITS))
 
 
-def _size(values: Mapping[str, Any]) -> Size | None:
-    try:
-        return TypeAdapter(Size).validate_python(inside(values, "camera", "size"))
-    except ValidationError:
-        return None
-
-
-def _change(values: Any, change: Any) -> None:
-    """Change the points in nested sections and lists of sections."""
-
-    def changed(value: Any) -> Any:
+def _scaled(values: dict[str, Any], scale: Callable[[float, float], float]) -> dict[str, Any]:
+    def scaled(value: Any) -> Any:
         match value:
             case [int() | float() as x, int() | float() as y]:
-                return change(x, y)
+                return [scale(x, size[0]), scale(y, size[1])]
             case [*points]:
-                return [changed(point) for point in points]
+                return [scaled(point) for point in points]
         return value
 
-    if isinstance(values, dict):
-        values |= {key: changed(values[key]) for key in _POINTS & values.keys()}
-    for value in values.values() if isinstance(values, dict) else values:
-        if isinstance(value, dict | list):
-            _change(value, change)
+    match size := inside(values, "camera", "size"):
+        case [int() | float() as width, int() | float() as height] if width > 0 and height > 0:
+            return dict(with_changed(values, _POINTS, scaled))
+    return values
+
+
+def with_changed(values: Any, keys: Collection[str], change: Callable[[Any], Any]) -> Any:
+    """Return settings with the values of some keys changed, in nested sections and lists too."""
+    if isinstance(values, list):
+        return [with_changed(item, keys, change) for item in values]
+    if not isinstance(values, dict):
+        return values
+    return {
+        key: change(value) if key in keys else with_changed(value, keys, change)
+        for key, value in values.items()
+    }
 
 
 def inside(values: Any, *keys: str) -> Any:
@@ -220,10 +213,3 @@ def inside(values: Any, *keys: str) -> Any:
     for key in keys:
         values = values.get(key) if isinstance(values, dict) else None
     return values
-
-
-def items(values: Any, *keys: str) -> Iterator[dict[str, Any]]:
-    """Yield the sections in a list in nested sections, or the section that is there."""
-    found = inside(values, *keys)
-    found = found if isinstance(found, list) else [found]
-    yield from (item for item in found if isinstance(item, dict))

@@ -25,8 +25,8 @@ def render(settings: Settings) -> str:
 
     Each key is preceded by what it means; the keys of list items stand before the list.
     """
-    values = to_jsonable_python(settings, exclude_none=True)  # an item says only what it has
-    to_pixels(values)
+    # An item says only what it has.
+    values = to_pixels(to_jsonable_python(settings, exclude_none=True))
     return "\n".join([HEADING, *_section(settings, values, "")]) + "\n"
 
 

@@ -23,9 +23,14 @@ class Section(BaseModel):
 
     @model_validator(mode="before")
     @classmethod
-    def _nothing_given(cls, values: Any) -> Any:
-        """Take a section without keys, which is null in YAML, for the defaults."""
-        return {} if values is None else values
+    def _mark_unknown(cls, values: Any) -> Any:
+        """Replace the values of unknown keys by this class: their errors then say which it has.
+
+        A section without keys is null in YAML, and stands for the defaults.
+        """
+        if not isinstance(values, dict | None):
+            return values
+        return {k: value if k in cls.model_fields else cls for k, value in (values or {}).items()}
 
 
 S = TypeVar("S", bound=Section)
