@@ -3,7 +3,6 @@
 import base64
 import zlib
 from collections.abc import Mapping, Sequence
-from copy import deepcopy
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -139,10 +138,8 @@ def split(
 
 def in_pixels(values: Mapping[str, Any], size: tuple[int, int]) -> dict[str, Any]:
     """Return settings with pixels of frames of this size, width and height, for fractions."""
-    sized = deepcopy(dict(values))
-    sized["camera"] = {**(sized.get("camera") or {}), "size": list(size)}
-    to_pixels(sized)
-    return sized
+    camera = {**(values.get("camera") or {}), "size": list(size)}
+    return to_pixels({**values, "camera": camera})
 
 
 def as_yaml(values: Mapping[str, Any]) -> list[str]:
