@@ -19,8 +19,8 @@ from vdet.detect.factory import load_detector
 from vdet.detect.protocol import DetectorModel
 from vdet.media import Frame, Picture, VideoInfo
 from vdet.media.writer import VideoWriter
+from vdet.run.sinks import Output
 from vdet.run.sinks.folders import ClipSink
-from vdet.run.sinks.protocol import Output
 from vdet.run.video import Run, run_video
 from vdet.synthetic.random_scenes import pole_scene
 from vdet.synthetic.render import Renderer

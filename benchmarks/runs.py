@@ -17,7 +17,7 @@ from vdet.config.schema import DrawSettings, InputSettings, Settings, SvmSetting
 from vdet.detect.factory import load_detector
 from vdet.detect.protocol import DetectorModel
 from vdet.media.reader import VideoReader
-from vdet.run.sinks.protocol import Output
+from vdet.run.sinks import Output
 from vdet.run.video import Run, run_video
 
 FRAMES = 250

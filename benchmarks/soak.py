@@ -14,7 +14,7 @@ import av
 
 from benchmarks.material import find_video
 from vdet.detect.factory import load_detector
-from vdet.run.sinks.protocol import Output
+from vdet.run.sinks import Output
 from vdet.run.video import Run, run_video
 
 FRAMES = 20_000

@@ -45,7 +45,8 @@ from vdet.progress import no_progress, reporting
 from vdet.regions import check_masks
 from vdet.run.pictures import PictureJob, PictureSearch, run_picture
 from vdet.run.result import FrameResult
-from vdet.run.sinks.protocol import Output, SinkContext, SinkKind, check_sinks
+from vdet.run.sinks import Output
+from vdet.run.sinks.protocol import SinkContext, SinkKind, check_sinks
 from vdet.run.steps import Step, StepContext
 from vdet.run.video import Results, Run, RunTotals, run_video
 from vdet.track.factory import TrackerKind, make_tracker

@@ -21,7 +21,7 @@ from vdet.learn.svm.dataset import find_patches
 from vdet.learn.svm.mining import VideoSource, mine
 from vdet.learn.svm.training import train
 from vdet.progress import Steps
-from vdet.run.sinks.protocol import Output
+from vdet.run.sinks import Output
 from vdet.run.video import Run, run_video
 from vdet.synthetic.random_scenes import busy_road, demo_scene, pole_scene
 from vdet.synthetic.render import write_clip

@@ -11,8 +11,8 @@ from vdet.batch.manifest import Record, Written, open_manifest
 from vdet.batch.run import Plan, make_plan
 from vdet.errors import BatchError, OutputError
 from vdet.files import recorded_inputs
-from vdet.run.sinks import data
-from vdet.run.sinks.protocol import BatchTotal, Output, output_state
+from vdet.run.sinks import Output, data
+from vdet.run.sinks.protocol import BatchTotal, output_state
 from vdet.run.video import Run
 
 COMMON = Run(Path(), frames=7)

@@ -16,8 +16,8 @@ from running import names, write_drive
 from vdet.batch.run import Plan, make_plan, run_batch
 from vdet.batch.task import process_file
 from vdet.errors import BatchError, OutputError
-from vdet.run.sinks import data
-from vdet.run.sinks.protocol import BatchTotal, Output
+from vdet.run.sinks import Output, data
+from vdet.run.sinks.protocol import BatchTotal
 from vdet.run.video import Run
 from vdet.workers import Submit
 

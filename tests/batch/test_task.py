@@ -15,7 +15,7 @@ from running import names, write_drive
 from vdet.batch.task import process_file, result_digest
 from vdet.detect.factory import load_detector
 from vdet.detect.protocol import DetectorModel
-from vdet.run.sinks.protocol import Output
+from vdet.run.sinks import Output
 from vdet.run.video import Run, write_outputs
 
 

@@ -17,7 +17,7 @@ from running import frames_of, names, until, write_drive
 from vdet.batch.task import process_file
 from vdet.errors import VdetError
 from vdet.labels.reading import read_labelled_pictures
-from vdet.run.sinks.protocol import Output
+from vdet.run.sinks import Output
 from vdet.run.video import Run, run_video
 
 COUNT = 60

@@ -14,7 +14,7 @@ from red_cars import red_settings
 from running import names, write_drive
 from vdet.batch.task import process_file
 from vdet.run import video
-from vdet.run.sinks.protocol import Output
+from vdet.run.sinks import Output
 from vdet.track.motion.tracker import MotionTracker
 from vdet.track.rules.tracker import RulesTracker
 

@@ -17,7 +17,8 @@ from vdet.media import Frame, Picture, VideoInfo
 from vdet.media.reader import VideoReader
 from vdet.run.loop import build, peek
 from vdet.run.result import FrameResult
-from vdet.run.sinks.protocol import Output, SinkContext, open_sink
+from vdet.run.sinks import Output
+from vdet.run.sinks.protocol import SinkContext, open_sink
 from vdet.run.video import Run, RunTotals, run_video
 from vdet.track.track import Track
 from vdet.traffic.live import LiveTraffic

@@ -20,7 +20,8 @@ from vdet.run.pictures import (
     run_pictures,
 )
 from vdet.run.result import FrameResult
-from vdet.run.sinks.protocol import Output, SinkContext, SinkKind
+from vdet.run.sinks import Output
+from vdet.run.sinks.protocol import SinkContext, SinkKind
 from writing import write_image
 
 

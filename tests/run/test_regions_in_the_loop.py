@@ -16,7 +16,7 @@ from vdet.config.schema import Settings
 from vdet.errors import ImageError, VideoError
 from vdet.media.images import read_image
 from vdet.run.pictures import PictureJob, PictureSearch, run_picture
-from vdet.run.sinks.protocol import Output
+from vdet.run.sinks import Output
 from vdet.run.video import Run
 from writing import write_image
 

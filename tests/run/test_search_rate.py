@@ -15,7 +15,7 @@ from vdet.errors import OutputError
 from vdet.media import Frame, Picture
 from vdet.run.loop import SearchRate
 from vdet.run.result import FrameResult
-from vdet.run.sinks.protocol import Output
+from vdet.run.sinks import Output
 
 PICTURE = Picture(road(CAR))
 OF_NETWORK, OF_SVM = NetworkSettings().searches_per_second, SvmSettings().searches_per_second

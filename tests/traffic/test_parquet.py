@@ -10,7 +10,8 @@ from doc_pages import blocks
 from traffic.passing import WIDTH, frame, summarize, track
 from vdet.boxes import Box
 from vdet.errors import OutputError
-from vdet.run.sinks.protocol import Output, check_sinks
+from vdet.run.sinks import Output
+from vdet.run.sinks.protocol import check_sinks
 from vdet.traffic.records import join_records, records_content
 
 BOX = Box.sized(5, 5, 30, 30)

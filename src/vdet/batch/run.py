@@ -21,7 +21,8 @@ from vdet.files import (
     record_input,
     remove_stale,
 )
-from vdet.run.sinks.protocol import BatchTotal, Output, check_sinks, sink_kind
+from vdet.run.sinks import Output
+from vdet.run.sinks.protocol import BatchTotal, check_sinks, sink_kind
 from vdet.run.video import Run
 from vdet.workers import Workers, call_all
 

@@ -35,7 +35,6 @@ def count(
     tracks: tuple[Path, ...],
     size: tuple[int, int] | None,
     rate: float | None,
-    choice: options.SettingsChoice,
     overwrite: bool,
 ) -> None:
     """Count the vehicles of track files at lines and in zones.
@@ -63,7 +62,7 @@ def count(
         if path.suffix.lower() in VIDEO_INPUT_SUFFIXES:
             saved = shlex.join(map(str, (path, "--no-video", "--tracks", f"{path.stem}.jsonl")))
             raise click.UsageError(f"{path}: is a video; run first: vdet detect-video {saved}")
-    settings = choice.read()
+    settings = options.read_settings()
     if not settings.traffic:
         raise click.UsageError("no lines or zones to count at; add a settings file with -c FILE")
     check_counting(settings, several=len(tracks) > 1)
@@ -72,7 +71,7 @@ def count(
     from vdet.traffic.counting import count_files
     from vdet.traffic.tables import write_content
 
-    outputs = options.as_outputs(options.wanted_outputs())
+    outputs = options.wanted_outputs()
     check_sinks(outputs, overwrite=overwrite)
     with progress_steps(" files") as steps:
         advance = steps("", len(tracks) if len(tracks) > 1 else None)

@@ -33,7 +33,6 @@ def detect_image(
     images: tuple[Path, ...],
     output: Path | None,
     stages: Path | None,
-    choice: options.SettingsChoice,
     overwrite: bool,
 ) -> int:
     """Find vehicles in images.
@@ -61,7 +60,7 @@ def detect_image(
     vdet detect-image images/ --labels images.coco.json
     vdet detect-image road.jpg --stages stages
     """
-    settings = choice.read()
+    settings = options.read_settings()
     if settings.lack_of_metres:
         log.warning("%s", settings.lack_of_metres)
     from vdet.detect.factory import load_detector
@@ -74,7 +73,7 @@ def detect_image(
     check_masks(settings.regions)
     model = load_detector(settings.detector)
     sources = find_images(images)
-    shared = options.as_outputs(options.wanted_outputs())
+    shared = options.wanted_outputs()
     check_sinks(shared, overwrite=overwrite)
     jobs = plan_pictures(sources, output, stages, overwrite=overwrite)
     is_printed = not (output or stages or shared)

@@ -3,9 +3,7 @@
 import logging
 import re
 import shlex
-from collections.abc import Sequence
 from contextlib import closing
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
@@ -18,6 +16,7 @@ from vdet.cli.command import command
 from vdet.cli.messages import announce, print_lines, progress_steps
 from vdet.cli.results import check_counting, counting_options
 from vdet.errors import DOUBTFUL, counted, failure_code
+from vdet.run.sinks import Output
 
 if TYPE_CHECKING:
     from vdet.batch.manifest import Record
@@ -29,38 +28,6 @@ log = logging.getLogger("vdet")
 
 _SUFFIX = re.compile(r"(\.[a-z0-9_-]+)+", re.ASCII)
 """The ending of an output's name, such as `.csv` or `.cars.csv`."""
-
-
-@dataclass(frozen=True, slots=True)
-class BatchOptions:
-    """The values of `_batch_options`; without a `folder` there is no batch."""
-
-    folder: Path | None
-    jobs: int | None
-    skip_existing: bool
-    dry_run: bool
-    scheduler: str | None
-
-    def check(self, *, overwrite: bool) -> None:
-        """Raise `click.UsageError` where options do not go together."""
-        others = self.jobs or self.skip_existing or self.dry_run or self.scheduler
-        if self.folder is None and others:
-            raise click.UsageError("--jobs, --skip-existing, --dry-run and --scheduler require -d")
-        if overwrite and self.skip_existing:
-            raise click.UsageError("--overwrite and --skip-existing cannot be used together")
-        if self.jobs and self.scheduler:
-            raise click.UsageError("--jobs and --scheduler cannot be used together")
-
-
-_batch_options = options.bundle(
-    "batch",
-    BatchOptions,
-    options.option("-d, --directory DIR", name="folder"),
-    options.jobs_option,
-    options.option("--skip-existing"),
-    options.option("--dry-run"),
-    options.scheduler_option,
-)
 
 
 @command()
@@ -84,7 +51,11 @@ _batch_options = options.bundle(
 @options.class_option
 @options.option(f"--at {options.TIME_FORM}", options.parse_time)
 @options.option("--strict")
-@_batch_options
+@options.option("-d, --directory DIR", name="folder")
+@options.jobs_option
+@options.option("--skip-existing")
+@options.option("--dry-run")
+@options.scheduler_option
 @options.lanes_option
 @options.settings_options("output.crf=18", options.model_option)
 @options.overwrite_option
@@ -96,10 +67,13 @@ def detect_video(
     frames: int | None,
     threads: int | None,
     at: Fraction | None,
-    choice: options.SettingsChoice,
-    overwrite: bool,
     strict: bool,
-    batch: BatchOptions,
+    folder: Path | None,
+    jobs: int | None,
+    skip_existing: bool,
+    dry_run: bool,
+    scheduler: str | None,
+    overwrite: bool,
 ) -> int:
     """Find and follow vehicles in one video or many.
 
@@ -171,43 +145,61 @@ def detect_video(
     vdet detect-video in.mp4 --no-video -c gate.yaml --flows flows.csv --interval 15min
     vdet detect-video clips/ -d found --tracks .jsonl --skip-existing
     """
-    wanted = options.wanted_outputs()
-    batch.check(overwrite=overwrite)
-    if start is not None and end is not None and end <= start:
-        raise click.UsageError("--end must be later than --start")
-    if (at is None) == any(sink == "stages" for sink, _ in wanted):
-        raise click.UsageError("--stages and --at must be used together")
+    outputs = options.wanted_outputs()
+    has_stages = any(output.sink == "stages" for output in outputs)
+    for is_wrong, words in (
+        (
+            folder is None and (jobs or skip_existing or dry_run or scheduler),
+            "--jobs, --skip-existing, --dry-run and --scheduler require -d",
+        ),
+        (overwrite and skip_existing, "--overwrite and --skip-existing cannot be used together"),
+        (jobs and scheduler, "--jobs and --scheduler cannot be used together"),
+        (
+            start is not None and end is not None and end <= start,
+            "--end must be later than --start",
+        ),
+        ((at is None) == has_stages, "--stages and --at must be used together"),
+        (
+            no_video and not outputs and (folder or len(videos) < 2),
+            "no output; add one, such as --tracks",
+        ),
+    ):
+        if is_wrong:
+            raise click.UsageError(words)
     source = Path()
-    if batch.folder is None:
-        source, video = _in_and_out(videos, no_video=no_video, is_alone=not (wanted or no_video))
-        wanted = [*video, *wanted]
-    if no_video and not wanted:
-        raise click.UsageError("no output; add one, such as --tracks")
-    settings = choice.read()
-    check_counting(settings, several=batch.folder is not None)
+    if folder is None:
+        source, outputs = _in_and_out(videos, outputs, no_video=no_video)
+    settings = options.read_settings()
+    check_counting(settings, several=folder is not None)
     from vdet.regions import check_masks
     from vdet.run.video import Run
 
     check_masks(settings.regions)
-    if batch.folder is not None:
-        wanted = [(sink, Path(_ending(sink, path))) for sink, path in wanted]
-        if not no_video and not any(sink == "video" for sink, _ in wanted):
-            wanted.insert(0, ("video", Path()))
+    if folder is not None:
+        outputs = _with_endings(outputs, no_video=no_video)
     part = start, end, frames, at or Fraction(0)
-    run = Run(source, options.as_outputs(wanted), settings, *part, overwrite, threads)
-    if batch.folder is not None:
-        return _process_batch(videos, run, batch, strict=strict)
-    is_doubtful = _process_one(run)
-    return DOUBTFUL if strict and is_doubtful else 0
+    run = Run(source, tuple(outputs), settings, *part, overwrite, threads)
+    if folder is None:
+        code, is_doubtful = 0, _process_one(run)
+    else:
+        from vdet.batch.run import make_plan
+
+        if scheduler:  # the workers were started in other folders
+            videos, folder = tuple(clip.absolute() for clip in videos), folder.absolute()
+        plan = make_plan(videos, folder, run, skip_existing=skip_existing)
+        if dry_run:
+            return _print_plan(plan)
+        code, is_doubtful = _process_batch(plan, jobs, scheduler)
+    return code or (DOUBTFUL if strict and is_doubtful else 0)
 
 
 def _in_and_out(
-    clips: tuple[Path, ...], *, no_video: bool, is_alone: bool
-) -> tuple[Path, list[options.Wanted]]:
-    """Return the source, and the video to write; `is_alone`: no other output is asked for."""
-    source, *outputs = clips
-    is_beside = is_alone and not (outputs or source.is_dir() or "%" in source.name)
-    if no_video == bool(outputs) and not is_beside:
+    clips: tuple[Path, ...], wanted: list[Output], *, no_video: bool
+) -> tuple[Path, list[Output]]:
+    """Return the source, and all outputs, with the video to write."""
+    source, *videos = clips
+    is_beside = not (no_video or wanted or videos or source.is_dir() or "%" in source.name)
+    if no_video == bool(videos) and not is_beside:
         raise click.UsageError("pass one OUT, or --no-video; or -d DIR for several videos")
     from vdet.media.writer import may_replace_video
     from vdet.run.sinks.protocol import sink_kind
@@ -216,15 +208,32 @@ def _in_and_out(
         from vdet.batch.inputs import DRAWN
 
         suffix = sink_kind("video").suffix_for(source)
-        outputs = [source.with_name(f"{source.stem}{DRAWN}{suffix}")]
-    is_kept = any(path.is_file() and not may_replace_video(path) for path in outputs[:1])
-    if len(outputs) > 1 or is_kept:
+        videos = [source.with_name(f"{source.stem}{DRAWN}{suffix}")]
+    is_kept = any(path.is_file() and not may_replace_video(path) for path in videos[:1])
+    if len(videos) > 1 or is_kept:
         shown = shlex.join(map(str, clips[:2])) + (" …" if len(clips) > 2 else "")
         raise click.UsageError(
-            f"{outputs[0]} would be replaced, but vdet did not write it; remove it, or for several "
+            f"{videos[0]} would be replaced, but vdet did not write it; remove it, or for several "
             f"videos use a folder: vdet detect-video {shown} -d found"
         )
-    return source, [("video", path) for path in outputs]
+    return source, [*(Output("video", path) for path in videos), *wanted]
+
+
+def _with_endings(outputs: list[Output], *, no_video: bool) -> list[Output]:
+    """Return the outputs of a batch: for each the ending of its name, after that of the video."""
+    from vdet.run.sinks.protocol import sink_kind
+
+    endings = []
+    for output in outputs:
+        sink, kind, suffix = output.sink, sink_kind(output.sink), str(output.path).lower()
+        if kind.takes == "pictures" or kind.one_frame:
+            raise click.UsageError(f"{sink}: cannot be written with -d; remove one of them")
+        if not _SUFFIX.fullmatch(suffix) or not kind.takes_name(f"video{suffix}"):
+            known = ", ".join(kind.endings) or f"as in .{sink if kind.marker else 'txt'}"
+            raise click.UsageError(f"{sink}: with -d, pass only the ending of the names: {known}")
+        endings.append(Output(sink, Path(suffix)))
+    has_video = no_video or any(output.sink == "video" for output in outputs)
+    return endings if has_video else [Output("video", Path()), *endings]
 
 
 def _process_one(run: "Run") -> bool:
@@ -246,58 +255,23 @@ def _process_one(run: "Run") -> bool:
     return findings_in(totals.facts).is_doubtful
 
 
-def _ending(sink: str, path: Path) -> str:
-    """Return the ending of an output's name; the rest of it is the name of the video."""
-    from vdet.run.sinks.protocol import sink_kind
-
-    kind, suffix = sink_kind(sink), str(path).lower()
-    if kind.takes == "pictures" or kind.one_frame:
-        raise click.UsageError(f"{sink}: cannot be written with -d; remove one of them")
-    if not _SUFFIX.fullmatch(suffix) or not kind.takes_name(f"video{suffix}"):
-        known = ", ".join(kind.endings) or f"as in .{sink if kind.marker else 'txt'}"
-        raise click.UsageError(f"{sink}: with -d, pass only the ending of the names: {known}")
-    return suffix
+def _print_plan(plan: "Plan") -> int:
+    for runs, form in ((plan.skipped, "{}: {} up to date"), (plan.runs, "{} → {}")):
+        for run in runs:
+            print_lines(form.format(run.source, ", ".join(str(item.path) for item in run.outputs)))
+    return 0
 
 
-def _process_batch(
-    clips: Sequence[Path], common: "Run", batch: BatchOptions, *, strict: bool
-) -> int:
-    """Process a batch, or list what would be written, and return the exit code."""
-    from vdet.batch.run import make_plan
-
-    folder = batch.folder or Path()
-    if batch.scheduler:  # the workers were started in other folders
-        clips, folder = [clip.absolute() for clip in clips], folder.absolute()
-    plan = make_plan(clips, folder, common, skip_existing=batch.skip_existing)
-    if batch.dry_run:
-        print_lines(
-            *(f"{run.source}: {_output_names(run)} up to date" for run in plan.skipped),
-            *(f"{run.source} → {_output_names(run)}" for run in plan.runs),
-        )
-        return 0
-    records = _run(plan, batch)
-    failed = sum(record.error is not None for record in records)
-    skipped = f"{len(plan.skipped)} skipped, " if plan.skipped else ""
-    announce(f"{folder}: {counted(len(records) - failed, 'file')} done, {skipped}{failed} failed")
-    code = failure_code(failed, len(plan.runs) + len(plan.skipped))
-    is_doubtful = any(record.is_doubtful for record in records)
-    return code or (DOUBTFUL if strict and is_doubtful else 0)
-
-
-def _output_names(run: "Run") -> str:
-    return ", ".join(str(output.path) for output in run.outputs)
-
-
-def _run(plan: "Plan", batch: BatchOptions) -> "list[Record]":
-    """Run the batch, print the result of each video, and return their records."""
+def _process_batch(plan: "Plan", jobs: int | None, scheduler: str | None) -> tuple[int, bool]:
+    """Process a batch; return the exit code, and whether a result is doubtful."""
     from vdet.batch.run import run_batch
     from vdet.workers import DaskCluster, LocalProcesses, core_count
 
     cores = core_count()
-    jobs = max(1, min(batch.jobs or cores, len(plan.runs)))
+    jobs = max(1, min(jobs or cores, len(plan.runs)))
     workers: Workers = LocalProcesses(jobs)
-    if batch.scheduler:
-        workers, jobs = DaskCluster(batch.scheduler), cores  # a thread for each file
+    if scheduler:
+        workers, jobs = DaskCluster(scheduler), cores  # a thread for each file
     records = []
     with (
         progress_steps(" files") as steps,
@@ -308,7 +282,12 @@ def _run(plan: "Plan", batch: BatchOptions) -> "list[Record]":
             _print_result(run, record)
             records.append(record)
             advance(1)
-    return records
+    failed = sum(record.error is not None for record in records)
+    skipped = f"{len(plan.skipped)} skipped, " if plan.skipped else ""
+    done = counted(len(records) - failed, "file")
+    announce(f"{plan.folder}: {done} done, {skipped}{failed} failed")
+    code = failure_code(failed, len(plan.runs) + len(plan.skipped))
+    return code, any(record.is_doubtful for record in records)
 
 
 def _print_result(run: "Run", record: "Record") -> None:

@@ -49,7 +49,6 @@ def draw(
     tracks: Path | None,
     start: Fraction | None,
     end: Fraction | None,
-    choice: options.SettingsChoice,
     overwrite: bool,
 ) -> None:
     """Write a page for drawing lines and zones over the paths of vehicles.
@@ -79,7 +78,7 @@ def draw(
     from vdet.run.video import Run
 
     outputs = [path for path in (output, propose) if path]
-    settings = choice.read()
+    settings = options.read_settings()
     if not outputs:
         raise click.UsageError("no output; use -o FILE or --propose FILE")
     for path, suffixes in ((output, _OUTPUTS), (propose, _SETTINGS)):
@@ -93,13 +92,13 @@ def draw(
         run = Run(clip, (), settings.model_copy(update={"regions": ()}), start, end)
         image, frames = _watched(run, tracks, steps)
     settings.camera.check_frames(image.shape[1], image.shape[0])
-    drawing = Drawing(image, frames, settings, choice.given(), facing)
+    drawing = Drawing(image, frames, settings, options.own_values(), facing)
     if propose and not drawing.proposals:
         raise ConfigError(f"{clip}: no stream has enough vehicles; draw lines with -o gate.html")
     with OutputFiles(overwrite=overwrite) as files:
         for path in outputs:
             with output_errors(path):
-                name = Path((choice.configs or [path.name])[-1]).with_suffix(".yaml").name
+                name = Path([path.name, *options.config_names()][-1]).with_suffix(".yaml").name
                 files.stage(path).write_bytes(drawing.output(path, name))
     lines = drawing.proposals if propose else ()
     print_lines(

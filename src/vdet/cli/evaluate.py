@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -22,9 +23,7 @@ _data = click.argument("data", nargs=-1, required=True, type=options.INPUT, meta
 @options.option("--min-width FRACTION", click.FloatRange(0, 1), default=0.0)
 @options.settings_options("detector.min_score_still=0.5", options.model_option)
 @results_options
-def images(
-    data: tuple[Path, ...], min_width: float, choice: options.SettingsChoice, results: Results
-) -> None:
+def images(data: tuple[Path, ...], min_width: float, **targets: Any) -> None:
     """Measure detection in labelled images.
 
     Each DATA is a folder in COCO, KITTI, YOLO or Pascal VOC format, or a COCO file. Each image is
@@ -39,7 +38,7 @@ def images(
     --------
     vdet eval images city/ motorway/ --model their.onnx --min-width 0.03
     """
-    settings = choice.read_for_whole_frames()
+    settings = options.read_for_whole_frames()
     from vdet.detect.factory import load_detector
     from vdet.evaluate.images import Counting, evaluate_images
     from vdet.evaluate.report import images_report
@@ -51,12 +50,13 @@ def images(
     detector, roles = settings.detector, Roles.from_settings(settings)
     model = load_detector(detector.showing_all())
     sets = [read_labelled_pictures(path, roles) for path in data]
+    results = Results(**targets)
     results.check()
     counting = Counting(detector.min_score_still, min_width)
     with progress_steps(" images") as steps:
         progress = partial(steps, "")
         result = evaluate_images(sets, model, counting, threads=core_count(), progress=progress)
-    results.print_report(images_report(result, choice.run_name(settings)))
+    results.print_report(images_report(result, options.run_name(settings)))
 
 
 _ON_LAST = "leak-free: a new model is tested on the last patches of each folder"
@@ -67,7 +67,7 @@ _ON_ALL = "if the model was trained on some of these patches, the scores are too
 @_data
 @options.settings_options("train.svm.C=1e-4", options.model_option)
 @facts_options
-def patches(data: tuple[Path, ...], choice: options.SettingsChoice, results: Results) -> None:
+def patches(data: tuple[Path, ...], **targets: Any) -> None:
     """Measure the classifier on labelled patches.
 
     Each DATA is a folder or a zip file, as for vdet train. With --model, that model is tested on
@@ -77,7 +77,7 @@ def patches(data: tuple[Path, ...], choice: options.SettingsChoice, results: Res
     --------
     vdet eval patches vehicles.zip non-vehicles.zip --json scores.json
     """
-    settings = choice.read(detector="svm")
+    settings = options.read_settings(detector="svm")
     from vdet.detect.svm.detector import requested_features
     from vdet.detect.svm.model import load_model
     from vdet.learn.svm.dataset import find_patches
@@ -85,11 +85,12 @@ def patches(data: tuple[Path, ...], choice: options.SettingsChoice, results: Res
 
     path = Path(settings.svm.model) if settings.svm.model else None
     model = load_model(path, requested_features(settings.svm)) if path else None
+    results = Results(**targets)
     results.check()
     files = find_patches(data)
     with progress_steps("") as steps:
         result = evaluate_patches(files, settings, model, steps=steps)
-    name = choice.run_name(settings)
+    name = options.run_name(settings)
     meaning = _ON_ALL if model else _ON_LAST
     values = name.values | {"meaning": meaning, "test": asdict(result)}
     results.print([name.line, meaning, "", *result.lines()], values)
@@ -101,13 +102,7 @@ def patches(data: tuple[Path, ...], choice: options.SettingsChoice, results: Res
 @options.until_option
 @options.settings_options("labels.roles.tram=vehicle")
 @results_options
-def tracks(
-    prediction: Path,
-    truth: Path,
-    until: int | None,
-    choice: options.SettingsChoice,
-    results: Results,
-) -> None:
+def tracks(prediction: Path, truth: Path, until: int | None, **targets: Any) -> None:
     """Compare a file of tracks with the ground truth.
 
     PRED is a file of vdet detect-video --tracks. TRUTH is a MOTChallenge gt.txt, KITTI tracking
@@ -120,10 +115,11 @@ def tracks(
     from vdet.evaluate.report import tracks_report
     from vdet.evaluate.video import score_files
 
+    results = Results(**targets)
     results.check()
     with progress_steps("") as steps:
         steps("comparing", None)
-        result = score_files(prediction, truth, until, choice.read())
+        result = score_files(prediction, truth, until, options.read_settings())
     results.print_report(tracks_report(result, truth))
 
 
@@ -139,8 +135,7 @@ def video(
     truths: tuple[Path, ...],
     until: int | None,
     sweeps: tuple[str, ...],
-    choice: options.SettingsChoice,
-    results: Results,
+    **targets: Any,
 ) -> None:
     """Measure detection and tracking in labelled video.
 
@@ -157,20 +152,21 @@ def video(
     vdet eval video in.mp4 --truth gt.txt --sweep tracker.confirm_seconds=0.1,0.3
     """
     pairs = options.paired(videos, truths)
-    base = choice.read()
+    base = options.read_settings()
     from vdet.detect.factory import load_detector
     from vdet.evaluate.report import video_report
     from vdet.evaluate.video import Variant, evaluate_clips, open_clip
     from vdet.regions import check_masks
 
     check_masks(base.regions)
-    swept = [(choice.read(*extra), extra) for extra in grid(sweeps)]
+    swept = [(options.read_settings(*extra), extra) for extra in grid(sweeps)]
     variants = [Variant(one, load_detector(one.detector), extra) for one, extra in swept]
+    results = Results(**targets)
     results.check()
     clips = [open_clip(*pair, until, base) for pair in pairs]
     with progress_steps(" frames") as steps:
         runs = evaluate_clips(clips, variants, partial(steps, ""))
-    results.print_report(video_report(runs, choice.run_name(base)))
+    results.print_report(video_report(runs, options.run_name(base)))
 
 
 def grid(sweeps: Sequence[str]) -> list[tuple[str, ...]]:

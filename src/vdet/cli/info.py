@@ -11,7 +11,7 @@ import click
 
 from vdet.cli.command import command
 from vdet.cli.messages import print_lines
-from vdet.cli.options import INPUT, SettingsChoice, settings_options
+from vdet.cli.options import INPUT, config_names, read_settings, settings_options
 from vdet.cli.results import Results, facts_options
 from vdet.errors import counted, in_one_line, opencv_fault, printable
 from vdet.version import __version__
@@ -30,7 +30,7 @@ _ANY_SIZE = 1000, 1000
 @click.argument("path", type=INPUT, metavar="[FILE]", required=False)
 @facts_options
 @settings_options("camera.size=[960,540]")
-def info(path: Path | None, results: Results, choice: SettingsChoice) -> int:
+def info(path: Path | None, **targets: Any) -> int:
     """Describe a video, an image, a model file, the settings of a camera, or this machine.
 
     FILE is a video, numbered images, an image, a linear model (.npz), or a network (.onnx) of vdet
@@ -48,9 +48,10 @@ def info(path: Path | None, results: Results, choice: SettingsChoice) -> int:
     """
     from vdet.media.images import is_picture_name
 
+    results = Results(**targets)
     results.check()
     if path is None:
-        facts = _settings(choice) if choice.configs else _machine()
+        facts = _settings() if config_names() else _machine()
     else:
         describe = {".npz": _linear_model, ".onnx": _network}.get(path.suffix.lower())
         if describe is None:
@@ -113,7 +114,7 @@ def _shipped(path: Path) -> str:
     return f"{path}, its model loads"
 
 
-def _settings(choice: SettingsChoice) -> Facts:
+def _settings() -> Facts:
     """Return what settings say of a camera, and how well the points of its ground fit."""
     import numpy as np
 
@@ -121,11 +122,11 @@ def _settings(choice: SettingsChoice) -> Facts:
     from vdet.traffic.crossings import place
     from vdet.traffic.speeds import KMH, WINDOW
 
-    settings = choice.read()
+    settings = read_settings()
     size = settings.camera.size or _ANY_SIZE
     lines, zones = place(settings.traffic, *size)
     facts: Facts = {
-        "file": choice.name,
+        "file": " ".join(config_names()),
         "kind": "settings of a camera",
         "lines": [line.name for line in lines],
         "zones": [zone.name for zone in zones],
@@ -237,7 +238,7 @@ def _video(path: Path) -> Facts:
 
 @command()
 @settings_options("tracker.kind=rules")
-def config(choice: SettingsChoice) -> None:
+def config() -> None:
     """Print the effective settings as commented YAML.
 
     Save them, change what you like, and pass the file to a command with -c.
@@ -249,4 +250,4 @@ def config(choice: SettingsChoice) -> None:
     """
     from vdet.config.rendering import render
 
-    print_lines(*render(choice.read()).splitlines())
+    print_lines(*render(read_settings()).splitlines())

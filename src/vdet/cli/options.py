@@ -1,6 +1,7 @@
 """Options that several commands share, so that one flag means one thing everywhere.
 
-A *bundle* adds several options to a command, which gets their values as one argument.
+Commands do not get the values of those for settings and outputs: `read_settings` and
+`wanted_outputs` return what these ask for.
 
 Parameters
 ----------
@@ -49,9 +50,7 @@ scheduler
 import json
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
 from fractions import Fraction
-from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -60,11 +59,11 @@ from click.shell_completion import CompletionItem
 
 from vdet.errors import ConfigError, OutputError
 from vdet.files import check_output, record_input
+from vdet.run.sinks import Output
 
 if TYPE_CHECKING:
     from vdet.config.schema import Settings
     from vdet.evaluate.output import RunName
-    from vdet.run.sinks.protocol import Output
 
 
 class _Input(click.Path):
@@ -111,28 +110,6 @@ def parse_pair(text: str) -> tuple[int, int]:
     if not match:
         raise click.BadParameter(f"{text!r} is not two numbers separated by x")
     return int(match[1]), int(match[2])
-
-
-def bundle(name: str, make: type[Any], *options: Callable[..., Any]) -> Callable[[F], F]:
-    """Return a decorator that adds options to a command.
-
-    The command gets one argument, `name`: the dataclass `make` with the values of the options. Its
-    fields are called as the options' values; one without an option keeps its default.
-    """
-    keys = [field.name for field in fields(make)]
-
-    def add(command: F) -> F:
-        @wraps(command)
-        def call(*arguments: Any, **values: Any) -> Any:
-            values[name] = make(**{key: values.pop(key) for key in keys if key in values})
-            return command(*arguments, **values)
-
-        decorated: Any = call
-        for option in reversed(options):
-            decorated = option(decorated)
-        return decorated  # type: ignore[no-any-return]
-
-    return add
 
 
 def option(shown: str, kind: Any = None, *, name: str = "", **more: Any) -> Callable[[F], F]:
@@ -189,19 +166,30 @@ def check_file(output: Path, *suffixes: str, what: str, overwrite: bool) -> None
     check_output(output, overwrite=overwrite)
 
 
-_SHORT = f"{__name__}.short"
+def _keeping(what: str, make: Callable[[Any], Iterable[Any]] = list) -> dict[str, Any]:
+    """Return arguments of `option` with which a value is not passed to the command, but `_kept`."""
+
+    def keep(_: click.Context, __: click.Parameter, given: Any) -> None:
+        if given not in (None, ()) and given is not False:
+            _kept(what).extend(make(given))
+
+    return {"expose_value": False, "callback": keep}
+
+
+def _kept(what: str) -> list[Any]:
+    kept: list[Any] = click.get_current_context().meta.setdefault(f"{__name__}.{what}", [])
+    return kept
 
 
 def short_form(
     shown: str, key: str, kind: Any = None, *, multiple: bool = False
 ) -> Callable[[F], F]:
-    """Add an option that is a short form of a setting: see `SettingsChoice`."""
+    """Add an option that is a short form of a setting: see `read_settings`."""
 
-    def keep(context: click.Context, _: click.Parameter, given: Any) -> None:
-        if given not in (None, ()) and given is not False:
-            context.meta.setdefault(_SHORT, []).append((key, given))
+    def assignments(given: Any) -> list[str]:
+        return [f"{key}={json.dumps(given, default=str)}"]
 
-    return option(shown, kind, expose_value=False, callback=keep, multiple=multiple)
+    return option(shown, kind, multiple=multiple, **_keeping("short forms", assignments))
 
 
 model_option = short_form("--model FILE", "detector.model")
@@ -209,69 +197,18 @@ class_option = short_form("--class NAME", "classes", str, multiple=True)
 lanes_option = short_form("--lanes", "lanes.enabled")
 
 
-@dataclass(frozen=True, slots=True)
-class SettingsChoice:
-    """The settings that `settings_options` choose: files, assignments and their short forms."""
-
-    configs: tuple[str, ...]
-    assignments: tuple[str, ...]
-
-    def read(self, *more: str, detector: str | None = None) -> "Settings":
-        """Read them, and `more` assignments; `detector` is its kind where nothing chooses one.
-
-        Raises `ConfigError`.
-        """
-        short = click.get_current_context().meta.get(_SHORT, [])
-        given = (f"{key}={json.dumps(value, default=str)}" for key, value in short)
-        assignments = (*self.assignments, *given, *more)
-        if not (self.configs or assignments or detector):
-            from vdet.config.schema import Settings
-
-            return Settings()
-        from vdet.config.loading import load_settings
-
-        return load_settings(self._files(), assignments, detector=detector)
-
-    def _files(self) -> list[Path]:
-        from vdet.config.loading import find_config
-
-        return [find_config(name) for name in self.configs]
-
-    def given(self) -> dict[str, Any]:
-        """Return what the files say that are not shipped ones; see `given_values`."""
-        from vdet.config.loading import given_values, shipped_configs
-
-        shipped = set(shipped_configs().values())
-        return given_values([path for path in self._files() if path not in shipped])
-
-    def run_name(self, settings: "Settings") -> "RunName":
-        """Return which detector these settings measure."""
-        from vdet.detect.factory import model_file
-        from vdet.evaluate.output import RunName
-
-        detector = settings.detector
-        return RunName(detector.kind, model_file(detector), self.name, self.assignments)
-
-    @property
-    def name(self) -> str | None:
-        """The names of the files as the user gave them; None for the defaults."""
-        return " ".join(self.configs) or None
-
-    def read_for_whole_frames(self, *, detector: str | None = None) -> "Settings":
-        """Read them for a command that looks at whole frames; refuse regions as a `ConfigError`."""
-        settings = self.read(detector=detector)
-        if settings.regions:
-            raise ConfigError("regions: this command uses whole frames; remove the regions")
-        return settings
-
-
 def settings_options(example: str, *more: Callable[..., Any]) -> Callable[[F], F]:
-    """Add `-c FILE`, `--set KEY=VALUE` and `more` options: `choice`, a `SettingsChoice`.
+    """Add `more` options, `-c FILE` and `--set KEY=VALUE`: see `read_settings`.
 
     `example` is an assignment for the help text that changes what the command does.
     """
     config = option(
-        "-c, --config FILE", str, name="configs", multiple=True, shell_complete=_complete_configs
+        "-c, --config FILE",
+        str,
+        name="configs",
+        multiple=True,
+        shell_complete=_complete_configs,
+        **_keeping("configs"),
     )
     assign = option(
         "--set KEY=VALUE",
@@ -279,8 +216,67 @@ def settings_options(example: str, *more: Callable[..., Any]) -> Callable[[F], F
         help=f"Change one setting, for example {example}. Can be repeated.",
         multiple=True,
         shell_complete=_complete_keys,
+        **_keeping("assignments"),
     )
-    return bundle("choice", SettingsChoice, *more, config, assign)
+
+    def add(command: F) -> F:
+        for one in (assign, config, *more):
+            command = one(command)
+        return command
+
+    return add
+
+
+def read_settings(*more: str, detector: str | None = None) -> "Settings":
+    """Read the settings that the options of the running command choose, and `more` assignments.
+
+    They are files, assignments and short forms. `detector` is its kind where nothing chooses one.
+    Raises `ConfigError`.
+    """
+    assignments = (*_kept("assignments"), *_kept("short forms"), *more)
+    if not (_kept("configs") or assignments or detector):
+        from vdet.config.schema import Settings
+
+        return Settings()
+    from vdet.config.loading import load_settings
+
+    return load_settings(_config_files(), assignments, detector=detector)
+
+
+def read_for_whole_frames(*, detector: str | None = None) -> "Settings":
+    """Read them for a command that looks at whole frames; refuse regions as a `ConfigError`."""
+    settings = read_settings(detector=detector)
+    if settings.regions:
+        raise ConfigError("regions: this command uses whole frames; remove the regions")
+    return settings
+
+
+def _config_files() -> list[Path]:
+    from vdet.config.loading import find_config
+
+    return [find_config(name) for name in _kept("configs")]
+
+
+def own_values() -> dict[str, Any]:
+    """Return what the files say that are not shipped ones; see `given_values`."""
+    from vdet.config.loading import given_values, shipped_configs
+
+    shipped = set(shipped_configs().values())
+    return given_values([path for path in _config_files() if path not in shipped])
+
+
+def config_names() -> list[str]:
+    """Return the files of settings as the user named them."""
+    return _kept("configs")
+
+
+def run_name(settings: "Settings") -> "RunName":
+    """Return which detector these settings measure."""
+    from vdet.detect.factory import model_file
+    from vdet.evaluate.output import RunName
+
+    detector, names = settings.detector, " ".join(config_names()) or None
+    return RunName(detector.kind, model_file(detector), names, tuple(_kept("assignments")))
 
 
 def _complete_configs(_: click.Context, __: click.Parameter, start: str) -> list[CompletionItem]:
@@ -305,41 +301,25 @@ def _keys(values: Mapping[str, Any], before: str = "") -> Iterator[str]:
             yield f"{before}{name}"
 
 
-Wanted = tuple[str, Path]
-"""An output that is asked for: the name of its sink, and its path."""
-
-_WANTED = f"{__name__}.wanted"
-
-
 def output_option(shown: str) -> Callable[[F], F]:
     """Add the option of a sink, which asks for an output: see `wanted_outputs`."""
-    return option(shown, PATH, multiple=True, expose_value=False, callback=_want)
+
+    def outputs(given: Sequence[Path]) -> list[Output]:
+        return [Output(shown.split(maxsplit=1)[0].lstrip("-"), path) for path in given]
+
+    return option(shown, PATH, multiple=True, **_keeping("outputs", outputs))
 
 
-def _want(context: click.Context, option: click.Parameter, given: tuple[Any, ...]) -> None:
-    wanted = [item if isinstance(item, tuple) else (option.name, item) for item in given]
-    context.meta.setdefault(_WANTED, []).extend(wanted)
-
-
-def _parse_sink(text: str) -> Wanted:
+def _parse_sink(text: str) -> Output:
     name, _, path = text.partition("=")
     if not (name and path):
         raise click.BadParameter(f"{text}: expected NAME=FILE, as in tracks=out.csv")
-    return name, Path(path)
+    return Output(name, Path(path))
 
 
-sink_option = option(
-    "--sink NAME=FILE", _parse_sink, multiple=True, expose_value=False, callback=_want
-)
+sink_option = option("--sink NAME=FILE", _parse_sink, multiple=True, **_keeping("outputs"))
 
 
-def wanted_outputs() -> list[Wanted]:
+def wanted_outputs() -> list[Output]:
     """Return what each `output_option` and `sink_option` of the running command asks for."""
-    return list(click.get_current_context().meta.get(_WANTED, []))
-
-
-def as_outputs(wanted: Iterable[Wanted]) -> tuple["Output", ...]:
-    """Return outputs as the library takes them."""
-    from vdet.run.sinks.protocol import Output
-
-    return tuple(Output(sink, path) for sink, path in wanted)
+    return list(_kept("outputs"))

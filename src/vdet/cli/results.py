@@ -9,7 +9,7 @@ import click
 
 from vdet.cli import options
 from vdet.cli.messages import print_lines, progress_steps
-from vdet.cli.options import F, bundle, option, overwrite_option, short_form
+from vdet.cli.options import F, option, overwrite_option, short_form
 from vdet.errors import OutputError
 from vdet.files import OutputFiles, check_output, json_text, output_errors, write_json, write_text
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Results:
-    """Where a command puts what it measured: the values of `results_options`."""
+    """Where a command puts what it measured: made of the values of `results_options`."""
 
     json_target: str | None
     overwrite: bool
@@ -79,17 +79,20 @@ class Results:
 _json_option = option("--json FILE", str, name="json_target")
 _page_option = option("--page DIR")
 
-facts_options = bundle("results", Results, _json_option, overwrite_option)
-"""`--json FILE` and `--overwrite`."""
 
-results_options = bundle("results", Results, _json_option, _page_option, overwrite_option)
-"""`--json FILE`, `--page DIR` and `--overwrite`."""
+def facts_options(command: F) -> F:
+    """Add `--json FILE` and `--overwrite`: arguments of `Results`."""
+    return _json_option(overwrite_option(command))
+
+
+def results_options(command: F) -> F:
+    """Add `--json FILE`, `--page DIR` and `--overwrite`: arguments of `Results`."""
+    return _json_option(_page_option(overwrite_option(command)))
 
 
 def check_counting(settings: "Settings", *, several: bool) -> None:
     """Raise `click.UsageError` where settings do not fit the outputs or the videos."""
-    wanted = {sink for sink, _ in options.wanted_outputs()}
-    tables = wanted & {"counts", "flows"}
+    tables = {output.sink for output in options.wanted_outputs()} & {"counts", "flows"}
     if tables and not settings.traffic:
         raise click.UsageError(
             f"--{min(tables)} needs lines or zones; add a settings file with -c FILE"

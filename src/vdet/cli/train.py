@@ -20,7 +20,6 @@ from vdet.files import check_output, staged
 def train(
     data: tuple[Path, ...],
     output: Path,
-    choice: options.SettingsChoice,
     jobs: int | None,
     overwrite: bool,
 ) -> None:
@@ -43,7 +42,7 @@ def train(
     vdet train vehicles.zip non-vehicles.zip mined.zip -o model.npz
     vdet train patches/ -o model.npz --set train.svm.C=1e-3
     """
-    settings = choice.read(detector="svm")
+    settings = options.read_settings(detector="svm")
     options.check_file(output, ".npz", what="models", overwrite=overwrite)
     from vdet.detect.svm.model import save_model
     from vdet.learn.svm.dataset import find_patches
@@ -73,7 +72,6 @@ def mine(
     every: int,
     first: int,
     until: int | None,
-    choice: options.SettingsChoice,
     overwrite: bool,
 ) -> None:
     """Cut patches for vdet train out of labelled videos.
@@ -99,7 +97,7 @@ def mine(
     if until is not None and until < first:
         raise click.UsageError("--until must not be before --from")
     options.check_file(output, ".zip", what="patches", overwrite=overwrite)
-    settings = choice.read_for_whole_frames(detector="svm")
+    settings = options.read_for_whole_frames(detector="svm")
     from vdet.detect.svm.detector import load_svm
     from vdet.learn.svm import mining
 
@@ -127,7 +125,6 @@ def train_net(
     output: Path,
     clips: tuple[tuple[Path, Path], ...],
     base: Path | None,
-    choice: options.SettingsChoice,
     overwrite: bool,
 ) -> None:
     """Train a network on labelled images.
@@ -153,7 +150,7 @@ def train_net(
     if not data and not clips:
         raise click.UsageError("nothing to learn from; pass DATA or --video")
     options.check_file(output, ".onnx", what="networks", overwrite=overwrite)
-    settings = choice.read()
+    settings = options.read_settings()
     try:
         from vdet.learn.net.sources import clip_source, picture_source
         from vdet.learn.net.training import train_to_file

@@ -17,7 +17,8 @@ from vdet.media.images import PICTURE_SUFFIXES, is_picture_name, read_image
 from vdet.progress import Progress, no_progress
 from vdet.run.loop import build, named_errors
 from vdet.run.result import FrameResult
-from vdet.run.sinks.protocol import Output, SinkContext, Sinks, check_sinks, open_sinks
+from vdet.run.sinks import Output
+from vdet.run.sinks.protocol import SinkContext, Sinks, check_sinks, open_sinks
 from vdet.run.threads import map_ordered
 
 

@@ -20,7 +20,8 @@ from vdet.media.reader import VideoReader
 from vdet.progress import Progress, no_progress
 from vdet.run.loop import build, named_errors, peek
 from vdet.run.result import Fact, Facts, FrameResult, findings_in
-from vdet.run.sinks.protocol import Output, SinkContext, check_sinks, open_sinks, sink_kind
+from vdet.run.sinks import Output
+from vdet.run.sinks.protocol import SinkContext, check_sinks, open_sinks, sink_kind
 from vdet.run.steps import Step
 from vdet.run.threads import prefetch
 from vdet.track.track import VideoTracker

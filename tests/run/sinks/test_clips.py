@@ -14,7 +14,7 @@ from running import names
 from vdet.config.schema import ClipSettings
 from vdet.media.reader import VideoReader
 from vdet.run.result import FrameResult
-from vdet.run.sinks.protocol import Output
+from vdet.run.sinks import Output
 from vdet.track.track import Track
 
 RATE = Fraction(25)

@@ -14,8 +14,8 @@ from vdet.config.places import LineSettings, TrafficSettings, ZoneSettings
 from vdet.config.schema import Settings
 from vdet.errors import OutputError
 from vdet.pages.render import PAGE_NAME
+from vdet.run.sinks import Output
 from vdet.run.sinks.data import COUNTS
-from vdet.run.sinks.protocol import Output
 from vdet.run.video import Run
 
 GATE, YARD = 100 / 320, 110 / 320

@@ -13,7 +13,7 @@ from vdet.boxes import Box
 from vdet.config.schema import LaneSettings
 from vdet.lanes.road import RoadFinder
 from vdet.media import Picture
-from vdet.run.sinks.protocol import Output
+from vdet.run.sinks import Output
 from vdet.track.track import Track
 
 ITEMS = (

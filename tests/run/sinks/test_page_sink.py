@@ -16,7 +16,7 @@ from running import names
 from vdet.boxes import Image
 from vdet.config.places import RegionSettings
 from vdet.media.images import decode_image
-from vdet.run.sinks.protocol import Output
+from vdet.run.sinks import Output
 from vdet.run.video import Run
 from writing import write_image
 

@@ -16,7 +16,8 @@ from vdet.conditions.finding import Findings
 from vdet.errors import OutputError
 from vdet.files import OutputFiles
 from vdet.run.result import FrameResult
-from vdet.run.sinks.protocol import BaseSink, Output, SinkContext, SinkKind, check_sinks, open_sink
+from vdet.run.sinks import Output
+from vdet.run.sinks.protocol import BaseSink, SinkContext, SinkKind, check_sinks, open_sink
 from vdet.run.video import Run
 
 MOMENTS = ("open", "enter", "first", "middle", "end")

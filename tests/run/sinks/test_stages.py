@@ -16,7 +16,7 @@ from vdet.errors import OutputError
 from vdet.lanes.road import Lane, Road
 from vdet.media.images import read_image
 from vdet.run.result import FrameResult
-from vdet.run.sinks.protocol import Output
+from vdet.run.sinks import Output
 
 NAMES = ["1-windows.png", "2-hits.png", "3-heat.png", "4-boxes.png"]
 

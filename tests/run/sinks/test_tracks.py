@@ -16,7 +16,7 @@ from vdet.config.schema import LaneSettings
 from vdet.lanes.road import Lane, RoadFinder
 from vdet.media import Picture
 from vdet.run.result import FrameResult
-from vdet.run.sinks.protocol import Output
+from vdet.run.sinks import Output
 from vdet.track.track import Track
 
 RESULTS = (

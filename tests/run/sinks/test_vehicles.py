@@ -12,7 +12,7 @@ from running import names, rows_of
 from vdet.boxes import Box
 from vdet.media.images import read_image
 from vdet.run.result import FrameResult
-from vdet.run.sinks.protocol import Output
+from vdet.run.sinks import Output
 from vdet.run.video import Run
 
 

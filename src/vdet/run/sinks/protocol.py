@@ -15,6 +15,7 @@ from vdet.files import OutputFiles, check_output, output_errors
 from vdet.media import VideoInfo
 from vdet.plugins import SINKS, load_plugin
 from vdet.run.result import Fact, FrameResult
+from vdet.run.sinks import Output
 from vdet.traffic.clock import Clock
 from vdet.traffic.live import LiveTraffic
 
@@ -31,14 +32,6 @@ class Sink(AbstractContextManager["Sink"], Protocol):
 
     def write(self, result: FrameResult) -> None:
         """Take the next result. It must not change the frame's image."""
-
-
-@dataclass(frozen=True, slots=True)
-class Output:
-    """An output of a run: the name of its sink, and its path."""
-
-    sink: str
-    path: Path
 
 
 @dataclass(frozen=True, slots=True)
