@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 from vdet.errors import OutputError
 from vdet.files import output_errors, remove_stale
@@ -170,14 +170,14 @@ def open_manifest(folder: Path) -> Iterator[Callable[[Record], None]]:
 
         def add(record: Record) -> None:
             with output_errors(path):
+                end = file.seek(0, os.SEEK_END)
                 if file.write(record.line.encode()) != len(record.line):
+                    file.truncate(end)  # half a line would spoil the next one
                     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
                 os.fsync(descriptor)
             if record.outputs:
                 note_path(folder, Path(record.outputs[0].path)).unlink(missing_ok=True)
 
-        with output_errors(path):
-            _end_last_line(file)
         for note in _notes(folder):
             for record in read_records(note):
                 add(record)
@@ -187,11 +187,3 @@ def open_manifest(folder: Path) -> Iterator[Callable[[Record], None]]:
             remove_stale(folder / _NOTES)
             with suppress(OSError):  # a worker of an earlier batch may still write into it
                 (folder / _NOTES).rmdir()
-
-
-def _end_last_line(file: BinaryIO) -> None:
-    """End a last line that was cut off by a full disk."""
-    if file.seek(0, os.SEEK_END):
-        file.seek(-1, os.SEEK_END)
-        if file.read(1) != b"\n":
-            file.write(b"\n")
