@@ -35,7 +35,7 @@ from vdet.config.loading import load_settings as load_layers
 from vdet.config.schema import DetectorSettings, Settings, TrackerSettings
 from vdet.detect.factory import DetectorKind, DetectorObject, as_model, load_detector
 from vdet.detect.protocol import DetectorModel, VideoDetector
-from vdet.errors import VdetError
+from vdet.errors import ImageError, VdetError
 from vdet.evaluate.scores import Scores
 from vdet.evaluate.video import score_files
 from vdet.files import record_input, recorded_inputs
@@ -43,12 +43,12 @@ from vdet.media import Frame, Picture
 from vdet.media.images import read_image
 from vdet.progress import no_progress, reporting
 from vdet.regions import check_masks
-from vdet.run.pictures import PictureJob, PictureSearch, run_picture
+from vdet.run.pictures import PictureJob, PictureSearch, run_pictures
 from vdet.run.result import FrameResult
 from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import SinkContext, SinkKind, check_sinks
 from vdet.run.steps import Step, StepContext
-from vdet.run.video import Results, Run, RunTotals, run_video
+from vdet.run.video import Results, Run, RunTotals, open_video, run_video
 from vdet.track.factory import TrackerKind, make_tracker
 from vdet.track.track import FrameTracks, Track, VideoTracker
 from vdet.traffic.counting import count_files, count_frames
@@ -210,7 +210,7 @@ def follow(
     part = {"start": _exact(start), "end": _exact(end), "frames": frames}
     run, loaded, tracker = _run(source, settings, detector, tracker, **part)
     threads = run.threads if isinstance(source, Run) else 1
-    return Results(replace(run, threads=threads), loaded, tracker, steps)
+    return Results(open_video(replace(run, threads=threads), loaded, tracker=tracker, steps=steps))
 
 
 def vehicles(source: PathName | Run, **options: Any) -> tuple[VehicleRecord, ...]:
@@ -287,7 +287,10 @@ def detect_image(
     check_masks(settings.regions)
     record_input(job.source)
     check_sinks(job.outputs, overwrite=overwrite)
-    return run_picture(job, PictureSearch(loaded, settings), overwrite=overwrite).detections
+    (found,) = run_pictures([job], (), PictureSearch(loaded, settings), overwrite=overwrite)
+    if isinstance(found, ImageError):
+        raise found
+    return found.detections
 
 
 def count(

@@ -16,7 +16,6 @@ from vdet.run.pictures import (
     PictureSearch,
     find_images,
     plan_pictures,
-    run_picture,
     run_pictures,
 )
 from vdet.run.result import FrameResult
@@ -97,8 +96,9 @@ def test_a_picture_that_is_too_small_is_named(tmp_path: Path) -> None:
     source, out = tmp_path / "tiny.png", tmp_path / "out.png"
     write_image(source, road(CAR)[:, :20])
     job = PictureJob(source, (Output("picture", out),))
-    with pytest.raises(ImageError, match=r"tiny\.png: no search window fits"):
-        run_picture(job, PictureSearch(model_for(SETTINGS), SETTINGS))
+    (found,) = run_pictures([job], (), PictureSearch(model_for(SETTINGS), SETTINGS))
+    assert isinstance(found, ImageError)
+    assert "tiny.png: no search window fits" in str(found)
     assert not out.exists()
 
 
@@ -139,8 +139,10 @@ class TestSeveral:
         self, jobs: list[PictureJob], tmp_path: Path, threads: int
     ) -> None:
         shared = [Output("json", tmp_path / "boxes.json")]
-        model = model_for(SETTINGS)
-        (failure,) = run_pictures(jobs, shared, PictureSearch(model, SETTINGS), threads=threads)
+        search = PictureSearch(model_for(SETTINGS), SETTINGS)
+        first, failure, last = run_pictures(jobs, shared, search, threads=threads)
+        assert isinstance(first, FrameResult)
+        assert isinstance(last, FrameResult)
         assert "b.png: is not an image" in str(failure)
         assert self.names(tmp_path) == ["boxes.json", "out-a.png", "out-c.png"]
         items = json.loads((tmp_path / "boxes.json").read_text())
@@ -153,7 +155,7 @@ class TestSeveral:
         register("fails", SinkKind(Fails))
         shared = [Output("json", tmp_path / "boxes.json"), Output("fails", tmp_path / "fails.txt")]
         with pytest.raises(OutputError, match=r"fails\.txt: cannot be written: No space"):
-            run_pictures(jobs, shared, PictureSearch(model_for(SETTINGS), SETTINGS))
+            list(run_pictures(jobs, shared, PictureSearch(model_for(SETTINGS), SETTINGS)))
         assert self.names(tmp_path) == ["out-a.png", "out-c.png"]
 
     def test_the_outputs_of_one_picture_appear_together_or_not_at_all(
@@ -165,5 +167,5 @@ class TestSeveral:
         for outputs in ((*first.outputs, fails), (fails, *first.outputs)):
             job = replace(first, outputs=outputs)
             with pytest.raises(OutputError, match=r"fails\.txt: cannot be written: No space"):
-                run_pictures([job], (), PictureSearch(model_for(SETTINGS), SETTINGS))
+                list(run_pictures([job], (), PictureSearch(model_for(SETTINGS), SETTINGS)))
             assert self.names(tmp_path) == []

@@ -15,7 +15,7 @@ from vdet.config.camera import CameraSettings
 from vdet.config.schema import Settings
 from vdet.errors import ImageError, VideoError
 from vdet.media.images import read_image
-from vdet.run.pictures import PictureJob, PictureSearch, run_picture
+from vdet.run.pictures import PictureJob, PictureSearch, run_pictures
 from vdet.run.sinks import Output
 from vdet.run.video import Run
 from writing import write_image
@@ -69,7 +69,7 @@ def test_the_stages_show_the_regions(tmp_path: Path) -> None:
     for name, settings in (("without", SETTINGS), ("with", within())):
         folder = tmp_path / name
         job = PictureJob(tmp_path / "road.png", (Output("stages", folder),))
-        run_picture(job, PictureSearch(model_for(settings), settings))
+        list(run_pictures([job], (), PictureSearch(model_for(settings), settings)))
     assert not list((tmp_path / "without").glob("*regions*"))
     names = sorted(path.name for path in (tmp_path / "with").iterdir())
     assert names[-2:] == ["4-regions.png", "5-boxes.png"]

@@ -1,7 +1,6 @@
 """`vdet detect-image`: find vehicles in pictures."""
 
 import logging
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,7 +9,7 @@ import click
 from vdet.cli import options
 from vdet.cli.command import command
 from vdet.cli.messages import print_lines, progress_steps
-from vdet.errors import counted, failure_code
+from vdet.errors import ImageError, counted, failure_code
 
 if TYPE_CHECKING:
     from vdet.run.result import FrameResult
@@ -76,20 +75,20 @@ def detect_image(
     shared = options.wanted_outputs()
     check_sinks(shared, overwrite=overwrite)
     jobs = plan_pictures(sources, output, stages, overwrite=overwrite)
-    is_printed = not (output or stages or shared)
+    is_printed, failed = not (output or stages or shared), 0
+    found = run_pictures(
+        jobs, shared, PictureSearch(model, settings), overwrite=overwrite, threads=core_count()
+    )
     with progress_steps(" images") as steps:
-        failures = run_pictures(
-            jobs,
-            shared,
-            PictureSearch(model, settings),
-            overwrite=overwrite,
-            threads=core_count(),
-            progress=partial(steps, ""),
-            on_result=_print_vehicles if is_printed else lambda _: None,
-        )
-    for failure in failures:
-        log.error("%s", failure)
-    return failure_code(len(failures), len(jobs))
+        advance = steps("", len(jobs))
+        for result in found:
+            if isinstance(result, ImageError):
+                log.error("%s", result)
+                failed += 1
+            elif is_printed:
+                _print_vehicles(result)
+            advance(1)
+    return failure_code(failed, len(jobs))
 
 
 def _print_vehicles(result: "FrameResult") -> None:

@@ -1,6 +1,6 @@
 """Vehicles in still pictures: read the picture, detect, give the result to sinks."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
@@ -14,7 +14,6 @@ from vdet.errors import ImageError
 from vdet.files import OutputFiles, record_input
 from vdet.media import Frame, Picture
 from vdet.media.images import PICTURE_SUFFIXES, is_picture_name, read_image
-from vdet.progress import Progress, no_progress
 from vdet.run.loop import build, named_errors
 from vdet.run.result import FrameResult
 from vdet.run.sinks import Output
@@ -123,7 +122,7 @@ class PictureSearch:
 
     @contextmanager
     def open_sinks(
-        self, outputs: Sequence[Output], jobs: Sequence[PictureJob], *, overwrite: bool
+        self, outputs: Sequence[Output], places: Mapping[Path, Path], *, overwrite: bool
     ) -> Iterator[Sinks]:
         """Yield the sinks of outputs of some pictures; they appear together after the block."""
 
@@ -132,7 +131,6 @@ class PictureSearch:
             return stage_pictures_of(detector)(image, detections)
 
         with OutputFiles(overwrite=overwrite) as files:
-            places = {job.source: job.place for job in jobs if job.place}
             context = SinkContext(
                 files, self.settings, places=places, stage_pictures=stage_pictures
             )
@@ -147,14 +145,12 @@ def run_pictures(
     *,
     overwrite: bool = False,
     threads: int = 1,
-    progress: Progress = no_progress,
-    on_result: Callable[[FrameResult], object] = lambda _: None,
-) -> list[ImageError]:
-    """Search pictures; return the errors of those that cannot be read or searched.
+) -> Iterator[FrameResult | ImageError]:
+    """Search pictures; yield the result of each, or why it cannot be read or searched.
 
-    `threads` pictures are read and searched at once. The outputs of one picture appear together.
-    The `shared` outputs, which get the results of all pictures in their order, appear at the end.
-    `progress` gets the number of pictures, and then each; `on_result` gets the result of each.
+    `threads` pictures are read and searched at once. The outputs of one picture appear together,
+    before its result. The `shared` outputs, which get the results of all pictures in their order,
+    appear after the last one.
 
     Raises
     ------
@@ -168,35 +164,14 @@ def run_pictures(
         except ImageError as error:
             return error
 
-    failures: list[ImageError] = []
+    places = {job.source: job.place for job in jobs if job.place}
     with (
-        search.open_sinks(shared, jobs, overwrite=overwrite) as sinks,
+        search.open_sinks(shared, places, overwrite=overwrite) as sinks,
         map_ordered(find, jobs, threads) as results,
     ):
-        advance = progress(len(jobs))
         for job, found in results:
-            if isinstance(found, ImageError):
-                failures.append(found)
-            else:
-                with search.open_sinks(job.outputs, [job], overwrite=overwrite) as own:
+            if isinstance(found, FrameResult):
+                with search.open_sinks(job.outputs, places, overwrite=overwrite) as own:
                     own.write(found)
                     sinks.write(found)
-                on_result(found)
-            advance(1)
-    return failures
-
-
-def run_picture(job: PictureJob, search: PictureSearch, *, overwrite: bool = False) -> FrameResult:
-    """Search a picture, and write its outputs together.
-
-    Raises
-    ------
-    ImageError
-        The picture cannot be read or searched.
-    OutputError
-        An output cannot be written.
-    """
-    results: list[FrameResult] = []
-    for error in run_pictures([job], (), search, overwrite=overwrite, on_result=results.append):
-        raise error
-    return results[0]
+            yield found

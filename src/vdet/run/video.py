@@ -3,7 +3,7 @@
 import logging
 import time
 from collections.abc import Generator, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from contextlib import AbstractContextManager, closing, contextmanager
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
@@ -185,19 +185,14 @@ def _reader_and_frames(run: Run) -> Generator[Any]:
 class Results(Iterator[FrameResult]):
     """The results of a video, frame by frame, and what they come to.
 
-    The video is opened for the first one; parameters and errors are those of `open_video`.
+    `video` is what `open_video` returns. It is opened for the first result; the errors are those
+    of `open_video`.
     """
 
     _video: OpenVideo | None = None
 
-    def __init__(
-        self,
-        run: Run,
-        model: DetectorModel,
-        tracker: VideoTracker | None = None,
-        steps: Sequence[Step] = (),
-    ) -> None:
-        self._frames = _video_and_results(run, model, tracker, steps)
+    def __init__(self, video: AbstractContextManager[OpenVideo]) -> None:
+        self._frames = _video_and_results(video)
 
     def __next__(self) -> FrameResult:
         if self._video is None:
@@ -225,11 +220,9 @@ class Results(Iterator[FrameResult]):
         return findings_in(self._video.facts).found if self._video else ()
 
 
-def _video_and_results(
-    run: Run, model: DetectorModel, tracker: VideoTracker | None, steps: Sequence[Step]
-) -> Generator[Any]:
+def _video_and_results(opening: AbstractContextManager[OpenVideo]) -> Generator[Any]:
     """Yield the open video, and then its results."""
-    with open_video(run, model, tracker=tracker, steps=steps) as video:
+    with opening as video:
         yield video
         yield from video.results
 

@@ -138,36 +138,34 @@ class JsonSink(BaseSink):
 JSON = SinkKind(JsonSink, what="lists of boxes", writes_standard_output=True, takes="pictures")
 
 
-class _TableSink(BaseSink):
-    """Writes a table or JSON at the end; `make_content` is what `write_content` takes."""
+class TableSink(BaseSink):
+    """Writes a table or JSON at the end of the video: what `make` returns of the sink."""
 
-    make_content: Callable[[], Any]
+    def __init__(
+        self, make: Callable[["TableSink"], Any], path: Path, context: SinkContext
+    ) -> None:
+        super().__init__(path, context)
+        self._make = make
 
     def finish(self) -> None:
         """Write it, and keep it for the file over all videos."""
-        self.summary = self.make_content()
+        self.summary = self._make(self)
         write_content(self.context.files.stage(self.path), self.summary)
 
 
-class VehicleSink(_TableSink):
-    """Writes a record of each vehicle, at the end, as `.csv`, `.json` or `.parquet`."""
-
-    def make_content(self) -> Any:
-        """Return the records."""
-        return records_content(self.traffic.vehicles, self.path, self.traffic.clock)
+def _records(sink: TableSink) -> Any:
+    """Return a record of each vehicle, for `.csv`, `.json` or `.parquet`."""
+    return records_content(sink.traffic.vehicles, sink.path, sink.traffic.clock)
 
 
-class ConditionSink(_TableSink):
-    """Writes what makes the results of a video doubtful, at the end: a list of findings."""
-
-    def make_content(self) -> Any:
-        """Return the findings."""
-        return findings_in(self.context.facts).record()
+def _findings(sink: TableSink) -> Any:
+    """Return what makes the results of the video doubtful: a list of findings."""
+    return findings_in(sink.context.facts).record()
 
 
-CONDITIONS = SinkKind(ConditionSink, (".json",), "findings", takes="videos")
+CONDITIONS = SinkKind(partial(TableSink, _findings), (".json",), "findings", takes="videos")
 VEHICLES = SinkKind(
-    VehicleSink,
+    partial(TableSink, _records),
     SUFFIXES,
     "records of vehicles",
     takes="videos",
@@ -176,28 +174,25 @@ VEHICLES = SinkKind(
 )
 
 
-class CountsSink(_TableSink):
-    """Writes which vehicles cross lines and visit zones, or their flows, at the end of the video.
+def _count_sink(make: MakeContent, path: Path, context: SinkContext) -> TableSink:
+    """Return a sink of which vehicles cross lines and visit zones, or of their flows.
 
     `make` is `counts_content` or `flows_content`; the end of the name chooses the table.
     """
+    traffic = context.settings.traffic
+    if not traffic:
+        raise OutputError(f"{path}: no lines or zones to count at; add them to the settings")
 
-    def __init__(self, make: MakeContent, path: Path, context: SinkContext) -> None:
-        super().__init__(path, context)
-        self._make = make
-        if not context.settings.traffic:
-            raise OutputError(f"{path}: no lines or zones to count at; add them to the settings")
-
-    def make_content(self) -> Any:
-        """Return the table."""
-        counts = self.traffic.counts()
+    def content(sink: TableSink) -> Any:
+        counts = sink.traffic.counts()
         assert counts  # the settings have lines or zones
-        videos = {self.video.path.name: counts}
-        return self._make(self.path, videos, self.context.settings.traffic.seconds)
+        return make(path, {sink.video.path.name: counts}, traffic.seconds)
+
+    return TableSink(content, path, context)
 
 
 COUNTS, FLOWS = (
-    SinkKind(partial(CountsSink, make), ends, what, takes="videos", total=BatchTotal("all", join))
+    SinkKind(partial(_count_sink, make), ends, what, takes="videos", total=BatchTotal("all", join))
     for what, make, ends, join in (
         ("counts", count_files.counts_content, count_files.COUNT_SUFFIXES, count_files.join_counts),
         ("flows", count_files.flows_content, count_files.FLOW_SUFFIXES, count_files.join_flows),
