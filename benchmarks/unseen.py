@@ -32,7 +32,7 @@ from vdet.evaluate.images import Counting, MeasuredImage, evaluate_images
 from vdet.evaluate.output import RunName, figure, table
 from vdet.evaluate.report import video_report
 from vdet.evaluate.scores import RankedPredictions
-from vdet.evaluate.video import Variant, evaluate_clips, open_clip
+from vdet.evaluate.video import evaluate_clip, open_clip
 from vdet.files import write_json
 from vdet.labels.pictures import LabelledPicture, LabelledPictures
 from vdet.labels.reading import read_labelled_pictures
@@ -250,8 +250,8 @@ def summary_lines(name: str, summary: dict[str, Any]) -> Iterator[str]:
 def video_lines(clip: tuple[Path, Path], network: Path, settings: Settings) -> list[str]:
     """Return how well a network finds and follows the vehicles of a video."""
     model = load_detector(NetworkSettings(model=str(network)))
-    runs = evaluate_clips([open_clip(*clip)], [Variant(settings, model)])
-    return video_report(runs, RunName("net", network, None)).lines()
+    found = evaluate_clip(open_clip(*clip), settings, model)
+    return video_report([found], RunName("net", network, None)).lines()
 
 
 class Unseen:

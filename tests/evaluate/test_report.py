@@ -21,7 +21,7 @@ from vdet.evaluate.report import (
     video_report,
     worst_tiles,
 )
-from vdet.evaluate.video import ClipResult, RunResult, score_files
+from vdet.evaluate.video import ClipResult, score_files
 from vdet.labels.label import Label, from_size
 from vdet.labels.reading import read_labelled_pictures
 
@@ -29,18 +29,15 @@ NAME = RunName("svm", None, None, ("b=1",))
 
 
 class TestVideo:
-    def run(self, assignments: tuple[str, ...], *found: range) -> RunResult:
-        """Return a run over as many clips; in each the vehicle is found in these of ten frames."""
+    def clips(self, *found: range) -> list[ClipResult]:
+        """Return as many clips; in each the vehicle is found in these of ten frames."""
         truth = video([label._replace(name="car") for label in drive(1, TEN)])
         tracks = [[item._replace(name="bus") for item in drive(1, frames)] for frames in found]
         comparisons = [compare(video(track), truth) for track in tracks]
-        clips = [
-            ClipResult(f"clip {n}", comparison, 10) for n, comparison in enumerate(comparisons)
-        ]
-        return RunResult(clips, assignments)
+        return [ClipResult(f"clip {n}", one, 10) for n, one in enumerate(comparisons)]
 
     def test_several_clips_have_a_row_each_and_a_total_and_classes_a_table(self) -> None:
-        report = video_report([self.run((), TEN, range(1, 6))], NAME)
+        report = video_report(self.clips(TEN, range(1, 6)), NAME)
         lines = report.lines()
         assert [line.split("  ")[0] for line in lines[3:6]] == ["clip 0", "clip 1", "total"]
         assert lines[7].split("  ")[0] == "class"
@@ -50,17 +47,10 @@ class TestVideo:
         assert [value["named"] for value in report.values["classes"]] == [{"bus": 2}]
         assert "missed vehicle 1" in Elements(report.page()).text
 
-    def test_a_sweep_has_a_row_for_each_setting_and_names_the_best(self) -> None:
-        runs = [self.run(("a=1", "b=2"), range(1, 6)), self.run(("a=2", "b=2"), TEN)]
-        report = video_report(runs, NAME)
-        assert [line.split("  ")[0] for line in report.lines()[3:5]] == ["a=1 b=2", "a=2 b=2"]
-        assert report.lines()[-1] == "best F1: a=2 b=2 (1.000)"
-        settings = [value["settings"] for value in report.values["sweep"]]
-        assert settings == [("a=1", "b=2"), ("a=2", "b=2")]
-        assert "a=1 b=2" in report.page()
-
-    def test_values_of_one_run(self) -> None:
-        values = video_report([self.run((), TEN)], NAME).values
+    def test_one_clip_is_its_own_total(self) -> None:
+        report = video_report(self.clips(TEN), NAME)
+        lines, values = report.lines(), report.values
+        assert [line.split("  ")[0] for line in lines[2:5]] == ["video", "clip 0", ""]
         assert (values["detector"], values["assignments"]) == ("svm", ("b=1",))
         assert values["total"]["f1"] == values["videos"][0]["f1"] == 1
 

@@ -1,7 +1,5 @@
 """`vdet eval`: measure detection, tracking or the classifier."""
 
-import itertools
-from collections.abc import Sequence
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -13,7 +11,6 @@ from vdet.cli import options
 from vdet.cli.command import command
 from vdet.cli.messages import progress_steps
 from vdet.cli.results import Results, facts_options, results_options
-from vdet.errors import ConfigError
 
 _data = click.argument("data", nargs=-1, required=True, type=options.INPUT, metavar="DATA...")
 
@@ -127,69 +124,35 @@ def tracks(prediction: Path, truth: Path, until: int | None, **targets: Any) -> 
 @click.argument("videos", nargs=-1, required=True, type=options.INPUT, metavar="IN...")
 @options.truth_option
 @options.until_option
-@options.option("--sweep KEY=VALUE,VALUE", name="sweeps", multiple=True)
 @options.settings_options("tracker.confirm_seconds=0.3", options.model_option)
 @results_options
 def video(
-    videos: tuple[Path, ...],
-    truths: tuple[Path, ...],
-    until: int | None,
-    sweeps: tuple[str, ...],
-    **targets: Any,
+    videos: tuple[Path, ...], truths: tuple[Path, ...], until: int | None, **targets: Any
 ) -> None:
     """Measure detection and tracking in labelled video.
 
     Tracks the vehicles in each video IN, and compares them with its ground truth. Vehicles outside
     the regions of the settings do not count.
 
-    Parameters
-    ----------
-    sweeps
-        Compare values of a setting, for example tracker.confirm_seconds=0.1,0.3. Can be repeated.
-
     Examples
     --------
-    vdet eval video in.mp4 --truth gt.txt --sweep tracker.confirm_seconds=0.1,0.3
+    vdet eval video in.mp4 --truth gt.txt --set tracker.confirm_seconds=0.3
     """
     pairs = options.paired(videos, truths)
-    base = options.read_settings()
+    settings = options.read_settings()
     from vdet.detect.factory import load_detector
     from vdet.evaluate.report import video_report
-    from vdet.evaluate.video import Variant, evaluate_clips, open_clip
+    from vdet.evaluate.video import evaluate_clip, open_clip
     from vdet.regions import check_masks
 
-    check_masks(base.regions)
-    swept = [(options.read_settings(*extra), extra) for extra in grid(sweeps)]
-    variants = [Variant(one, load_detector(one.detector), extra) for one, extra in swept]
+    check_masks(settings.regions)
+    model = load_detector(settings.detector)
     results = Results(**targets)
     results.check()
-    clips = [open_clip(*pair, until, base) for pair in pairs]
+    clips = [open_clip(*pair, until, settings) for pair in pairs]
     with progress_steps(" frames") as steps:
-        runs = evaluate_clips(clips, variants, partial(steps, ""))
-    results.print_report(video_report(runs, options.run_name(base)))
-
-
-def grid(sweeps: Sequence[str]) -> list[tuple[str, ...]]:
-    """Return every combination of the values, each as assignments for `load_settings`.
-
-    Parameters
-    ----------
-    sweeps
-        `KEY=VALUE,VALUE…` each.
-
-    Raises
-    ------
-    ConfigError
-        There is no `=`, or a value is empty.
-    """
-    axes = []
-    for sweep in sweeps:
-        key, _, values = sweep.partition("=")
-        found = [value.strip() for value in values.split(",")]
-        if not (key and all(found)):
-            raise ConfigError(f"--sweep {sweep}: expected KEY=VALUE,VALUE, as in a.b=0.1,0.2")
-        axes.append([f"{key}={value}" for value in found])
-    return list(itertools.product(*axes))
+        found = [evaluate_clip(clip, settings, model, partial(steps, "")) for clip in clips]
+    results.print_report(video_report(found, options.run_name(settings)))
 
 
 _HELP = "Measure detection, tracking or the classifier."

@@ -227,13 +227,13 @@ def settings_options(example: str, *more: Callable[..., Any]) -> Callable[[F], F
     return add
 
 
-def read_settings(*more: str, detector: str | None = None) -> "Settings":
-    """Read the settings that the options of the running command choose, and `more` assignments.
+def read_settings(*, detector: str | None = None) -> "Settings":
+    """Read the settings that the options of the running command choose.
 
     They are files, assignments and short forms. `detector` is its kind where nothing chooses one.
     Raises `ConfigError`.
     """
-    assignments = (*_kept("assignments"), *_kept("short forms"), *more)
+    assignments = (*_kept("assignments"), *_kept("short forms"))
     if not (_kept("configs") or assignments or detector):
         from vdet.config.schema import Settings
 

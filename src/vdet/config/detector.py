@@ -32,15 +32,6 @@ class DetectorSettings(Section):
     """Minimum score of a vehicle in a single image. In video, the tracker decides."""
 
     @property
-    def search_key(self) -> object:
-        """What the search of a frame depends on, apart from which frames are searched.
-
-        Detectors whose settings have equal keys and the same stride, and that read the same model
-        file, find the same candidates in a frame.
-        """
-        return self
-
-    @property
     def vehicle_classes(self) -> tuple[str, ...]:
         """The classes that the detector looks for, of `vdet.detect.classes.OUR_NAMES`."""
         return "car", "truck", "bus", "vehicle"
@@ -76,11 +67,6 @@ class NetworkSettings(DetectorSettings):
     """
     class_names: tuple[str, ...] | None = Field(None, max_length=10_000)
     """Class names in the order of the network. null: those in its file."""
-
-    @property
-    def search_key(self) -> object:
-        """What the search of a frame depends on."""
-        return self.kind, self.model, self.min_score, self.classes, self.class_names
 
     @property
     def vehicle_classes(self) -> tuple[str, ...]:
@@ -242,11 +228,6 @@ class SvmSettings(DetectorSettings):
     search: SearchSettings = SearchSettings()
     heat: HeatSettings = HeatSettings()
     score: ScoreSettings = ScoreSettings()
-
-    @property
-    def search_key(self) -> object:
-        """What the search of a frame depends on: all but heat, score and still pictures."""
-        return self.kind, self.features, self.search
 
     @property
     def foot(self) -> float:

@@ -2,7 +2,7 @@
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ from vdet.evaluate.comparison import ComparedFrame, Comparison
 from vdet.evaluate.images import ImagesResult, MeasuredSet
 from vdet.evaluate.output import RunName, figure, share, table
 from vdet.evaluate.scores import ClassResult, class_results, score_boxes
-from vdet.evaluate.video import ClipResult, RunResult
+from vdet.evaluate.video import ClipResult, total
 from vdet.media.reader import VideoReader
 from vdet.pages.render import render
 from vdet.version import __version__
@@ -240,45 +240,37 @@ def images_report(result: ImagesResult, name: RunName) -> Report:
     )
 
 
-def video_report(runs: Sequence[RunResult], name: RunName) -> Report:
-    """Show one run in full, or a row for each of several (a sweep)."""
-    if len(runs) == 1:
-        return _run_report(runs[0], name.line, name.values | _run_values(runs[0]))
-    rows = [(" ".join(run.assignments), run.total.scores) for run in runs]
-    best, scores = max(rows, key=lambda row: row[1].f1)
-    notes = [f"best F1: {best} ({share(scores.f1)})"]
-    sweep = [{"settings": run.assignments, **_run_values(run)} for run in runs]
-    swept = _score_table("setting", _OF_BOXES + _OF_VIDEO, rows)
-    return Report([name.line], [swept], notes, name.values | {"sweep": sweep})
+def video_report(clips: Sequence[ClipResult], name: RunName) -> Report:
+    """Show the scores of labelled videos: a row for each, and one for the total of several."""
+    return _clips_report(clips, name.line, name.values)
 
 
-def tracks_report(result: ClipResult, truth: Path) -> Report:
+def tracks_report(clip: ClipResult, truth: Path) -> Report:
     """Show the scores of a file of tracks."""
-    run, what = RunResult([result]), f"compared with {truth} by vdet {__version__}"
-    values = _run_values(run)
-    return _run_report(run, what, values["videos"][0] | {"classes": values["classes"]})
+    report = _clips_report([clip], f"compared with {truth} by vdet {__version__}", {})
+    (values,), classes = report.values["videos"], report.values["classes"]
+    return replace(report, values=values | {"classes": classes})
 
 
-def _run_report(run: RunResult, what: str, values: Mapping[str, Any]) -> Report:
-    """Show a row of scores for each video and one for the total of several, and the mistakes."""
-    clips = dict.fromkeys((*run.clips, run.total))  # of one video, its own result is the total
-    rows = [(clip.name, clip.scores) for clip in clips]
+def _clips_report(clips: Sequence[ClipResult], what: str, facts: Mapping[str, Any]) -> Report:
+    rows = [*clips, total(clips)] if len(clips) > 1 else clips
+    classes = class_results(rows[-1].comparison)
+    values = {
+        "total": asdict(rows[-1].scores),
+        "classes": list(map(asdict, classes)),
+        "videos": list(map(_clip_values, clips)),
+    }
+    scores = [(clip.name, clip.scores) for clip in rows]
     tables = [
-        _score_table("video", _OF_BOXES + _OF_VIDEO, rows),
-        _class_table(class_results(run.total.comparison)),
-        *map(_mistake_table, run.clips),
+        _score_table("video", _OF_BOXES + _OF_VIDEO, scores),
+        _class_table(classes),
+        *map(_mistake_table, clips),
     ]
-    notes = [f"{clip.name}: frames 1–{clip.until} compared" for clip in run.clips]
+    notes = [f"{clip.name}: frames 1–{clip.until} compared" for clip in clips]
     sheets = [
-        (clip.name, mistake_tiles(clip.video, clip.comparison)) for clip in run.clips if clip.video
+        (clip.name, mistake_tiles(clip.video, clip.comparison)) for clip in clips if clip.video
     ]
-    return Report([what], tables, notes, values, sheets)
-
-
-def _run_values(run: RunResult) -> dict[str, Any]:
-    classes = list(map(asdict, class_results(run.total.comparison)))
-    videos = list(map(_clip_values, run.clips))
-    return {"total": asdict(run.total.scores), "classes": classes, "videos": videos}
+    return Report([what], tables, notes, {**facts, **values}, sheets)
 
 
 def _clip_values(clip: ClipResult) -> dict[str, Any]:
