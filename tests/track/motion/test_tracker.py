@@ -99,6 +99,15 @@ def test_weak_detections_do_not_re_identify_a_lost_vehicle() -> None:
     assert [id_at(tracks, CAR) for tracks in shown[-5:]] == [1] * 5
 
 
+def test_weak_detections_do_not_lead_from_one_vehicle_to_the_next() -> None:
+    there = moving(CAR, dx=5, frames=24)
+    back = moving(there[-1], dx=-5, frames=20)
+    faint = [[(place, FAINT)] for place in there]
+    shown = follow([*[[CAR]] * 20, *faint, *[[place] for place in back]])
+    assert ids(shown[:20]) == {1}
+    assert [id_at(tracks, back[-1]) for tracks in shown[-1:]] == [2]
+
+
 # One vehicle behind another
 
 VAN = Box.sized(100, 390, 180, 130)

@@ -178,6 +178,11 @@ def carried(mean: Float64Array, seconds: float) -> Float64Array:
 LONGEST_LOOK = 0.1
 """Seconds for which one frame counts as evidence at most: a single frame must not be enough."""
 
+_LONGEST_DOUBT = 0.6
+"""Seconds for which detections below the decay keep a vehicle present: far off, such weak ones lead
+from one vehicle to the next.
+"""
+
 _SLOWING_TIME = 0.8
 """Seconds in which the velocity of a vehicle unseen for longer than it is carried falls to 1/e."""
 
@@ -268,6 +273,8 @@ class Vehicle:
         Seconds without a detection, up to the latest frame.
     hidden
         Seconds of these in which a nearer vehicle hid it.
+    doubtful
+        Seconds without a detection that adds to the evidence.
     scores
         Mean score of the latest detections, 0 to 1; a frame without one counts as 0.
     detection_scores
@@ -290,7 +297,7 @@ class Vehicle:
         self.history = History(Moment(look.time, self.state, first.score))
         self.begin = self.since = look.time
         self.appearance = first.appearance
-        self.evidence = self.unseen = self.hidden = 0.0
+        self.evidence = self.unseen = self.hidden = self.doubtful = 0.0
         self.confirmed = False
         self.id: int | None = None
         self.scores, self.detection_scores = RecentMean(), RecentMean()
@@ -300,7 +307,8 @@ class Vehicle:
     @property
     def is_present(self) -> bool:
         """Whether it is known and was seen lately."""
-        return self.confirmed and self.evidence > 0 and self.unseen <= self._settings.coast_seconds
+        is_seen = self.unseen <= self._settings.coast_seconds and self.doubtful <= _LONGEST_DOUBT
+        return self.confirmed and self.evidence > 0 and is_seen
 
     @property
     def age(self) -> float:
@@ -369,6 +377,7 @@ class Vehicle:
         self.votes.add(observation.classes, weight * min(look.seconds, LONGEST_LOOK))
 
     def _weigh(self, score: float, seconds: float) -> None:
+        self.doubtful = 0.0 if score >= self._settings.decay else self.doubtful + seconds
         gained = (score - self._settings.decay) * min(seconds, LONGEST_LOOK)
         self.evidence = min(max(self.evidence + gained, 0.0), self._settings.confirm_seconds)
         self.confirmed |= self.evidence >= self._settings.confirm_seconds
