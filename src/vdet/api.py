@@ -249,8 +249,8 @@ def detect_video(
     video
         The video with the vehicles drawn in: .mp4, .mov or .mkv.
     tracks
-        Every shown box, in one file or several: .txt (MOTChallenge), .csv, .jsonl, .coco.json, .xml
-        (CVAT), .kitti.txt, .yolo.zip or .ottrk.
+        Every shown box, in one file or several: .txt (MOTChallenge), .csv, .jsonl, .coco.json,
+        .kitti.txt or .yolo.zip.
     outputs
         Other outputs, one path or several, by the name of their sink.
     overwrite

@@ -48,10 +48,8 @@ _BUILT_IN: dict[str, dict[str, str]] = {
         "csv": "vdet.labels.records:CSV",
         "jsonl": "vdet.labels.records:JSON_LINES",
         "coco": "vdet.labels.coco:COCO",
-        "cvat": "vdet.labels.cvat:CVAT",
         "kitti": "vdet.labels.kitti:KITTI",
         "yolo": "vdet.labels.yolo:YOLO",
-        "ottrk": "vdet.labels.ottrk:OTTRK",
     },
 }
 """The names of vdet itself: where each is defined."""

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from conftest import Run
+from labels.writers import exported
 from vdet.detect.svm.model import load_model
 from vdet.labels.reading import read_truth
 from vdet.learn.svm.dataset import find_patches, read_patches
@@ -126,12 +127,8 @@ def test_a_frame_gives_the_same_patches_whatever_other_frames_are_used(
 def test_only_frames_that_the_truth_is_about_are_used(
     run: Run, clip_path: Path, options: tuple[str, ...], tmp_path: Path
 ) -> None:
-    truth, target = tmp_path / "task.xml", tmp_path / "mined.zip"
-    truth.write_text(
-        "<annotations><meta><task><start_frame>1</start_frame><stop_frame>7</stop_frame>"
-        '<frame_filter>step=3</frame_filter></task></meta><track id="1" label="car">'
-        '<box frame="1" outside="0" xtl="100" ytl="101" xbr="130" ybr="126"/></track></annotations>'
-    )
+    truth, target = tmp_path / "task.json", tmp_path / "mined.zip"
+    truth.write_bytes(exported({1: [1], 4: [1], 7: [1]}, bbox=[100, 101, 30, 25]))
     wanted = ("--truth", truth, "-o", target, "--every", "1")
     result = run("mine", clip_path, *wanted, *options, code=0)
     assert result.out.endswith("from 3 frames\n")

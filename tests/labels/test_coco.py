@@ -5,10 +5,14 @@ from typing import Any
 import pytest
 
 from labels.saving import car, frame, written
+from labels.writers import exported
 from vdet.errors import TruthError
 from vdet.labels.coco import COCO, read_coco
 
 FRAMES = [frame(4, car(3)), frame(5), frame(6, car(3), car(5, class_name="bus", state="predicted"))]
+
+
+FILE = Path("a.json")
 
 
 def document() -> dict[str, Any]:
@@ -23,6 +27,24 @@ def test_images_name_their_frame_and_annotations_their_track() -> None:
     assert [(a["image_id"], a["track_id"]) for a in made["annotations"]] == [(1, 3), (3, 3), (3, 5)]
     categories = {item["id"]: item["name"] for item in made["categories"]}
     assert {t["id"]: categories[t["category_id"]] for t in made["tracks"]} == {3: "car", 5: "bus"}
+
+
+def test_cvat_finds_what_it_needs_to_import_tracks() -> None:
+    vehicle = document()["annotations"][2]
+    assert vehicle["segmentation"] == []
+    assert vehicle["attributes"] == {"occluded": True, "track_id": 5, "keyframe": True}
+    assert [image["file_name"] for image in document()["images"]] == [
+        *("frame_000004.png", "frame_000005.png", "frame_000006.png")
+    ]
+
+
+def test_tracks_that_cvat_exports_are_read() -> None:
+    saved = read_coco(FILE, exported({0: [7], 5: [], 10: [7, 8]}))
+    assert saved.known == (0, 5, 10)
+    assert saved.size == (300, 200)
+    assert [(row.frame, row.id, row.box) for row in saved.labels] == [
+        *((1, 7, (1, 1, 9, 9)), (11, 7, (1, 1, 9, 9)), (11, 8, (1, 1, 9, 9)))
+    ]
 
 
 def changed(name: str, number: int, **values: object) -> bytes:
@@ -43,13 +65,14 @@ def changed(name: str, number: int, **values: object) -> bytes:
         (changed("annotations", 2, image_id=9), ":annotations.2: image 9 or category 2 not found"),
         (changed("annotations", 2, category_id=9), ":annotations.2: image 3 or category 9 not"),
         (changed("annotations", 2, bbox=[1, 2, 3]), ": is not COCO: annotations.2.bbox.3: Field"),
-        (changed("images", 1, frame_index=None), ": needs the frame_index of each image and the"),
-        (changed("annotations", 2, track_id=None), ": needs the frame_index of each image and the"),
+        (changed("images", 1, frame_index=None, file_name="a"), ": needs the frame_index of each"),
+        (exported({0: [1]}, attributes={}), ": needs the frame_index of each image and the track_"),
+        (exported({0: [1]}, attributes={"track_id": "x"}), ": needs the frame_index of each image"),
     ],
 )
 def test_what_does_not_fit_is_refused_with_its_place(data: bytes, message: str) -> None:
     with pytest.raises(TruthError) as caught:
-        read_coco(Path("a.json"), data)
+        read_coco(FILE, data)
     assert str(caught.value).startswith(f"a.json{message}")
 
 
@@ -58,4 +81,4 @@ def test_an_entry_that_would_take_much_memory_is_refused_before_it_is_read(befor
     data = b'{"images": [], "categories": [' + before + b'{"id": [' + b"[]," * 6_000_000
     words = r"a\.json: has an entry of more than 16,000,000 bytes"
     with pytest.raises(TruthError, match=words):
-        read_coco(Path("a.json"), data)
+        read_coco(FILE, data)

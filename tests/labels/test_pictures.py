@@ -1,4 +1,4 @@
-"""Labelled pictures, read from each of the four forms."""
+"""Labelled pictures, read from each of the three forms."""
 
 import json
 import shutil
@@ -20,7 +20,6 @@ from labels.writers import (
     write_coco,
     write_kitti,
     write_pictures,
-    write_voc,
     write_yolo,
 )
 from vdet.errors import ImageError, TruthError
@@ -100,7 +99,7 @@ def test_a_missing_picture_is_named(tmp_path: Path, form: str) -> None:
         read_labelled_pictures(tmp_path)
 
 
-@pytest.mark.parametrize("form", ["COCO", "YOLO", "VOC"])
+@pytest.mark.parametrize("form", ["COCO", "YOLO"])
 def test_a_picture_of_another_size_than_its_labels_say_is_refused(
     tmp_path: Path, form: str
 ) -> None:
@@ -235,14 +234,6 @@ def test_a_wrong_entry_of_coco_is_refused_by_its_number(
         ("YOLO", "0 .5 .5 .1 .1\n0 .5 .5 .1", r"a\.txt:2: YOLO has 5 columns, .* has 4"),
         ("YOLO", "0.5 0.5 0.5 0.1 0.1", r"a\.txt:1: '0\.5' is not a whole number"),
         ("YOLO", "0 320 200 40 30", r"a\.txt:1: a number is not between 0 and 1"),
-        ("VOC", "<annotations/>", r"a\.xml: <annotations> where the format has <annotation>"),
-        ("VOC", "<annotation>", r"a\.xml:1: broken XML: no element found"),
-        (
-            "VOC",
-            "<annotation><object><name>car</name></object></annotation>",
-            r"a\.xml:object 1: <object> without its <bndbox/xmin>",
-        ),
-        ("VOC", "<annotation><size><width>3</width></size></annotation>", "without its <height>"),
     ],
 )
 def test_a_wrong_file_of_labels_is_refused_with_the_place(
@@ -311,14 +302,6 @@ class TestYolo:
         path.rename(path.with_name("c.txt"))
         with pytest.raises(TruthError, match=r"c\.txt: has no image of its name below"):
             read_labelled_pictures(tmp_path)
-
-
-def test_pixels_of_voc_count_from_1_and_the_last_belongs_to_the_box(tmp_path: Path) -> None:
-    box = "<bndbox><xmin>1</xmin><ymin>1</ymin><xmax>9</xmax><ymax>9</ymax></bndbox>"
-    text = f"<annotation><object><name>car</name>{box}</object></annotation>"
-    write_voc(tmp_path, SCENE).write_text(text, encoding="utf-8")
-    image = read_labelled_pictures(tmp_path).pictures[0]
-    assert (image.boxes.tolist(), image.size) == ([[0, 0, 9, 9]], None)
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,6 @@ import pytest
 from labels.saving import car, frame, written
 from vdet.errors import TruthError
 from vdet.labels.coco import COCO
-from vdet.labels.cvat import CVAT
 from vdet.labels.formats import Format, format_for, track_formats, track_suffixes
 from vdet.labels.kitti import KITTI
 from vdet.labels.mot import MOT
@@ -27,7 +26,6 @@ def test_every_format_has_an_ending_of_its_own() -> None:
         ("0000.txt", KITTI),
         ("annotations.zip", YOLO),
         ("instances_default.json", COCO),
-        ("task", CVAT),
     ],
 )
 def test_the_content_tells_the_format_where_the_name_leaves_it_open(
@@ -44,6 +42,7 @@ def test_the_content_tells_the_format_where_the_name_leaves_it_open(
     [
         ("gt.txt", "1;1;10;20;30;40", "columns must be separated by commas or spaces, not by ';'"),
         ("a.csv", "frame;time;id", "columns must be separated by commas or spaces, not by ';'"),
+        ("t.xml", "<annotations>", r"t\.xml: XML is not supported; export the labels as COCO"),
         ("a.txt", "1,1,1,1,9,9,0.9,0,1", "with nine columns, column 7 must be a flag, 0 or 1, but"),
     ],
 )

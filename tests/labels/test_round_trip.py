@@ -18,26 +18,24 @@ from vdet.boxes import Box
 from vdet.detect.classes import OUR_NAMES, UNKNOWN
 from vdet.errors import TruthError
 from vdet.labels.coco import COCO, read_coco_pictures
-from vdet.labels.cvat import CVAT, read_cvat_pictures
 from vdet.labels.formats import Format, PictureTracks, track_formats
 from vdet.labels.kitti import KITTI
 from vdet.labels.label import SavedTracks
 from vdet.labels.mot import MOT
-from vdet.labels.ottrk import OTTRK
 from vdet.labels.pictures import LabelledPicture
 from vdet.labels.records import CSV, JSON_LINES
-from vdet.labels.yolo import YOLO, YOLO_PICTURES
+from vdet.labels.yolo import YOLO, read_yolo_pictures
 from vdet.track.track import FrameTracks, State, Track
 from writing import write_image
 
 WHOLE = {CSV, JSON_LINES}
 """Formats that keep all that is known of a track."""
-TIMED = WHOLE | {COCO, OTTRK}
+TIMED = WHOLE | {COCO}
 LISTING = {JSON_LINES, COCO, YOLO}
-"""Formats that keep the frames without a box; CVAT has all up to the last one."""
-SCORED = {MOT, CSV, JSON_LINES, COCO, KITTI, OTTRK}
-SIZED = {COCO, CVAT, YOLO, OTTRK}
-MARKING = WHOLE | {COCO, CVAT}
+"""Formats that keep the frames without a box."""
+SCORED = {MOT, CSV, JSON_LINES, COCO, KITTI}
+SIZED = {COCO, YOLO}
+MARKING = WHOLE | {COCO}
 """Formats that keep which vehicles are lost."""
 
 FORMATS = track_formats()
@@ -54,8 +52,7 @@ def boxes(draw: st.DrawFn) -> Box:
 
 READERS: dict[Format, Callable[[Path], Iterator[LabelledPicture]]] = {
     COCO: read_coco_pictures,
-    CVAT: read_cvat_pictures,
-    YOLO: lambda path: YOLO_PICTURES.read(path.parent),
+    YOLO: lambda path: read_yolo_pictures(path.parent / "images", path.parent / "labels"),
 }
 """How the labels of pictures are read again."""
 
@@ -98,8 +95,6 @@ def kept(form: Format, track: Track) -> Track:
     whole = form in WHOLE
     marks_lost = form in MARKING and track.state == "predicted"
     state: State = track.state if whole else "predicted" if marks_lost else "detected"
-    if form is OTTRK and track.state != "detected":
-        state = "interpolated"
     return replace(
         track,
         score=track.score if form in SCORED else 1.0,
@@ -121,11 +116,10 @@ def test_what_is_written_is_read_again(
         return  # a file without a record is no such file
     saved = read_back(form, tmp_path_factory.getbasetemp(), written(form, frames))
     found = {item.index: item.tracks for item in saved}
-    between = range(frames[-1].index if frames else 1) if form is CVAT else ()
-    assert found == dict.fromkeys(between, ()) | {
+    assert found == {
         frame.index: tuple(kept(form, track) for track in frame.tracks)
         for frame in frames
-        if frame.tracks or form in LISTING or form is CVAT
+        if frame.tracks or form in LISTING
     }
     for item in saved:
         seconds = item.index / 25 if form in TIMED else math.nan

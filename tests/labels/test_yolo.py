@@ -7,7 +7,7 @@ import pytest
 from labels.saving import car, frame, written
 from vdet.boxes import Box
 from vdet.errors import TruthError
-from vdet.labels import parsing
+from vdet.labels import yolo
 from vdet.labels.yolo import YOLO, read_yolo
 
 DATA = "names: [car, truck]\nwidth: 200\nheight: 100\n"
@@ -80,7 +80,7 @@ class TestReading:
         (b"PK nothing", ": is not a folder or a readable zip file"),
         (
             archive_of({"labels/f0": ""}),
-            ": holds neither annotations.xml (CVAT) nor data.yaml (YOLO); unpack",
+            ": holds no data.yaml (YOLO); unpack it, and use the file of",
         ),
         (described("names: [car]"), ":data.yaml: needs the size of the frames"),
         (described(DATA.replace("200", "0")), ":data.yaml: needs the size of the frames"),
@@ -106,7 +106,7 @@ def test_what_does_not_fit_is_refused_with_its_place(data: bytes, message: str) 
 
 
 def test_a_bomb_is_refused_before_it_is_unpacked(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(parsing, "MAX_BYTES", 100_000)
+    monkeypatch.setattr(yolo, "MAX_BYTES", 100_000)
     data = archive(labels__f0=" " * 60_000, labels__f1=" " * 60_000)
     assert len(data) < 1000
     with pytest.raises(TruthError, match=r"its labels are larger than 100,000 bytes"):

@@ -1,7 +1,7 @@
-"""Labelled pictures written in the four forms, for the tests that read them."""
+"""Labelled pictures and videos as other programs write them, for the tests that read them."""
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -104,27 +104,45 @@ def write_yolo(folder: Path, pictures: Pictures) -> Path:
     return folder / "labels" / f"{min(pictures)}.txt"
 
 
-def write_voc(folder: Path, pictures: Pictures) -> Path:
-    write_pictures(folder / "JPEGImages", pictures)
-    (folder / "Annotations").mkdir(exist_ok=True)
-    for name, picture in pictures.items():
-        objects = "".join(
-            f"<object>\n<name>{'car' if boxed.name == 'ignore' else boxed.name}</name>\n"
-            f"<difficult>{int(boxed.name == 'ignore')}</difficult><bndbox><xmin>{x + 1}</xmin>"
-            f"<ymin>{y + 1}</ymin><xmax>{x + w}</xmax><ymax>{y + h}</ymax></bndbox></object>\n"
-            for boxed in picture.boxes
-            for x, y, w, h in [boxed.box]
-        )
-        size = f"<size><width>{picture.width}</width><height>{picture.height}</height></size>\n"
-        text = f"<annotation>\n<filename>{name}.png</filename>{size}{objects}</annotation>\n"
-        (folder / "Annotations" / f"{name}.xml").write_text(text, encoding="utf-8")
-    return folder / "Annotations" / f"{min(pictures)}.xml"
+def exported(frames: Mapping[int, Sequence[int]], **known: object) -> bytes:
+    """Return what CVAT exports as COCO 1.0 of a video: the ids of the cars of each frame."""
+    images = [
+        {
+            "id": n,
+            "width": 300,
+            "height": 200,
+            "file_name": f"frame_{frame:06}.PNG",
+            "license": 0,
+            "flickr_url": "",
+            "coco_url": "",
+            "date_captured": 0,
+        }
+        for n, frame in enumerate(frames, start=1)
+    ]
+    boxes = [
+        {
+            "id": n,
+            "image_id": n,
+            "category_id": 1,
+            "segmentation": [],
+            "area": 64.0,
+            "bbox": [1.0, 1.0, 8.0, 8.0],
+            "iscrowd": 0,
+            "attributes": {"occluded": False, "rotation": 0.0, "track_id": id_, "keyframe": True},
+        }
+        | known
+        for n, ids in enumerate(frames.values(), start=1)
+        for id_ in ids
+    ]
+    categories = [{"id": 1, "name": "car", "supercategory": ""}]
+    head = {"licenses": [{"name": "", "id": 0, "url": ""}], "info": {"year": ""}}
+    document = {**head, "categories": categories, "images": images, "annotations": boxes}
+    return json.dumps(document).encode()
 
 
 WRITERS: dict[str, Callable[[Path, Pictures], Path]] = {
     "COCO": write_coco,
     "KITTI": write_kitti,
     "YOLO": write_yolo,
-    "VOC": write_voc,
 }
 """By the name of the form; each returns the label file of the first picture by name."""

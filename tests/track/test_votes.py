@@ -77,7 +77,7 @@ def test_what_is_made_at_the_end_has_the_last_class_of_the_track(tmp_path: Path)
     assert [event.class_name for event in live.events] == ["truck"]
     assert last_classes(frames) == {1: "truck"}
     for form in track_formats():
-        if form.suffix not in (".csv", ".jsonl", ".coco.json", ".xml", ".ottrk"):
+        if form.suffix not in (".csv", ".jsonl", ".coco.json"):
             continue
         path = tmp_path / f"tracks{form.suffix}"
         with path.open("wb") as file:

@@ -49,7 +49,7 @@ def detect_image(
     json
         Write the boxes to FILE. With -, to standard output.
     labels
-        Write the boxes for labelling tools: .coco.json, .xml (CVAT), or .yolo.zip. Can be repeated.
+        Write the boxes for labelling tools: .coco.json or .yolo.zip. Can be repeated.
 
     Examples
     --------

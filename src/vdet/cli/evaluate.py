@@ -23,8 +23,8 @@ _data = click.argument("data", nargs=-1, required=True, type=options.INPUT, meta
 def images(data: tuple[Path, ...], min_width: float, **targets: Any) -> None:
     """Measure detection in labelled images.
 
-    Each DATA is a folder in COCO, KITTI, YOLO or Pascal VOC format, or a COCO file. Each image is
-    searched on its own and compared with its labels.
+    Each DATA is a folder in COCO, KITTI or YOLO format, or a COCO file. Each image is searched on
+    its own and compared with its labels.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def tracks(prediction: Path, truth: Path, until: int | None, **targets: Any) -> 
     """Compare a file of tracks with the ground truth.
 
     PRED is a file of vdet detect-video --tracks. TRUTH is a MOTChallenge gt.txt, KITTI tracking
-    labels, CVAT for video 1.1, COCO or YOLO with tracks, or a .csv or .jsonl of vdet.
+    labels, COCO or YOLO with tracks, or a .csv or .jsonl of vdet.
 
     Examples
     --------

@@ -3,8 +3,12 @@
 For tracks there are `videos` and `tracks` beside the `images`, `annotations` and `categories` of
 COCO. An image names its `video_id` and `frame_index`, an annotation its `track_id`. All ids count
 from 1, frames and pixels from 0.
+
+CVAT ("COCO 1.0") has the number of a frame at the end of its `file_name`. It imports a box only
+with a `segmentation`, and as one of a track only with `track_id` and `keyframe` in `attributes`.
 Source: Lin et al., "Microsoft COCO: Common Objects in Context", 2014; cocodataset.org, "Data
-format"; Dave et al., "TAO: A Large-Scale Benchmark for Tracking Any Object", 2020.
+format"; Dave et al., "TAO: A Large-Scale Benchmark for Tracking Any Object", 2020; the source code
+of CVAT, `dataset_manager/bindings.py`.
 """
 
 import io
@@ -31,10 +35,17 @@ from vdet.labels.label import (
     SavedTracks,
     Size,
     from_size,
-    known_size,
     line_error,
 )
-from vdet.labels.parsing import Index, Number, Times, checked_times, first_mistake
+from vdet.labels.parsing import (
+    LIMIT,
+    Index,
+    Number,
+    Times,
+    checked_times,
+    first_mistake,
+    frame_number,
+)
 from vdet.labels.pictures import LabelledPicture, inside, picture_folder
 from vdet.track.track import FrameTracks, State
 
@@ -59,9 +70,9 @@ class _Writer:
         """Add an annotation; its `score` is one that other programs ignore."""
         x, y, width, height = box.xywh
         whose = {"id": len(self._lists["annotations"]) + 1, "image_id": image}
-        sides = {"bbox": [x, y, width, height], "area": width * height, "iscrowd": 0}
-        more = {"category_id": category, **sides, "score": round(score, 4), **more}
-        self.add("annotations", **whose, **more)
+        sides = {"bbox": [x, y, width, height], "area": width * height, "segmentation": []}
+        known = {"category_id": category, **sides, "iscrowd": 0, "score": round(score, 4)}
+        self.add("annotations", **whose, **known, **more)
 
     def category(self, name: str) -> int:
         """Return the id of a category, a new one where it has none."""
@@ -79,8 +90,8 @@ class _Writer:
 def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) -> None:
     """Write the tracks of a video.
 
-    An image has its `time` in seconds, which other programs ignore. `attributes.occluded` says that
-    the vehicle is lost.
+    An image has its `time` in seconds, which other programs ignore. A vehicle that is lost is
+    `occluded`.
     """
     size = {"width": video.width, "height": video.height}
     classes, writer = last_classes(frames), _Writer("videos", "images", "tracks")
@@ -91,8 +102,9 @@ def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) ->
         writer.add("images", **image, **size, time=time)
         for track in frame.tracks:
             category = writer.category(classes[track.id])
-            lost = {"occluded": track.state == "predicted"}
-            more = {"track_id": track.id, "attributes": lost}
+            lost = track.state == "predicted"
+            attributes = {"occluded": lost, "track_id": track.id, "keyframe": True}
+            more = {"track_id": track.id, "attributes": attributes}
             writer.add_box(number, track.box, category, track.score, **more)
     for id_, name in classes.items():
         writer.add("tracks", id=id_, video_id=_VIDEO, category_id=writer.category(name))
@@ -129,6 +141,12 @@ class _Annotation:
     score: Number = 1.0
     attributes: dict[str, Any] | None = None
 
+    @property
+    def track(self) -> int:
+        """Id of the track, which CVAT has in `attributes`; `NO_ID` without one."""
+        own = (self.attributes or {}).get("track_id") if self.track_id is None else self.track_id
+        return own if isinstance(own, int) and 0 <= own <= LIMIT else NO_ID
+
 
 @_entry
 class _Image:
@@ -141,8 +159,14 @@ class _Image:
     labels: list[Label] = Field(default_factory=list, init=False)
 
     @property
+    def frame(self) -> int | None:
+        """Number of the frame, from 0; None if it is not known."""
+        return frame_number(self.file_name) if self.frame_index is None else self.frame_index
+
+    @property
     def size(self) -> Size | None:
-        return known_size(self.width, self.height)
+        """Width and height; None where a side is missing or 0, as some tools write."""
+        return (self.width, self.height) if self.width and self.height else None
 
 
 _LISTS: dict[str, TypeAdapter[Any]] = {
@@ -178,9 +202,8 @@ def _read(path: Path, file: BinaryIO) -> tuple[list[_Image], tuple[str, ...]]:
             raise line_error(path, place, what)
         image, box = by_id[entry.image_id], from_size(*entry.bbox)
         state: State = "predicted" if (entry.attributes or {}).get("occluded") else "detected"
-        id_, frame = NO_ID if entry.track_id is None else entry.track_id, image.frame_index or 0
-        known = frame + 1, id_, entry.score, entry.iscrowd, state
-        image.labels.append(Label(place, box, names[entry.category_id], *known))
+        known = entry.track, entry.score, entry.iscrowd, state
+        image.labels.append(Label(place, box, names[entry.category_id], 1, *known))
     return images, tuple(unlabelled)
 
 
@@ -194,11 +217,11 @@ def read_coco(path: Path, data: bytes) -> SavedTracks:
         twice, a time is wrong, or an annotation names an image or a category that is not there.
     """
     images, _ = _read(path, io.BytesIO(data))
-    labels = tuple(label for image in images for label in image.labels)
-    frames = [image.frame_index for image in images if image.frame_index is not None]
-    if len(frames) < len(images) or any(label.id == NO_ID for label in labels):
+    frames = [image.frame for image in images if image.frame is not None]
+    ids = (label.id for image in images for label in image.labels)
+    if len(frames) < len(images) or NO_ID in ids:
         what = "needs the frame_index of each image and the track_id of each annotation"
-        raise TruthError(f"{path}: {what}; CVAT has them in 'CVAT for video 1.1'")
+        raise TruthError(f"{path}: {what}; in CVAT, label vehicles as tracks")
     if len(set(frames)) < len(images):
         raise TruthError(f"{path}: a frame_index occurs twice; use one file for each video")
     times: Times = {
@@ -206,6 +229,11 @@ def read_coco(path: Path, data: bytes) -> SavedTracks:
         for number, (frame, image) in enumerate(zip(frames, images, strict=True))
         if image.time is not None
     }
+    labels = tuple(
+        label._replace(frame=frame + 1)
+        for frame, image in zip(frames, images, strict=True)
+        for label in image.labels
+    )
     size = images[0].size if images else None
     return SavedTracks(labels, tuple(sorted(frames)), checked_times(path, times), size)
 

@@ -5,7 +5,6 @@ Formats are registered in the group `vdet.formats`: see `vdet.plugins`.
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime
 from pathlib import Path
 from typing import BinaryIO
 
@@ -21,23 +20,13 @@ from vdet.track.track import FrameTracks, Track
 class SourceVideo:
     """Facts about a video that files of tracks contain.
 
-    Attributes
-    ----------
-    name
-        Name of the file, without its folder.
-    width, height
-        Size of the upright frames, pixels.
-    frames
-        Number of frames of the video, if only a part of it is read and the number is known.
-    begin
-        The moment of time 0 in the video, if that is known.
+    `name` is that of the file, without its folder; `width` and `height` are the size of the upright
+    frames, pixels.
     """
 
     name: str
     width: int
     height: int
-    frames: int | None = None
-    begin: datetime | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,8 +135,8 @@ def recognise(path: Path, data: bytes) -> Format:
     Raises
     ------
     TruthError
-        The file is empty, and its name has the ending of no format; or its columns have semicolons
-        between them.
+        The file is empty, and its name has the ending of no format; its columns have semicolons
+        between them; or it is XML.
     """
     by_name = format_for(path)
     if by_name and by_name.suffix not in _UNCLEAR:
@@ -163,10 +152,12 @@ def recognise(path: Path, data: bytes) -> Format:
 def _content(path: Path, data: bytes) -> str | None:
     """Return the name under which the format of a file is registered; None if it is empty."""
     if data.startswith(b"PK"):
-        return "cvat" if b"annotations.xml" in data else "yolo"
+        return "yolo"
     _, first = next(numbered_lines(path, data), (0, ""))
-    if first[:1] in ("", "<", "{"):
-        return {"": None, "<": "cvat", "{": "coco"}[first[:1]]
+    if first.startswith("<"):
+        raise TruthError(f"{path}: XML is not supported; export the labels as COCO")
+    if first[:1] in ("", "{"):
+        return "coco" if first else None
     if "," in first:
         return "mot" if first[0] in "0123456789+-." else "csv"
     if ";" in first:

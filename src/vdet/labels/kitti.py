@@ -9,8 +9,8 @@ from pathlib import Path
 
 from vdet.labels.formats import Format
 from vdet.labels.label import Label, SavedTracks, limited
-from vdet.labels.parsing import label_lines, parse_corners, parse_number, parse_whole, read_bytes
-from vdet.labels.pictures import PictureFormat
+from vdet.labels.parsing import label_lines, parse_number, parse_whole, read_bytes
+from vdet.labels.pictures import LabelledPicture, paired_files
 from vdet.track.track import FrameTracks
 
 _TRACK_COLUMNS = 17  # frame and id, then those of an object
@@ -51,16 +51,22 @@ def _track_label(place: int, columns: Sequence[str]) -> Label:
 
 
 def _object_label(place: int, columns: Sequence[str]) -> Label:
-    return Label(place, parse_corners(columns[4:8]), columns[0])
+    left, top, right, bottom = map(parse_number, columns[4:8])
+    return Label(place, (left, top, right, bottom), columns[0])
 
 
-def read_kitti_objects(file: Path, _: Path) -> tuple[tuple[Label, ...], None]:
-    """Read the labels of a picture, with 15 columns a line. Raises `TruthError` as `read_kitti`."""
-    data = read_bytes(file)
-    return tuple(label_lines(file, data, _object_label, form="KITTI", counts=[15])), None
+def read_kitti_pictures(pictures: Path, labels: Path) -> Iterator[LabelledPicture]:
+    """Yield the pictures of a set that have a file of labels, with 15 columns a line.
+
+    Raises
+    ------
+    TruthError
+        As `read_kitti`, or as `paired_files`.
+    """
+    for picture, file in paired_files(pictures, labels):
+        if file:
+            found = label_lines(file, read_bytes(file), _object_label, form="KITTI", counts=[15])
+            yield LabelledPicture(picture, file, tuple(found))
 
 
 KITTI = Format("KITTI tracking", ".kitti.txt", read_kitti, _lines)
-KITTI_PICTURES = PictureFormat(
-    "KITTI", ("image_2", "label_2"), ".txt", lambda _: read_kitti_objects
-)

@@ -38,11 +38,6 @@ Size = tuple[int, int]
 """Width and height in pixels."""
 
 
-def known_size(width: int | None, height: int | None) -> Size | None:
-    """Return a size; None where a side is missing or 0, as some tools write."""
-    return (width, height) if width and height and min(width, height) > 0 else None
-
-
 class Label(NamedTuple):
     """A labelled box of a file; there may be millions.
 
@@ -87,15 +82,11 @@ def line_error(path: Path | str, place: int | str, what: str) -> TruthError:
     return TruthError(f"{path}:{place}: {what}")
 
 
-def limited(path: Path, labels: Iterable[Label], most: int | None = None) -> tuple[Label, ...]:
-    """Return the labels of a file. Raises `TruthError` if there are more than `most`.
-
-    None stands for `MAX_LABELS`.
-    """
-    most = MAX_LABELS if most is None else most
-    found = tuple(islice(labels, most + 1))
-    if len(found) > most:
-        what = f"has more than {most:,} boxes; cut it into parts"
+def limited(path: Path, labels: Iterable[Label]) -> tuple[Label, ...]:
+    """Return the labels of a file. Raises `TruthError` if there are more than `MAX_LABELS`."""
+    found = tuple(islice(labels, MAX_LABELS + 1))
+    if len(found) > MAX_LABELS:
+        what = f"has more than {MAX_LABELS:,} boxes; cut it into parts"
         raise line_error(path, found[-1].place, what)
     return found
 

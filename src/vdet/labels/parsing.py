@@ -1,20 +1,18 @@
-"""The limits of all files of boxes, and readers of their texts, numbers and rows."""
+"""The limits of all files of boxes, and readers of their texts, lines and numbers."""
 
 import codecs
 import io
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from itertools import islice
+import re
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path, PurePosixPath
-from typing import Annotated, Any
+from typing import Annotated
 
-from pydantic import Field, TypeAdapter, ValidationError
+from pydantic import Field, ValidationError
 
-from vdet.archives import ArchiveError, list_members, open_archive, read_member
 from vdet.errors import TruthError
 from vdet.files import read_whole
-from vdet.labels.label import Corners, Label, from_size, limited, line_error
-from vdet.track.track import State
+from vdet.labels.label import Label, line_error
 
 LIMIT = 10_000_000
 """Largest frame number, id or pixel coordinate. Larger numbers are damage, and would overflow."""
@@ -28,6 +26,7 @@ MAX_PART = 1_000_000
 MAX_LINES = 10_000_000
 """Largest number of lines in a file of boxes."""
 
+_NUMBER = re.compile(r"([0-9]{1,8})$", re.ASCII)
 _LATEST = 1e11
 """Largest time in seconds, three thousand years of wall-clock time."""
 
@@ -131,10 +130,10 @@ def parse_whole(text: str) -> int:
     return int(value)
 
 
-def parse_corners(texts: Sequence[str]) -> Corners:
-    """Return left, top, right and bottom from their texts. Raises ValueError."""
-    left, top, right, bottom = map(parse_number, texts)
-    return left, top, right, bottom
+def frame_number(name: str) -> int | None:
+    """Return the number of a frame at the end of the name of its file; None if there is none."""
+    number = _NUMBER.search(PurePosixPath(name).stem)
+    return int(number[1]) if number else None
 
 
 def checked_times(path: Path, times: Times) -> dict[int, float]:
@@ -156,94 +155,8 @@ def checked_times(path: Path, times: Times) -> dict[int, float]:
     return {frame: time for frame, (_, time) in times.items()}
 
 
-KINDS = {
-    "frame": Index,
-    "time": float,
-    "id": Index,
-    **dict.fromkeys(("x", "y", "width", "height"), Number),
-    "score": Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] | None,
-    "state": State | None,
-    "class": str | None,
-    "foot": tuple[Number, Number] | None,
-    "distance": Number | None,
-    "lane": Annotated[int, Field(ge=-LIMIT, le=LIMIT)] | None,
-}
-"""What is known of a box, in pixels; the frame and the time, seconds, come first."""
-_Row: Any = tuple[(*KINDS.values(),)]  # type: ignore[misc]
-_ROWS: TypeAdapter[list[Any]] = TypeAdapter(list[_Row])
-_BLOCK = 300
-"""Rows that are checked at once; they fit into the cache."""
-
-Row = tuple[int | str, Sequence[Any]]
-"""The place of a box in its file, and its values in the order of `KINDS`."""
-
-
-def read_rows(
-    path: Path, rows: Iterable[Row], times: Times | None = None, first_frame: int = 0
-) -> tuple[tuple[Label, ...], dict[int, float]]:
-    """Return the labels of rows, and the times of all frames.
-
-    Parameters
-    ----------
-    times
-        Those of frames without a box, which `rows` may fill.
-    first_frame
-        The number of the first frame of a video in the file.
-
-    Raises
-    ------
-    TruthError
-        A value is not what its column needs, there are too many rows, or a time is wrong.
-    """
-    times = {} if times is None else times
-    return limited(path, _labels(path, rows, times, first_frame)), checked_times(path, times)
-
-
-def _labels(path: Path, rows: Iterable[Row], times: Times, first_frame: int) -> Iterator[Label]:
-    """Yield the label of each row, and put the time of its frame into `times`."""
-    left = iter(rows)
-    while block := list(islice(left, _BLOCK)):
-        places, cells = zip(*block, strict=True)
-        try:
-            values = _ROWS.validate_python(cells)
-        except ValidationError as error:
-            at, column = error.errors()[0]["loc"][:2]
-            what = f"{tuple(KINDS)[int(column)]}: {error.errors()[0]['msg']}"
-            raise line_error(path, places[int(at)], what) from error
-        for place, row in zip(places, values, strict=True):
-            frame, time, id_, x, y, width, height, score, state, name, *known = row
-            index, score = frame - first_frame, 1.0 if score is None else score
-            times[index] = place, time
-            box, number = from_size(x, y, width, height), index + 1
-            yield Label(place, box, name, number, id_, score, False, state or "detected", *known)
-
-
-def archive_members(
-    path: Path, data: bytes, is_wanted: Callable[[PurePosixPath], bool]
-) -> dict[str, bytes]:
-    """Return the members of a zip file that are wanted, by their names.
-
-    Raises
-    ------
-    TruthError
-        The archive is damaged, a name in it leads out of it, or the members are larger than
-        `MAX_BYTES` together.
-    """
-    try:
-        names = [name for name in list_members(io.BytesIO(data)) if is_wanted(PurePosixPath(name))]
-        with open_archive(io.BytesIO(data)) as archive:
-            if sum(archive.getinfo(name).file_size for name in names) > MAX_BYTES:
-                what = f"its labels are larger than {MAX_BYTES:,} bytes; cut the video into parts"
-                raise ArchiveError(what)
-            return {name: read_member(archive, name, most=MAX_BYTES) for name in names}
-    except ArchiveError as error:
-        raise TruthError(f"{path}: {error}") from error
-
-
-def first_mistake(error: Exception) -> str:
+def first_mistake(error: ValidationError) -> str:
     """Return one line that describes the first mistake in a document, and its place."""
-    if not isinstance(error, ValidationError):
-        return str(error)
     first = error.errors(include_url=False, include_input=False, include_context=False)[0]
     place = ".".join(str(part) for part in first["loc"])
     what = first["msg"].removeprefix("Value error, ")

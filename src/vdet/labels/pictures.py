@@ -4,7 +4,7 @@ import logging
 import math
 import os
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
@@ -206,64 +206,23 @@ def picture_folder(path: Path, name: str) -> Path:
     raise TruthError(f"{path}: its first image, {shown}, was not found beside it or below")
 
 
-Parse = Callable[[Path, Path], tuple[tuple[Label, ...], Size | None]]
-"""Reads a file of labels, of a picture: all its labels, and the size of the picture if known."""
+def paired_files(pictures: Path, labels: Path) -> Iterator[tuple[Path, Path | None]]:
+    """Yield the pictures below a folder, and the file of labels of the same name below another.
 
-
-@dataclass(frozen=True, slots=True)
-class PictureFormat:
-    """A form of labelled pictures: a folder with pictures, and a folder with a file for each.
-
-    Attributes
-    ----------
-    name
-        For messages.
-    folders
-        The names of both folders.
-    suffix
-        Ending of the files of labels.
-    parser
-        Function that takes the folder of the set, and returns what reads a file of labels. Both
-        raise `TruthError` with the place of the first mistake.
-    is_whole
-        Whether a picture without a file of labels shows no vehicle; else it is not of the set.
+    Hidden files and others of the system or of a label tool are left out; a picture may have no
+    file of labels. Raises `TruthError` at the end if a file of labels has no picture of its name.
     """
-
-    name: str
-    folders: tuple[str, str]
-    suffix: str
-    parser: Callable[[Path], Parse]
-    is_whole: bool = False
-
-    def is_in(self, folder: Path) -> bool:
-        """Return whether a folder holds such a set."""
-        return all((folder / name).is_dir() for name in self.folders)
-
-    def read(self, folder: Path) -> Iterator[LabelledPicture]:
-        """Yield the pictures of a set, without hidden files.
-
-        Raises
-        ------
-        TruthError
-            A file of labels has no picture of its name, or a mistake.
-        """
-        pictures, labels = (folder / name for name in self.folders)
-        parse = self.parser(folder)
-        found = filter(Path.is_file, labels.rglob(f"*{self.suffix}"))  # a FIFO may never end
-        names = (file.relative_to(labels) for file in found)
-        files = {name.with_suffix(""): labels / name for name in names if not _is_other(name)}
-        used = set()
-        for picture in sorted(filter(is_picture_name, pictures.rglob("*"))):
-            name = picture.relative_to(pictures).with_suffix("")
-            if name in files:
-                yield LabelledPicture(picture, files[name], *parse(files[name], picture))
-                used.add(name)
-            elif self.is_whole:
-                yield LabelledPicture(picture, picture)
-        if unused := files.keys() - used:
-            raise TruthError(f"{files[min(unused)]}: has no image of its name below {pictures}")
-
-
-def _is_other(name: Path) -> bool:
-    """Return whether a file is not one of labels, but of the system or of a label tool."""
-    return is_hidden(name) or name.name == "classes.txt"
+    found = filter(Path.is_file, labels.rglob("*.txt"))  # a FIFO may never end
+    names = (file.relative_to(labels) for file in found)
+    files = {
+        name.with_suffix(""): labels / name
+        for name in names
+        if not is_hidden(name) and name.name != "classes.txt"
+    }
+    used = set()
+    for picture in sorted(filter(is_picture_name, pictures.rglob("*"))):
+        name = picture.relative_to(pictures).with_suffix("")
+        yield picture, files.get(name)
+        used.add(name)
+    if unused := files.keys() - used:
+        raise TruthError(f"{files[min(unused)]}: has no image of its name below {pictures}")

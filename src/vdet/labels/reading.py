@@ -8,22 +8,17 @@ from pathlib import Path
 from vdet.archives import is_hidden
 from vdet.errors import TruthError
 from vdet.labels.coco import read_coco_pictures
-from vdet.labels.cvat import read_cvat_pictures
 from vdet.labels.formats import recognise, track_formats
-from vdet.labels.kitti import KITTI_PICTURES
+from vdet.labels.kitti import read_kitti_pictures
 from vdet.labels.label import Label, LabelledVideo, SavedTracks, checked_labels, line_error
 from vdet.labels.mot import MOT
 from vdet.labels.parsing import read_bytes
 from vdet.labels.pictures import LabelledPicture, LabelledPictures, checked_pictures
 from vdet.labels.roles import DEFAULT_ROLES, Roles, is_region
-from vdet.labels.voc import VOC_PICTURES
-from vdet.labels.yolo import YOLO_PICTURES
+from vdet.labels.yolo import read_yolo_pictures
 
-_FORMS = (KITTI_PICTURES, YOLO_PICTURES, VOC_PICTURES)
-"""The forms of labelled pictures with a file for each picture."""
-
-_READERS = {".json": read_coco_pictures, ".xml": read_cvat_pictures}
-"""Readers of files that label many pictures."""
+_FOLDERS = {("image_2", "label_2"): read_kitti_pictures, ("images", "labels"): read_yolo_pictures}
+"""Readers of sets with a file of labels for each picture, by the names of both folders."""
 
 
 def read_tracks(path: Path, rate: float | None = None) -> SavedTracks:
@@ -129,25 +124,26 @@ def read_labelled_pictures(path: Path, roles: Roles = DEFAULT_ROLES) -> Labelled
     return checked_pictures(str(path), _pictures(path), roles)
 
 
+def _pictures(path: Path) -> Iterable[LabelledPicture]:
+    for names, read in _FOLDERS.items():
+        pictures, labels = (path / name for name in names)
+        if pictures.is_dir() and labels.is_dir():
+            return read(pictures, labels)
+    files = _files(path)
+    if len(files) == 1:
+        return read_coco_pictures(files[0])
+    if files:
+        found = ", ".join(str(file.relative_to(path)) for file in files[:5])
+        raise TruthError(f"{path}: contains several such files ({found}); pass the one with labels")
+    raise TruthError(
+        f"{path}: labelled images not found; use a folder with one .json file (COCO), with image_2 "
+        "and label_2 (KITTI), or with images and labels (YOLO)"
+    )
+
+
 def _files(path: Path) -> list[Path]:
     """Return what may be a file of labels, if it is a regular file: a FIFO may never end."""
     if not path.is_dir():
-        return [path] if path.suffix.lower() in _READERS and path.is_file() else []
-    names = "*.json", "annotations/*.json", "annotations.xml"
-    files = sorted(file for name in names for file in path.glob(name))
+        return [path] if path.suffix.lower() == ".json" and path.is_file() else []
+    files = sorted(file for name in ("*.json", "annotations/*.json") for file in path.glob(name))
     return [file for file in files if file.is_file() and not is_hidden(file.relative_to(path))]
-
-
-def _pictures(path: Path) -> Iterable[LabelledPicture]:
-    for form in _FORMS:
-        if form.is_in(path):
-            return form.read(path)
-    files = _files(path)
-    if len(files) == 1:
-        return _READERS[files[0].suffix.lower()](files[0])
-    if files:
-        names = ", ".join(str(file.relative_to(path)) for file in files[:5])
-        raise TruthError(f"{path}: contains several such files ({names}); pass the one with labels")
-    wanted = ", ".join(f"{' and '.join(form.folders)} ({form.name})" for form in _FORMS)
-    what = "labelled images not found; use a folder with one .json file (COCO)"
-    raise TruthError(f"{path}: {what}, {wanted} or annotations.xml (CVAT)")

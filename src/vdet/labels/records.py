@@ -6,22 +6,30 @@ JSON lines have a record for each frame, even one without a box. CSV has a row f
 import csv
 import io
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import datetime, timedelta
 from itertools import islice
 from operator import itemgetter
 from pathlib import Path
 from typing import Annotated, Any, NotRequired
 
-from pydantic import FailFast, TypeAdapter, ValidationError
+from pydantic import FailFast, Field, TypeAdapter, ValidationError
 from typing_extensions import TypedDict
 
 from vdet.config.camera import moment
 from vdet.errors import TruthError
 from vdet.labels.formats import Format
-from vdet.labels.label import SavedTracks, line_error
-from vdet.labels.parsing import KINDS, Index, Row, Times, first_mistake, numbered_lines, read_rows
-from vdet.track.track import FrameTracks, Track
+from vdet.labels.label import Label, SavedTracks, from_size, limited, line_error
+from vdet.labels.parsing import (
+    LIMIT,
+    Index,
+    Number,
+    Times,
+    checked_times,
+    first_mistake,
+    numbered_lines,
+)
+from vdet.track.track import FrameTracks, State, Track
 
 _NEEDED = ("frame", "time", "id", "x", "y", "width", "height")
 _COLUMNS = (*_NEEDED, "score", "state", "class", "foot_x", "foot_y", "distance", "lane")
@@ -30,7 +38,27 @@ _FOOT = slice(10, 12)  # columns
 CLOCK = "clock"
 """Name of the fact and of the column that has the moment of a frame, in ISO 8601."""
 
-_OF_TRACK = tuple(KINDS)[2:]
+_KINDS = {
+    "frame": Index,
+    "time": float,
+    "id": Index,
+    **dict.fromkeys(("x", "y", "width", "height"), Number),
+    "score": Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] | None,
+    "state": State | None,
+    "class": str | None,
+    "foot": tuple[Number, Number] | None,
+    "distance": Number | None,
+    "lane": Annotated[int, Field(ge=-LIMIT, le=LIMIT)] | None,
+}
+"""What is known of a box, in pixels; the frame and the time, seconds, come first."""
+_OF_TRACK = tuple(_KINDS)[2:]
+_Values: Any = tuple[(*_KINDS.values(),)]  # type: ignore[misc]
+_ROWS: TypeAdapter[list[Any]] = TypeAdapter(list[_Values])
+_BLOCK = 300
+"""Rows that are checked at once; they fit into the cache."""
+
+_Row = tuple[int, Sequence[Any]]
+"""The line of a box in its file, and its values in the order of `_KINDS`."""
 
 
 class _Record(TypedDict):
@@ -84,8 +112,9 @@ def read_json_lines(path: Path, data: bytes) -> SavedTracks:
     TruthError
         The file is empty, a line is not such a record, frames do not ascend, or a time is wrong.
     """
-    frames: Times = {}
-    labels, times = read_rows(path, _json_rows(path, data, frames), frames)
+    found: Times = {}
+    labels = limited(path, _labels(path, _json_rows(path, data, found), found))
+    times = checked_times(path, found)
     if not times:
         raise TruthError(f"{path}: is empty; it should have a record for every frame")
     line, first = next(numbered_lines(path, data))
@@ -104,7 +133,9 @@ def read_csv(path: Path, data: bytes) -> SavedTracks:
         A column is missing or appears twice, a row has another number of cells, a cell is not what
         its column needs, or a time is wrong.
     """
-    labels, times = read_rows(path, _csv_rows(path, data))
+    found: Times = {}
+    labels = limited(path, _labels(path, _csv_rows(path, data), found))
+    times = checked_times(path, found)
     (_, head), *rows = islice(numbered_lines(path, data), 2)
     begin = None
     for line, row in rows:
@@ -122,7 +153,25 @@ def _begin(path: Path, line: int, first: Mapping[str, Any]) -> datetime | None:
         raise line_error(path, line, f"clock: {error}") from error
 
 
-def _json_rows(path: Path, data: bytes, times: Times) -> Iterator[Row]:
+def _labels(path: Path, rows: Iterable[_Row], times: Times) -> Iterator[Label]:
+    """Yield the label of each row, and put the time of its frame into `times`."""
+    left = iter(rows)
+    while block := list(islice(left, _BLOCK)):
+        lines, cells = zip(*block, strict=True)
+        try:
+            values = _ROWS.validate_python(cells)
+        except ValidationError as error:
+            at, column = error.errors()[0]["loc"][:2]
+            what = f"{tuple(_KINDS)[int(column)]}: {error.errors()[0]['msg']}"
+            raise line_error(path, lines[int(at)], what) from error
+        for line, row in zip(lines, values, strict=True):
+            frame, time, id_, x, y, width, height, score, state, name, *known = row
+            times[frame] = line, time
+            box, score = from_size(x, y, width, height), 1.0 if score is None else score
+            yield Label(line, box, name, frame + 1, id_, score, False, state or "detected", *known)
+
+
+def _json_rows(path: Path, data: bytes, times: Times) -> Iterator[_Row]:
     """Yield the boxes of every record, and put the time of its frame into `times`."""
     last = -1
     for line, content in numbered_lines(path, data):
@@ -138,7 +187,7 @@ def _json_rows(path: Path, data: bytes, times: Times) -> Iterator[Row]:
             yield line, (last, time, *map(track.get, _OF_TRACK))
 
 
-def _csv_rows(path: Path, data: bytes) -> Iterator[Row]:
+def _csv_rows(path: Path, data: bytes) -> Iterator[_Row]:
     """Yield the rows of a table; an empty cell is None, and so is one of a missing column."""
     lines = numbered_lines(path, data)
     names = _cells(path, *next(lines, (1, "")))

@@ -10,36 +10,37 @@ Source: docs.ultralytics.com, "Object detection datasets overview"; the CVAT man
 YOLO".
 """
 
+import io
 import json
 import logging
-import re
 import zipfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any, BinaryIO
 
-from vdet.archives import store
+from vdet.archives import ArchiveError, list_members, open_archive, read_member, store
 from vdet.boxes import Box
-from vdet.config.document import MAX_BYTES, parse_document
+from vdet.config.document import MAX_BYTES as MAX_DESCRIPTION
+from vdet.config.document import parse_document
 from vdet.detect.classes import UNKNOWN
 from vdet.errors import ConfigError, ImageError, OutputError, TruthError, escaped, printable
 from vdet.labels.formats import Format, PictureTracks, SourceVideo
 from vdet.labels.label import Label, SavedTracks, Size, limited
 from vdet.labels.parsing import (
     LIMIT,
-    archive_members,
+    MAX_BYTES,
+    frame_number,
     label_lines,
     parse_number,
     parse_whole,
     read_bytes,
 )
-from vdet.labels.pictures import Parse, PictureFormat
+from vdet.labels.pictures import LabelledPicture, paired_files
 from vdet.media.images import read_header
 from vdet.track.track import FrameTracks
 
 _DATA = "data.yaml"
-_NUMBER = re.compile(r"([0-9]{1,8})$", re.ASCII)
 _COLUMNS = 5
 _MIN_POLYGON = 7  # columns: the class and three points
 
@@ -107,11 +108,11 @@ def read_yolo(path: Path, data: bytes) -> SavedTracks:
         The archive is damaged, a name in it leads out of it, its labels are too large, there is no
         `data.yaml` with names and the size of the frames, or a line is not of this form.
     """
-    members = archive_members(path, data, _is_wanted)
+    members = _members(path, data)
     described = [name for name in members if PurePosixPath(name).name == _DATA]
     if not described:
-        what = f"holds neither annotations.xml (CVAT) nor {_DATA} (YOLO)"
-        raise TruthError(f"{path}: {what}; unpack it, and use the file of labels in it")
+        what = f"holds no {_DATA} (YOLO); unpack it, and use the file of labels in it"
+        raise TruthError(f"{path}: {what}")
     first = min(described, key=lambda name: (name.count("/"), name))
     where = f"{path}:{printable(first)}"
     values, names = _described(members[first], where)
@@ -133,10 +134,43 @@ def read_yolo(path: Path, data: bytes) -> SavedTracks:
     return SavedTracks(limited(path, labels), sorted({n for n, _ in frames}), size=size)
 
 
+def _members(path: Path, data: bytes) -> dict[str, bytes]:
+    """Return the files of labels and the descriptions in a zip file, by their names.
+
+    Raises
+    ------
+    TruthError
+        The archive is damaged, a name in it leads out of it, or these files are larger than
+        `MAX_BYTES` together.
+    """
+    try:
+        names = [name for name in list_members(io.BytesIO(data)) if _is_wanted(PurePosixPath(name))]
+        with open_archive(io.BytesIO(data)) as archive:
+            if sum(archive.getinfo(name).file_size for name in names) > MAX_BYTES:
+                what = f"its labels are larger than {MAX_BYTES:,} bytes; cut the video into parts"
+                raise ArchiveError(what)
+            return {name: read_member(archive, name, most=MAX_BYTES) for name in names}
+    except ArchiveError as error:
+        raise TruthError(f"{path}: {error}") from error
+
+
+def _is_wanted(name: PurePosixPath) -> bool:
+    is_label_file = name.suffix.lower() == ".txt" and "labels" in name.parts[:-1]
+    return is_label_file or name.name == _DATA
+
+
+def _frame(path: Path, name: str) -> int:
+    """Return the number of the frame that a file of labels is of."""
+    number = frame_number(name)
+    if number is None:
+        raise TruthError(f"{path}: {printable(name)} must end in a frame number")
+    return number
+
+
 def _described(data: bytes, where: str) -> tuple[Mapping[str, Any], list[str]]:
     """Return the values of `data.yaml`, and in them the names of the classes."""
-    if len(data) > MAX_BYTES:
-        raise TruthError(f"{where}: is larger than {MAX_BYTES:,} bytes")
+    if len(data) > MAX_DESCRIPTION:
+        raise TruthError(f"{where}: is larger than {MAX_DESCRIPTION:,} bytes")
     try:
         values = parse_document(data.decode("utf-8-sig", "replace"), where).values
     except ConfigError as error:
@@ -147,19 +181,6 @@ def _described(data: bytes, where: str) -> tuple[Mapping[str, Any], list[str]]:
     if not (isinstance(names, list) and names and all(isinstance(name, str) for name in names)):
         raise TruthError(f"{where}: names must be a list with all classes, or number them from 0")
     return values, names
-
-
-def _frame(path: Path, name: str) -> int:
-    """Return the number of the frame that a file of labels is of."""
-    number = _NUMBER.search(PurePosixPath(name).stem)
-    if number is None:
-        raise TruthError(f"{path}: {printable(name)} must end in a frame number")
-    return int(number[1])
-
-
-def _is_wanted(name: PurePosixPath) -> bool:
-    is_label_file = name.suffix.lower() == ".txt" and "labels" in name.parts[:-1]
-    return is_label_file or name.name == _DATA
 
 
 def _label(place: int, columns: Sequence[str], names: Sequence[str], size: Size) -> Label:
@@ -201,23 +222,31 @@ def _track_label(place: int, columns: Sequence[str], names: Sequence[str], size:
     return label._replace(id=parse_whole(columns[-1]), score=score)
 
 
-def _parser(folder: Path) -> Parse:
-    """Read `data.yaml` in the folder of a set or above it, and return what reads its labels."""
+def read_yolo_pictures(pictures: Path, labels: Path) -> Iterator[LabelledPicture]:
+    """Yield the pictures of a set; one without a file of labels shows no vehicle.
+
+    Raises
+    ------
+    TruthError
+        There is no `data.yaml` in the folder of the set or above it, a picture cannot be read, or
+        as `read_yolo` or `paired_files`.
+    """
+    folder = pictures.parent
     data = next((p for p in (folder / _DATA, folder.parent / _DATA) if p.is_file()), None)
     if data is None:
         raise TruthError(f"{folder}: needs {_DATA} with the names of the classes, here or above")
     _, names = _described(read_bytes(data), str(data))
-
-    def parse(file: Path, picture: Path) -> tuple[tuple[Label, ...], Size]:
+    for picture, file in paired_files(pictures, labels):
+        if file is None:
+            yield LabelledPicture(picture, picture)
+            continue
         try:
             size, _ = read_header(picture)
         except ImageError as error:
             raise TruthError(str(error)) from error
-        label = partial(_label, names=names, size=size)
-        return tuple(label_lines(file, read_bytes(file), label, form="YOLO", counts=None)), size
-
-    return parse
+        parse = partial(_label, names=names, size=size)
+        found = label_lines(file, read_bytes(file), parse, form="YOLO", counts=None)
+        yield LabelledPicture(picture, file, tuple(found), size)
 
 
 YOLO = Format("YOLO", ".yolo.zip", read_yolo, whole=_write, pictures=_write_pictures)
-YOLO_PICTURES = PictureFormat("YOLO", ("images", "labels"), ".txt", _parser, is_whole=True)

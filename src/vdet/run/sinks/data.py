@@ -50,10 +50,7 @@ class TrackSink(BaseSink):
             return self
         form = format_for(self.path)
         assert form is not None  # the suffixes of the kind say so
-        video = self.video
-        frames = video.frames if self.context.is_part else None  # else those that are read
-        begin = self.context.clock.zero if self.context.clock else None
-        source = SourceVideo(video.path.name, video.width, video.height, frames, begin)
+        source = SourceVideo(self.video.path.name, self.video.width, self.video.height)
         self._file = self.context.files.stage(self.path).open("wb")
         self._writer = TrackWriter(form, self._file, source)
         return self
