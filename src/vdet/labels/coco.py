@@ -217,22 +217,20 @@ def read_coco(path: Path, data: bytes) -> SavedTracks:
         twice, a time is wrong, or an annotation names an image or a category that is not there.
     """
     images, _ = _read(path, io.BytesIO(data))
-    frames = [image.frame for image in images if image.frame is not None]
+    frames = {image.frame: image for image in images if image.frame is not None}
     ids = (label.id for image in images for label in image.labels)
-    if len(frames) < len(images) or NO_ID in ids:
+    if any(image.frame is None for image in images) or NO_ID in ids:
         what = "needs the frame_index of each image and the track_id of each annotation"
         raise TruthError(f"{path}: {what}; in CVAT, label vehicles as tracks")
-    if len(set(frames)) < len(images):
+    if len(frames) < len(images):
         raise TruthError(f"{path}: a frame_index occurs twice; use one file for each video")
     times: Times = {
         frame: (f"images.{number}", nan if isinstance(image.time, str) else image.time)
-        for number, (frame, image) in enumerate(zip(frames, images, strict=True))
+        for number, (frame, image) in enumerate(frames.items())
         if image.time is not None
     }
     labels = tuple(
-        label._replace(frame=frame + 1)
-        for frame, image in zip(frames, images, strict=True)
-        for label in image.labels
+        label._replace(frame=frame + 1) for frame, image in frames.items() for label in image.labels
     )
     size = images[0].size if images else None
     return SavedTracks(labels, tuple(sorted(frames)), checked_times(path, times), size)

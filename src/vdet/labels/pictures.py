@@ -26,9 +26,6 @@ MAX_BOXES = 2_000_000
 _SLACK = 0.1
 """How far beyond a side of the picture boxes may reach, as a fraction of it."""
 
-ANNOTATIONS = "annotations"
-"""The folder of label files in the COCO set itself."""
-
 log = logging.getLogger("vdet")
 
 
@@ -195,7 +192,7 @@ def picture_folder(path: Path, name: str) -> Path:
     above that folder. Raises `TruthError` if there is none or several.
     """
     near, shown = path.parent, printable(name)
-    above = near.parent if near.name == ANNOTATIONS else near
+    above = near.parent if near.name == "annotations" else near
     for level in ([near], [above], sorted(above.glob("*/")), sorted(above.glob("*/*/"))):
         found = [folder for folder in level if is_file(folder / name)]
         if len(found) > 1:

@@ -94,14 +94,15 @@ def track_record(track: Track) -> dict[str, Any]:
 
 def _csv_lines(frame: FrameTracks) -> Iterator[str]:
     """Yield a row for each box; what is not known is an empty cell."""
+    rows, clock = io.StringIO(), frame.facts.get(CLOCK)
+    writer = csv.writer(rows, lineterminator="\n")
     for track in frame.tracks:
         known = track_record(track)
         place, score = track.box.xywh, f"{track.score:.4f}"
         cells = (frame.index, f"{frame.time:.6f}", track.id, *place, score, track.state)
         others = (track.class_name, *known["foot"], known["distance"], known["lane"])
-        row, clock = io.StringIO(), frame.facts.get(CLOCK)
-        csv.writer(row, lineterminator="\n").writerow((*cells, *others, clock))
-        yield row.getvalue()
+        writer.writerow((*cells, *others, clock))
+    yield rows.getvalue()
 
 
 def read_json_lines(path: Path, data: bytes) -> SavedTracks:

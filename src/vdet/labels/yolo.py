@@ -52,13 +52,12 @@ def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) ->
     size = video.width, video.height
     classes: dict[str, int] = {}  # name: number, in the order of their numbers
     pictures = "".join(f"images/train/frame_{frame.index:06}.png\n" for frame in frames)
-    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
-        store(archive, "train.txt", pictures)
-        for frame in frames:
-            lines = (_line(t.box, t.class_name, size, classes, f" {t.id}") for t in frame.tracks)
-            store(archive, f"labels/train/frame_{frame.index:06}.txt", "".join(lines))
-        sides = f"width: {video.width}\nheight: {video.height}\n"
-        store(archive, _DATA, _description("train.txt", classes) + sides)
+    texts = {"train.txt": pictures}
+    for frame in frames:
+        lines = (_line(t.box, t.class_name, size, classes, f" {t.id}") for t in frame.tracks)
+        texts[f"labels/train/frame_{frame.index:06}.txt"] = "".join(lines)
+    sides = f"width: {video.width}\nheight: {video.height}\n"
+    _store(file, texts | {_DATA: _description("train.txt", classes) + sides})
 
 
 def _write_pictures(file: BinaryIO, pictures: Sequence[PictureTracks]) -> None:
@@ -72,10 +71,13 @@ def _write_pictures(file: BinaryIO, pictures: Sequence[PictureTracks]) -> None:
             raise OutputError(f"{picture.path.with_suffix('')}: {what}")
         lines = (_line(t.box, t.class_name, picture.size, classes) for t in picture.tracks)
         texts[name] = "".join(lines)
+    _store(file, texts | {_DATA: _description("images", classes)})
+
+
+def _store(file: BinaryIO, texts: Mapping[str, str]) -> None:
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, text in texts.items():
             store(archive, name, text)
-        store(archive, _DATA, _description("images", classes))
 
 
 def _description(pictures: str, classes: Iterable[str]) -> str:
