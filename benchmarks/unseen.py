@@ -22,12 +22,12 @@ from sklearn.linear_model import LogisticRegression
 from vdet.boxes import BoolArray, Float64Array, Int64Array
 from vdet.config.loading import load_settings
 from vdet.config.schema import NetworkSettings, Settings
-from vdet.detect.classes import OUR_NAMES
+from vdet.detect.classes import OUR_NAMES, UNKNOWN
 from vdet.detect.factory import load_detector
 from vdet.detect.onnx.detector import trained_on
 from vdet.detect.onnx.recognition import Calibration, read_header
 from vdet.detect.onnx.session import Session
-from vdet.evaluate.comparison import MATCH_IOU, UNKNOWN, ComparedFrame
+from vdet.evaluate.comparison import MATCH_IOU, ComparedFrame
 from vdet.evaluate.images import Counting, MeasuredImage, evaluate_images
 from vdet.evaluate.output import RunName, figure, table
 from vdet.evaluate.report import video_report

@@ -38,28 +38,27 @@ def check_detector(model: DetectorModel, images: Sequence[Image]) -> None:
     * Stage pictures are BGR uint8 images.
     """
     height, width = images[0].shape[:2]
-    first, second = (model.for_video(width, height, images) for _ in range(2))
-    pictures = [Picture(image.copy()) for image in images]
+    shown = [image.copy() for image in images]
+    first, second = (model.for_video(width, height, shown) for _ in range(2))
+    found = [_detect(first, image, index) for index, image in enumerate(shown)]
     with ThreadPoolExecutor(2) as pool:
-        candidates = list(pool.map(second.search, pictures, range(len(images))))
-    for index, (image, searched) in enumerate(zip(images, candidates, strict=True)):
-        found, again = _found(first, image, index), second.detect(searched)
-        is_same = len(found) == len(again) and np.allclose(found.sides, again.sides, atol=1e-4)
-        assert is_same, "boxes differ between two detectors: they share something"
-    still = model.for_video(width, height, images[:1])
-    found = _found(still, images[0], None)
-    for name, picture in stage_pictures_of(still)(images[0], found).items():
+        again = map(second.detect, pool.map(second.search, map(Picture, shown), range(len(shown))))
+        for one, other in zip(found, again, strict=True):
+            is_same = len(one) == len(other) and np.allclose(one.sides, other.sides, atol=1e-4)
+            assert is_same, "boxes differ between two detectors: they share something"
+    still = model.for_video(width, height, shown[:1])
+    in_still = _detect(still, shown[0], None)
+    for boxes in (*found, in_still):
+        inside = visible(boxes.sides, (width, height))
+        assert np.array_equal(inside, boxes.sides), "a box lies outside the frame"
+    for name, picture in stage_pictures_of(still)(shown[0], in_still).items():
         is_image = picture.dtype == np.uint8 and picture.ndim == 3
         assert is_image, f"stage picture {name} is not uint8 of shape (H, W, 3)"
+    assert np.array_equal(shown, images), "the detector changed a frame"
 
 
-def _found(detector: VideoDetector, image: Image, index: int | None) -> Boxes:
-    before = image.copy()
-    found = detector.detect(detector.search(Picture(image), index))
-    assert np.array_equal(image, before), "the detector changed a frame"
-    inside = visible(found.sides, (image.shape[1], image.shape[0]))
-    assert np.array_equal(inside, found.sides), "a box lies outside the frame"
-    return found
+def _detect(detector: VideoDetector, image: Image, index: int | None) -> Boxes:
+    return detector.detect(detector.search(Picture(image), index))
 
 
 def check_tracker(make: Callable[[int, int], VideoTracker]) -> None:
@@ -76,23 +75,20 @@ def check_tracker(make: Callable[[int, int], VideoTracker]) -> None:
     ids: set[int] = set()
     for index in range(3 * RATE):
         picture = Picture(_scene(index))
-        tracks, again = (
-            list(tracker.update(_detections(index), index / RATE, picture))
-            for tracker in (first, second)
-        )
+        frame = _detections(index), index / RATE, picture
+        tracks, again = first.update(*frame), second.update(*frame)
         _check_tracks(tracks)
         assert again == tracks, "two trackers differ: they share something"
         assert (picture.image == _scene(index)).all(), "the tracker changed the frame"
         ids |= {track.id for track in tracks}
     assert len(tracks) == 2, f"{len(tracks)} of 2 vehicles are shown"
-    states = {track.state for track in tracks}
-    assert states == {"detected"}, "a detected vehicle is not called detected"
     assert len(ids) == 2, "a vehicle that is always detected changed its id"
+    assert {track.state for track in tracks} == {"detected"}, "not called detected"
     if isinstance(second, TimedTracker):
         later = second.at(3.0)
         _check_tracks(later)
         assert {track.id for track in later} == ids, "a vehicle is lost a moment later"
-        assert all(track.state == "interpolated" for track in later), "not called interpolated"
+        assert {track.state for track in later} == {"interpolated"}, "not called interpolated"
     for index in range(3 * RATE, 30 * RATE):
         tracks = first.update(NO_BOXES, index / RATE, Picture(_scene(0) // 2))
     assert not tracks, "vehicles are shown long after the last detection"
@@ -120,39 +116,37 @@ def check_sink(
     * The frame's image is not changed.
     * The same output can be written after a failed run.
     """
-    folder = path if kind.marker else path.parent
-    folder.mkdir(parents=True, exist_ok=True)
     for fails in (True, False):
         with suppress(KeyboardInterrupt):
             _write(kind, path, settings or Settings(), still=still, fails=fails)
-        assert bool(_content(path)) is not fails, (
-            "a failed run left its output" if fails else "a run that ended well left no output"
-        )
-    assert not list(folder.glob("*.vdet-*")), "temporary files are left"
+        wrong = "a failed run left its output" if fails else "a run that ended well left no output"
+        assert _is_there(path) is not fails, wrong
+    assert not list(path.parent.rglob("*.vdet-*")), "temporary files are left"
 
 
 def _write(kind: SinkKind, path: Path, settings: Settings, *, still: bool, fails: bool) -> None:
     """Write a picture or three frames through the sink; the run may end with an error."""
-    count, rate, traffic = 1 if still else 3, Fraction(RATE), LiveTraffic(settings, WIDTH, HEIGHT)
-    info = VideoInfo(Path("check.mp4"), WIDTH, HEIGHT, rate, 1 / rate, frames=count)
+    rate, traffic = Fraction(RATE), LiveTraffic(settings, WIDTH, HEIGHT)
+    info = None if still else VideoInfo(Path("check.mp4"), WIDTH, HEIGHT, rate, 1 / rate, frames=3)
     with OutputFiles() as files:
-        context = SinkContext(files, settings, None if still else info, traffic=traffic)
+        context = SinkContext(files, settings, info, traffic=traffic)
         with kind.open(path, context) as sink:
-            for index in range(count):
+            for index in range(1 if still else 3):
                 result = _result(index)
                 traffic.add(result.frame_tracks)
                 sink.write(result)
                 assert (result.frame.image == _scene(index)).all(), "the sink changed the frame"
             traffic.end()
-            assert not _content(path), "the output is there before the run has ended"
+            assert not _is_there(path), "the output is there before the run has ended"
             if fails:
                 raise KeyboardInterrupt
 
 
-def _content(path: Path) -> list[Path]:
-    """Return the files that an output consists of, temporary ones left out."""
-    files = path.iterdir() if path.is_dir() else [path]
-    return [file for file in files if file.exists() and ".vdet-" not in file.name]
+def _is_there(path: Path) -> bool:
+    """Return whether an output has files, apart from temporary ones."""
+    if path.is_dir():
+        return any(".vdet-" not in file.name for file in path.iterdir())
+    return path.exists()
 
 
 def _detections(index: int) -> Boxes:

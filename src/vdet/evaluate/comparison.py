@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vdet.boxes import BoolArray, Float64Array, Int64Array, coverage, iou_matrix
+from vdet.detect.classes import UNKNOWN
 from vdet.errors import TruthError
 from vdet.labels.label import MAX_IN_FRAME, LabelledVideo
 
@@ -30,10 +31,7 @@ MAX_PAIRS = 25_000_000
 UNMATCHED = -1
 """Partner of a vehicle that no track has found."""
 
-UNKNOWN = "vehicle"
-"""Class of a vehicle or a track whose kind is not known."""
-
-_IGNORED_SHARE = 0.5
+_IGNORED_FRACTION = 0.5
 _KEEP_BONUS = 1000.0  # larger than any sum of overlaps
 
 
@@ -244,7 +242,7 @@ def _apply_regions(
     vehicles, regions = truth.where(~truth.ignored), truth.where(truth.ignored)
     iou = iou_matrix(vehicles.boxes, tracks.boxes)
     _, paired = assign(np.where(at_least(iou, MATCH_IOU), iou, 0))
-    covered = at_least(coverage(tracks.boxes, regions.boxes), _IGNORED_SHARE)
+    covered = at_least(coverage(tracks.boxes, regions.boxes), _IGNORED_FRACTION)
     dropped = np.asarray(covered.any(axis=1) | tracks.ignored)
     dropped[paired] = False
     return vehicles, tracks.where(~dropped)
@@ -339,6 +337,6 @@ def _alignment(comparison: Comparison, lengths: Int64Array) -> Float64Array:
     for frame in comparison.frames:
         others = frame.iou.sum(axis=0)[np.newaxis, :] + frame.iou.sum(axis=1)[:, np.newaxis]
         total = others - frame.iou
-        share = np.divide(frame.iou, total, out=np.zeros_like(total), where=total > 0)
-        shared[np.ix_(frame.vehicles, frame.tracks)] += share
+        part = np.divide(frame.iou, total, out=np.zeros_like(total), where=total > 0)
+        shared[np.ix_(frame.vehicles, frame.tracks)] += part
     return shared / (lengths - shared)

@@ -9,8 +9,9 @@ import numpy as np
 
 from vdet.boxes import BoolArray, Boxes, Float64Array
 from vdet.config.schema import Settings
+from vdet.detect.classes import UNKNOWN
 from vdet.detect.protocol import DetectorModel
-from vdet.evaluate.comparison import UNKNOWN, Comparison, compare, pool
+from vdet.evaluate.comparison import Comparison, compare, pool
 from vdet.evaluate.scores import DetectionScores, RankedPredictions, rank_predictions, score_boxes
 from vdet.labels.label import MAX_IN_FRAME, LabelledVideo
 from vdet.labels.pictures import LabelledPicture, LabelledPictures

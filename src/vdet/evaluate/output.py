@@ -7,8 +7,6 @@ from typing import Any
 
 from vdet.version import __version__
 
-ABSENT = "–"
-
 
 @dataclass(frozen=True, slots=True)
 class RunName:
@@ -33,9 +31,11 @@ class RunName:
         return {"program": f"vdet {__version__}", **asdict(self), "model": model}
 
 
-def figure(value: float | str | None) -> str:
-    """Write a text, a count or a ratio; a dash for None."""
-    return str(value) if isinstance(value, int | str) else share(value)
+def figure(value: float | str | None, digits: int = 3) -> str:
+    """Write a text, a count, or a ratio with some digits; a dash for None."""
+    if value is None:
+        return "–"
+    return str(value) if isinstance(value, int | str) else f"{value:.{digits}f}"
 
 
 def table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
@@ -51,8 +51,3 @@ def table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
     widths = [max(map(len, column)) for column in zip(headings, *rows, strict=True)]
     form = "  ".join(f"{{:{'>' if number else '<'}{width}}}" for number, width in enumerate(widths))
     return [form.format(*row).rstrip() for row in (headings, *rows)]
-
-
-def share(value: float | None, digits: int = 3) -> str:
-    """Write a ratio; a dash for None."""
-    return ABSENT if value is None else f"{value:.{digits}f}"

@@ -16,7 +16,7 @@ from vdet.draw.boxes import Color
 from vdet.errors import counted, printable
 from vdet.evaluate.comparison import ComparedFrame, Comparison
 from vdet.evaluate.images import ImagesResult, MeasuredSet
-from vdet.evaluate.output import RunName, figure, share, table
+from vdet.evaluate.output import RunName, figure, table
 from vdet.evaluate.scores import ClassResult, class_results, score_boxes
 from vdet.evaluate.video import ClipResult, total
 from vdet.media.reader import VideoReader
@@ -159,23 +159,29 @@ def _with_boxes(image: Image, frame: ComparedFrame) -> Image:
     return drawn
 
 
-_OF_BOXES = (
-    *(("precision", "precision"), ("recall", "recall"), ("F1", "f1"), ("AP50", "ap50")),
-    *(("IoU", "mean_iou"), ("false alarms", "false_positives")),
-)
-_OF_PICTURES = (
-    *(("pictures", "images"), ("vehicles", "vehicles"), *_OF_BOXES),
-    *(("best F1", "best_f1"), ("at score", "best_score")),
-)
+_OF_BOXES = "precision", "recall", "f1", "ap50", "mean_iou", "false_positives"
+_OF_PICTURES = "images", "vehicles", *_OF_BOXES, "best_f1", "best_score"
 _OF_VIDEO = (
-    *(("missed", "misses"), ("MOTA", "mota"), ("IDF1", "idf1"), ("HOTA", "hota")),
-    *(("switches", "id_switches"), ("false tracks", "false_tracks"), ("delay", "mean_delay")),
+    *_OF_BOXES,
+    "misses",
+    "mota",
+    "idf1",
+    "hota",
+    "id_switches",
+    "false_tracks",
+    "mean_delay",
 )
-_OF_CLASSES = (
-    *(("vehicles", "vehicles"), ("found", "found"), ("named right", "right")),
-    *(*_OF_BOXES[:3], ("confused with", "confused")),
-)
-"""The headings of scores, and the attributes of the scores below them."""
+_OF_CLASSES = "vehicles", "found", "right", "precision", "recall", "f1", "confused"
+"""The columns of tables: attributes of scores."""
+
+_HEADINGS = {
+    "f1": "F1", "ap50": "AP50", "mean_iou": "IoU", "false_positives": "false alarms",
+    "images": "pictures", "best_f1": "best F1", "best_score": "at score", "misses": "missed",
+    "mota": "MOTA", "idf1": "IDF1", "hota": "HOTA", "id_switches": "switches",
+    "false_tracks": "false tracks", "mean_delay": "delay", "right": "named right",
+    "confused": "confused with",
+}  # fmt: skip
+"""Headings of columns, where they are not the name of the attribute."""
 
 _MOST_MISTAKES = 10  # listed for a video
 
@@ -262,7 +268,7 @@ def _clips_report(clips: Sequence[ClipResult], what: str, facts: Mapping[str, An
     }
     scores = [(clip.name, clip.scores) for clip in rows]
     tables = [
-        _score_table("video", _OF_BOXES + _OF_VIDEO, scores),
+        _score_table("video", _OF_VIDEO, scores),
         _class_table(classes),
         *map(_mistake_table, clips),
     ]
@@ -278,12 +284,11 @@ def _clip_values(clip: ClipResult) -> dict[str, Any]:
     return {"video": clip.name, "until": clip.until, **asdict(clip.scores), "mistakes": wrong}
 
 
-def _score_table(
-    first: str, columns: Sequence[tuple[str, str]], named: Iterable[tuple[str, object]]
-) -> Table:
+def _score_table(first: str, columns: Sequence[str], named: Iterable[tuple[str, object]]) -> Table:
     """Return a table of scores and their names; `first` is the heading of the names."""
-    rows = [[name, *(figure(getattr(item, key)) for _, key in columns)] for name, item in named]
-    return (first, *(heading for heading, _ in columns)), rows
+    headings = [first, *(_HEADINGS.get(column, column) for column in columns)]
+    rows = [[name, *(figure(getattr(scores, key)) for key in columns)] for name, scores in named]
+    return headings, rows
 
 
 def _class_table(classes: Iterable[ClassResult]) -> Table:
@@ -294,7 +299,7 @@ def _class_table(classes: Iterable[ClassResult]) -> Table:
 def _mistake_table(clip: ClipResult) -> Table:
     """Return the largest mistakes."""
     return (f"worst errors in {clip.name}", "frames", "boxes", "best IoU"), [
-        [mistake.name, mistake.span, str(mistake.boxes), share(mistake.overlap, 2)]
+        [mistake.name, mistake.span, str(mistake.boxes), figure(mistake.overlap, 2)]
         for mistake in mistakes(clip.comparison)[:_MOST_MISTAKES]
     ]
 

@@ -8,9 +8,9 @@ from statistics import fmean
 import numpy as np
 
 from vdet.boxes import BoolArray, Float64Array
-from vdet.detect.classes import OUR_NAMES
+from vdet.detect.classes import OUR_NAMES, UNKNOWN
 from vdet.evaluate import comparison as metrics
-from vdet.evaluate.comparison import UNKNOWN, ComparedFrame, Comparison, compare, counts
+from vdet.evaluate.comparison import ComparedFrame, Comparison, compare, counts
 from vdet.labels.label import LabelledVideo
 
 IOU_THRESHOLDS = np.linspace(0.5, 0.95, 10)

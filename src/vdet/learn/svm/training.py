@@ -12,7 +12,7 @@ from vdet.boxes import BoolArray
 from vdet.config.schema import Settings
 from vdet.detect.svm.model import LinearModel
 from vdet.errors import DataError
-from vdet.evaluate.output import share, table
+from vdet.evaluate.output import figure, table
 from vdet.learn.svm.dataset import PatchFile
 from vdet.learn.svm.extraction import LabelledVectors, extract, hold_out
 from vdet.learn.svm.fitting import fit, fit_boxes
@@ -62,11 +62,11 @@ class Classification:
         """Yield the metrics as lines of text."""
         yield f"patches tested: {self.patches}"
         for name in ("accuracy", "precision", "recall"):
-            yield f"{name} {share(getattr(self, name), 4)}"
+            yield f"{name} {figure(getattr(self, name), 4)}"
         found, others = ([*map(str, row)] for row in self.confusion)
         rows = [["is vehicle", *found], ["is non-vehicle", *others]]
         yield from ("", *table(("", "predicted vehicle", "predicted non-vehicle"), rows))
-        by_group = [[name, share(accuracy, 4)] for name, accuracy in self.groups.items()]
+        by_group = [[name, figure(accuracy, 4)] for name, accuracy in self.groups.items()]
         yield from ("", *table(("group", "accuracy"), by_group))
 
 
