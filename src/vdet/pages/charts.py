@@ -5,6 +5,7 @@ read at any width.
 """
 
 import heapq
+import itertools
 import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -13,11 +14,11 @@ from time import gmtime, strftime
 
 import numpy as np
 
-from vdet.draw.boxes import Color, color_of, text_color
+from vdet.draw.boxes import Color
 from vdet.errors import clock
 
-FILL, BAD, SOFT = "var(--fill)", "var(--bad)", "var(--soft)"
-"""Colours of the style: what is right, what is wrong, and what is less important."""
+FILL, SOFT = "var(--fill)", "var(--soft)"
+"""Colours of the style: of what counts, and of what is less important."""
 
 _COLORS = ("#0f9d8a", "#d97706", "#6366f1", "#db2777", "#65a30d", "#0284c7", "#b45309", "#9333ea")
 _TICKS = 5  # most parts of an axis
@@ -80,39 +81,18 @@ class Span:
     label: str = ""
     time: float | None = None
 
-    def fits(self, width: float, pixels: int) -> bool:
-        """Return whether the label fits into the bar, `width` percent of a chart of `pixels`."""
-        return bool(self.label) and width * pixels >= 100 * (10 + 7.5 * len(self.label))
-
 
 @dataclass(frozen=True, slots=True)
 class Timeline:
-    """Spans in rows, which may have names."""
+    """Spans in rows."""
 
     title: str
     x: Axis
     spans: Sequence[Span]
-    names: Sequence[str] = ()
-
-    @property
-    def rows(self) -> int:
-        """The number of rows."""
-        return max([len(self.names), *(span.row + 1 for span in self.spans)])
 
 
 Series = dict[str, Counter[float]]
 """How often something happened in each interval, by its name; intervals by their start, seconds."""
-
-
-def color(number: int) -> str:
-    """Return the colour of the series with this number."""
-    return _COLORS[number % len(_COLORS)]
-
-
-def vehicle_colors(number: int) -> tuple[str, str]:
-    """Return the colour that the box of a vehicle has in the video, and that of text on it."""
-    bgr = color_of(number)
-    return hex_color(bgr), hex_color(text_color(bgr))
 
 
 def hex_color(bgr: Color) -> str:
@@ -141,21 +121,12 @@ def _time_text(seconds: float, zero: float | None) -> str:
     return strftime("%H:%M:%S", gmtime(round(seconds + zero))).removesuffix(":00")
 
 
-def number_axis(
-    low: float, high: float, title: str = "", *, minimum: float = 0, fixed: bool = False
-) -> Axis:
-    """Return an axis with even parts, each at least `minimum` long.
-
-    Its ends are round numbers, or those given if they are `fixed`.
-    """
-    length = max(high - low, minimum, _NOTHING)
-    power = 10.0 ** math.floor(math.log10(length / _TICKS))
-    step = next(power * item for item in (1, 2, 5, 10) if length / (power * item) <= _TICKS)
-    step = max(step, minimum)
-    first, last = math.floor(low / step + _NOTHING), math.ceil(high / step - _NOTHING)
-    ticks = [(n * step, f"{n * step:g}") for n in range(first, max(first + 1, last) + 1)]
-    if fixed:
-        return Axis(low, high, [tick for tick in ticks if low <= tick[0] <= high], title)
+def number_axis(low: int, high: int, title: str = "") -> Axis:
+    """Return an axis of whole numbers in even parts, whose ends are round."""
+    steps = (item * 10**power for power in itertools.count() for item in (1, 2, 5))
+    step = next(step for step in steps if high - low <= _TICKS * step)
+    numbers = range(low // step, max(low // step + 1, math.ceil(high / step)) + 1)
+    ticks = [(number * step, f"{number * step:g}") for number in numbers]
     return Axis(ticks[0][0], ticks[-1][0], ticks, title)
 
 
@@ -177,7 +148,7 @@ def level_plot(
         for at, level in zip(edges.tolist(), levels.tolist(), strict=False)
         if level
     ]
-    y = _counts(levels.max())
+    y = number_axis(0, max(1, levels.max().item()))
     bars += [
         Bar(*gap, 0, y.high, SOFT, f"no frames: {' to '.join(map(time_text, gap))}") for gap in gaps
     ]
@@ -192,34 +163,30 @@ def interval_plot(
 
     `interval` is in seconds, `zero` as of `time_axis`.
     """
-    bars = []
+    bars, most = list[Bar](), 1
+    colors = dict(zip(series, itertools.cycle(_COLORS), strict=False))
     for at in sorted(set().union(*series.values())):
         below = 0
-        for number, (name, counts) in enumerate(series.items()):
+        for name, counts in series.items():
             if count := counts[at]:
                 tip = f"{_time_text(at, zero)}: {count} {name}"
                 place = at + 0.1 * interval, at + 0.9 * interval, below, below + count
-                bars.append(Bar(*place, color(number), tip))
+                bars.append(Bar(*place, colors[name], tip))
                 below += count
-    sums = [f"{name}: {counts.total()}" for name, counts in series.items()]
-    legend = [(text, color(number)) for number, text in enumerate(sums)]
-    most = max((bar.high for bar in bars), default=0)
-    return Plot(title, x, _counts(most), bars, legend=legend)
+        most = max(most, below)
+    legend = [(f"{name}: {counts.total()}", colors[name]) for name, counts in series.items()]
+    return Plot(title, x, number_axis(0, most), bars, legend=legend)
 
 
-def histogram(values: Sequence[float], step: float, title: str, unit: str) -> Plot:
+def histogram(values: Sequence[float], step: int, title: str, unit: str) -> Plot:
     """Return how many values lie in each class of width `step`."""
     counts = Counter(int(value // step) for value in values)
     bars = []
     for number, count in sorted(counts.items()):
         low, high = step * number, step * (number + 1)
         bars.append(Bar(low, high, 0, count, title=f"{low:g} to {high:g} {unit}"))
-    x = number_axis(bars[0].left, bars[-1].right, unit)
-    return Plot(title, x, _counts(max(counts.values())), bars)
-
-
-def _counts(most: float) -> Axis:
-    return number_axis(0, max(1, most), minimum=1)
+    x = number_axis(step * min(counts), step * (max(counts) + 1), unit)
+    return Plot(title, x, number_axis(0, max(counts.values())), bars)
 
 
 def pack(spans: Iterable[tuple[float, float]]) -> list[int]:

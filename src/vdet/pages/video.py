@@ -7,12 +7,13 @@ from dataclasses import dataclass, field
 from vdet.boxes import Image
 from vdet.conditions.finding import Finding
 from vdet.detect.classes import UNKNOWN
+from vdet.draw.boxes import color_of, text_color
 from vdet.errors import named
 from vdet.lanes.ground import Ground
 from vdet.media import VideoInfo
 from vdet.pages import charts
 from vdet.pages.batch import NO_STILL, VideoFacts
-from vdet.pages.charts import Axis, Plot, Span, Timeline
+from vdet.pages.charts import Axis, Plot, Span, Timeline, hex_color
 from vdet.pages.place import path_marks, traffic_part, with_marks
 from vdet.pages.render import jpeg_uri, render
 from vdet.pages.vehicles import Part, VehicleRow, table_json
@@ -144,23 +145,20 @@ class VideoPage:
         for event in self.counts.events if self.counts else ():
             ways.setdefault(event.id, {})[event.name] = None
         return tuple(
-            self._row(record, " → ".join(ways.get(record.id, ())), pictures.get(record.id, ""))
+            VehicleRow(
+                id=record.id,
+                class_name=record.class_name,
+                first=round(record.first, 3),
+                seconds=round(record.seconds, 1),
+                clock=self.clock and self.clock.at(record.first).isoformat(timespec="seconds"),
+                speed=round(KMH * record.speeds.quantile(0.5), 1) if record.speeds else None,
+                way=" → ".join(ways.get(record.id, ())),
+                motion=record.motion or "",
+                distance=None if record.distance is None else round(record.distance, 1),
+                lane=record.lane,
+                picture=pictures.get(record.id, ""),
+            )
             for record in self.records
-        )
-
-    def _row(self, record: VehicleRecord, way: str, picture: str) -> VehicleRow:
-        return VehicleRow(
-            id=record.id,
-            class_name=record.class_name,
-            first=round(record.first, 3),
-            seconds=round(record.seconds, 1),
-            clock=self.clock and self.clock.at(record.first).isoformat(timespec="seconds"),
-            speed=round(KMH * record.speeds.quantile(0.5), 1) if record.speeds else None,
-            way=way,
-            motion=record.motion or "",
-            distance=None if record.distance is None else round(record.distance, 1),
-            lane=record.lane,
-            picture=picture,
         )
 
     def html(self) -> str:
@@ -278,9 +276,10 @@ def _spans(record: VehicleRecord, row: int) -> list[Span]:
     name = f" ({record.class_name})" if record.class_name else ""
     times = " to ".join(map(charts.time_text, (record.first, record.last)))
     title = f"vehicle {record.id}{name}: {times}"
-    fill, ink = charts.vehicle_colors(record.id)
+    fill = color_of(record.id)
+    colors = hex_color(fill), hex_color(text_color(fill))
     longest = max(record.followed, key=lambda span: span[1] - span[0])
     return [
-        Span(row, *span, title, fill, ink, f"#{record.id}" if span is longest else "", span[0])
+        Span(row, *span, title, *colors, f"#{record.id}" if span is longest else "", span[0])
         for span in record.followed
     ]
