@@ -22,8 +22,8 @@ from vdet.media.writer import VideoWriter
 from vdet.run.sinks import Output
 from vdet.run.sinks.folders import ClipSink
 from vdet.run.video import Run, run_video
-from vdet.synthetic.random_scenes import pole_scene
 from vdet.synthetic.render import Renderer
+from vdet.synthetic.scene import pole_scene
 
 PARTS = 15
 """One of so many parts of the video has traffic."""

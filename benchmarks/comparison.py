@@ -25,9 +25,8 @@ from vdet.evaluate.scores import Scores, score
 from vdet.labels.label import Label, LabelledVideo
 from vdet.labels.reading import read_truth
 from vdet.run.result import FrameResult
-from vdet.synthetic.random_scenes import pole_scene
 from vdet.synthetic.render import write_clip
-from vdet.synthetic.scene import Scene, SceneVehicle
+from vdet.synthetic.scene import Scene, SceneVehicle, pole_scene
 from vdet.synthetic.truth import write_truth
 
 SEEDS = (1, 2, 3, 4)

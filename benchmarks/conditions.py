@@ -22,9 +22,8 @@ from vdet.conditions.watch import Conditions
 from vdet.config.places import LineSettings, TrafficSettings
 from vdet.config.schema import Settings
 from vdet.media import Picture
-from vdet.synthetic.random_scenes import pole_scene
 from vdet.synthetic.render import Renderer
-from vdet.synthetic.scene import Scene
+from vdet.synthetic.scene import Scene, pole_scene
 from vdet.synthetic.truth import true_boxes
 from vdet.track.track import Track
 

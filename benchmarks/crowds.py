@@ -16,15 +16,17 @@ from vdet.detect.factory import load_detector
 from vdet.detect.protocol import DetectorModel
 from vdet.evaluate.scores import Scores, score
 from vdet.synthetic.camera import PinholeCamera
-from vdet.synthetic.random_scenes import (
+from vdet.synthetic.render import frames
+from vdet.synthetic.scene import (
     LANE_WIDTH,
     LORRY,
+    Scene,
+    SceneVehicle,
+    Waypoint,
     empty_road,
     random_body,
     random_paint,
 )
-from vdet.synthetic.render import frames
-from vdet.synthetic.scene import Scene, SceneVehicle, Waypoint
 from vdet.workers import limit_library_threads
 
 SCENES = range(30)

@@ -16,8 +16,17 @@ from vdet.media.frame import Coding
 from vdet.run.loop import build, peek
 from vdet.run.result import FrameResult
 from vdet.synthetic.camera import PinholeCamera
-from vdet.synthetic.random_scenes import LANE_WIDTH, empty_road, random_body, random_paint
-from vdet.synthetic.scene import LaneLine, Light, Scene, SceneVehicle, Waypoint
+from vdet.synthetic.scene import (
+    LANE_WIDTH,
+    LaneLine,
+    Light,
+    Scene,
+    SceneVehicle,
+    Waypoint,
+    empty_road,
+    random_body,
+    random_paint,
+)
 from vdet.synthetic.truth import must_be_found, true_boxes
 from vdet.synthetic.vehicle import STANDS
 

@@ -10,8 +10,8 @@ from vdet.detect.svm.detector import SvmModel, shipped_model
 from vdet.detect.svm.model import LinearModel, load_model
 from vdet.media import Picture
 from vdet.media.reader import VideoReader
-from vdet.synthetic.random_scenes import demo_scene
 from vdet.synthetic.render import write_clip
+from vdet.synthetic.scene import demo_scene
 
 FRAMES_SEARCHED = (20, 240, 470, 690, 760)  # of the project video, within its labelled part
 

@@ -28,10 +28,9 @@ from benchmarks.pole_cameras import HEIGHT, WIDTH
 from vdet.boxes import Box
 from vdet.config.schema import Settings
 from vdet.media import VideoInfo
-from vdet.pages.batch import VideoFacts, write_index
+from vdet.pages.batch import VehicleRow, VideoFacts, write_index
 from vdet.pages.drawing import Drawing
 from vdet.pages.render import jpeg_uri
-from vdet.pages.vehicles import VehicleRow
 from vdet.pages.video import VideoPage
 from vdet.track.track import State
 from vdet.traffic.linking import VehiclePath

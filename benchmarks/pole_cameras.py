@@ -26,9 +26,18 @@ from vdet.detect.protocol import DetectorModel
 from vdet.lanes.camera import Undistorter
 from vdet.lanes.ground import Ground, fit_ground
 from vdet.synthetic.camera import PinholeCamera
-from vdet.synthetic.random_scenes import LANE_WIDTH, LORRY, empty_road, random_body, random_paint
 from vdet.synthetic.render import frames
-from vdet.synthetic.scene import Body, Scene, SceneVehicle, Waypoint
+from vdet.synthetic.scene import (
+    LANE_WIDTH,
+    LORRY,
+    Body,
+    Scene,
+    SceneVehicle,
+    Waypoint,
+    empty_road,
+    random_body,
+    random_paint,
+)
 from vdet.synthetic.truth import true_boxes
 from vdet.track.track import FrameTracks, Track
 from vdet.traffic.counting import count_frames

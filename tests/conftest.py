@@ -20,9 +20,8 @@ from vdet.config.schema import Settings, SvmSettings, SvmTrainingSettings, Train
 from vdet.detect.svm.model import save_model
 from vdet.learn.svm.dataset import find_patches
 from vdet.learn.svm.training import train
-from vdet.synthetic.random_scenes import demo_scene
 from vdet.synthetic.render import write_clip
-from vdet.synthetic.scene import Scene
+from vdet.synthetic.scene import Scene, demo_scene
 
 # Seeded, so that a run of the tests says the same twice; and no test is a timing.
 settings.register_profile("vdet", derandomize=True, deadline=None)

@@ -23,9 +23,8 @@ from vdet.learn.svm.training import train
 from vdet.progress import Steps
 from vdet.run.sinks import Output
 from vdet.run.video import Run, run_video
-from vdet.synthetic.random_scenes import busy_road, demo_scene, pole_scene
 from vdet.synthetic.render import write_clip
-from vdet.synthetic.scene import Scene
+from vdet.synthetic.scene import Scene, busy_road, demo_scene, pole_scene
 from vdet.synthetic.truth import write_truth
 from vdet.traffic.count_files import NOWHERE
 from vdet.traffic.counting import count_files

@@ -5,8 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from pages.html import Elements, needs_chromium, title_in_chromium
-from vdet.pages.batch import NO_STILL, VideoFacts, write_index
-from vdet.pages.vehicles import VehicleRow
+from vdet.pages.batch import NO_STILL, VehicleRow, VideoFacts, write_index
 
 NASTY = "</script><b>"
 

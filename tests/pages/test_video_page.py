@@ -18,8 +18,8 @@ from traffic.passing import HEIGHT, WIDTH, frame, passing, summarize, track
 from vdet.boxes import Box
 from vdet.conditions.finding import Finding
 from vdet.pages import charts
+from vdet.pages.batch import VehicleRow
 from vdet.pages.render import jpeg_uri, link_to
-from vdet.pages.vehicles import VehicleRow
 from vdet.pages.video import Player, VideoPage
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Clock

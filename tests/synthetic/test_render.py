@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from synthetic.scenes import make_scene
-from vdet.synthetic.random_scenes import demo_scene
 from vdet.synthetic.render import Renderer, render
-from vdet.synthetic.scene import Shadow
+from vdet.synthetic.scene import Shadow, demo_scene
 
 
 def test_the_same_seed_gives_the_same_pixels_in_any_order() -> None:

@@ -171,8 +171,12 @@ _BETTER = 0.1
 
 def color_of(number: int) -> Color:
     """Return a bright colour for an id; neighbouring ids differ clearly."""
-    hue = (0.33 + number * _GOLDEN_RATIO) % 1
-    red, green, blue = colorsys.hsv_to_rgb(hue, 0.85, 1)
+    return of_hue(0.33 + number * _GOLDEN_RATIO, 0.85)
+
+
+def of_hue(hue: float, saturation: float) -> Color:
+    """Return a bright colour; a hue of 0 is red, as is one of 1."""
+    red, green, blue = colorsys.hsv_to_rgb(hue % 1, saturation, 1)
     return round(255 * blue), round(255 * green), round(255 * red)
 
 
@@ -225,10 +229,10 @@ def draw_labels(
     """
     taken = np.array([(box.x1, box.y1, box.x2, box.y2) for box in boxes]).reshape(-1, 4)
     for box, options, tint in zip(boxes, texts, color, strict=True):
-        tags = ((text, label_tag(surface, text, (0, 0))) for text in options)
-        text, tag = next(
-            item for item in tags if item[1].width <= box.width or item[0] == options[-1]
-        )
+        for text in options:
+            tag, *_ = _lay_out(surface, text, (0, 0))
+            if tag.width <= box.width:
+                break
         if text:
             places = _places(surface, box, tag)
             hidden = (coverage(places, taken).sum(axis=1) / _BETTER).astype(int)
@@ -244,11 +248,6 @@ def _places(surface: Surface, box: Box, tag: Box) -> Float64Array:
     y = np.array([box.y1 - tag.height, box.y2, box.y1 - tag.height, box.y2])
     x, y = x.clip(0, max(0, columns - tag.width)), y.clip(0, max(0, rows - tag.height))
     return np.stack([x, y, x + tag.width, y + tag.height], axis=1)
-
-
-def label_tag(surface: Surface, text: str, corner: Point) -> Box:
-    """Return the tag that `draw_label` would draw."""
-    return _lay_out(surface, text, corner)[0]
 
 
 def _lay_out(surface: Surface, text: str, corner: Point) -> tuple[Box, Point, float]:
@@ -312,5 +311,5 @@ def draw_outline(surface: Surface, corners: Sequence[Point], color: Color, label
     """Draw the sides of a polygon, and write a label at its highest corner."""
     draw_lines(surface, corners, color, line_width(surface), closed=True)
     left, top = min(corners, key=lambda corner: (corner[1], corner[0]))
-    height = label_tag(surface, label, (0, 0)).height
-    draw_label(surface, label, (round(left), round(top) + height), color)
+    tag, *_ = _lay_out(surface, label, (0, 0))
+    draw_label(surface, label, (round(left), round(top) + tag.height), color)

@@ -119,8 +119,6 @@ class TopView:
         right = left + self.lane_width
         ground = np.array([(left, start), (right, start), (right, end), (left, end)], np.float32)
         frame = (corners * (width, height)).astype(np.float32)
-        self.corners = np.asarray(frame, np.float64), np.asarray(ground, np.float64)
-        """The corners of the trapezoid, in pixels of the undistorted frame and metres."""
         self._to_frame = np.asarray(cv2.getPerspectiveTransform(ground, frame), np.float64)
         """From `(x, z, 1)`, metres, to pixels of the undistorted frame."""
         self._to_ground = np.linalg.inv(self._to_frame)

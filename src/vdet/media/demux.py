@@ -284,13 +284,10 @@ class ClockUnwrapper:
 
     def _part_at(self, stream: int, begin: Fraction) -> int:
         """Return the part in which a stream goes on at a time of its clock; it may be a new one."""
-        newest = self._part_of.get(self._pictures, 0)
+        newest, end = self._part_of.get(self._pictures, 0), self._ends.get(stream)
         for number in range(self._part_of.setdefault(stream, newest), len(self._offsets)):
-            if self._goes_on(stream, begin + self._offsets[number]):
+            time = begin + self._offsets[number]
+            if end is None or end - _BACK <= time <= max(self._ends.values()) + _FORTH:
                 return number
         self._offsets.append(max(self._ends.values()) - begin)
         return len(self._offsets) - 1
-
-    def _goes_on(self, stream: int, begin: Fraction) -> bool:
-        end = self._ends.get(stream)
-        return end is None or end - _BACK <= begin <= max(self._ends.values()) + _FORTH

@@ -167,11 +167,6 @@ class VideoWriter:
     threads
         Of the encoder; None lets it choose.
 
-    Attributes
-    ----------
-    size
-        Bytes of pictures that were encoded until now.
-
     Raises
     ------
     OutputError
@@ -201,7 +196,6 @@ class VideoWriter:
         self._last = -1
         self._sound: SoundCopy | None = None
         self._failure: OutputError | None = None
-        self.size = 0
         flags = {"movflags": "+faststart"}
         with self._naming_the_file():
             self._container = av.open(str(path.absolute()), mode="w", container_options=flags)
@@ -225,9 +219,7 @@ class VideoWriter:
             picture = _to_encode(frame.picture, self._info.coding)
             picture.pts, picture.time_base = self._last, self._time_base
             picture.duration = round(self._period / self._time_base)
-            packets = self._stream.encode(picture)
-            self.size += sum(packet.size for packet in packets)
-            self._container.mux(packets)
+            self._container.mux(self._stream.encode(picture))
             if self._sound:
                 self._sound.copy(since)
 

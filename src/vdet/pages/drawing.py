@@ -11,7 +11,7 @@ import numpy as np
 import yaml
 from markupsafe import Markup
 
-from vdet.boxes import Float64Array, Image
+from vdet.boxes import Image
 from vdet.config.places import to_pixels
 from vdet.config.schema import Settings
 from vdet.detect.classes import UNKNOWN
@@ -162,14 +162,12 @@ def pack(paths: Sequence[VehiclePath]) -> dict[str, Any]:
 
     Times are µs since the first row, feet hundredths of a pixel; the page turns them back exactly.
     """
-    columns: list[list[Float64Array]] = [[], [], [], []]
+    columns = [np.empty((4, 0))]
     for path in paths:
         times = 1e6 * (path.times - path.times[0])
-        rows = times, *(100 * path.points.T), path.heights
-        for column, values in zip(columns, rows, strict=True):
-            column.append(np.diff(np.diff(np.rint(values), prepend=0), prepend=0))
-    joined = np.concatenate([np.empty(0), *(part for column in columns for part in column)])
-    planes = joined.astype("<i4").view(np.uint8).reshape(-1, 4).T
+        rows = np.rint(np.vstack([times, 100 * path.points.T, path.heights]))
+        columns.append(np.diff(np.diff(rows, prepend=0), prepend=0))
+    planes = np.hstack(columns).astype("<i4").view(np.uint8).reshape(-1, 4).T
     vehicles = [
         (
             *(path.vehicle, path.class_name or UNKNOWN, path.size),

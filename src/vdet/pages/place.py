@@ -3,7 +3,6 @@
 Its picture is made of marks, which are painted into an image or written as SVG.
 """
 
-import colorsys
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -18,7 +17,7 @@ from vdet.lanes.ground import Ground
 from vdet.pages.charts import hex_color
 from vdet.pages.render import render
 from vdet.polygons import Point
-from vdet.traffic.counts import Counts, Event, Way, class_of, vehicle_trips
+from vdet.traffic.counts import Counts, Event, Way, class_of, vehicle_flows
 from vdet.traffic.crossings import Border, PlacedLine
 from vdet.traffic.records import VehicleRecord
 
@@ -59,9 +58,9 @@ class Mark:
 def flows_of(counts: Counts) -> dict[Way, list[tuple[Event, Event]]]:
     """Return the first and the last event of each vehicle, by flow, the largest flow first."""
     flows: dict[Way, list[tuple[Event, Event]]] = {}
-    for first, *others in vehicle_trips(counts):
-        way = first.name, others[-1].name if others else NOWHERE
-        flows.setdefault(way, []).append((first, others[-1] if others else first))
+    for _, first, last in vehicle_flows([counts]):
+        way = first.name, last.name if last else NOWHERE
+        flows.setdefault(way, []).append((first, last or first))
     return dict(sorted(flows.items(), key=lambda flow: -len(flow[1])))
 
 
@@ -108,8 +107,7 @@ def _inside(path: Sequence[Point], size: tuple[int, int]) -> list[Point]:
 def direction_color(start: Point, end: Point) -> Color:
     """Return the colour of the direction from one point to another."""
     angle = math.atan2(end[1] - start[1], end[0] - start[0])
-    red, green, blue = colorsys.hsv_to_rgb(angle / (2 * math.pi) % 1, 0.8, 1)
-    return round(255 * blue), round(255 * green), round(255 * red)
+    return boxes.of_hue(angle / (2 * math.pi), 0.8)
 
 
 def border_marks(border: Border, totals: Mapping[Way, int], text: str = "") -> Iterator[Mark]:

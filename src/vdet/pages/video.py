@@ -12,11 +12,10 @@ from vdet.errors import named
 from vdet.lanes.ground import Ground
 from vdet.media import VideoInfo
 from vdet.pages import charts
-from vdet.pages.batch import NO_STILL, VideoFacts
+from vdet.pages.batch import NO_STILL, Part, VehicleRow, VideoFacts, table_json
 from vdet.pages.charts import Axis, Plot, Span, Timeline, hex_color
 from vdet.pages.place import path_marks, traffic_part, with_marks
 from vdet.pages.render import jpeg_uri, render
-from vdet.pages.vehicles import Part, VehicleRow, table_json
 from vdet.traffic.clock import Clock, Intervals
 from vdet.traffic.counts import Counts
 from vdet.traffic.crossings import Border

@@ -1,4 +1,4 @@
-"""The description of a road scene: plain values in metres and seconds.
+"""Road scenes: their description, plain values in metres and seconds, and random ones from a seed.
 
 The same scene always gives the same images and the same truth. Lateral positions are metres to
 the right of the camera. A `station` is metres along the road from where the clip begins. The road's
@@ -6,7 +6,7 @@ surface and the plants beside it repeat every `PERIOD` metres, so a clip may hav
 """
 
 import math
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, replace
 from fractions import Fraction
 
 import numpy as np
@@ -17,6 +17,8 @@ from vdet.synthetic.camera import PinholeCamera
 PERIOD = 200.0
 """Metres after which plants and surface repeat."""
 LINE_WIDTH = 0.15
+"""Metres."""
+LANE_WIDTH = 3.7
 """Metres."""
 
 
@@ -160,3 +162,141 @@ class Scene:
             return place.ahead + min(0.0, math.cos(place.heading) * vehicle.body.length)
 
         return sorted(placed, key=nearest)
+
+
+_YELLOW: Color = (60, 180, 225)
+_PAINTS: tuple[Color, ...] = (
+    (228, 228, 226), (170, 168, 165), (112, 110, 108), (34, 32, 32), (40, 34, 128), (110, 62, 34),
+    (70, 84, 60), (128, 140, 150), (52, 46, 44), (150, 110, 74),
+)  # fmt: skip
+_VERGES: tuple[Color, ...] = ((92, 132, 150), (60, 104, 96), (100, 122, 128))
+_SHAPES: tuple[Body, ...] = (
+    Body(),
+    Body(length=4.2, boot=0.15, slope=0.5, height=1.48),
+    Body(width=1.88, length=4.7, boot=0.12, slope=0.35, height=1.72, belt=1.04),
+    Body(width=1.9, length=4.9, boot=0.06, slope=0.12, height=1.92, belt=1.12),
+    Body(width=1.82, length=4.8, boot=0.1, slope=0.7, height=1.46),
+)
+
+LORRY = Body(width=2.5, length=9.0, height=3.5, belt=3.45, boot=0.05, slope=0.05)
+"""A lorry with a box body."""
+
+
+def demo_scene(seed: int, *, width: int = 960, height: int = 540) -> Scene:
+    """Return the scene of the demo: 10 s at 25 frames a second.
+
+    The camera drives in the left lane. Vehicle 1 drives far ahead in the same lane, vehicle 2 two
+    lanes to the right. The camera overtakes vehicle 3, which leaves at the right edge. Vehicle 4
+    enters at the right edge, overtakes, and hides vehicle 2 for about two seconds.
+    """
+    rng = np.random.default_rng(seed)
+    scene = empty_road(rng, PinholeCamera.dashboard(width, height), lane=0, lanes=3, seed=seed)
+    near, far = LANE_WIDTH, 2 * LANE_WIDTH
+    paths = (
+        ((0.0, 25.0, 0.0), (4.0, 29.0, 0.1), (10.0, 26.0, -0.1)),
+        ((0.0, 20.0, far), (10.0, 30.0, far)),
+        ((0.0, 24.0, near), (2.0, 10.0, near), (4.5, -8.0, near)),
+        ((3.0, -8.0, near), (5.0, 7.0, near), (6.5, 13.0, near), (10.0, 26.0, near)),
+    )
+    paints = rng.permutation(len(_PAINTS))
+    vehicles = tuple(
+        SceneVehicle(n, tuple(Waypoint(*at) for at in path), _PAINTS[paints[n]], random_body(rng))
+        for n, path in enumerate(paths, start=1)
+    )
+    return replace(scene, vehicles=vehicles, frames=250)
+
+
+def pole_scene(seed: int) -> Scene:
+    """Return a road from a pole: 10 s, two lanes away from the camera and two to it, two cars each.
+
+    All cars come from outside the frame, and leave it or are far away in the end.
+    """
+    rng = np.random.default_rng(seed)
+    scene = empty_road(rng, PinholeCamera.pole(960, 540), lane=1, lanes=4, seed=seed)
+    vehicles = []
+    for number in range(8):
+        lateral, comes = (number % 4 - 1) * LANE_WIDTH, number % 4 < 2
+        start, speed = 2.4 * (number // 4) + rng.uniform(0, 0.5), rng.uniform(13, 16)
+        first, last = (90.0, -10.0) if comes else (-10.0, 90.0)
+        ends = (start, first), (start + 100 / speed, last)
+        path = tuple(Waypoint(time, ahead, lateral, np.pi * comes) for time, ahead in ends)
+        vehicles.append(SceneVehicle(number + 1, path, random_paint(rng), random_body(rng)))
+    still = replace(scene, roadside=(), speed=0.0, rate=Fraction(25, 2), frames=125)
+    return replace(still, vehicles=tuple(vehicles))
+
+
+def busy_road(rng: np.random.Generator) -> Scene:
+    """Return a road of 40 frames, each with its own vehicles, two in each lane, to learn from.
+
+    The camera is so fast that consecutive frames show different places.
+    """
+    lanes = int(rng.integers(2, 5))
+    lane, seed = int(rng.integers(lanes)), int(rng.integers(2**31))
+    height, curvature = rng.uniform(1.1, 1.6), rng.uniform(-1, 1) / 600
+    camera = PinholeCamera(960, 320, 864.0, 120.0, height, curvature)
+    road = empty_road(rng, camera, lane=lane, lanes=lanes, seed=seed)
+    scene = replace(road, frames=40, speed=400.0)
+    cars = [(random_paint(rng), random_body(rng)) for _ in range(50)]
+    vehicles: list[SceneVehicle] = []
+    for index in range(scene.frames):
+        for lateral in (np.arange(lanes) - lane) * LANE_WIDTH:
+            near = rng.uniform(6.5, 16) + abs(lateral)
+            for ahead in (near, near + rng.uniform(8, 24)):
+                place = Waypoint(scene.time(index), ahead, lateral + rng.uniform(-0.6, 0.6))
+                color, body = cars[rng.integers(len(cars))]
+                vehicles.append(SceneVehicle(len(vehicles) + 1, (place,), color, body))
+    return replace(scene, vehicles=tuple(vehicles))
+
+
+def empty_road(
+    rng: np.random.Generator, camera: PinholeCamera, *, lane: int, lanes: int, seed: int
+) -> Scene:
+    """Return a road without vehicles, with random colours, light and roadside.
+
+    The camera drives in the middle of lane `lane` of `lanes`, counted from 0 at the left.
+    """
+    left = -(lane + 0.5) * LANE_WIDTH
+    right = left + lanes * LANE_WIDTH
+    dashed = [LaneLine(left + number * LANE_WIDTH, dash=3.0) for number in range(1, lanes)]
+    lines = (LaneLine(left, _YELLOW), *dashed, LaneLine(right))
+    grey, verge = int(rng.integers(58, 120)), _VERGES[rng.integers(len(_VERGES))]
+    road = Carriageway(left - 1.5, right + 2.0, lines, (grey + 4, grey, grey - 3), verge)
+    light = _random_light(rng)
+    sides = ((-1, left - 3), (1, right + 4)) * 28
+    plants = tuple(_random_plant(rng, side, edge) for side, edge in sides)
+    return Scene(camera, road, light, plants, seed=seed)
+
+
+def random_body(rng: np.random.Generator) -> Body:
+    """Return a saloon, hatchback, off-roader, van or coupé of a random size."""
+    shape = _SHAPES[rng.integers(len(_SHAPES))]
+    sides = {side: getattr(shape, side) for side in ("width", "height", "length")}
+    return replace(shape, **{side: v * rng.uniform(0.96, 1.04) for side, v in sides.items()})
+
+
+def random_paint(rng: np.random.Generator) -> Color:
+    """Return a random colour that is usual for cars."""
+    paint = np.array(_PAINTS[rng.integers(len(_PAINTS))]) + rng.integers(-12, 13, 3)
+    blue, green, red = (int(value) for value in np.clip(paint, 8, 245))
+    return blue, green, red
+
+
+def _random_light(rng: np.random.Generator) -> Light:
+    stations = np.arange(15.0, PERIOD - 20, 45.0) + rng.uniform(0, 15)
+    shadows = tuple(
+        Shadow(station, rng.uniform(4, 14), rng.uniform(0.25, 0.5), dappled=rng.random() < 0.7)
+        for station in stations.tolist()
+    )
+    gain, noise, sun = rng.uniform(0.75, 1.2), rng.uniform(1.5, 4.0), rng.uniform(-0.8, 0.8)
+    return Light(gain, noise, sun, shadows)
+
+
+def _random_plant(rng: np.random.Generator, side: int, edge: float) -> Plant:
+    """Return a tree or a bush."""
+    tall = rng.random() < 0.6
+    height = rng.uniform(4, 9) if tall else rng.uniform(1.0, 2.0)
+    green, station = int(rng.integers(60, 110)), rng.uniform(0, PERIOD)
+    lateral = edge + side * (rng.uniform(6, 28) if tall else rng.uniform(1, 12))
+    width = height * (rng.uniform(0.6, 1.1) if tall else rng.uniform(1.0, 1.8))
+    color = (green - int(rng.integers(10, 40)), green, green - int(rng.integers(-10, 30)))
+    return Plant(station, lateral, width, height, color)

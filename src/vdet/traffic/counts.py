@@ -4,7 +4,7 @@ Tables cover the whole video, or intervals of it. Several videos have one table.
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from itertools import accumulate, pairwise
 from typing import TYPE_CHECKING, TypeVar
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, TypeVar
 from vdet.detect.classes import UNKNOWN
 from vdet.errors import ConfigError
 from vdet.traffic.clock import Clock, Intervals, Moment, Span
-from vdet.traffic.crossings import APPEAR, ENTER, EXIT, VANISH
+from vdet.traffic.crossings import APPEAR, ENTER
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 Way = tuple[str, str]
 """Name of a line or zone, and a direction."""
 
-_IN, _OUT = (ENTER, APPEAR), (EXIT, VANISH)
+_IN = ENTER, APPEAR
 
 R = TypeVar("R")
 
@@ -266,13 +266,9 @@ def flow_table(videos: Sequence[Counts], interval: int | None = None) -> list[Fl
     `count_table`.
     """
     intervals = _intervals(videos, interval)
-    visits: dict[int, list[tuple[int, Event]]] = {}
-    for which, video in enumerate(videos):
-        for trip in vehicle_trips(video):
-            visits.setdefault(trip[0].vehicle, []).extend((which, item) for item in trip)
     found: _Found = Counter()
-    for (which, first), *others in visits.values():
-        flow = first.name, others[-1][-1].name if others else None
+    for which, first, last in vehicle_flows(videos):
+        flow = first.name, last.name if last else None
         found[intervals.number(which, first.time), flow, class_of(first)] += 1
     names = dict.fromkeys(name for video in videos for name, _ in video.ways)
     order = {name: number for number, name in enumerate((*names, None))}
@@ -280,13 +276,18 @@ def flow_table(videos: Sequence[Counts], interval: int | None = None) -> list[Fl
     return _rows(FlowRow, intervals, found, flows)
 
 
-def vehicle_trips(video: Counts) -> list[list[Event]]:
-    """Return the crossings of lines and the entries into zones of each vehicle, in order."""
-    trips: dict[int, list[Event]] = {}
-    for event in video.events:
-        if event.name not in video.zones or event.direction in _IN:
-            trips.setdefault(event.vehicle, []).append(event)
-    return list(trips.values())
+def vehicle_flows(videos: Sequence[Counts]) -> Iterator[tuple[int, Event, Event | None]]:
+    """Yield the first and the last event of each vehicle that crosses a line or enters a zone.
+
+    The number of the video of the first comes before them; the last is None if there is one only.
+    """
+    trips: dict[int, list[tuple[int, Event]]] = {}
+    for which, video in enumerate(videos):
+        for event in video.events:
+            if event.name not in video.zones or event.direction in _IN:
+                trips.setdefault(event.vehicle, []).append((which, event))
+    for (which, first), *others in trips.values():
+        yield which, first, others[-1][1] if others else None
 
 
 def zone_table(videos: Sequence[Counts], interval: int | None = None) -> list[ZoneRow]:

@@ -18,7 +18,7 @@ GAP = 1.0
 """Longest time between the end of a track and the start of one that continues it, seconds."""
 REMEMBERED = 10.0
 """Seconds for which a vehicle that is not shown is remembered; trackers keep ids for less."""
-MOVED = 0.5
+_MOVED = 0.5
 """Distance by which a vehicle that drives has moved, as a multiple of its size."""
 DURATION_DIGITS = 4
 """Decimals of a duration in seconds that are compared: times are rounded."""
@@ -93,8 +93,7 @@ class VehiclePath:
     @property
     def has_driven(self) -> bool:
         """Whether it moved while it was seen, and did not stand the whole time."""
-        ways = self.points[: self.seen] - self.points[0]
-        return bool(np.hypot(*ways.T).max() >= MOVED * self.size)
+        return has_moved(self.points[: self.seen], self.size)
 
     @property
     def seconds(self) -> float:
@@ -104,6 +103,11 @@ class VehiclePath:
     def track_at(self, row: int) -> int:
         """Return the id of its track in a row."""
         return next(key for since, key in reversed(self.tracks) if since <= self.times[row])
+
+
+def has_moved(points: Float64Array, size: float) -> bool:
+    """Return whether what is at points `(n, 2)` was ever half its size, pixels, from the first."""
+    return bool(np.hypot(*(points - points[0]).T).max() >= _MOVED * size)
 
 
 def link_tracks(frames: Iterable[FrameTracks], width: int, height: int) -> list[VehiclePath]:

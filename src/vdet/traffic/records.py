@@ -7,12 +7,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, get_args
 
+import numpy as np
+
 from vdet.boxes import Box, Image
 from vdet.media import Picture
 from vdet.polygons import Point
 from vdet.track.track import FrameTracks, State, Track
 from vdet.traffic.clock import Clock
-from vdet.traffic.linking import MOVED
+from vdet.traffic.linking import has_moved
 from vdet.traffic.speeds import KMH, SpeedMeter, Speeds
 from vdet.traffic.tables import VIDEO, is_json, join_tables, plain_moment, write_content
 
@@ -146,10 +148,9 @@ class VehicleRecord:
 
     def judge(self) -> None:
         """Set `motion`, before a camera that stood still."""
-        size = (self.largest.width + self.largest.height) / 2
-        way = max(math.dist(self.path[0], point) for point in self.path)
         stood: Motion = "standing" if self.seconds >= _STANDING else "unknown"
-        self.motion = "drove" if way >= MOVED * size else stood
+        size = (self.largest.width + self.largest.height) / 2
+        self.motion = "drove" if has_moved(np.array(self.path), size) else stood
 
     def _go_to(self, point: Point) -> None:
         """Continue the path; its last point stays only if it is a step away from the one before."""

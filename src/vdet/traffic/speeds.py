@@ -147,18 +147,15 @@ class SpeedMeter:
             if track.state != "predicted" and left < box.x1 and box.x2 < right and box.y2 < bottom:
                 row = frame.time, *track.foot, box.width, box.height
                 self._rows.setdefault(track.id, array("d")).extend(row)
-        for number, rows in list(self._rows.items()):
-            if frame.time - rows[-_COLUMNS] > _GONE:
-                self._close(number)
+        oldest = frame.time - _GONE
+        for number in [key for key, rows in self._rows.items() if rows[-_COLUMNS] < oldest]:
+            self._known[number] = self._measured(number)
+            del self._rows[number]
 
     def speeds(self) -> dict[int, Speeds]:
         """Return the speeds so far of the vehicles by their ids, where they are known."""
         known = self._known | {number: self._measured(number) for number in self._rows}
         return {number: speeds for number, speeds in known.items() if speeds}
-
-    def _close(self, number: int) -> None:
-        self._known[number] = self._measured(number)
-        del self._rows[number]
 
     def _measured(self, number: int) -> Speeds | None:
         rows = np.array(self._rows[number]).reshape(-1, _COLUMNS)

@@ -11,8 +11,8 @@ from vdet.boxes import Float64Array
 from vdet.detect.onnx.preparation import InputForm, Placement
 from vdet.media import Picture, Planes
 from vdet.media.frame import Coding
-from vdet.synthetic.random_scenes import demo_scene
 from vdet.synthetic.render import render
+from vdet.synthetic.scene import demo_scene
 
 ROAD = render(demo_scene(1, width=1280, height=720), 200)
 FORMS = pytest.mark.parametrize("dtype", [np.uint8, np.float32], ids=["ours", "others"])

@@ -17,8 +17,8 @@ from vdet.detect.svm.pyramid import FramePyramid
 from vdet.detect.svm.search import DenseSearch
 from vdet.detect.svm.windows import WindowGrid, lay_grid
 from vdet.media import Picture, Planes
-from vdet.synthetic.random_scenes import demo_scene
 from vdet.synthetic.render import render
+from vdet.synthetic.scene import demo_scene
 
 Exact = npt.NDArray[np.float64]
 
