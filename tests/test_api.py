@@ -25,7 +25,7 @@ from running import frames_of, write_drive
 from vdet.boxes import Image
 from vdet.detect.onnx.detector import SHIPPED
 from vdet.media.reader import VideoReader
-from vdet.synthetic.render import render
+from vdet.synthetic.render import Renderer
 from vdet.synthetic.scene import Scene
 from vdet.traffic.records import records_content
 from writing import write_image
@@ -38,7 +38,7 @@ def page(
     """Run the page's code from top to bottom in a folder with a clip and a picture."""
     folder = tmp_path_factory.mktemp("page")
     (folder / "in.mp4").write_bytes(clip_path.read_bytes())
-    write_image(folder / "road.png", render(scene, 10))
+    write_image(folder / "road.png", Renderer(scene).image(10))
     names: dict[str, Any] = {}
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)

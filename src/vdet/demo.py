@@ -16,9 +16,8 @@ from vdet.evaluate.output import table
 from vdet.evaluate.scores import score
 from vdet.files import make_folder, staged, write_whole
 from vdet.labels.reading import read_predictions, read_truth
-from vdet.learn.svm.choosing import Most
 from vdet.learn.svm.dataset import find_patches
-from vdet.learn.svm.mining import VideoSource, mine
+from vdet.learn.svm.mining import Most, VideoSource, mine
 from vdet.learn.svm.training import train
 from vdet.progress import Steps
 from vdet.run.sinks import Output

@@ -10,7 +10,7 @@ from conftest import Run
 from quick import QUICK_OPTIONS, only_windows
 from vdet.labels.reading import read_labelled_pictures
 from vdet.media.images import read_image
-from vdet.synthetic.render import render
+from vdet.synthetic.render import Renderer
 from vdet.synthetic.scene import Scene
 from vdet.synthetic.truth import true_boxes
 from writing import write_image
@@ -22,7 +22,7 @@ FEW_WINDOWS = only_windows("size: 160, overlap: 0.7, top: 380, bottom: 600")
 def picture(scene: Scene, tmp_path: Path) -> Path:
     path = tmp_path / "in" / "road.png"
     path.parent.mkdir()
-    write_image(path, render(scene, 10))
+    write_image(path, Renderer(scene).image(10))
     return path
 
 

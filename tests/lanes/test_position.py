@@ -17,7 +17,7 @@ from vdet.lanes.road import Road, RoadFinder, RoadPosition, position_on_road
 from vdet.media import Picture
 from vdet.run.steps import with_positions
 from vdet.synthetic.camera import PinholeCamera
-from vdet.synthetic.render import render
+from vdet.synthetic.render import Renderer
 from vdet.track.track import Track
 
 CAMERA = PinholeCamera.dashboard(1280, 720)
@@ -92,7 +92,7 @@ def road() -> Road:
     """A bend of 600 m radius, without a lens."""
     scene = make_road(curvature=1 / 600, size=(640, 480), frames=1)
     finder = RoadFinder(None, settings_for(scene.camera), 640, 480)
-    return finder.update(finder.observe(Picture(render(scene, 0))))
+    return finder.update(finder.observe(Picture(Renderer(scene).image(0))))
 
 
 def test_a_foot_is_at_the_edge_of_a_pixel_as_boxes_are(road: Road) -> None:

@@ -14,7 +14,7 @@ from vdet.config.schema import LaneSettings
 from vdet.lanes.road import CARRY, Lane, RoadFinder
 from vdet.media import Picture
 from vdet.synthetic.camera import PinholeCamera
-from vdet.synthetic.render import render
+from vdet.synthetic.render import Renderer
 from vdet.synthetic.scene import LaneLine, Light, Shadow
 
 SHADOWS = tuple(
@@ -117,7 +117,7 @@ def test_a_pitching_camera_keeps_the_lane_and_its_width() -> None:
     finder = RoadFinder(None, settings_for(camera), camera.width, camera.height)
     for shift in (0, 3, 6, 8, 4, -3, -6, -3):  # pixels by which the horizon moves
         pitched = replace(camera, horizon=camera.horizon + shift)
-        view = finder.observe(Picture(render(replace(scene, camera=pitched), 0)))
+        view = finder.observe(Picture(Renderer(replace(scene, camera=pitched)).image(0)))
         check(finder.update(view).lane, pitched)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from synthetic.scenes import make_scene
-from vdet.synthetic.render import Renderer, render
+from vdet.synthetic.render import Renderer
 from vdet.synthetic.scene import Shadow, demo_scene
 
 
@@ -26,7 +26,7 @@ def test_the_road_moves_and_repeats_after_its_period() -> None:
 @pytest.mark.parametrize("curvature", [-1 / 400, 0.0, 1 / 400])
 def test_a_solid_line_is_drawn_where_the_projection_puts_it(curvature: float) -> None:
     scene = make_scene(curvature=curvature)
-    camera, image = scene.camera, render(scene, 0)
+    camera, image = scene.camera, Renderer(scene).image(0)
     for row in (440, 460, 500, 580):
         ahead = camera.focal * camera.above_ground / (row - camera.horizon)
         [[u, _]] = camera.project(np.array([[-1.85, 0.0, ahead]]))
@@ -40,7 +40,7 @@ def test_a_shadow_darkens_the_road_where_it_lies() -> None:
     scene = make_scene()
     shadow = Shadow(station=10.0, length=5.0, strength=0.5, dappled=False)
     shaded = replace(scene, light=replace(scene.light, shadows=(shadow,)))
-    ratio = render(shaded, 0).astype(float) / np.maximum(render(scene, 0), 1)
+    ratio = Renderer(shaded).image(0).astype(float) / np.maximum(Renderer(scene).image(0), 1)
     for ahead, expected in ((8.0, 1.0), (12.0, 0.5), (20.0, 1.0)):
         [[u, v]] = scene.camera.project(np.array([[0.0, 0.0, ahead]])).round().astype(int)
         assert ratio[v, u - 20 : u + 20].mean() == pytest.approx(expected, abs=0.05)

@@ -9,7 +9,7 @@ from benchmarks.drawn_traffic import true_places
 
 from synthetic.scenes import make_scene, parked
 from vdet.boxes import Box
-from vdet.synthetic.render import render
+from vdet.synthetic.render import Renderer
 from vdet.synthetic.scene import Scene, Waypoint
 from vdet.synthetic.truth import TrueBox, must_be_found, true_boxes
 from vdet.synthetic.vehicle import STANDS
@@ -19,8 +19,8 @@ SIZES = [(1280, 720), (640, 360), (1242, 375)]
 
 def drawn(scene: Scene) -> npt.NDArray[np.bool_]:
     """Return the pixels that differ from those of the same road without vehicles."""
-    empty = render(replace(scene, vehicles=()), 0)
-    return np.asarray(cv2.absdiff(render(scene, 0), empty).max(axis=2) > 12)
+    empty = Renderer(replace(scene, vehicles=())).image(0)
+    return np.asarray(cv2.absdiff(Renderer(scene).image(0), empty).max(axis=2) > 12)
 
 
 def drawn_box(scene: Scene) -> Box:

@@ -303,13 +303,8 @@ def draw_regions(image: Image, regions: Regions) -> Image:
     picture = np.ascontiguousarray(np.where(regions.pixels[..., np.newaxis], image, dark))
     for polygons, color in ((regions.included, GREEN), (regions.excluded, RED)):
         for name, corners in polygons.items():
-            draw_outline(picture, corners, color, name)
+            draw_lines(picture, corners, color, line_width(picture), closed=True)
+            left, top = min(corners, key=lambda corner: (corner[1], corner[0]))
+            tag, *_ = _lay_out(picture, name, (0, 0))
+            draw_label(picture, name, (round(left), round(top) + tag.height), color)
     return picture
-
-
-def draw_outline(surface: Surface, corners: Sequence[Point], color: Color, label: str) -> None:
-    """Draw the sides of a polygon, and write a label at its highest corner."""
-    draw_lines(surface, corners, color, line_width(surface), closed=True)
-    left, top = min(corners, key=lambda corner: (corner[1], corner[0]))
-    tag, *_ = _lay_out(surface, label, (0, 0))
-    draw_label(surface, label, (round(left), round(top) + tag.height), color)

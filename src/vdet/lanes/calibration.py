@@ -1,11 +1,11 @@
 """Chessboard photographs → a camera (Zhang 2000, in OpenCV's implementation)."""
 
 import math
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from statistics import mode
 
 import cv2
 import numpy as np
@@ -70,8 +70,7 @@ def calibrate(paths: Iterable[Path], pattern: Pattern) -> Calibration:
     boards = {path: _find_board(path, pattern) for path in paths}
     skipped = {path: board for path, board in boards.items() if isinstance(board, str)}
     photos = [board for board in boards.values() if isinstance(board, BoardPhoto)]
-    sizes = [*Counter(photo.size for photo in photos).most_common(1), ((0, 0), 0)]
-    size = sizes[0][0]
+    size = mode(photo.size for photo in photos) if photos else (0, 0)
     for photo in photos:
         if np.abs(np.subtract(photo.size, size)).max() > SIZE_TOLERANCE:
             skipped[photo.path] = f"is {_text(photo.size)}, the others are {_text(size)}"

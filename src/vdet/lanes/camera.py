@@ -162,10 +162,6 @@ class TopView:
         """Return where pixels `(n, 2)` of the undistorted frame lie in the top view, `(n, 2)`."""
         return _transform(self._to_top, pixels)
 
-    def columns(self, x: Float64Array) -> Float64Array:
-        """Return the columns of the top view at lateral positions x, metres."""
-        return np.asarray((x - self.laterals[0]) * ACROSS)
-
     @property
     def outline(self) -> Float64Array:
         """The corners of the top view in the undistorted frame, pixels `(4, 2)`."""

@@ -122,7 +122,7 @@ def paint_along(
     """
     half = max(1, round(margin * ACROSS))
     around = np.arange(-half, half + 1)
-    columns = np.rint(top_view.columns(np.stack(lines)))
+    columns = np.rint((np.stack(lines) - top_view.laterals[0]) * ACROSS)
     middles = np.clip(columns, -half - 1, mask.shape[1] + half).astype(np.intp)
     padded = cv2.copyMakeBorder(mask, 0, 0, 2 * half + 1, 2 * half + 1, cv2.BORDER_CONSTANT)
     first = np.arange(len(mask)) * padded.shape[1] + 2 * half + 1
@@ -207,6 +207,8 @@ _MIN_RADIUS = 150.0
 """Smallest radius of a bend, metres."""
 _JUMP = 0.35
 """Largest sideways move of a line between two frames, metres."""
+_MEMORY = 0.6
+"""Weight of the frames before, where the newest frame has weight 1."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -251,18 +253,6 @@ Equations = Float64Array
 the last column."""
 
 
-def add_earlier(equations: Equations, earlier: Equations, memory: float) -> Equations:
-    """Add the equations of earlier frames, weighted by `memory`, without their pitch.
-
-    The pitch of a vehicle changes from frame to frame; its position and the road do not. The
-    earlier pitch is eliminated (Schur complement).
-    """
-    factors = earlier[:, _PITCH] / (earlier[_PITCH, _PITCH] + _PITCH_WEIGHT)
-    rest = earlier - np.outer(factors, earlier[_PITCH])
-    rest[_PITCH] = rest[:, _PITCH] = 0
-    return equations + memory * rest
-
-
 def normal_equations(left: LinePaint, right: LinePaint, guess: LaneCurves) -> Equations:
     """Return the equations that the paint of both lines gives; `guess` linearizes the pitch."""
     of_left = _rows(left, (1, 0), guess.left, guess)
@@ -296,6 +286,19 @@ class FrameFit:
     equations: Equations
     seen: tuple[bool, bool]
     """Whether the left and the right line were seen, rather than derived from the other one."""
+
+    def with_earlier(self, earlier: "FrameFit") -> "FrameFit":
+        """Return a fit to the paint of earlier frames too, without their pitch.
+
+        The pitch of a vehicle changes from frame to frame; its position and the road do not. The
+        earlier pitch is eliminated (Schur complement).
+        """
+        known = earlier.equations
+        factors = known[:, _PITCH] / (known[_PITCH, _PITCH] + _PITCH_WEIGHT)
+        rest = known - np.outer(factors, known[_PITCH])
+        rest[_PITCH] = rest[:, _PITCH] = 0
+        equations = self.equations + _MEMORY * rest
+        return FrameFit(solve(equations, earlier.curves.width), equations, self.seen)
 
 
 def fit_near(mask: Image, top_view: TopView, last: LaneCurves) -> FrameFit | None:

@@ -17,24 +17,12 @@ from vdet.config.camera import LensSettings
 from vdet.config.schema import LaneSettings
 from vdet.draw.boxes import Color, Surface, draw_label, draw_lines, line_width, shade
 from vdet.lanes.camera import Maps, TopView, Undistorter, warped
-from vdet.lanes.curves import (
-    Equations,
-    FrameFit,
-    LaneCurves,
-    add_earlier,
-    fit_near,
-    fit_new,
-    hide,
-    paint_mask,
-    solve,
-)
+from vdet.lanes.curves import FrameFit, LaneCurves, fit_near, fit_new, hide, paint_mask
 from vdet.media import Picture
 from vdet.media.images import to_ycrcb
 
 CARRY = 12
 """Number of frames for which an unseen line is kept."""
-_MEMORY = 0.6
-"""Weight of the frames before, where the newest frame has weight 1."""
 _CURVE_MEMORY = 0.95
 """Fraction of the frames before in the radius that is shown."""
 _STRAIGHT = 5000.0
@@ -176,8 +164,7 @@ class Road:
 class _LaneState:
     """What the frames so far say about the lane."""
 
-    curves: LaneCurves
-    equations: Equations
+    fit: FrameFit
     unseen: tuple[int, int]
     """Number of frames since the left and the right line were last seen."""
     curvature: float
@@ -232,21 +219,21 @@ class RoadFinder:
         placed = [self._undistorter.box(box) for box in vehicles]
         view = replace(view, mask=hide(view.mask, self._top_view, placed))
         self._state = state = self._next_state(view.mask)
-        lane, curves = (self._lane(state), state.curves) if state else (None, None)
+        lane, curves = (self._lane(state), state.fit.curves) if state else (None, None)
         return Road(view, lane, curves, self._top_view, self._undistorter)
 
     def _next_state(self, mask: Image) -> _LaneState | None:
         """Fit near the last lane; else find a new one; else keep the last one for some frames."""
         state = self._state
-        near = fit_near(mask, self._top_view, state.curves) if state else None
+        near = fit_near(mask, self._top_view, state.fit.curves) if state else None
         if state and near and (updated := _advance(state, near)):
             return updated
         if new := fit_new(mask, self._top_view):
-            return _LaneState(new.curves, new.equations, (0, 0), 2 * new.curves.bend)
+            return _LaneState(new, (0, 0), 2 * new.curves.bend)
         return _advance(state, None) if state and not near else None
 
     def _lane(self, state: _LaneState) -> Lane:
-        curves, curvature = state.curves, state.curvature
+        curves, curvature = state.fit.curves, state.curvature
         z = self._lane_z
         lines = self._top_view.ground_to_frame(np.concatenate(curves.at(z)), np.tile(z, 2))
         left, right = np.split(self._undistorter.distorted(lines), 2)
@@ -263,14 +250,12 @@ def _advance(state: _LaneState, fit: FrameFit | None) -> _LaneState | None:
     """
     seen = fit.seen if fit else (False, False)
     left, right = (0 if now else before + 1 for now, before in zip(seen, state.unseen, strict=True))
-    curves, equations, curvature = state.curves, state.equations, state.curvature
+    joined, curvature = fit.with_earlier(state.fit) if fit else state.fit, state.curvature
     if fit:
-        equations = add_earlier(fit.equations, equations, _MEMORY)
-        curves = solve(equations, curves.width)
-        curvature += (1 - _CURVE_MEMORY) * (2 * curves.bend - curvature)
-    if max(left, right) > CARRY or not curves.contain_camera:
+        curvature += (1 - _CURVE_MEMORY) * (2 * joined.curves.bend - curvature)
+    if max(left, right) > CARRY or not joined.curves.contain_camera:
         return None
-    return _LaneState(curves, equations, (left, right), curvature)
+    return _LaneState(joined, (left, right), curvature)
 
 
 AREA: Color = (80, 200, 60)

@@ -25,6 +25,8 @@ LUMA_SHARES = {"bt601": (0.299, 0.114), "bt709": (0.2126, 0.0722)}
 _PLANAR = ("yuv420p", "yuvj420p")
 _MATRICES: dict[int, Literal["bt601", "bt709"]] = {1: "bt709", 2: "bt601", 5: "bt601", 6: "bt601"}
 """By code of ITU-T H.273; untagged video is taken for BT.601."""
+MATRIX_CODES = {"bt601": 6, "bt709": 1}
+"""Those that are written."""
 
 _LUMA_STEPS, _CHROMA_STEPS = 219 / 255, 224 / 255  # of the limited range, for one of the full range
 
@@ -155,7 +157,7 @@ class Planes:
     def blank(cls, width: int, height: int, coding: Coding) -> "Planes":
         """Return planes of their own, with any values; `width` × `height` pixels."""
         picture = av.VideoFrame(width, height, "yuv420p")
-        picture.colorspace = 1 if coding.matrix == "bt709" else 6  # ITU-T H.273
+        picture.colorspace = MATRIX_CODES[coding.matrix]
         picture.color_range = ColorRange.JPEG if coding.full_range else ColorRange.MPEG
         return cls(picture, coding, is_own=True)
 

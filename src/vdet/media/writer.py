@@ -18,7 +18,7 @@ from av.video.reformatter import ColorRange
 from vdet.config.schema import OutputSettings
 from vdet.errors import OutputError, VideoError
 from vdet.media.demux import SAFELY, ClockUnwrapper, open_input, packets, picture_stream
-from vdet.media.frame import UNSPECIFIED, Coding, Frame, Picture, Planes, VideoInfo
+from vdet.media.frame import MATRIX_CODES, UNSPECIFIED, Coding, Frame, Picture, Planes, VideoInfo
 from vdet.version import __version__
 
 _log = logging.getLogger("vdet")
@@ -117,7 +117,6 @@ _LARGEST_AT_ONCE = 1920 * 1088
 _MARK = "made by vdet"
 _MP4 = (b"ftyp", b"styp", b"moov", b"moof", b"mdat", b"free", b"skip", b"wide")  # first boxes
 _FINEST = 10_000_000  # ticks a second; more is not safe in mp4 players
-_MATRICES = {"bt601": 6, "bt709": 1}  # codes of ITU-T H.273
 
 
 def may_replace_video(path: Path) -> bool:
@@ -275,7 +274,8 @@ class VideoWriter:
         context.time_base, context.sample_aspect_ratio = self._time_base, info.pixel_aspect
         context.color_primaries, context.color_trc = color.primaries, color.transfer
         if color.matrix != UNSPECIFIED:
-            context.colorspace, context.color_range = _MATRICES[info.coding.matrix], ColorRange.MPEG
+            context.colorspace = MATRIX_CODES[info.coding.matrix]
+            context.color_range = ColorRange.MPEG
         if info.coding.full_range:
             context.color_range = ColorRange.JPEG
         return stream

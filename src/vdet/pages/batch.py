@@ -162,14 +162,11 @@ def _plain_seconds(clock: str | None) -> int | None:
 
 def write_index(videos: Sequence[tuple[str, Path, VideoFacts]], target: Path) -> None:
     """Write the page over many videos: each has a name, a page as seen from it, and facts."""
-    counts: Counter[str] = Counter()
-    for _, _, facts in videos:
-        counts.update(facts.counts)
+    counts = sum((Counter(facts.counts) for _, _, facts in videos), Counter[str]())
     linked = [(name, link_to(page, Path()), facts) for name, page, facts in videos]
-    table = table_json(
-        [
-            Part(name, page, facts.start, page.removesuffix(PAGE_NAME), facts.rows)
-            for name, page, facts in linked
-        ]
-    )
-    write_text(target, render("index.html", videos=linked, counts=counts, table=table))
+    parts = [
+        Part(name, page, facts.start, page.removesuffix(PAGE_NAME), facts.rows)
+        for name, page, facts in linked
+    ]
+    page = render("index.html", videos=linked, counts=counts, table=table_json(parts))
+    write_text(target, page)

@@ -169,11 +169,8 @@ def pack(paths: Sequence[VehiclePath]) -> dict[str, Any]:
         columns.append(np.diff(np.diff(rows, prepend=0), prepend=0))
     planes = np.hstack(columns).astype("<i4").view(np.uint8).reshape(-1, 4).T
     vehicles = [
-        (
-            *(path.vehicle, path.class_name or UNKNOWN, path.size),
-            *(path.times[0], path.seen, len(path.times)),
-        )
-        for path in paths
+        (one.vehicle, one.class_name or UNKNOWN, one.size, one.times[0], one.seen, len(one.times))
+        for one in paths
     ]
     return {
         "vehicles": vehicles,

@@ -112,7 +112,7 @@ class VideoPage:
             start=self.player.start if self.player else 0.0,
             seconds=max(0.0, self.seconds),
             frames=self.frames,
-            vehicles=self._vehicles,
+            vehicles=len(self._driven),
             most=self._most,
             still=NO_STILL if self.poster is None else jpeg_uri(self.poster, _SMALL),
             counts=self._totals,
@@ -123,9 +123,9 @@ class VideoPage:
         )
 
     @property
-    def _vehicles(self) -> int:
-        """The number of vehicles that drove."""
-        return sum(record.has_driven for record in self.records)
+    def _driven(self) -> list[VehicleRecord]:
+        """The vehicles that drove."""
+        return [record for record in self.records if record.has_driven]
 
     @property
     def _most(self) -> int:
@@ -204,11 +204,10 @@ class VideoPage:
         """Return the key figures."""
         shown = sum(record.seconds for record in self.records) / max(1, len(self.records))
         stood = Counter(record.motion for record in self.records if not record.has_driven)
-        classes = Counter(
-            record.class_name for record in self.records if record.class_name and record.has_driven
-        )
+        driven = self._driven
+        classes = Counter(record.class_name for record in driven if record.class_name)
         return [
-            (named(self._vehicles, "vehicle"), str(self._vehicles)),
+            (named(len(driven), "vehicle"), str(len(driven))),
             *((named(n, name), str(n)) for name, n in classes.most_common(4)),
             *((_STOOD[motion], str(n)) for motion, n in stood.items() if motion in _STOOD),
             ("most at once", str(self._most)),
@@ -229,7 +228,7 @@ class VideoPage:
         if len(first) == 1:
             return []
         came: dict[str, Counter[float]] = {}
-        for record in (record for record in self.records if record.has_driven):
+        for record in self._driven:
             name = record.class_name or UNKNOWN
             came.setdefault(name, Counter())[first[intervals.number(0, record.first)]] += 1
         counted: dict[str, Counter[float]] = {}

@@ -96,11 +96,6 @@ class Renderer:
         return np.asarray(cv2.add(exposed, noise, dtype=cv2.CV_8U), dtype=np.uint8)
 
 
-def render(scene: Scene, index: int) -> Image:
-    """Return one frame, BGR uint8 `(H, W, 3)`; use a `Renderer` for many frames of a scene."""
-    return Renderer(scene).image(index)
-
-
 def frames(scene: Scene) -> Iterator[Frame]:
     """Render the frames of a scene, the first at 0 s."""
     renderer = Renderer(scene)

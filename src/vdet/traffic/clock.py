@@ -106,12 +106,10 @@ def _found(path: Path, settings: Settings, created: str | None) -> tuple[datetim
     if not named:
         return (written, "its creation time") if written else None
     if written and not clock.pattern and abs(_utc(named, zone) - _utc(written, zone)) > _SAME:
-        by_name, by_metadata = (
-            _text(_utc(time, zone).astimezone(zone)) for time in (named, written)
-        )
+        times = (_text(_utc(time, zone).astimezone(zone)) for time in (named, written))
         _log.warning(
             "%s: begins %s by its name, %s by its metadata; using the name; --begin overrides it",
-            *(path, by_name, by_metadata),
+            *(path, *times),
         )
     return named, "from its name"
 
@@ -174,7 +172,7 @@ class Intervals:
         self._length = length
         self._origin: datetime | None = None
         self._zone: tzinfo | None = None
-        self._is_timed = True
+        self._is_timed = len(videos) == 1
         self._zeros = [0.0]
         clocks = [clock for clock, _ in videos if clock]
         if clocks and len(clocks) == len(videos):
@@ -187,7 +185,6 @@ class Intervals:
                 raise ConfigError(
                     "intervals over several videos need the time at which each begins; pass --begin"
                 )
-            self._is_timed = False
             ends = accumulate(spans[-1][1] - spans[0][0] for _, spans in videos)
             self._zeros = [end - spans[-1][1] for end, (_, spans) in zip(ends, videos, strict=True)]
         self._spans = [

@@ -11,15 +11,7 @@ from vdet.detect.classes import is_chosen
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Span, add_frame
 from vdet.traffic.counts import Counts, Event, Way
-from vdet.traffic.crossings import (
-    VANISH,
-    Border,
-    Crossing,
-    PlacedLine,
-    crossings,
-    distances_to,
-    place,
-)
+from vdet.traffic.crossings import VANISH, Border, Crossing, PlacedLine, crossings, place
 from vdet.traffic.linking import GAP, TrackLinker, VehiclePath
 
 _OLDEST = 0.2
@@ -138,10 +130,7 @@ class VehicleCounter:
             events += [_event(path, name, crossing) for crossing in some]
             heights[name] = path.heights[[crossing.row for crossing in some]].tolist()
         missed = [
-            line.name
-            for line in self.lines
-            if not found[line.name]
-            and (distances_to([(line.start, line.end)], points)[:, 0] <= reach).any()
+            line.name for line in self.lines if not found[line.name] and line.is_near(points, reach)
         ]
         return _Passage(events, heights, missed)
 

@@ -162,10 +162,8 @@ class _Group:
     def counts(self) -> dict[str, Counts]:
         """Return the counts of each video, with its own times."""
         whole = self.counter.counts()
-        ends = [
-            bisect_right(whole.events, video.end, key=lambda event: event.time)
-            for video in self._videos[:-1]
-        ]
+        times = [event.time for event in whole.events]
+        ends = [bisect_right(times, video.end) for video in self._videos[:-1]]
         found: dict[str, Counts] = {}
         for video, first, end in zip(self._videos, [0, *ends], [*ends, None], strict=True):
             events = tuple(

@@ -64,6 +64,10 @@ class PlacedLine:
         x, y = points.T
         return np.asarray(side_of(self.end, self.start, (x, y)))
 
+    def is_near(self, points: Float64Array, reach: Float64Array) -> bool:
+        """Return whether one of the points `(n, 2)` is within its reach, `(n,)`, of the line."""
+        return bool((distances_to([(self.start, self.end)], points)[:, 0] <= reach).any())
+
     def meeting(self, path: Segment) -> float | None:
         """Return the fraction of the way along `path` at which it meets the line, if it does."""
         return meeting(path, self.reach)

@@ -5,7 +5,7 @@ Rule 8 of `vdet.traffic` is here.
 
 import math
 from array import array
-from collections.abc import Container, Iterable, Mapping
+from collections.abc import Container, Iterable
 from dataclasses import dataclass, field
 from operator import itemgetter
 
@@ -50,7 +50,8 @@ lie within this fraction of the height of its box. So memory does not grow with 
 """
 
 
-_Size = tuple[int, int]
+_Lost = tuple[int, float, float, float]
+"""The key of a vehicle that is lost, x and y of a foot, and the height of its box, pixels."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -139,8 +140,7 @@ class TrackLinker:
         ended = [key for key, vehicle in self._vehicles.items() if vehicle.shown < oldest]
         paths = [self._vehicles.pop(key).path(self._now) for key in ended]
         shown = {track.id for track in frame.tracks}
-        is_new = not shown <= self._vehicles.keys()
-        lost = _Lost(self._vehicles, shown, self._now, self._size) if is_new else None
+        lost = [] if shown <= self._vehicles.keys() else self._lost(shown)
         for track in frame.tracks:
             vehicle = self._vehicles.get(track.id) or self._begin(track, lost)
             vehicle.see(track, self._now, frame.index)
@@ -157,14 +157,38 @@ class TrackLinker:
         """Return the paths so far of the vehicles that may still be shown again."""
         return [vehicle.path(self._now) for vehicle in self._vehicles.values()]
 
-    def _begin(self, track: Track, lost: "_Lost | None") -> "_Vehicle":
-        """Remember a new vehicle, or one that goes on under a new id."""
-        key = lost.take(track) if lost else None
-        if key is None:
+    def _lost(self, shown: Container[int]) -> list[_Lost]:
+        """Return the vehicles that may go on under a new id: that have just ended in the frame.
+
+        Those with a key in `shown` go on anyway. One that would be outside the frame now has left:
+        who comes in there is another. Each has two rows, for the place where it was last and for
+        that where it would be now.
+        """
+        return [
+            (key, *row[1:4])
+            for key, vehicle in self._vehicles.items()
+            if key not in shown and self._now - vehicle.shown <= GAP
+            if not vehicle.is_leaving(*self._size)
+            for places in [vehicle.onward(self._now).tolist()]
+            if 0 <= places[1][1] <= self._size[0] and 0 <= places[1][2] <= self._size[1]
+            for row in places
+        ]
+
+    def _begin(self, track: Track, lost: Iterable[_Lost]) -> "_Vehicle":
+        """Remember a new vehicle, or the nearest of the lost ones that goes on as this track."""
+        foot, (*_, height) = track.written_foot, track.box.xywh
+        near = [
+            (distance, key)
+            for key, x, y, other in lost
+            for distance, largest in [(math.dist(foot, (x, y)), max(height, other))]
+            if largest <= _MAX_GROWTH * min(height, other) and distance <= _REACH * largest
+            if key in self._vehicles  # else it goes on already
+        ]
+        if near:
+            vehicle = self._vehicles.pop(min(near, key=itemgetter(0))[1])
+        else:
             self.begun += 1
             vehicle = _Vehicle(self.begun, track.box, self._now)
-        else:
-            vehicle = self._vehicles.pop(key)
         vehicle.tracks.append((self._now, track.id))
         self._vehicles[track.id] = vehicle
         return vehicle
@@ -173,12 +197,10 @@ class TrackLinker:
         """Return the path until a vehicle was out of sight; since then it is another one."""
         self.begun += 1
         vehicle = self._vehicles[key]
-        at = vehicle.back or 0
-        self._vehicles[key] = _Vehicle(
-            self.begun, vehicle.box, self._now, vehicle.tracks.copy(), vehicle.rows[at:]
-        )
-        self._vehicles[key].size = vehicle.size
-        del vehicle.rows[at:]
+        tracks, rows = vehicle.tracks.copy(), vehicle.rows[vehicle.back or 0 :]
+        other = _Vehicle(self.begun, vehicle.box, self._now, tracks, rows, size=vehicle.size)
+        self._vehicles[key] = other
+        del vehicle.rows[vehicle.back or 0 :]
         return vehicle.path(self._now)
 
 
@@ -232,10 +254,8 @@ class _Vehicle:
         """Return whether it drives the other way than before it was out of sight."""
         if self.back is None or self.shown - self.rows[self.back] < _JUDGED:
             return False
-        before, (first, *_, last) = (
-            _velocity(self.rows[: self.back]),
-            _table(self.rows[self.back :]),
-        )
+        before = _velocity(self.rows[: self.back])
+        first, *_, last = _table(self.rows[self.back :])
         way, speed, height = complex(*(last - first)[1:3]), abs(before), last[3]
         onward = (way * before.conjugate()).real / max(speed, 1e-9)
         is_another = speed > _LEAVES * height
@@ -290,38 +310,3 @@ def _velocity(rows: "array[float]") -> complex:
     weights = 0.5 ** np.arange(len(steps), 0, -1)
     weights[0] *= 2
     return complex(*(weights @ (steps[:, 1:] / steps[:, :1])))
-
-
-class _Lost:
-    """Vehicles that may go on under a new id: those that have just ended inside the frame.
-
-    Those with a key in `shown` go on anyway. One that would be outside the frame now has left: who
-    comes in there is another. Each has two rows, for the place where it was last and for that where
-    it would be now.
-    """
-
-    def __init__(
-        self, vehicles: Mapping[int, _Vehicle], shown: Container[int], now: float, size: _Size
-    ) -> None:
-        rows = [
-            (*row[1:4], key)
-            for key, vehicle in vehicles.items()
-            if key not in shown and now - vehicle.shown <= GAP and not vehicle.is_leaving(*size)
-            for places in [vehicle.onward(now).tolist()]
-            if 0 <= places[1][1] <= size[0] and 0 <= places[1][2] <= size[1]
-            for row in places
-        ]
-        self._keys: list[int] = [key for *_, key in rows]
-        self._x, self._y, self._heights = np.array([row[:3] for row in rows]).reshape(-1, 3).T
-
-    def take(self, track: Track) -> int | None:
-        """Return the key of the nearest vehicle that goes on as a track, each only once."""
-        (x, y), (*_, height) = track.written_foot, track.box.xywh
-        larger, smaller = np.maximum(self._heights, height), np.minimum(self._heights, height)
-        distances = np.hypot(self._x - x, self._y - y)
-        fits = (larger <= _MAX_GROWTH * smaller) & (distances <= _REACH * larger)
-        if not fits.any():
-            return None
-        key = self._keys[int(np.argmin(np.where(fits, distances, np.inf)))]
-        self._heights[[item == key for item in self._keys]] = np.inf  # it is taken
-        return key

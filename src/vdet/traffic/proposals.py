@@ -107,9 +107,7 @@ def propose_lines(
         return ()
     candidates = list(_Streams(moving, width, height).candidates())
     left, lines, names = np.ones(len(moving), np.bool_), [], Counter[str]()
-    while gains := [
-        (gain, candidate) for candidate in candidates if (gain := candidate.gain(left))
-    ]:
+    while gains := [(gain, item) for item in candidates if (gain := item.gain(left))]:
         best = max(gain for gain, _ in gains)
         good = (item for gain, item in gains if gain >= _NEAR_BEST * best)
         line = min(good, key=lambda item: item.place)
@@ -118,9 +116,7 @@ def propose_lines(
         name = f"{ahead} {names[ahead]}" if names[ahead] > 1 else ahead
         lines.append(ProposedLine(name, *line.ends, ahead, back, int(left[line.own].sum())))
         left[line.own] = False
-        candidates = [
-            candidate for candidate in candidates if meeting(candidate.ends, line.ends) is None
-        ]
+        candidates = [item for item in candidates if meeting(item.ends, line.ends) is None]
     return tuple(lines)
 
 

@@ -191,18 +191,18 @@ def measure(ground: Ground, rows: Float64Array) -> Speeds | None:
     if len(rows) < 3 or rows[-1, 0] - rows[0, 0] < MIN_SECONDS:
         return None
     seen = _Sight.of(ground, rows)
-    line = _Line.of(seen.times, seen.places, seen.weights)
-    off = np.hypot(*(seen.places - line.fitted).T) * np.sqrt(seen.weights)  # in heights of the box
+    _, fitted, _ = seen.lines(seen.places)
+    off = np.hypot(*(seen.places - fitted).T) * np.sqrt(seen.weights)  # in heights of the box
     is_near = off <= max(_OUTLIERS[0], _OUTLIERS[1] * float(np.median(off)))
     seen = _Sight.of(ground, rows[is_near])
-    line = _Line.of(seen.times, seen.places, seen.weights)
-    middles = seen.middles(line.velocities)
-    line = _Line.of(seen.times, middles, seen.weights)
-    speeds = np.hypot(*line.velocities.T)
+    rough, *_ = seen.lines(seen.places)
+    middles = seen.middles(rough)
+    velocities, _, deviations = seen.lines(middles)
+    speeds = np.hypot(*velocities.T)
     at = np.arange(seen.times[0], seen.times[-1] + _SPACING, _SPACING)
     thin = np.unique(np.minimum(np.searchsorted(seen.times, at), len(speeds) - 1))
     common = _common(ground, rows[is_near])
-    return Speeds(seen.times[thin], middles[thin], speeds[thin], line.deviations[thin], common)
+    return Speeds(seen.times[thin], middles[thin], speeds[thin], deviations[thin], common)
 
 
 def _common(ground: Ground, rows: Float64Array) -> float:
@@ -265,21 +265,16 @@ class _Sight:
         extent = length * (along + _SLIMNESS * across)
         return np.asarray(self.places + self.away * extent[:, None] / 2)
 
+    def lines(self, places: Float64Array) -> tuple[Float64Array, Float64Array, Float64Array]:
+        """Fit a straight line to the places of the window around each time.
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Line:
-    """Straight lines through the places of a window around each time.
-
-    `velocities` are m/s and `fitted` metres, `(n, 2)`; `deviations` of the speeds are `(n,)`.
-    """
-
-    velocities: Float64Array
-    fitted: Float64Array
-    deviations: Float64Array
-
-    @classmethod
-    def of(cls, times: Float64Array, places: Float64Array, weights: Float64Array) -> "_Line":
-        t, origin = times - times[0], places.mean(axis=0)
+        Returns
+        -------
+        Velocities, m/s `(n, 2)`; places on the lines, metres `(n, 2)`; standard deviations of the
+        speeds, m/s `(n,)`.
+        """
+        weights = self.weights
+        t, origin = self.times - self.times[0], places.mean(axis=0)
         starts = np.clip(t - WINDOW / 2, 0, max(0.0, t[-1] - WINDOW))
         first = np.searchsorted(t, starts - _NOTHING)
         end = np.searchsorted(t, starts + WINDOW + _NOTHING)
@@ -301,4 +296,4 @@ class _Line:
         alike = np.sum(off[1:] * off[:-1]) / max(float(np.sum(off**2)), _NOTHING)
         alike = float(np.clip(alike, 0, _MAX_ALIKE))
         variance = np.mean(off**2) * (1 + alike) / (1 - alike)
-        return cls(velocities, fitted, np.sqrt(variance / spread))
+        return velocities, fitted, np.sqrt(variance / spread)

@@ -11,10 +11,10 @@ from vdet.boxes import Float64Array
 from vdet.detect.onnx.preparation import InputForm, Placement
 from vdet.media import Picture, Planes
 from vdet.media.frame import Coding
-from vdet.synthetic.render import render
+from vdet.synthetic.render import Renderer
 from vdet.synthetic.scene import demo_scene
 
-ROAD = render(demo_scene(1, width=1280, height=720), 200)
+ROAD = Renderer(demo_scene(1, width=1280, height=720)).image(200)
 FORMS = pytest.mark.parametrize("dtype", [np.uint8, np.float32], ids=["ours", "others"])
 Dtype = type[np.generic]
 Measure = Callable[[Float64Array], np.floating[Any]]

@@ -17,7 +17,7 @@ from vdet.detect.svm.pyramid import FramePyramid
 from vdet.detect.svm.search import DenseSearch
 from vdet.detect.svm.windows import WindowGrid, lay_grid
 from vdet.media import Picture, Planes
-from vdet.synthetic.render import render
+from vdet.synthetic.render import Renderer
 from vdet.synthetic.scene import demo_scene
 
 Exact = npt.NDArray[np.float64]
@@ -98,7 +98,7 @@ def _patches() -> tuple[list[Image], Float32Array]:
 @functools.cache
 def road(width: int = 1280, height: int = 720) -> Image:
     """Return a frame of the demo's clip: cars of a 17th, an 11th and an 8th of its width."""
-    return render(demo_scene(7, width=width, height=height), 200)
+    return Renderer(demo_scene(7, width=width, height=height)).image(200)
 
 
 def cars() -> Image:

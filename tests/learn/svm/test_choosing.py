@@ -5,7 +5,7 @@ import numpy.typing as npt
 
 from vdet.boxes import Box, from_sizes
 from vdet.detect.svm.windows import Windows
-from vdet.learn.svm.choosing import (
+from vdet.learn.svm.mining import (
     ChosenWindow,
     Most,
     PatchKind,

@@ -8,8 +8,7 @@ import pytest
 from vdet.config.schema import Settings, SvmSettings
 from vdet.detect.svm.detector import load_svm
 from vdet.errors import DataError
-from vdet.learn.svm.choosing import Most
-from vdet.learn.svm.mining import VideoSource, mine
+from vdet.learn.svm.mining import Most, VideoSource, mine
 from vdet.synthetic.scene import Scene
 from vdet.synthetic.truth import write_truth
 

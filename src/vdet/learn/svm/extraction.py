@@ -71,9 +71,8 @@ class LabelledVectors:
         used = kept[self.origins]
         files = [file for file, is_kept in zip(self.files, kept, strict=True) if is_kept]
         origins = (np.cumsum(kept) - 1)[self.origins[used]]
-        return LabelledVectors(
-            self.vectors[used], self.vehicle[used], self.sides[used], origins, files
-        )
+        rows = self.vectors[used], self.vehicle[used], self.sides[used]
+        return LabelledVectors(*rows, origins, files)
 
 
 def extract(
