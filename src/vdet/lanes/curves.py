@@ -77,9 +77,8 @@ def paint_mask(luma: Image, blue: Image) -> Image:
     """
     width = round(_LINE_WIDTH * ACROSS) | 1  # odd, so that the blur does not shift lines
     reach = round(_REACH * ACROSS)
-    lightness, yellow = (
-        np.asarray(cv2.blur(item, (width, 3)), np.uint8) for item in (luma, cv2.bitwise_not(blue))
-    )
+    layers = luma, cv2.bitwise_not(blue)
+    lightness, yellow = (np.asarray(cv2.blur(item, (width, 3)), np.uint8) for item in layers)
     road = _larger_side(lightness, reach)
     rise = cv2.subtract(lightness, road)  # saturates at 0
     tint = cv2.subtract(yellow, _larger_side(yellow, reach))

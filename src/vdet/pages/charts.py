@@ -143,11 +143,8 @@ def level_plot(
     firsts, lasts = np.sort(np.array(spans, np.float64).reshape(-1, 2), axis=0).T
     levels = np.searchsorted(firsts, middles, "right") - np.searchsorted(lasts, middles)
     width = 1.2 * (end - start) / _STEPS  # gaps would show as thin lines
-    bars = [
-        Bar(at, at + width, 0, level)
-        for at, level in zip(edges.tolist(), levels.tolist(), strict=False)
-        if level
-    ]
+    steps = zip(edges.tolist(), levels.tolist(), strict=False)
+    bars = [Bar(at, at + width, 0, level) for at, level in steps if level]
     y = number_axis(0, max(1, levels.max().item()))
     bars += [
         Bar(*gap, 0, y.high, SOFT, f"no frames: {' to '.join(map(time_text, gap))}") for gap in gaps

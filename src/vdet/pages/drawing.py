@@ -172,7 +172,5 @@ def pack(paths: Sequence[VehiclePath]) -> dict[str, Any]:
         (one.vehicle, one.class_name or UNKNOWN, one.size, one.times[0], one.seen, len(one.times))
         for one in paths
     ]
-    return {
-        "vehicles": vehicles,
-        "data": base64.b64encode(zlib.compress(planes.tobytes())).decode("ascii"),
-    }
+    data = base64.b64encode(zlib.compress(planes.tobytes())).decode("ascii")
+    return {"vehicles": vehicles, "data": data}

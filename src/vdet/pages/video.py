@@ -13,7 +13,7 @@ from vdet.lanes.ground import Ground
 from vdet.media import VideoInfo
 from vdet.pages import charts
 from vdet.pages.batch import NO_STILL, Part, VehicleRow, VideoFacts, table_json
-from vdet.pages.charts import Axis, Plot, Span, Timeline, hex_color
+from vdet.pages.charts import Axis, Plot, Span, Timeline, hex_color, interval_plot
 from vdet.pages.place import path_marks, traffic_part, with_marks
 from vdet.pages.render import jpeg_uri, render
 from vdet.traffic.clock import Clock, Intervals
@@ -116,9 +116,7 @@ class VideoPage:
             most=self._most,
             still=NO_STILL if self.poster is None else jpeg_uri(self.poster, _SMALL),
             counts=self._totals,
-            conditions=tuple(
-                finding.text for finding in self.findings if finding.severity == "warning"
-            ),
+            conditions=tuple(item.text for item in self.findings if item.severity == "warning"),
             rows=self._rows(self.pictures),
         )
 
@@ -235,12 +233,8 @@ class VideoPage:
         for event in self.counts.events if self.counts else ():
             found = counted.setdefault(f"{event.name}: {event.direction}", Counter())
             found[first[intervals.number(0, event.time)]] += 1
-        series = {"First seen": came, "At lines and zones": counted}
-        return [
-            charts.interval_plot(some, x, step, name, self.zero)
-            for name, some in series.items()
-            if some
-        ]
+        series = ("First seen", came), ("At lines and zones", counted)
+        return [interval_plot(some, x, step, name, self.zero) for name, some in series if some]
 
     def _paths(self) -> Image | None:
         """Return the frame with the paths of all vehicles."""
@@ -255,18 +249,15 @@ def _timeline(shown: Sequence[VehicleRecord], findings: Sequence[Finding], x: Ax
 
     Where the results are doubtful, the first row says when.
     """
-    doubts = [
+    spans = [
         Span(0, *span, finding.text, *_DOUBT, finding.code, span[0])
         for finding in findings
         for span in finding.spans
     ]
-    rows = charts.pack((record.first, record.last) for record in shown)
-    spans = [
-        span
-        for record, row in zip(shown, rows, strict=True)
-        for span in _spans(record, row + bool(doubts))
-    ]
-    return Timeline("When each vehicle is shown", x, [*doubts, *spans])
+    first, rows = bool(spans), charts.pack((record.first, record.last) for record in shown)
+    for record, row in zip(shown, rows, strict=True):
+        spans += _spans(record, first + row)
+    return Timeline("When each vehicle is shown", x, spans)
 
 
 def _spans(record: VehicleRecord, row: int) -> list[Span]:

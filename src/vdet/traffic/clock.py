@@ -182,9 +182,8 @@ class Intervals:
             self._zeros = [(clock.zero - self._origin).total_seconds() for clock in clocks]
         elif len(videos) > 1:
             if length is not None:
-                raise ConfigError(
-                    "intervals over several videos need the time at which each begins; pass --begin"
-                )
+                what = "intervals over several videos need the time at which each begins"
+                raise ConfigError(f"{what}; pass --begin")
             ends = accumulate(spans[-1][1] - spans[0][0] for _, spans in videos)
             self._zeros = [end - spans[-1][1] for end, (_, spans) in zip(ends, videos, strict=True)]
         self._spans = [

@@ -103,10 +103,8 @@ def wide_table(rows: Sequence[CountRow | FlowRow], between: str) -> list[Sequenc
     ways = dict.fromkeys(tuple(row[2:4]) for row in cells)
     columns = [*((*way, name) for way in ways for name in (*classes, ALL)), (ALL,)]
     heading = (*(f"{between.join(way)}, {name}" for *way, name in columns[:-1]), ALL)
-    body = (
-        (*interval, *(found[*interval, *column] for column in columns))
-        for interval in (*intervals, (ALL, ""))
-    )
+    times = (*intervals, (ALL, ""))
+    body = ((*time, *(found[*time, *column] for column in columns)) for time in times)
     return [("start", "end", *heading), *body]
 
 
@@ -150,9 +148,8 @@ def _json(
         begin = plain_moment(video.clock and video.clock.at(video.spans[0][0]))
         facts[name] = {"begin": begin, "warnings": list(video.warnings)}
         if events:
-            facts[name]["events"] = [
-                dict(zip(_EVENTS, _event(video, event), strict=True)) for event in video.events
-            ]
+            rows = (_event(video, event) for event in video.events)
+            facts[name]["events"] = [dict(zip(_EVENTS, row, strict=True)) for row in rows]
     alone = facts.popitem()[1] if len(facts) == 1 else {"videos": facts}
     return {"interval": interval, **tables, **alone}
 

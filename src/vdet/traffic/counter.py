@@ -111,13 +111,9 @@ class VehicleCounter:
 
     def _passages(self, paths: Iterable[VehiclePath]) -> list[_Passage]:
         """Return what vehicles do that count: of the classes, seen long enough, and not parked."""
-        return [
-            self._passage(path)
-            for path in paths
-            if path.seconds >= self._settings.traffic.min_seen_seconds
-            and path.has_driven
-            and is_chosen(path.class_name, self._settings.classes)
-        ]
+        minimum, classes = self._settings.traffic.min_seen_seconds, self._settings.classes
+        seen = (path for path in paths if path.seconds >= minimum and path.has_driven)
+        return [self._passage(path) for path in seen if is_chosen(path.class_name, classes)]
 
     def _passage(self, path: VehiclePath) -> _Passage:
         found = {border.name: crossings(path, border) for border in self._borders}

@@ -153,11 +153,9 @@ class _Group:
             self.counter.update(replace(frame, time=latest + shift) if shift else frame)
             if meter:
                 meter.add(frame)
-        spans = [
-            (round(begin - shift, 6), round(end - shift, 6))
-            for begin, end in self.counter.spans[begun:]
-        ]
-        self._videos.append(_Video(name, clock, tuple(spans) or ((first, first),), shift, meter))
+        new = self.counter.spans[begun:] or [(first + shift, first + shift)]
+        spans = tuple((round(begin - shift, 6), round(end - shift, 6)) for begin, end in new)
+        self._videos.append(_Video(name, clock, spans, shift, meter))
 
     def counts(self) -> dict[str, Counts]:
         """Return the counts of each video, with its own times."""
@@ -166,13 +164,9 @@ class _Group:
         ends = [bisect_right(times, video.end) for video in self._videos[:-1]]
         found: dict[str, Counts] = {}
         for video, first, end in zip(self._videos, [0, *ends], [*ends, None], strict=True):
-            events = tuple(
-                replace(event, time=round(event.time - video.shift, 3))
-                for event in whole.events[first:end]
-            )
-            warnings = () if found else whole.warnings
-            counts = replace(
-                whole, events=events, spans=video.spans, clock=video.clock, warnings=warnings
-            )
+            own, shift = whole.events[first:end], video.shift
+            events = tuple(replace(event, time=round(event.time - shift, 3)) for event in own)
+            counts = replace(whole, events=events, spans=video.spans, clock=video.clock)
             found[video.name] = with_speeds(counts, video.meter)
+            whole = replace(whole, warnings=())  # they are said once
         return found

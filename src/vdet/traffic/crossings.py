@@ -160,14 +160,12 @@ def _reach(start: Point, end: Point, size: _Size) -> Segment:
     """Lengthen a line beyond the edge of the frame where it ends there: feet may be there too."""
     factor = sum(size) / math.dist(start, end)
     dx, dy = factor * (end[0] - start[0]), factor * (end[1] - start[1])
-    at_edge = [
-        any(value in (0, length) for value, length in zip(point, size, strict=True))
-        for point in (start, end)
-    ]
-    return (
-        (start[0] - dx, start[1] - dy) if at_edge[0] else start,
-        (end[0] + dx, end[1] + dy) if at_edge[1] else end,
-    )
+
+    def reached(point: Point, way: int) -> Point:
+        at_edge = any(value in (0, length) for value, length in zip(point, size, strict=True))
+        return (point[0] + way * dx, point[1] + way * dy) if at_edge else point
+
+    return reached(start, -1), reached(end, 1)
 
 
 def _inner_sides(corners: Sequence[Point], size: _Size) -> tuple[Segment, ...]:

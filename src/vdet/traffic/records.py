@@ -260,15 +260,14 @@ def _row(record: VehicleRecord, clock: Clock | None) -> dict[str, Any]:
 
 def _item(row: Mapping[str, Any]) -> dict[str, Any]:
     """Return a row as values for JSON, with the path and the largest box as objects."""
-    path = {
-        "start": [row["start_x"], row["start_y"]],
-        "end": [row["end_x"], row["end_y"]],
-        "length": row["length"],
-        "length_share": row["length_share"],
-    }
-    largest = {name: row[name] for name in ("x", "y", "width", "height")}
-    first, last = ({name: row[name] for name in some} for some in (_COLUMNS[:11], _COLUMNS[-7:]))
-    return {**first, "path": path, "largest": largest, **last}
+
+    def values(*names: str) -> dict[str, Any]:
+        return {name: row[name] for name in names}
+
+    ends = {end: [row[f"{end}_x"], row[f"{end}_y"]] for end in ("start", "end")}
+    path, largest = values("length", "length_share"), values("x", "y", "width", "height")
+    places = {"path": ends | path, "largest": largest}
+    return values(*_COLUMNS[:11]) | places | values(*_COLUMNS[-7:])
 
 
 _PADDING = 0.1  # margin around a vehicle, as a fraction of the width and the height of its box

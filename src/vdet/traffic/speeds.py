@@ -100,9 +100,8 @@ class Speeds:
         """Return the speed and its standard deviation at a time, m/s; None where it is unknown."""
         if not self.times[0] <= time <= self.times[-1]:
             return None
-        speed, scatter = (
-            float(np.interp(time, self.times, item)) for item in (self.speeds, self.deviations)
-        )
+        known = self.speeds, self.deviations
+        speed, scatter = (float(np.interp(time, self.times, values)) for values in known)
         return speed, float(np.hypot(scatter, self.common * speed))
 
     def between(self, first: float, last: float) -> float | None:

@@ -59,9 +59,8 @@ def fit(rows: LabelledVectors, settings: Settings) -> LinearModel:
     penalty, labels = settings.train.svm.C, rows.labels
     fewest = min(np.count_nonzero(labels), np.count_nonzero(~labels))
     if fewest < FOLDS:
-        raise DataError(
-            f"a class has {fewest} training patches, must be at least {FOLDS}; add more"
-        )
+        what = f"a class has {fewest} training patches, must be at least {FOLDS}"
+        raise DataError(f"{what}; add more")
     scaler = StandardScaler(copy=False)
     for start in range(0, len(rows.vectors), _BLOCK):  # as a whole, it needs twice their memory
         scaler.partial_fit(rows.vectors[start : start + _BLOCK])

@@ -146,11 +146,9 @@ def train(
         test=_classify(model, data, tested),
         box_error=box_error,
     )
-    provenance = {
-        "program": f"vdet {__version__}",
-        "training": settings.train.svm.model_dump(mode="json"),
-        "report": asdict(metrics),
-    }
+    training = settings.train.svm.model_dump(mode="json")
+    program = {"program": f"vdet {__version__}"}
+    provenance = program | {"training": training, "report": asdict(metrics)}
     return replace(model, provenance=provenance, box_regression=regression), metrics
 
 
