@@ -70,16 +70,15 @@ class Plot:
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """A bar in a row of a timeline; a click leads to `time` in the video of the page."""
+    """A bar in a row of a timeline; a click leads to its `first` time in the video of the page."""
 
     row: int
     first: float
     last: float
     title: str
     color: str
-    ink: str = "#fff"
-    label: str = ""
-    time: float | None = None
+    ink: str
+    label: str
 
 
 @dataclass(frozen=True, slots=True)

@@ -249,11 +249,7 @@ def _timeline(shown: Sequence[VehicleRecord], findings: Sequence[Finding], x: Ax
 
     Where the results are doubtful, the first row says when.
     """
-    spans = [
-        Span(0, *span, finding.text, *_DOUBT, finding.code, span[0])
-        for finding in findings
-        for span in finding.spans
-    ]
+    spans = [Span(0, *at, item.text, *_DOUBT, item.code) for item in findings for at in item.spans]
     first, rows = bool(spans), charts.pack((record.first, record.last) for record in shown)
     for record, row in zip(shown, rows, strict=True):
         spans += _spans(record, first + row)
@@ -269,6 +265,6 @@ def _spans(record: VehicleRecord, row: int) -> list[Span]:
     colors = hex_color(fill), hex_color(text_color(fill))
     longest = max(record.followed, key=lambda span: span[1] - span[0])
     return [
-        Span(row, *span, title, *colors, f"#{record.id}" if span is longest else "", span[0])
+        Span(row, *span, title, *colors, f"#{record.id}" if span is longest else "")
         for span in record.followed
     ]

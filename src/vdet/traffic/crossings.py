@@ -40,21 +40,31 @@ class PlacedLine:
     """A line; its positive side is the left of someone who looks from `start` to `end`.
 
     `directions` are the names of the left and of the right. `start` and `end` are those that are
-    drawn; `reach` goes on where they lie at the edge of the frame. `size` is the width and height
-    of the frame. All are in pixels.
+    drawn, `size` is the width and height of the frame, all in pixels.
     """
 
     name: str
     directions: tuple[str, str]
     start: Point
     end: Point
-    reach: Segment
     size: _Size
 
     @property
     def length(self) -> float:
         """Pixels."""
         return math.dist(self.start, self.end)
+
+    @property
+    def reach(self) -> Segment:
+        """The line, longer where it ends at the edge of the frame: feet may be beyond it, too."""
+        (ax, ay), (bx, by) = self.start, self.end
+        factor = sum(self.size) / self.length
+        dx, dy = factor * (bx - ax), factor * (by - ay)
+        start, end = (self._is_at_edge(point) for point in (self.start, self.end))
+        return (ax - start * dx, ay - start * dy), (bx + end * dx, by + end * dy)
+
+    def _is_at_edge(self, point: Point) -> bool:
+        return any(value in (0, length) for value, length in zip(point, self.size, strict=True))
 
     def distances(self, points: Float64Array) -> Float64Array:
         """Return how far points `(n, 2)` are from the line, positive on the left, `(n,)`.
@@ -77,16 +87,23 @@ class PlacedLine:
 class Zone:
     """A polygon, whose positive side is the inside; at the frame's edge it goes on beyond.
 
-    `sides` are those of its sides that do not run along the edge of the frame, `size` is the width
-    and height of the frame. All are in pixels.
+    `corners` and `size`, the width and height of the frame, are in pixels.
     """
 
     name: str
     corners: tuple[Point, ...]
-    sides: tuple[Segment, ...]
     size: _Size
 
     directions = ENTER, EXIT, APPEAR, VANISH
+
+    @property
+    def inner_sides(self) -> list[Segment]:
+        """Those of its sides that do not run along the edge of the frame."""
+        return [
+            (a, b)
+            for a, b in sides(self.corners)
+            if not any(p == q and p in (0, end) for p, q, end in zip(a, b, self.size, strict=True))
+        ]
 
     def distances(self, points: Float64Array) -> Float64Array:
         """Return how far points `(n, 2)` are from the sides, positive inside, `(n,)`.
@@ -94,16 +111,16 @@ class Zone:
         The distances are infinite where there are no sides.
         """
         points = self._in_frame(points)
-        inside = _are_inside(self.corners, points)
-        if not self.sides:
+        inside, border = _are_inside(self.corners, points), self.inner_sides
+        if not border:
             return np.where(inside, np.inf, -np.inf)
-        distances = distances_to(self.sides, points).min(axis=1)
+        distances = distances_to(border, points).min(axis=1)
         return np.asarray(np.where(inside, distances, -distances))
 
     def meeting(self, path: Segment) -> float:
         """Return how far along `path` it last meets the border, 0 to 1."""
-        start, end = self._in_frame(np.array(path)).tolist()
-        fractions = (meeting(((start[0], start[1]), (end[0], end[1])), side) for side in self.sides)
+        (ax, ay), (bx, by) = self._in_frame(np.array(path)).tolist()
+        fractions = (meeting(((ax, ay), (bx, by)), side) for side in self.inner_sides)
         return max((fraction for fraction in fractions if fraction is not None), default=1.0)
 
     def _in_frame(self, points: Float64Array) -> Float64Array:
@@ -144,37 +161,11 @@ def place(
         return _snapped(point[0] * width, width), _snapped(point[1] * height, height)
 
     lines = tuple(
-        PlacedLine(line.name, (line.left, line.right), start, end, _reach(start, end, size), size)
+        PlacedLine(line.name, (line.left, line.right), placed(line.start), placed(line.end), size)
         for line in settings.lines
-        for start, end in [(placed(line.start), placed(line.end))]
     )
-    zones = tuple(
-        Zone(zone.name, corners, _inner_sides(corners, size), size)
-        for zone in settings.zones
-        for corners in [tuple(map(placed, zone.points))]
-    )
+    zones = tuple(Zone(zone.name, tuple(map(placed, zone.points)), size) for zone in settings.zones)
     return lines, zones
-
-
-def _reach(start: Point, end: Point, size: _Size) -> Segment:
-    """Lengthen a line beyond the edge of the frame where it ends there: feet may be there too."""
-    factor = sum(size) / math.dist(start, end)
-    dx, dy = factor * (end[0] - start[0]), factor * (end[1] - start[1])
-
-    def reached(point: Point, way: int) -> Point:
-        at_edge = any(value in (0, length) for value, length in zip(point, size, strict=True))
-        return (point[0] + way * dx, point[1] + way * dy) if at_edge else point
-
-    return reached(start, -1), reached(end, 1)
-
-
-def _inner_sides(corners: Sequence[Point], size: _Size) -> tuple[Segment, ...]:
-    """Return the sides of a polygon that do not run along the edge of the frame."""
-    return tuple(
-        side
-        for side in sides(corners)
-        if not any(a == b and a in (0, length) for a, b, length in zip(*side, size, strict=True))
-    )
 
 
 def _snapped(value: float, length: float) -> float:
