@@ -19,6 +19,7 @@ from vdet.detect.factory import load_detector
 from vdet.detect.protocol import DetectorModel
 from vdet.media import Frame, Picture, VideoInfo
 from vdet.media.writer import VideoWriter
+from vdet.run.loop import Parts
 from vdet.run.sinks import Output
 from vdet.run.sinks.folders import ClipSink
 from vdet.run.video import Run, run_video
@@ -55,7 +56,7 @@ def seconds_of_run(run: Run, model: DetectorModel) -> tuple[float, float]:
 
     begin = time.process_time()
     with patch.object(ClipSink, "finish", timed):
-        run_video(run, model)
+        run_video(run, Parts(model))
     return time.process_time() - begin, cut
 
 

@@ -22,7 +22,7 @@ from vdet.detect.factory import load_detector
 from vdet.lanes.curves import LaneCurves
 from vdet.lanes.road import Road, RoadFinder
 from vdet.media import Frame, Picture, VideoInfo
-from vdet.run.loop import build, peek
+from vdet.run.loop import Parts, build, peek
 from vdet.run.steps import LaneStep, with_positions
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.render import Renderer
@@ -192,7 +192,7 @@ class Shown:
         )
         first, all_frames = peek(clip)
         lanes = LaneStep(drive.finder(), self.settings.detector.foot)
-        pipeline = build(self.model, self.settings, video, first, steps=[lanes])
+        pipeline = build(Parts(self.model, steps=[lanes]), self.settings, video, first)
         for result in pipeline.follow(all_frames):
             index = result.frame.index
             if index in COUNTED:

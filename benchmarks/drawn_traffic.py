@@ -13,7 +13,7 @@ from vdet.detect.protocol import DetectorModel
 from vdet.labels.label import Label, LabelledVideo
 from vdet.media import Frame, Picture, Planes, VideoInfo
 from vdet.media.frame import Coding
-from vdet.run.loop import build, peek
+from vdet.run.loop import Parts, build, peek
 from vdet.run.result import FrameResult
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.scene import (
@@ -89,7 +89,7 @@ def follow(
     camera, rate = scene.camera, scene.rate
     video = VideoInfo(Path("clip.mp4"), camera.width, camera.height, rate, 1 / rate)
     images, every = peek(clip)
-    return build(model, settings, video, images).follow(every)
+    return build(Parts(model), settings, video, images).follow(every)
 
 
 def shown_labels(results: Iterable[FrameResult]) -> LabelledVideo:

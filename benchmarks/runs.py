@@ -17,6 +17,7 @@ from vdet.config.schema import DrawSettings, InputSettings, Settings, SvmSetting
 from vdet.detect.factory import load_detector
 from vdet.detect.protocol import DetectorModel
 from vdet.media.reader import VideoReader
+from vdet.run.loop import Parts
 from vdet.run.sinks import Output
 from vdet.run.video import Run, run_video
 
@@ -73,7 +74,7 @@ def run_times(path: Path, folder: Path, rounds: int) -> dict[str, tuple[float, f
         outputs: tuple[Output, ...] = video,
         settings: Settings = default,
     ) -> None:
-        run_video(Run(path, outputs, settings, frames=FRAMES, overwrite=True), detector)
+        run_video(Run(path, outputs, settings, frames=FRAMES, overwrite=True), Parts(detector))
 
     tasks: dict[str, Task] = {
         "transcode": partial(transcode, path, folder / "transcoded.mp4", FRAMES),

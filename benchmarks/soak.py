@@ -14,6 +14,7 @@ import av
 
 from benchmarks.material import find_video
 from vdet.detect.factory import load_detector
+from vdet.run.loop import Parts
 from vdet.run.sinks import Output
 from vdet.run.video import Run, run_video
 
@@ -168,7 +169,7 @@ def main() -> None:
             Output("tracks", folder / "out.jsonl"),
         )
         run = Run(folder / "long.mp4", outputs, frames=frames)
-        totals = run_video(run, load_detector(run.settings.detector), progress=monitor)
+        totals = run_video(run, Parts(load_detector(run.settings.detector)), progress=monitor)
     print(file=sys.stderr)
     print("\n".join(table(monitor.samples)))
     first, last = tenths(monitor.samples)

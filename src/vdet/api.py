@@ -43,6 +43,7 @@ from vdet.media import Frame, Picture
 from vdet.media.images import read_image
 from vdet.progress import no_progress, reporting
 from vdet.regions import check_masks
+from vdet.run.loop import Parts
 from vdet.run.pictures import PictureJob, PictureSearch, run_pictures
 from vdet.run.result import FrameResult
 from vdet.run.sinks import Output
@@ -208,9 +209,9 @@ def follow(
     searched.
     """
     part = {"start": _exact(start), "end": _exact(end), "frames": frames}
-    run, loaded, tracker = _run(source, settings, detector, tracker, **part)
+    run, parts = _run(source, settings, detector, tracker, steps, **part)
     threads = run.threads if isinstance(source, Run) else 1
-    return Results(open_video(replace(run, threads=threads), loaded, tracker=tracker, steps=steps))
+    return Results(open_video(replace(run, threads=threads), parts))
 
 
 def vehicles(source: PathName | Run, **options: Any) -> tuple[VehicleRecord, ...]:
@@ -260,12 +261,12 @@ def detect_video(
 
     The others are those of `follow`, and the errors those of the command `vdet detect-video`.
     """
-    run, loaded, tracker = _run(source, settings, detector, tracker)
+    run, parts = _run(source, settings, detector, tracker, steps)
     wanted = _outputs({"video": video or (), "tracks": tracks, **(outputs or {})})
     run = replace(run, outputs=run.outputs + wanted, overwrite=overwrite or run.overwrite)
     check_masks(run.settings.regions)
     reported = reporting(progress) if progress else no_progress
-    return run_video(run, loaded, tracker=tracker, steps=steps, progress=reported)
+    return run_video(run, parts, progress=reported)
 
 
 @recorded_inputs()
@@ -340,9 +341,10 @@ def _run(
     settings: Settings | None,
     detector: AnyDetector | None,
     tracker: AnyTracker | None,
+    steps: Sequence[Step],
     **part: Any,
-) -> tuple[Run, DetectorModel, VideoTracker | None]:
-    """Return a run, its detector and its tracker; `part` is that of a video, not of a `Run`."""
+) -> tuple[Run, Parts]:
+    """Return a run and what it runs with; `part` is that of a video, not of a `Run`."""
     if isinstance(source, Run):
         for name, value in {"settings": settings, **part}.items():
             if value is not None:
@@ -351,7 +353,7 @@ def _run(
     else:
         run = Run(Path(source), **part)
     settings, loaded, tracker = _resolved(settings, detector, tracker)
-    return replace(run, settings=settings), loaded, tracker
+    return replace(run, settings=settings), Parts(loaded, tracker, steps)
 
 
 def _resolved(

@@ -20,6 +20,7 @@ from vdet.learn.svm.dataset import find_patches
 from vdet.learn.svm.mining import Most, VideoSource, mine
 from vdet.learn.svm.training import train
 from vdet.progress import Steps
+from vdet.run.loop import Parts
 from vdet.run.sinks import Output
 from vdet.run.video import Run, run_video
 from vdet.synthetic.render import write_clip
@@ -87,7 +88,7 @@ def run_demo(
     def find(clip: str, outputs: dict[str, str], settings: Settings) -> None:
         paths = tuple(Output(sink, folder / name) for sink, name in outputs.items())
         run = Run(folder / clip, paths, settings, at=middle, overwrite=overwrite)
-        run_video(run, load_detector(settings.detector), progress=partial(steps, "frames"))
+        run_video(run, Parts(load_detector(settings.detector)), progress=partial(steps, "frames"))
 
     scene, pole, rng = demo_scene(seed), pole_scene(seed), np.random.default_rng(seed)
     middle = scene.frames / scene.rate / 2

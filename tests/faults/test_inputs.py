@@ -17,6 +17,7 @@ from running import frames_of, names, until, write_drive
 from vdet.batch.task import process_file
 from vdet.errors import VdetError
 from vdet.labels.reading import read_labelled_pictures
+from vdet.run.loop import Parts
 from vdet.run.sinks import Output
 from vdet.run.video import Run, run_video
 
@@ -49,7 +50,9 @@ def after(frames: int, happens: Callable[[], object]) -> Callable[[object], Call
 
 
 def test_a_file_that_is_removed_while_it_is_read_is_read_to_its_end(job: Run) -> None:
-    run_video(replace(job, settings=SETTINGS), red_model(), progress=after(5, job.source.unlink))
+    run_video(
+        replace(job, settings=SETTINGS), Parts(red_model()), progress=after(5, job.source.unlink)
+    )
     assert frames_of(job.outputs[0].path) == COUNT
 
 
@@ -66,7 +69,7 @@ def test_a_file_that_shrinks_is_read_as_far_as_it_goes_with_a_warning(
 ) -> None:
     half = job.source.stat().st_size // 2
     shrink = after(5, lambda: os.truncate(job.source, half))
-    totals = run_video(replace(job, settings=SETTINGS), red_model(), progress=shrink)
+    totals = run_video(replace(job, settings=SETTINGS), Parts(red_model()), progress=shrink)
     assert COUNT // 4 < totals.frames < COUNT * 3 // 4
     assert frames_of(job.outputs[0].path) == totals.frames
     assert f"ends early: {totals.frames} of {COUNT} frames could be read" in caplog.text

@@ -15,10 +15,11 @@ from vdet.files import OutputFiles
 from vdet.lanes.road import Road
 from vdet.media import Frame, Picture, VideoInfo
 from vdet.media.reader import VideoReader
-from vdet.run.loop import build, peek
+from vdet.progress import Progress, no_progress
+from vdet.run.loop import Parts, build, peek
 from vdet.run.result import FrameResult
 from vdet.run.sinks import Output
-from vdet.run.sinks.protocol import SinkContext, open_sink
+from vdet.run.sinks.protocol import SinkContext, open_sinks
 from vdet.run.video import Run, RunTotals, run_video
 from vdet.track.track import Track
 from vdet.traffic.live import LiveTraffic
@@ -46,9 +47,12 @@ def outputs(**paths: Path) -> tuple[Output, ...]:
     return tuple(Output(sink, path) for sink, path in paths.items())
 
 
-def run_red(job: Run, settings: Settings = SETTINGS, **options: Any) -> RunTotals:
-    """Run a job that finds red cars."""
-    return run_video(replace(job, settings=settings), model_for(settings), **options)
+def run_red(
+    job: Run, settings: Settings = SETTINGS, *, progress: Progress = no_progress, **own: Any
+) -> RunTotals:
+    """Run a job that finds red cars, with a tracker or steps of its own."""
+    parts = Parts(model_for(settings), **own)
+    return run_video(replace(job, settings=settings), parts, progress=progress)
 
 
 def follow(
@@ -56,7 +60,7 @@ def follow(
 ) -> Iterator[FrameResult]:
     """Find and follow red cars through some frames."""
     images, frames = peek(frames)
-    pipeline = build(model_for(settings), settings, VIDEO, images)
+    pipeline = build(Parts(model_for(settings)), settings, VIDEO, images)
     return pipeline.follow(frames, VIDEO.path, threads=threads)
 
 
@@ -107,11 +111,11 @@ def write(
         context = SinkContext(
             files, settings, video, at=at, traffic=traffic, stage_pictures=stage_pictures
         )
-        with open_sink(output, context) as sink:
+        with open_sinks([output], context) as sinks:
             for result in results:
                 if traffic:
                     traffic.add(result.frame_tracks)
-                sink.write(result)
+                sinks.write(result)
             if traffic:
                 traffic.end()
 

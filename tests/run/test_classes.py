@@ -15,6 +15,7 @@ from vdet.config.places import LineSettings, TrafficSettings
 from vdet.config.schema import Settings
 from vdet.errors import ConfigError
 from vdet.media import Picture
+from vdet.run.loop import Parts
 from vdet.run.video import Run, run_video
 from vdet.track.track import Track
 from vdet.traffic.counting import count_files
@@ -38,7 +39,7 @@ def test_boxes_go_by_the_class_so_far_and_all_else_by_the_last_one(
 ) -> None:
     files = {name: tmp_path / f"{name}.csv" for name in ("vehicles", "counts", "tracks")}
     wanted = outputs(**files, crops=tmp_path / "crops")
-    run_video(Run(red_clip, wanted, TRUCKS), NullDetector(), tracker=TwoVehicles())
+    run_video(Run(red_clip, wanted, TRUCKS), Parts(NullDetector(), TwoVehicles()))
     rows = rows_of(files["tracks"])
     assert {row["class"] for row in rows} == {"truck"}
     assert min(float(row["time"]) for row in rows) > 1.7
@@ -53,7 +54,7 @@ def test_boxes_go_by_the_class_so_far_and_all_else_by_the_last_one(
 def test_saved_tracks_are_counted_as_live(red_clip: Path, tmp_path: Path) -> None:
     live, saved = tmp_path / "live.json", tmp_path / "all.jsonl"
     for settings, wanted in ((TRUCKS, outputs(counts=live)), (SETTINGS, outputs(tracks=saved))):
-        run_video(Run(red_clip, wanted, settings), NullDetector(), tracker=TwoVehicles())
+        run_video(Run(red_clip, wanted, settings), Parts(NullDetector(), TwoVehicles()))
     (counts,) = count_files([saved], TRUCKS, (320, 240)).values()
     events = json.loads(live.read_text())["events"]
     assert [(event.id, event.time) for event in counts.events] == [

@@ -32,7 +32,7 @@ from vdet.media import Frame
 from vdet.media.frame import Planes
 from vdet.media.images import read_image
 from vdet.run import video
-from vdet.run.loop import FIRST_FRAMES
+from vdet.run.loop import FIRST_FRAMES, Parts
 from vdet.run.threads import map_ordered
 from vdet.run.video import run_video
 
@@ -118,8 +118,8 @@ class TestRun:
         monkeypatch.setattr("vdet.run.video.core_count", lambda: 3)
         monkeypatch.setattr("vdet.run.loop.map_ordered", note)
         job = video.Run(write_drive(tmp_path / "a.mp4", 2))
-        run_video(replace(job, settings=SETTINGS), red_model())
-        run_video(replace(job, threads=2, settings=SETTINGS), red_model())
+        run_video(replace(job, settings=SETTINGS), Parts(red_model()))
+        run_video(replace(job, threads=2, settings=SETTINGS), Parts(red_model()))
         assert pools == [3, 2]
 
     def test_the_totals_count_frames_and_vehicles(self, red_clip: Path, tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ from vdet.detect.factory import load_detector, model_file
 from vdet.detect.protocol import DetectorModel
 from vdet.errors import BatchError, in_one_line
 from vdet.files import OutputFiles, recorded_inputs, write_whole
+from vdet.run.loop import Parts
 from vdet.run.sinks.protocol import output_state
 from vdet.run.video import Run, write_outputs
 from vdet.version import __version__
@@ -134,7 +135,8 @@ def _written(run: Run, record: Record, files: OutputFiles) -> Record:
     """Write the outputs, which have not their names yet, and return the record about them."""
     digest = result_digest(run)
     chosen = pickle.dumps(run.settings.detector)  # settings of other packages may be unhashable
-    totals = write_outputs(run, _kept_detector(chosen, record.model_sha256), files)
+    parts = Parts(_kept_detector(chosen, record.model_sha256))
+    totals = write_outputs(run, parts, files)
     written = []
     for output in run.outputs:
         state = output_state(output, files.place_of(output.path)) or (0, 0)

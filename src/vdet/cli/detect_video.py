@@ -239,13 +239,14 @@ def _with_endings(outputs: list[Output], *, no_video: bool) -> list[Output]:
 def _process_one(run: "Run") -> bool:
     """Process a video, and return whether the result is doubtful."""
     from vdet.detect.factory import load_detector
+    from vdet.run.loop import Parts
     from vdet.run.result import findings_in
     from vdet.run.video import run_video
 
-    model = load_detector(run.settings.detector)
+    parts = Parts(load_detector(run.settings.detector))
     with progress_steps(" frames") as steps:
         steps("opening", None)
-        totals = run_video(run, model, progress=partial(steps, ""))
+        totals = run_video(run, parts, progress=partial(steps, ""))
     rate = totals.frames / totals.seconds
     found = f"{counted(totals.frames, 'frame')}, {counted(totals.tracks, 'track')}"
     announce(f"{run.source}: {found}, {totals.seconds:.1f} s, {rate:.1f} frames/s")

@@ -120,6 +120,7 @@ def _watched(run: "Run", tracks: Path | None, steps: Steps) -> "tuple[Image, lis
     from vdet.detect.factory import load_detector
     from vdet.media.images import is_picture_name, read_image
     from vdet.media.reader import VideoReader
+    from vdet.run.loop import Parts
     from vdet.run.video import open_video
 
     clip, settings = run.source, run.settings
@@ -136,7 +137,7 @@ def _watched(run: "Run", tracks: Path | None, steps: Steps) -> "tuple[Image, lis
                 steps("reading the scene", None)
                 yield from reader
             return
-        with open_video(run, load_detector(settings.detector)) as video:
+        with open_video(run, Parts(load_detector(settings.detector))) as video:
             advance = steps("", video.reader.expected)
             for result in video.results:
                 found.append(result.frame_tracks)

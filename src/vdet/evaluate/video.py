@@ -17,6 +17,7 @@ from vdet.labels.reading import read_predictions, read_truth
 from vdet.labels.roles import Roles
 from vdet.progress import Progress, no_progress
 from vdet.regions import lay_regions
+from vdet.run.loop import Parts
 from vdet.run.video import Run, open_video
 
 _DEFAULT = Settings()
@@ -121,7 +122,7 @@ def evaluate_clip(
     all_classes = settings.model_copy(update={"classes": ()})
     run = Run(clip.video, settings=all_classes, frames=clip.truth.last_frame or None)
     labels, frames = list[Label](), 0
-    with open_video(run, model) as video:
+    with open_video(run, Parts(model)) as video:
         advance, info = progress(video.reader.expected), video.reader.info
         for result in video.results:
             number = result.frame.index + 1

@@ -201,16 +201,31 @@ def _delayed(results: Iterable[FrameResult], seconds: Fraction) -> Iterator[Fram
         yield waiting.popleft()
 
 
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """What finds and follows the vehicles of a run.
+
+    Attributes
+    ----------
+    model
+        It makes the detector of each video.
+    tracker
+        A tracker for one video; None for that of the settings.
+    steps
+        Steps in addition to those of the settings.
+    """
+
+    model: DetectorModel
+    tracker: VideoTracker | None = None
+    steps: Sequence[Step] = ()
+
+
 def build(
-    model: DetectorModel,
-    settings: Settings,
-    video: VideoInfo | None,
-    images: Sequence[Image],
-    *,
-    tracker: VideoTracker | None = None,
-    steps: Sequence[Step] = (),
+    parts: Parts, settings: Settings, video: VideoInfo | None, images: Sequence[Image]
 ) -> Pipeline:
     """Make the pipeline of a video, or of one still picture.
+
+    In a still picture each detection becomes a track, with ids from 1.
 
     Parameters
     ----------
@@ -218,11 +233,6 @@ def build(
         None for a still picture.
     images
         The first frames, from `peek`; the still picture alone.
-    tracker
-        A tracker for this video; None for that of the settings. In a still picture each detection
-        becomes a track, with ids from 1.
-    steps
-        Steps in addition to those of the settings.
 
     Raises
     ------
@@ -233,14 +243,15 @@ def build(
     """
     height, width = (video.height, video.width) if video else images[0].shape[:2]
     settings.camera.check_frames(width, height)
-    detector = model.for_video(width, height, images)
+    detector = parts.model.for_video(width, height, images)
     unknown = getattr(detector, "unknown_classes", ())
-    made = make_steps(StepContext(settings, width, height, video, unknown), steps)
+    made = make_steps(StepContext(settings, width, height, video, unknown), parts.steps)
     if video is None:
         return Pipeline(detector, timed(StillTracker()), made, is_still=True)
-    followed_by = timed(tracker) if tracker else make_tracker(settings, width, height)
+    own = parts.tracker
+    tracker = timed(own) if own else make_tracker(settings, width, height)
     rate = SearchRate(settings.detector.searches_per_second, settings.detector.stride)
-    return Pipeline(detector, followed_by, made, rate, Fraction(settings.tracker.look_ahead))
+    return Pipeline(detector, tracker, made, rate, Fraction(settings.tracker.look_ahead))
 
 
 def peek(frames: Iterable[Frame]) -> tuple[list[Image], Iterable[Frame]]:

@@ -14,7 +14,7 @@ from vdet.errors import ImageError
 from vdet.files import OutputFiles, record_input
 from vdet.media import Frame, Picture
 from vdet.media.images import PICTURE_SUFFIXES, is_picture_name, read_image
-from vdet.run.loop import build, named_errors
+from vdet.run.loop import Parts, build, named_errors
 from vdet.run.result import FrameResult
 from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import SinkContext, Sinks, check_sinks, open_sinks
@@ -116,7 +116,7 @@ class PictureSearch:
         """
         frame = Frame(0, Fraction(0), Picture(image))
         with named_errors(source, ImageError):
-            pipeline = build(self.model, self.settings, None, [image])
+            pipeline = build(Parts(self.model), self.settings, None, [image])
             (result,) = pipeline.follow([frame], source)
         return result.of_classes(self.settings.classes)
 

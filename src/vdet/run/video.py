@@ -2,7 +2,7 @@
 
 import logging
 import time
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Mapping
 from contextlib import AbstractContextManager, closing, contextmanager
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -13,18 +13,16 @@ from vdet.boxes import NO_BOXES
 from vdet.conditions.finding import Finding
 from vdet.config.schema import Settings
 from vdet.detect.factory import as_model
-from vdet.detect.protocol import DetectorModel, VideoDetector, stage_pictures_of
+from vdet.detect.protocol import VideoDetector, stage_pictures_of
 from vdet.errors import FrameSizeError, VideoError, check_positive
 from vdet.files import OutputFiles, record_input, recorded_inputs
 from vdet.media.reader import VideoReader
 from vdet.progress import Progress, no_progress
-from vdet.run.loop import build, named_errors, peek
+from vdet.run.loop import Parts, build, named_errors, peek
 from vdet.run.result import Fact, Facts, FrameResult, findings_in
 from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import SinkContext, check_sinks, open_sinks, sink_kind
-from vdet.run.steps import Step
 from vdet.run.threads import prefetch
-from vdet.track.track import VideoTracker
 from vdet.traffic.clock import Clock, find_clock
 from vdet.traffic.live import LiveTraffic
 from vdet.workers import core_count, return_freed_memory
@@ -132,13 +130,7 @@ class OpenVideo:
 
 
 @contextmanager
-def open_video(
-    run: Run,
-    model: DetectorModel,
-    *,
-    tracker: VideoTracker | None = None,
-    steps: Sequence[Step] = (),
-) -> Iterator[OpenVideo]:
+def open_video(run: Run, parts: Parts) -> Iterator[OpenVideo]:
     """Open a video, and follow the vehicles through it; parameters and errors as in `run_video`.
 
     Reading and searching run in threads.
@@ -151,10 +143,10 @@ def open_video(
         images, frames = peek(read)
         settings, info = run.settings, reader.info
         try:
-            pipeline = build(model, settings, info, images, tracker=tracker, steps=steps)
+            pipeline = build(parts, settings, info, images)
         except FrameSizeError as error:
             log.warning("%s: gets no boxes: %s", run.source, error)
-            pipeline = build(as_model(lambda _: NO_BOXES), settings, info, images)
+            pipeline = build(Parts(as_model(lambda _: NO_BOXES)), settings, info, images)
         del images  # otherwise they stay in memory for the whole run
         threads = run.threads or core_count()
         clock = find_clock(run.source, settings, info.tags.creation_time, float(info.start))
@@ -228,22 +220,13 @@ def _video_and_results(opening: AbstractContextManager[OpenVideo]) -> Generator[
 
 
 @recorded_inputs()
-def run_video(
-    run: Run,
-    model: DetectorModel,
-    *,
-    tracker: VideoTracker | None = None,
-    steps: Sequence[Step] = (),
-    progress: Progress = no_progress,
-) -> RunTotals:
+def run_video(run: Run, parts: Parts, *, progress: Progress = no_progress) -> RunTotals:
     """Run a run. Its outputs appear under their names together, at the end of the run.
 
     Reading, searching and encoding run in threads, tracking and drawing in the calling one.
 
     Parameters
     ----------
-    tracker, steps
-        As `vdet.run.loop.build` takes them.
     progress
         Called once with the expected number of frames (None: unknown). What it returns is called
         with the number of frames done since the last call.
@@ -261,17 +244,11 @@ def run_video(
     record_input(run.source)
     check_sinks(run.outputs, overwrite=run.overwrite)
     with OutputFiles(overwrite=run.overwrite) as files:
-        return write_outputs(run, model, files, tracker=tracker, steps=steps, progress=progress)
+        return write_outputs(run, parts, files, progress=progress)
 
 
 def write_outputs(
-    run: Run,
-    model: DetectorModel,
-    files: OutputFiles,
-    *,
-    tracker: VideoTracker | None = None,
-    steps: Sequence[Step] = (),
-    progress: Progress = no_progress,
+    run: Run, parts: Parts, files: OutputFiles, *, progress: Progress = no_progress
 ) -> RunTotals:
     """Do as `run_video`, into `files`: the outputs are complete, but do not have their names yet.
 
@@ -282,20 +259,28 @@ def write_outputs(
     if run.outputs and all(sink_kind(output.sink).one_frame for output in run.outputs):
         start = max(run.at - LEAD, run.start or Fraction(0))
         run = replace(run, start=start, end=run.end or run.at + LEAD)
-    with (
-        open_video(run, model, tracker=tracker, steps=steps) as video,
-        open_sinks(run.outputs, _context(run, files, video)) as sinks,
-    ):
-        info = video.reader.info
-        advance = progress(video.reader.expected)
-        frames, ids = 0, set[int]()
-        for result in video.results:
-            sinks.write(result)
-            ids.update(track.id for track in result.tracks)
-            frames += 1
-            advance(1)
-        if not frames:
-            raise _no_frame(run, "no frames at these times", video.reader)
+    with open_video(run, parts) as video:
+        info, frames, ids = video.reader.info, 0, set[int]()
+        context = SinkContext(
+            files,
+            run.settings,
+            info,
+            is_part=run.is_part,
+            at=run.at,
+            outputs=run.outputs,
+            traffic=video.traffic,
+            facts=video.facts,
+            stage_pictures=stage_pictures_of(video.detector),
+        )
+        with open_sinks(run.outputs, context) as sinks:
+            advance = progress(video.reader.expected)
+            for result in video.results:
+                sinks.write(result)
+                ids.update(track.id for track in result.tracks)
+                frames += 1
+                advance(1)
+            if not frames:
+                raise _no_frame(run, "no frames at these times", video.reader)
         counts = video.traffic.counts()
         found = [line for fact in video.facts.values() for line in str(fact).splitlines()]
         for warning in (*(counts.warnings if counts else ()), *found):
@@ -303,22 +288,6 @@ def write_outputs(
     seconds = time.perf_counter() - began
     totals = info.width, info.height, frames, len(ids), seconds
     return RunTotals(*totals, video.traffic.clock, video.facts, sinks.summaries)
-
-
-def _context(run: Run, files: OutputFiles, video: OpenVideo) -> SinkContext:
-    info = video.reader.info
-    return SinkContext(
-        files,
-        run.settings,
-        info,
-        is_part=run.is_part,
-        at=run.at,
-        threads=core_count(),  # more or fewer would write other bytes
-        outputs=run.outputs,
-        traffic=video.traffic,
-        facts=video.facts,
-        stage_pictures=stage_pictures_of(video.detector),
-    )
 
 
 def _no_frame(run: Run, words: str, reader: VideoReader) -> VideoError:

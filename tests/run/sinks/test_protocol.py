@@ -17,7 +17,7 @@ from vdet.errors import OutputError
 from vdet.files import OutputFiles
 from vdet.run.result import FrameResult
 from vdet.run.sinks import Output
-from vdet.run.sinks.protocol import BaseSink, SinkContext, SinkKind, check_sinks, open_sink
+from vdet.run.sinks.protocol import BaseSink, SinkContext, SinkKind, check_sinks, open_sinks
 from vdet.run.video import Run
 
 MOMENTS = ("open", "enter", "first", "middle", "end")
@@ -172,7 +172,7 @@ def test_a_sink_refuses_results_that_it_cannot_take(
         context = SinkContext(files, SETTINGS, video_info() if is_video else None)
         with (
             pytest.raises(OutputError, match=f"{name}: the sink {sink} {words}"),
-            open_sink(output, context),
+            open_sinks([output], context),
         ):
             pass
     assert list(tmp_path.iterdir()) == []

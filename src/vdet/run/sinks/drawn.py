@@ -18,6 +18,7 @@ from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import BaseSink, SinkContext, SinkKind
 from vdet.run.threads import write_async
 from vdet.track.track import Track
+from vdet.workers import core_count
 
 if TYPE_CHECKING:
     from vdet.traffic.counter import VehicleCounter
@@ -133,7 +134,7 @@ class VideoSink(BaseSink):
             context.settings.output,
             name=self.path,
             whole_sound=not context.is_part,
-            threads=context.threads,
+            threads=core_count(),  # more or fewer would write other bytes
         )
         self._used: list[Planes] = []  # new memory would take longer than what is copied into it
 

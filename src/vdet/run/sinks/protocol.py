@@ -48,8 +48,6 @@ class SinkContext:
         Whether only a part of the video is read.
     at
         The option `--at`: seconds from the first frame.
-    threads
-        Number of threads of an encoder; None lets it choose.
     outputs
         All outputs of the run, for a sink that refers to another.
     traffic
@@ -69,7 +67,6 @@ class SinkContext:
     video: VideoInfo | None = None
     is_part: bool = False
     at: Fraction = Fraction(0)
-    threads: int | None = None
     outputs: tuple[Output, ...] = ()
     traffic: LiveTraffic | None = None
     facts: dict[str, Fact] = field(default_factory=dict)
@@ -251,25 +248,6 @@ def output_state(output: Output, place: Path | None = None) -> tuple[int, int] |
     return sum(s.st_size for s in states), max((s.st_mtime_ns for s in states), default=0)
 
 
-@contextmanager
-def open_sink(output: Output, context: SinkContext) -> Iterator[Sink]:
-    """Open the sink of an output. An `OSError` of its `with` block is that of the output.
-
-    Raises
-    ------
-    OutputError
-        The sink does not take such results, or the output cannot be written.
-    ConfigError
-        There is no sink with that name.
-    """
-    kind = sink_kind(output.sink)
-    source = "pictures" if context.video is None else "videos"
-    if kind.takes not in ("both", source):
-        raise OutputError(f"{output.path}: the sink {output.sink} is for {kind.takes}")
-    with output_errors(output.path), kind.open(output.path, context) as sink:
-        yield sink
-
-
 class Sinks:
     """The open sinks of several outputs, which get the same results."""
 
@@ -290,8 +268,22 @@ class Sinks:
 
 @contextmanager
 def open_sinks(outputs: Iterable[Output], context: SinkContext) -> Iterator[Sinks]:
-    """Open the sinks of several outputs; errors as of `open_sink`."""
+    """Open the sinks of several outputs. An `OSError` of one is that of its output.
+
+    Raises
+    ------
+    OutputError
+        A sink does not take such results, or an output cannot be written.
+    ConfigError
+        There is no sink of a name.
+    """
+    source = "pictures" if context.video is None else "videos"
+    sinks = {}
     with ExitStack() as stack:
-        yield Sinks(
-            {output.path: stack.enter_context(open_sink(output, context)) for output in outputs}
-        )
+        for output in outputs:
+            kind = sink_kind(output.sink)
+            if kind.takes not in ("both", source):
+                raise OutputError(f"{output.path}: the sink {output.sink} is for {kind.takes}")
+            stack.enter_context(output_errors(output.path))
+            sinks[output.path] = stack.enter_context(kind.open(output.path, context))
+        yield Sinks(sinks)
