@@ -195,7 +195,10 @@ class TestRefused:
     def test_an_output_that_is_an_input(self) -> None:
         Path("out").mkdir()
         Path("out/a.mp4").symlink_to(Path("clips/a.mp4").absolute())
-        with recorded_inputs(), pytest.raises(OutputError, match=r"out/a\.mp4: is an input itself"):
+        with (
+            recorded_inputs(),
+            pytest.raises(OutputError, match=r"out/a\.mp4: is the input itself"),
+        ):
             plan("clips", overwrite=True)
 
     @pytest.mark.parametrize("make", [os.mkfifo, lambda path: path.symlink_to("elsewhere")])

@@ -47,8 +47,8 @@ def test_quiet_and_verbose_work_before_and_after_the_command(
     [
         (("--frames", 10**30), "'--frames'"),
         (("--threads", 10**30), "'--threads'"),
-        (("--start", "999999999:00:00"), "is more than 10,000 hours"),
-        (("--end", "999999999:00:00"), "is more than 10,000 hours"),
+        (("--start", "999999999:00:00"), "is not a time"),
+        (("--end", "999999999:00:00"), "is not a time"),
     ],
 )
 def test_numbers_that_are_too_large_are_wrong_usage(

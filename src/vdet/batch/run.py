@@ -11,11 +11,10 @@ from vdet.batch.inputs import InputVideo, find_sources
 from vdet.batch.manifest import MANIFEST, Record, open_manifest, read_batch
 from vdet.batch.task import is_done, known_outputs, new_record, process_file, replacing_ours
 from vdet.detect.factory import load_detector
-from vdet.errors import BatchError, OutputError
+from vdet.errors import BatchError
 from vdet.files import (
     OutputFiles,
     check_output,
-    is_input,
     make_folder,
     output_errors,
     record_input,
@@ -125,14 +124,12 @@ def _refuse_nested(clips: Iterable[Path], sources: Iterable[InputVideo], folder:
 
 
 def _refuse_shared(runs: Iterable[Run], totals: Iterable[Path], folder: Path) -> None:
-    """Refuse an output with the name of another output, of a total, the manifest or an input."""
+    """Refuse an output with the name of another output, of a total or the manifest."""
     record_input(*(run.source for run in runs))
     owners = {folder / MANIFEST: "the manifest"}
     makers = [(path, "the outputs of all videos") for path in totals]
     makers += [(output.path, str(run.source)) for run in runs for output in run.outputs]
     for path, maker in makers:
-        if is_input(path):
-            raise OutputError(f"{path}: is an input itself; use another folder")
         if path in owners:
             raise BatchError(
                 f"{owners[path]} and {maker}: both would be written to {path}; rename one"

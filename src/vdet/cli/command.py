@@ -10,7 +10,6 @@ import click
 
 from vdet.cli import options as shared
 from vdet.cli.messages import set_up_logs
-from vdet.errors import ConfigError
 from vdet.plugins import COMMANDS, built_in_names, load_plugin, plugin_names
 
 _OTHERS = "Input"
@@ -97,9 +96,7 @@ class Program(click.Group):
         if name not in built_in_names(COMMANDS) and name not in plugin_names(COMMANDS):
             self.commands = {own: load_plugin(COMMANDS, own) for own in built_in_names(COMMANDS)}
             return None  # click suggests one of `commands`
-        command = load_plugin(COMMANDS, name)
-        if not isinstance(command, click.Command):
-            raise ConfigError(f"{name}: is not a click command; repair or reinstall that package")
+        command: click.Command = load_plugin(COMMANDS, name)
         return command
 
     def format_commands(self, _: click.Context, formatter: click.HelpFormatter) -> None:

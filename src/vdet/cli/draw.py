@@ -168,8 +168,6 @@ def _saved(tracks: Path, rate: float | None, run: "Run") -> "list[FrameTracks]":
     saved = read_tracks(tracks, rate)
     if not saved.has_times:
         raise TruthError(f"{tracks}: has no times; CLIP must be the video")
-    start, end = (
-        limit if moment is None else moment
-        for moment, limit in ((run.start, -math.inf), (run.end, math.inf))
-    )
+    start = -math.inf if run.start is None else run.start
+    end = math.inf if run.end is None else run.end
     return [frame for frame in saved if start <= frame.time < end]

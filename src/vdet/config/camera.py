@@ -132,14 +132,11 @@ class ClockSettings(Section):
             texts = re.findall(f"(?=({form}))", name, re.ASCII)
         for text in texts:
             with suppress(ValueError):
-                return moment(self._iso(text) if self.pattern else text)
+                if not self.pattern:
+                    return moment(text)
+                zone = "Z" if "%SZ" in self.pattern else ""
+                return moment(datetime.strptime(text, self.pattern).isoformat() + zone)
         return None
-
-    def _iso(self, text: str) -> str:
-        """Write a time of the pattern as ISO 8601 does. Raises `ValueError`."""
-        pattern = self.pattern or ""
-        zone = "Z" if "%SZ" in pattern else ""
-        return datetime.strptime(text, pattern).isoformat() + zone
 
 
 class CameraSettings(Section):

@@ -7,18 +7,16 @@ settings do not ask for it.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
 
+from vdet.conditions.watch import Conditions
 from vdet.config.schema import Settings
+from vdet.lanes.road import FrameView, Road, RoadFinder
 from vdet.media import Frame, VideoInfo
 from vdet.plugins import STEPS, load_plugin
+from vdet.regions import Regions
 from vdet.run.result import CONDITIONS, Facts, FrameResult
 from vdet.track.track import Track
-
-if TYPE_CHECKING:
-    from vdet.conditions.watch import Conditions
-    from vdet.lanes.road import FrameView, Road, RoadFinder
-    from vdet.regions import Regions
 
 
 class Step(Protocol):
@@ -81,18 +79,12 @@ def make_steps(context: StepContext, others: Sequence[Step] = ()) -> list[Step]:
     settings, width, height = context.settings, context.width, context.height
     steps: list[Step | None] = []
     if context.video is not None:
-        from vdet.conditions.watch import Conditions
-
         steps.append(ConditionStep(Conditions(settings, width, context.unknown)))
     if settings.lanes.enabled:
-        from vdet.lanes.road import RoadFinder
-
         roads = RoadFinder(settings.camera.lens, settings.lanes, width, height)
         has_metres = settings.lack_of_metres is None
         steps.append(LaneStep(roads, settings.detector.foot, has_metres=has_metres))
     if settings.regions:
-        from vdet.regions import Regions
-
         steps.append(RegionStep(Regions(settings.regions, width, height)))
     steps += [load_plugin(STEPS, name)(context) for name in settings.steps]
     return [step for step in (*steps, *others) if step is not None]
@@ -101,7 +93,7 @@ def make_steps(context: StepContext, others: Sequence[Step] = ()) -> list[Step]:
 class LaneStep:
     """Finds the lane, and with `has_metres` the distance and the lane of each vehicle."""
 
-    def __init__(self, roads: "RoadFinder", foot: float, *, has_metres: bool = True) -> None:
+    def __init__(self, roads: RoadFinder, foot: float, *, has_metres: bool = True) -> None:
         self._has_metres = has_metres
         self._roads = roads
         self._foot = foot
@@ -120,7 +112,7 @@ class LaneStep:
         return replace(result, tracks=tracks, facts={**result.facts, "lane": road})
 
 
-def with_positions(tracks: Sequence[Track], road: "Road", foot: float) -> tuple[Track, ...]:
+def with_positions(tracks: Sequence[Track], road: Road, foot: float) -> tuple[Track, ...]:
     """Return the tracks of a frame with the `distance` and the `lane` of their feet.
 
     Both are None without a lane, for a vehicle whose lower edge the frame cuts off, and where
@@ -142,7 +134,7 @@ def with_positions(tracks: Sequence[Track], road: "Road", foot: float) -> tuple[
 class RegionStep:
     """Removes detections and vehicles that stand outside the regions."""
 
-    def __init__(self, regions: "Regions") -> None:
+    def __init__(self, regions: Regions) -> None:
         self._regions = regions
 
     def apply(self, result: FrameResult) -> FrameResult:
@@ -156,7 +148,7 @@ class RegionStep:
 class ConditionStep:
     """Watches what makes the results doubtful; it changes none."""
 
-    def __init__(self, conditions: "Conditions") -> None:
+    def __init__(self, conditions: Conditions) -> None:
         self._conditions = conditions
 
     def apply(self, result: FrameResult) -> FrameResult:

@@ -7,7 +7,7 @@ from contextlib import AbstractContextManager, closing, contextmanager
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from vdet.boxes import NO_BOXES
 from vdet.conditions.finding import Finding
@@ -24,12 +24,10 @@ from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import SinkContext, check_sinks, open_sinks, sink_kind
 from vdet.run.threads import prefetch
 from vdet.traffic.clock import Clock, find_clock
+from vdet.traffic.counts import Counts
 from vdet.traffic.live import LiveTraffic
+from vdet.traffic.records import VehicleRecord
 from vdet.workers import core_count, return_freed_memory
-
-if TYPE_CHECKING:  # most runs count nothing
-    from vdet.traffic.counts import Counts
-    from vdet.traffic.records import VehicleRecord
 
 log = logging.getLogger("vdet")
 
@@ -197,12 +195,12 @@ class Results(Iterator[FrameResult]):
         self._frames.close()
 
     @property
-    def counts(self) -> "Counts | None":
+    def counts(self) -> Counts | None:
         """The counts so far at the lines and in the zones of the settings; None without these."""
         return self._video.traffic.counts() if self._video else None
 
     @property
-    def vehicles(self) -> "tuple[VehicleRecord, ...]":
+    def vehicles(self) -> tuple[VehicleRecord, ...]:
         """A record of each vehicle, by id; none before the last frame."""
         return self._video.traffic.vehicles if self._video else ()
 
