@@ -166,7 +166,8 @@ class Tracker:
         """Follow the vehicles into the next frame; arguments and errors as of `update`."""
         if not self._time < time < math.inf:
             raise ValueError(f"time: {time} s is not after the {self._time} s of the frame before")
-        self._tracker.observe(detections, time, _picture(image))
+        picture = Picture(image) if isinstance(image, np.ndarray) else image
+        self._tracker.observe(detections, time, picture)
         self._time = time
 
     def at(self, time: float) -> list[Track]:
@@ -393,7 +394,3 @@ def _listed(paths: Paths) -> Sequence[PathName]:
 
 def _exact(seconds: Seconds | None) -> Fraction | None:
     return None if seconds is None else Fraction(str(seconds))  # 0.04 means 1/25
-
-
-def _picture(image: Image | Picture | None) -> Picture | None:
-    return image if image is None or isinstance(image, Picture) else Picture(image)

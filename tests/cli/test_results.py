@@ -14,26 +14,26 @@ def test_a_page_and_numbers_that_cannot_be_written_are_refused_before_any_work(
 ) -> None:
     folder, target = tmp_path / "a" / "b", tmp_path / "a.json"
     results = Results(str(target), page=folder, overwrite=False)
-    results.check()
+    results.checked()
     assert not list(tmp_path.iterdir()), "a run that fails leaves no folder"
     results.print(["F1"], {"f1": 0.5}, lambda: "precious")
     for kept in (results, Results(str(target), overwrite=False), Results(None, False, folder)):
         with pytest.raises(OutputError, match="already exists; use --overwrite"):
-            kept.check()
-    Results(str(target), page=folder, overwrite=True).check()
+            kept.checked()
+    Results(str(target), page=folder, overwrite=True).checked()
     with recorded_inputs():
         record_input(target)
         with pytest.raises(OutputError, match="is the input itself"):
-            Results(str(target), overwrite=True).check()
+            Results(str(target), overwrite=True).checked()
     with pytest.raises(OutputError, match=r"the folder .*page\.html is not a folder"):
-        Results(None, page=folder / "page.html", overwrite=True).check()
+        Results(None, page=folder / "page.html", overwrite=True).checked()
     with pytest.raises(OutputError, match="is used for two outputs"):
-        Results(str(folder / "page.html"), page=folder, overwrite=True).check()
+        Results(str(folder / "page.html"), page=folder, overwrite=True).checked()
 
 
 def test_numbers_may_lie_in_the_new_folder_of_the_page(tmp_path: Path) -> None:
     results = Results(str(tmp_path / "a" / "a.json"), page=tmp_path / "a", overwrite=False)
-    results.check()
+    results.checked()
     results.print([], {"f1": 0.5}, lambda: "html")
     assert {file.name for file in (tmp_path / "a").iterdir()} == {"a.json", "page.html"}
 

@@ -25,6 +25,8 @@ from vdet.run.sinks.protocol import BatchTotal, check_sinks, sink_kind
 from vdet.run.video import Run
 from vdet.workers import Workers, call_all
 
+_KILLED = "{}: its process was killed or crashed; it may have run out of memory"
+
 
 @dataclass(frozen=True, slots=True)
 class Plan:
@@ -163,7 +165,7 @@ def run_batch(
             closing(call_all(function, runs, workers)) as results,
         ):
             for run, result in results:
-                record = result or _record_of_killed(run)
+                record = result or replace(new_record(run), error=_KILLED.format(run.source))
                 add(record)
                 yield run, record
             _write_totals(plan)
@@ -171,11 +173,6 @@ def run_batch(
         paths = [output.path for run in runs for output in run.outputs]
         for folder in {path.parent for path in paths} | set(filter(os.path.isdir, paths)):
             remove_stale(folder)
-
-
-def _record_of_killed(run: Run) -> Record:
-    error = f"{run.source}: its process was killed or crashed; it may have run out of memory"
-    return replace(new_record(run), error=error)
 
 
 def _write_totals(plan: Plan) -> None:

@@ -48,8 +48,7 @@ def info(path: Path | None, **targets: Any) -> int:
     """
     from vdet.media.images import is_picture_name
 
-    results = Results(**targets)
-    results.check()
+    results = Results(**targets).checked()
     if path is None:
         facts = _settings() if config_names() else _machine()
     else:

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import click
 
@@ -26,8 +26,8 @@ class Results:
     overwrite: bool
     page: Path | None = None
 
-    def check(self) -> None:
-        """Refuse outputs that could not be written, before any work.
+    def checked(self) -> Self:
+        """Return this; refuse outputs that could not be written, before any work.
 
         Raises
         ------
@@ -41,6 +41,7 @@ class Results:
         for path in paths:
             makes_folder = self.page is not None and self.page.is_relative_to(path.parent)
             check_output(path, overwrite=self.overwrite, makes_folder=makes_folder)
+        return self
 
     @property
     def _files(self) -> dict[str, Path]:

@@ -64,7 +64,7 @@ class TrackSink(BaseSink):
 
     def write(self, result: FrameResult) -> None:
         """Add the tracks of a frame."""
-        frame, clock = result.frame_tracks, self.context.clock
+        frame, clock = result.frame_tracks, self.traffic.clock
         if clock:
             moment = clock.at(frame.time).isoformat(" ", "microseconds")
             frame = replace(frame, facts={CLOCK: moment, **frame.facts})

@@ -219,7 +219,7 @@ PAGE = SinkKind(PageSink, what="pages", marker=PAGE_NAME, takes="videos", total=
 
 
 _NAME = re.compile(r"clip-[\dT-]+-\S+-\d+(\+\d+)?\.(mp4|mov|mkv)")
-_PRECISION = 1_000_000  # parts of a second
+_PRECISION = 1_000_000  # largest denominator of a time, seconds
 
 
 @dataclass(frozen=True, slots=True)
@@ -258,7 +258,8 @@ class ClipSink(BaseSink):
         suffix = copied_suffix(source) if copies else ".mp4"
         for scene in scenes(self._chosen(), settings.clips.margin):
             target = self._folder / f"{self._name(scene)}{suffix}"
-            start, end = _exact(scene.start), _exact(scene.end)
+            sides = scene.start, scene.end
+            start, end = (Fraction(side).limit_denominator(_PRECISION) for side in sides)
             if copies:
                 copy_part(source, start, end, target)
             else:
@@ -273,16 +274,12 @@ class ClipSink(BaseSink):
         return [record for record in records if record.id in counted]
 
     def _name(self, scene: Scene) -> str:
-        (first, *others), when = scene.vehicles, self.context.clock
+        (first, *others), when = scene.vehicles, self.traffic.clock
         moment = clock(int(first.first), hours=True).zfill(8).replace(":", "-")
         if when:
             moment = when.at(first.first).strftime("%Y-%m-%dT%H-%M-%S")
         more = f"+{len(others)}" if others else ""
         return f"clip-{moment}-{in_file_name(first.class_name)}-{first.id}{more}"
-
-
-def _exact(seconds: float) -> Fraction:
-    return Fraction(round(seconds * _PRECISION), _PRECISION)
 
 
 CLIPS = SinkKind(ClipSink, what="clips", marker="clip-*.*", takes="videos")

@@ -16,7 +16,6 @@ from vdet.media import VideoInfo
 from vdet.plugins import SINKS, load_plugin
 from vdet.run.result import Fact, FrameResult
 from vdet.run.sinks import Output
-from vdet.traffic.clock import Clock
 from vdet.traffic.live import LiveTraffic
 
 STANDARD_OUTPUT = Path("-")
@@ -72,11 +71,6 @@ class SinkContext:
     facts: dict[str, Fact] = field(default_factory=dict)
     places: Mapping[Path, Path] = field(default_factory=dict)
     stage_pictures: StagePictures = lambda *_: {}
-
-    @property
-    def clock(self) -> Clock | None:
-        """When the video begins; None where it is not known."""
-        return self.traffic.clock if self.traffic else None
 
 
 class BaseSink:
