@@ -146,23 +146,17 @@ def detect_video(
     vdet detect-video clips/ -d found --tracks .jsonl --skip-existing
     """
     outputs = options.wanted_outputs()
+    for_batch = jobs or skip_existing or dry_run or scheduler
+    is_reversed = start is not None and end is not None and end <= start
     has_stages = any(output.sink == "stages" for output in outputs)
+    has_nothing = no_video and not outputs and (folder or len(videos) < 2)
     for is_wrong, words in (
-        (
-            folder is None and (jobs or skip_existing or dry_run or scheduler),
-            "--jobs, --skip-existing, --dry-run and --scheduler require -d",
-        ),
+        (for_batch and not folder, "--jobs, --skip-existing, --dry-run and --scheduler require -d"),
         (overwrite and skip_existing, "--overwrite and --skip-existing cannot be used together"),
         (jobs and scheduler, "--jobs and --scheduler cannot be used together"),
-        (
-            start is not None and end is not None and end <= start,
-            "--end must be later than --start",
-        ),
+        (is_reversed, "--end must be later than --start"),
         ((at is None) == has_stages, "--stages and --at must be used together"),
-        (
-            no_video and not outputs and (folder or len(videos) < 2),
-            "no output; add one, such as --tracks",
-        ),
+        (has_nothing, "no output; add one, such as --tracks"),
     ):
         if is_wrong:
             raise click.UsageError(words)
