@@ -209,7 +209,6 @@ def settings_options(example: str, *more: Callable[..., Any]) -> Callable[[F], F
     )
     assign = option(
         "--set KEY=VALUE",
-        name="assignments",
         help=f"Change one setting, for example {example}. Can be repeated.",
         multiple=True,
         shell_complete=_complete_keys,

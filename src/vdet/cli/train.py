@@ -17,12 +17,7 @@ from vdet.files import check_output, staged
 @options.settings_options("train.svm.C=1e-4")
 @options.jobs_option
 @options.overwrite_option
-def train(
-    data: tuple[Path, ...],
-    output: Path,
-    jobs: int | None,
-    overwrite: bool,
-) -> None:
+def train(data: tuple[Path, ...], output: Path, jobs: int | None, overwrite: bool) -> None:
     """Train a linear model on labelled patches.
 
     Each DATA is a folder or a zip file with images in vehicles/<group>/ and non-vehicles/<group>/.

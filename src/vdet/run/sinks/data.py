@@ -35,10 +35,10 @@ class TrackSink(BaseSink):
 
     The formats are those of `vdet.labels.formats`. The path `-` stands for standard output, as
     `.jsonl`, frame by frame. In `.jsonl` and `.csv` a frame has `clock`, its moment, where that is
-    known. In `.jsonl` it has `lane` if the lane is looked for: null if none
-    is shown, else an object with `radius` (metres, null on a straight road), `offset` (of the
-    camera from the middle of the lane, metres, positive to the right), `width` (metres), `left` and
-    `right`: each line as `[[x, y], …]`, pixels of the frame, the nearest point first.
+    known. In `.jsonl` it has `lane` if the lane is looked for: null if none is shown, else an
+    object with `radius` (metres, null on a straight road), `offset` (of the camera from the middle
+    of the lane, metres, positive to the right), `width` (metres), `left` and `right`: each line as
+    `[[x, y], …]`, pixels of the frame, the nearest point first.
     """
 
     _file: BinaryIO | None = None
