@@ -125,11 +125,13 @@ class TestFiles:
 
     def test_paths_are_relative_to_their_file(self, tmp_path: Path) -> None:
         (tmp_path / "gate.yaml").write_text(
-            "regions: [{name: r, mask: mask.png}]\ndetector: {model: a.npz}"
+            "regions: [{name: r, mask: mask.png}]\ndetector: {model: a.npz}\n"
+            "labels: {roles: {mask: ignored, model: other}}"
         )
         settings = load_settings([tmp_path / "gate.yaml"], ["detector.model=b.npz"])
         assert settings.regions[0].mask == str(tmp_path / "mask.png")
         assert (settings.detector.kind, settings.detector.model) == ("svm", "b.npz")
+        assert settings.labels.roles == {"mask": "ignored", "model": "other"}
         assert load_settings([tmp_path / "gate.yaml"]).detector.model == str(tmp_path / "a.npz")
 
     def test_a_mistake_has_its_place_in_the_file(self, tmp_path: Path) -> None:

@@ -106,7 +106,12 @@ def _read_file(path: Path) -> Document:
         return str(path.parent / name) if isinstance(name, str) else name
 
     layer = _with_fractions(document.read_document(path))
-    return replace(layer, values=with_changed(layer.values, {"mask", "model"}, from_here))
+    found = {
+        name: with_changed(section, {"mask", "model"}, from_here)
+        for name, section in layer.values.items()
+        if name in ("detector", "regions")  # in `labels.roles` these keys may be labels
+    }
+    return replace(layer, values=layer.values | found)
 
 
 def _over(below: Document, above: Document) -> Document:

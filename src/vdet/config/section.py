@@ -24,13 +24,14 @@ class Section(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _mark_unknown(cls, values: Any) -> Any:
-        """Replace the values of unknown keys by this class: their errors then say which it has.
+        """Replace the values of unknown keys by this class, so that errors can name its keys.
 
         A section without keys is null in YAML, and stands for the defaults.
         """
         if not isinstance(values, dict | None):
             return values
-        return {k: value if k in cls.model_fields else cls for k, value in (values or {}).items()}
+        known = cls.model_fields
+        return {key: value if key in known else cls for key, value in (values or {}).items()}
 
 
 S = TypeVar("S", bound=Section)
