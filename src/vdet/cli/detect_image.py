@@ -1,6 +1,7 @@
 """`vdet detect-image`: find vehicles in pictures."""
 
 import logging
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -76,12 +77,11 @@ def detect_image(
     check_sinks(shared, overwrite=overwrite)
     jobs = plan_pictures(sources, output, stages, overwrite=overwrite)
     is_printed, failed = not (output or stages or shared), 0
-    found = run_pictures(
-        jobs, shared, PictureSearch(model, settings), overwrite=overwrite, threads=core_count()
-    )
-    with progress_steps(" images") as steps:
+    search, threads = PictureSearch(model, settings), core_count()
+    results = run_pictures(jobs, shared, search, overwrite=overwrite, threads=threads)
+    with progress_steps(" images") as steps, closing(results):
         advance = steps("", len(jobs))
-        for result in found:
+        for result in results:
             if isinstance(result, ImageError):
                 log.error("%s", result)
                 failed += 1

@@ -1,6 +1,6 @@
 """Vehicles in still pictures: read the picture, detect, give the result to sinks."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
@@ -145,7 +145,7 @@ def run_pictures(
     *,
     overwrite: bool = False,
     threads: int = 1,
-) -> Iterator[FrameResult | ImageError]:
+) -> Generator[FrameResult | ImageError]:
     """Search pictures; yield the result of each, or why it cannot be read or searched.
 
     `threads` pictures are read and searched at once. The outputs of one picture appear together,
