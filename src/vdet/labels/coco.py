@@ -221,7 +221,7 @@ def read_coco(path: Path, data: bytes) -> SavedTracks:
     ids = (label.id for image in images for label in image.labels)
     if any(image.frame is None for image in images) or NO_ID in ids:
         what = "needs the frame_index of each image and the track_id of each annotation"
-        raise TruthError(f"{path}: {what}; in CVAT, label vehicles as tracks")
+        raise TruthError(f"{path}: {what}; in CVAT, draw each box as a track")
     if len(frames) < len(images):
         raise TruthError(f"{path}: a frame_index occurs twice; use one file for each video")
     times: Times = {

@@ -129,7 +129,7 @@ _UNCLEAR = (".txt", ".csv")
 """Endings that several formats share; the first line of the file decides."""
 
 
-def recognise(path: Path, data: bytes) -> Format:
+def recognize(path: Path, data: bytes) -> Format:
     """Return the format of a file, by its name, or by its content if the name is ambiguous.
 
     Raises

@@ -8,7 +8,7 @@ from pathlib import Path
 from vdet.archives import is_hidden
 from vdet.errors import TruthError
 from vdet.labels.coco import read_coco_pictures
-from vdet.labels.formats import recognise, track_formats
+from vdet.labels.formats import recognize, track_formats
 from vdet.labels.kitti import read_kitti_pictures
 from vdet.labels.label import Label, LabelledVideo, SavedTracks, checked_labels, line_error
 from vdet.labels.mot import MOT
@@ -37,7 +37,7 @@ def read_tracks(path: Path, rate: float | None = None) -> SavedTracks:
     data = read_bytes(path)
     gc.disable()  # a million labels have no cycles, and to look for some takes a fourth of the time
     try:
-        saved = recognise(path, data).read(path, data)
+        saved = recognize(path, data).read(path, data)
         regions = {name for name in {label.name for label in saved.labels} if is_region(name)}
         vehicles = (label for label in saved.labels if not (label.ignored or label.name in regions))
         saved = replace(saved, labels=checked_labels(path, vehicles))
@@ -85,7 +85,7 @@ def read_true_labels(path: Path, roles: Roles) -> SavedTracks:
     if not data.strip():
         names = ", ".join(track_format.name for track_format in track_formats())
         raise TruthError(f"{path}: is empty; ground truth must be a file of {names}")
-    form = recognise(path, data)
+    form = recognize(path, data)
     saved = form.read(path, data)
     labels: Iterable[Label] = saved.labels
     if form is MOT:  # in the older form, the column of the score is the flag
