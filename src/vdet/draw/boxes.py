@@ -51,7 +51,7 @@ def draw_lines(
 def draw_arrow(
     surface: Surface, start: Point, end: Point, color: Color, width: int, *, tip: float
 ) -> None:
-    """Draw an arrow whose tip has the share `tip` of its length."""
+    """Draw an arrow whose tip has the fraction `tip` of its length."""
     first, last = ((round(x), round(y)) for x, y in (start, end))
     for layer, value, halved in _layers(surface, color):
         thickness = max(1, round(width / 2**halved))

@@ -28,7 +28,7 @@ _AGREEMENT = 0.35
 """Minimum intersection over union of two boxes that agree."""
 
 _INSIDE = 0.7
-"""A box with more than this share inside a larger vehicle is a part of it."""
+"""A box with more than this fraction inside a larger vehicle is a part of it."""
 
 _SHARPNESS = 4.0
 """Power of -log(1 - probability) that is a hit's `position` weight: the best fit counts most."""
