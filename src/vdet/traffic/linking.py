@@ -158,32 +158,32 @@ class TrackLinker:
         return [vehicle.path(self._now) for vehicle in self._vehicles.values()]
 
     def _lost(self, shown: Container[int]) -> list[_Lost]:
-        """Return the vehicles that may go on under a new id: that have just ended in the frame.
+        """Return the vehicles that may go on under a new id: they just disappeared in the frame.
 
         Those with a key in `shown` go on anyway. One that would be outside the frame now has left:
-        who comes in there is another. Each has two rows, for the place where it was last and for
-        that where it would be now.
+        a vehicle that appears there is another one. Each has two rows, for the place where it was
+        last and for that where it would be now.
         """
-        return [
-            (key, *row[1:4])
-            for key, vehicle in self._vehicles.items()
-            if key not in shown and self._now - vehicle.shown <= GAP
-            if not vehicle.is_leaving(*self._size)
-            for places in [vehicle.onward(self._now).tolist()]
-            if 0 <= places[1][1] <= self._size[0] and 0 <= places[1][2] <= self._size[1]
-            for row in places
-        ]
+        width, height = self._size
+        lost: list[_Lost] = []
+        for key, vehicle in self._vehicles.items():
+            is_old = self._now - vehicle.shown > GAP
+            if key in shown or is_old or vehicle.is_leaving(width, height):
+                continue
+            before, now = vehicle.onward(self._now)[:, 1:4].tolist()
+            if 0 <= now[0] <= width and 0 <= now[1] <= height:
+                lost += [(key, *before), (key, *now)]
+        return lost
 
     def _begin(self, track: Track, lost: Iterable[_Lost]) -> "_Vehicle":
         """Remember a new vehicle, or the nearest of the lost ones that goes on as this track."""
         foot, (*_, height) = track.written_foot, track.box.xywh
-        near = [
-            (distance, key)
-            for key, x, y, other in lost
-            for distance, largest in [(math.dist(foot, (x, y)), max(height, other))]
-            if largest <= _MAX_GROWTH * min(height, other) and distance <= _REACH * largest
-            if key in self._vehicles  # else it goes on already
-        ]
+        near: list[tuple[float, int]] = []
+        for key, x, y, other in lost:
+            distance, larger = math.dist(foot, (x, y)), max(height, other)
+            is_alike = larger <= _MAX_GROWTH * min(height, other)
+            if key in self._vehicles and is_alike and distance <= _REACH * larger:  # not taken yet
+                near.append((distance, key))
         if near:
             vehicle = self._vehicles.pop(min(near, key=itemgetter(0))[1])
         else:
