@@ -92,6 +92,11 @@ def test_after_that_it_is_not_shown_but_keeps_its_id() -> None:
     assert [id_at(tracks, CAR) for tracks in shown[-5:]] == [1] * 5  # once it is sure again
 
 
+def test_a_vehicle_is_shown_without_detections_for_as_long_as_the_settings_say() -> None:
+    shown = follow([*[[CAR]] * 20, *[[]] * 40], coast_seconds=0.9, confirm_seconds=0.3)
+    assert sum(map(len, shown[20:])) == frames(0.9)
+
+
 def test_weak_detections_do_not_re_identify_a_lost_vehicle() -> None:
     faint = [(place, FAINT) for place in moving(CAR, dx=6, frames=10)]
     missed: list[list[Box]] = [[]] * (CARRIED + 1)

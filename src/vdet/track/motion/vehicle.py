@@ -307,7 +307,8 @@ class Vehicle:
     @property
     def is_present(self) -> bool:
         """Whether it is known and was seen lately."""
-        is_seen = self.unseen <= self._settings.coast_seconds and self.doubtful <= _LONGEST_DOUBT
+        longest = self._settings.coast_seconds
+        is_seen = self.unseen <= longest and self.doubtful <= max(longest, _LONGEST_DOUBT)
         return self.confirmed and self.evidence > 0 and is_seen
 
     @property
