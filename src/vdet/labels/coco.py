@@ -90,8 +90,7 @@ class _Writer:
 def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) -> None:
     """Write the tracks of a video.
 
-    An image has its `time` in seconds, which other programs ignore. A vehicle that is lost is
-    `occluded`.
+    An image has its `time` in seconds, which other programs ignore. A predicted box is `occluded`.
     """
     size = {"width": video.width, "height": video.height}
     classes, writer = last_classes(frames), _Writer("videos", "images", "tracks")
@@ -102,8 +101,8 @@ def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) ->
         writer.add("images", **image, **size, time=time)
         for track in frame.tracks:
             category = writer.category(classes[track.id])
-            lost = track.state == "predicted"
-            attributes = {"occluded": lost, "track_id": track.id, "keyframe": True}
+            occluded = track.state == "predicted"
+            attributes = {"occluded": occluded, "track_id": track.id, "keyframe": True}
             more = {"track_id": track.id, "attributes": attributes}
             writer.add_box(number, track.box, category, track.score, **more)
     for id_, name in classes.items():

@@ -26,7 +26,7 @@ MAX_PART = 1_000_000
 MAX_LINES = 10_000_000
 """Largest number of lines in a file of boxes."""
 
-_NUMBER = re.compile(r"([0-9]{1,8})$", re.ASCII)
+_LAST_NUMBER = re.compile(r"([0-9]{1,8})$", re.ASCII)
 _LATEST = 1e11
 """Largest time in seconds, three thousand years of wall-clock time."""
 
@@ -132,7 +132,7 @@ def parse_whole(text: str) -> int:
 
 def frame_number(name: str) -> int | None:
     """Return the number of a frame at the end of the name of its file; None if there is none."""
-    number = _NUMBER.search(PurePosixPath(name).stem)
+    number = _LAST_NUMBER.search(PurePosixPath(name).stem)
     return int(number[1]) if number else None
 
 

@@ -269,8 +269,12 @@ class _Sight:
 
         Returns
         -------
-        Velocities, m/s `(n, 2)`; places on the lines, metres `(n, 2)`; standard deviations of the
-        speeds, m/s `(n,)`.
+        velocities
+            float64 `(n, 2)`, m/s.
+        fitted
+            float64 `(n, 2)`: the places on the lines, metres.
+        deviations
+            float64 `(n,)`: standard deviations of the speeds, m/s.
         """
         weights = self.weights
         t, origin = self.times - self.times[0], places.mean(axis=0)
