@@ -143,10 +143,11 @@ class TrackLinker:
         lost = [] if shown <= self._vehicles.keys() else self._lost(shown)
         for track in frame.tracks:
             vehicle = self._vehicles.get(track.id) or self._begin(track, lost)
-            vehicle.see(track, self._now, frame.index)
+            *_, width, height = track.box.xywh
+            vehicle.see(track, self._now, frame.index, (width + height) / 2)
             if vehicle.is_another():
                 paths.append(self._split(track.id))
-            self._vehicles[track.id].name(track)
+            self._vehicles[track.id].name(track, height)
         return paths
 
     def start_video(self) -> None:
@@ -233,22 +234,22 @@ class _Vehicle:
     size: float = 0.0
     back: int | None = None
 
-    def see(self, track: Track, time: float, frame: int) -> None:
-        """Add the next frame that shows it."""
+    def see(self, track: Track, time: float, frame: int, size: float) -> None:
+        """Add the next frame that shows it; `size` is that of its box, pixels."""
         if time - self.shown > _OUT_OF_SIGHT:
             self.back = len(self.rows)
         self.box, self.shown = track.box, time
-        self.size = max(self.size, sum(track.box.xywh[2:]) / 2)
+        self.size = max(self.size, size)
         self.rows.extend((time, *track.foot, self.box.y1, self.box.y2, track.score, frame))
         if len(self.rows) % (_STAY * _COLUMNS) == 0 and self.back is None:
             stay = _table(self.rows[-_STAY * _COLUMNS :])
             if np.ptp(stay[:, 1:3], axis=0).max() <= _STANDS * stay[-1, 3]:
                 del self.rows[(1 - _STAY) * _COLUMNS : -_COLUMNS]
 
-    def name(self, track: Track) -> None:
-        """Take in the class so far of its track."""
+    def name(self, track: Track, height: int) -> None:
+        """Take in the class so far of its track, and the height of its box, pixels."""
         largest, _ = self.classes.get(track.id, (0, None))
-        self.classes[track.id] = max(largest, track.box.xywh[3]), track.class_name
+        self.classes[track.id] = max(largest, height), track.class_name
 
     def is_another(self) -> bool:
         """Return whether it drives the other way than before it was out of sight."""
