@@ -93,3 +93,13 @@ def test_an_unconfirmed_track_with_a_higher_score_waits_beside_the_confirmed_one
     unconfirmed.confirmed = True
     assert without(weaker, unconfirmed) == [unconfirmed]
     assert unconfirmed.id == 1
+
+
+@pytest.mark.parametrize(("score", "kept"), [(0.4, 2), (0.6, 1)], ids=["weak", "strong"])
+def test_a_clear_vehicle_in_the_box_of_a_weak_one_is_not_a_part_of_it(
+    score: float, kept: int
+) -> None:
+    both = vehicle(np.array([300.0, 150.0, 510.0, 300.0]), score=score)
+    clear = vehicle(score=0.95, confirmed=False)
+    boxes = np.array([both.state.box, clear.state.box])
+    assert len(without_duplicates([both, clear], boxes)) == kept

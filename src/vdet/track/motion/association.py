@@ -68,6 +68,11 @@ CLEAR = 0.8
 """A detection on a nearer vehicle that scores less than this fraction of its score is a part of it.
 """
 
+_DOUBTED = 0.5
+"""It is not a part of a vehicle that scores less than this fraction of its score: that one's box
+may span two vehicles that were seen as one.
+"""
+
 
 def are_hidden(boxes: Float64Array, present: Sequence[bool]) -> BoolArray:
     """Return for each box whether another one covers more than half of it and is not farther.
@@ -131,7 +136,7 @@ class Case(Enum):
     PART = auto()
     """It is not confirmed, and shows the other's vehicle or a part of it: it is dropped."""
     EMERGING = auto()
-    """It may be a hidden vehicle that comes out from behind the other one."""
+    """It may be a hidden vehicle that comes out, or one of two that the other spans."""
     HIDDEN = auto()
     """It was apart, and follows the vehicle now that hides its own: it is lost."""
 
@@ -204,7 +209,9 @@ def _case(vehicle: Vehicle, other: Vehicle, overlap: _Overlap, hidden: Sequence[
     if vehicle.scores.value <= other.scores.value and one > _LEVEL_OVERLAP:
         return Case.PART
     if inside > PART:
-        return Case.EMERGING if _comes_out(vehicle, other, hidden) else Case.PART
+        is_doubted = other.detection_scores.value < _DOUBTED * vehicle.detection_scores.value
+        is_whole = is_doubted or _comes_out(vehicle, other, hidden)
+        return Case.EMERGING if is_whole else Case.PART
     return Case.APART
 
 
