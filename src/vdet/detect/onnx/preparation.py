@@ -48,9 +48,13 @@ class InputForm:
             width = max(1, round(picture.width * factor))
             height = max(1, round(picture.height * factor))
         left, top = (self.width - width) // 2, (self.height - height) // 2
+        place = Placement(left, top, (width / picture.width, height / picture.height))
+        scaled = _scaled_picture(picture, width, height)
+        if scaled.shape[:2] == (self.height, self.width):
+            return scaled, place
         canvas = np.full((self.height, self.width, 3), GREY, np.uint8)
-        canvas[top : top + height, left : left + width] = _scaled_picture(picture, width, height)
-        return canvas, Placement(left, top, (width / picture.width, height / picture.height))
+        canvas[top : top + height, left : left + width] = scaled
+        return canvas, place
 
 
 class Placement(NamedTuple):

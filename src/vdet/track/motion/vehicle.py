@@ -179,8 +179,8 @@ LONGEST_LOOK = 0.1
 """Seconds for which one frame counts as evidence at most: a single frame must not be enough."""
 
 _LONGEST_DOUBT = 0.6
-"""Seconds for which detections below the decay keep a vehicle present: far off, such weak ones lead
-from one vehicle to the next.
+"""Seconds for which detections below the decay keep a vehicle present; at least `coast_seconds`.
+Far off, such weak ones lead from one vehicle to the next.
 """
 
 _SLOWING_TIME = 0.8
