@@ -20,8 +20,8 @@ HEADINGS: Mapping[str, Sequence[str]] = {
     "Outputs": (
         *("--output", "--no-video", "--tracks", "--counts", "--flows", "--interval", "--vehicles"),
         "--class",
-        *("--crops", "--clips", "--margin", "--exact", "--json", "--page", "--propose"),
-        *("--stages", "--at", "--sink", "--overwrite"),
+        *("--crops", "--clips", "--margin", "--exact", "--json", "--labels", "--page"),
+        *("--propose", "--stages", "--at", "--sink", "--overwrite"),
     ),
     _OTHERS: (),
     "Batch": ("--directory", "--skip-existing", "--dry-run"),

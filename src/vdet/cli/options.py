@@ -6,8 +6,8 @@ Commands do not get the values of those for settings and outputs: `read_settings
 Parameters
 ----------
 configs
-    Read settings from a YAML file, or from a shipped one: default, svm or seed. Can be repeated.
-    Later files win.
+    Read settings from a YAML file, or from a shipped one: default, svm, seed or project-camera. Can
+    be repeated. Later files win.
 model
     Detector model: .npz from vdet train, or .onnx. It determines which detector runs
     (`detector.model`).
