@@ -7,7 +7,7 @@ from typing import Any, Self
 
 import pytest
 
-from vdet.batch.manifest import Record, Written, open_manifest
+from vdet.batch.manifest import Record, Written, open_manifest, read_batch
 from vdet.errors import OutputError
 
 RECORD = Record(
@@ -57,7 +57,8 @@ def test_a_disk_that_is_full_within_a_line_is_named_and_leaves_no_half_line(
         """The file of a disk that takes ten bytes."""
 
         def __init__(self, file: Any) -> None:
-            self.file, self.seek, self.truncate = file, file.seek, file.truncate
+            self.file, self.truncate = file, file.truncate
+            self.seek, self.read = file.seek, file.read
 
         def __enter__(self) -> Self:
             return self
@@ -77,6 +78,13 @@ def test_a_disk_that_is_full_within_a_line_is_named_and_leaves_no_half_line(
     with pytest.raises(OutputError, match=r"manifest\.jsonl: cannot be written: No space left on"):
         fill()
     assert [json.loads(line)["frames"] for line in lines(path)] == [2]
+
+
+def test_half_a_line_that_a_power_cut_left_does_not_spoil_the_next_one(tmp_path: Path) -> None:
+    (tmp_path / "manifest.jsonl").write_text(RECORD.line + RECORD.line[:50], encoding="utf-8")
+    with open_manifest(tmp_path) as add:
+        add(RECORD)
+    assert [record.line for record in read_batch(tmp_path)] == [RECORD.line, RECORD.line]
 
 
 def test_a_second_batch_into_the_folder_is_refused(tmp_path: Path) -> None:

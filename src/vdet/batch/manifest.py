@@ -167,6 +167,11 @@ def open_manifest(folder: Path) -> Iterator[Callable[[Record], None]]:
         except BlockingIOError:
             message = f"{path}: another batch is writing here; wait, or use another folder"
             raise OutputError(message) from None
+        with output_errors(path):
+            size = file.seek(0, os.SEEK_END)
+            file.seek(max(0, size - 1))
+            if file.read() not in (b"", b"\n"):
+                file.write(b"\n")  # a power cut left half a line
 
         def add(record: Record) -> None:
             with output_errors(path):
