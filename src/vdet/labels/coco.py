@@ -4,8 +4,9 @@ For tracks there are `videos` and `tracks` beside the `images`, `annotations` an
 COCO. An image names its `video_id` and `frame_index`, an annotation its `track_id`. All ids count
 from 1, frames and pixels from 0.
 
-CVAT ("COCO 1.0") has the number of a frame at the end of its `file_name`. It imports a box only
-with a `segmentation`, and as one of a track only with `track_id` and `keyframe` in `attributes`.
+CVAT ("COCO 1.0") names the images of a video `frame_` and the number of the frame. It imports a
+box only with a `segmentation`, and as one of a track only with `track_id` and `keyframe` in
+`attributes`.
 Source: Lin et al., "Microsoft COCO: Common Objects in Context", 2014; cocodataset.org, "Data
 format"; Dave et al., "TAO: A Large-Scale Benchmark for Tracking Any Object", 2020; the source code
 of CVAT, `dataset_manager/bindings.py`.
@@ -159,8 +160,10 @@ class _Image:
 
     @property
     def frame(self) -> int | None:
-        """Number of the frame, from 0; None if it is not known."""
-        return frame_number(self.file_name) if self.frame_index is None else self.frame_index
+        """Number of the frame, from 0; CVAT has it only in the name. None if it is unknown."""
+        if self.frame_index is None and Path(self.file_name).name.startswith("frame_"):
+            return frame_number(self.file_name)
+        return self.frame_index
 
     @property
     def size(self) -> Size | None:
