@@ -47,10 +47,10 @@ PITCH = (0, 2, 4, 5, 3, 0, -3, -4, -2)
 """Rows of 720 by which the horizon of a camera that pitches lies lower, for two frames each."""
 EDGES = (0, 10, 20, 30, 40, 55)
 """Ranges of the true distance, metres."""
-MOST = 40
+FARTHEST = 40
 RIGHT = 0.1
 """Largest error of a distance that counts as right, fraction of it."""
-LEAST_IOU = 0.5
+MIN_IOU = 0.5
 """Of a shown box with the vehicle whose place it is compared with."""
 
 
@@ -114,7 +114,7 @@ def main() -> None:
         by_drive = [[*steps[name](drive)] for drive in [*drives()][::every]]
         print_table(name, [sample for samples in by_drive for sample in samples])
         worst = min(_right(samples) for samples in by_drive)
-        print(f"worst of {len(by_drive)} scenes, to {MOST} m: {worst:.1%} within {RIGHT:.0%}\n")
+        print(f"worst of {len(by_drive)} scenes, to {FARTHEST} m: {worst:.1%} within {RIGHT:.0%}\n")
 
 
 def drives() -> Iterator[Drive]:
@@ -205,20 +205,20 @@ def _matched(scene: Scene, index: int, tracks: Sequence[Track]) -> Iterator[Samp
     for track in tracks:
         best = max(boxes, key=lambda box: box.box.iou(track.box))
         counts = must_be_found(best, scene.camera.height)
-        if counts and best.box.iou(track.box) > LEAST_IOU:
+        if counts and best.box.iou(track.box) > MIN_IOU:
             yield Sample(places[best.id], track)
 
 
 def _right(samples: Sequence[Sample]) -> float:
-    known = [s for s in samples if s.reported.distance is not None and s.truth.distance <= MOST]
+    known = [s for s in samples if s.reported.distance is not None and s.truth.distance <= FARTHEST]
     return float(np.mean([abs(sample.error) <= RIGHT for sample in known])) if known else 1.0
 
 
 def print_table(name: str, samples: Sequence[Sample]) -> None:
-    """Print a row for each range of the distance, and one for all up to `MOST`."""
+    """Print a row for each range of the distance, and one for all up to `FARTHEST`."""
     print(f"| {name}: metres | boxes | none | mean | median | 95 % | within 10 % | lane right |")
     print("|---|---|---|---|---|---|---|---|")
-    for low, high in (*pairwise(EDGES), (0, MOST)):
+    for low, high in (*pairwise(EDGES), (0, FARTHEST)):
         inside = [sample for sample in samples if low < sample.truth.distance <= high]
         known = [sample for sample in inside if sample.reported.distance is not None]
         if known:

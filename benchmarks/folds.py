@@ -35,9 +35,9 @@ from vdet.track.factory import make_tracker
 from vdet.workers import limit_library_threads
 
 BLOCKS = 5
-LEAST = 0.2  # probability of the windows that are kept for the sweeps
+MIN_PROBABILITY = 0.2  # probability of the windows that are kept for the sweeps
 SETTINGS = (
-    f"detector.search.probability={LEAST}",
+    f"detector.search.probability={MIN_PROBABILITY}",
     "train.svm.augmentation=false",  # half the memory, a third of the time
 )
 SWEEPS = {
@@ -83,7 +83,7 @@ class Searching:
         assert index is not None
         block = int(_block_of(np.array([index + 1]), self.last)[0])
         candidates = self.detectors[block].search(picture, index)
-        return index, candidates[0].hits(LEAST)
+        return index, candidates[0].hits(MIN_PROBABILITY)
 
     def detect(self, candidates: tuple[int, Windows]) -> Boxes:
         index, self.windows[index] = candidates

@@ -52,9 +52,9 @@ RATE = Fraction(25, 2)
 FRAMES = int(SECONDS * RATE)
 NEAR = 0.05
 """Largest relative error of a speed that is right."""
-LEAST_IOU = 0.5
+MIN_IOU = 0.5
 """Of a shown box with that of the vehicle that it shows."""
-LEAST_WIDTH = 0.015
+MIN_WIDTH = 0.015
 """Fraction of the frame's width from which a true box is shown, as a tracker does."""
 
 _FAR, _NEAR, _SIDE = 90.0, -15.0, -30.0  # metres; where lanes and the side road begin and end
@@ -112,7 +112,7 @@ class PoleScene:
                 tuple(
                     Track(true_box.id, true_box.box, 1.0, "detected", "car")
                     for true_box in true_boxes(self.scene, index)
-                    if true_box.box.width >= LEAST_WIDTH * WIDTH
+                    if true_box.box.width >= MIN_WIDTH * WIDTH
                 ),
             )
 
@@ -306,7 +306,7 @@ def _same(truth: Sequence[FrameTracks], shown: Sequence[FrameTracks]) -> dict[in
     for frame in truth:
         for true in frame.tracks:
             for track in by_index.get(frame.index, ()):
-                if track.box.iou(true.box) > LEAST_IOU:
+                if track.box.iou(true.box) > MIN_IOU:
                     hits.setdefault(true.id, Counter())[track.id] += 1
     return {number: found.most_common(1)[0][0] for number, found in hits.items()}
 

@@ -26,8 +26,8 @@ from vdet.traffic.proposals import propose_lines
 
 LARGE = 0.08
 """Fraction of the vehicles from which a stream should have a line."""
-LEAST = 5
-ALL, MOST = 0.7, 0.5
+MIN_VEHICLES = 5
+MIN_OWN, MIN_ALL = 0.7, 0.5
 LENGTHS = 1.5
 """Way of a vehicle that can be followed, in heights of its largest box."""
 
@@ -52,7 +52,7 @@ def proposed(scene: PoleScene, found: Sequence[FrameTracks] = ()) -> Proposed:
         for path in paths
         if math.dist(path.points[0], path.points[path.seen - 1]) >= LENGTHS * path.heights.max()
     )
-    large = {flow for flow, n in size.items() if n >= max(LEAST, LARGE * size.total())}
+    large = {flow for flow, n in size.items() if n >= max(MIN_VEHICLES, LARGE * size.total())}
     settings = Settings(
         traffic=TrafficSettings(
             lines=tuple(
@@ -75,7 +75,7 @@ def proposed(scene: PoleScene, found: Sequence[FrameTracks] = ()) -> Proposed:
             if (event.name, event.direction) == (line.name, "left")
         )
         flow, most = next(iter(counted.most_common(1)), (None, 0))
-        fits = flow and most >= ALL * size[flow] and most >= MOST * counted.total()
+        fits = flow and most >= MIN_OWN * size[flow] and most >= MIN_ALL * counted.total()
         if flow is None or not fits or flow in used:
             useless += 1
         else:

@@ -19,9 +19,9 @@ def zipped(name: str, data: bytes, compression: int = zipfile.ZIP_DEFLATED) -> b
     return file.getvalue()
 
 
-def member(data: bytes, name: str = "a", most: int = 10**9) -> bytes:
+def member(data: bytes, name: str = "a", limit: int = 10**9) -> bytes:
     with open_archive(io.BytesIO(data)) as archive:
-        return read_member(archive, name, most=most)
+        return read_member(archive, name, limit=limit)
 
 
 @given(st.binary(), st.sampled_from([zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED]))
@@ -41,7 +41,7 @@ def test_a_member_is_read_as_it_was_written(data: bytes, compression: int) -> No
 )
 def test_the_error_says_why_a_member_is_not_read(data: bytes, words: str) -> None:
     with pytest.raises(ArchiveError, match=words):
-        member(data, most=100)
+        member(data, limit=100)
 
 
 def test_a_member_is_unpacked_no_further_than_it_claims_to_go() -> None:

@@ -254,8 +254,8 @@ def test_a_folder_that_the_work_makes_may_be_missing(tmp_path: Path) -> None:
     assert names(tmp_path) == ["file"]
 
 
-def read(path: Path, most: int) -> bytes:
-    return read_whole(path, most=most, what="letter", error=ConfigError)
+def read(path: Path, limit: int) -> bytes:
+    return read_whole(path, limit=limit, what="letter", error=ConfigError)
 
 
 def read_all(path: Path) -> bytes:

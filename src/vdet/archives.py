@@ -74,19 +74,19 @@ def _mistake(member: zipfile.ZipInfo, earlier: Mapping[str, None]) -> str | None
     return None
 
 
-def read_member(archive: zipfile.ZipFile, name: str, *, most: int) -> bytes:
+def read_member(archive: zipfile.ZipFile, name: str, *, limit: int) -> bytes:
     """Return a member's content, checksum verified; never unpack more than its stated size.
 
     Raises
     ------
     ArchiveError
-        There is no such member, it is larger than `most` bytes, encrypted, compressed in another
+        There is no such member, it is larger than `limit`, encrypted, compressed in another
         way than `ZIP_DEFLATED`, or damaged.
     """
     try:
         member = archive.getinfo(name)
-        if member.file_size > most:
-            raise ArchiveError(f"its member {name} is larger than {most:,} bytes")
+        if member.file_size > limit:
+            raise ArchiveError(f"its member {name} is larger than {limit:,} bytes")
         if member.flag_bits & _ENCRYPTED:
             raise ArchiveError(f"its member {name} is encrypted")
         if member.compress_type not in _COMPRESSIONS:

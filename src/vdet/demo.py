@@ -17,7 +17,7 @@ from vdet.evaluate.scores import score
 from vdet.files import make_folder, staged, write_whole
 from vdet.labels.reading import read_predictions, read_truth
 from vdet.learn.svm.dataset import find_patches
-from vdet.learn.svm.mining import Most, VideoSource, mine
+from vdet.learn.svm.mining import MiningLimits, VideoSource, mine
 from vdet.learn.svm.training import train
 from vdet.progress import Steps
 from vdet.run.loop import Parts
@@ -51,7 +51,9 @@ traffic:
 """
 _BY_NETWORK = {"video": "found.mp4", "tracks": "found.csv"}
 _ON_POLE = {"video": "counted.mp4", "tracks": "pole.csv", "flows": "flows.csv", "page": "page"}
-_MOST = Most(per_vehicle=2, false_alarms=6, parts=3, probability=0)  # drawn ones are alike
+_LIMITS = MiningLimits(
+    per_vehicle=2, false_alarms=6, parts=3, probability=0
+)  # drawn cars are alike
 _BY_MODEL = {"tracks": "model.csv", "stages": "stages"}
 
 
@@ -109,7 +111,7 @@ def run_demo(
     for source in sources:
         draw(busy_road(rng), source.path, source.truth)
     model = load_svm(linear.svm, None)  # only the places of its windows matter
-    mine(sources, folder / PATCHES, linear, model, most=_MOST, overwrite=overwrite, steps=steps)
+    mine(sources, folder / PATCHES, linear, model, limits=_LIMITS, overwrite=overwrite, steps=steps)
     learnt, _ = train(find_patches([folder / PATCHES]), linear, steps=steps)
     with staged(folder / MODEL, overwrite=overwrite) as temporary:
         save_model(learnt, temporary)

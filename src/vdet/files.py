@@ -343,13 +343,13 @@ def write_json(values: Any, target: str, *, overwrite: bool = False) -> None:
         write_whole(Path(target), json_text(values), overwrite=overwrite)
 
 
-def read_whole(path: Path, *, most: int, what: str, error: type[VdetError]) -> bytes:
+def read_whole(path: Path, *, limit: int, what: str, error: type[VdetError]) -> bytes:
     """Return the content of a file, and record it as an input.
 
     Parameters
     ----------
-    most
-        Bytes. A larger file is refused after `most` + 1 bytes, whatever size it claims.
+    limit
+        Bytes. A larger file is refused after `limit` + 1 bytes, whatever size it claims.
     what
         What the file should be, for the message.
     error
@@ -359,11 +359,11 @@ def read_whole(path: Path, *, most: int, what: str, error: type[VdetError]) -> b
     try:
         with path.open("rb") as file:
             record_input(file.fileno())
-            # A single read would set memory aside for all of `most`.
-            while len(data) <= most and (chunk := file.read(min(_CHUNK, most + 1 - len(data)))):
+            # A single read would set memory aside for all of `limit`.
+            while len(data) <= limit and (chunk := file.read(min(_CHUNK, limit + 1 - len(data)))):
                 data += chunk
     except OSError as fault:
         raise error(f"{path}: cannot be read: {fault.strerror}") from fault
-    if len(data) > most:
-        raise error(f"{path}: is larger than {most:,} bytes, too large for a {what}")
+    if len(data) > limit:
+        raise error(f"{path}: is larger than {limit:,} bytes, too large for a {what}")
     return bytes(data)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from benchmarks.distances import MOST, RIGHT, Drive, Sample, by_true_boxes
+from benchmarks.distances import FARTHEST, RIGHT, Drive, Sample, by_true_boxes
 from benchmarks.drawn_traffic import traffic_scene
 
 from vdet.media import Picture
@@ -55,7 +55,7 @@ def test_with_the_lines_that_are_found_distances_are_right(
             sample
             for sample in by_true_boxes(scene, index, road)
             if index >= SETTLED
-            and sample.truth.distance <= MOST
+            and sample.truth.distance <= FARTHEST
             and not road.cuts(sample.reported.box)
         ]
     assert len(samples) > 2 * FRAMES

@@ -15,8 +15,8 @@ from vdet.errors import clock
 
 _LIMIT = 0.01
 """Displacement of a camera that is not worth a word, as a fraction of the frame's width."""
-_POINTS, _FEWEST = 80, 12
-"""Number of corners, and that from which a plane can be laid over another."""
+_POINTS, _MIN_POINTS = 80, 12
+"""Number of corners to follow, and the minimum to lay a plane over another."""
 _AGREEING = 0.5
 """Fraction of the corners that must agree with a similarity."""
 _ERROR = 0.3
@@ -61,7 +61,7 @@ class CameraWatch:
         self._times.append(time)
         self._places.append(place)
         is_old = time - self._since > _RENEWED and np.isfinite(place).all()
-        if is_old or len(self._points) < _FEWEST:
+        if is_old or len(self._points) < _MIN_POINTS:
             if np.abs(moved).max() > _ERROR:  # small errors do not add up
                 self._place = place
             self._plane, self._since, self._points = plane, time, _corners(plane, boxes)
@@ -104,13 +104,13 @@ class CameraWatch:
         """
         if self._plane is None:
             return np.zeros((4, 2))
-        if len(self._points) < _FEWEST:
+        if len(self._points) < _MIN_POINTS:
             return np.full((4, 2), np.nan)
         found, status, _ = cv2.calcOpticalFlowPyrLK(
             self._plane, plane, self._points, np.empty(0), winSize=(9, 9), maxLevel=2
         )
         seen = status.ravel() > 0
-        if seen.sum() >= _FEWEST:
+        if seen.sum() >= _MIN_POINTS:
             matrix, agreeing = cv2.estimateAffinePartial2D(
                 self._points[seen], found[seen], ransacReprojThreshold=0.7, maxIters=200
             )

@@ -21,8 +21,8 @@ _RATE = 8.0
 """Grey levels by which the background follows in a second."""
 _NOISE, _CONTRAST = 4.0, 12.0
 """What differs does so by this many times a pixel's usual difference, and by these grey levels."""
-_SMALLEST, _LARGEST = 0.0015, 0.25
-"""Of what counts, as fractions of the frame's area; more is a cloud, or a change of the light."""
+_MIN_AREA, _MAX_AREA = 0.0015, 0.25
+"""Area of a mover, fractions of the frame's; more is a cloud, or a change of the light."""
 _OUTSIDE = 0.5
 """Fraction of it that lies outside the boxes; less is a shadow, or the edge of a vehicle."""
 _TRAVEL = 0.08
@@ -33,8 +33,8 @@ _PLANES = 4
 """Number of planes that show what travels."""
 _REACH = 1.5
 """How far it moves to the next plane, as a multiple of its size."""
-_FEWEST, _FRACTION = 2, 0.15
-"""Number of things, and fraction of all that travelled, from which a finding is reported."""
+_MIN_MOVERS, _MIN_FRACTION = 2, 0.15
+"""Minimum number of movers, and minimum fraction of all that travelled, for a finding."""
 
 
 @dataclass(slots=True, eq=False)
@@ -96,7 +96,7 @@ class MotionWatch:
         """Return how much of what travelled is not a vehicle that was found, and when."""
         left = self._ended + self._unexplained(self._movers)
         fraction = len(left) / max(1, len(left) + len(self._driven))
-        if len(left) < _FEWEST or fraction < _FRACTION:
+        if len(left) < _MIN_MOVERS or fraction < _MIN_FRACTION:
             return []
         spans = joined(sorted(itertools.chain.from_iterable(left)))
         what = f"{fraction:.0%} of the moving objects are not detected vehicles, mostly"
@@ -131,12 +131,12 @@ class MotionWatch:
         _, labels, stats, _ = cv2.connectedComponentsWithStats(closed)
         labels[self._covered > 0] = 0
         areas = stats[:, cv2.CC_STAT_AREA]
-        fewest, most = _SMALLEST * differs.size, _LARGEST * differs.size
+        minimum, maximum = _MIN_AREA * differs.size, _MAX_AREA * differs.size
         things = []
         for number in np.argsort(-areas).tolist():
-            if number and fewest <= areas[number] <= most:
+            if number and minimum <= areas[number] <= maximum:
                 rows, columns = np.nonzero(labels == number)
-                if len(rows) >= max(_OUTSIDE * areas[number], fewest):
+                if len(rows) >= max(_OUTSIDE * areas[number], minimum):
                     center = float(columns.mean()), float(rows.mean())
                     things.append((center, float(max(np.ptp(rows), np.ptp(columns)) + 1)))
         return things

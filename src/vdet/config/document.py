@@ -112,7 +112,7 @@ def read_document(path: Path) -> Document:
     ConfigError
         The file cannot be read, is not YAML, or gives a key twice.
     """
-    data = read_whole(path, most=MAX_BYTES, what="settings file", error=ConfigError)
+    data = read_whole(path, limit=MAX_BYTES, what="settings file", error=ConfigError)
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

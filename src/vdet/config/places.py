@@ -19,8 +19,8 @@ Size = tuple[Side, Side]
 """Width and height of frames, in pixels."""
 Name = Annotated[str, Field(min_length=1, max_length=80)]
 
-MOST_CORNERS = 100
-MOST_SHAPES = 100
+MAX_CORNERS = 100
+MAX_SHAPES = 100
 SHORTEST_LINE = 0.01
 """Length of the shortest line, as a fraction of the frame's width or height."""
 
@@ -50,7 +50,7 @@ def _check_polygon(points: tuple[Point, ...]) -> tuple[Point, ...]:
 
 
 Polygon = Annotated[
-    tuple[Place, ...], Field(max_length=MOST_CORNERS), AfterValidator(_check_polygon)
+    tuple[Place, ...], Field(max_length=MAX_CORNERS), AfterValidator(_check_polygon)
 ]
 
 
@@ -79,7 +79,7 @@ def _check_regions(regions: tuple[RegionSettings, ...]) -> tuple[RegionSettings,
 
 
 RegionList = Annotated[
-    tuple[RegionSettings, ...], Field(max_length=MOST_SHAPES), AfterValidator(_check_regions)
+    tuple[RegionSettings, ...], Field(max_length=MAX_SHAPES), AfterValidator(_check_regions)
 ]
 
 
@@ -121,9 +121,9 @@ _DAY = 24 * 3600
 class TrafficSettings(Section):
     """Lines and zones at which vehicles are counted (`vdet.traffic` explains the rule)."""
 
-    lines: tuple[LineSettings, ...] = Field((), max_length=MOST_SHAPES)
+    lines: tuple[LineSettings, ...] = Field((), max_length=MAX_SHAPES)
     """Lines."""
-    zones: tuple[ZoneSettings, ...] = Field((), max_length=MOST_SHAPES)
+    zones: tuple[ZoneSettings, ...] = Field((), max_length=MAX_SHAPES)
     """Zones."""
     interval: str | None = Field(None, pattern=r"^[1-9][0-9]{0,4} ?(s|min|h)$")
     """Interval of tables and charts, such as 5min, 15min or 1h. null: the whole video; 1min in

@@ -26,7 +26,7 @@ from vdet.version import __version__
 TRUE: Color = (90, 220, 60)
 FOUND: Color = (40, 120, 255)
 
-_MOST_PICTURES, _MOST_CROPS = 9, 24  # of each source; of each video
+_MAX_PICTURES, _MAX_CROPS = 9, 24  # of each source; of each video
 _SCALE = 3.0  # width of the part around a box, in sizes of the box
 
 _Seen = tuple[int, Float64Array, float]
@@ -119,7 +119,7 @@ def worst_tiles(source: MeasuredSet) -> Iterator[Tile]:
     """
     scored = [(score_boxes(image.shown), image) for image in source.images]
     scored.sort(key=lambda pair: -pair[0][1] - pair[0][2])
-    for (_, alarms, misses, *_), image in scored[:_MOST_PICTURES]:
+    for (_, alarms, misses, *_), image in scored[:_MAX_PICTURES]:
         if alarms or misses:
             (frame,), picture = image.shown.frames, image.picture
             caption = f"{misses} missed, {counted(alarms, 'false alarm')}"
@@ -132,7 +132,7 @@ def mistake_tiles(video: Path, comparison: Comparison) -> Iterator[Tile]:
     The video is decoded again. Raises `VideoError`.
     """
     frames = {frame.number: frame for frame in comparison.frames}
-    for mistake, image in _middle_frames(video, mistakes(comparison)[:_MOST_CROPS]):
+    for mistake, image in _middle_frames(video, mistakes(comparison)[:_MAX_CROPS]):
         box = Box(*mistake.box)
         x, y = box.center
         width = max(_SCALE * max(box.width, box.height), image.shape[1] / 8)
@@ -183,7 +183,7 @@ _HEADINGS = {
 }  # fmt: skip
 """Headings of columns, where they are not the name of the attribute."""
 
-_MOST_MISTAKES = 10  # listed for a video
+_MAX_MISTAKES = 10  # listed for a video
 
 Table = tuple[Sequence[str], Sequence[Sequence[str]]]
 """Headings and rows of text."""
@@ -300,7 +300,7 @@ def _mistake_table(clip: ClipResult) -> Table:
     """Return the largest mistakes."""
     return (f"worst errors in {clip.name}", "frames", "boxes", "best IoU"), [
         [mistake.name, mistake.span, str(mistake.boxes), figure(mistake.overlap, 2)]
-        for mistake in mistakes(clip.comparison)[:_MOST_MISTAKES]
+        for mistake in mistakes(clip.comparison)[:_MAX_MISTAKES]
     ]
 
 

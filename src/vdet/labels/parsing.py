@@ -40,7 +40,7 @@ Times = dict[int, tuple[int | str, float]]
 
 def read_bytes(path: Path) -> bytes:
     """Return the content of a file. Raises `TruthError` if it is larger than `MAX_BYTES`."""
-    return read_whole(path, most=MAX_BYTES, what="file of boxes", error=TruthError)
+    return read_whole(path, limit=MAX_BYTES, what="file of boxes", error=TruthError)
 
 
 def numbered_lines(path: Path | str, data: bytes) -> Iterator[tuple[int, str]]:

@@ -151,7 +151,7 @@ def _members(path: Path, data: bytes) -> dict[str, bytes]:
             if sum(archive.getinfo(name).file_size for name in names) > MAX_BYTES:
                 what = f"its labels are larger than {MAX_BYTES:,} bytes; cut the video into parts"
                 raise ArchiveError(what)
-            return {name: read_member(archive, name, most=MAX_BYTES) for name in names}
+            return {name: read_member(archive, name, limit=MAX_BYTES) for name in names}
     except ArchiveError as error:
         raise TruthError(f"{path}: {error}") from error
 

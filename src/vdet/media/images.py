@@ -133,7 +133,7 @@ def read_encoded(path: Path) -> bytes:
     """Return the content of the file of a picture. Raises `ImageError`."""
     if path.is_fifo():  # it may never end, or never begin
         raise ImageError(f"{path}: can be read only once; save it to a file first")
-    return read_whole(path, most=MAX_BYTES, what="picture", error=ImageError)
+    return read_whole(path, limit=MAX_BYTES, what="picture", error=ImageError)
 
 
 def decode_image(data: bytes) -> Image | None:

@@ -37,9 +37,9 @@ def render(template: str, **values: Any) -> str:
     return environment.get_template(template).render(values, version=__version__)
 
 
-def jpeg_uri(image: Image, most: int | None = None) -> str:
-    """Return a BGR uint8 image as a data URI; its longer side gets at most `most` pixels."""
-    if most and (scale := most / max(image.shape[:2])) < 1:
+def jpeg_uri(image: Image, max_side: int | None = None) -> str:
+    """Return a BGR uint8 image as a data URI; its longer side has at most `max_side` pixels."""
+    if max_side and (scale := max_side / max(image.shape[:2])) < 1:
         height, width = (max(1, round(side * scale)) for side in image.shape[:2])
         shrunk = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
         image = np.asarray(shrunk, np.uint8)

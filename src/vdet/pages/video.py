@@ -22,7 +22,7 @@ from vdet.traffic.crossings import Border
 from vdet.traffic.records import VehicleRecord
 from vdet.traffic.speeds import KMH
 
-_MOST_VEHICLES = 300  # in the timeline, and with pictures
+_MAX_VEHICLES = 300  # in the timeline, and with pictures
 _SPEED_STEP = 5  # km/h, of the classes of speeds
 _DOUBT = "#f3d9a4", "#333"  # colours of the row that says when the results are doubtful
 _STOOD = {"standing": "standing", "unknown": "not seen moving"}
@@ -160,7 +160,7 @@ class VideoPage:
 
     def html(self) -> str:
         """Return the page; it loads nothing but the video."""
-        longest = sorted(self.records, key=lambda record: -record.seconds)[:_MOST_VEHICLES]
+        longest = sorted(self.records, key=lambda record: -record.seconds)[:_MAX_VEHICLES]
         shown = sorted(longest, key=lambda record: (record.first, record.id))
         x = charts.time_axis(self.start, self.end, self.zero)
         known = {number: picture for number, (_, picture) in self.thumbnails.items()}

@@ -97,7 +97,7 @@ EVERY_FRAME = SearchRate()
 FIRST_FRAMES = 2
 """Number of frames that `DetectorModel.for_video` gets."""
 
-_MOST_WAITING = 60
+_MAX_WAITING = 60
 """Maximum number of frames that wait for later ones, in memory."""
 
 
@@ -195,7 +195,7 @@ def _delayed(results: Iterable[FrameResult], seconds: Fraction) -> Iterator[Fram
     for result in results:
         waiting.append(result)
         until = result.frame.time - seconds
-        while waiting and (waiting[0].frame.time <= until or len(waiting) > _MOST_WAITING):
+        while waiting and (waiting[0].frame.time <= until or len(waiting) > _MAX_WAITING):
             yield waiting.popleft()
     while waiting:
         yield waiting.popleft()

@@ -21,7 +21,7 @@ from vdet.draw.boxes import GREEN, draw_box
 from vdet.errors import ModelError
 from vdet.media import Picture
 
-_MOST_BOXES = 10_000  # before suppression, those of the highest scores
+_MAX_BOXES = 10_000  # before suppression, those of the highest scores
 
 Candidates = tuple[RawBoxes, InputForm, float]
 """The boxes before suppression, the input that they were found in, and the minimum score."""
@@ -130,7 +130,7 @@ def suppress(boxes: Float32Array, scores: Float32Array, overlap: float) -> Int64
     """
     near, far = boxes[:, :2], boxes[:, 2:]
     places = np.concatenate([near, far - near], axis=1, dtype=np.float64)
-    kept = cv2.dnn.NMSBoxes(places.tolist(), scores.tolist(), 0.0, overlap, top_k=_MOST_BOXES)
+    kept = cv2.dnn.NMSBoxes(places.tolist(), scores.tolist(), 0.0, overlap, top_k=_MAX_BOXES)
     return np.asarray(kept, np.int64).reshape(-1)
 
 

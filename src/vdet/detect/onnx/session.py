@@ -45,7 +45,7 @@ class Session:
     """
 
     def __init__(self, path: Path) -> None:
-        data = read_whole(path, most=MAX_BYTES, what="model", error=ModelError)
+        data = read_whole(path, limit=MAX_BYTES, what="model", error=ModelError)
         # Keeps onnxruntime from reporting to its maker and from writing into the home folder.
         os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")
         import onnxruntime

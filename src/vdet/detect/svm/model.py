@@ -120,7 +120,7 @@ def load_model(path: Path, features: FeatureSettings | None = None) -> LinearMod
         features; its arrays do not fit its features; a value is not finite, or larger than
         `MAX_VALUE`.
     """
-    data = read_whole(path, most=_MAX_BYTES, what="model", error=ModelError)
+    data = read_whole(path, limit=_MAX_BYTES, what="model", error=ModelError)
     try:
         with open_archive(io.BytesIO(data)) as archive, warnings.catch_warnings(action="error"):
             model = _read(archive)
@@ -156,7 +156,7 @@ def _read(archive: zipfile.ZipFile) -> LinearModel:
 
 def _read_array(archive: zipfile.ZipFile, name: str) -> npt.NDArray[Any]:
     """Return an array of the file; one with another length than it claims is a `ValueError`."""
-    data = read_member(archive, f"{name}.npy", most=_MAX_BYTES)
+    data = read_member(archive, f"{name}.npy", limit=_MAX_BYTES)
     file = io.BytesIO(data)
     np.lib.format.read_magic(file)
     shape, is_fortran, dtype = np.lib.format.read_array_header_1_0(file)

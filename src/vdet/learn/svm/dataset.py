@@ -136,9 +136,9 @@ def _contents(places: Iterable[tuple[Path, str]]) -> Iterator[bytes]:
             try:
                 if source.is_dir():
                     path = source / name
-                    yield read_whole(path, most=MAX_PATCH_BYTES, what="patch", error=DataError)
+                    yield read_whole(path, limit=MAX_PATCH_BYTES, what="patch", error=DataError)
                 else:
-                    yield read_member(opened(source), name, most=MAX_PATCH_BYTES)
+                    yield read_member(opened(source), name, limit=MAX_PATCH_BYTES)
             except (DataError, ArchiveError):
                 yield b""
 

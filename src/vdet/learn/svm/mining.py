@@ -40,8 +40,8 @@ shows only a part of one."""
 
 
 @dataclass(frozen=True, slots=True)
-class Most:
-    """Maximum number of windows that are chosen in a frame.
+class MiningLimits:
+    """Maximum numbers of windows to choose in a frame.
 
     For each vehicle, at most `per_vehicle` windows that fit it, and as many others that show it. In
     the whole frame, at most `false_alarms` windows where no vehicle is, and `parts` that show only
@@ -55,7 +55,7 @@ class Most:
     probability: float = 0.2
 
 
-MOST = Most()
+LIMITS = MiningLimits()
 
 _MAX_COVERED = 0.3
 """Largest fraction of a false alarm that a vehicle or an ignore region may cover."""
@@ -79,9 +79,9 @@ def choose_windows(
     frame_width: int,
     rng: np.random.Generator,
     *,
-    most: Most,
+    limits: MiningLimits,
 ) -> Iterator[ChosenWindow]:
-    """Choose from the windows of a frame, of each kind at most as many as `most` says.
+    """Choose from the windows of a frame, at most as many of each kind as `limits` says.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def choose_windows(
     """
     _, first = np.unique(windows.boxes, axis=0, return_index=True)
     boxes, vehicles = from_sizes(windows.boxes[first]), labelled[~ignored]
-    is_hit = windows.probabilities[first] >= most.probability
+    is_hit = windows.probabilities[first] >= limits.probability
     comparisons = [compare_windows(boxes, vehicle, frame_width) for vehicle in vehicles]
     of_none = np.full(len(boxes), np.inf)
     nearest = np.argmin([of_none, *(item.distances for item in comparisons)], axis=0) - 1
@@ -103,18 +103,18 @@ def choose_windows(
     is_alarm = is_hit & (nearest < 0) & ~is_covered.any(axis=1)
     is_part = np.zeros(len(boxes), np.bool_)
 
-    def some(kind: PatchKind, flags: BoolArray, most: int, sides: Any = None) -> Iterator[Any]:
-        for row in sorted(rng.permutation(np.flatnonzero(flags))[:most].tolist()):
+    def some(kind: PatchKind, flags: BoolArray, limit: int, sides: Any = None) -> Iterator[Any]:
+        for row in sorted(rng.permutation(np.flatnonzero(flags))[:limit].tolist()):
             seen = None if sides is None else tuple(sides[row].tolist())
             yield ChosenWindow(kind, Box(*boxes[row].tolist()), seen)
 
     for number, comparison in enumerate(comparisons):
         own = nearest == number
         is_part |= is_hit & comparison.part & ~np.delete(is_covered, number, axis=1).any(axis=1)
-        yield from some("vehicle", comparison.fits & own, most.per_vehicle, comparison.sides)
-        yield from some("box", comparison.shows & own, most.per_vehicle, comparison.sides)
-    yield from some("false alarm", is_alarm, most.false_alarms)
-    yield from some("part", is_part, most.parts)
+        yield from some("vehicle", comparison.fits & own, limits.per_vehicle, comparison.sides)
+        yield from some("box", comparison.shows & own, limits.per_vehicle, comparison.sides)
+    yield from some("false alarm", is_alarm, limits.false_alarms)
+    yield from some("part", is_part, limits.parts)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -266,7 +266,7 @@ def mine(
     settings: Settings,
     model: SvmModel,
     *,
-    most: Most = MOST,
+    limits: MiningLimits = LIMITS,
     overwrite: bool = False,
     steps: Steps = no_steps,
 ) -> tuple[int, Counter[PatchKind]]:
@@ -282,8 +282,8 @@ def mine(
         The zip file to write; `overwrite` replaces an existing one.
     model
         The model whose false alarms are searched for.
-    most
-        Most patches of each kind in a frame, and the minimum probability of false alarms.
+    limits
+        Maximum numbers of patches in a frame, and the minimum probability of false alarms.
     steps
         Called for each source with its name and its number of frames.
 
@@ -314,7 +314,7 @@ def mine(
                 searched += 1
                 rng, width = np.random.default_rng(frame.index), frame.picture.width
                 boxes = labels.boxes, labels.ignored
-                for chosen in choose_windows(windows, *boxes, width, rng, most=most):
+                for chosen in choose_windows(windows, *boxes, width, rng, limits=limits):
                     x, y, side, _ = chosen.box.xywh
                     patch = to_patch(cut_window(frame.image, x, y, side, side), PATCH)
                     folder = _FOLDERS[chosen.kind].format(stem)
