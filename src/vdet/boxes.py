@@ -27,8 +27,10 @@ Image = npt.NDArray[np.uint8]
 
 _Rows = slice | Sequence[int] | npt.NDArray[Any]
 
+EDGE = 0.005
+"""A box that ends this near to a side of the frame is cut off by it, fraction of the frame."""
 _NESTED = 0.8
-"""Fraction of a box from which on it lies in another one."""
+"""Minimum fraction of a box inside another one that it is nested in."""
 
 
 @dataclass(frozen=True, slots=True)

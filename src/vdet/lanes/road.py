@@ -12,7 +12,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from vdet.boxes import Box, Float64Array, Image
+from vdet.boxes import EDGE, Box, Float64Array, Image
 from vdet.config.camera import LensSettings
 from vdet.config.schema import LaneSettings
 from vdet.draw.boxes import Color, Surface, draw_label, draw_lines, line_width, shade
@@ -27,8 +27,6 @@ _CURVE_MEMORY = 0.95
 """Fraction of the frames before in the radius that is shown."""
 _STRAIGHT = 5000.0
 """Radius from which the road counts as straight, metres."""
-_EDGE = 0.005
-"""A box that ends this near to the frame's edge is cut off: fraction of the width or height."""
 _LINE_POINTS = 24  # of each line of a `Lane`
 _REACH = 1.25
 """Farthest reported vehicle, as a multiple of the distance up to which the lane is fitted."""
@@ -145,8 +143,8 @@ class Road:
     def cuts(self, box: Box) -> bool:
         """Return whether the left, right or lower edge of the frame cuts its box."""
         height, width = self.view.picture.height, self.view.picture.width
-        beside = box.x1 <= _EDGE * width or box.x2 >= (1 - _EDGE) * width
-        return bool(beside or box.y2 >= (1 - _EDGE) * height)
+        beside = box.x1 <= EDGE * width or box.x2 >= (1 - EDGE) * width
+        return bool(beside or box.y2 >= (1 - EDGE) * height)
 
     def position(self, foot: tuple[float, float]) -> RoadPosition | None:
         """Return where on the road a vehicle is that stands at `foot` in the frame.

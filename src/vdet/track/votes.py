@@ -7,7 +7,7 @@ as counts, records and pages, uses the class of the track's last row.
 from collections import defaultdict
 from collections.abc import Mapping
 
-from vdet.boxes import Float64Array
+from vdet.boxes import EDGE, Float64Array
 from vdet.detect.classes import UNKNOWN
 
 _USUAL, _USUAL_NEEDS = "car", 0.6
@@ -24,9 +24,6 @@ _CLOSE = 0.05
 
 _CUT_OFF = 0.1
 """What a search that sees only a part of the vehicle counts: a cut-off truck looks like a car."""
-
-_BORDER = 0.005
-"""A box that ends this near to the side of the frame is cut off, as a fraction of the frame."""
 
 
 class ClassVotes:
@@ -70,5 +67,5 @@ def vote_weight(box: Float64Array, score: float, size: tuple[int, int]) -> float
     """
     x1, y1, x2, y2 = map(float, box / (*size, *size))
     area = min((x2 - x1) * (y2 - y1), _CLOSE)
-    is_whole = min(x1, y1) > _BORDER and max(x2, y2) < 1 - _BORDER
+    is_whole = min(x1, y1) > EDGE and max(x2, y2) < 1 - EDGE
     return score * area * (1 if is_whole else _CUT_OFF)

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vdet.boxes import Float64Array
+from vdet.boxes import EDGE, Float64Array
 from vdet.lanes.ground import Ground
 from vdet.track.track import FrameTracks
 from vdet.traffic.counts import Counts
@@ -29,8 +29,6 @@ MIN_SECONDS = 0.5
 KMH = 3.6
 """km/h in 1 m/s."""
 
-_EDGE = 0.005
-"""A box that ends this near to the frame's edge is cut off, as a fraction of the frame's side."""
 _SLIMNESS = 0.4
 """Width of a vehicle as a fraction of its length."""
 _LENGTHS = 1.5, 20.0
@@ -134,7 +132,7 @@ class SpeedMeter:
 
     def __init__(self, ground: Ground, width: int, height: int) -> None:
         self.ground = ground
-        self._sides = _EDGE * width, (1 - _EDGE) * width, (1 - _EDGE) * height
+        self._sides = EDGE * width, (1 - EDGE) * width, (1 - EDGE) * height
         self._rows: dict[int, array[float]] = {}
         self._known: dict[int, Speeds | None] = {}
 

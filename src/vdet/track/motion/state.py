@@ -14,7 +14,7 @@ from typing import Self
 
 import numpy as np
 
-from vdet.boxes import Float64Array
+from vdet.boxes import EDGE, Float64Array
 
 _MAX_NEARER = 0.3
 """Largest change of the distance in a step that is believed, as a fraction of it."""
@@ -27,9 +27,6 @@ _ACCELERATION = 0.8
 
 _VELOCITY = 2.5
 """Standard deviation of a new vehicle's velocity, sizes of the vehicle a second."""
-
-_BORDER = 0.005
-"""A box that ends this near to the frame's side, as a fraction of the frame, touches it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -146,8 +143,8 @@ def whole_box(mean: Float64Array) -> Float64Array:
 
 def _ways_in(box: Float64Array, size: tuple[int, int]) -> tuple[int, int]:
     (width, height), (x1, y1, x2, y2) = size, box.tolist()
-    across = (x1 <= _BORDER * width) - (x2 >= width - _BORDER * width)
-    return across, (y1 <= _BORDER * height) - (y2 >= height - _BORDER * height)
+    across = (x1 <= EDGE * width) - (x2 >= width - EDGE * width)
+    return across, (y1 <= EDGE * height) - (y2 >= height - EDGE * height)
 
 
 def _measurement(box: Float64Array) -> Float64Array:
