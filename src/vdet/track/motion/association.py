@@ -8,6 +8,7 @@ vehicle: two would be in the same place.
 import math
 from collections.abc import Sequence
 from enum import Enum, auto
+from typing import NamedTuple
 
 import numpy as np
 
@@ -141,13 +142,23 @@ class Case(Enum):
     """It was apart, and follows the vehicle now that hides its own: it is lost."""
 
 
-_Overlap = tuple[float, float, bool]
-"""How the box of a track lies to that of another one.
+class _Overlap(NamedTuple):
+    """How the box of a track overlaps that of another one.
 
-Which fraction of it is inside the other box; how much the two show one vehicle, which is the
-fraction of the smaller one in the other if they are level, 1 if they are alike, or else 0; and
-whether they are alike.
-"""
+    Attributes
+    ----------
+    inside
+        Fraction of it that is inside the other box.
+    same
+        How much the two show one vehicle: the fraction of the smaller box inside the other if they
+        are level, 1 if they are alike, else 0.
+    alike
+        Whether their intersection over union is high.
+    """
+
+    inside: float
+    same: float
+    alike: bool
 
 
 def without_duplicates(vehicles: Sequence[Vehicle], boxes: Float64Array) -> list[Vehicle]:
@@ -165,7 +176,7 @@ def without_duplicates(vehicles: Sequence[Vehicle], boxes: Float64Array) -> list
     overlaps = np.maximum(inside, inside.T)
     bottoms, heights = boxes[:, 3], boxes[:, 3] - boxes[:, 1]
     level = abs(bottoms - bottoms[:, None]) < _LEVEL * np.minimum(heights, heights[:, None])
-    one = np.where(alike, 1.0, overlaps * level)
+    same = np.where(alike, 1.0, overlaps * level)
     hidden = [vehicle for vehicle in vehicles if vehicle.hidden]
     kept: list[int] = []
 
@@ -180,7 +191,7 @@ def without_duplicates(vehicles: Sequence[Vehicle], boxes: Float64Array) -> list
             other = vehicles[at]
             if other.unseen or not other.confirmed:
                 continue
-            overlap = inside[row, at], one[row, at], alike[row, at]
+            overlap = _Overlap(inside[row, at], same[row, at], alike[row, at])
             match _case(vehicle, other, overlap, hidden):
                 case Case.DUPLICATE:
                     other.merge(vehicle)
@@ -198,17 +209,16 @@ def without_duplicates(vehicles: Sequence[Vehicle], boxes: Float64Array) -> list
 
 def _case(vehicle: Vehicle, other: Vehicle, overlap: _Overlap, hidden: Sequence[Vehicle]) -> Case:
     """Return what a track is beside another one, higher in rank, that it overlaps; both see."""
-    inside, one, alike = overlap
     if min(vehicle.age, other.age) > _APART:
-        if not alike:
+        if not overlap.alike:
             return Case.APART
         return Case.HIDDEN if vehicle.confirmed else Case.PART
     if vehicle.confirmed:
         fraction = PART if max(vehicle.age, other.age) > _APART else _LEVEL_OVERLAP
-        return Case.DUPLICATE if one > fraction else Case.APART
-    if vehicle.scores.value <= other.scores.value and one > _LEVEL_OVERLAP:
+        return Case.DUPLICATE if overlap.same > fraction else Case.APART
+    if vehicle.scores.value <= other.scores.value and overlap.same > _LEVEL_OVERLAP:
         return Case.PART
-    if inside > PART:
+    if overlap.inside > PART:
         is_doubted = other.detection_scores.value < _DOUBTED * vehicle.detection_scores.value
         is_whole = is_doubted or _comes_out(vehicle, other, hidden)
         return Case.EMERGING if is_whole else Case.PART
