@@ -329,9 +329,9 @@ def print_now(text: str) -> None:
     sys.stdout.flush()
 
 
-def json_text(values: Any) -> str:
-    """Return values as JSON, indented."""
-    return json.dumps(values, indent=2, allow_nan=False) + "\n"
+def json_text(values: Any, *, ensure_ascii: bool = True) -> str:
+    """Return values as JSON, indented; only ASCII can be printed everywhere."""
+    return json.dumps(values, indent=2, allow_nan=False, ensure_ascii=ensure_ascii) + "\n"
 
 
 def write_json(values: Any, target: str, *, overwrite: bool = False) -> None:

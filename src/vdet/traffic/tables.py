@@ -1,7 +1,6 @@
 """Tables and JSON files of one video and of many; in those of many, the video comes first."""
 
 import csv
-import json
 import re
 from collections.abc import Mapping, Sequence
 from datetime import datetime
@@ -9,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from vdet.errors import OutputError
-from vdet.files import write_text
+from vdet.files import json_text, write_text
 
 SUFFIXES = (".csv", ".json", ".parquet")
 
@@ -67,8 +66,7 @@ def write_content(path: Path, content: Any) -> None:
     """
     match path.suffix.lower():
         case ".json":
-            text = json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
-            write_text(path, text)
+            write_text(path, json_text(content, ensure_ascii=False))
         case ".parquet":
             _write_parquet(path, content[0], content[1:])
         case _:  # the name of a video may be no valid text
