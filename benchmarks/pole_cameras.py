@@ -318,7 +318,7 @@ def detected(scene: PoleScene, model: DetectorModel) -> list[FrameTracks]:
 
 
 def main() -> None:
-    """Measure all scenes; print a row for each, and the shares of all."""
+    """Measure all scenes; print a row for each, and the fractions of all."""
     names = sys.argv[1:] or ["truth", "detector"]
     model = load_detector(Settings().detector)
     outcomes: dict[str, list[Outcome]] = {name: [] for name in names}

@@ -142,7 +142,7 @@ def test_several_files_are_counted_each_and_together(
     }  # fmt: skip
 
 
-def test_shares_need_the_size_of_the_frames(run: Run, tmp_path: Path) -> None:
+def test_fractions_need_the_size_of_the_frames(run: Run, tmp_path: Path) -> None:
     tracks, lines = write_tracks(tmp_path / "t.csv"), tmp_path / "lines.yaml"
     lines.write_text("traffic: {lines: [{name: gate, start: [0.5, 0], end: [0.5, 1]}]}")
     result = run("count", tracks, "-c", lines)

@@ -109,8 +109,8 @@ def contrast(one: Color, other: Color) -> float:
     """Return the contrast ratio of two colours, 1 to 21, as WCAG 2.1 defines it."""
 
     def luminance(color: Color) -> float:
-        shares = [value / 255 for value in reversed(color)]
-        linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in shares]
+        channels = [value / 255 for value in reversed(color)]
+        linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in channels]
         return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
 
     low, high = sorted([luminance(one), luminance(other)])

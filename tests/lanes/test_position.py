@@ -69,9 +69,9 @@ def test_a_point_on_a_known_road_gets_its_metres_and_its_lane(
     position = position_on_road(foot, curves, view)
     assert position is not None
     assert position.distance == pytest.approx(distance, rel=1e-3)
-    share = (lateral - shift) / width
-    if abs(share - np.floor(share) - 0.5) > 0.01:  # not on a line
-        assert position.lane == (round(share) if abs(share) < 3.5 else None)
+    fraction = (lateral - shift) / width
+    if abs(fraction - np.floor(fraction) - 0.5) > 0.01:  # not on a line
+        assert position.lane == (round(fraction) if abs(fraction) < 3.5 else None)
 
 
 @pytest.mark.parametrize("row", [-1e6, CAMERA.horizon - 30, CAMERA.horizon, np.nan])

@@ -52,9 +52,9 @@ def read_damaged(path: Path) -> tuple[list[Frame], int]:
         return list(reader), reader.damaged
 
 
-def cut_off(path: Path, share: float) -> Path:
+def cut_off(path: Path, fraction: float) -> Path:
     data = path.read_bytes()
-    path.write_bytes(data[: int(len(data) * share)])
+    path.write_bytes(data[: int(len(data) * fraction)])
     return path
 
 
@@ -156,12 +156,12 @@ def write_hdr(path: Path, transfer: int, lumas: list[int]) -> Path:
     return path
 
 
-def hdr_signal(transfer: int, share: float) -> float:
+def hdr_signal(transfer: int, fraction: float) -> float:
     """Return the signal of a fraction of reference white, 203 cd/m² (BT.2100, BT.2408)."""
     if transfer == 16:
-        power = (203 * share / 10_000) ** 0.1593017578125
+        power = (203 * fraction / 10_000) ** 0.1593017578125
         return float(((0.8359375 + 18.8515625 * power) / (1 + 18.6875 * power)) ** 78.84375)
-    scene = (0.203 * share) ** (1 / 1.2)
+    scene = (0.203 * fraction) ** (1 / 1.2)
     if scene <= 1 / 12:
         return float(np.sqrt(3 * scene))
     return float(0.17883277 * np.log(12 * scene - 0.28466892) + 0.55991073)
@@ -169,12 +169,12 @@ def hdr_signal(transfer: int, share: float) -> float:
 
 @pytest.mark.parametrize("transfer", [16, 18])
 def test_hdr_is_read_as_standard_range(transfer: int, tmp_path: Path, warnings: Warnings) -> None:
-    shares = np.array([0, 0.01, 0.18, 0.5])
-    lumas = [round(64 + 876 * hdr_signal(transfer, share)) for share in shares]
+    fractions = np.array([0, 0.01, 0.18, 0.5])
+    lumas = [round(64 + 876 * hdr_signal(transfer, fraction)) for fraction in fractions]
     with VideoReader(write_hdr(tmp_path / "hdr.mkv", transfer, lumas)) as reader:
         (frame,) = reader
         assert reader.info.color == ColorTags(1, 1, 1)
-    expected = 255 * shares ** (1 / 2.4)
+    expected = 255 * fractions ** (1 / 2.4)
     assert np.abs(frame.image[:, 20::40] - expected[:, None]).max() < 5
     assert warnings() == []
 

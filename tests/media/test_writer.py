@@ -66,12 +66,12 @@ class TestMark:
         assert may_replace_video(path), "it is damaged, and vdet wrote it all the same"
 
     @pytest.mark.parametrize("suffix", [".mp4", ".mov", ".mkv", ".avi", ".ts"])
-    @pytest.mark.parametrize("share", [1, 0.7])
+    @pytest.mark.parametrize("fraction", [1, 0.7])
     def test_other_videos_do_not_even_if_they_are_cut_off(
-        self, suffix: str, share: float, tmp_path: Path
+        self, suffix: str, fraction: float, tmp_path: Path
     ) -> None:
         path = write_clip(tmp_path / f"in{suffix}", count=60)
-        path.write_bytes(path.read_bytes()[: int(path.stat().st_size * share)])
+        path.write_bytes(path.read_bytes()[: int(path.stat().st_size * fraction)])
         assert not may_replace_video(path)
 
 

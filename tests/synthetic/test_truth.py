@@ -55,7 +55,7 @@ def test_a_vehicle_right_behind_a_nearer_one_is_hidden_but_keeps_its_box() -> No
     assert front.hidden == 0
 
 
-def test_hidden_is_the_share_of_the_farther_vehicle_that_the_nearer_one_covers() -> None:
+def test_hidden_is_the_fraction_of_the_farther_vehicle_that_the_nearer_one_covers() -> None:
     near, far = parked(1, 12.0, 0.0), parked(2, 30.0, 2.0)
     front, back = drawn(make_scene(near)), drawn(make_scene(far))
     covered = (front & back).sum() / back.sum()

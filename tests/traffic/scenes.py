@@ -43,8 +43,8 @@ def through(*points: tuple[float, float, float], gone: Sequence[tuple[float, flo
             return None
         for (t0, x0, y0), (t1, x1, y1) in pairwise(points):
             if t0 <= time <= t1:
-                share = (time - t0) / (t1 - t0)
-                return x0 + share * (x1 - x0), y0 + share * (y1 - y0)
+                fraction = (time - t0) / (t1 - t0)
+                return x0 + fraction * (x1 - x0), y0 + fraction * (y1 - y0)
         return None
 
     return path

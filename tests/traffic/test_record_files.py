@@ -12,7 +12,7 @@ from vdet.traffic.tables import write_content
 
 HEADING = (
     "id,class,clock,first,last,seconds,detected,interpolated,predicted,mean_score,best_score,"
-    "start_x,start_y,end_x,end_y,length,length_share,x,y,width,height,metres,speed,speed_85,speed_sd,"
+    "start_x,start_y,end_x,end_y,length,length_fraction,x,y,width,height,metres,speed,speed_85,speed_sd,"
     "motion,distance,lane\n"
 )
 BOX = Box.sized(-30, 5, 30, 30)
@@ -37,7 +37,7 @@ def test_json_is_a_list_of_vehicles(tmp_path: Path) -> None:
     assert item == {
         "id": 3, "class": "truck", "clock": None, "first": 0, "last": 0, "seconds": 0,
         "detected": 0, "interpolated": 0, "predicted": 1, "mean_score": 1, "best_score": 1,
-        "path": {"start": [16, 42], "end": [16, 42], "length": 0, "length_share": 0},
+        "path": {"start": [16, 42], "end": [16, 42], "length": 0, "length_fraction": 0},
         "largest": {"x": 1, "y": 2, "width": 30, "height": 40},
         **dict.fromkeys(("metres", "speed", "speed_85", "speed_sd", "motion", "distance", "lane")),
     }  # fmt: skip

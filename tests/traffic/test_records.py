@@ -27,7 +27,7 @@ def test_a_vehicle_has_its_times_frames_and_path() -> None:
     assert found.path[0] == (30, 130)
     assert found.path[-1] == (130, 130)
     assert found.length == pytest.approx(100)
-    assert found.share == pytest.approx(100 / WIDTH)
+    assert found.length_fraction == pytest.approx(100 / WIDTH)
 
 
 def test_scores_are_those_of_all_frames_and_the_largest_box_is_kept() -> None:

@@ -28,8 +28,8 @@ def measured(
 ) -> Speeds | None:
     """Return the speeds of a vehicle whose foot is at `places`, one each frame.
 
-    `noise` and `low` move the lower edge of its box, as shares of its height. `asked` asks for the
-    speeds after every frame.
+    `noise` and `low` move the lower edge of its box, as fractions of its height. `asked` asks for
+    the speeds after every frame.
     """
     rng = np.random.default_rng(seed)
     meter = SpeedMeter(GROUND, WIDTH, HEIGHT)

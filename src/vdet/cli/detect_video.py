@@ -223,7 +223,7 @@ def _with_endings(outputs: list[Output], *, no_video: bool) -> list[Output]:
         if kind.takes == "pictures" or kind.one_frame:
             raise click.UsageError(f"{sink}: cannot be written with -d; remove one of them")
         if not _SUFFIX.fullmatch(suffix) or not kind.takes_name(f"video{suffix}"):
-            known = ", ".join(kind.endings) or f"as in .{sink if kind.marker else 'txt'}"
+            known = ", ".join(kind.endings) or f"as in .{sink if kind.folder_pattern else 'txt'}"
             raise click.UsageError(f"{sink}: with -d, pass only the ending of the names: {known}")
         endings.append(Output(sink, Path(suffix)))
     has_video = no_video or any(output.sink == "video" for output in outputs)

@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from vdet.config.section import FRAME_LENGTH, Pixels, Section, Share
+from vdet.config.section import FRAME_LENGTH, Pixels, Ratio, Section
 
 Searches = Annotated[float | None, Field(gt=0, le=1000)]
 
@@ -28,7 +28,7 @@ class DetectorSettings(Section):
     """
     stride: int | None = Field(None, ge=1, le=100)
     """Search every N-th frame. Overrides searches_per_second."""
-    min_score_still: Share = 0.0
+    min_score_still: Ratio = 0.0
     """Minimum score of a vehicle in a single image. In video, the tracker decides."""
 
     @property
@@ -54,10 +54,10 @@ class NetworkSettings(DetectorSettings):
     kind: Literal["net"] = "net"
     """net: a network."""
     searches_per_second: Searches = 12.0
-    min_score_still: Share = 0.45
+    min_score_still: Ratio = 0.45
     min_score: float = Field(0.03, gt=0, lt=1)
     """Ignore boxes with a lower score."""
-    nms_iou: Share = 0.55
+    nms_iou: Ratio = 0.55
     """Remove a box if its intersection over union with a better one is higher."""
     classes: tuple[str, ...] = Field(
         ("car", "truck", "bus", "motorcycle", "bicycle", "vehicle"), min_length=1, max_length=100
@@ -140,7 +140,7 @@ class WindowSettings(Section):
     size: Annotated[int, Field(ge=8, le=100_000), FRAME_LENGTH]
     """Side of a window, in pixels."""
     overlap: float = Field(ge=0, lt=1)
-    """Fraction of a window that the next one overlaps."""
+    """Ratio of a window that the next one overlaps."""
     top: Pixels
     """First row of the band."""
     bottom: Pixels
@@ -171,7 +171,7 @@ class PerspectiveSettings(Section):
 class SearchSettings(Section):
     """The windows of a frame to search."""
 
-    probability: Share = 0.3
+    probability: Ratio = 0.3
     """Minimum probability of a hit, a window that counts as evidence."""
     windows: tuple[WindowSettings, ...] = Field((), max_length=32)
     """Window sets over fixed rows."""
@@ -221,8 +221,8 @@ class SvmSettings(DetectorSettings):
     kind: Literal["svm"] = "svm"
     """svm: a linear SVM on HOG and colour features."""
     searches_per_second: Searches = 8.0
-    min_score_still: Share = 0.844
-    min_size_still: tuple[Share, Share] = (0.028, 0.0)
+    min_score_still: Ratio = 0.844
+    min_size_still: tuple[Ratio, Ratio] = (0.028, 0.0)
     """Minimum width and height of a vehicle in a single image, as fractions of the image's."""
     features: FeatureSettings = FeatureSettings()
     search: SearchSettings = SearchSettings()

@@ -20,7 +20,7 @@ from vdet.config.camera import CameraSettings, moment
 from vdet.config.detector import DetectorSettings, NetworkSettings, SvmSettings
 from vdet.config.kinds import with_kind
 from vdet.config.places import Place, RegionList, TrafficSettings
-from vdet.config.section import Section, Share
+from vdet.config.section import Ratio, Section
 from vdet.config.tracker import MotionTrackerSettings, TrackerSettings
 from vdet.errors import ConfigError
 
@@ -136,7 +136,7 @@ Seconds = Annotated[float, Field(gt=0, le=60)]
 class InputSettings(Section):
     """The input video."""
 
-    max_damaged: Share = 0.05
+    max_damaged: Ratio = 0.05
     """Maximum fraction of damaged or lost frames."""
     begin: str | None = Field(None, max_length=100)
     """Start time of the video, such as '2026-05-01 07:00+02:00'. null: from camera.clock."""

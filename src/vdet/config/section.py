@@ -13,7 +13,7 @@ FRAME_LENGTH = _FrameLength()
 REFERENCE_HEIGHT = 720
 """Rows of the frames that lengths in frame pixels are given for."""
 Pixels = Annotated[int, Field(ge=0, le=100_000), FRAME_LENGTH]
-Share = Annotated[float, Field(ge=0, le=1)]
+Ratio = Annotated[float, Field(ge=0, le=1)]
 
 
 class Section(BaseModel):

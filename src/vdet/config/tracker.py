@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from vdet.config.section import Pixels, Section, Share
+from vdet.config.section import Pixels, Ratio, Section
 
 Seconds = Annotated[float, Field(ge=0, le=1000)]
 LookAhead = Annotated[float, Field(ge=0, le=10)]
@@ -28,15 +28,15 @@ class MotionTrackerSettings(TrackerSettings):
     rules of the original system, which count frames.
     """
     look_ahead: LookAhead = 0.6
-    min_size: Share = 0.018
+    min_size: Ratio = 0.018
     """Minimum size of a vehicle to be shown: √(width × height), as a fraction of the frame's width.
     At 0.018, a car seen from behind is 2 % of the frame wide.
     """
-    min_score: Share = 0.4
+    min_score: Ratio = 0.4
     """Minimum mean score of a vehicle's latest detections to be shown."""
     confirm_seconds: Seconds = 0.1
     """Evidence needed to show a vehicle: seconds of detections with score 1."""
-    decay: Share = 0.2
+    decay: Ratio = 0.2
     """Evidence that a vehicle loses per second. Detections with lower scores never add up."""
     coast_seconds: Seconds = 0.35
     """Seconds to show a vehicle without detections, by prediction."""
@@ -65,18 +65,18 @@ class RulesTrackerSettings(TrackerSettings):
     """Consecutive detections needed to show a car after a confident peak."""
     wide: Pixels = 200
     """A wider detection is always accepted for its car."""
-    good_fraction: Share = 2 / 3
+    good_fraction: Ratio = 2 / 3
     """A detection wider than this fraction of its car is also accepted."""
     max_combined: Pixels = 250
     """Maximum width of two combined detections of one car."""
-    combined_tolerance: Share = 1 / 3
+    combined_tolerance: Ratio = 1 / 3
     """Maximum difference between the combined and the car's width, as a fraction of the car's
     width."""
     merge_overlap: Pixels = 40
     """Cars in one detection merge if they overlap by more, horizontally and vertically."""
     match_distance: Pixels = 50
     """Maximum distance from a car's last position to search its image."""
-    match_score: Share = 0.5
+    match_score: Ratio = 0.5
     """Minimum score of a match; 1 is perfect."""
     young: int = Field(7, ge=0)
     """Minimum detections to keep a car at its first miss."""

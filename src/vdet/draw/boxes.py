@@ -74,8 +74,8 @@ def write_text(
     for layer, value, halved in _layers(surface, color):
         part = _part(layer, corners, halved)
         covered = masks[halved].reshape(part.shape[:2] + (1,) * (part.ndim - 2))
-        shares = covered * np.float32(1 / 255)
-        part[:] = np.rint(part + (np.array(value, np.float32) - part) * shares)
+        alpha = covered * np.float32(1 / 255)
+        part[:] = np.rint(part + (np.array(value, np.float32) - part) * alpha)
 
 
 @lru_cache(maxsize=256)
@@ -266,8 +266,8 @@ def _lay_out(surface: Surface, text: str, corner: Point) -> tuple[Box, Point, fl
 @cache
 def text_color(background: Color) -> Color:
     """Return black or white: the one with the higher contrast ratio (WCAG 2.1) on a background."""
-    shares = np.array(background) / 255
-    linear = np.where(shares <= 0.04045, shares / 12.92, ((shares + 0.055) / 1.055) ** 2.4)
+    channels = np.array(background) / 255
+    linear = np.where(channels <= 0.04045, channels / 12.92, ((channels + 0.055) / 1.055) ** 2.4)
     luminance = float(linear @ (0.0722, 0.7152, 0.2126)) + 0.05
     return BLACK if luminance**2 > 0.05 * 1.05 else WHITE
 

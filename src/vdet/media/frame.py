@@ -19,8 +19,8 @@ from vdet.media.images import Orientation, from_16_bits, to_ycrcb
 Layers = tuple[Image, Image, Image]
 """Luma, blue and red chroma, uint8 each; chroma may be of half the size of luma."""
 
-LUMA_SHARES = {"bt601": (0.299, 0.114), "bt709": (0.2126, 0.0722)}
-"""Shares of red and blue in luma, ITU-R BT.601 and BT.709."""
+LUMA_WEIGHTS = {"bt601": (0.299, 0.114), "bt709": (0.2126, 0.0722)}
+"""Weights of red and blue in luma, ITU-R BT.601 and BT.709."""
 
 _PLANAR = ("yuv420p", "yuvj420p")
 _MATRICES: dict[int, Literal["bt601", "bt709"]] = {1: "bt709", 2: "bt601", 5: "bt601", 6: "bt601"}
@@ -86,7 +86,7 @@ def _looked_up(layers: Layers, for_luma: Image, for_chroma: Image) -> Layers:
 
 def _from_rgb(matrix: str) -> Float64Array:
     """Return the matrix from red, green, blue to luma, blue chroma, red chroma; 3 × 3."""
-    red, blue = LUMA_SHARES[matrix]
+    red, blue = LUMA_WEIGHTS[matrix]
     luma = np.array([red, 1 - red - blue, blue])
     blue_chroma = (np.array([0, 0, 1]) - luma) / (2 - 2 * blue)
     red_chroma = (np.array([1, 0, 0]) - luma) / (2 - 2 * red)

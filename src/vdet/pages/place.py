@@ -95,7 +95,7 @@ def path_marks(records: Iterable[VehicleRecord], size: tuple[int, int]) -> Itera
     width = max(1, size[1] // 720)
     for record in records:
         path = _inside(record.path, size)
-        if record.share >= _SHORTEST and len(path) > 1:
+        if record.length_fraction >= _SHORTEST and len(path) > 1:
             yield Mark(path, direction_color(path[0], path[-1]), width, is_arrow=True)
 
 

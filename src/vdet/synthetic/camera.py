@@ -65,8 +65,8 @@ def beyond_near(polygon: Float64Array) -> Float64Array:
     for i, current in enumerate(polygon):
         previous = polygon[i - 1]
         if ahead[i - 1] != ahead[i]:
-            share = (NEAR - previous[2]) / (current[2] - previous[2])
-            kept.append(previous + share * (current - previous))
+            fraction = (NEAR - previous[2]) / (current[2] - previous[2])
+            kept.append(previous + fraction * (current - previous))
         if ahead[i]:
             kept.append(current)
     return np.array(kept).reshape(-1, 3)
@@ -88,7 +88,7 @@ def shaded(color: Color, factor: float) -> Color:
     return blue, green, red
 
 
-def mixed(color: Color, other: Color, share: float) -> Color:
-    """Return a colour with this `share` of another one, 0 to 1."""
-    blue, green, red = (round(a + (b - a) * share) for a, b in zip(color, other, strict=True))
+def mixed(color: Color, other: Color, fraction: float) -> Color:
+    """Return a colour mixed with this fraction, 0 to 1, of another one."""
+    blue, green, red = (round(a + (b - a) * fraction) for a, b in zip(color, other, strict=True))
     return blue, green, red

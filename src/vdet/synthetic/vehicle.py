@@ -179,7 +179,7 @@ def _disc(x: float, axle: float, radius: float) -> Float64Array:
 
 
 def _inset(quad: Float64Array, left: float, right: float) -> Float64Array:
-    """Return the part of a quad between two shares of its width, without 14 % below and above.
+    """Return the part of a quad between two fractions of its width, without 14 % below and above.
 
     The corners of a quad are lower left, upper left, upper right, lower right.
     """

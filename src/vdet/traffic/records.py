@@ -27,7 +27,7 @@ Shorter moves are jitter of the boxes.
 _COLUMNS = (
     *("id", "class", "clock", "first", "last", "seconds", "detected", "interpolated", "predicted"),
     *("mean_score", "best_score"),
-    *("start_x", "start_y", "end_x", "end_y", "length", "length_share"),
+    *("start_x", "start_y", "end_x", "end_y", "length", "length_fraction"),
     *("x", "y", "width", "height"),
     *("metres", "speed", "speed_85", "speed_sd", "motion", "distance", "lane"),
 )
@@ -120,7 +120,7 @@ class VehicleRecord:
         return sum(map(math.dist, self.path, self.path[1:]))
 
     @property
-    def share(self) -> float:
+    def length_fraction(self) -> float:
         """Length of the path as a fraction of the frame's width."""
         return self.length / self.frame_width
 
@@ -246,7 +246,7 @@ def _row(record: VehicleRecord, clock: Clock | None) -> dict[str, Any]:
     states = [record.states[state] for state in get_args(State)]
     scores = round(record.mean_score, 4), round(record.best_score, 4)
     ends = [round(value, 1) for point in (record.path[0], record.path[-1]) for value in point]
-    lengths = round(record.length, 1), round(record.share, 4)
+    lengths = round(record.length, 1), round(record.length_fraction, 4)
     speeds: list[float | None] = [None] * 4
     if known := record.speeds:
         measured = known.quantile(0.5), known.quantile(0.85), known.deviation
@@ -265,7 +265,7 @@ def _item(row: Mapping[str, Any]) -> dict[str, Any]:
         return {name: row[name] for name in names}
 
     ends = {end: [row[f"{end}_x"], row[f"{end}_y"]] for end in ("start", "end")}
-    path, largest = values("length", "length_share"), values("x", "y", "width", "height")
+    path, largest = values("length", "length_fraction"), values("x", "y", "width", "height")
     places = {"path": ends | path, "largest": largest}
     return values(*_COLUMNS[:11]) | places | values(*_COLUMNS[-7:])
 

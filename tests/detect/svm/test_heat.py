@@ -10,11 +10,11 @@ from vdet.detect.svm.heat import Heat, find_regions, sum_heat
 from vdet.detect.svm.windows import Windows, lay_grid
 
 
-def found(*windows: tuple[int, int, int, int, float], share: float = 1) -> Windows:
+def found(*windows: tuple[int, int, int, int, float], weight: float = 1) -> Windows:
     boxes = np.array([window[:4] for window in windows], np.int32).reshape(-1, 4)
     probabilities = np.array([window[4] for window in windows], np.float32)
-    shares = np.full(len(windows), share, np.float32)
-    return Windows(boxes, probabilities, shares, boxes.astype(np.float32))
+    weights = np.full(len(windows), weight, np.float32)
+    return Windows(boxes, probabilities, weights, boxes.astype(np.float32))
 
 
 def heat_of(
@@ -68,8 +68,8 @@ def test_a_hit_partly_outside_the_frame_heats_the_inside(
     assert heat_of(found((*window, 1))).values.sum() == pixels
 
 
-def test_with_votes_a_hit_adds_its_probability_times_its_share() -> None:
-    quarters = found((8, 8, 20, 20, 0.5), (20, 20, 20, 20, 1), share=0.25)
+def test_with_votes_a_hit_adds_its_probability_times_its_weight() -> None:
+    quarters = found((8, 8, 20, 20, 0.5), (20, 20, 20, 20, 1), weight=0.25)
     values = heat_of(quarters, votes=0.1).values
     assert (values[2, 2], values[6, 6], values[9, 9]) == (0.125, 0.375, 0.25)
 
@@ -78,9 +78,9 @@ def test_with_votes_a_hit_adds_its_probability_times_its_share() -> None:
 def test_with_votes_heat_does_not_depend_on_overlap(overlap: float) -> None:
     settings = WindowSettings(size=20, overlap=overlap, top=0, bottom=60)
     grid = lay_grid(settings, 100, 60)
-    shares = np.full(len(grid), grid.share, np.float32)
+    weights = np.full(len(grid), grid.weight, np.float32)
     ones, boxes = np.ones(len(grid), np.float32), grid.boxes
-    windows = Windows(boxes, ones, shares, boxes.astype(np.float32))
+    windows = Windows(boxes, ones, weights, boxes.astype(np.float32))
     assert heat_of(windows, votes=0.1).values[7, 12] == pytest.approx(1)
 
 

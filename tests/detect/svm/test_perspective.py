@@ -88,9 +88,9 @@ def test_the_default_sets_in_frames_of_other_shapes(
 
 @given(st.integers(1, 400), st.integers(1, 400), st.floats(0, 1), st.floats(0.01, 1))
 def test_windows_lie_inside_the_rows_of_any_frame(
-    width: int, height: int, horizon: float, share: float
+    width: int, height: int, horizon: float, size: float
 ) -> None:
-    for grid in laid(width, height, horizon, sizes=(share,)):
+    for grid in laid(width, height, horizon, sizes=(size,)):
         boxes = grid.boxes
         assert len(boxes) == len(grid) > 0
         assert boxes[:, 1].min() >= 0

@@ -80,15 +80,15 @@ def test_the_seed_has_831_windows_on_a_720p_frame_the_large_ones_first() -> None
 
 
 class TestSearching:
-    def test_every_window_of_every_set_has_a_probability_and_its_share(self) -> None:
+    def test_every_window_of_every_set_has_a_probability_and_its_weight(self) -> None:
         found = search_all(search_of(SMALL))
         # 4 cells across: the first set's step is 8 pixels of 32, the second's 24 of 48
         assert len(found) == 17 * 5 + 5 * 3
         assert found.boxes[0].tolist() == [0, 24, 32, 32]
         assert found.boxes[-1, 2:].tolist() == [48, 48]
-        assert found.shares.tolist() == [1 / 16] * (17 * 5) + [1 / 4] * (5 * 3)
-        assert found.probabilities.shape == found.shares.shape
-        assert found.probabilities.dtype == found.shares.dtype == np.float32
+        assert found.weights.tolist() == [1 / 16] * (17 * 5) + [1 / 4] * (5 * 3)
+        assert found.probabilities.shape == found.weights.shape
+        assert found.probabilities.dtype == found.weights.dtype == np.float32
         assert len(np.unique(found.probabilities)) > len(found) / 2
 
     def test_what_lies_beyond_the_sides_repeats_the_outermost_columns(self) -> None:

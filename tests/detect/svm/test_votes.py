@@ -120,13 +120,13 @@ def collected(*windows: Windows) -> Votes:
 
 
 class TestCollecting:
-    def test_presence_is_probability_times_share_for_the_hits_of_all_frames(self) -> None:
+    def test_presence_is_probability_times_weight_for_the_hits_of_all_frames(self) -> None:
         def windows(count: int, x: int) -> Windows:
             vehicles = np.tile(np.array([x, 0, 10, 20], np.float32), (count, 1))
             vehicles[:, 0] += np.arange(count)
             values = np.linspace(0.5, 1, count, dtype=np.float32)
-            shares = np.asarray(values / 4, np.float32)
-            return Windows(np.zeros((count, 4), np.int32), values, shares, vehicles)
+            weights = np.asarray(values / 4, np.float32)
+            return Windows(np.zeros((count, 4), np.int32), values, weights, vehicles)
 
         votes = collected(windows(2, 0), windows(0, 0), windows(1, 50))
         assert votes.boxes.tolist() == [[0, 0, 10, 20], [1, 0, 11, 20], [50, 0, 60, 20]]

@@ -50,13 +50,13 @@ def test_all_windows_lie_inside_band_and_frame(
     assert ((w == size) & (h == size)).all()
 
 
-def test_the_share_is_one_over_the_number_of_windows_that_cover_a_pixel() -> None:
+def test_the_weight_is_one_over_the_number_of_windows_that_cover_a_pixel() -> None:
     grid = lay_grid(band(64, 0.75, 0, 320), 320, 320)
     covered = np.zeros((320, 320))
     for x, y, w, h in grid.boxes.tolist():
         covered[y : y + h, x : x + w] += 1
     assert covered[160, 160] == 16
-    assert grid.share == 1 / 16
+    assert grid.weight == 1 / 16
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 50])
@@ -71,13 +71,13 @@ def test_the_grids_of_every_nth_window_together_are_the_whole_grid(n: int) -> No
 def test_hits_are_the_windows_of_at_least_the_probability_in_order() -> None:
     boxes = np.arange(16, dtype=np.int32).reshape(4, 4)
     probabilities = np.array([0.5, 0.25, 0.75, 0.499], np.float32)
-    shares = np.array([1, 0.5, 0.25, 0.125], np.float32)
+    weights = np.array([1, 0.5, 0.25, 0.125], np.float32)
     vehicles = boxes.astype(np.float32) + 0.5
-    windows = Windows(boxes, probabilities, shares, vehicles)
+    windows = Windows(boxes, probabilities, weights, vehicles)
     found = windows.hits(0.5)
     assert found.boxes.tolist() == [[0, 1, 2, 3], [8, 9, 10, 11]]
     assert found.probabilities.tolist() == [0.5, 0.75]
-    assert found.shares.tolist() == [1, 0.25]
+    assert found.weights.tolist() == [1, 0.25]
     assert found.vehicles.tolist() == [[0.5, 1.5, 2.5, 3.5], [8.5, 9.5, 10.5, 11.5]]
     assert len(windows) == 4
     assert len(found) == 2

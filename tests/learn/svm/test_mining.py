@@ -127,9 +127,11 @@ LEFT = (0, 300, 100, 70)
 
 def test_a_window_fits_a_cut_off_vehicle_by_its_visible_side_and_its_height() -> None:
     side = 140
-    windows = [window(side, 900 + share * side) for share in (0.1, 0.25, 0.45, 0.6, 0.7, 0.9)]
+    windows = [window(side, 900 + fraction * side) for fraction in (0.1, 0.25, 0.45, 0.6, 0.7, 0.9)]
     assert flags(*windows, vehicle=RIGHT) == "- shows fits fits shows -"
-    mirrored = [window(side, 100 - share * side) for share in (0.1, 0.25, 0.45, 0.6, 0.7, 0.9)]
+    mirrored = [
+        window(side, 100 - fraction * side) for fraction in (0.1, 0.25, 0.45, 0.6, 0.7, 0.9)
+    ]
     assert flags(*mirrored, vehicle=LEFT) == "- shows fits fits shows -"
     sizes = [window(side, 900 + 0.45 * side) for side in (60, 78, 100, 150, 190, 300)]
     assert flags(*sizes, vehicle=RIGHT) == "- shows fits fits shows -"

@@ -29,7 +29,7 @@ def test_a_run_writes_the_record_and_the_picture_of_its_car(red_clip: Path, tmp_
     assert sum(int(row[state]) for state in ("detected", "interpolated", "predicted")) == len(
         tracks
     )
-    assert float(row["length_share"]) == pytest.approx(float(row["length"]) / WIDTH, abs=1e-3)
+    assert float(row["length_fraction"]) == pytest.approx(float(row["length"]) / WIDTH, abs=1e-3)
     assert float(row["length"]) == pytest.approx(COUNT, abs=COUNT / 4), "a pixel a frame"
     (name,) = names(tmp_path / "crops")
     assert name.startswith("vehicle-0001-at-")

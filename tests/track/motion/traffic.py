@@ -24,7 +24,7 @@ _LANE_WIDTH = 3.7
 
 @dataclass(frozen=True, slots=True)
 class TrueVehicle:
-    """A vehicle in one frame: its visible box `(4,)` and the share that another one hides."""
+    """A vehicle in one frame: its visible box `(4,)` and the fraction that another one hides."""
 
     id: int
     box: Float64Array

@@ -135,8 +135,8 @@ class SvmDetector:
             raise ImageError(f"{many}; use larger steps")
         self._searches = [engine(model, grid) for grid in self.grids]
         self._boxes = np.concatenate([grid.boxes for grid in self.grids])
-        shares = np.array([grid.share for grid in self.grids], np.float32)
-        self._shares = np.repeat(shares, list(map(len, self.grids)))
+        weights = np.array([grid.weight for grid in self.grids], np.float32)
+        self._weights = np.repeat(weights, list(map(len, self.grids)))
         left, top = self._boxes[:, :2].min(axis=0).tolist()
         right, bottom = (self._boxes[:, :2] + self._boxes[:, 2:]).max(axis=0).tolist()
         margin = -(-max(-left, right - width, 0) // _ALIGNMENT) * _ALIGNMENT
@@ -149,7 +149,7 @@ class SvmDetector:
         results = [search.search(frame, probability) for search in self._searches]
         probabilities, sides = map(np.concatenate, zip(*results, strict=True))
         vehicles = vehicle_boxes(self._boxes.astype(np.float32), sides)
-        return Windows(self._boxes, probabilities, self._shares, vehicles), index is None
+        return Windows(self._boxes, probabilities, self._weights, vehicles), index is None
 
     def detect(self, candidates: Candidates) -> Boxes:
         """Add the hits of the next frame to the heat, and return what is hot.

@@ -59,7 +59,7 @@ def sum_heat(recent: Sequence[Windows], size: tuple[int, int], settings: HeatSet
     """Return the blurred sum of the hits of the last frames.
 
     Each hit adds to the values that its vehicle covers: its probability or, with `votes`,
-    its probability times its share.
+    its probability times its weight.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def sum_heat(recent: Sequence[Windows], size: tuple[int, int], settings: HeatSet
     total = np.zeros([-(-side // shrink) for side in reversed(size)], np.float32)
     for hits in recent:
         values = np.zeros_like(total)
-        heats = hits.probabilities * hits.shares if by_votes else hits.probabilities
+        heats = hits.probabilities * hits.weights if by_votes else hits.probabilities
         sides = np.maximum(0, np.floor(from_sizes(hits.vehicles) / shrink + 0.5)).astype(np.int64)
         for (left, top, right, bottom), heat in zip(sides.tolist(), heats.tolist(), strict=True):
             values[top:bottom, left:right] += heat

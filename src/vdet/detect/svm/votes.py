@@ -63,12 +63,12 @@ class Votes:
         can only guess how far a vehicle reaches beyond, so their guesses need not agree.
         """
         boxes = from_sizes(np.concatenate([some.vehicles for some in hits]))
-        shares = np.concatenate([hit.shares for hit in hits], dtype=np.float64)
+        weights = np.concatenate([hit.weights for hit in hits], dtype=np.float64)
         probabilities = np.concatenate([hit.probabilities for hit in hits], dtype=np.float64)
         bounded = np.clip(probabilities, 1 - _MAX_PROBABILITY, _MAX_PROBABILITY)
         position, inside = (-np.log1p(-bounded)) ** _SHARPNESS, visible(boxes, size)
         seen = (inside[:, 2:] - inside[:, :2] >= 1).all(axis=1)
-        return Votes(inside[seen], (probabilities * shares)[seen], position[seen])
+        return Votes(inside[seen], (probabilities * weights)[seen], position[seen])
 
     def within(self, boxes: Iterable[Box]) -> "Votes":
         """Return the votes whose centre lies in one of `boxes`, each once.
@@ -140,7 +140,7 @@ def _vehicles(votes: Votes, minimum: float) -> Iterator[tuple[Float64Array, floa
 
 def _average(boxes: Float64Array, weights: Float64Array, overlaps: Float64Array) -> Float64Array:
     """Average the boxes that agree; a better overlap counts more."""
-    shares = np.where(overlaps > _AGREEMENT, weights * overlaps**2, 0)
-    if not (total := shares.sum()):
+    agreeing = np.where(overlaps > _AGREEMENT, weights * overlaps**2, 0)
+    if not (total := agreeing.sum()):
         return np.asarray(boxes[int(overlaps.argmax())])
-    return np.asarray(shares @ boxes / total)
+    return np.asarray(agreeing @ boxes / total)

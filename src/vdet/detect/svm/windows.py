@@ -46,7 +46,7 @@ class Windows:
         int32 `(n, 4)`: x, y, width, height of the windows, pixels of the frame.
     probabilities
         float32 `(n,)`, 0 to 1.
-    shares
+    weights
         float32 `(n,)`: one over the number of windows of the same set that cover a pixel.
     vehicles
         float32 `(n, 4)`: x, y, width, height of the vehicle in a window, pixels of the frame. Only
@@ -57,7 +57,7 @@ class Windows:
 
     boxes: Int32Array
     probabilities: Float32Array
-    shares: Float32Array
+    weights: Float32Array
     vehicles: Float32Array
 
     def __len__(self) -> int:
@@ -66,7 +66,7 @@ class Windows:
     def hits(self, probability: float) -> "Windows":
         """Return the windows of at least this probability, in the same order."""
         keep = self.probabilities >= probability
-        columns: tuple[Any, ...] = self.boxes, self.probabilities, self.shares, self.vehicles
+        columns: tuple[Any, ...] = self.boxes, self.probabilities, self.weights, self.vehicles
         return Windows(*(column[keep] for column in columns))
 
 
@@ -97,7 +97,7 @@ class WindowGrid:
         return np.array(boxes, np.int32).reshape(-1, 4)
 
     @property
-    def share(self) -> float:
+    def weight(self) -> float:
         """One over the number of windows that cover a pixel in the middle of the grid."""
         along = max(1.0, float(self.size / self.step))
         return 1 / (min(self.columns, along) * min(self.rows, along))
@@ -188,8 +188,8 @@ def lay_perspective(
     """
     cells = features.patch // features.hog.cell
     grids: list[WindowGrid] = []
-    for share in sets.sizes:
-        side = share * min(width, _MAX_ASPECT * height)
+    for fraction in sets.sizes:
+        side = fraction * min(width, _MAX_ASPECT * height)
         halvings = max(0, math.floor(math.log2(max(side, 1) / features.patch)))
         unit = cells << halvings
         size = unit * max(1, round(side / unit))

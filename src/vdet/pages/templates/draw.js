@@ -81,7 +81,7 @@ function placeZone(zone, size) {
     away: (x, y) => sides.reduce((least, side) =>
       Math.min(least, distanceTo(side, clamp(x, INSIDE, right), clamp(y, INSIDE, bottom))), Infinity),
     meeting(a, b) {
-      const met = segments.map(segment => meeting(inFrame(a), inFrame(b), segment)).filter(share => share !== null);
+      const met = segments.map(segment => meeting(inFrame(a), inFrame(b), segment)).filter(fraction => fraction !== null);
       return met.length ? Math.max(...met) : 1;
     },
   };
@@ -150,13 +150,13 @@ function crossings(path, border) {
       if (side && border.isZone) found.push({ time: times[0], row: 0, direction: "appear" });
     } else {
       const a = [xs[row - 1], ys[row - 1]], b = [xs[row], ys[row]];
-      const share = border.meeting(a, b), along = share ?? 1;
+      const fraction = border.meeting(a, b), along = fraction ?? 1;
       const place = [a[0] + along * (b[0] - a[0]), a[1] + along * (b[1] - a[1])];
       const way = crossed ? Math.hypot(crossed[0] - place[0], crossed[1] - place[1]) : Infinity;
       if (!settles(path, border, row, end, way)) continue; // back, but not far
-      crossed = share === null ? null : place;
+      crossed = fraction === null ? null : place;
       const time = times[row - 1] + along * (times[row] - times[row - 1]);
-      if (share !== null) found.push({ time, row: share ? row : row - 1, direction: border.directions[side ? 0 : 1] });
+      if (fraction !== null) found.push({ time, row: fraction ? row : row - 1, direction: border.directions[side ? 0 : 1] });
     }
     settled = side;
   }
@@ -230,8 +230,8 @@ function warningsOf(line, visits, paths, span) {
   ].filter(text => text);
 }
 
-function quantile(values, share) {
-  const sorted = [...values].sort((a, b) => a - b), at = share * (sorted.length - 1), low = Math.floor(at);
+function quantile(values, fraction) {
+  const sorted = [...values].sort((a, b) => a - b), at = fraction * (sorted.length - 1), low = Math.floor(at);
   return sorted[low] + (at - low) * (sorted[Math.ceil(at)] - sorted[low]);
 }
 
@@ -627,8 +627,8 @@ async function openPage(data) {
       return [el("polyline", { points: points.join(" "), class: "grid" }),
         label(points[0] ?? [0, 0], [points.length && `${value} m`], "middle", "grid")];
     }).flat();
-    return [...lines(left, right, (x, share) => [x, low + share * (high - low)]),
-      ...lines(low, high, (y, share) => [left + share * (right - left), y])];
+    return [...lines(left, right, (x, fraction) => [x, low + fraction * (high - low)]),
+      ...lines(low, high, (y, fraction) => [left + fraction * (right - left), y])];
   }
 
   function showLens() {
@@ -713,7 +713,7 @@ async function openPage(data) {
       .map(each => speedAt(path, each.time, ground)).filter(speed => speed !== null));
     if (!speeds.length) return "";
     const bars = Array.from({ length: 16 }, (_, i) => speeds.filter(speed => Math.min(15, Math.floor(speed / 10)) === i).length);
-    const [middle, most] = [0.5, 0.85].map(share => quantile(speeds, share).toFixed(0));
+    const [middle, most] = [0.5, 0.85].map(fraction => quantile(speeds, fraction).toFixed(0));
     return el("div", { class: "speed" }, el("b", {}, `${border.name}: ${direction}`),
       el("span", {}, `median ${middle} km/h, 85 % ${most} km/h`), el("div", { class: "bars", title: "0 to 160 km/h" },
         ...bars.map(count => el("i", { style: `height: ${100 * count / Math.max(...bars)}%` }))));

@@ -78,7 +78,7 @@ def _with_boxes(result: FrameResult) -> Image:
     return picture
 
 
-STAGES = SinkKind(StagesSink, what="stages", marker=f"*-{_BOXES}.png", one_frame=True)
+STAGES = SinkKind(StagesSink, what="stages", folder_pattern=f"*-{_BOXES}.png", one_frame=True)
 
 
 class CropSink(BaseSink):
@@ -117,7 +117,9 @@ def _crop_name(vehicle: VehicleRecord, time: float) -> str:
     return f"{'-'.join(parts)}-at-{time:.3f}s.jpg"
 
 
-CROPS = SinkKind(CropSink, what="pictures of vehicles", marker="vehicle-*-at-*s.*", takes="videos")
+CROPS = SinkKind(
+    CropSink, what="pictures of vehicles", folder_pattern="vehicle-*-at-*s.*", takes="videos"
+)
 
 
 class PageSink(BaseSink):
@@ -215,7 +217,7 @@ def _write_index(summaries: Mapping[str, dict[str, Any]], target: Path) -> None:
 
 
 _INDEX = BatchTotal("index", _write_index, suffix=".html")
-PAGE = SinkKind(PageSink, what="pages", marker=PAGE_NAME, takes="videos", total=_INDEX)
+PAGE = SinkKind(PageSink, what="pages", folder_pattern=PAGE_NAME, takes="videos", total=_INDEX)
 
 
 _NAME = re.compile(r"clip-[\dT-]+-\S+-\d+(\+\d+)?\.(mp4|mov|mkv)")
@@ -282,4 +284,4 @@ class ClipSink(BaseSink):
         return f"clip-{moment}-{in_file_name(first.class_name)}-{first.id}{more}"
 
 
-CLIPS = SinkKind(ClipSink, what="clips", marker="clip-*.*", takes="videos")
+CLIPS = SinkKind(ClipSink, what="clips", folder_pattern="clip-*.*", takes="videos")

@@ -144,9 +144,9 @@ class SinkKind:
         function that returns it; empty for any.
     what
         Noun for what it writes, for messages: "tracks".
-    marker
-        Only if the output is a folder, which is made: pattern of the files in it. If there is such
-        a file, the folder is the output of an earlier run.
+    folder_pattern
+        Only if the output is a folder: pattern of the files that the sink writes into it. A folder
+        with such a file is the output of an earlier run.
     writes_standard_output
         Whether the path `-` means standard output.
     one_frame
@@ -165,7 +165,7 @@ class SinkKind:
     open: Callable[[Path, SinkContext], Sink]
     suffixes: Sequence[str] | Callable[[], Sequence[str]] = ()
     what: str = "outputs"
-    marker: str = ""
+    folder_pattern: str = ""
     writes_standard_output: bool = False
     one_frame: bool = False
     takes: Literal["videos", "pictures", "both"] = "both"
@@ -219,10 +219,10 @@ def check_sinks(outputs: Sequence[Output], *, overwrite: bool, makes_folder: boo
         seen.add(path.resolve())
         if path == STANDARD_OUTPUT and kind.writes_standard_output:
             continue
-        if kind.marker:
-            written = path.glob(kind.marker) if os.path.isdir(path) else ()  # noqa: PTH112
-            path = min(written, default=path / kind.marker)
-        makes = makes_folder or bool(kind.marker)
+        if kind.folder_pattern:
+            written = path.glob(kind.folder_pattern) if os.path.isdir(path) else ()  # noqa: PTH112
+            path = min(written, default=path / kind.folder_pattern)
+        makes = makes_folder or bool(kind.folder_pattern)
         check_output(path, overwrite=overwrite, makes_folder=makes)
         if os.path.lexists(path) and not kind.may_replace(path):
             what = "was not written by vdet and will not be replaced; choose another name"
@@ -235,10 +235,10 @@ def output_state(output: Output, place: Path | None = None) -> tuple[int, int] |
     The time is in nanoseconds since 1970. Of a folder they are the sum and the latest of the files
     in it that the sink writes. Before they have their names, they lie at `place`.
     """
-    marker, path = sink_kind(output.sink).marker, place or output.path
-    if not (os.path.isdir if marker else os.path.isfile)(path):  # its name may be too long
+    pattern, path = sink_kind(output.sink).folder_pattern, place or output.path
+    if not (os.path.isdir if pattern else os.path.isfile)(path):  # its name may be too long
         return None
-    states = [file.stat() for file in (path.glob(marker) if marker else [path])]
+    states = [file.stat() for file in (path.glob(pattern) if pattern else [path])]
     return sum(s.st_size for s in states), max((s.st_mtime_ns for s in states), default=0)
 
 

@@ -27,7 +27,7 @@ _OVERLAP = 0.3
 """Minimum intersection over union of a detection with the expected box of its vehicle."""
 
 _UNSURE = 0.2
-"""Share by which a vehicle that scores 0 has less claim to a detection than one that scores 1.
+"""Fraction by which a vehicle that scores 0 has less claim to a detection than one that scores 1.
 
 A shadow that is taken for a vehicle does not keep the detections of those that drive over it.
 """
