@@ -1,18 +1,17 @@
-"""What Python users call: vehicles in NumPy frames, in pictures and in videos.
+"""The Python API: vehicles in NumPy arrays, in images and in videos.
 
 Images are BGR uint8 arrays `(H, W, 3)`, as OpenCV reads them.
 
-The detector is the network where none is chosen. A model file decides which detector runs: the
-linear model with .npz, a network with .onnx. Settings choose a detector too, for example
-`load_settings("svm")`.
+The default detector is the network. A model file determines the detector: .npz the linear model,
+.onnx a network. Settings can choose a detector too, for example `load_settings("svm")`.
 
-A detector or a tracker of your own is an object, which is used as it is:
+You can pass your own detector or tracker as an object:
 
 * a detector is a function that takes an image and returns `Boxes`, or a `VideoDetector`, or a
   `DetectorModel`, which makes a detector for each video;
 * a tracker is a `VideoTracker`, for one video.
 
-A name is that of a kind of detector or tracker, also of another package, or that of a model file.
+A name is that of a kind of detector or tracker, from vdet or another package, or of a model file.
 """
 
 import math
@@ -80,7 +79,7 @@ def load_settings(config: Paths = (), assignments: Sequence[str] = ()) -> Settin
     config
         A YAML file, or the name of a shipped config such as "seed", or several; later ones win.
     assignments
-        Single values on top, as the command line takes them: `["tracker.kind=rules"]`.
+        Single values that override the files, as `--set` takes them: `["tracker.kind=rules"]`.
 
     Raises
     ------
@@ -93,7 +92,7 @@ def load_settings(config: Paths = (), assignments: Sequence[str] = ()) -> Settin
 
 
 class Detector:
-    """Finds vehicles in single pictures; `follow` and the others take it as their detector too.
+    """Finds vehicles in single images; `follow` and the others also accept it as a detector.
 
     Raises
     ------
@@ -111,11 +110,11 @@ class Detector:
         self.for_video = self._model.for_video
 
     def detect(self, image: Image | PathName) -> Boxes:
-        """Find the vehicles in a picture: the path of a file, or an array, BGR uint8 `(H, W, 3)`.
+        """Find the vehicles in an image: the path of a file, or an array, BGR uint8 `(H, W, 3)`.
 
-        Each picture is searched for itself; `follow` uses what consecutive frames have in common.
+        Each image is searched on its own; `follow` also uses the other frames of a video.
 
-        Raises `ImageError` if it cannot be read or is too small to be searched, `TypeError` or
+        Raises `ImageError` if it cannot be read or is too small to search, `TypeError` or
         `ValueError` if it is neither a path nor such an array.
         """
         source = Path("image")
@@ -146,14 +145,14 @@ class Tracker:
     def update(
         self, detections: Boxes, time: float, image: Image | Picture | None = None
     ) -> list[Track]:
-        """Follow the vehicles into the next frame, and return those that are shown, by id.
+        """Track the vehicles into the next frame, and return those to show, by id.
 
         Parameters
         ----------
         detections
-            The vehicles that any detector sees in the frame.
+            The vehicles that any detector found in the frame.
         time
-            When the frame is shown, seconds; it increases from frame to frame.
+            Presentation time of the frame, seconds; must increase from frame to frame.
         image
             The frame; only the tracker `rules` needs it.
 
@@ -163,7 +162,7 @@ class Tracker:
         return self.at(time)
 
     def observe(self, detections: Boxes, time: float, image: Image | Picture | None = None) -> None:
-        """Follow the vehicles into the next frame; arguments and errors as of `update`."""
+        """Track the vehicles into the next frame; arguments and errors as for `update`."""
         if not self._time < time < math.inf:
             raise ValueError(f"time: {time} s is not after the {self._time} s of the frame before")
         picture = Picture(image) if isinstance(image, np.ndarray) else image
@@ -171,10 +170,10 @@ class Tracker:
         self._time = time
 
     def at(self, time: float) -> list[Track]:
-        """Return the vehicles at another time, for a frame in which no detector looked for them.
+        """Return the vehicles at another time, for a frame that was not searched.
 
-        Times may not decrease from call to call. At a time before the latest frame, at most
-        `tracker.look_ahead` seconds before it, what came later is known.
+        Times must not decrease from call to call. A time may be up to `tracker.look_ahead` seconds
+        before the latest frame; the result then also uses the later detections.
         """
         return self._tracker.at(time)
 
@@ -190,24 +189,24 @@ def follow(
     end: Seconds | None = None,
     frames: int | None = None,
 ) -> Results:
-    """Return an iterator over the frames of a video: each with its detections and its tracks.
+    """Return an iterator over the frames of a video, each with its detections and tracks.
 
     Parameters
     ----------
     source
         The video, or a `Run`, which has its own settings and part.
     detector, tracker
-        Objects or names, as the module describes them; None for those of the settings. With an
-        object, and without settings, every frame is searched.
+        Objects or names, see the module docstring; None: as set. With a detector object and no
+        settings, every frame is searched.
     steps
-        Each gets every result, and returns it or a changed one.
+        Each receives every result, and returns it, changed or unchanged.
     start, end
-        Seconds from the first frame; frames with start ≤ time < end are taken.
+        Seconds from the first frame; frames with start ≤ time < end are processed.
     frames
-        Maximum number of frames to take.
+        Maximum number of frames to process.
 
-    The video is opened for the first frame; `VideoError` is raised then if it cannot be read or
-    searched.
+    The video is opened when the first frame is requested; `VideoError` is raised then if it cannot
+    be read or searched.
     """
     part = {"start": _exact(start), "end": _exact(end), "frames": frames}
     run, parts = _run(source, settings, detector, tracker, steps, **part)
@@ -216,9 +215,9 @@ def follow(
 
 
 def vehicles(source: PathName | Run, **options: Any) -> tuple[VehicleRecord, ...]:
-    """Return a record of each vehicle of a video, by id: when it is shown, its class, its path.
+    """Return a record of each vehicle of a video, by id: its times, class and path.
 
-    Parameters and errors are those of `follow`.
+    Parameters and errors as for `follow`.
     """
     results = follow(source, **options)
     for _ in results:
@@ -240,27 +239,27 @@ def detect_video(
     overwrite: bool = False,
     progress: Callable[[int, int | None], object] | None = None,
 ) -> RunTotals:
-    """Find and follow the vehicles in a video, and write the outputs that are asked for.
+    """Find and follow the vehicles in a video, and write the requested outputs.
 
-    All outputs appear together when the run ends well, and none appears otherwise.
+    All outputs appear together when the run succeeds; otherwise none appears.
 
     Parameters
     ----------
     source
-        The video; or a `Run`, for a part of it or a number of threads.
+        The video, or a `Run` to choose a part of it or a number of threads.
     video
-        The video with the vehicles drawn in: .mp4, .mov or .mkv.
+        Output: the video with a box around each vehicle, .mp4, .mov or .mkv.
     tracks
-        Every shown box, in one file or several: .txt (MOTChallenge), .csv, .jsonl, .coco.json,
-        .kitti.txt or .yolo.zip.
+        Output: the boxes of every frame, one file or several: .txt (MOTChallenge), .csv, .jsonl,
+        .coco.json, .kitti.txt or .yolo.zip.
     outputs
-        Other outputs, one path or several, by the name of their sink.
+        Other outputs by the name of their sink, one path or several.
     overwrite
-        Replace outputs that exist already.
+        Replace existing outputs.
     progress
-        Called after each frame with the number of frames done, and that of all if it is known.
+        Called after each frame with the number of frames done, and the total, None if unknown.
 
-    The others are those of `follow`, and the errors those of the command `vdet detect-video`.
+    Other parameters as for `follow`; errors as for the command `vdet detect-video`.
     """
     run, parts = _run(source, settings, detector, tracker, steps)
     wanted = _outputs({"video": video or (), "tracks": tracks, **(outputs or {})})
@@ -280,9 +279,9 @@ def detect_image(
     detector: AnyDetector | None = None,
     overwrite: bool = False,
 ) -> Boxes:
-    """Find the vehicles in a picture file, and write the outputs that are asked for.
+    """Find the vehicles in an image file, and write the requested outputs.
 
-    `picture` is the file with the vehicles drawn in; the others are those of `detect_video`.
+    `picture` is the output with a box around each vehicle; other parameters as for `detect_video`.
     """
     settings, loaded, _ = _resolved(settings, detector, None)
     job = PictureJob(Path(source), _outputs({"picture": picture or (), **(outputs or {})}))
@@ -307,9 +306,9 @@ def count(
     Parameters
     ----------
     tracks
-        A file that `detect_video` wrote; or the results of `follow`, or their `frame_tracks`.
+        A file written by `detect_video`, the results of `follow`, or their `frame_tracks`.
     size
-        Width and height of the frames, pixels; None: as the tracks or `camera.size` say.
+        Width and height of the frames, pixels; None: from the tracks or `camera.size`.
     rate
         Frames per second, for a file of tracks without times.
     """
@@ -325,12 +324,12 @@ def count(
 
 
 def evaluate_tracks(tracks: PathName, truth: PathName, *, until: int | None = None) -> Scores:
-    """Compare a file of tracks with the truth.
+    """Compare a file of tracks with the ground truth.
 
     Parameters
     ----------
     until
-        Number of the last frame to use, from 1; None: the last that the truth covers.
+        Number of the last frame to use, from 1; None: the last one of the ground truth.
 
     Raises `TruthError` if a file cannot be used.
     """
@@ -345,7 +344,7 @@ def _run(
     steps: Sequence[Step],
     **part: Any,
 ) -> tuple[Run, Parts]:
-    """Return a run and what it runs with; `part` is that of a video, not of a `Run`."""
+    """Return the run and its parts; `part` is for a video, because a `Run` has its own."""
     if isinstance(source, Run):
         for name, value in {"settings": settings, **part}.items():
             if value is not None:
@@ -360,7 +359,7 @@ def _run(
 def _resolved(
     settings: Settings | None, detector: AnyDetector | None, tracker: AnyTracker | None
 ) -> tuple[Settings, DetectorModel, VideoTracker | None]:
-    """Return the settings, the detector, and the tracker; None for that of the settings."""
+    """Return the settings, the detector, and the tracker, None if the settings choose it."""
     changes: dict[str, object] = {}
     if isinstance(tracker, str):
         changes["tracker"] = load_layers(assignments=[f"tracker.kind={tracker}"]).tracker

@@ -1,7 +1,7 @@
-"""Boxes in a picture: x1, y1, x2, y2 in pixels, x to the right, y down, far sides exclusive.
+"""Boxes in an image: x1, y1, x2, y2 in pixels, x to the right, y down, far sides exclusive.
 
-Boxes are rounded only where a format is written or pixels are cut or drawn. The types of all arrays
-are here too.
+Boxes are rounded only where a format is written or pixels are cut or drawn. The array types are
+here too.
 """
 
 import math
@@ -105,16 +105,16 @@ class Box:
         return Box(x1, y1, max(self.x2, other.x2), max(self.y2, other.y2))
 
     def intersection(self, other: "Box") -> "Box":
-        """Return the part in common; its area is 0 where there is none."""
+        """Return the intersection; its area is 0 if they do not overlap."""
         x1, y1 = max(self.x1, other.x1), max(self.y1, other.y1)
         return Box(x1, y1, max(x1, min(self.x2, other.x2)), max(y1, min(self.y2, other.y2)))
 
     def clipped(self, width: float, height: float) -> "Box":
-        """Return the part that lies in a picture of `width` × `height` pixels."""
+        """Return the part inside an image of `width` × `height` pixels."""
         return self.intersection(Box(0, 0, width, height))
 
     def iou(self, other: "Box") -> float:
-        """Return intersection over union, 0 to 1; 0 where neither has an area."""
+        """Return intersection over union, 0 to 1; 0 if neither has an area."""
         common = self.intersection(other).area
         total = self.area + other.area - common
         return common / total if total else 0.0
@@ -128,7 +128,7 @@ class Box:
 
 @dataclass(frozen=True, slots=True)
 class Detection:
-    """One row of `Boxes`; `class_name` and `id` are None where they are not known."""
+    """One row of `Boxes`; `class_name` and `id` are None if unknown."""
 
     box: Box
     score: float
@@ -138,7 +138,7 @@ class Detection:
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)
 class Boxes:
-    """Scored boxes of one picture in columns of `n` rows, immutable: what detectors return.
+    """Scored boxes of one image in columns of `n` rows, immutable; detectors return it.
 
     Attributes
     ----------
@@ -146,25 +146,25 @@ class Boxes:
         float64 `(n, 4)`: x1, y1, x2, y2 in pixels of the frame; x to the right, y down, `x2` and
         `y2` are exclusive.
     scores
-        float64 `(n,)`, 0 to 1: the fraction of boxes with such a score that are vehicles.
+        float64 `(n,)`, 0 to 1: the fraction of boxes with this score that are vehicles.
     classes
-        int32 `(n,)`: indices into `names`; None where classes are not known.
+        int32 `(n,)`: indices into `names`; None if classes are unknown.
     names
         The names of all classes.
     ids
-        int64 `(n,)`: which vehicle each is; None where that is not known.
+        int64 `(n,)`: the id of each vehicle; None if unknown.
     data
         Further columns of `n` rows by name, float64. Trackers use `class_scores`
-        `(n, len(names))`, how likely each box is of each class; the rules tracker also uses
+        `(n, len(names))`, the probability of each class; the rules tracker also uses
         `centroid` `(n, 2)`, x and y, and `strength` `(n,)`.
     trace
-        What the detector needs for its stage pictures; not used by others.
+        What the detector needs for its stage images; not used elsewhere.
 
     Raises
     ------
     ValueError
-        A column has another shape, a value is not finite, a box has no area, a score is not in
-        0 to 1, a class has no name.
+        A column has the wrong shape, a value is not finite, a box has no area, a score is not from
+        0 to 1, or a class has no name.
     """
 
     sides: Float64Array
@@ -223,7 +223,9 @@ class Boxes:
         if isinstance(rows, int | np.integer):
             return next(iter(self[[int(rows)]]))
         if not isinstance(rows, slice):
-            rows = np.asarray(rows) if len(rows) else slice(0)  # an empty array is one of floats
+            rows = (
+                np.asarray(rows) if len(rows) else slice(0)
+            )  # an empty list makes an array of floats
         return Boxes(
             self.sides[rows],
             self.scores[rows],
@@ -236,14 +238,14 @@ class Boxes:
 
     @property
     def class_names(self) -> list[str | None]:
-        """The name of each box's class; None for all where classes are not known."""
+        """The class name of each box; None if classes are unknown."""
         if self.classes is None:
             return [None] * len(self)
         return [self.names[number] for number in self.classes.tolist()]
 
     @property
     def likely_classes(self) -> list[dict[str, float]]:
-        """For each box how likely each class is, 0 to 1; nothing where classes are not known."""
+        """For each box the probability of each class, 0 to 1; empty if classes are unknown."""
         if "class_scores" in self.data:
             rows = self.data["class_scores"].tolist()
             return [dict(zip(self.names, row, strict=True)) for row in rows]
@@ -267,8 +269,8 @@ class Boxes:
     def from_supervision(cls, detections: "supervision.Detections") -> "Boxes":
         """Return boxes with copies of the columns of a `supervision.Detections`.
 
-        The classes are those of the column `class_name`, the other columns of numbers become
-        `data`. Without confidences, scores are 1. Errors as of `Boxes`.
+        Classes are taken from the column `class_name`; other numeric columns become `data`. Without
+        confidences, scores are 1. Errors as for `Boxes`.
         """
         data = {name: np.asarray(column) for name, column in detections.data.items()}
         labels, scores = data.pop("class_name", None), detections.confidence
@@ -319,7 +321,7 @@ NO_BOXES = Boxes(np.empty((0, 4)), np.empty(0))
 
 
 def from_sizes(places: npt.NDArray[Any]) -> Float64Array:
-    """Return boxes `(n, 4)` given by x, y, width, height as x1, y1, x2, y2."""
+    """Convert boxes `(n, 4)` from x, y, width, height to x1, y1, x2, y2."""
     boxes = places.astype(np.float64)
     boxes[:, 2:] += boxes[:, :2]
     return boxes
@@ -335,7 +337,7 @@ def iou_matrix(a: Float64Array, b: Float64Array) -> Float64Array:
 
     Returns
     -------
-    float64 of shape `(n, m)`; boxes that only touch have 0.
+    float64 of shape `(n, m)`; 0 for boxes that only touch.
     """
     return iou(a[:, np.newaxis], b)
 
@@ -347,24 +349,24 @@ def iou(a: Float64Array, b: Float64Array) -> Float64Array:
 
 
 def coverage(boxes: Float64Array, others: Float64Array) -> Float64Array:
-    """Return the fraction of every box's own area that lies in each of the others, `(n, m)`.
+    """Return the fraction of the area of each box that is inside each of the others, `(n, m)`.
 
-    `boxes` and `others` are x1, y1, x2, y2 of shapes `(n, 4)` and `(m, 4)`; those have an area.
+    `boxes` and `others` are x1, y1, x2, y2 of shapes `(n, 4)` and `(m, 4)`; `boxes` have an area.
     """
     return _intersection(boxes[:, np.newaxis], others) / area(boxes)[:, np.newaxis]
 
 
 def are_nested(boxes: Float64Array, scores: npt.ArrayLike) -> BoolArray:
-    """Return for each box whether it contains, or lies in, a box with a higher score.
+    """Return for each box whether it contains, or is inside, a box with a higher score.
 
-    Then nearly all of the smaller one lies in the larger: at most one of them shows a vehicle.
+    Nearly all of the smaller one is then inside the larger: at most one of them shows a vehicle.
 
     Parameters
     ----------
     boxes
         x1, y1, x2, y2 of shape `(n, 4)`, each with an area.
     scores
-        Shape `(n,)`. Of two equal scores, that of the larger box counts as higher.
+        Shape `(n,)`. Of two equal scores, the one of the larger box counts as higher.
 
     Returns
     -------
@@ -378,7 +380,7 @@ def are_nested(boxes: Float64Array, scores: npt.ArrayLike) -> BoolArray:
 
 
 def visible(boxes: Float64Array, size: tuple[int, int]) -> Float64Array:
-    """Return the parts of boxes `(n, 4)` in a frame of `size`; they may have no area."""
+    """Clip boxes `(n, 4)` to a frame of `size`, width and height; they may lose their area."""
     return np.minimum(np.maximum(boxes, 0), (*size, *size))  # np.clip is three times slower
 
 
@@ -393,6 +395,6 @@ def _intersection(a: Float64Array, b: Float64Array) -> Float64Array:
 
 
 def _common(a: Float64Array, b: Float64Array) -> Float64Array:
-    """Return the length, at least 0, that spans `(…, 2)` of near and far end share."""
+    """Return the length of the overlap of spans `(…, 2)`, near and far end, at least 0."""
     shared = np.minimum(a[..., 1], b[..., 1]) - np.maximum(a[..., 0], b[..., 0])
     return np.asarray(np.maximum(shared, 0))

@@ -1,9 +1,9 @@
-"""Kinds of errors, each with the exit code of the program; names, numbers and times in messages.
+"""The errors and their exit codes; how messages write names, numbers and times.
 
-Exit codes: 0 success, 1 an error below, 2 wrong usage (click's own), 3 some files of a batch
-failed, 4 a result is doubtful and `--strict` was given, 130 interrupted.
-A message is one line (a `ConfigError` may be several, one for each mistake): what is wrong, where,
-and what to do about it.
+Exit codes: 0 success, 1 an error below, 2 wrong usage (from click), 3 some files of a batch failed,
+4 a result is doubtful and `--strict` is set, 130 interrupted.
+A message is one line (a `ConfigError` has one for each mistake): what is wrong, where, and what to
+do.
 """
 
 from fractions import Fraction
@@ -15,27 +15,27 @@ _MAX_SHOWN = 80  # characters of a name
 
 
 def failure_code(failed: int, inputs: int) -> int:
-    """Return the exit code of a run over several inputs, of which some or all may have failed."""
+    """Return the exit code of a run over several inputs, given how many have failed."""
     if not failed:
         return 0
     return SOME_FAILED if failed < inputs else VdetError.exit_code
 
 
 class VdetError(Exception):
-    """An error that the user can understand and act upon."""
+    """An error that the user can understand and fix."""
 
     exit_code = 1
 
 
 class ConfigError(VdetError, ValueError):
-    """Settings are wrong; each argument is a mistake, and a line of the message."""
+    """Settings are wrong; each argument is one mistake, and one line of the message."""
 
     def __str__(self) -> str:
         return "\n".join(self.args)
 
 
 def check_positive(**numbers: int | None) -> None:
-    """Raise a `ConfigError` that names the first number below 1; None counts as not given."""
+    """Raise a `ConfigError` that names the first number below 1; None is skipped."""
     for name, number in numbers.items():
         if number is not None and number < 1:
             raise ConfigError(f"{name}: is {number}; must be at least 1")
@@ -46,15 +46,15 @@ class DataError(VdetError, ValueError):
 
 
 class ModelError(VdetError, ValueError):
-    """A model file is damaged, is not a model, or does not fit its use."""
+    """A model file is damaged, is not a model, or cannot be used here."""
 
 
 class ImageError(VdetError, ValueError):
-    """A picture cannot be read, or searched."""
+    """An image cannot be read or searched."""
 
 
 class FrameSizeError(ImageError):
-    """Frames or pictures of this size are too small to be searched."""
+    """Frames or images of this size are too small to search."""
 
 
 class VideoError(VdetError, OSError):
@@ -62,31 +62,31 @@ class VideoError(VdetError, OSError):
 
 
 class OutputError(VdetError, OSError):
-    """An output cannot be written, or is already there."""
+    """An output cannot be written, or already exists."""
 
 
 class TruthError(VdetError, ValueError):
-    """A file of labelled boxes, truth or tracks, cannot be used."""
+    """A file of labelled boxes, ground truth or tracks, cannot be used."""
 
 
 class BatchError(VdetError, ValueError):
-    """A batch cannot be run as it was asked for."""
+    """A batch cannot be run with these inputs and outputs."""
 
 
 class ClusterError(VdetError, OSError):
     """A cluster cannot be used."""
 
 
-_NO_ROOM = "failed to map segment"  # says the system, of a library for which memory is missing
+_NO_MEMORY = "failed to map segment"  # the system, when there is no memory to load a library
 
 
 def in_one_line(error: Exception) -> str:
-    """Describe any error in one line; all but a `VdetError` and an `OSError` are called a bug."""
+    """Describe any error in one line; anything but a `VdetError` or an `OSError` is a bug."""
     if isinstance(error, VdetError):
         return str(error)
     if isinstance(error, OSError):
         return f"{error.filename or 'reading or writing'}: {error.strerror or error}"
-    if isinstance(error, MemoryError) or _NO_ROOM in str(error):
+    if isinstance(error, MemoryError) or _NO_MEMORY in str(error):
         return "out of memory; close other programs, or raise the limit (ulimit -v)"
     if fault := opencv_fault():
         return fault
@@ -97,7 +97,8 @@ def in_one_line(error: Exception) -> str:
 def opencv_fault() -> str | None:
     """Return what is wrong if another package has replaced or removed the OpenCV that vdet needs.
 
-    Both packages of OpenCV write into one folder: the later one wins, and removing it breaks both.
+    Both packages of OpenCV install into the same folder: the later one wins, and removing it breaks
+    both.
     """
     try:
         import cv2
@@ -120,7 +121,7 @@ def escaped(text: str) -> str:
 
 
 def printable(name: str) -> str:
-    """Return a name from outside as messages show it: escaped, and cut where it is very long."""
+    """Return a name from outside for messages: escaped, and truncated if it is very long."""
     shown = escaped(name)
     return shown if len(shown) <= _MAX_SHOWN else f"{shown[:_MAX_SHOWN]}…"
 
@@ -136,7 +137,7 @@ def named(count: int, noun: str) -> str:
 
 
 def clock(seconds: float | Fraction, digits: int = 0, *, hours: bool = False) -> str:
-    """Return a time as `1:05`, or `2:01:05`; always as this with `hours`, and with decimals."""
+    """Return a time as `1:05`, or `2:01:05` for hours; `digits` is the number of decimals."""
     whole, part = divmod(round(abs(seconds) * 10**digits), 10**digits)
     minutes, rest = divmod(whole, 60)
     text = f"{minutes // 60}:{minutes % 60:02}" if hours or minutes >= 60 else f"{minutes}"

@@ -1,9 +1,9 @@
-"""Files: outputs that appear only when they are complete, and never in the place of an input.
+"""Files: outputs appear only when they are complete, and never replace an input.
 
-Outputs are written into temporary folders beside the place where they will appear, which are named
-`.vdet-`, the host, and 16 digits. The writer holds a lock on its folder, which the system releases
-when the process ends, in whatever way. A lock of another host may not be seen on a shared file
-system, so what a killed run left is removed by the next run on its host.
+Outputs are written into temporary folders beside their destination, named `.vdet-`, the host, and
+16 digits. The writer holds a lock on its folder, which the system releases when the process ends,
+however it ends. A shared file system may not show the locks of other hosts, so the files of a
+killed run are removed by the next run on the same host.
 """
 
 import contextlib
@@ -33,10 +33,10 @@ _inputs: ContextVar[set[_FileId] | None] = ContextVar("inputs", default=None)
 
 @contextlib.contextmanager
 def recorded_inputs() -> Iterator[None]:
-    """Record each file that is read in the block; no output of it takes the place of one.
+    """Record each file that is read in the block, so that no output of the block replaces one.
 
-    A block inside another one has the record of that one. Threads have that of the context in which
-    they run (`contextvars`), and so have those of `vdet.run.threads`. Worker processes have none.
+    A nested block shares the record of the outer one. Threads use the record of their context
+    (`contextvars`), as those of `vdet.run.threads` do. Worker processes have none.
     """
     record = _inputs.get()
     token = _inputs.set(set() if record is None else record)
@@ -47,9 +47,9 @@ def recorded_inputs() -> Iterator[None]:
 
 
 def record_input(*files: Path | int) -> None:
-    """Record files that are read, by their names or as descriptors; links are followed.
+    """Record files as inputs, by name or as descriptors; links are followed.
 
-    Whatever opens a file for reading calls this. A name can be recorded before that, so that an
+    All code that opens a file for reading calls this. A name can be recorded earlier, so that an
     output of this name is refused before any work.
     """
     record = _inputs.get()
@@ -65,18 +65,18 @@ def is_input(path: Path) -> bool:
 def _id(file: Path | int) -> _FileId | None:
     try:
         status = os.stat(file)  # noqa: PTH116  # it may be a descriptor
-    except OSError:  # there is none
+    except OSError:  # it does not exist
         return None
     return status.st_dev, status.st_ino
 
 
 def check_output(path: Path, *, overwrite: bool, makes_folder: bool = False) -> None:
-    """Refuse an output that could not be written, before any work is done.
+    """Refuse an output that cannot be written, before any work is done.
 
     Parameters
     ----------
     makes_folder
-        The work makes the folder of the output if it is missing.
+        The folder of the output is created later if it is missing.
 
     Raises
     ------
@@ -110,7 +110,7 @@ def _check_replaceable(path: Path) -> None:
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder, and those above it, where it is missing. Raises `OutputError`."""
+    """Create a folder and its parents if they are missing. Raises `OutputError`."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -120,36 +120,36 @@ def make_folder(folder: Path) -> None:
 class OutputFiles:
     """The output files of one run, which appear together; a context manager.
 
-    When the block ends without an error, all staged files are synced to the disk and then get their
-    names, in the order in which their folders were staged. When it ends with an error, or is
-    interrupted, none appears, and every older file is as it was. Folders are made where they are
-    missing, and are removed again after an error.
+    When the block ends without an error, all staged files are synced to disk and then renamed, in
+    the order in which their folders were staged. If it ends with an error or is interrupted, none
+    appears, and every older file is unchanged. Missing folders are created, and removed again after
+    an error.
 
     Parameters
     ----------
     overwrite
-        Replace files that have these names, but for inputs, and keep their permissions. A link is
-        replaced, and not what it leads to. Without it every existing file is kept, also one
-        that appears while the run writes.
+        Replace existing files, except inputs, and keep their permissions. A link itself is
+        replaced, not its target. Otherwise every existing file is kept, also one that appears
+        during the run.
 
     Raises
     ------
     OutputError
-        A file cannot be made or synced, or cannot get its name, because there is one that is kept.
+        A file cannot be created, synced or renamed, or an existing one must be kept.
     """
 
     def __init__(self, *, overwrite: bool = False) -> None:
         self._overwrite = overwrite
-        self._folders: dict[Path, Path] = {}  # temporary ones by where their files will go
+        self._folders: dict[Path, Path] = {}  # temporary folders by destination
         self._names: dict[Path, re.Pattern[str]] = {}
-        self._new_folders: list[Path] = []  # the outer ones first
+        self._new_folders: list[Path] = []  # outermost first
         self._cleanup = contextlib.ExitStack()
 
     def stage(self, path: Path) -> Path:
-        """Return the file of the same name that will become `path`; it is empty at first.
+        """Return an empty temporary file of the same name that will become `path`.
 
-        It lies in a temporary folder beside `path`. Temporary folders that killed runs left there
-        are removed.
+        It is in a temporary folder beside `path`. Temporary folders left there by killed runs are
+        removed.
         """
         with output_errors(path):
             temporary = self._temporary_folder(path.parent) / path.name
@@ -157,13 +157,13 @@ class OutputFiles:
         return temporary
 
     def stage_folder(self, path: Path, names: re.Pattern[str] | None = None) -> Path:
-        """Return a folder whose files will lie in the folder `path`.
+        """Return a temporary folder whose files will be moved to the folder `path`.
 
         Parameters
         ----------
         names
-            With `overwrite`, files of an earlier run are removed at the end: those in `path` with
-            such names that this run did not write. None: all are kept.
+            With `overwrite`, files of an earlier run are removed at the end: files in `path` with
+            such names that this run did not write. None: keep all.
         """
         if names:
             self._names[path] = names
@@ -171,7 +171,7 @@ class OutputFiles:
             return self._temporary_folder(path)
 
     def place_of(self, path: Path) -> Path:
-        """Return where a file or folder lies that was staged, before it gets its name."""
+        """Return the temporary path of a staged file or folder."""
         folder = self._folders.get(path.parent, path.parent)
         return self._folders.get(path, folder / path.name)
 
@@ -207,9 +207,9 @@ class OutputFiles:
         for path, file in files.items():
             with output_errors(path), file.open("rb+") as written:
                 os.fsync(written.fileno())
-        # New files are not inputs, though one may have the number of an input that was deleted.
+        # New files are not inputs, although one may reuse the inode of a deleted input.
         (_inputs.get() or set()).difference_update(map(_id, files.values()))
-        # An interrupt may come at any time, so how to undo a step is noted before the step.
+        # An interrupt may come at any time, so the undo is registered before each step.
         with contextlib.ExitStack() as undo:
             for path, file in files.items():
                 with output_errors(path):
@@ -240,9 +240,9 @@ def _put_back(aside: Path, path: Path) -> None:
 
 
 def _add_name(path: Path, file: Path, undo: contextlib.ExitStack) -> None:
-    """Give a file its final name, unless another file has it; in one step where links are known.
+    """Give a file its final name, atomically where the file system has hard links.
 
-    Raises `OutputError` if there is one.
+    Raises `OutputError` if another file has this name.
     """
     undo.callback(_remove_if_same, path, file.stat())
     try:
@@ -260,14 +260,16 @@ def _remove_if_same(path: Path, status: os.stat_result) -> None:
 
 
 def _make_temporary(parent: Path, cleanup: contextlib.ExitStack) -> Path:
-    """Make an empty, locked folder in `parent` and return it; `cleanup` unlocks and removes it."""
+    """Create an empty, locked folder in `parent`; `cleanup` unlocks and removes it."""
     while True:
         folder = parent / f".vdet-{_HOST}-{os.urandom(8).hex()}"
-        # An interrupt may come as soon as the folder is there.
+        # An interrupt may come as soon as the folder exists.
         cleanup.callback(shutil.rmtree, folder, ignore_errors=True)
-        parent.mkdir(parents=True, exist_ok=True)  # a run that failed may have removed it
-        with contextlib.suppress(FileNotFoundError, BlockingIOError):  # it was taken for stale
-            folder.mkdir(0o700)  # what is private stays so while it is written
+        parent.mkdir(parents=True, exist_ok=True)  # a failed run may have removed it
+        with contextlib.suppress(
+            FileNotFoundError, BlockingIOError
+        ):  # another run removed it as stale
+            folder.mkdir(0o700)  # private content stays private while it is written
             cleanup.enter_context(locked_folder(folder))
             folder.lstat()
             return folder
@@ -289,8 +291,8 @@ def staged(path: Path, *, overwrite: bool = False) -> Iterator[Path]:
     Raises
     ------
     OutputError
-        The file cannot be made, or cannot get its name (see `OutputFiles`), or the block raises an
-        `OSError` that is not a `VdetError`.
+        The file cannot be created or renamed (see `OutputFiles`), or the block raises an `OSError`
+        that is not a `VdetError`.
     """
     with OutputFiles(overwrite=overwrite) as files:
         temporary = files.stage(path)
@@ -302,7 +304,7 @@ def staged(path: Path, *, overwrite: bool = False) -> Iterator[Path]:
 def output_errors(path: Path) -> Iterator[None]:
     """Turn an `OSError` of the block into an `OutputError` that names `path`.
 
-    A `BrokenPipeError` passes: whoever read the output has ended, and so does the program.
+    A `BrokenPipeError` passes: the reader of the output has ended, and so does the program.
     """
     try:
         yield
@@ -313,18 +315,18 @@ def output_errors(path: Path) -> Iterator[None]:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write UTF-8; what is not valid text, as a name of a file may be, is escaped."""
+    """Write UTF-8; invalid text, such as undecodable file names, is escaped."""
     path.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
 
 
 def write_whole(path: Path, text: str, *, overwrite: bool = False) -> None:
-    """Write text that appears at `path` as a whole. Raises `OutputError`."""
+    """Write a text file that appears only when it is complete. Raises `OutputError`."""
     with staged(path, overwrite=overwrite) as temporary:
         write_text(temporary, text)
 
 
 def print_now(text: str) -> None:
-    """Write to standard output, so that an error comes here and not as Python ends."""
+    """Write to standard output and flush, so that an error is raised here."""
     sys.stdout.write(text)
     sys.stdout.flush()
 
@@ -351,9 +353,9 @@ def read_whole(path: Path, *, limit: int, what: str, error: type[VdetError]) -> 
     limit
         Bytes. A larger file is refused after `limit` + 1 bytes, whatever size it claims.
     what
-        What the file should be, for the message.
+        What the file should be, for messages.
     error
-        Raised where the file cannot be read, or is larger.
+        Type of the error to raise if the file cannot be read, or is larger.
     """
     data = bytearray()
     try:

@@ -1,7 +1,7 @@
 """Plug-ins by name: detectors, trackers, steps, sinks, formats and commands.
 
-A package registers its own as entry points of these groups. It is imported when one of its names is
-used, not before.
+Other packages register theirs as entry points of these groups. A package is imported only when one
+of its names is used.
 """
 
 from importlib.metadata import entry_points
@@ -52,22 +52,22 @@ _BUILT_IN: dict[str, dict[str, str]] = {
         "yolo": "vdet.labels.yolo:YOLO",
     },
 }
-"""The names of vdet itself: where each is defined."""
+"""The plug-ins of vdet itself: where each name is defined."""
 
 
 def built_in_names(group: str) -> list[str]:
-    """Return the names of a group that are those of vdet."""
+    """Return the names in a group that belong to vdet."""
     return list(_BUILT_IN.get(group, {}))
 
 
 def plugin_names(group: str) -> list[str]:
-    """Return all names of a group, those of vdet first."""
+    """Return all names in a group, those of vdet first."""
     own = built_in_names(group)
     return own + sorted({point.name for point in entry_points(group=group)} - set(own))
 
 
 def load_plugin(group: str, name: str) -> Any:
-    """Import what is registered under a name of a group.
+    """Import the object registered under a name in a group.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The process of the program: its signals, its standard streams, the threads of its libraries."""
+"""The process of the program: signals, standard streams, and threads of the libraries."""
 
 import os
 import signal
@@ -21,7 +21,7 @@ def run() -> NoReturn:
     open_streams()
     for name, value in SINGLE_THREADED.items():
         os.environ.setdefault(name, value)
-    # A worker that is killed leaves semaphores, which loky removes; the user need not know of it.
+    # A killed worker leaves semaphores, which loky removes with a warning that users do not need.
     sys.warnoptions.append("ignore::UserWarning:loky.backend.resource_tracker")
     for number in _signals():
         signal.signal(number, _interrupt)
@@ -38,17 +38,17 @@ def run() -> NoReturn:
         sys.stderr.write(f"vdet: {in_one_line(error)}\n")
         sys.exit(VdetError.exit_code)
     except SystemExit as end:
-        _ignore_signals()  # the work is done: one that comes now must not change the exit code
+        _ignore_signals()  # the work is done: a late signal must not change the exit code
         _exit(end.code)
 
 
 def open_streams() -> None:
-    """Open standard streams that are closed, so that no output file takes their place."""
+    """Open closed standard streams, so that no output file gets their descriptors."""
     for number in range(3):
         try:
             os.fstat(number)
         except OSError:
-            os.open(os.devnull, os.O_RDWR)  # takes the lowest number that is free
+            os.open(os.devnull, os.O_RDWR)  # takes the lowest free number
             os.set_inheritable(number, True)
     sys.stdout = sys.stdout or open(_STDOUT, "w", encoding="utf-8", closefd=False)  # noqa: SIM115
     sys.stderr = sys.stderr or open(_STDERR, "w", encoding="utf-8", closefd=False)  # noqa: SIM115
@@ -72,8 +72,8 @@ def _interrupt(*_: object) -> NoReturn:
 def _watch_for_signals() -> None:
     """Exit `CLEANUP_TIMEOUT` after a signal, even if the main thread hangs in a library.
 
-    A signal that comes just before the main thread begins to wait does not end this wait. So it is
-    sent again; once it has been handled, it is ignored.
+    A signal just before the main thread begins to wait does not end that wait, so it is sent again;
+    once handled, it is ignored.
     """
     reader, writer = os.pipe()
     os.set_blocking(writer, False)
@@ -92,7 +92,7 @@ def _watch_for_signals() -> None:
 
 
 def _exit(code: object) -> NoReturn:
-    """Exit without unloading the libraries: it takes time, and waits for a thread that hangs."""
+    """Exit without unloading the libraries, which takes time and waits for hanging threads."""
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(code if isinstance(code, int) else int(code is not None))

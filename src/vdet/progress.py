@@ -1,4 +1,4 @@
-"""How library code reports progress: it calls functions that the caller gives."""
+"""How library code reports progress: it calls functions passed by the caller."""
 
 import itertools
 from collections.abc import Callable
@@ -10,7 +10,7 @@ Progress = Callable[[int | None], Advance]
 """Called once with the expected number of items, None if it is unknown."""
 
 Steps = Callable[[str, int | None], Advance]
-"""A `Progress` for work in several steps: it also gets the name of each step."""
+"""A `Progress` for work in several steps, with the name of each step."""
 
 
 def no_steps(_: str, __: int | None) -> Advance:
@@ -24,7 +24,7 @@ def no_progress(_: int | None) -> Advance:
 
 
 def reporting(report: Callable[[int, int | None], object]) -> Progress:
-    """Return a `Progress` that calls a function with the number of items done, and that of all."""
+    """Return a `Progress` that calls a function with the number of items done and the total."""
 
     def begin(total: int | None) -> Advance:
         done = itertools.count(1)

@@ -1,6 +1,6 @@
-"""Checks that every detector, tracker and sink should pass, also those of other packages.
+"""Checks that every detector, tracker and sink should pass, including those of other packages.
 
-Each check raises `AssertionError`, which says what is wrong.
+Each check raises an `AssertionError` that says what is wrong.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,7 +22,7 @@ from vdet.track.track import TimedTracker, Track, VideoTracker
 from vdet.traffic.live import LiveTraffic
 
 RATE = 25
-"""Frames a second of the scenes that the checks make."""
+"""Frame rate of the scenes that the checks make."""
 
 WIDTH, HEIGHT = 640, 360
 """Size of their frames, pixels."""
@@ -32,10 +32,10 @@ def check_detector(model: DetectorModel, images: Sequence[Image]) -> None:
     """Check a detector on two or more consecutive frames of one video, BGR uint8 `(H, W, 3)`.
 
     * Detections lie in the frame, and the frame is not changed.
-    * A second detector finds the same in the same frames, also when frames are searched in
-      threads: detectors share nothing.
-    * A still picture can be searched.
-    * Stage pictures are BGR uint8 images.
+    * A second detector finds the same in the same frames, also if frames are searched in threads:
+      detectors share no state.
+    * A single image can be searched.
+    * Stage images are BGR uint8.
     """
     height, width = images[0].shape[:2]
     shown = [image.copy() for image in images]
@@ -65,11 +65,11 @@ def check_tracker(make: Callable[[int, int], VideoTracker]) -> None:
     """Check a tracker; `make` returns a new one for frames of a width and height.
 
     * Two vehicles that are always detected keep one id each. Boxes lie in the frame, ids are
-      positive and in order, scores are 0 to 1, and what is detected is "detected".
+      positive and in order, scores are 0 to 1, and the state is "detected".
     * The frame is not changed.
-    * A second tracker shows the same: trackers share nothing.
+    * A second tracker shows the same: trackers share no state.
     * Nothing is shown some seconds after the last detection.
-    * `at`, if there is one, shows the same vehicles a moment later, between detections.
+    * `at`, if the tracker has it, shows the same vehicles a moment later, between detections.
     """
     first, second = make(WIDTH, HEIGHT), make(WIDTH, HEIGHT)
     ids: set[int] = set()
@@ -107,12 +107,12 @@ def _check_tracks(tracks: Sequence[Track]) -> None:
 def check_sink(
     kind: SinkKind, path: Path, settings: Settings | None = None, *, still: bool = False
 ) -> None:
-    """Check a sink that writes to `path`, which must not be there yet.
+    """Check a sink that writes to `path`, which must not exist yet.
 
-    With `still` it gets one still picture, else three frames of a video.
+    With `still` it receives one image, else three frames of a video.
 
-    * Nothing is there before the run ends, nor after a run that ends with an error.
-    * After a run that ends well the output is there, and no temporary file is left.
+    * The output does not exist before the run ends, nor after a run that fails.
+    * After a successful run the output exists, and no temporary file is left.
     * The frame's image is not changed.
     * The same output can be written after a failed run.
     """

@@ -22,7 +22,7 @@ Submit = Callable[..., Future[Any]]
 
 PARENT_CHECK_INTERVAL = 0.5  # seconds
 SINGLE_THREADED = {"OPENBLAS_NUM_THREADS": "1", "OPENCV_FOR_THREADS_NUM": "1"}
-"""Variables that limit libraries to one thread a call: frames and files are done in parallel."""
+"""Variables that limit libraries to one thread, because frames and files run in parallel."""
 ENVIRONMENT = {
     **SINGLE_THREADED,
     "OMP_NUM_THREADS": "1",
@@ -33,11 +33,11 @@ ENVIRONMENT = {
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3  # of malloc.h
 
 QUOTA = Path("/sys/fs/cgroup/cpu.max")
-"""The file of quota and period of this process's control group, version 2."""
+"""CPU quota and period of this process's control group (cgroup v2)."""
 
 
 def core_count() -> int:
-    """Return how many cores this process may use: its affinity and its control group limit them."""
+    """Return the number of cores that this process may use, by its affinity and control group."""
     has_affinity = hasattr(os, "sched_getaffinity")
     cores = len(os.sched_getaffinity(0)) if has_affinity else os.cpu_count() or 1
     with contextlib.suppress(OSError, ValueError):  # ValueError: "max", no limit
@@ -47,7 +47,7 @@ def core_count() -> int:
 
 
 def limit_library_threads() -> None:
-    """Do as `SINGLE_THREADED` says in a process that has loaded the libraries."""
+    """Apply `SINGLE_THREADED` in a process that has already loaded the libraries."""
     import cv2
     from threadpoolctl import threadpool_limits
 
@@ -56,18 +56,18 @@ def limit_library_threads() -> None:
 
 
 PICTURES = 32_000_000, 64_000_000
-"""Limits for `return_freed_memory` with which each picture takes the memory of an earlier one.
+"""Limits for `return_freed_memory` with which each image reuses the memory of an earlier one.
 
-New memory takes longer than to decode a picture into it.
+Allocating new memory takes longer than decoding an image into it.
 """
 
 
 def return_freed_memory(minimum: int = 1_000_000, at_end: int = 16_000_000) -> None:
     """Let glibc return freed memory to the system, with limits in bytes.
 
-    Blocks from `minimum` on, such as frames, are returned, and the end of the heap once `at_end` of
-    it are free. glibc would raise its own limit to 32 MB, and keep frames in the gaps between
-    others. With another C library nothing is done.
+    Blocks of at least `minimum`, such as frames, are returned, and the end of the heap once
+    `at_end` of it are free. By default glibc raises its limit to 32 MB, and keeps frames in gaps of
+    the heap. Does nothing with other C libraries.
     """
     import ctypes
 
@@ -82,20 +82,20 @@ class Workers(Protocol):
 
     @property
     def at_once(self) -> float:
-        """Maximum number of items that they are given at a time."""
+        """Maximum number of items in work at a time."""
 
     def open(self) -> contextlib.AbstractContextManager[Submit]:
-        """Start or connect them; give the `submit` of an executor, as `concurrent.futures` has."""
+        """Start them or connect to them; yield the `submit` method of an executor."""
 
 
 def call_all(
     function: Callable[[T], R], items: Iterable[T], workers: Workers
 ) -> Generator[tuple[T, R | None]]:
-    """Yield every item with its result, in the order in which they end.
+    """Yield every item with its result, in order of completion.
 
-    The result is None for an item that kills its process. When a process is killed, several items
-    may be in work, and any of them may be the cause. They are repeated at the end, one by one, so
-    that only the cause is blamed. An error that `function` raises is raised here.
+    The result is None for an item that kills its process. When a process is killed, any of the
+    items in work may be the cause. They are repeated at the end, one by one, to find the cause. An
+    error raised by `function` is raised here.
     """
     suspects: list[T] = []
     for item, result in _call(function, items, workers):
@@ -131,13 +131,13 @@ def _call(
 
 
 def _is_killed(error: BaseException | None) -> bool:
-    """Return whether it is the error of a process that was killed or crashed."""
+    """Return whether an error means that a process was killed or crashed."""
     return isinstance(error, BrokenExecutor) or type(error).__name__ == "KilledWorker"  # of Dask
 
 
 @dataclass(frozen=True, slots=True)
 class LocalProcesses:
-    """`at_once` processes of this machine, which only the main thread can start.
+    """`at_once` processes of this machine; only the main thread can start them.
 
     They ignore Ctrl-C in a terminal, because their parent ends them, and end soon after it.
     """
@@ -182,10 +182,10 @@ def _initialize(parent: int) -> None:
 
 @dataclass(frozen=True, slots=True)
 class DaskCluster:
-    """All workers of the Dask scheduler at `address`; they find inputs and outputs by their paths.
+    """All workers of the Dask scheduler at `address`; they must see files at the same paths.
 
-    The scheduler has `timeout` seconds to answer, and then to have a worker. It repeats an item
-    whose worker was lost, as `distributed.scheduler.allowed-failures` says.
+    The scheduler must answer within `timeout` seconds, and have a worker within as many more. It
+    repeats an item whose worker was lost (`distributed.scheduler.allowed-failures`).
     """
 
     address: str
@@ -194,7 +194,7 @@ class DaskCluster:
 
     @contextlib.contextmanager
     def open(self) -> Iterator[Submit]:
-        """Connect with the scheduler; at the end of the block it drops what has not begun.
+        """Connect to the scheduler; at the end of the block it drops items that have not begun.
 
         Raises
         ------

@@ -15,16 +15,16 @@ from vdet.plugins import DETECTORS, load_plugin
 
 @dataclass(frozen=True, slots=True)
 class DetectorKind:
-    """What is registered under the name of a kind of detector.
+    """A kind of detector, as registered under its name.
 
     Attributes
     ----------
     settings
-        The class of its section `detector`; the default of the field `kind` is the name.
+        Class of the section `detector` for this kind; the default of its `kind` is the name.
     load
-        Loads it from its settings and a model file; None stands for the shipped file.
+        Loads the detector from its settings and a model file, None for the shipped one.
     shipped
-        Returns the shipped model file for some settings; None where the kind needs no file.
+        Returns the shipped model file for given settings; None if the kind needs no file.
     """
 
     settings: type[DetectorSettings]
@@ -38,7 +38,7 @@ def load_detector(settings: DetectorSettings) -> DetectorModel:
     Raises
     ------
     ConfigError
-        There is no detector of that name, or the model file is for a detector of another kind.
+        The kind is unknown, or the model file is for another kind.
     ModelError
         The model file cannot be used.
     """
@@ -67,13 +67,13 @@ DetectorObject = DetectorModel | VideoDetector | Callable[[Image], Boxes]
 
 
 def as_model(detector: DetectorObject) -> DetectorModel:
-    """Return a detector object as one that any video can be searched with."""
+    """Return a detector object as one that can search any video."""
     return detector if isinstance(detector, DetectorModel) else _Shared(detector)
 
 
 @dataclass(frozen=True, slots=True)
 class _Shared:
-    """A detector, or a function of an image, that is used as it is for every video."""
+    """A detector, or a function of an image, used unchanged for every video."""
 
     detector: Any
 

@@ -1,10 +1,10 @@
 """The loop: frames → detector → tracker → steps → results.
 
-`build` makes the `Pipeline` of a video, and `Pipeline.follow` leads its frames through:
+`build` makes the `Pipeline` of a video, and `Pipeline.follow` passes its frames through:
 
-1. `search`, in threads: what needs one frame alone;
-2. `observe`, in the order of the frames: the detections go into the tracker;
-3. a wait of `look_ahead` seconds of video, for the tracker to see what comes;
+1. `search`, in threads: everything that needs only one frame;
+2. `observe`, in the order of the frames: the detections go to the tracker;
+3. a delay of `look_ahead` seconds of video, so that the tracker knows later detections;
 4. `complete`: the tracks at the time of the frame, and then every step.
 """
 
@@ -31,27 +31,27 @@ from vdet.track.factory import make_tracker, timed
 from vdet.track.track import TimedTracker, Track, VideoTracker
 
 _STEPS = 25
-"""Number of the latest steps from frame to frame that give the usual step."""
+"""Number of the latest frame intervals whose trimmed mean is the usual interval."""
 
 _SLACK = 0.1
-"""How far apart searches may be beyond 1 / `searches`, in frames.
+"""Tolerance of the distance between searches, 1 / `searches`, in frames.
 
-With 12 searches a second, every second frame is searched at 23.976 frames/s, as at 24.
+With 12 searches per second, every second frame is searched at 23.976 frames/s, as at 24.
 """
 
 
 @dataclass(frozen=True, slots=True)
 class SearchRate:
-    """How often the frames of a video are searched; the first one always is.
+    """How often the frames of a video are searched; the first frame always is.
 
-    Frames are chosen by their times, because the frame rate that a file declares may be wrong.
+    Frames are chosen by their times, because the declared frame rate of a file may be wrong.
 
     Attributes
     ----------
     searches
-        Minimum number of searches a second; None for every frame.
+        Minimum number of searches per second; None for every frame.
     stride
-        Search every `stride`-th frame, whatever `searches` is; None to go by `searches`.
+        Search every `stride`-th frame; overrides `searches`. None to use `searches`.
     """
 
     searches: float | None = None
@@ -63,10 +63,10 @@ class SearchRate:
         Raises
         ------
         ValueError
-            A time is not a finite number, or is not later than that of the frame before.
+            A time is not a finite number, or is not later than that of the previous frame.
         """
         steps: deque[float] = deque(maxlen=_STEPS)
-        before, since = None, 0.0  # time of the frame before; seconds since the latest search
+        before, since = None, 0.0  # time of the previous frame; seconds since the latest search
         for position, frame in enumerate(frames):
             if before is not None:
                 steps.append(float(frame.time - before))
@@ -95,26 +95,26 @@ EVERY_FRAME = SearchRate()
 
 
 FIRST_FRAMES = 2
-"""Number of frames that `DetectorModel.for_video` gets."""
+"""Number of frames passed to `DetectorModel.for_video`."""
 
 _MAX_WAITING = 60
-"""Maximum number of frames that wait for later ones, in memory."""
+"""Maximum number of frames in memory that wait for later ones."""
 
 
 @dataclass(frozen=True, slots=True)
 class Pipeline:
-    """Detector, tracker and steps for the frames of one video, or for one still picture.
+    """Detector, tracker and steps for the frames of one video, or for one single image.
 
     Attributes
     ----------
     steps
-        Each gets every result, in the order of the frames.
+        Each receives every result, in the order of the frames.
     rate
         Which frames are searched.
     look_ahead
-        Seconds of video that are searched after a frame before its tracks are known.
+        Seconds of video to search after a frame before its tracks are shown.
     is_still
-        Whether the only frame is a still picture.
+        Whether the only frame is a single image.
     """
 
     detector: VideoDetector
@@ -134,7 +134,7 @@ class Pipeline:
         source
             The video, for `FrameResult.source`.
         threads
-            Number of frames that are searched at once. The results do not depend on it.
+            Number of frames searched at once. The results do not depend on it.
 
         Raises
         ------
@@ -154,7 +154,7 @@ class Pipeline:
                 yield self.complete(result)
 
     def search(self, chosen: tuple[Frame, bool]) -> Any:
-        """Do what needs one frame alone, and search it or not; return the candidates.
+        """Do everything that needs only one frame; return its candidates, None if not searched.
 
         Several threads may call this at once.
         """
@@ -169,7 +169,7 @@ class Pipeline:
     def observe(
         self, frame: Frame, candidates: Any, source: Path, *, searched: bool = True
     ) -> FrameResult:
-        """Return the result of the next frame, without tracks; the tracker follows into it."""
+        """Pass the next frame to the tracker; return its result, still without tracks."""
         if not searched:
             return FrameResult(source, frame, NO_BOXES, (), searched=False)
         detections = self.detector.detect(candidates)
@@ -190,7 +190,7 @@ class Pipeline:
 
 
 def _delayed(results: Iterable[FrameResult], seconds: Fraction) -> Iterator[FrameResult]:
-    """Yield each result once there are those of the `seconds` of video after it."""
+    """Yield each result when the results of the next `seconds` of video are known."""
     waiting = deque[FrameResult]()
     for result in results:
         waiting.append(result)
@@ -203,14 +203,14 @@ def _delayed(results: Iterable[FrameResult], seconds: Fraction) -> Iterator[Fram
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """What finds and follows the vehicles of a run.
+    """The parts of a run that find and track the vehicles.
 
     Attributes
     ----------
     model
-        It makes the detector of each video.
+        Makes the detector of each video.
     tracker
-        A tracker for one video; None for that of the settings.
+        A tracker for one video; None: the settings choose it.
     steps
         Steps in addition to those of the settings.
     """
@@ -223,23 +223,23 @@ class Parts:
 def build(
     parts: Parts, settings: Settings, video: VideoInfo | None, images: Sequence[Image]
 ) -> Pipeline:
-    """Make the pipeline of a video, or of one still picture.
+    """Make the pipeline of a video, or of one single image.
 
-    In a still picture each detection becomes a track, with ids from 1.
+    In a single image each detection becomes a track, with ids from 1.
 
     Parameters
     ----------
     video
-        None for a still picture.
+        None for a single image.
     images
-        The first frames, from `peek`; the still picture alone.
+        The first frames, from `peek`, or the single image.
 
     Raises
     ------
     FrameSizeError
-        Frames of this size are too small to be searched.
+        Frames of this size are too small to search.
     ConfigError, ImageError
-        The places in the settings or the lens do not fit the frames.
+        The points or the lens in the settings do not fit the frames.
     """
     height, width = (video.height, video.width) if video else images[0].shape[:2]
     settings.camera.check_frames(width, height)
@@ -255,7 +255,7 @@ def build(
 
 
 def peek(frames: Iterable[Frame]) -> tuple[list[Image], Iterable[Frame]]:
-    """Return the images that `DetectorModel.for_video` gets, and an iterable of all frames."""
+    """Return the images for `DetectorModel.for_video`, and an iterable of all frames."""
     rest = iter(frames)
     first = list(itertools.islice(rest, FIRST_FRAMES))
     # A list iterator releases its list at the end; the list itself would stay for the whole run.
@@ -264,7 +264,7 @@ def peek(frames: Iterable[Frame]) -> tuple[list[Image], Iterable[Frame]]:
 
 @contextmanager
 def named_errors(source: Path, kind: type[VdetError]) -> Iterator[None]:
-    """Raise errors of settings and of pictures as `kind`, with the name of the source."""
+    """Raise errors of settings and images as `kind`, with the name of the source."""
     try:
         yield
     except (ConfigError, ImageError) as error:
@@ -272,7 +272,7 @@ def named_errors(source: Path, kind: type[VdetError]) -> Iterator[None]:
 
 
 class StillTracker:
-    """Makes a track of each detection of a still picture."""
+    """Makes a track from each detection in a single image."""
 
     def update(self, detections: Boxes, *_: object) -> list[Track]:
         """Return a track for each detection, with ids from 1."""

@@ -1,4 +1,4 @@
-"""Vehicles in still pictures: read the picture, detect, give the result to sinks."""
+"""Vehicles in single images: read the image, detect, pass the result to the sinks."""
 
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -23,9 +23,9 @@ from vdet.run.threads import map_ordered
 
 @dataclass(frozen=True, slots=True)
 class PictureJob:
-    """A picture, and the outputs that are written for it alone.
+    """An image, and the outputs for it alone.
 
-    `place` is its path below the folder that it was found by; None: its name.
+    `place` is its path below the input folder; None: its name.
     """
 
     source: Path
@@ -34,15 +34,15 @@ class PictureJob:
 
 
 def find_images(paths: Sequence[Path]) -> dict[Path, Path]:
-    """Return the pictures that `paths` name: files, and the pictures in and below folders.
+    """Return the images that `paths` name: files, and all images in folders, recursively.
 
-    Each has its path below the folder; hidden files and folders are left out. The pictures are
+    Each has its path below the folder; hidden files and folders are skipped. The images are
     recorded as inputs.
 
     Raises
     ------
     ImageError
-        A path does not exist, or a folder holds no picture.
+        A path does not exist, or a folder contains no image.
     """
     found: dict[Path, Path] = {}
     for path in paths:
@@ -69,22 +69,22 @@ def plan_pictures(
     *,
     overwrite: bool,
 ) -> list[PictureJob]:
-    """Choose the outputs of each picture, and check them before any work.
+    """Choose the outputs of each image, and check them before any work.
 
     Parameters
     ----------
     sources
         As `find_images` returns them.
     out
-        A file, if there is a single source and `out` has the suffix of a picture; else a folder,
-        in which the pictures keep their names and folders. None: no pictures.
+        A file, if there is a single source and `out` has the suffix of an image; else a folder, in
+        which images keep their names and folders. None: no images.
     stages
-        Folder of the stage pictures; of several sources, each gets a folder in it. None: none.
+        Folder of the stage images; with several sources, each has a subfolder. None: none.
 
     Raises
     ------
     OutputError
-        An output exists already (and not `overwrite`), is an input, or is that of two sources.
+        An output already exists (without `overwrite`), is an input, or belongs to two sources.
     """
     several = len(sources) > 1
     is_file = out is not None and not several and out.suffix.lower() in PICTURE_SUFFIXES
@@ -103,15 +103,15 @@ def plan_pictures(
 
 @dataclass(frozen=True, slots=True)
 class PictureSearch:
-    """How pictures are searched."""
+    """Searches single images, with one detector and settings."""
 
     model: DetectorModel
     settings: Settings
 
     def detect(self, source: Path, image: Image) -> FrameResult:
-        """Search a picture, BGR uint8 `(H, W, 3)`; threads may call this at once.
+        """Search an image, BGR uint8 `(H, W, 3)`; threads may call this at once.
 
-        Each detection becomes a track, with ids from 1. `source` is the name of the picture in
+        Each detection becomes a track, with ids from 1. `source` is the name of the image in
         messages. Raises `ImageError` if it cannot be searched.
         """
         frame = Frame(0, Fraction(0), Picture(image))
@@ -124,7 +124,7 @@ class PictureSearch:
     def open_sinks(
         self, outputs: Sequence[Output], places: Mapping[Path, Path], *, overwrite: bool
     ) -> Iterator[Sinks]:
-        """Yield the sinks of outputs of some pictures; they appear together after the block."""
+        """Yield the sinks of some outputs, which appear together after the block."""
 
         def stage_pictures(image: Image, detections: Boxes) -> dict[str, Image]:
             detector = self.model.for_video(image.shape[1], image.shape[0], [image])
@@ -146,11 +146,11 @@ def run_pictures(
     overwrite: bool = False,
     threads: int = 1,
 ) -> Generator[FrameResult | ImageError]:
-    """Search pictures; yield the result of each, or why it cannot be read or searched.
+    """Search images; yield the result of each, or the error that prevented it.
 
-    `threads` pictures are read and searched at once. The outputs of one picture appear together,
-    before its result. The `shared` outputs, which get the results of all pictures in their order,
-    appear after the last one.
+    `threads` images are read and searched at once. The outputs of one image appear together, before
+    its result is yielded. The `shared` outputs, which receive all results in order, appear after
+    the last one.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The result of one frame, and what steps find out beside its tracks."""
+"""The result of one frame, and the facts that steps add to it."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
@@ -17,9 +17,9 @@ from vdet.track.track import FrameTracks, Track
 
 
 class Fact(Protocol):
-    """What a step finds out of a frame or of a whole video: a frozen value of a type of its own.
+    """What a step found out about a frame or a whole video: a frozen value of its own type.
 
-    Each line of `str` of a fact about a whole video is a warning for people; empty for none.
+    Each line of the `str` of a fact about a whole video is printed as a warning.
     """
 
     def record(self) -> Any:
@@ -30,31 +30,31 @@ Facts = Mapping[str, Fact]
 """Facts by their names, which are their keys in JSON."""
 
 CONDITIONS = "conditions"
-"""Name of the fact about a video that says what makes its results doubtful."""
+"""Name of the fact that has the reasons to doubt the results of a video."""
 
 
 def findings_in(facts: Facts) -> Findings:
-    """Return what makes the results of a video doubtful."""
+    """Return the reasons to doubt the results of a video."""
     return cast("Findings", facts.get(CONDITIONS, Findings()))
 
 
 @dataclass(frozen=True, slots=True)
 class FrameResult:
-    """A frame, what was detected in it, the vehicles that are shown, and facts about it.
+    """A frame, its detections, the vehicles shown, and facts about it.
 
     Attributes
     ----------
     source
-        The video, or the still picture.
+        The video or image file.
     frame
-        The frame as it was read. All sinks get the same image, so none may change it.
+        The frame as read. All sinks share the same image, so none may change it.
     detections, tracks
         In pixels of that frame.
     facts
-        What steps found out of it; the lane is "lane".
+        What steps found out about it; the lane is "lane".
     searched
-        Whether the detector searched the frame: see `detector.stride`. Where it did not, there are
-        no detections.
+        Whether the detector searched the frame: see `detector.searches_per_second`. Without a
+        search there are no detections.
     """
 
     source: Path
@@ -66,22 +66,22 @@ class FrameResult:
 
     @property
     def road(self) -> Road | None:
-        """The lane; None if lanes are not looked for."""
+        """The lane; None if lane finding is disabled."""
         return cast("Road | None", self.facts.get("lane"))
 
     @property
     def frame_tracks(self) -> FrameTracks:
-        """The tracks with the number and the time of the frame, and its facts."""
+        """The tracks with the number, time and facts of the frame."""
         facts = {name: fact.record() for name, fact in self.facts.items()}
         return FrameTracks(self.frame.index, float(self.frame.time), self.tracks, facts)
 
     def of_classes(self, classes: Collection[str]) -> "FrameResult":
-        """Return the result with only the tracks of some classes; none means all."""
+        """Return the result with only the tracks of some classes; empty for all."""
         chosen = (track for track in self.tracks if is_chosen(track.class_name, classes))
         return replace(self, tracks=tuple(chosen)) if classes else self
 
     def _repr_png_(self) -> bytes:
-        """Return the frame with its vehicles, which notebooks show."""
+        """Return the frame with its vehicles, for notebooks."""
         image = self.frame.image.copy()
         for track in self.tracks:
             label = f"#{track.id} {track.class_name or ''}".rstrip()

@@ -1,8 +1,8 @@
-"""Steps: what stands between the tracker and the sinks, and the steps of vdet itself.
+"""Steps: they run between the tracker and the sinks. vdet's own are here.
 
-A step is made for one video or one picture. Its kind, which is registered as an entry point of the
-group `vdet.steps`, is a function that takes a `StepContext` and returns the step, or None where the
-settings do not ask for it.
+A step is made for one video or one image. What is registered as an entry point of the group
+`vdet.steps` is a function that takes a `StepContext` and returns a step, or None if the settings do
+not enable it.
 """
 
 from collections.abc import Sequence
@@ -23,26 +23,26 @@ class Step(Protocol):
     """Changes or adds to the results of one video."""
 
     def apply(self, result: FrameResult) -> FrameResult:
-        """Return the result that the next step and the sinks get.
+        """Return the result for the next step and the sinks.
 
-        It is called in the order of the frames. `dataclasses.replace` makes a changed result.
+        It is called in the order of the frames. Use `dataclasses.replace` to change a result.
         """
 
 
 @runtime_checkable
 class ParallelStep(Step, Protocol):
-    """A step with a part that needs only one frame."""
+    """A step with a part that needs only one frame, and can run in threads."""
 
     def prepare(self, frame: Frame) -> None:
-        """Do that part; several threads call this at once, each before `apply` for its frame."""
+        """Do that part; several threads call this at once, before `apply` for the same frame."""
 
 
 @runtime_checkable
 class FindingStep(Step, Protocol):
-    """A step that finds out something about the whole video."""
+    """A step that reports facts about the whole video."""
 
     def finish(self) -> Facts:
-        """Return it, after the last frame; sinks get it as `SinkContext.facts` when they finish."""
+        """Return the facts, after the last frame; sinks find them in `SinkContext.facts`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,9 +54,9 @@ class StepContext:
     width, height
         Size of the frames, pixels.
     video
-        None for a still picture.
+        None for a single image.
     unknown
-        Classes that the settings ask for and the detector does not know.
+        Classes in the settings that the detector does not know.
     """
 
     settings: Settings
@@ -67,14 +67,14 @@ class StepContext:
 
 
 def make_steps(context: StepContext, others: Sequence[Step] = ()) -> list[Step]:
-    """Make the steps that the settings ask for, and then `others`.
+    """Make the steps enabled by the settings, followed by `others`.
 
     Raises
     ------
     ConfigError, ImageError
         The regions or the lens do not fit the frames.
     ConfigError
-        There is no step with a name in `settings.steps`.
+        A name in `settings.steps` is unknown.
     """
     settings, width, height = context.settings, context.width, context.height
     steps: list[Step | None] = []
@@ -100,11 +100,11 @@ class LaneStep:
         self._views: dict[int, FrameView] = {}
 
     def prepare(self, frame: Frame) -> None:
-        """Mark the paint of a frame."""
+        """Mark the lane markings of a frame."""
         self._views[frame.index] = self._roads.observe(frame.picture)
 
     def apply(self, result: FrameResult) -> FrameResult:
-        """Add the road, and where the vehicles are on it."""
+        """Add the road, and the positions of the vehicles on it."""
         view = self._views.pop(result.frame.index)
         road = self._roads.update(view, (track.box for track in result.tracks))
         road = road if self._has_metres else road.without_metres()
@@ -115,10 +115,9 @@ class LaneStep:
 def with_positions(tracks: Sequence[Track], road: Road, foot: float) -> tuple[Track, ...]:
     """Return the tracks of a frame with the `distance` and the `lane` of their feet.
 
-    Both are None without a lane, for a vehicle whose lower edge the frame cuts off, and where
-    `Road.position` does not know them.
-
-    `foot` is how far boxes end below the tyres, as a fraction of their height.
+    Both are None without a lane, for a vehicle whose lower edge is cut off by the frame, and where
+    `Road.position` does not know them. `foot` is how far boxes extend below the tyres, as a
+    fraction of their height.
     """
 
     def placed(track: Track) -> Track:
@@ -132,13 +131,13 @@ def with_positions(tracks: Sequence[Track], road: Road, foot: float) -> tuple[Tr
 
 
 class RegionStep:
-    """Removes detections and vehicles that stand outside the regions."""
+    """Removes detections and vehicles outside the regions."""
 
     def __init__(self, regions: Regions) -> None:
         self._regions = regions
 
     def apply(self, result: FrameResult) -> FrameResult:
-        """Keep the detections and the vehicles whose foot is in the regions."""
+        """Keep the detections and vehicles whose foot is inside the regions."""
         contains, found = self._regions.contains, result.detections
         detections = found[[n for n, item in enumerate(found) if contains(item.box.foot)]]
         tracks = tuple(track for track in result.tracks if contains(track.foot))
@@ -146,18 +145,18 @@ class RegionStep:
 
 
 class ConditionStep:
-    """Watches what makes the results doubtful; it changes none."""
+    """Watches for reasons to doubt the results, without changing them."""
 
     def __init__(self, conditions: Conditions) -> None:
         self._conditions = conditions
 
     def apply(self, result: FrameResult) -> FrameResult:
-        """Look at a frame that was searched."""
+        """Analyse a searched frame."""
         if result.searched:
             time, picture = float(result.frame.time), result.frame.picture
             self._conditions.add(time, picture, result.detections, result.tracks)
         return result
 
     def finish(self) -> Facts:
-        """Return what was found out about the video."""
+        """Return the findings about the video."""
         return {CONDITIONS: self._conditions.findings()}

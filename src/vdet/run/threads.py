@@ -1,8 +1,8 @@
-"""Threads that read, search and write ahead: items keep their order, an error in one ends all.
+"""Threads that read, search and write in parallel: items keep their order, one error ends all.
 
-Each part is a context manager. When its block ends, its threads have ended. There is one exception:
-a thread that hangs in a read or write (for instance on a network disk that is gone) is abandoned
-after `JOIN_TIMEOUT`, together with the files that only it has open.
+Each function is a context manager. When its block ends, its threads have ended, with one exception:
+a thread that hangs in a read or write (for example on a network disk that is gone) is abandoned
+after `JOIN_TIMEOUT`, with the files that only it has open.
 """
 
 import sys
@@ -16,17 +16,17 @@ from typing import Any, TypeVar
 T = TypeVar("T")
 R = TypeVar("R")
 
-JOIN_TIMEOUT = 2.0  # seconds that a thread gets to end
-DEPTH = 2  # items between two threads
-_END = object()  # what follows the last item
+JOIN_TIMEOUT = 2.0  # seconds for a thread to end
+DEPTH = 2  # items queued between two threads
+_END = object()  # follows the last item
 _AHEAD = 8
-"""Largest number of items that `map_ordered` takes ahead for each thread."""
+"""Maximum number of items that `map_ordered` takes ahead per thread."""
 
 
 class _Thread(ThreadPoolExecutor):
     """A thread that makes calls in turn, each in the context (`contextvars`) of its caller.
 
-    At the end of the block all calls are still made, but nobody waits long for them.
+    At the end of the block, pending calls are still made, but waited for only `JOIN_TIMEOUT`.
     """
 
     def __init__(self, name: str) -> None:
@@ -42,9 +42,9 @@ class _Thread(ThreadPoolExecutor):
 
 @contextmanager
 def prefetch(items: Iterable[T]) -> Iterator[Iterator[T]]:
-    """Take `items` in a thread, at most `DEPTH` ahead of the reader.
+    """Iterate over `items` in a thread, at most `DEPTH` ahead of the consumer.
 
-    A generator is closed in that thread too.
+    A generator is also closed in that thread.
     """
     iterator = iter(items)
 
@@ -71,8 +71,8 @@ def write_async(
 ) -> Iterator[Callable[[T], None]]:
     """Yield a function that passes items to `take` in a thread; at most `DEPTH` items wait.
 
-    The thread enters and leaves the context manager `within`, with an error if the block ends with
-    one. An error in the thread is raised by a later call, or when the block ends.
+    The thread enters and exits the context manager `within`, with the error of the block if there
+    is one. An error in the thread is raised by a later call, or when the block ends.
     """
     with _Thread("vdet-write") as thread:
         waiting: deque[Future[Any]] = deque([thread.call(within.__enter__)])
@@ -100,10 +100,10 @@ def map_ordered(
     *,
     is_work: Callable[[T], bool] = lambda _: True,
 ) -> Iterator[Iterator[tuple[T, R]]]:
-    """Pair items with the results of `function`, computed in parallel, in their order.
+    """Yield an iterator of items with the results of `function`, computed in parallel, in order.
 
-    Items are taken until there is one for each thread and one more. Those for which `is_work` is
-    false get None and do not count, but at most `_AHEAD` items are taken for each thread.
+    Items are taken ahead until every thread has one, and one more. Items for which `is_work` is
+    false have the result None and do not count, but at most `_AHEAD` items per thread are taken.
     """
     running: deque[tuple[T, Future[R] | None]] = deque()
 

@@ -1,4 +1,4 @@
-"""A run: read a video, search its frames, follow the vehicles, and give the results to sinks."""
+"""A run: read a video, search its frames, track the vehicles, and pass the results to sinks."""
 
 import logging
 import time
@@ -32,28 +32,28 @@ from vdet.workers import core_count, return_freed_memory
 log = logging.getLogger("vdet")
 
 LEAD = Fraction(2)
-"""Seconds around the time `Run.at` that are processed too, for detector and tracker."""
+"""Seconds to process before and after the time `Run.at`, for detector and tracker."""
 
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """A run: a video, the part of it that is processed, the settings and the outputs.
+    """A run: a video, the part to process, the settings and the outputs.
 
     Attributes
     ----------
     settings
-        All that the results depend on, beside the video and the part.
+        Everything that the results depend on, besides the video and the part.
     start, end
         Seconds from the first frame; frames with start ≤ time < end are processed.
     frames
         Maximum number of frames to process.
     at
-        Time of the stage pictures, seconds from the first frame. If no output needs more, only the
-        frames from 2 s before it to 2 s after it are processed.
+        Time of the stage images, seconds from the first frame. Without other outputs, only the
+        frames from 2 s before to 2 s after it are processed.
     overwrite
         Replace existing outputs.
     threads
-        Number of threads that search; None for one per core.
+        Number of threads for the search; None for one per core.
     """
 
     source: Path
@@ -89,11 +89,11 @@ class RunTotals:
     seconds
         Wall time.
     clock
-        When the video was recorded, if that is known.
+        When the video was recorded; None if unknown.
     facts
         What the steps found out about the whole video.
     summaries
-        What sinks say of their outputs, by the path of the output: see `BaseSink`.
+        The `BaseSink.summary` of each output, by its path.
     """
 
     width: int
@@ -113,9 +113,9 @@ class OpenVideo:
     Attributes
     ----------
     results
-        Those of its frames, in order.
+        The results of its frames, in order.
     traffic
-        It has read the tracks of the results so far.
+        Counts, speeds and records of the results so far.
     facts
         What the steps found out about the whole video; empty before the last result.
     """
@@ -129,7 +129,7 @@ class OpenVideo:
 
 @contextmanager
 def open_video(run: Run, parts: Parts) -> Iterator[OpenVideo]:
-    """Open a video, and follow the vehicles through it; parameters and errors as in `run_video`.
+    """Open a video, and track the vehicles in it; parameters and errors as for `run_video`.
 
     Reading and searching run in threads.
     """
@@ -154,7 +154,7 @@ def open_video(run: Run, parts: Parts) -> Iterator[OpenVideo]:
         def results() -> Generator[FrameResult]:
             with closing(pipeline.follow(frames, run.source, threads=threads)) as found:
                 for result in found:
-                    traffic.add(replace(result, facts={}).frame_tracks)  # it reads no facts
+                    traffic.add(replace(result, facts={}).frame_tracks)  # it does not use facts
                     yield result.of_classes(settings.classes)
             facts.update(pipeline.facts())
             traffic.end(is_still=findings_in(facts).is_still)
@@ -164,7 +164,7 @@ def open_video(run: Run, parts: Parts) -> Iterator[OpenVideo]:
 
 
 def _reader_and_frames(run: Run) -> Generator[Any]:
-    """Yield the reader, and then its frames; the thread that reads them opens and closes it."""
+    """Yield the reader, and then its frames; the reading thread opens and closes it."""
     with VideoReader(
         run.source, start=run.start, end=run.end, frames=run.frames, settings=run.settings.input
     ) as reader:
@@ -173,10 +173,10 @@ def _reader_and_frames(run: Run) -> Generator[Any]:
 
 
 class Results(Iterator[FrameResult]):
-    """The results of a video, frame by frame, and what they come to.
+    """The results of a video, frame by frame, and their totals.
 
-    `video` is what `open_video` returns. It is opened for the first result; the errors are those
-    of `open_video`.
+    `video` is the value of `open_video`. It is opened when the first result is requested; errors as
+    for `open_video`.
     """
 
     _video: OpenVideo | None = None
@@ -196,17 +196,17 @@ class Results(Iterator[FrameResult]):
 
     @property
     def counts(self) -> Counts | None:
-        """The counts so far at the lines and in the zones of the settings; None without these."""
+        """The counts so far at the lines and in the zones of the settings; None without any."""
         return self._video.traffic.counts() if self._video else None
 
     @property
     def vehicles(self) -> tuple[VehicleRecord, ...]:
-        """A record of each vehicle, by id; none before the last frame."""
+        """A record of each vehicle, by id; empty before the last frame."""
         return self._video.traffic.vehicles if self._video else ()
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """What makes the results doubtful; known after the last frame."""
+        """Reasons to doubt the results; empty before the last frame."""
         return findings_in(self._video.facts).found if self._video else ()
 
 
@@ -219,15 +219,15 @@ def _video_and_results(opening: AbstractContextManager[OpenVideo]) -> Generator[
 
 @recorded_inputs()
 def run_video(run: Run, parts: Parts, *, progress: Progress = no_progress) -> RunTotals:
-    """Run a run. Its outputs appear under their names together, at the end of the run.
+    """Process a run. Its outputs appear together, at the end of the run.
 
-    Reading, searching and encoding run in threads, tracking and drawing in the calling one.
+    Reading, searching and encoding run in threads, tracking and drawing in the calling thread.
 
     Parameters
     ----------
     progress
-        Called once with the expected number of frames (None: unknown). What it returns is called
-        with the number of frames done since the last call.
+        Called once with the expected number of frames, None if unknown. The function it returns is
+        called with the number of frames done since the last call.
 
     Raises
     ------
@@ -235,7 +235,7 @@ def run_video(run: Run, parts: Parts, *, progress: Progress = no_progress) -> Ru
         The video cannot be read, too much of it is damaged, or the regions, the lines or the camera
         do not fit its frames.
     OutputError
-        An output cannot be written; before any work, where that can be known.
+        An output cannot be written; raised before any work if possible.
 
     No output is left after an error.
     """
@@ -248,9 +248,9 @@ def run_video(run: Run, parts: Parts, *, progress: Progress = no_progress) -> Ru
 def write_outputs(
     run: Run, parts: Parts, files: OutputFiles, *, progress: Progress = no_progress
 ) -> RunTotals:
-    """Do as `run_video`, into `files`: the outputs are complete, but do not have their names yet.
+    """Do as `run_video`, but leave the complete outputs in `files`, under temporary names.
 
-    The others are those of `run_video`.
+    Other parameters and errors as for `run_video`.
     """
     began = time.perf_counter()
     return_freed_memory()
@@ -289,6 +289,6 @@ def write_outputs(
 
 
 def _no_frame(run: Run, words: str, reader: VideoReader) -> VideoError:
-    """Return the error of a time at which there is no frame."""
+    """Return the error for a time without a frame."""
     end = "check them" if reader.length is None else f"it ends at {float(reader.length):.2f} s"
     return VideoError(f"{run.source}: {words}; {end}")

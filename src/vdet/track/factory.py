@@ -1,4 +1,4 @@
-"""A tracker from its settings, of any kind."""
+"""Trackers of any kind, made from settings."""
 
 from collections.abc import Callable
 from dataclasses import astuple, dataclass, replace
@@ -20,12 +20,12 @@ from vdet.track.track import State, TimedTracker, Track, VideoTracker
 
 @dataclass(frozen=True, slots=True)
 class TrackerKind:
-    """A kind of tracker, as it is registered under its name.
+    """A kind of tracker, as registered under its name.
 
     Attributes
     ----------
     settings
-        Class of the section `tracker` for this kind; its `kind` has the name as default.
+        Class of the section `tracker` for this kind; the default of its `kind` is the name.
     make
         Takes these settings and the width and height of the frames, pixels.
     """
@@ -40,17 +40,17 @@ def make_tracker(settings: Settings, width: int, height: int) -> TimedTracker:
     Raises
     ------
     ConfigError
-        There is no such kind.
+        The kind is unknown.
     """
     kind: TrackerKind = load_plugin(TRACKERS, settings.tracker.kind)
     return timed(kind.make(settings.tracker, width, height))
 
 
 def timed(tracker: VideoTracker) -> TimedTracker:
-    """Return a tracker that knows its vehicles at any time: the tracker itself, or one around it.
+    """Return a tracker that knows its vehicles at any time: the tracker itself, or a wrapper.
 
-    Between two searched frames, vehicles move straight from one box to the other; after the latest
-    one they stay where they are.
+    With the wrapper, vehicles move straight from one box to the next between two searched frames;
+    after the latest frame they stay where they are.
     """
     return tracker if isinstance(tracker, TimedTracker) else InterpolatingTracker(tracker)
 
@@ -61,7 +61,7 @@ class InterpolatingTracker:
     Attributes
     ----------
     tracker
-        The other one. It sees the searched frames only, with their times.
+        The wrapped tracker. It receives only searched frames, with their times.
     """
 
     def __init__(self, tracker: VideoTracker) -> None:

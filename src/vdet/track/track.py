@@ -1,4 +1,4 @@
-"""The protocol of all trackers, and the vehicles that they show in a frame."""
+"""The protocol of all trackers, and the vehicles they show in a frame."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, astuple, dataclass, field, fields
@@ -12,39 +12,39 @@ if TYPE_CHECKING:
     import supervision
 
 State = Literal["detected", "interpolated", "predicted"]
-"""How a vehicle is known in a frame: see `Track`."""
+"""Source of a box in a frame: see `Track`."""
 
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """A vehicle as it is shown in one frame.
+    """A vehicle as shown in one frame.
 
     Attributes
     ----------
     id
-        1, 2, 3 … in the order in which the vehicles of a video are first shown; an id is never
-        used again for another vehicle.
+        1, 2, 3 … in the order in which the vehicles of a video are first shown; ids are never
+        reused.
     box
-        Its place in pixels of the full frame. From the motion tracker: the estimate for this frame,
-        the part inside the frame. From the rules: the average of the car's last rectangles
-        (`tracker.history` of them), in whole pixels, which lie in the frame.
+        In pixels of the full frame. From the motion tracker: the estimate for this frame, clipped
+        to it. From the rules tracker: the average of the last `tracker.history` rectangles, in
+        whole pixels, inside the frame.
     score
         0 to 1: the fraction of shown boxes with such a score that are vehicles.
     state
-        "detected": the detector found the vehicle in this frame. "interpolated": it found it before
-        and after, or the frame was not searched; the box lies between its detections. "predicted":
-        it did not find the vehicle again; the box is where its motion leads or, by the rules, where
-        its image was found again.
+        "detected": the detector found the vehicle in this frame. "interpolated": the detector found
+        it before and after, or the frame was not searched; the box lies between detections.
+        "predicted": the detector did not find it again; the box follows its motion or, with the
+        rules tracker, a match of its image.
     class_name
-        Its class, one of `Boxes.names`; None where the detector does not know classes.
+        Its class, one of `Boxes.names`; None if the detector does not know classes.
     whole_foot
-        Middle of the lower edge of the whole box, with its part outside the frame; x and y, pixels.
-        None where the tracker does not know it: see `foot`.
+        Middle of the lower edge of the whole box, including the part outside the frame; x and y,
+        pixels. None if the tracker does not know it: see `foot`.
     distance
-        Metres along the road from the camera to the vehicle; None where it is not known.
+        Metres along the road from the camera to the vehicle; None if unknown.
     lane
-        0 in the own lane, 1 in the next one to the right, -1 to the left and so on; None where it
-        is not known.
+        0 for the camera's lane, 1 for the next one to the right, -1 to the left and so on; None if
+        unknown.
     """
 
     id: int
@@ -63,25 +63,25 @@ class Track:
 
     @property
     def written_foot(self) -> tuple[float, float]:
-        """The foot as exactly as files have it, to a hundredth of a pixel."""
+        """The foot as written to files, to a hundredth of a pixel."""
         x, y = self.whole_foot or self.box.foot
         return round(100 * x) / 100, round(100 * y) / 100  # round(x, 2) is three times slower
 
 
 @dataclass(frozen=True, slots=True)
 class FrameTracks:
-    """The vehicles that are shown in one frame of a video.
+    """The vehicles shown in one frame of a video.
 
     Attributes
     ----------
     index
         Number of the frame, from 0 at the start of the video.
     time
-        When the frame is shown, seconds.
+        Presentation time of the frame, seconds.
     tracks
         By id.
     facts
-        More about the frame, as values for JSON: `lane` if lanes are searched for.
+        More about the frame, as values for JSON: `lane` if lane finding is enabled.
     """
 
     index: int
@@ -91,7 +91,7 @@ class FrameTracks:
 
     @property
     def boxes(self) -> Boxes:
-        """The vehicles as boxes with ids; without classes where one of them has none."""
+        """The vehicles as boxes with ids; without classes if one of them has none."""
         names = sorted({track.class_name for track in self.tracks if track.class_name})
         every = [track.class_name for track in self.tracks]
         return Boxes(
@@ -120,7 +120,7 @@ class FrameTracks:
 
 
 class VideoTracker(Protocol):
-    """Follows the vehicles of one video; a new one is made for every video."""
+    """Tracks the vehicles of one video; every video gets a new tracker."""
 
     def update(self, detections: Boxes, time: float, picture: Picture | None = None) -> list[Track]:
         """Follow the vehicles into the next frame.
@@ -128,9 +128,9 @@ class VideoTracker(Protocol):
         Parameters
         ----------
         detections
-            What the detector sees in the frame.
+            The detections in the frame.
         time
-            When the frame is shown, seconds; it increases from frame to frame.
+            Presentation time of the frame, seconds; increases from frame to frame.
         picture
             The frame; only trackers that look at pixels need it.
 
@@ -147,13 +147,13 @@ class VideoTracker(Protocol):
 
 @runtime_checkable
 class TimedTracker(Protocol):
-    """A tracker that knows where its vehicles are at any time, also between searched frames.
+    """A tracker that knows its vehicles at any time, also between searched frames.
 
-    `vdet.track.factory.timed` makes one of a `VideoTracker`.
+    `vdet.track.factory.timed` makes one from a `VideoTracker`.
     """
 
     def observe(self, detections: Boxes, time: float, picture: Picture | None = None) -> None:
-        """Follow the vehicles into the next frame; parameters as of `VideoTracker.update`."""
+        """Track the vehicles into the next frame; parameters as for `VideoTracker.update`."""
 
     def at(self, time: float) -> list[Track]:
         """Return the vehicles shown at a time, by id.
@@ -161,7 +161,7 @@ class TimedTracker(Protocol):
         Parameters
         ----------
         time
-            Seconds; not earlier than in the call before. Before the time of the latest `observe`,
-            what came after it is known: nothing earlier than `tracker.look_ahead` before that.
-            Later than it, the vehicles move on.
+            Seconds; not earlier than in the previous call, and at most `tracker.look_ahead` before
+            the latest `observe`. Later detections are used where they are known; after the latest
+            `observe`, the vehicles move on.
         """

@@ -1,4 +1,4 @@
-"""The clock of a video, where it is known from, and the intervals of tables and of pages."""
+"""The clock of a video and its source, and the intervals of tables and pages."""
 
 import logging
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ from vdet.track.track import FrameTracks
 
 _log = logging.getLogger("vdet")
 _SAME = timedelta(minutes=1)
-"""Largest difference of the times in the name and in the metadata of a video that are one."""
+"""Maximum difference between the times in the name and the metadata without a warning."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,11 +26,11 @@ class Clock:
     Attributes
     ----------
     zero
-        The moment of time 0 in the video, in UTC.
+        Clock time at time 0 of the video, in UTC.
     source
-        Where it is known from, for messages.
+        Where it comes from, for messages.
     zone
-        The time zone of the moments that `at` returns; None for that of this computer.
+        Time zone of the values of `at`; None: that of this computer.
     first
         Time of the first frame in the video, seconds.
     """
@@ -50,35 +50,35 @@ class Clock:
         return (zero - zero.replace(hour=0, minute=0, second=0, microsecond=0)).total_seconds()
 
     def at(self, seconds: float) -> datetime:
-        """Return the moment of a time in the video, with the offset of its zone at that moment."""
+        """Return the clock time of a time in the video, with the offset of the zone then."""
         return (self.zero + timedelta(seconds=seconds)).astimezone(self.zone)
 
 
 def find_clock(
     path: Path, settings: Settings, created: str | None, start: float, zero: datetime | None = None
 ) -> Clock | None:
-    """Return the clock of a video; None if nothing says when it begins.
+    """Return the clock of a video; None if its start time is unknown.
 
-    `input.begin` decides, then the pattern of `camera.clock`, then `zero`, then a time in its name
-    or in that of its first image, then the creation time of the video. A time without a zone is
-    in that of the camera. If the name and the creation time differ by more than a minute, a warning
-    (logger "vdet") has both.
+    `input.begin` has priority, then the pattern of `camera.clock`, then `zero`, then a time in the
+    name of the video or its first image, then the creation time of the video. A time without a zone
+    is local time of the camera. If the name and the creation time differ by more than a minute, a
+    warning (logger "vdet") shows both.
 
     Parameters
     ----------
     path
-        The video, or a file that is named after it.
+        The video, or a file named after it.
     created
         The creation time in the metadata of the file.
     start
         Time of its first frame in the video, seconds.
     zero
-        The moment of time 0, where the file itself says so.
+        Clock time at time 0, if it is in the file itself.
 
     Raises
     ------
     ConfigError
-        The name has no time as the pattern says.
+        The name does not match the pattern.
     """
     clock = settings.camera.clock
     zone: tzinfo | None = clock.zone
@@ -95,7 +95,7 @@ def find_clock(
 
 
 def _found(path: Path, settings: Settings, created: str | None) -> tuple[datetime, str] | None:
-    """Return when a video begins by its name and its metadata, and which of these says so."""
+    """Return the start time by the name and metadata of a video, and which of them it is from."""
     clock, zone = settings.camera.clock, settings.camera.clock.zone
     sequence = find_sequence(path)
     named, written = clock.time_in((sequence.files[0] if sequence else path).name), None
@@ -115,7 +115,7 @@ def _found(path: Path, settings: Settings, created: str | None) -> tuple[datetim
 
 
 def _utc(time: datetime, zone: tzinfo | None) -> datetime:
-    """Return a moment in UTC; without a zone of its own it is local time in `zone`."""
+    """Return a time in UTC; without a zone of its own it is local time in `zone`."""
     return (time if time.tzinfo or not zone else time.replace(tzinfo=zone)).astimezone(UTC)
 
 
@@ -124,20 +124,20 @@ def _text(time: datetime) -> str:
 
 
 Span = tuple[float, float]
-"""From when to when there is video: times of the first and the last frame, seconds."""
+"""Start and end of a part with video: times of its first and last frame, seconds."""
 
 Moment = datetime | float | None
-"""The moment on the clock; seconds in a video without; None in several without."""
+"""A clock time; without a clock, seconds in the video; None for several videos without one."""
 
 _LONGEST_FRAME = 60.0
-"""Seconds for which a frame is shown at most; until a later one there is no video."""
+"""Maximum duration of a frame, seconds; a later next frame means a part without video."""
 
 
 def add_frame(spans: list[Span], frame: FrameTracks, before: FrameTracks | None) -> None:
-    """Let the last span end with a frame, or begin another where there is no video before it.
+    """Extend the last span to a frame, or begin a new one if there is no video before it.
 
-    `before` is the last frame that was added, None for the first one of a video. Frames between may
-    have been left out.
+    `before` is the frame added last, None for the first one of a video. Frames in between may have
+    been skipped.
     """
     time = round(frame.time, 6)
     frames = frame.index - before.index if before else 0
@@ -148,22 +148,22 @@ def add_frame(spans: list[Span], frame: FrameTracks, before: FrameTracks | None)
 
 
 class Intervals:
-    """The intervals of one or several videos in which there is video, by their numbers.
+    """The numbered intervals of one or several videos that contain video.
 
-    With a clock, they begin at round times of the day. Inside, seconds are those of the video, of
-    the clock's local time since 1970, or of several videos without clocks one after the other.
+    With a clock, they begin at round times of the day. Internally, seconds are those of the video,
+    of the local clock time since 1970, or of several videos without clocks one after another.
 
     Parameters
     ----------
     videos
         The clock and the spans of each video.
     length
-        Seconds; None for one interval over all.
+        Seconds; None for a single interval.
 
     Raises
     ------
     ConfigError
-        There are intervals, and several videos of which one has no clock.
+        `length` is set, and one of several videos has no clock.
     """
 
     def __init__(
@@ -197,9 +197,9 @@ class Intervals:
         self.numbers = sorted({n for first, last in ranges for n in range(first, last + 1)})
 
     def seconds(self, which: int, time: float) -> float:
-        """Return a time in one of the videos in the seconds of the intervals.
+        """Convert a time in one of the videos to the seconds of the intervals.
 
-        The time of an event may be a little before or after the frames: it is that of the nearest.
+        The time of an event may be slightly before or after the frames: the nearest one is used.
         """
         seconds, spans = self._zeros[which] + time, self._spans[which]
         first, last = next((span for span in reversed(spans) if span[0] <= seconds), spans[0])
@@ -214,7 +214,7 @@ class Intervals:
         return 0 if self._length is None else int(seconds // self._length)
 
     def limits(self, number: int) -> Span:
-        """Return the part of an interval between the first and the last frame of all videos."""
+        """Return the part of an interval between the first and last frame of all videos."""
         begin, end = self._ends(number)
         return max(begin, self._first), min(end, self._last)
 
@@ -224,7 +224,7 @@ class Intervals:
         return float(number * self._length), float((number + 1) * self._length)
 
     def start_in(self, which: int, number: int) -> float:
-        """Return when an interval begins, in the time of one of the videos."""
+        """Return the start of an interval, in the time of one of the videos."""
         return round(self._ends(number)[0] - self._zeros[which], 3)
 
     def covered(self, number: int) -> float:

@@ -1,7 +1,7 @@
-"""Files of counts and of flows, of one video and of many.
+"""Files of counts and flows, of one video or several.
 
-The ending of a name chooses the table; `.json` has all tables. Of several videos there is one table
-by interval; events have the name of their video.
+The ending of a name selects the table; `.json` has all tables. Several videos have one table by
+interval; events have the name of their video.
 """
 
 from collections import Counter
@@ -26,10 +26,10 @@ _TOTALS, _ZONES, _FLOWS = map(_columns, (CountRow, ZoneRow, FlowRow))
 _EVENTS = ("time", "clock", *_columns(Event)[1:])
 
 NOWHERE = "(none)"
-"""In tables, where a flow leads that ends at its first line or zone."""
+"""In tables, the destination of a flow that ends at its first line or zone."""
 
 ALL = "all"
-"""In wide tables, the column of a sum."""
+"""In wide tables, the name of a sum."""
 
 COUNT_SUFFIXES = (".csv", ".json", ".totals.csv", ".zones.csv", ".wide.csv")
 FLOW_SUFFIXES = (".csv", ".json", ".matrix.csv", ".wide.csv")
@@ -39,14 +39,14 @@ Videos = Mapping[str, Counts]
 
 
 def counts_content(path: Path, videos: Videos, interval: int | None = None) -> Any:
-    """Return the events, or what the ending of `path` says: totals (also wide), zones, all as JSON.
+    """Return the events, or by the ending of `path` the totals (also wide), zones, or all as JSON.
 
-    `write_content` takes it.
+    Pass the result to `write_content`.
 
     Parameters
     ----------
     interval
-        That of totals and zones, seconds; None for the whole.
+        Interval of totals and zones, seconds; None for the whole video.
 
     Raises
     ------
@@ -70,9 +70,9 @@ def counts_content(path: Path, videos: Videos, interval: int | None = None) -> A
 
 
 def flows_content(path: Path, videos: Videos, interval: int | None = None) -> Any:
-    """Return the flows, or what the ending of `path` says: wide, their matrix, or all as JSON.
+    """Return the flows, or by the ending of `path` a wide table, the matrix, or all as JSON.
 
-    Parameters and errors as of `counts_content`.
+    Parameters and errors as for `counts_content`.
     """
     every = list(videos.values())
     rows = tables.flow_table(every, interval)
@@ -88,7 +88,7 @@ def flows_content(path: Path, videos: Videos, interval: int | None = None) -> An
 
 
 def wide_table(rows: Sequence[CountRow | FlowRow], between: str) -> list[Sequence[Any]]:
-    """Return a table with a row for each interval, and a column for each way and class, and sums.
+    """Return a table with a row for each interval, a column for each way and class, and sums.
 
     `between` is the text between the two names of a way.
     """
@@ -122,10 +122,10 @@ def _matrix_columns(videos: Iterable[Counts]) -> tuple[str, ...]:
 
 
 def _join(table: str, videos: Mapping[str, Any], path: Path) -> None:
-    """Write one file over the videos of a batch, from the content for each.
+    """Write one file over the videos of a batch, from the content of each.
 
-    A row gets the name of its video; JSON has the sums of a table over all videos and intervals,
-    and the JSON of each.
+    Rows have the name of their video; JSON has the sums of a table over all videos and intervals,
+    and the JSON of each video.
     """
     if not is_json(path):
         write_content(path, join_tables(videos, missing=0))

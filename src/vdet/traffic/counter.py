@@ -15,18 +15,18 @@ from vdet.traffic.crossings import VANISH, Border, Crossing, PlacedLine, crossin
 from vdet.traffic.linking import GAP, TrackLinker, VehiclePath
 
 _OLDEST = 0.2
-"""Seconds after which running counts are counted anew."""
+"""Seconds after which running counts are recomputed."""
 _NEAR = 0.5
-"""Distance in heights of its box within which a track that begins or ends is at a line."""
+"""Distance within which the end of a track is at a line, in heights of its box."""
 _FEW = 0.05
-"""Fraction of the crossings of a line up to which tracks that go wrong there are no warning."""
+"""Fraction of the crossings of a line up to which wrong tracks there cause no warning."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Passage:
     """What a vehicle did: its events, and by line or zone the heights of its box then, pixels.
 
-    `missed` are the lines at which its path begins or ends, and which it does not cross.
+    `missed` are the lines at which its path begins or ends without crossing them.
     """
 
     events: list[Event]
@@ -47,14 +47,14 @@ class VehicleCounter:
     lines, zones
         Places in its frames.
     spans
-        From when to when there is video, seconds.
+        The parts with video, seconds.
     linker
-        It says how many vehicles have begun.
+        Counts how many vehicles have begun.
 
     Raises
     ------
     ConfigError
-        They are given for frames of another aspect ratio than `width` × `height` pixels.
+        `camera.size` has another aspect ratio than `width` × `height` pixels.
     """
 
     def __init__(self, settings: Settings, width: int, height: int, begun: int = 0) -> None:
@@ -78,7 +78,7 @@ class VehicleCounter:
         self._tally.update((event.name, event.direction) for some in ended for event in some.events)
 
     def start_video(self) -> None:
-        """Take the ids of the next frames for those of other tracks: they are of another video."""
+        """Treat the ids of the next frames as other tracks, because they are of another video."""
         self._latest = None
         self.linker.start_video()
 
@@ -93,9 +93,9 @@ class VehicleCounter:
         return Counts(tuple(events), ways, zones, spans, warnings=warnings)
 
     def so_far(self) -> Counter[Way]:
-        """Return how often each direction was counted; vehicles that are in a zone stay there.
+        """Return the count of each direction so far; vehicles in a zone have not left it.
 
-        The counts are at most `_OLDEST` seconds old, so that this may be asked for each frame.
+        The counts may be `_OLDEST` seconds old, so that this can be called for each frame.
         """
         now = self.spans[-1][1]
         if now - self._counted >= _OLDEST:
@@ -110,7 +110,7 @@ class VehicleCounter:
         return self._so_far
 
     def _passages(self, paths: Iterable[VehiclePath]) -> list[_Passage]:
-        """Return what vehicles do that count: of the classes, seen long enough, and not parked."""
+        """Return the passages that count: of the classes, seen long enough, and not parked."""
         minimum, classes = self._settings.traffic.min_seen_seconds, self._settings.classes
         seen = (path for path in paths if path.seconds >= minimum and path.has_driven)
         return [self._passage(path) for path in seen if is_chosen(path.class_name, classes)]
@@ -118,7 +118,7 @@ class VehicleCounter:
     def _passage(self, path: VehiclePath) -> _Passage:
         found = {border.name: crossings(path, border) for border in self._borders}
         last, (start, _), (_, now) = path.seen - 1, self.spans[0], self.spans[-1]
-        # Where it begins and ends, but for the ends of the video.
+        # The ends of the path, except at the ends of the video.
         rows = [row for row in (0, last) if start < path.times[row] < now]
         points, reach = path.points[rows], _NEAR * path.heights[rows]
         events, heights = list[Event](), {}
@@ -140,7 +140,7 @@ def _event(path: VehiclePath, name: str, crossing: Crossing) -> Event:
 
 
 def _line_warnings(lines: Sequence[PlacedLine], passages: Sequence[_Passage]) -> Iterator[str]:
-    """Yield a sentence for each thing that is wrong with a line, as the tracks of a run show."""
+    """Yield a sentence for each problem of a line that the tracks of a run show."""
     for line in lines if passages else ():
         found = [heights for passage in passages if (heights := passage.heights[line.name])]
         few = _FEW * len(found)

@@ -1,4 +1,4 @@
-"""Counting in saved tracks: of one video, or of many that may follow one another in time."""
+"""Count in saved tracks of one video, or of several that may follow one another in time."""
 
 import math
 from bisect import bisect_right
@@ -18,10 +18,11 @@ from vdet.traffic.counts import Counts
 from vdet.traffic.speeds import SpeedMeter, with_speeds
 
 _SEAM = 2.0
-"""Largest difference, in seconds, of the end of a video and the start of one that goes on from it:
-clocks of names and of containers have whole seconds."""
+"""Maximum seconds between the end of a video and the start of the one that continues it: times in
+names and containers are whole seconds.
+"""
 _STEP = 0.04
-"""Seconds that are taken for the time from the last frame before a seam to the first one after."""
+"""Assumed seconds from the last frame before a seam to the first one after it."""
 
 
 def count_files(
@@ -34,13 +35,13 @@ def count_files(
 ) -> dict[str, Counts]:
     """Count the vehicles of files of tracks at the lines and in the zones of the settings.
 
-    A file that follows the one before, by their clocks, is counted together with it: a vehicle on
-    both sides of the seam is one vehicle. Others are counted one by one.
+    A file that follows the previous one, by their clocks, is counted together with it: a vehicle in
+    both is one vehicle. Other files are counted separately.
 
     Parameters
     ----------
     size
-        Width and height of the frames, pixels; None: as the file says, else as the lines say.
+        Width and height of the frames, pixels; None: from the file, else from `camera.size`.
     rate
         Frames per second, for a file without times.
     advance
@@ -48,15 +49,15 @@ def count_files(
 
     Returns
     -------
-    The counts of each file. The numbers of vehicles differ in all of them.
+    The counts of each file. No two vehicles have the same number, in all files.
 
     Raises
     ------
     TruthError
         A file cannot be used, or its times are missing or wrong.
     ConfigError
-        The lines do not fit the frames, the size of the frames is not known, or a name has no time
-        as the pattern of the clock says.
+        The lines do not fit the frames, the size of the frames is unknown, or a name does not match
+        the pattern of the clock.
     """
     counted: dict[str, Counts] = {}
     group: _Group | None = None
@@ -78,7 +79,7 @@ def count_files(
 def count_frames(
     frames: Iterable[FrameTracks], settings: Settings, size: tuple[int, int] | None = None
 ) -> Counts:
-    """Count the vehicles in the tracks of each frame; arguments and errors as of `count_files`."""
+    """Count the vehicles in the tracks of each frame; arguments and errors as for `count_files`."""
     group = _Group(settings, _size(settings, size))
     group.add("", None, 0.0, frames)
     return group.counts()[""]
@@ -96,7 +97,7 @@ def _size(settings: Settings, size: tuple[int, int] | None) -> tuple[int, int]:
 class _Video:
     """A video of a group.
 
-    `spans` are those of `Counts`; `shift` turns its times into those of the group.
+    `spans` as in `Counts`; `shift` converts its times to those of the group.
     """
 
     name: str
@@ -168,5 +169,5 @@ class _Group:
             events = tuple(replace(event, time=round(event.time - shift, 3)) for event in own)
             counts = replace(whole, events=events, spans=video.spans, clock=video.clock)
             found[video.name] = with_speeds(counts, video.meter)
-            whole = replace(whole, warnings=())  # they are said once
+            whole = replace(whole, warnings=())  # reported once
         return found

@@ -1,6 +1,6 @@
-"""Events, and what follows from them: totals, flows, and the use of zones, by interval and class.
+"""Events, and the tables computed from them: totals, flows and zones, by interval and class.
 
-Tables cover the whole video, or intervals of it. Several videos have one table.
+Tables cover the whole video or intervals of it. Several videos have one table.
 """
 
 from collections import Counter
@@ -33,7 +33,7 @@ class Event:
     Attributes
     ----------
     time
-        Seconds, as the frames of the video count them; interpolated between two frames.
+        Seconds in the video, interpolated between two frames.
     frame
         Number of the first frame at or after it, from 0.
     name
@@ -44,7 +44,7 @@ class Event:
     id
         Id of the track.
     vehicle
-        Number of the vehicle. Several tracks have one where they were taken for one vehicle.
+        Number of the vehicle, which several linked tracks share.
     class_name
         Class of the vehicle; None if the detector has no classes.
     score
@@ -52,10 +52,10 @@ class Event:
     seconds
         How long the vehicle was in the zone, for exit and vanish; else None.
     speed, speed_sd
-        Speed at `time`, and its standard deviation, km/h; None where it is not known.
+        Speed at `time`, and its standard deviation, km/h; None if unknown.
     mean_speed
-        Mean speed since the event before of the same track, from the places at both events alone,
-        km/h; None where it is not known.
+        Mean speed since the previous event of the same track, from the positions at both events,
+        km/h; None if unknown.
     """
 
     time: float
@@ -74,7 +74,7 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class DirectionTotal:
-    """How many vehicles were counted in a direction, and how many of them of each class."""
+    """Number of vehicles counted in a direction, in total and by class."""
 
     name: str
     direction: str
@@ -84,9 +84,9 @@ class DirectionTotal:
 
 @dataclass(frozen=True, slots=True)
 class CountRow:
-    """Vehicles of a class that were counted in a direction of a line or zone, in an interval.
+    """Number of vehicles of a class in a direction of a line or zone, in an interval.
 
-    The class is `UNKNOWN` where the detector has no classes, as in `FlowRow`.
+    The class is `UNKNOWN` if the detector has no classes, as in `FlowRow`.
     """
 
     start: Moment
@@ -99,9 +99,9 @@ class CountRow:
 
 @dataclass(frozen=True, slots=True)
 class FlowRow:
-    """Vehicles of a class from one line or zone to another, in the interval of the first.
+    """Number of vehicles of a class from one line or zone to another, in an interval.
 
-    `destination` is None for vehicles that were at no other.
+    The interval is that of the first event. `destination` is None for vehicles with one event only.
     """
 
     start: Moment
@@ -119,11 +119,11 @@ class ZoneRow:
     Attributes
     ----------
     entered, left
-        Vehicles that came in or appeared, and that left or vanished.
+        Vehicles that entered or appeared, and that left or vanished.
     mean, most
-        Vehicles inside: the mean over the time of video in the interval, and the most at once.
+        Mean and maximum number of vehicles inside, over the video in the interval.
     mean_stay, longest_stay
-        Of the vehicles that left or vanished, seconds; None where none did.
+        Of the vehicles that left or vanished, seconds; None if none did.
     """
 
     start: Moment
@@ -148,11 +148,11 @@ class Counts:
     zones
         The names of the zones.
     spans
-        From when to when there is video, seconds.
+        The parts with video, seconds.
     clock
-        None where it is not known.
+        None if unknown.
     warnings
-        A sentence for each line that is not where it should be.
+        A sentence for each misplaced line.
     """
 
     events: tuple[Event, ...]
@@ -164,7 +164,7 @@ class Counts:
 
     @property
     def totals(self) -> tuple[DirectionTotal, ...]:
-        """The totals over the whole video, also of directions without a vehicle."""
+        """The totals over the whole video, including directions without vehicles."""
         return direction_totals([self])
 
     def table(self, interval: int | None = None) -> list[CountRow]:
@@ -189,13 +189,13 @@ class Counts:
     def plot(self, interval: int | None = None, axes: "Axes | None" = None) -> "Axes":
         """Draw the counts as bars; needs the package matplotlib.
 
-        There is a bar for each direction, in parts by class; or, with an interval in seconds, a bar
-        for each interval, in parts by direction.
+        There is a bar for each direction, stacked by class; or, with an interval in seconds, a bar
+        for each interval, stacked by direction.
 
         Parameters
         ----------
         axes
-            Where to draw; None for the current axes of pyplot.
+            The axes to draw on; None for the current axes of pyplot.
 
         Raises
         ------
@@ -225,7 +225,7 @@ class Counts:
 
 
 def direction_totals(videos: Sequence[Counts]) -> tuple[DirectionTotal, ...]:
-    """Return the totals of each direction over the whole of all videos."""
+    """Return the totals of each direction over all videos."""
     classes: dict[Way, Counter[str]] = {way: Counter() for video in videos for way in video.ways}
     for event in (event for video in videos for event in video.events):
         classes[event.name, event.direction][event.class_name or ""] += 1
@@ -241,12 +241,12 @@ def count_table(videos: Sequence[Counts], interval: int | None = None) -> list[C
     Parameters
     ----------
     interval
-        Seconds; None for one interval over all.
+        Seconds; None for a single interval.
 
     Raises
     ------
     ConfigError
-        There are intervals, and several videos of which one has no clock.
+        `interval` is set, and one of several videos has no clock.
     """
     intervals = _intervals(videos, interval)
     found: _Found = Counter(
@@ -259,11 +259,10 @@ def count_table(videos: Sequence[Counts], interval: int | None = None) -> list[C
 
 
 def flow_table(videos: Sequence[Counts], interval: int | None = None) -> list[FlowRow]:
-    """Return the flows in each interval, by class: the ways of vehicles through lines and zones.
+    """Return the flows in each interval, by class: from the first line or zone to the last.
 
-    A flow leads from the first line or zone of a vehicle to the last, which is the same one where
-    it comes back. It counts in the interval of the first. Parameters and errors as of
-    `count_table`.
+    Both are the same if a vehicle returns. A flow counts in the interval of its first event.
+    Parameters and errors as for `count_table`.
     """
     intervals = _intervals(videos, interval)
     found: _Found = Counter()
@@ -277,9 +276,9 @@ def flow_table(videos: Sequence[Counts], interval: int | None = None) -> list[Fl
 
 
 def vehicle_flows(videos: Sequence[Counts]) -> Iterator[tuple[int, Event, Event | None]]:
-    """Yield the first and the last event of each vehicle that crosses a line or enters a zone.
+    """Yield the first and last event of each vehicle that crosses a line or enters a zone.
 
-    The number of the video of the first comes before them; the last is None if there is one only.
+    The number of the video of the first event precedes them; the last is None if there is only one.
     """
     trips: dict[int, list[tuple[int, Event]]] = {}
     for which, video in enumerate(videos):
@@ -291,7 +290,7 @@ def vehicle_flows(videos: Sequence[Counts]) -> Iterator[tuple[int, Event, Event 
 
 
 def zone_table(videos: Sequence[Counts], interval: int | None = None) -> list[ZoneRow]:
-    """Return the use of each zone in each interval; parameters and errors as of `count_table`."""
+    """Return the use of each zone in each interval; parameters and errors as for `count_table`."""
     intervals = _intervals(videos, interval)
     rows = []
     for name in dict.fromkeys(name for video in videos for name in video.zones):
@@ -309,19 +308,19 @@ def zone_table(videos: Sequence[Counts], interval: int | None = None) -> list[Zo
 
 
 _Visit = tuple[float, int, float | None]
-"""When a vehicle enters (1) or leaves (-1) a zone, and how long it was in it if it leaves."""
+"""When a vehicle enters (1) or leaves (-1) a zone, and if it leaves, how long it was inside."""
 
 
 def _zone_row(
     name: str, intervals: Intervals, number: int, visits: Sequence[_Visit], inside: int
 ) -> ZoneRow:
-    """Return the use in one interval, at whose start so many vehicles are inside."""
+    """Return the use in one interval, given the number of vehicles inside at its start."""
     begin, end = intervals.limits(number)
-    visits = sorted(visits, key=lambda visit: visit[:2])  # who leaves makes room for who enters
+    visits = sorted(visits, key=lambda visit: visit[:2])  # at the same time, leaving comes first
     levels = list(accumulate((change for _, change, _ in visits), initial=inside))
     times = [begin, *(time for time, _, _ in visits), end]
     used = sum(n * (b - a) for n, (a, b) in zip(levels, pairwise(times), strict=True))
-    covered = intervals.covered(number)  # nothing, where only one frame is in the interval
+    covered = intervals.covered(number)  # 0 if the interval has only one frame
     stays = [stay for _, _, stay in visits if stay is not None]
     changes = sum(change > 0 for _, change, _ in visits), sum(change < 0 for _, change, _ in visits)
     mean = round(used / covered, 3) if covered else float(inside)
@@ -336,12 +335,12 @@ def _intervals(videos: Sequence[Counts], interval: int | None) -> Intervals:
 
 
 def class_of(event: Event) -> str:
-    """Return the class of its vehicle, also where the detector has no classes."""
+    """Return the class of its vehicle, `UNKNOWN` if the detector has no classes."""
     return event.class_name or UNKNOWN
 
 
 _Found = Counter[tuple[int, tuple[str, str | None], str]]
-"""How many vehicles: by the number of the interval, the way or flow, and the class."""
+"""Number of vehicles by number of the interval, direction or flow, and class."""
 
 
 def _rows(
@@ -350,7 +349,7 @@ def _rows(
     found: _Found,
     ways: Iterable[tuple[str, str | None]],
 ) -> list[R]:
-    """Return a row for each interval, way and class that occurs, also where its count is 0."""
+    """Return a row for each interval, direction and class that occurs, even if its count is 0."""
     classes = sorted({name for _, _, name in found}) or [UNKNOWN]
     keys = [(way, name) for way in ways for name in classes]
     return [

@@ -1,4 +1,4 @@
-"""Lines and zones in the frames of a video, and what a vehicle does there, from its whole path.
+"""Lines and zones placed in frames, and the crossings of a whole path.
 
 `vdet.traffic` explains the rule.
 """
@@ -16,7 +16,7 @@ from vdet.polygons import Point, Segment, meeting, side_of, sides
 from vdet.traffic.linking import DURATION_DIGITS, VehiclePath
 
 ENTER, EXIT, APPEAR, VANISH = "enter", "exit", "appear", "vanish"
-"""Directions of a zone: over its border, or first and last seen inside."""
+"""Directions of a zone: across its border, or first and last seen inside."""
 
 _AT_EDGE = 0.002
 """A point within this fraction of the frame's side (or one pixel) of the frame's edge lies on it.
@@ -24,23 +24,23 @@ _AT_EDGE = 0.002
 _MAX_AT_EDGE = 0.005
 """Limit of that one pixel in small frames, as a fraction; lines are longer (`SHORTEST_LINE`)."""
 _INSIDE = 0.01
-"""Pixels from the edge of the frame to which points outside are moved."""
+"""Points outside the frame are moved this far inside, pixels."""
 _SETTLED = 0.1
-"""Seconds after which a vehicle off a border's band has changed the side."""
+"""Seconds outside the band of a border after which a vehicle has settled on a side."""
 _BAND = 0.05
 """Distance from a border within which a vehicle is on neither side, in heights of its box."""
 _MIN_BAND = 0.003
-"""Smallest such distance, as a fraction of the frame's height."""
+"""Minimum of this distance, as a fraction of the frame's height."""
 
 _Size = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
 class PlacedLine:
-    """A line; its positive side is the left of someone who looks from `start` to `end`.
+    """A line; its positive side is the left, seen from `start` towards `end`.
 
-    `directions` are the names of the left and of the right. `start` and `end` are those that are
-    drawn, `size` is the width and height of the frame, all in pixels.
+    `directions` are the names of left and right. `start` and `end` as drawn, and `size`, width and
+    height of the frame, are in pixels.
     """
 
     name: str
@@ -56,7 +56,7 @@ class PlacedLine:
 
     @property
     def reach(self) -> Segment:
-        """The line, longer where it ends at the edge of the frame: feet may be beyond it, too."""
+        """The line, extended where it ends at the edge of the frame: feet may be beyond it."""
         (ax, ay), (bx, by) = self.start, self.end
         factor = sum(self.size) / self.length
         dx, dy = factor * (bx - ax), factor * (by - ay)
@@ -69,7 +69,7 @@ class PlacedLine:
     def distances(self, points: Float64Array) -> Float64Array:
         """Return how far points `(n, 2)` are from the line, positive on the left, `(n,)`.
 
-        The line goes on beyond its ends.
+        The line is infinite here.
         """
         x, y = points.T
         return np.asarray(side_of(self.end, self.start, (x, y)))
@@ -79,13 +79,13 @@ class PlacedLine:
         return bool((distances_to([(self.start, self.end)], points)[:, 0] <= reach).any())
 
     def meeting(self, path: Segment) -> float | None:
-        """Return the fraction of the way along `path` at which it meets the line, if it does."""
+        """Return the fraction of `path` at which it meets the line; None if it does not."""
         return meeting(path, self.reach)
 
 
 @dataclass(frozen=True, slots=True)
 class Zone:
-    """A polygon, whose positive side is the inside; at the frame's edge it goes on beyond.
+    """A polygon, whose positive side is the inside; it extends beyond the edge of the frame.
 
     `corners` and `size`, the width and height of the frame, are in pixels.
     """
@@ -98,7 +98,7 @@ class Zone:
 
     @property
     def inner_sides(self) -> list[Segment]:
-        """Those of its sides that do not run along the edge of the frame."""
+        """The sides that do not run along the edge of the frame."""
         return [
             (a, b)
             for a, b in sides(self.corners)
@@ -108,7 +108,7 @@ class Zone:
     def distances(self, points: Float64Array) -> Float64Array:
         """Return how far points `(n, 2)` are from the sides, positive inside, `(n,)`.
 
-        The distances are infinite where there are no sides.
+        The distances are infinite if there are no sides.
         """
         points = self._in_frame(points)
         inside, border = _are_inside(self.corners, points), self.inner_sides
@@ -128,7 +128,7 @@ class Zone:
 
 
 Border = PlacedLine | Zone
-"""The first of its directions leads to its positive side, the second to its negative side."""
+"""Its first direction leads to its positive side, its second to its negative side."""
 
 
 def distances_to(segments: Sequence[Segment], points: Float64Array) -> Float64Array:
@@ -140,9 +140,9 @@ def distances_to(segments: Sequence[Segment], points: Float64Array) -> Float64Ar
 
 
 def _are_inside(corners: Sequence[Point], points: Float64Array) -> BoolArray:
-    """Return which of the points `(n, 2)` lie in a polygon; those on a side may be in or out.
+    """Return which points `(n, 2)` are inside a polygon; points on a side may be either.
 
-    A point is in where a ray from it meets an odd number of sides (Shimrat 1962).
+    A point is inside if a ray from it meets an odd number of sides (Shimrat 1962).
     """
     x, y = points.T[..., np.newaxis]
     (ax, bx), (ay, by) = np.array(sides(corners)).T
@@ -169,7 +169,7 @@ def place(
 
 
 def _snapped(value: float, length: float) -> float:
-    """Return a coordinate, moved onto the frame's edge where it is very near to it."""
+    """Return a coordinate, moved onto the edge of the frame if it is very near to it."""
     near = max(min(1.0, _MAX_AT_EDGE * length), _AT_EDGE * length)
     if value <= near:
         return 0.0
@@ -187,7 +187,7 @@ class Crossing:
     row
         Number of the first row of the path at or after it.
     direction
-        As of `Event`.
+        As in `Event`.
     seconds
         How long the vehicle was in the zone, for exit and vanish; else None.
     """
@@ -199,7 +199,7 @@ class Crossing:
 
 
 def crossings(path: VehiclePath, border: Border) -> list[Crossing]:
-    """Return what a vehicle does at a border, in order; it depends on nothing but the arguments."""
+    """Return the crossings of a border by a vehicle, in order; a pure function."""
     found = list(_changes(path, border))
     if not isinstance(border, Zone) or not found:
         return found
@@ -209,13 +209,13 @@ def crossings(path: VehiclePath, border: Border) -> list[Crossing]:
         visits.append(replace(item, seconds=stay))
     last = path.seen - 1
     if found[-1].direction != EXIT:
-        end = max(float(path.times[last]), found[-1].time)  # it may enter where it drives on
+        end = max(float(path.times[last]), found[-1].time)  # it may enter in extrapolated rows
         visits.append(Crossing(end, last, VANISH, end - found[-1].time))
     return visits
 
 
 def _changes(path: VehiclePath, border: Border) -> Iterator[Crossing]:
-    """Yield the changes of the settled side, and where it begins in a zone."""
+    """Yield the changes of the settled side, and the start of a path inside a zone."""
     distances = border.distances(path.points)
     side = distances >= 0
     turns = (np.flatnonzero(side[1:] != side[:-1]) + 1).tolist()
@@ -245,9 +245,9 @@ def _changes(path: VehiclePath, border: Border) -> Iterator[Crossing]:
 def _settling(
     path: VehiclePath, border: Border, distances: Float64Array
 ) -> tuple[BoolArray, BoolArray]:
-    """Return the rows that settle the side on which they are, and those in which it is clear.
+    """Return the rows that settle a side, and those in which the side is clear.
 
-    It is clear where this row or the one before shows it one height of the box away.
+    It is clear if this row or the previous one is one box height away from the border.
     """
     side, away, times = distances >= 0, np.abs(distances), path.times
     is_off = away > np.maximum(_BAND * path.heights, _MIN_BAND * border.size[1])
@@ -262,9 +262,9 @@ def _settling(
 
 
 def _meeting(path: VehiclePath, border: Border, row: int) -> tuple[float | None, float, Point]:
-    """Return where a path meets a border between a row and the one before.
+    """Return where a path meets a border between a row and the previous one.
 
-    That is the fraction of the way, None where it does not, and the time and the place.
+    Returns the fraction of the way, None if they do not meet, and the time and position.
     """
     (ax, ay), (bx, by) = path.points[row - 1 : row + 1].tolist()
     before, after = path.times[row - 1 : row + 1].tolist()

@@ -1,4 +1,4 @@
-"""What reads the tracks of a video while it is processed: records, counts and speeds."""
+"""Records, counts and speeds of a video while it is processed."""
 
 from dataclasses import replace
 
@@ -19,13 +19,13 @@ class LiveTraffic:
     Attributes
     ----------
     clock
-        When the video begins; None where it is not known.
+        Start time of the video; None if unknown.
     counter
         None without lines and zones.
     speeds
-        None without points of the ground.
+        None without ground points.
     vehicles
-        A record of each vehicle of the classes in the settings, by id; none before `end`.
+        A record of each vehicle of the selected classes, by id; empty before `end`.
 
     Raises
     ------
@@ -58,13 +58,13 @@ class LiveTraffic:
             self.speeds.add(frame)
 
     def counts(self) -> Counts | None:
-        """Return all counts so far, with the speeds that are known."""
+        """Return all counts so far, with known speeds."""
         if self._final or self.counter is None:
             return self._final
         return with_speeds(replace(self.counter.counts(), clock=self.clock), self.speeds)
 
     def end(self, *, is_still: bool = False) -> None:
-        """Make records and counts, after the last frame; `is_still` as of `VehicleRecords.end`."""
+        """Make records and counts, after the last frame; `is_still` as for `VehicleRecords.end`."""
         self._final = self.counts()
         records = self._records.end(self.speeds, is_still=is_still)
         chosen = (record for record in records if is_chosen(record.class_name, self._classes))

@@ -1,4 +1,4 @@
-"""Tables and JSON files of one video and of many; in those of many, the video comes first."""
+"""Tables and JSON files of one video or several; with several, the video is the first column."""
 
 import csv
 import re
@@ -13,16 +13,16 @@ from vdet.files import json_text, write_text
 SUFFIXES = (".csv", ".json", ".parquet")
 
 VIDEO = "video"
-"""The column that has the name of the video."""
+"""The column with the name of the video."""
 _TEXTS = (VIDEO, "class", "clock", "motion")
 """Columns of text in Parquet."""
 
 _FORMULA = re.compile(r"[=+@\t\r-](?!\d*\.?\d*(e-?\d+)?$)")
-"""How a text begins that a spreadsheet takes for a formula; a number is none."""
+"""Start of a text that a spreadsheet would run as a formula; numbers are excluded."""
 
 
 def is_json(path: Path) -> bool:
-    """Return whether a file is JSON by its name; else it is a table."""
+    """Return whether a file is JSON by its name, and not a table."""
     return path.suffix.lower() == ".json"
 
 
@@ -31,14 +31,14 @@ def _plain_text(cell: Any) -> Any:
 
 
 def plain_moment(value: Any) -> Any:
-    """Return a moment as text, with its time zone; other values as they are."""
+    """Return a clock time as text, with its time zone; other values unchanged."""
     if not isinstance(value, datetime):
         return value
     return value.isoformat(" ", "milliseconds" if value.microsecond else "seconds")
 
 
 def check_table(path: Path) -> None:
-    """Refuse a table that needs a package that is not installed. Raises `OutputError`."""
+    """Raise `OutputError` if a table needs a package that is not installed."""
     if path.suffix.lower() == ".parquet":
         try:
             import pyarrow.parquet  # noqa: F401
@@ -47,7 +47,7 @@ def check_table(path: Path) -> None:
 
 
 def _write_parquet(path: Path, columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
-    """Write a table; a column without a value has numbers, or text where others have."""
+    """Write a table; an empty column has the type that it usually has."""
     import pyarrow as pa
     from pyarrow import parquet
 
@@ -60,16 +60,16 @@ def _write_parquet(path: Path, columns: Sequence[str], rows: Sequence[Sequence[A
 
 
 def write_content(path: Path, content: Any) -> None:
-    """Write JSON or a table (a list: heading, rows), as the suffix of `path` says.
+    """Write JSON or a table (a list: heading, rows), by the suffix of `path`.
 
-    In `.csv`, a text that a spreadsheet would take for a formula gets an apostrophe in front.
+    In `.csv`, a text that a spreadsheet would run as a formula is prefixed with an apostrophe.
     """
     match path.suffix.lower():
         case ".json":
             write_text(path, json_text(content, ensure_ascii=False))
         case ".parquet":
             _write_parquet(path, content[0], content[1:])
-        case _:  # the name of a video may be no valid text
+        case _:  # the name of a video may be invalid text
             with path.open("w", encoding="utf-8", errors="backslashreplace", newline="") as file:
                 rows = (map(_plain_text, row) for row in content)
                 csv.writer(file, lineterminator="\n").writerows(rows)
@@ -78,10 +78,10 @@ def write_content(path: Path, content: Any) -> None:
 def join_tables(
     tables: Mapping[str, Sequence[Sequence[Any]]], missing: Any = None
 ) -> list[Sequence[Any]]:
-    """Return one table over those of many videos, by their names, with the name in each row.
+    """Join the tables of many videos, given by name, with the name in each row.
 
-    It has the columns of all of them, in their order; `missing` is the cell of a column that a
-    table lacks.
+    The result has the columns of all tables, in their order; `missing` fills columns that a table
+    lacks.
     """
     columns: list[str] = []
     for heading, *_ in tables.values():

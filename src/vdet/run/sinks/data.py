@@ -1,6 +1,6 @@
-"""The sinks that write data: `tracks`, `json`, `labels`, `vehicles`, `counts` and `flows`.
+"""The sinks that write data: tracks, JSON, labels, records of vehicles, counts, flows, findings.
 
-Times are in seconds and those of the input. Pixels are those of the input frame, counted from 0.
+Times are in seconds of the input. Pixels are those of the input frame, counted from 0.
 """
 
 import sys
@@ -31,11 +31,11 @@ MakeContent = Callable[[Path, count_files.Videos, int | None], Any]
 
 
 class TrackSink(BaseSink):
-    """Writes the shown tracks of each frame; the end of the name chooses the format.
+    """Writes the tracks of each frame; the ending of the name selects the format.
 
     The formats are those of `vdet.labels.formats`. The path `-` stands for standard output, as
-    `.jsonl`, frame by frame. In `.jsonl` and `.csv` a frame has `clock`, its moment, where that is
-    known. In `.jsonl` it has `lane` if the lane is looked for: null if none is shown, else an
+    `.jsonl`, frame by frame. In `.jsonl` and `.csv` a frame has its time of day in `clock`, if
+    known. In `.jsonl` it has `lane` if lane finding is enabled: null if no lane is shown, else an
     object with `radius` (metres, null on a straight road), `offset` (of the camera from the middle
     of the lane, metres, positive to the right), `width` (metres), `left` and `right`: each line as
     `[[x, y], …]`, pixels of the frame, the nearest point first.
@@ -77,10 +77,9 @@ TRACKS = SinkKind(TrackSink, track_suffixes, "tracks", writes_standard_output=Tr
 
 
 class LabelSink(BaseSink):
-    """Collects the boxes of pictures, and writes them at the end in a format of labels.
+    """Collects the boxes of images, and writes them at the end in a format for label tools.
 
-    The end of the name chooses the format. A picture is named by its path below the folder that it
-    was found by.
+    The ending of the name selects the format. An image is named by its path below the input folder.
     """
 
     def __init__(self, path: Path, context: SinkContext) -> None:
@@ -106,10 +105,10 @@ LABELS = SinkKind(LabelSink, picture_suffixes, "labels of pictures", takes="pict
 
 
 class JsonSink(BaseSink):
-    """Collects an item per picture, and writes the list at the end, if there is an item.
+    """Collects an item per image, and writes the list at the end, if it is not empty.
 
-    Each item has `image`, `width`, `height` and `boxes`: the tracks of the picture as in `.jsonl`,
-    without `id` and `state`. If lanes are searched for, it also has `lane`, as in `.jsonl`.
+    Each item has `image`, `width`, `height` and `boxes`: the tracks of the image as in `.jsonl`,
+    without `id` and `state`. If lane finding is enabled, it also has `lane`, as in `.jsonl`.
     """
 
     def __init__(self, path: Path, context: SinkContext) -> None:
@@ -127,7 +126,7 @@ class JsonSink(BaseSink):
         """Add the item of a picture."""
         picture, boxes = result.frame.picture, list(map(track_record, result.tracks))
         for box in boxes:
-            del box["id"], box["state"]  # they say nothing in a still picture
+            del box["id"], box["state"]  # they mean nothing in a single image
         item = {"image": str(result.source), "width": picture.width, "height": picture.height}
         self._items.append({**item, "boxes": boxes, **result.frame_tracks.facts})
 
@@ -136,7 +135,7 @@ JSON = SinkKind(JsonSink, what="lists of boxes", writes_standard_output=True, ta
 
 
 class TableSink(BaseSink):
-    """Writes a table or JSON at the end of the video: what `make` returns of the sink."""
+    """Writes a table or JSON at the end of the video; `make` makes it from the sink."""
 
     def __init__(
         self, make: Callable[["TableSink"], Any], path: Path, context: SinkContext
@@ -156,7 +155,7 @@ def _records(sink: TableSink) -> Any:
 
 
 def _findings(sink: TableSink) -> Any:
-    """Return what makes the results of the video doubtful: a list of findings."""
+    """Return the reasons to doubt the results of the video: a list of findings."""
     return findings_in(sink.context.facts).record()
 
 
@@ -172,9 +171,9 @@ VEHICLES = SinkKind(
 
 
 def _count_sink(make: MakeContent, path: Path, context: SinkContext) -> TableSink:
-    """Return a sink of which vehicles cross lines and visit zones, or of their flows.
+    """Return a sink of the counts at lines and in zones, or of the flows.
 
-    `make` is `counts_content` or `flows_content`; the end of the name chooses the table.
+    `make` is `counts_content` or `flows_content`; the ending of the name selects the table.
     """
     traffic = context.settings.traffic
     if not traffic:

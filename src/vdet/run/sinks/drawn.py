@@ -1,4 +1,4 @@
-"""The sinks `video` and `picture`: frames with what the section `draw` asks for drawn in."""
+"""The sinks `video` and `picture`: frames with boxes, labels, trails and counts."""
 
 import zlib
 from collections.abc import Sequence
@@ -24,18 +24,18 @@ from vdet.workers import core_count
 
 VIDEO_LABELS = ("id", "class"), ("id",)
 PICTURE_LABELS = ("class", "score"), ("score",)
-"""Parts of the label of a vehicle where there is room, and where there is not."""
+"""Parts of the label of a vehicle if it fits the box, and otherwise."""
 
 
 class Overlay:
-    """Draws the vehicles and the lane of one video, or of one still picture.
+    """Draws the vehicles and the lane of one video, or of one image.
 
     Parameters
     ----------
     video
-        None for a still picture, which has no trails.
+        None for a single image, which has no trails.
     counter
-        Its counts so far are drawn, if the settings say so.
+        Its current counts are drawn if `traffic.draw` is set.
     """
 
     def __init__(
@@ -52,14 +52,14 @@ class Overlay:
         self._trails: dict[int, list[tuple[float, Point]]] = {}  # with the time in seconds
 
     def draw(self, result: FrameResult, used: Planes | None = None) -> Surface:
-        """Return a copy of the frame with its vehicles: BGR or planes, as the frame came.
+        """Return a copy of the frame with its vehicles: BGR or planes, like the frame itself.
 
-        The memory of `used` is taken.
+        The memory of `used` is reused.
         """
         surface = result.frame.picture.copy(used)
         if result.road and result.road.lane:
             draw_lane(surface, result.road.lane)
-        shown = sorted(result.tracks, key=lambda track: track.box.y2)  # the farthest first
+        shown = sorted(result.tracks, key=lambda track: track.box.y2)  # farthest first
         if self._counter:
             draw_running_counts(surface, self._counter)
         self._draw_trails(surface, shown, float(result.frame.time))
@@ -93,21 +93,21 @@ class Overlay:
 
 
 def label_text(track: Track, parts: Sequence[str]) -> str:
-    """Return the text of a label: those of its parts that are known of the vehicle."""
+    """Return the text of a label: the parts that are known."""
     texts = {"id": f"#{track.id}", "class": track.class_name, "score": f"{track.score:.2f}"}
     texts["distance"] = None if track.distance is None else f"{track.distance:.0f} m"
     return " ".join(text for part in parts if (text := texts[part]))
 
 
 def _class_number(name: str | None) -> int:
-    """Return the number of a class for its colour; 0 where the class is not known."""
+    """Return a number for the colour of a class; 0 if the class is unknown."""
     if name in OUR_NAMES:
         return OUR_NAMES.index(name) + 1
     return zlib.crc32(name.encode()) if name else 0
 
 
 def draw_running_counts(surface: Surface, counter: VehicleCounter) -> None:
-    """Draw the lines and zones, and what is counted so far; vehicles are drawn over them."""
+    """Draw the lines and zones with their current counts; vehicles are drawn over them."""
     from vdet.pages.place import border_marks, draw_marks
 
     found = counter.so_far()
@@ -119,7 +119,7 @@ def draw_running_counts(surface: Surface, counter: VehicleCounter) -> None:
 
 
 class VideoSink(BaseSink):
-    """Draws into copies of the frames, and encodes them in a thread."""
+    """Draws on copies of the frames, and encodes them in a thread."""
 
     def __enter__(self) -> Self:
         context = self.context
@@ -133,7 +133,7 @@ class VideoSink(BaseSink):
             whole_sound=not context.is_part,
             threads=core_count(),  # more or fewer would write other bytes
         )
-        self._used: list[Planes] = []  # new memory would take longer than what is copied into it
+        self._used: list[Planes] = []  # allocating memory would take longer than copying into it
 
         def write(frame: Frame) -> None:
             writer.write(frame)
@@ -148,7 +148,7 @@ class VideoSink(BaseSink):
         self._encoding.__exit__(*raised)
 
     def write(self, result: FrameResult) -> None:
-        """Draw the shown vehicles, and give the frame to the encoder."""
+        """Draw the vehicles, and pass the frame to the encoder."""
         surface = self._overlay.draw(result, self._used.pop() if self._used else None)
         self._encode(Frame(result.frame.index, result.frame.time, Picture(surface)))
 
@@ -157,7 +157,7 @@ VIDEO = SinkKind(VideoSink, VIDEO_SUFFIXES, "videos", takes="videos", may_replac
 
 
 class PictureSink(BaseSink):
-    """Writes one picture."""
+    """Writes one image."""
 
     def __init__(self, path: Path, context: SinkContext) -> None:
         super().__init__(path, context)
@@ -165,9 +165,9 @@ class PictureSink(BaseSink):
         self._is_done = False
 
     def write(self, result: FrameResult) -> None:
-        """Draw the vehicles, and write the picture.
+        """Draw the vehicles, and write the image.
 
-        Raises `OutputError` for a second picture.
+        Raises `OutputError` for a second image.
         """
         if self._is_done:
             raise OutputError(f"{self.path}: is for one image; for several, use a folder")

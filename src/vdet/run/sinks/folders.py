@@ -1,4 +1,4 @@
-"""The sinks that fill a folder: `stages` of a frame, `crops`, `clips`, and the `page`."""
+"""The sinks that write a folder: `stages`, `crops`, `clips` and `page`."""
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -33,7 +33,7 @@ _THUMBNAIL = 200  # longer side of the picture of a vehicle, pixels
 
 
 class StagesSink(BaseSink):
-    """Writes the pictures of the first searched frame at or after the time `SinkContext.at`."""
+    """Writes stage images of the first searched frame at or after the time `SinkContext.at`."""
 
     def __init__(self, path: Path, context: SinkContext) -> None:
         super().__init__(path, context)
@@ -41,14 +41,14 @@ class StagesSink(BaseSink):
         self._is_done = False
 
     def finish(self) -> None:
-        """Refuse a time that no frame has. Raises `OutputError`."""
+        """Raise `OutputError` if there is no frame at this time."""
         if not self._is_done:
             source = self.context.video.path if self.context.video else self.path
             at = float(self.context.at)
             raise OutputError(f"{source}: no frame at {at:.2f} s or later; use an earlier --at")
 
     def write(self, result: FrameResult) -> None:
-        """Write the pictures if it is the frame."""
+        """Write the images if this is the frame."""
         if self._is_done or not result.searched or result.frame.time < self._time:
             return
         self._is_done = True
@@ -82,7 +82,7 @@ STAGES = SinkKind(StagesSink, what="stages", folder_pattern=f"*-{_BOXES}.png", o
 
 
 class CropSink(BaseSink):
-    """Writes the picture of a vehicle when it is gone, again where a better one follows."""
+    """Writes the image of a vehicle when it is gone; a better one later replaces it."""
 
     def __init__(self, path: Path, context: SinkContext) -> None:
         super().__init__(path, context)
@@ -91,7 +91,7 @@ class CropSink(BaseSink):
         self._written: dict[int, tuple[float, Path]] = {}
 
     def finish(self) -> None:
-        """Write the pictures of the vehicles that are still shown, and name those with a record."""
+        """Write the images of vehicles still shown, and name those of all recorded vehicles."""
         self._write_all(self._best.end())
         for vehicle in self.traffic.vehicles:
             if vehicle.id in self._written:
@@ -101,7 +101,7 @@ class CropSink(BaseSink):
             path.unlink()
 
     def write(self, result: FrameResult) -> None:
-        """Look for better pictures in a frame."""
+        """Look for better images in a frame."""
         self._write_all(self._best.add(result.frame_tracks, result.frame.picture))
 
     def _write_all(self, crops: list[Crop]) -> None:
@@ -185,7 +185,7 @@ class PageSink(BaseSink):
         )
 
     def _pictures(self) -> dict[int, str]:
-        """Return the addresses of the pictures of `crops`, where this run writes them."""
+        """Return the addresses of the images of `crops`, if this run writes them."""
         times = {number: time for number, (time, _) in self._thumbnails.items()}
         return {
             vehicle.id: link_to(folder / _crop_name(vehicle, times[vehicle.id]), self.path)
@@ -195,7 +195,7 @@ class PageSink(BaseSink):
         }
 
     def _player(self) -> Player | None:
-        """Return the video that this run writes; else the source, if it is a video file."""
+        """Return the video that this run writes, else the source if it is a video file."""
         source = self.video.path
         drawn = self._paths_of("video")
         if not drawn and (not source.is_file() or is_picture_name(source)):
@@ -226,7 +226,7 @@ _PRECISION = 1_000_000  # largest denominator of a time, seconds
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """A time in which vehicles are shown: seconds in the video, with the margins around it."""
+    """A time span in which vehicles are shown, with its margins; seconds in the video."""
 
     start: float
     end: float
@@ -234,7 +234,7 @@ class Scene:
 
 
 def scenes(records: Iterable[VehicleRecord], margin: float) -> list[Scene]:
-    """Return the times of vehicles with `margin` seconds around them; those that touch are one."""
+    """Return the time spans of vehicles with margins, seconds; spans that touch are joined."""
     found: list[Scene] = []
     for record in sorted(records, key=lambda record: record.first):
         scene = Scene(record.first - margin, record.last + margin, (record,))
@@ -247,7 +247,7 @@ def scenes(records: Iterable[VehicleRecord], margin: float) -> list[Scene]:
 
 
 class ClipSink(BaseSink):
-    """Cuts the clips at the end of the run; with lines or zones, of vehicles counted there."""
+    """Cuts the clips at the end of the run; with lines or zones, only of counted vehicles."""
 
     def __init__(self, path: Path, context: SinkContext) -> None:
         super().__init__(path, context)

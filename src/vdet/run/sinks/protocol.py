@@ -1,4 +1,4 @@
-"""The protocol of an output (a sink), its kinds, and how outputs are checked and opened."""
+"""The protocol of outputs (sinks), their kinds, and how outputs are checked and opened."""
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -22,27 +22,27 @@ STANDARD_OUTPUT = Path("-")
 
 
 class Sink(AbstractContextManager["Sink"], Protocol):
-    """Takes the results of a run, frame by frame; a context manager.
+    """Receives the results of a run, frame by frame; a context manager.
 
-    It writes into files that it gets from `SinkContext.files`. They appear under their names when
-    the whole run ends without an error, and not at all otherwise. When the `with` block of the sink
-    ends without an error, its files must be complete.
+    It writes into temporary files from `SinkContext.files`. They appear under their names when the
+    whole run succeeds, and not at all otherwise. When the `with` block of the sink ends without an
+    error, its files must be complete.
     """
 
     def write(self, result: FrameResult) -> None:
-        """Take the next result. It must not change the frame's image."""
+        """Receive the next result, without changing the frame's image."""
 
 
 @dataclass(frozen=True, slots=True)
 class SinkContext:
-    """What a sink gets when it is opened.
+    """What a sink receives when it is opened.
 
     Attributes
     ----------
     files
-        Gives temporary files: `files.stage(path)`.
+        Provides temporary files: `files.stage(path)`.
     video
-        The video that is read; None if the results are of still pictures.
+        The video that is read; None for single images.
     is_part
         Whether only a part of the video is read.
     at
@@ -50,15 +50,15 @@ class SinkContext:
     outputs
         All outputs of the run, for a sink that refers to another.
     traffic
-        The counts and the speeds of a video, up to the latest result, and the records of its
-        vehicles, which are known when sinks finish; None for still pictures.
+        Counts and speeds up to the latest result, and the records of vehicles, which are known when
+        sinks finish; None for single images.
     facts
         What the steps found out about the whole video; empty before sinks finish.
     places
-        Of still pictures: their paths below the folders that they were found by.
+        For single images: their paths below the input folders.
     stage_pictures
-        Returns a picture of each stage of the detection by its name, in order. It takes the image
-        of a frame and its detections.
+        Takes the image of a frame and its detections; returns an image of each stage of the
+        detector by its name, in order.
     """
 
     files: OutputFiles
@@ -74,9 +74,9 @@ class SinkContext:
 
 
 class BaseSink:
-    """What most sinks have in common: they finish where the run ends without an error.
+    """Base of most sinks: `finish` is called when the run ends without an error.
 
-    `summary` is what a file over all videos of a batch needs of the output, as values for JSON.
+    `summary` is what a file over all videos of a batch needs from the output, as values for JSON.
     """
 
     summary: Any = None
@@ -87,13 +87,13 @@ class BaseSink:
 
     @property
     def video(self) -> VideoInfo:
-        """The video, for sinks that take no pictures."""
+        """The video, for sinks that do not accept images."""
         assert self.context.video is not None  # `SinkKind.takes` says so
         return self.context.video
 
     @property
     def traffic(self) -> LiveTraffic:
-        """What has read the tracks of the video, for sinks that take no pictures."""
+        """Counts, speeds and records of the video, for sinks that do not accept images."""
         assert self.context.traffic is not None  # as for `video`
         return self.context.traffic
 
@@ -105,25 +105,25 @@ class BaseSink:
             self.finish()
 
     def write(self, result: FrameResult) -> None:
-        """Take the next result; what the run reads of it, and the steps, is known at the end."""
+        """Receive the next result."""
 
     def finish(self) -> None:
-        """Write what is still to be written."""
+        """Write everything that is left."""
 
 
 @dataclass(frozen=True, slots=True)
 class BatchTotal:
-    """A file over all videos of a batch, made from what the sinks say of their outputs.
+    """A file over all videos of a batch, made from the summaries of the sinks.
 
     Attributes
     ----------
     name
         Its name in the folder of the batch, without suffix.
     write
-        Function that gets the `summary` of each output that was made, by the name of its video (as
-        in the folder of the batch, without suffix), and the file to write.
+        Function that takes the `summary` of each existing output, by the name of its video (its
+        path in the folder of the batch, without suffix), and the file to write.
     suffix
-        Suffix of the file; None for that of the outputs.
+        Suffix of the file; None: the suffix of the outputs.
     """
 
     name: str
@@ -133,33 +133,33 @@ class BatchTotal:
 
 @dataclass(frozen=True, slots=True)
 class SinkKind:
-    """A kind of sink, which is registered under a name.
+    """A kind of sink, as registered under its name.
 
     Attributes
     ----------
     open
         Function that takes the path of the output and a `SinkContext`, and returns the sink.
     suffixes
-        What the name of the output may end in, lower case, such as ".csv" or ".coco.json", or a
-        function that returns it; empty for any.
+        Allowed endings of the name of the output, lower case, such as ".csv" or ".coco.json", or a
+        function that returns them; empty for any.
     what
-        Noun for what it writes, for messages: "tracks".
+        Noun for the output in messages: "tracks".
     folder_pattern
         Only if the output is a folder: pattern of the files that the sink writes into it. A folder
         with such a file is the output of an earlier run.
     writes_standard_output
         Whether the path `-` means standard output.
     one_frame
-        Whether it takes only the frame at `SinkContext.at`. If all outputs of a run do, no other
-        frames are read than it needs.
+        Whether it needs only the frame at `SinkContext.at`. If all outputs of a run do, only the
+        frames around it are read.
     takes
-        "videos" or "pictures" if the sink can take results of these only.
+        "videos" or "pictures" if the sink accepts only results of videos, or only of images.
     may_replace
         Whether `--overwrite` may replace a file.
     check
-        Refuses an output that cannot be written for another reason: raises `OutputError`.
+        Raises `OutputError` if an output cannot be written for another reason.
     total
-        What a batch writes in addition, over all its videos.
+        The file that a batch writes over all its videos.
     """
 
     open: Callable[[Path, SinkContext], Sink]
@@ -175,11 +175,11 @@ class SinkKind:
 
     @property
     def endings(self) -> Sequence[str]:
-        """What the name of the output may end in; empty for any."""
+        """Allowed endings of the name of the output; empty for any."""
         return self.suffixes() if callable(self.suffixes) else self.suffixes
 
     def suffix_for(self, video: Path) -> str:
-        """Return the ending of its output for a video: that of the video if it can write it."""
+        """Return the ending of the output for a video: its own, if the sink can write it."""
         is_known = not self.endings or video.suffix.lower() in self.endings
         return video.suffix if is_known else self.endings[0]
 
@@ -192,7 +192,7 @@ class SinkKind:
 
 
 def sink_kind(name: str) -> SinkKind:
-    """Return the kind of sink with this name. Raises `ConfigError` if there is none."""
+    """Return the kind of sink with this name. Raises `ConfigError` if it is unknown."""
     kind: SinkKind = load_plugin(SINKS, name)
     return kind
 
@@ -203,10 +203,10 @@ def check_sinks(outputs: Sequence[Output], *, overwrite: bool, makes_folder: boo
     Raises
     ------
     OutputError
-        Two outputs have one path, a suffix is not one of the sink's, or an output cannot be written
-        or already exists.
+        Two outputs have the same path, an ending is not one of the sink's, or an output cannot be
+        written or already exists.
     ConfigError
-        There is no sink with such a name.
+        A sink is unknown.
     """
     seen: set[Path] = set()
     for output in outputs:
@@ -230,10 +230,10 @@ def check_sinks(outputs: Sequence[Output], *, overwrite: bool, makes_folder: boo
 
 
 def output_state(output: Output, place: Path | None = None) -> tuple[int, int] | None:
-    """Return the bytes of an output and the time of its last change; None if it is not there.
+    """Return the size in bytes and modification time of an output; None if it does not exist.
 
-    The time is in nanoseconds since 1970. Of a folder they are the sum and the latest of the files
-    in it that the sink writes. Before they have their names, they lie at `place`.
+    The time is in nanoseconds since 1970. For a folder, they are the sum and the latest of the
+    files written by the sink. Staged outputs are at `place`.
     """
     pattern, path = sink_kind(output.sink).folder_pattern, place or output.path
     if not (os.path.isdir if pattern else os.path.isfile)(path):  # its name may be too long
@@ -243,13 +243,13 @@ def output_state(output: Output, place: Path | None = None) -> tuple[int, int] |
 
 
 class Sinks:
-    """The open sinks of several outputs, which get the same results."""
+    """The open sinks of several outputs, which receive the same results."""
 
     def __init__(self, sinks: Mapping[Path, Sink]) -> None:
         self._sinks = sinks
 
     def write(self, result: FrameResult) -> None:
-        """Give a result to all of them. Raises `OutputError`."""
+        """Pass a result to all of them. Raises `OutputError`."""
         for path, sink in self._sinks.items():
             with output_errors(path):
                 sink.write(result)
@@ -262,14 +262,14 @@ class Sinks:
 
 @contextmanager
 def open_sinks(outputs: Iterable[Output], context: SinkContext) -> Iterator[Sinks]:
-    """Open the sinks of several outputs. An `OSError` of one is that of its output.
+    """Open the sinks of several outputs; an `OSError` becomes an error of the output.
 
     Raises
     ------
     OutputError
-        A sink does not take such results, or an output cannot be written.
+        A sink does not accept such results, or an output cannot be written.
     ConfigError
-        There is no sink of a name.
+        A sink is unknown.
     """
     source = "pictures" if context.video is None else "videos"
     sinks = {}
