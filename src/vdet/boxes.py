@@ -320,7 +320,7 @@ def _column(
 NO_BOXES = Boxes(np.empty((0, 4)), np.empty(0))
 
 
-def from_sizes(places: npt.NDArray[Any]) -> Float64Array:
+def from_xywh(places: npt.NDArray[Any]) -> Float64Array:
     """Convert boxes `(n, 4)` from x, y, width, height to x1, y1, x2, y2."""
     boxes = places.astype(np.float64)
     boxes[:, 2:] += boxes[:, :2]

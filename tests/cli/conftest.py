@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from red_cars import SETTINGS, red_finder
-from vdet.config.rendering import render
+from vdet.config.rendering import render_settings
 from vdet.detect.svm.model import save_model
 from vdet.synthetic.scene import Scene
 from vdet.synthetic.truth import write_truth
@@ -25,5 +25,5 @@ def red(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, ...]:
     """Options with which red cars are found, by the names of files."""
     folder = tmp_path_factory.mktemp("red")
     save_model(red_finder(), folder / "red.npz")
-    (folder / "red.yaml").write_text(render(SETTINGS), encoding="utf-8")
+    (folder / "red.yaml").write_text(render_settings(SETTINGS), encoding="utf-8")
     return ("--model", str(folder / "red.npz"), "-c", str(folder / "red.yaml"))

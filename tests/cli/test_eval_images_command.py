@@ -9,7 +9,7 @@ import vdet
 from conftest import Run
 from labels.writers import WRITERS, Boxed, Labelled, show
 from red_cars import CAR, HEIGHT, PERSPECTIVE, WIDTH, red_finder, road
-from vdet.config.rendering import render
+from vdet.config.rendering import render_settings
 from vdet.detect.svm.model import save_model
 
 CAR_BOX = (CAR.x1, CAR.y1, CAR.width, CAR.height)
@@ -19,7 +19,7 @@ CAR_BOX = (CAR.x1, CAR.y1, CAR.width, CAR.height)
 def red(tmp_path: Path) -> tuple[str | Path, ...]:
     """The options for the detector of red cars."""
     save_model(red_finder(), tmp_path / "red.npz")
-    (tmp_path / "red.yaml").write_text(render(PERSPECTIVE), encoding="utf-8")
+    (tmp_path / "red.yaml").write_text(render_settings(PERSPECTIVE), encoding="utf-8")
     return "-c", tmp_path / "red.yaml", "--model", tmp_path / "red.npz"
 
 

@@ -10,7 +10,7 @@ import vdet
 from conftest import Run
 from red_cars import red_settings
 from running import write_drive
-from vdet.config.rendering import render
+from vdet.config.rendering import render_settings
 
 TEXT = "lanes: no values in metres without camera.lens, lanes.metres"
 FINDING: dict[str, Any] = {
@@ -26,7 +26,7 @@ def clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("red")
-    (folder / "red.yaml").write_text(render(red_settings(folder)), encoding="utf-8")
+    (folder / "red.yaml").write_text(render_settings(red_settings(folder)), encoding="utf-8")
     return folder / "red.yaml"
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from vdet.config.loading import load_settings
-from vdet.config.rendering import render
+from vdet.config.rendering import render_settings
 from vdet.config.schema import MotionTrackerSettings, Settings
 from vdet.config.tracker import RulesTrackerSettings
 from vdet.errors import ConfigError
@@ -62,7 +62,7 @@ def test_a_later_layer_changes_a_kind_or_chooses_another(
 
 @pytest.mark.parametrize("printed", ["motion", "rules"])
 def test_a_kind_may_be_chosen_over_printed_settings(path: Path, printed: str) -> None:
-    text = render(load_settings((), [f"tracker.kind={printed}"]))
+    text = render_settings(load_settings((), [f"tracker.kind={printed}"]))
     assert load(path, text, "tracker.kind=rules") == load_settings((), ["tracker.kind=rules"])
 
 
@@ -151,7 +151,7 @@ class TestOtherPackages:
         assert type(settings.detector).__name__ == "FakeSettings"
         own = {"level": 9, "parts": ({"size": 5},), "by_name": {"a": {"size": 6}}}
         assert settings.detector.model_dump(include=set(own)) == own
-        printed = render(settings)
+        printed = render_settings(settings)
         assert "  # its parts\n  # Each item is a part of it.\n  #   size: how large" in printed
         assert "# A detector of another package.\ndetector:\n  # fake: finds nothing\n" in printed
         assert "  # how red a vehicle is\n  level: 9\n" in printed

@@ -8,7 +8,7 @@ import yaml
 from seed import SEED
 from vdet.config.document import parse_document
 from vdet.config.loading import load_settings
-from vdet.config.rendering import explanations, render
+from vdet.config.rendering import explanations, render_settings
 from vdet.config.schema import Section, Settings, SvmSettings
 from vdet.config.tracker import RulesTrackerSettings
 
@@ -49,13 +49,13 @@ def sections_of(settings: Settings) -> Iterator[tuple[str, type[Section]]]:
 def test_the_shipped_configs_are_printed_settings() -> None:
     names = sorted(path.name for path in CONFIGS.iterdir())
     assert names == ["default.yaml", "project-camera.yaml", "seed.yaml", "svm.yaml"]
-    assert (CONFIGS / "default.yaml").read_text(encoding="utf-8") == render(Settings())
+    assert (CONFIGS / "default.yaml").read_text(encoding="utf-8") == render_settings(Settings())
     tracker = SVM.tracker.model_copy(update={"look_ahead": 0.8})
     assert load_settings([CONFIGS / "svm.yaml"]) == SVM.model_copy(update={"tracker": tracker})
     for name in ("seed", "svm"):
         path = CONFIGS / f"{name}.yaml"
         _, *blocks = path.read_text(encoding="utf-8").rstrip().split("\n\n")
-        printed = iter(render(load_settings([path])).splitlines())
+        printed = iter(render_settings(load_settings([path])).splitlines())
         assert all(line in printed for line in "\n".join(blocks).splitlines())
 
 
@@ -63,7 +63,7 @@ def test_the_shipped_configs_are_printed_settings() -> None:
 def test_every_setting_is_printed_with_its_explanation_and_read_back_the_same(
     settings: Settings, tmp_path: Path
 ) -> None:
-    printed = render(settings)
+    printed = render_settings(settings)
     (tmp_path / "printed.yaml").write_text(printed, encoding="utf-8")
     assert load_settings([tmp_path / "printed.yaml"]) == settings
     given = settings.model_dump(mode="json")

@@ -247,6 +247,6 @@ def config() -> None:
     vdet config > my.yaml
     vdet config -c seed --set output.crf=18
     """
-    from vdet.config.rendering import render
+    from vdet.config.rendering import render_settings
 
-    print_lines(*render(read_settings()).splitlines())
+    print_lines(*render_settings(read_settings()).splitlines())

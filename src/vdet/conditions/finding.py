@@ -6,9 +6,8 @@ from typing import Any, Literal
 
 from vdet.config.schema import Code
 from vdet.errors import clock
+from vdet.traffic.clock import Span
 
-Span = tuple[float, float]
-"""From when to when, seconds as in the tracks."""
 Severity = Literal["warning", "note"]
 _GAP = 2.0
 """Seconds between two times that end a span."""

@@ -20,7 +20,7 @@ HEADING = "# vdet settings. `vdet config` prints the effective ones."
 WIDTH = 100
 
 
-def render(settings: Settings) -> str:
+def render_settings(settings: Settings) -> str:
     """Write settings as YAML; reading the text gives the same settings again.
 
     Each key is preceded by what it means; the keys of list items stand before the list.

@@ -130,7 +130,6 @@ class LabelSettings(Section):
 
 
 LabelPart = Literal["id", "class", "score", "distance"]
-Seconds = Annotated[float, Field(gt=0, le=60)]
 
 
 class InputSettings(Section):
@@ -180,7 +179,7 @@ class DrawSettings(Section):
     """
     colors: Literal["id", "class", "one"] = "id"
     """Use one colour for each id, for each class, or for all vehicles (one)."""
-    trails: Seconds | None = None
+    trails: Annotated[float, Field(gt=0, le=60)] | None = None
     """Seconds of each vehicle's path to draw in a video. null: no path."""
 
 

@@ -20,7 +20,7 @@ from vdet.evaluate.output import RunName, figure, table
 from vdet.evaluate.scores import ClassResult, class_results, score_boxes
 from vdet.evaluate.video import ClipResult, total
 from vdet.media.reader import VideoReader
-from vdet.pages.render import render
+from vdet.pages.render import Table, render
 from vdet.version import __version__
 
 TRUE: Color = (90, 220, 60)
@@ -184,9 +184,6 @@ _HEADINGS = {
 """Headings of columns, where they are not the name of the attribute."""
 
 _MAX_MISTAKES = 10  # listed for a video
-
-Table = tuple[Sequence[str], Sequence[Sequence[str]]]
-"""Headings and rows of text."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -69,7 +69,7 @@ class Plot:
 
 
 @dataclass(frozen=True, slots=True)
-class Span:
+class TimelineBar:
     """A bar in a row of a timeline; a click leads to its `first` time in the video of the page."""
 
     row: int
@@ -87,7 +87,7 @@ class Timeline:
 
     title: str
     x: Axis
-    spans: Sequence[Span]
+    spans: Sequence[TimelineBar]
 
 
 Series = dict[str, Counter[float]]
@@ -185,7 +185,7 @@ def histogram(values: Sequence[float], step: int, title: str, unit: str) -> Plot
     return Plot(title, x, number_axis(0, max(counts.values())), bars)
 
 
-def pack(spans: Iterable[tuple[float, float]]) -> list[int]:
+def pack_rows(spans: Iterable[tuple[float, float]]) -> list[int]:
     """Return a row for each span, in order of their start; those at one time get different rows."""
     rows: list[int] = []
     free: list[tuple[float, int]] = []  # when the last span of a row ends, and the row

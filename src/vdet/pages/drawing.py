@@ -89,7 +89,7 @@ class Drawing:
             "size": self._size,
             "span": (times[0], times[-1]) if times else (0, 0),
             "picture": jpeg_uri(self._image),
-            "paths": pack(self.paths),
+            "paths": pack_paths(self.paths),
             "places": places,
             "rest": rest,
             "proposals": [asdict(proposal) for proposal in self.proposals],
@@ -157,7 +157,7 @@ class _Dumper(yaml.SafeDumper):
         return super().represent_sequence(tag, sequence, is_flat or flow_style)
 
 
-def pack(paths: Sequence[VehiclePath]) -> dict[str, Any]:
+def pack_paths(paths: Sequence[VehiclePath]) -> dict[str, Any]:
     """Return paths as JSON: second differences of rows, in planes of bytes, deflated.
 
     Times are µs since the first row, feet hundredths of a pixel; the page turns them back exactly.

@@ -15,7 +15,7 @@ from vdet.draw import boxes
 from vdet.draw.boxes import Color, Surface
 from vdet.lanes.ground import Ground
 from vdet.pages.charts import hex_color
-from vdet.pages.render import render
+from vdet.pages.render import Table, render
 from vdet.polygons import Point
 from vdet.traffic.counts import Counts, Event, Way, class_of, vehicle_flows
 from vdet.traffic.crossings import Border, PlacedLine
@@ -174,10 +174,6 @@ def svg(image: Image, marks: Sequence[Mark]) -> str:
     """Return a picture as SVG, with the image in it and the marks as shapes and text."""
     height, width = image.shape[:2]
     return render("place.svg", picture=image, width=width, height=height, marks=marks)
-
-
-Table = tuple[Sequence[str], Sequence[Sequence[str]]]
-"""Headings and rows."""
 
 
 @dataclass(frozen=True, slots=True)

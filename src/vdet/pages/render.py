@@ -2,6 +2,7 @@
 
 import base64
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -14,6 +15,8 @@ from vdet.errors import counted, escaped
 from vdet.pages.charts import hex_color, time_text
 from vdet.version import __version__
 
+Table = tuple[Sequence[str], Sequence[Sequence[str]]]
+"""Headings and rows of text."""
 PAGE_NAME = "page.html"
 """Name of the file of a page in its folder."""
 TEMPLATES = Path(__file__).parent / "templates"

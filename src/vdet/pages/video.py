@@ -13,7 +13,7 @@ from vdet.lanes.ground import Ground
 from vdet.media import VideoInfo
 from vdet.pages import charts
 from vdet.pages.batch import NO_STILL, Part, VehicleRow, VideoFacts, table_json
-from vdet.pages.charts import Axis, Plot, Span, Timeline, hex_color, interval_plot
+from vdet.pages.charts import Axis, Plot, Timeline, TimelineBar, hex_color, interval_plot
 from vdet.pages.place import path_marks, traffic_part, with_marks
 from vdet.pages.render import jpeg_uri, render
 from vdet.traffic.clock import Clock, Intervals
@@ -128,7 +128,7 @@ class VideoPage:
     @property
     def _most(self) -> int:
         """The most vehicles at once."""
-        return 1 + max(charts.pack(self._spans), default=-1)
+        return 1 + max(charts.pack_rows(self._spans), default=-1)
 
     @property
     def _totals(self) -> dict[str, int]:
@@ -249,14 +249,16 @@ def _timeline(shown: Sequence[VehicleRecord], findings: Sequence[Finding], x: Ax
 
     Where the results are doubtful, the first row says when.
     """
-    spans = [Span(0, *at, item.text, *_DOUBT, item.code) for item in findings for at in item.spans]
-    first, rows = bool(spans), charts.pack((record.first, record.last) for record in shown)
+    spans = [
+        TimelineBar(0, *at, item.text, *_DOUBT, item.code) for item in findings for at in item.spans
+    ]
+    first, rows = bool(spans), charts.pack_rows((record.first, record.last) for record in shown)
     for record, row in zip(shown, rows, strict=True):
         spans += _spans(record, first + row)
     return Timeline("When each vehicle is shown", x, spans)
 
 
-def _spans(record: VehicleRecord, row: int) -> list[Span]:
+def _spans(record: VehicleRecord, row: int) -> list[TimelineBar]:
     """Return a bar for each time in which a vehicle is shown and not lost; the longest is named."""
     name = f" ({record.class_name})" if record.class_name else ""
     times = " to ".join(map(charts.time_text, (record.first, record.last)))
@@ -265,6 +267,6 @@ def _spans(record: VehicleRecord, row: int) -> list[Span]:
     colors = hex_color(fill), hex_color(text_color(fill))
     longest = max(record.followed, key=lambda span: span[1] - span[0])
     return [
-        Span(row, *span, title, *colors, f"#{record.id}" if span is longest else "")
+        TimelineBar(row, *span, title, *colors, f"#{record.id}" if span is longest else "")
         for span in record.followed
     ]

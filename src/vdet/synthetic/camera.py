@@ -53,7 +53,7 @@ class PinholeCamera:
 
     def draw(self, image: Image, polygon: Float64Array, color: Color) -> None:
         """Fill the part of a polygon `(n, 3)` beyond `NEAR`."""
-        fill(image, self.project(beyond_near(polygon)), color)
+        fill_outline(image, self.project(beyond_near(polygon)), color)
 
 
 def beyond_near(polygon: Float64Array) -> Float64Array:
@@ -72,7 +72,7 @@ def beyond_near(polygon: Float64Array) -> Float64Array:
     return np.array(kept).reshape(-1, 3)
 
 
-def fill(image: Image, outline: Float64Array, color: Color, *, smooth: bool = True) -> None:
+def fill_outline(image: Image, outline: Float64Array, color: Color, *, smooth: bool = True) -> None:
     """Fill an outline of pixels `(n, 2)`; an empty outline changes nothing.
 
     The edges are smooth, or all pixels that they touch have the colour.

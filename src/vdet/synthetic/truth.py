@@ -8,7 +8,7 @@ import numpy as np
 
 from vdet.boxes import Box
 from vdet.files import write_whole
-from vdet.synthetic.camera import fill
+from vdet.synthetic.camera import fill_outline
 from vdet.synthetic.scene import Scene
 from vdet.synthetic.vehicle import outlines
 
@@ -40,7 +40,7 @@ def true_boxes(scene: Scene, index: int) -> tuple[TrueBox, ...]:
     for place, vehicle in scene.nearest_first(scene.time(index)):
         mask = np.zeros_like(covered)
         for outline, _ in outlines(vehicle, place, camera):
-            fill(mask, outline, _WHITE, smooth=False)
+            fill_outline(mask, outline, _WHITE, smooth=False)
         if inside := cv2.countNonZero(mask):
             hidden = cv2.countNonZero(mask & covered) / inside
             found.append(TrueBox(vehicle.id, Box.sized(*cv2.boundingRect(mask)), hidden))

@@ -13,7 +13,7 @@ import numpy as np
 
 from vdet.boxes import Float64Array, Image, Int64Array
 from vdet.draw.boxes import Color
-from vdet.synthetic.camera import PinholeCamera, beyond_near, fill, mixed, shaded
+from vdet.synthetic.camera import PinholeCamera, beyond_near, fill_outline, mixed, shaded
 from vdet.synthetic.scene import Body, Scene, SceneVehicle, Waypoint
 
 _SHADOW: Color = (34, 32, 32)
@@ -62,7 +62,7 @@ def draw_vehicle(image: Image, vehicle: SceneVehicle, place: Waypoint, scene: Sc
     scene.camera.draw(image, _placed(shadow, place), _SHADOW)
     light = scene.brightness(scene.speed * place.time + place.ahead)
     for outline, color in outlines(vehicle, place, scene.camera):
-        fill(image, outline, shaded(color, light))
+        fill_outline(image, outline, shaded(color, light))
 
 
 def _placed(corners: Float64Array, place: Waypoint) -> Float64Array:

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from boxing import moved_to
-from vdet.boxes import Box, from_sizes
+from vdet.boxes import Box, from_xywh
 from vdet.detect.svm.heat import HotRegion
 from vdet.detect.svm.votes import MAX_VOTES, Votes, split_regions
 from vdet.detect.svm.windows import Windows
@@ -26,7 +26,7 @@ EVERYWHERE = Box.sized(-1000, -1000, 5000, 5000)
 def votes_of(*votes: Vote) -> Votes:
     """Return votes whose weights for presence and position are equal."""
     table = np.array(votes, np.float64).reshape(-1, 5)
-    return Votes(from_sizes(table[:, :4]), table[:, 4], table[:, 4])
+    return Votes(from_xywh(table[:, :4]), table[:, 4], table[:, 4])
 
 
 def around(box: Box, weight: float = 0.1, seed: int = 0, count: int = 12) -> list[Vote]:
@@ -72,7 +72,7 @@ class TestWeights:
         off = moved_to(LEFT, 120, 100)
         table = np.array([exactly(LEFT, 0)[:4], exactly(off, 0)[:4]], np.float64)
         presence, position = np.array([0.2, 0.6]), np.array([1e4, 1.0])
-        votes = Votes(from_sizes(table), presence, position)
+        votes = Votes(from_xywh(table), presence, position)
         (vehicle,) = split_regions([HotRegion(EVERYWHERE, (0, 0), 1)], votes, 0.12)
         assert vehicle.box == LEFT
         assert vehicle.strength == pytest.approx(0.2 + 0.6 * LEFT.iou(off))

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from vdet.boxes import Box, from_sizes
+from vdet.boxes import Box, from_xywh
 from vdet.config.schema import Settings, SvmSettings
 from vdet.detect.svm.detector import load_svm
 from vdet.detect.svm.windows import Windows
@@ -106,8 +106,8 @@ def window(side: float, x: float = 450) -> tuple[float, ...]:
 
 def flags(*windows: tuple[float, ...], vehicle: tuple[float, ...] = VEHICLE) -> str:
     """Return the flags that are set for each window as a word, "-" where none is."""
-    (box,) = from_sizes(np.array([vehicle]))
-    found = compare_windows(from_sizes(np.array(windows)), box, WIDTH)
+    (box,) = from_xywh(np.array([vehicle]))
+    found = compare_windows(from_xywh(np.array(windows)), box, WIDTH)
     words = []
     for i in range(len(windows)):
         values = {"fits": found.fits[i], "shows": found.shows[i], "part": found.part[i]}

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from vdet.boxes import Box, Float32Array, from_sizes
+from vdet.boxes import Box, Float32Array, from_xywh
 from vdet.config.detector import HeatSettings
 from vdet.config.section import REFERENCE_HEIGHT
 from vdet.detect.svm.windows import Windows
@@ -74,7 +74,7 @@ def sum_heat(recent: Sequence[Windows], size: tuple[int, int], settings: HeatSet
     for hits in recent:
         values = np.zeros_like(total)
         heats = hits.probabilities * hits.weights if by_votes else hits.probabilities
-        sides = np.maximum(0, np.floor(from_sizes(hits.vehicles) / shrink + 0.5)).astype(np.int64)
+        sides = np.maximum(0, np.floor(from_xywh(hits.vehicles) / shrink + 0.5)).astype(np.int64)
         for (left, top, right, bottom), heat in zip(sides.tolist(), heats.tolist(), strict=True):
             values[top:bottom, left:right] += heat
         total += values

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vdet.boxes import BoolArray, Box, Float64Array, area, coverage, from_sizes, iou_matrix, visible
+from vdet.boxes import BoolArray, Box, Float64Array, area, coverage, from_xywh, iou_matrix, visible
 from vdet.detect.svm.heat import HotRegion
 from vdet.detect.svm.windows import Windows
 
@@ -62,7 +62,7 @@ class Votes:
         Boxes are cut off at the sides of the frame of `size` (width and height, pixels): windows
         can only guess how far a vehicle reaches beyond, so their guesses need not agree.
         """
-        boxes = from_sizes(np.concatenate([some.vehicles for some in hits]))
+        boxes = from_xywh(np.concatenate([some.vehicles for some in hits]))
         weights = np.concatenate([hit.weights for hit in hits], dtype=np.float64)
         probabilities = np.concatenate([hit.probabilities for hit in hits], dtype=np.float64)
         bounded = np.clip(probabilities, 1 - _MAX_PROBABILITY, _MAX_PROBABILITY)

@@ -18,7 +18,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from vdet.boxes import BoolArray, Box, Float64Array, coverage, from_sizes
+from vdet.boxes import BoolArray, Box, Float64Array, coverage, from_xywh
 from vdet.config.schema import Settings
 from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.features import cut_window, to_patch
@@ -94,7 +94,7 @@ def choose_windows(
         Width of the frame, pixels.
     """
     _, first = np.unique(windows.boxes, axis=0, return_index=True)
-    boxes, vehicles = from_sizes(windows.boxes[first]), labelled[~ignored]
+    boxes, vehicles = from_xywh(windows.boxes[first]), labelled[~ignored]
     is_hit = windows.probabilities[first] >= limits.probability
     comparisons = [compare_windows(boxes, vehicle, frame_width) for vehicle in vehicles]
     of_none = np.full(len(boxes), np.inf)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from vdet.boxes import Image
-from vdet.config.rendering import render
+from vdet.config.rendering import render_settings
 from vdet.detect.classes import UNKNOWN, in_file_name
 from vdet.draw.boxes import WHITE, color_of, draw_box, draw_label, draw_regions
 from vdet.errors import OutputError, clock
@@ -173,7 +173,7 @@ class PageSink(BaseSink):
             thumbnails=self._thumbnails,
             poster=self._fullest.image if self._fullest else None,
             player=self._player(),
-            settings=render(settings.with_paths(lambda path: Path(path).name)),
+            settings=render_settings(settings.with_paths(lambda path: Path(path).name)),
             counts=traffic.counts(),
             interval=settings.traffic.seconds or 60,
             gaps=self._gaps,

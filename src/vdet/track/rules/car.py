@@ -10,9 +10,8 @@ import numpy as np
 
 from vdet.boxes import Box, Image
 from vdet.config.tracker import RulesTrackerSettings
+from vdet.polygons import Point
 from vdet.track.votes import ClassVotes, vote_weight
-
-Point = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
