@@ -18,15 +18,15 @@ VIDEO_INPUT_SUFFIXES = frozenset((
     ".hevc", ".insv", ".m2t", ".m2ts", ".m2v", ".m4v", ".mjpeg", ".mjpg", ".mkv", ".mov", ".mp4",
     ".mpeg", ".mpg", ".mts", ".mxf", ".ogv", ".ts", ".vob", ".webm", ".wmv", ".y4m",
 ))  # fmt: skip
-"""Suffixes of videos in a folder. A file that is named may have any suffix."""
+"""Suffixes of videos in a folder. A file passed by name may have any suffix."""
 
 DRAWN = ".vdet"
-"""What the name of a video that is written beside its source has before the suffix."""
+"""Part before the suffix in the name of a video written beside its source."""
 
 
 @dataclass(frozen=True, slots=True)
 class InputVideo:
-    """A video, and its `place`: its path below the folder or the pattern that it was found by."""
+    """A video, and its `place`: its path below the input folder or pattern."""
 
     path: Path
     place: Path
@@ -37,24 +37,23 @@ def find_sources(clips: Sequence[Path]) -> list[InputVideo]:
 
     Each clip is one of these, and its videos are in the order of their names:
 
-    * a file, or numbered pictures such as ``img_%04d.png``;
-    * a folder: the videos in it and below it, without hidden files and folders. A folder without
-      videos in which there are numbered pictures is a video itself;
+    * a file, or numbered images such as ``img_%04d.png``;
+    * a folder: the videos in it, recursively, without hidden files and folders. A folder that has
+      numbered images and no videos is a video itself;
     * a pattern with ``*``, ``?`` or ``[``, where ``**`` means any folders: the videos that match,
       and those in the folders that match. Their places are below the last folder of the pattern
-      that has no such character. If the pattern ends in a suffix, as ``*.raw`` does, all files that
-      match are taken for videos.
+      that has no such character. If the pattern ends in a suffix, such as ``*.raw``, all matching
+      files are treated as videos.
 
-    Videos that vdet wrote beside their sources are left out, unless they are named.
-
-    Numbered pictures of which one is missing are left out with a warning (logger "vdet").
+    Videos that vdet wrote beside their sources are skipped, unless they are passed by name.
+    Numbered images with a gap are skipped with a warning (logger "vdet").
 
     Raises
     ------
     BatchError
-        One of `clips` gives no video, or a folder cannot be read.
+        One of `clips` has no video, or a folder cannot be read.
     VideoError
-        One of `clips` is an address, or numbered pictures with a gap.
+        One of `clips` is an address, or numbered images with a gap.
     """
     found: dict[tuple[Path, Path], InputVideo] = {}
     for clip in clips:
@@ -102,7 +101,7 @@ def _below(folder: Path, base: Path) -> Iterator[InputVideo]:
 
 
 def _pictures_in(folder: Path, base: Path) -> Iterator[InputVideo]:
-    """Give the numbered pictures of a folder as one video, named as the folder."""
+    """Yield the numbered images of a folder as one video, with the name of the folder."""
     try:
         sequence = find_sequence(folder)
     except VideoError as error:

@@ -1,8 +1,8 @@
 """The manifest: a line of JSON for every file of a batch, added as soon as the file is done.
 
-Whoever processes a file leaves its record as a note in a hidden folder of the batch, just before
-the outputs get their names. The note moves into the manifest when the file is done, or when the
-next batch begins, so no kill can separate outputs from their record.
+The worker writes the record of a file as a note into a hidden folder of the batch, just before the
+outputs are renamed. The note moves into the manifest when the file is done, or when the next batch
+begins, so that a killed batch never has outputs without their record.
 """
 
 import errno
@@ -28,19 +28,19 @@ _FLAGS = sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_BI
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """An output that was written.
+    """A written output.
 
     Attributes
     ----------
     sink, path
         The name of its sink; its absolute path.
     bytes, changed
-        Its size, and the time of its last change (nanoseconds since 1970); of a folder the sum and
-        the latest of the files in it.
+        Its size and modification time (nanoseconds since 1970); for a folder, the sum and the
+        latest of its files.
     digest
-        SHA-256 of all that it depends on: see `vdet.batch.task`.
+        SHA-256 of everything that it depends on: see `vdet.batch.task`.
     summary
-        What a file over all videos needs of it: see `BatchTotal`.
+        What a file over all videos needs from it: see `BatchTotal`.
     """
 
     sink: str
@@ -52,7 +52,7 @@ class Written:
 
     @property
     def state(self) -> tuple[int, int]:
-        """Its size and time, as of `output_state`."""
+        """Its size and time, as in `output_state`."""
         return self.bytes, self.changed
 
 
@@ -65,25 +65,25 @@ class Record:
     input
         Its absolute path.
     started
-        In UTC, as ISO 8601 writes it.
+        Start time in UTC, ISO 8601.
     seconds
         Wall time.
     model, model_sha256
         Name and SHA-256 of the model file; None for a detector without one.
     width, height
-        Size of the upright picture, pixels.
+        Size of the upright frames, pixels.
     frames, tracks
         Number of frames read, and of tracks shown.
     begin
-        When the video was recorded, and where that is known from, if it is.
+        When the recording began, and the source of that time; None if unknown.
     facts
-        What steps found out about the whole video, by their names.
+        What steps found out about the whole video, by name.
     outputs
         Empty after an error.
     error
-        None if all went well; else there are no outputs, and of the numbers only the seconds.
+        None on success; otherwise there are no outputs, and no numbers except the seconds.
     program
-        The program with its version.
+        Name and version of the program.
     """
 
     input: str
@@ -115,13 +115,13 @@ class Record:
 
 
 def note_path(folder: Path, path: Path) -> Path:
-    """Return the note in the folder of a batch about the run whose first output has a path."""
+    """Return the path of the note about the run with this first output."""
     name = hashlib.sha256(os.fsencode(path.absolute())).hexdigest()
     return folder / _NOTES / f"{name[:32]}.json"
 
 
 def read_records(*paths: Path) -> Iterator[Record]:
-    """Yield the records in some files; what does not exist, or is not a record, is skipped.
+    """Yield the records in some files; missing files and invalid records are skipped.
 
     Raises
     ------
@@ -138,7 +138,7 @@ def read_records(*paths: Path) -> Iterator[Record]:
 
 
 def read_batch(folder: Path) -> Iterator[Record]:
-    """Yield the records of all batches into a folder, in order. Errors as of `read_records`."""
+    """Yield the records of all batches in a folder, in order. Errors as for `read_records`."""
     return read_records(folder / MANIFEST, *_notes(folder))
 
 
@@ -148,10 +148,10 @@ def _notes(folder: Path) -> list[Path]:
 
 @contextmanager
 def open_manifest(folder: Path) -> Iterator[Callable[[Record], None]]:
-    """Yield a function that adds a record to the manifest; it returns when the disk has it.
+    """Yield a function that appends a record to the manifest and syncs it to disk.
 
     The manifest is locked: no other batch can write into the folder until the block ends. Notes
-    that an earlier batch left move into it.
+    left by an earlier batch are moved into it.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Plan a batch, and run it: process every file, and write its record when it has ended."""
+"""Plan and run a batch: process every file, and write its record when it is done."""
 
 import os
 from collections.abc import Generator, Iterable, Mapping, Sequence
@@ -30,13 +30,13 @@ _KILLED = "{}: its process was killed or crashed; it may have run out of memory"
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """The runs to do and those that are left out; all their outputs lie in `folder`.
+    """The runs to process and those to skip; all their outputs are in `folder`.
 
     Attributes
     ----------
     totals
         The files over all videos: path, kind, and ending of the outputs that each is made from, by
-        their number in every run.
+        the position of these outputs in every run.
     """
 
     folder: Path
@@ -48,29 +48,29 @@ class Plan:
 def make_plan(
     clips: Sequence[Path], folder: Path, common: Run, *, skip_existing: bool = False
 ) -> Plan:
-    """Plan a run for every video of `clips`; outputs lie in `folder` by the places of the videos.
+    """Plan a run for every video of `clips`; outputs are in `folder`, at the places of the videos.
 
-    The paths in the settings become absolute: processes on other machines work in other folders.
+    The paths in the settings become absolute, because other machines have other working folders.
 
     Parameters
     ----------
     common
-        A run with what all runs have in common. The paths of its outputs are the endings of their
-        names, after that of the video, such as `.csv`. An empty one is the video's own suffix if
-        the sink can write it, else the first that the sink can write.
+        A run with everything that all runs have in common. The paths of its outputs are the endings
+        of their names, after the name of the video, such as `.csv`. An empty one stands for the
+        suffix of the video if the sink can write it, else for the first suffix of the sink.
     skip_existing
-        Skip runs whose outputs all exist, and are up to date as the manifest says. All outputs of
-        the other runs are made again, but only those that vdet wrote are replaced.
+        Skip runs whose outputs all exist and are up to date by the manifest. All outputs of the
+        other runs are made again; only outputs that vdet wrote are replaced.
 
     Raises
     ------
     BatchError
-        There is no video; an input lies in `folder`, or `folder` in an input; two outputs have one
-        name; with `skip_existing`, an output exists that vdet did not write.
+        There is no video; an input is inside `folder`, or `folder` inside an input; two outputs
+        have the same name; with `skip_existing`, an output exists that vdet did not write.
     OutputError
         An output cannot be written, or already exists; the manifest cannot be used.
     ConfigError, ModelError
-        There is no sink of a name, or the detector cannot be loaded.
+        A sink is unknown, or the detector cannot be loaded.
     """
     settings = common.settings.with_paths(lambda path: str(Path(path).absolute()))
     load_detector(settings.detector)
@@ -110,7 +110,7 @@ def make_plan(
 
 
 def _named(output: Output, video: Path) -> Output:
-    """Return an output whose path is the ending of its name, named after a video."""
+    """Return an output named after a video; its path was the ending of the name."""
     ending = output.path.name or sink_kind(output.sink).suffix_for(video)
     return replace(output, path=video.with_suffix(ending))
 
@@ -126,7 +126,7 @@ def _refuse_nested(clips: Iterable[Path], sources: Iterable[InputVideo], folder:
 
 
 def _refuse_shared(runs: Iterable[Run], totals: Iterable[Path], folder: Path) -> None:
-    """Refuse an output with the name of another output, of a total or the manifest."""
+    """Refuse an output with the name of another output, a total or the manifest."""
     record_input(*(run.source for run in runs))
     owners = {folder / MANIFEST: "the manifest"}
     makers = [(path, "the outputs of all videos") for path in totals]
@@ -142,12 +142,10 @@ def _refuse_shared(runs: Iterable[Run], totals: Iterable[Path], folder: Path) ->
 def run_batch(
     plan: Plan, *, workers: Workers, threads: int | None = None
 ) -> Generator[tuple[Run, Record]]:
-    """Process the files of a plan; yield each when it has ended, with its record in the manifest.
+    """Process the files of a plan; yield each when it is done and its record is in the manifest.
 
-    `threads` is the number of threads of each run that has none.
-
-    At the end, the files over all videos are written, and temporary files of killed worker
-    processes are removed.
+    `threads` is the number of threads for each run that does not set it. At the end, the files over
+    all videos are written, and temporary files of killed workers are removed.
 
     Raises
     ------
@@ -176,7 +174,7 @@ def run_batch(
 
 
 def _write_totals(plan: Plan) -> None:
-    """Write the files over all videos, from what records say of the outputs that exist."""
+    """Write the files over all videos, from the records of existing outputs."""
     known = known_outputs(read_batch(plan.folder)) if plan.totals else {}
     runs = sorted((*plan.runs, *plan.skipped), key=lambda run: run.outputs[0].path)
     for number, (path, total, ending) in plan.totals.items():

@@ -1,4 +1,4 @@
-"""One file of a batch: what its result depends on, whether it is done, and its record."""
+"""One file of a batch: the digest of its result, whether it is done, and its record."""
 
 import hashlib
 import logging
@@ -24,15 +24,14 @@ from vdet.version import __version__
 from vdet.workers import limit_library_threads
 
 Known = Mapping[str, Sequence[Written]]
-"""What records say of outputs, by their real paths; the latest comes last."""
+"""Records of outputs by their real paths; the latest is last."""
 
 
 def result_digest(run: Run) -> str:
-    """Return a digest of all that the outputs of a run depend on.
+    """Return a digest of everything that the outputs of a run depend on.
 
-    These are the program, the files of model and masks, the settings, the part, the time zone of
-    this computer, and the size and the time of the input; numbered pictures count by those of all
-    files in their folder.
+    This is the program, the model and mask files, the settings, the part, the time zone of this
+    computer, and the size and time of the input; for numbered images, of all files in their folder.
     """
     settings = run.settings
     files = model_file(settings.detector), *(region.mask for region in settings.regions)
@@ -49,14 +48,14 @@ def result_digest(run: Run) -> str:
 
 def _states(source: Path) -> list[tuple[Path, os.stat_result]]:
     folder = source if source.is_dir() else source.parent
-    with suppress(OSError):  # there is no such input; reading it is an error soon
+    with suppress(OSError):  # the input does not exist; reading it will fail
         files = [source] if source.is_file() else sorted(folder.iterdir())
         return [(file, file.stat()) for file in files]
     return []
 
 
 def _digest_of(path: Path | str | None) -> str | None:
-    """Return the SHA-256 of a file; None where there is none."""
+    """Return the SHA-256 of a file; None if it does not exist."""
     with suppress(OSError):
         if path:
             state = Path(path).stat()
@@ -70,7 +69,7 @@ def _kept_digest(path: str, *_state: int) -> str:
 
 
 def known_outputs(records: Iterable[Record]) -> Known:
-    """Return what some records say of outputs."""
+    """Return the outputs in some records."""
     found: dict[str, list[Written]] = {}
     for written in (written for record in records for written in record.outputs):
         found.setdefault(os.path.realpath(written.path), []).append(written)
@@ -78,7 +77,7 @@ def known_outputs(records: Iterable[Record]) -> Known:
 
 
 def is_done(run: Run, known: Known) -> bool:
-    """Return whether the outputs of a run have their sizes, and were made as it would make them."""
+    """Return whether the outputs of a run have their recorded sizes and the current digest."""
     digest = result_digest(run)
     for output in run.outputs:
         state, written = output_state(output), known.get(os.path.realpath(output.path))
@@ -88,12 +87,12 @@ def is_done(run: Run, known: Known) -> bool:
 
 
 def replacing_ours(run: Run, known: Known) -> Run:
-    """Return a run that replaces its outputs, where vdet wrote all of them that exist.
+    """Return a run that may replace its outputs, if vdet wrote all that exist.
 
     Raises
     ------
     BatchError
-        One exists that has another size or time than all records say, and is not empty.
+        A non-empty output has a size or time that is not in any record.
     """
     for output in run.outputs:
         state, ours = output_state(output), known.get(os.path.realpath(output.path), ())
@@ -106,10 +105,10 @@ def replacing_ours(run: Run, known: Known) -> Run:
 
 @recorded_inputs()
 def process_file(run: Run, *, folder: Path) -> Record:
-    """Process a video, and return its record, which is left as a note in the folder of the batch.
+    """Process a video, and return its record, which is also written as a note into the folder.
 
-    Errors are recorded, and not raised. It can be called again where its process was killed: then
-    the outputs are made again, or else were complete.
+    Errors are recorded, not raised. After its process was killed, it can be called again: the
+    outputs are made again unless they were complete.
     """
     limit_library_threads()
     began, record = time.perf_counter(), new_record(run)
@@ -132,7 +131,7 @@ def process_file(run: Run, *, folder: Path) -> Record:
 
 
 def _written(run: Run, record: Record, files: OutputFiles) -> Record:
-    """Write the outputs, which have not their names yet, and return the record about them."""
+    """Write the outputs, still under temporary names, and return their record."""
     digest = result_digest(run)
     chosen = pickle.dumps(run.settings.detector)  # settings of other packages may be unhashable
     parts = Parts(_kept_detector(chosen, record.model_sha256))
@@ -154,12 +153,12 @@ def _written(run: Run, record: Record, files: OutputFiles) -> Record:
 
 @lru_cache(maxsize=1)
 def _kept_detector(chosen: bytes, _sha256: str | None) -> DetectorModel:
-    """Load a detector, which this process keeps for the next videos; the file may not change."""
+    """Load a detector, and keep it for the next videos of this process."""
     return load_detector(pickle.loads(chosen))
 
 
 def new_record(run: Run) -> Record:
-    """Return the record of a run that begins now."""
+    """Return the record of a run that starts now."""
     source, now = str(run.source.absolute()), datetime.now(UTC).isoformat(timespec="seconds")
     model = model_file(run.settings.detector)
     return Record(source, now, 0.0, model.name if model else None, _digest_of(model))
@@ -167,7 +166,7 @@ def new_record(run: Run) -> Record:
 
 @contextmanager
 def _collected_warnings() -> Iterator[list[str]]:
-    """Yield a list of the warnings of the block; whoever gets the record prints them."""
+    """Yield a list of the warnings in the block; the receiver of the record prints them."""
     messages: list[str] = []
 
     def collect(record: logging.LogRecord) -> bool:

@@ -1,1 +1,1 @@
-"""What makes a result doubtful: typed findings about a video, and why."""
+"""Reasons to doubt a result: typed findings about a video."""

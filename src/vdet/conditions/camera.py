@@ -1,7 +1,8 @@
-"""Whether the camera moves: how the small planes of a video lie over one of them.
+"""Whether the camera moves, from small luma planes of a video.
 
-Corners (Shi and Tomasi 1994) of a plane are followed into later ones (Lucas and Kanade 1981), and
-a similarity is fitted to them by RANSAC (Fischler and Bolles 1981): what drives does not count.
+Corners (Shi and Tomasi 1994) of a reference plane are tracked into later ones (Lucas and Kanade
+1981), and a similarity is fitted to them by RANSAC (Fischler and Bolles 1981), which rejects
+vehicles.
 """
 
 from collections.abc import Iterable
@@ -14,31 +15,31 @@ from vdet.conditions.finding import Finding, joined, when
 from vdet.errors import clock
 
 _LIMIT = 0.01
-"""Displacement of a camera that is not worth a word, as a fraction of the frame's width."""
+"""Displacement of a camera that is not reported, as a fraction of the frame's width."""
 _POINTS, _MIN_POINTS = 80, 12
 """Number of corners to follow, and the minimum to lay a plane over another."""
 _AGREEING = 0.5
 """Fraction of the corners that must agree with a similarity."""
 _ERROR = 0.3
-"""Displacement that is only an error of measurement, pixels of a plane."""
+"""Displacement within the error of measurement, pixels of a plane."""
 _RENEWED = 30.0
-"""Seconds after which corners that are found are chosen anew: the light changes."""
+"""Seconds after which corners are chosen again, because the light changes."""
 _LOST = 3.0
-"""Seconds after which a view that is not found again is another view: no lorry hides it all."""
+"""Seconds after which a lost view is another view: a lorry does not hide everything for so long."""
 _STILL = 0.9
-"""Fraction of the planes in which a still camera stands as in the plane before."""
+"""Minimum fraction of planes in which a fixed camera has not moved since the previous one."""
 
 
 class CameraWatch:
-    """Follows the place of the camera through the planes of one video."""
+    """Tracks the displacement of the camera through the planes of one video."""
 
     def __init__(self) -> None:
         self._even = cv2.createCLAHE(4, (10, 6))
-        """Makes contrast even, so that light and fog do not matter (Zuiderveld 1994)."""
+        """Equalizes contrast, against changes of light and fog (Zuiderveld 1994)."""
         self._times: list[float] = []
         self._places: list[Float64Array] = []
-        """How far the corners of the frame are from where they were at first, `(4, 2)` each, as
-        fractions of the width: infinite in another view, NaN where that is not known.
+        """Displacements of the corners of the frame since the start, `(4, 2)` each, fractions of
+        the width: infinite in another view, NaN if unknown.
         """
         self._stood: list[bool] = []
         self._plane: Image | None = None
@@ -47,33 +48,33 @@ class CameraWatch:
         self._since = 0.0
 
     def add(self, time: float, plane: Image, boxes: Iterable[Box], *, is_clear: bool) -> bool:
-        """Add the next plane, uint8 `(h, w)`; return whether the camera stands as before.
+        """Add the next plane, uint8 `(h, w)`; return whether the camera has not moved.
 
-        `boxes` are those of vehicles, in pixels of the plane. `is_clear` says whether one sees
-        well: otherwise a view that is not found may be the same.
+        `boxes` are those of vehicles, in pixels of the plane. `is_clear` says whether visibility is
+        good: otherwise a view that is not found may be the same.
         """
         plane = np.asarray(self._even.apply(plane), np.uint8)
         moved = self._moved(plane, np.inf if is_clear else np.nan)
         place = self._place + moved / plane.shape[1]
         before = self._places[-1] if self._places else place
-        with np.errstate(invalid="ignore"):  # another view may follow another
+        with np.errstate(invalid="ignore"):  # both may be other views
             self._stood.append(bool(np.abs(place - before).max() <= _LIMIT / 2))
         self._times.append(time)
         self._places.append(place)
         is_old = time - self._since > _RENEWED and np.isfinite(place).all()
         if is_old or len(self._points) < _MIN_POINTS:
-            if np.abs(moved).max() > _ERROR:  # small errors do not add up
+            if np.abs(moved).max() > _ERROR:  # so that small errors do not add up
                 self._place = place
             self._plane, self._since, self._points = plane, time, _corners(plane, boxes)
         return self._stood[-1]
 
     @property
     def is_still(self) -> bool:
-        """Whether it has stood still most of the time."""
+        """Whether the camera was fixed most of the time."""
         return len(self._stood) > 1 and float(np.mean(self._stood)) >= _STILL
 
     def findings(self) -> list[Finding]:
-        """Return from when to when it moved, or when it was moved for good."""
+        """Return when the camera moved, or when it was moved permanently."""
         times, places = np.array(self._times), np.array(self._places)
         is_known = np.isfinite(places).all(axis=(1, 2))
         off = _distances(places, places[is_known][:5])
@@ -98,7 +99,7 @@ class CameraWatch:
         return [Finding("camera-moves", text, tuple(spans), value=size)]
 
     def _moved(self, plane: Image, lost: float) -> Float64Array:
-        """Return how far the corners of the frame have moved in a plane, `(4, 2)` pixels.
+        """Return the displacement of the corners of the frame in a plane, `(4, 2)` pixels.
 
         It is `lost` if the view is not found.
         """
@@ -122,7 +123,7 @@ class CameraWatch:
 
 
 def _distances(places: Float64Array, usual: Float64Array) -> Float64Array:
-    """Return the mean distance of the corners from their median in usual places, `(n,)`."""
+    """Return the mean distance of the corners from the median of the usual places, `(n,)`."""
     x, y = np.moveaxis(places - np.median(usual, axis=0), -1, 0)
     return np.asarray(np.hypot(x, y).mean(axis=1))
 

@@ -1,4 +1,4 @@
-"""A finding: what makes a result doubtful, from when to when, and how much."""
+"""A finding: a reason to doubt a result, when it applies, and how much."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -10,26 +10,26 @@ from vdet.traffic.clock import Span
 
 Severity = Literal["warning", "note"]
 _GAP = 2.0
-"""Seconds between two times that end a span."""
+"""Maximum seconds between two times of one span."""
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What makes a result doubtful.
+    """A reason to doubt a result.
 
     Attributes
     ----------
     code
-        What it is, in short: `conditions.ignore` leaves findings out by it.
+        Its name; `conditions.ignore` suppresses findings by it.
     text
         A sentence: what was found, and what it means.
     spans
-        When, in order; none if it holds for the whole video.
+        When it applies, in order; empty for the whole video.
     severity
-        "warning": the result may be wrong. "note": good to know.
+        "warning": the result may be wrong. "note": for information.
     value
-        How much, where there is a measure: the fraction of the frame's width, of the motion, or of
-        the vehicles that the network finds.
+        A measure, if there is one: fraction of the frame's width, of the motion, or of the vehicles
+        that the network finds.
     """
 
     code: Code
@@ -48,7 +48,7 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Findings:
-    """What makes the results of a video doubtful.
+    """The reasons to doubt the results of a video.
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ class Findings:
 
 
 def joined(times: Iterable[float], shortest: float = 0.0) -> list[Span]:
-    """Return the spans of ascending times that are near to each other, but no shorter ones."""
+    """Join ascending times that are near each other into spans; drop spans that are too short."""
     spans: list[Span] = []
     for time in times:
         if spans and time - spans[-1][1] <= _GAP:
@@ -87,7 +87,7 @@ def joined(times: Iterable[float], shortest: float = 0.0) -> list[Span]:
 
 
 def when(spans: Sequence[Span]) -> str:
-    """Return "from 0:05 to 0:32"; of several spans, the longest and how many more there are."""
+    """Return "from 0:05 to 0:32"; for several spans, the longest and the number of others."""
     first, last = max(spans, key=lambda span: span[1] - span[0])
     others = f" (and {len(spans) - 1} more)" if len(spans) > 1 else ""
     return f"from {clock(int(first))} to {clock(int(last))}{others}"

@@ -1,8 +1,8 @@
-"""What moves before a still camera, and is not a vehicle that was found.
+"""Moving objects in front of a fixed camera that are not detected vehicles.
 
-The background follows the planes as a running median (McFarlane and Schofield 1995). What differs
-from it, outside the boxes, is linked from plane to plane. Only what travels counts: leaves, flags
-and drops on the lens do not.
+The background is a running median of the planes (McFarlane and Schofield 1995). Areas that differ
+from it, outside the boxes, are linked from plane to plane. Only objects that travel count, not
+leaves, flags or drops on the lens.
 """
 
 import itertools
@@ -18,30 +18,30 @@ from vdet.conditions.finding import Finding, joined, when
 from vdet.polygons import Point
 
 _RATE = 8.0
-"""Grey levels by which the background follows in a second."""
+"""Grey levels per second by which the background adapts."""
 _NOISE, _CONTRAST = 4.0, 12.0
-"""What differs does so by this many times a pixel's usual difference, and by these grey levels."""
+"""Minimum difference: in usual differences of a pixel, and in grey levels."""
 _MIN_AREA, _MAX_AREA = 0.0015, 0.25
 """Area of a mover, fractions of the frame's; more is a cloud, or a change of the light."""
 _OUTSIDE = 0.5
-"""Fraction of it that lies outside the boxes; less is a shadow, or the edge of a vehicle."""
+"""Minimum fraction of it outside the boxes; less is a shadow, or the edge of a vehicle."""
 _TRAVEL = 0.08
-"""Distance of what travels from where it began, as a fraction of the frame's width."""
+"""Minimum distance from the start of an object that travels, as a fraction of the frame's width."""
 _STRAIGHT = 0.7
-"""The same, as a fraction of its way."""
+"""The same, as a fraction of the length of its path."""
 _PLANES = 4
-"""Number of planes that show what travels."""
+"""Minimum number of planes that show it."""
 _REACH = 1.5
-"""How far it moves to the next plane, as a multiple of its size."""
+"""Maximum distance to the next plane, as a multiple of its size."""
 _MIN_MOVERS, _MIN_FRACTION = 2, 0.15
 """Minimum number of movers, and minimum fraction of all that travelled, for a finding."""
 
 
 @dataclass(slots=True, eq=False)
 class Mover:
-    """What moved: when, where (pixels of a plane), and how large it was last.
+    """A moving object: its times, places (pixels of a plane) and last size.
 
-    `is_found` says whether it came out of the box of a vehicle, or was found in the end.
+    `is_found` says whether it came out of the box of a vehicle, or was detected later.
     """
 
     is_found: bool
@@ -50,14 +50,14 @@ class Mover:
     places: list[Point] = field(default_factory=list)
 
     def has_travelled(self, width: int) -> bool:
-        """Return whether it moved on, in planes of this width."""
+        """Return whether it travelled, in planes of this width."""
         way = sum(map(math.dist, self.places, self.places[1:]))
         minimum = max(_TRAVEL * width, self.size, _STRAIGHT * way)
         return len(self.places) >= _PLANES and math.dist(self.places[0], self.places[-1]) >= minimum
 
 
 class MotionWatch:
-    """Follows what moves through the planes of one video."""
+    """Tracks moving objects through the planes of one video."""
 
     def __init__(self) -> None:
         self._ended: list[list[float]] = []
@@ -71,7 +71,7 @@ class MotionWatch:
     def add(self, time: float, plane: Image, boxes: Mapping[int, Box], *, stood: bool) -> None:
         """Add the next plane, uint8 `(h, w)`; `boxes` are those of vehicles by id, its pixels.
 
-        `stood` says whether the camera stands as in the plane before.
+        `stood` says whether the camera has not moved since the previous plane.
         """
         follow, self._time = np.float32(min(1.0, time - self._time) * _RATE), time
         before, self._covered = self._covered, np.zeros_like(plane)
@@ -93,7 +93,7 @@ class MotionWatch:
         self._link(time, differs.astype(np.uint8), before)
 
     def findings(self) -> list[Finding]:
-        """Return how much of what travelled is not a vehicle that was found, and when."""
+        """Return the fraction of travelling objects that are not detected vehicles, and when."""
         left = self._ended + self._unexplained(self._movers)
         fraction = len(left) / max(1, len(left) + len(self._driven))
         if len(left) < _MIN_MOVERS or fraction < _MIN_FRACTION:
@@ -104,7 +104,7 @@ class MotionWatch:
         return [Finding("unexplained-motion", text, tuple(spans), value=fraction)]
 
     def _link(self, time: float, differs: Image, before: Image) -> None:
-        """Continue the movers; `before` is where boxes were in the plane before."""
+        """Link the movers; `before` marks the boxes of the previous plane."""
         left, self._movers = self._movers, []
         for center, size in self._things(differs):
             mover = min(left, key=lambda item: math.dist(item.places[-1], center), default=None)
@@ -121,12 +121,12 @@ class MotionWatch:
         self._ended += self._unexplained(left)
 
     def _unexplained(self, movers: Iterable[Mover]) -> list[list[float]]:
-        """Return the times of each that travelled and was not found."""
+        """Return the times of each mover that travelled and was not detected."""
         width = self._covered.shape[1]
         return [item.times for item in movers if not item.is_found and item.has_travelled(width)]
 
     def _things(self, differs: Image) -> list[tuple[Point, float]]:
-        """Return the middle and the size of what differs outside the boxes, the largest first."""
+        """Return centre and size of the areas that differ outside the boxes, the largest first."""
         closed = cv2.morphologyEx(differs, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
         _, labels, stats, _ = cv2.connectedComponentsWithStats(closed)
         labels[self._covered > 0] = 0

@@ -1,7 +1,7 @@
-"""How well one sees in the parts of a video, and what the shipped network finds in such pictures.
+"""Visibility in a video, and what the shipped network finds in such images.
 
-`benchmarks/visibility.py` measures what it finds in pictures of many roads, and writes the weights
-of two logistic regressions: of the recall, and of how likely there are drops on the lens.
+`benchmarks/visibility.py` measures its recall in images of many roads, and writes the weights of
+two logistic regressions: for the recall, and for the probability of drops on the lens.
 """
 
 import json
@@ -18,7 +18,7 @@ from vdet.conditions.finding import Finding, Severity, joined, when
 from vdet.config.schema import Code
 
 Codes = npt.NDArray[np.str_]
-"""Why one does not see well, `(n,)`: of `WORDS`, empty where one does."""
+"""Reasons for poor visibility, `(n,)`: keys of `WORDS`, empty where visibility is good."""
 WORDS: dict[Code, str] = {
     "dark": "it is dark",
     "haze": "contrast is low, as in fog or spray",
@@ -26,37 +26,37 @@ WORDS: dict[Code, str] = {
     "drops": "drops, dirt or spray are on the lens",
 }
 PLAIN = 7
-"""Number of the measures that do not depend on the detector: the first ones of `look`."""
+"""Number of measures that do not depend on the detector: the first ones of `look`."""
 LIKELY = 0.9
-"""Probability of drops on the lens from which they are reported."""
+"""Minimum probability of drops on the lens to report them."""
 _TOP = 0.35
-"""Where the part of the plane begins that shows a road, as a fraction of its height."""
+"""Start of the part of the plane that shows a road, as a fraction of its height."""
 _LIGHT = 5.0
-"""Added to the mean of a plane before its logarithm is taken, grey levels."""
+"""Added to the mean of a plane before taking its logarithm, grey levels."""
 _DARK = 45.0
-"""Mean of what is dark, grey levels."""
+"""Maximum mean of a dark plane, grey levels."""
 _HAZY = 0.07
-"""Local contrast of what is hazy, as a fraction of the mean."""
+"""Maximum local contrast of a hazy plane, as a fraction of the mean."""
 _BLURRED = 0.3
-"""Fine contrast of what is blurred, as a fraction of the coarse."""
+"""Maximum fine contrast of a blurred plane, as a fraction of the coarse contrast."""
 _DOUBTED, _WIDER = 0.5, 1.2
-"""Recall below which these limits are wider, and the factor: the scores say the same."""
+"""Recall below which these limits are widened, because scores agree, and the factor."""
 _EMPTY = 1.0
-"""Local contrast of a plane that shows nothing to be seen, grey levels."""
+"""Maximum local contrast of a plane that shows nothing, grey levels."""
 _SHORTEST = 3.0
-"""Seconds of bad sight from which it is reported; an underpass is shorter."""
+"""Minimum seconds of poor visibility to report it; an underpass is shorter."""
 _AROUND = 5
-"""Number of planes around one whose most frequent reason counts."""
+"""Number of neighbouring planes whose most frequent reason counts."""
 _SURE = 0.4
-"""Score of a vehicle that is shown."""
+"""Minimum score of a sure detection."""
 _NOTED = 0.6
-"""Recall from which bad sight is only noted."""
+"""Minimum recall at which poor visibility is only a note."""
 _TILES = 16, 9
-"""Parts of a plane in which it is more or less fine: columns, rows."""
+"""Tiles of a plane whose fine contrast is compared: columns, rows."""
 
 
 def look(fine_plane: Image, plane: Image, scores: Float64Array) -> Float64Array:
-    """Measure how well one sees in a frame, from two of its planes, uint8.
+    """Measure the visibility in a frame, from two of its planes, uint8.
 
     `scores` are those of all its detections.
 
@@ -80,7 +80,7 @@ def look(fine_plane: Image, plane: Image, scores: Float64Array) -> Float64Array:
 
 
 def _texture(plane: Image) -> tuple[float, ...]:
-    """Return the measures of the whole frame: what tells drops."""
+    """Return the measures of the whole frame, which reveal drops."""
     pixels = plane.astype(np.float32)
     soft, softer, edges = (cv2.GaussianBlur(pixels, (0, 0), sigma) for sigma in (0.7, 1.4, 1.0))
     fine = np.abs(pixels - soft)
@@ -102,7 +102,7 @@ def dim(looks: Float64Array, factor: float | Float64Array = 1.0) -> Codes:
 
 
 def reasons(looks: Float64Array) -> Codes:
-    """Return why one does not see well in frames; `looks` are `(n, 9)`."""
+    """Return the reasons for poor visibility in frames; `looks` are `(n, 9)`."""
     recall = probability(read_weights()["recall"], looks)
     codes = dim(looks, np.where(recall < _DOUBTED, _WIDER, 1.0))
     has_drops = probability(read_weights()["drops"], looks[:, :PLAIN]) > LIKELY
@@ -112,21 +112,21 @@ def reasons(looks: Float64Array) -> Codes:
 
 @cache
 def read_weights() -> dict[str, list[float]]:
-    """Return the weights by what they tell; the last of each is the bias."""
+    """Return the weights of both regressions by name; the last of each is the bias."""
     weights = files("vdet.conditions").joinpath("weights.json").read_text(encoding="utf-8")
     return dict(json.loads(weights))
 
 
 def probability(weights: Sequence[float], looks: Float64Array) -> Float64Array:
-    """Return what a logistic regression tells of each look, `(n,)`, 0 to 1."""
+    """Return the probability that a logistic regression predicts for each look, `(n,)`."""
     return np.asarray(1 / (1 + np.exp(-(looks @ weights[:-1] + weights[-1]))))
 
 
 def findings(times: Float64Array, looks: Float64Array, *, is_shipped: bool) -> list[Finding]:
-    """Return from when to when one does not see well, for each reason.
+    """Return when visibility is poor, for each reason.
 
-    `times` are `(n,)` and `looks` `(n, 9)`. `is_shipped` says whether the shipped network was used:
-    what it finds is known.
+    `times` are `(n,)` and `looks` `(n, 9)`. `is_shipped` says whether the shipped network is used,
+    whose recall is known.
     """
     found: list[Finding] = []
     if len(times) < _AROUND:

@@ -1,4 +1,4 @@
-"""Watches the conditions of one video: small planes of its frames, and what was found in them."""
+"""Watches the conditions of one video: small planes of its frames, and their detections."""
 
 from collections.abc import Sequence
 
@@ -17,20 +17,20 @@ from vdet.track.track import Track
 _STEP = 0.24
 """Seconds between two planes."""
 _WIDTH = 320
-"""Of a plane, pixels; what moves is measured on planes of half of it."""
+"""Width of a plane, pixels; motion is measured on planes of half this width."""
 _NARROW = 320
-"""Width of frames that are smaller than any the detectors were measured on, pixels."""
+"""Minimum width of the frames that the detectors were measured on, pixels."""
 
 
 class Conditions:
-    """Measures what makes the results of one video doubtful, a few times in a second.
+    """Looks for reasons to doubt the results of one video, a few times per second.
 
     Parameters
     ----------
     width
-        Of the frames, pixels.
+        Width of the frames, pixels.
     unknown
-        Classes that the settings ask for and the network does not know.
+        Classes in the settings that the network does not know.
     """
 
     def __init__(self, settings: Settings, width: int, unknown: Sequence[str] = ()) -> None:
@@ -42,7 +42,7 @@ class Conditions:
         self._looks: list[Float64Array] = []
 
     def add(self, time: float, picture: Picture, found: Boxes, tracks: Sequence[Track]) -> None:
-        """Add a frame that was searched, with its detections and the vehicles that are shown."""
+        """Add a searched frame, with its detections and the vehicles shown."""
         if self._times and time - self._times[-1] < _STEP:
             return
         fine_plane, plane = planes_of(picture)
@@ -55,7 +55,7 @@ class Conditions:
         self._motion.add(time, plane, boxes, stood=stood)
 
     def findings(self) -> Findings:
-        """Return what was found out so far, but for what the settings leave out."""
+        """Return the findings so far, except those that the settings suppress."""
         settings, detector = self._settings, self._settings.detector
         found = []
         if settings.lack_of_metres:
@@ -93,6 +93,6 @@ def planes_of(picture: Picture) -> tuple[Image, Image]:
 
 
 def _enlarged(box: Box, scale: float) -> Box:
-    """Return a box in pixels of a plane, with a vehicle's shadow around it."""
+    """Return a box in pixels of a plane, enlarged for the shadow of the vehicle."""
     x, y, width, height = (scale * side for side in (box.x1, box.y1, box.width, box.height))
     return Box.sized(x - width / 4, y - height / 4, 1.5 * width, 1.5 * height)

@@ -140,7 +140,7 @@ class WindowSettings(Section):
     size: Annotated[int, Field(ge=8, le=100_000), FRAME_LENGTH]
     """Side of a window, in pixels."""
     overlap: float = Field(ge=0, lt=1)
-    """Ratio of a window that the next one overlaps."""
+    """Fraction of a window that the next one overlaps."""
     top: Pixels
     """First row of the band."""
     bottom: Pixels

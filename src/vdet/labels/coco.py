@@ -1,8 +1,8 @@
-"""COCO: one JSON document, of the tracks of a video or of a set of pictures.
+"""COCO: one JSON document for the tracks of a video or for a set of images.
 
-For tracks there are `videos` and `tracks` beside the `images`, `annotations` and `categories` of
-COCO. An image names its `video_id` and `frame_index`, an annotation its `track_id`. All ids count
-from 1, frames and pixels from 0.
+For tracks there are `videos` and `tracks` in addition to the `images`, `annotations` and
+`categories` of COCO. An image names its `video_id` and `frame_index`, an annotation its `track_id`.
+All ids count from 1, frames and pixels from 0.
 
 CVAT ("COCO 1.0") names the images of a video `frame_` and the number of the frame. It imports a
 box only with a `segmentation`, and as one of a track only with `track_id` and `keyframe` in
@@ -55,7 +55,7 @@ _VIDEO = 1
 
 
 class _Writer:
-    """Collects a document, and writes each entry on its line."""
+    """Collects a document, and writes each entry on its own line."""
 
     def __init__(self, *names: str) -> None:
         # Entries are kept as text, which is smaller than dictionaries.
@@ -68,7 +68,7 @@ class _Writer:
         self._lists[name].append(json.dumps(entry))
 
     def add_box(self, image: int, box: Box, category: int, score: float, **more: Any) -> None:
-        """Add an annotation; its `score` is one that other programs ignore."""
+        """Add an annotation; other programs ignore its `score`."""
         x, y, width, height = box.xywh
         whose = {"id": len(self._lists["annotations"]) + 1, "image_id": image}
         sides = {"bbox": [x, y, width, height], "area": width * height, "segmentation": []}
@@ -76,7 +76,7 @@ class _Writer:
         self.add("annotations", **whose, **known, **more)
 
     def category(self, name: str) -> int:
-        """Return the id of a category, a new one where it has none."""
+        """Return the id of a category, and add it if it is new."""
         if name not in self._categories:
             self._categories[name] = len(self._categories) + 1
             self.add("categories", id=self._categories[name], name=name)
@@ -91,7 +91,7 @@ class _Writer:
 def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) -> None:
     """Write the tracks of a video.
 
-    An image has its `time` in seconds, which other programs ignore. A predicted box is `occluded`.
+    Images have a `time` in seconds, which other programs ignore. Predicted boxes are `occluded`.
     """
     size = {"width": video.width, "height": video.height}
     classes, writer = last_classes(frames), _Writer("videos", "images", "tracks")
@@ -155,7 +155,7 @@ class _Image:
     height: Index | None = None
     file_name: Annotated[str, AfterValidator(inside)] = ""
     frame_index: Index | None = None
-    time: float | str | None = None  # "night" in some sets of pictures
+    time: float | str | None = None  # "night" in some sets of images
     labels: list[Label] = Field(default_factory=list, init=False)
 
     @property
@@ -167,7 +167,7 @@ class _Image:
 
     @property
     def size(self) -> Size | None:
-        """Width and height; None where a side is missing or 0, as some tools write."""
+        """Width and height; None if a side is missing or 0, as some tools write."""
         return (self.width, self.height) if self.width and self.height else None
 
 
@@ -215,8 +215,8 @@ def read_coco(path: Path, data: bytes) -> SavedTracks:
     Raises
     ------
     TruthError
-        The file is not of this form or too large, an id of images or categories or a frame occurs
-        twice, a time is wrong, or an annotation names an image or a category that is not there.
+        The file is not in this format or is too large, an id of images or categories or a frame
+        occurs twice, a time is wrong, or an annotation refers to a missing image or category.
     """
     images, _ = _read(path, io.BytesIO(data))
     frames = {image.frame: image for image in images if image.frame is not None}
@@ -242,16 +242,16 @@ COCO = Format("COCO", ".coco.json", read_coco, whole=_write, pictures=_write_pic
 
 
 def read_coco_pictures(path: Path) -> Iterator[LabelledPicture]:
-    """Yield every picture of a COCO file; `iscrowd: 1` marks an ignore region.
+    """Yield every image of a COCO file; `iscrowd: 1` marks an ignore region.
 
-    Pictures lie where `picture_folder` says, as in `images/default` of CVAT. Only boxes and
+    `picture_folder` finds the images, such as in `images/default` from CVAT. Only boxes and
     categories are used.
 
     Raises
     ------
     TruthError
-        The file is not of this form, an annotation names a picture or a category that is not
-        there, an id occurs twice, or a picture lies outside.
+        The file is not in this format, an annotation refers to a missing image or category, an id
+        occurs twice, or an image is outside the set.
     """
     folder = None
     try:

@@ -10,9 +10,9 @@ import ijson
 from vdet.errors import TruthError, printable
 
 MAX_ENTRY = 16_000_000
-"""Largest number of bytes between two values that are read from a JSON document."""
+"""Maximum number of bytes between two values of a JSON document."""
 
-_CHUNK = 65_536  # bytes; a text that goes on in the next chunk is read again from its start
+_CHUNK = 65_536  # bytes; a string that continues in the next chunk is read again from its start
 _MAX_DEPTH = 1000
 _STARTS: dict[str, Callable[[], Any]] = {"start_map": dict, "start_array": list}
 _ENDS = ("end_map", "end_array")
@@ -21,8 +21,8 @@ _ENDS = ("end_map", "end_array")
 def json_values(path: Path, file: IO[bytes], *places: str) -> Iterator[tuple[str, Any]]:
     """Yield the values at some places of a JSON document, each with its place.
 
-    Places are those of ijson: `info.year` is one value, `images.item` each entry of a list. Memory
-    holds a few values at a time.
+    Places are those of ijson: `info.year` is one value, `images.item` is every entry of a list.
+    Only a few values are in memory at a time.
 
     Raises
     ------
@@ -47,18 +47,18 @@ def json_values(path: Path, file: IO[bytes], *places: str) -> Iterator[tuple[str
 
 
 class _Finder:
-    """Builds the values at some places of a JSON document from its events."""
+    """Builds the values at some places of a JSON document from parser events."""
 
     def __init__(self, places: Iterable[str]) -> None:
         self._places = {tuple(place.split(".")): place for place in places}
         self._deepest = max(map(len, self._places))
-        self._keys: list[str] = []  # of each open map the last key, of each open list "item"
-        self._parts: list[Any] = []  # the open maps and lists of the value that is built
+        self._keys: list[str] = []  # the last key of each open map, "item" for each open list
+        self._parts: list[Any] = []  # the open maps and lists of the current value
 
     def values(self, events: Iterable[tuple[str, Any]]) -> Iterator[tuple[str, Any]]:
-        """Yield each value that some further events complete, with its place.
+        """Yield each value that further events complete, with its place.
 
-        Raises `ValueError` where the document is nested too deeply.
+        Raises `ValueError` if the document is nested too deeply.
         """
         keys, parts = self._keys, self._parts
         for event, value in events:

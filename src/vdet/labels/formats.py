@@ -1,4 +1,4 @@
-"""What a format of tracks is, and the choice of the format of a file.
+"""Formats of tracks, and the choice of the format of a file.
 
 Formats are registered in the group `vdet.formats`: see `vdet.plugins`.
 """
@@ -18,10 +18,10 @@ from vdet.track.track import FrameTracks, Track
 
 @dataclass(frozen=True, slots=True)
 class SourceVideo:
-    """Facts about a video that files of tracks contain.
+    """Facts about a video for files of tracks.
 
-    `name` is that of the file, without its folder; `width` and `height` are the size of the upright
-    frames, pixels.
+    `name` is the file name without folder; `width` and `height` are the size of the upright frames,
+    pixels.
     """
 
     name: str
@@ -31,7 +31,7 @@ class SourceVideo:
 
 @dataclass(frozen=True, slots=True)
 class PictureTracks:
-    """The vehicles of a still picture.
+    """The vehicles in a single image.
 
     `path` is its name in the file of labels, `size` its width and height in pixels.
     """
@@ -50,19 +50,18 @@ class Format:
     name
         For messages.
     suffix
-        Ending of the names of its files, lower case, with a leading dot.
+        Ending of its file names, lower case, with a leading dot.
     read
         Function that takes the path of a file, for messages, and its content. It raises
-        `TruthError` with the place of the first mistake; the labels that it returns are not
-        checked otherwise.
+        `TruthError` with the place of the first mistake; its labels are not checked elsewhere.
     lines, heading
-        For a format with lines for each frame: the function that returns them, each with its end,
-        and the first line of the file.
+        For a format with lines for each frame: function that returns the lines, with line ends, and
+        the first line of the file.
     whole
-        For a format that is written at the end: the function that writes all frames of a video.
+        For a format that is written at the end: function that writes all frames of a video.
     pictures
-        For a format that labels of still pictures have too: the function that writes them. Their
-        paths are their names in the file.
+        For a format that also stores labels of images: function that writes them. Their paths are
+        their names in the file.
     """
 
     name: str
@@ -90,7 +89,7 @@ class TrackWriter:
             self._kept.append(replace(frame, facts={}))
 
     def end(self) -> None:
-        """Write what is left. It is not called after an error."""
+        """Write everything that is left. Not called after an error."""
         if self._form.whole and self._video:
             self._form.whole(self._file, self._video, self._kept)
 
@@ -102,7 +101,7 @@ def last_classes(frames: Iterable[FrameTracks]) -> dict[int, str]:
 
 
 def track_formats() -> list[Format]:
-    """Return all formats of tracks, those of vdet first. Raises `ConfigError` as `load_plugin`."""
+    """Return all formats of tracks, those of vdet first. Raises `ConfigError`."""
     return [load_plugin(FORMATS, name) for name in plugin_names(FORMATS)]
 
 
@@ -112,12 +111,12 @@ def track_suffixes() -> list[str]:
 
 
 def picture_suffixes() -> list[str]:
-    """Return the endings of files of labels of pictures."""
+    """Return the endings of files with labels of images."""
     return [form.suffix for form in track_formats() if form.pictures]
 
 
 def format_for(path: Path) -> Format | None:
-    """Return the format that the ending of a name stands for; None if it is not known."""
+    """Return the format by the ending of a name; None if it is unknown."""
     name = path.name.lower()
     fitting = [
         track_format for track_format in track_formats() if name.endswith(track_format.suffix)
@@ -125,8 +124,8 @@ def format_for(path: Path) -> Format | None:
     return max(fitting, key=lambda item: len(item.suffix), default=None)
 
 
-_UNCLEAR = (".txt", ".csv")
-"""Endings that several formats share; the first line of the file decides."""
+_AMBIGUOUS = (".txt", ".csv")
+"""Endings of several formats; the first line of the file decides."""
 
 
 def recognize(path: Path, data: bytes) -> Format:
@@ -135,11 +134,11 @@ def recognize(path: Path, data: bytes) -> Format:
     Raises
     ------
     TruthError
-        The file is empty, and its name has the ending of no format; its columns have semicolons
-        between them; or it is XML.
+        The file is empty, and the ending of its name is unknown; its columns are separated by
+        semicolons; or it is XML.
     """
     by_name = format_for(path)
-    if by_name and by_name.suffix not in _UNCLEAR:
+    if by_name and by_name.suffix not in _AMBIGUOUS:
         return by_name
     content = _content(path, data)
     form: Format | None = load_plugin(FORMATS, content) if content else by_name
@@ -150,7 +149,7 @@ def recognize(path: Path, data: bytes) -> Format:
 
 
 def _content(path: Path, data: bytes) -> str | None:
-    """Return the name under which the format of a file is registered; None if it is empty."""
+    """Return the registered name of the format of a file; None if it is empty."""
     if data.startswith(b"PK"):
         return "yolo"
     _, first = next(numbered_lines(path, data), (0, ""))

@@ -1,4 +1,4 @@
-"""KITTI: columns between spaces; frames and pixels count from 0.
+"""KITTI: space-separated columns; frames and pixels count from 0.
 
 Source: Geiger, Lenz, Urtasun, "Are we ready for autonomous driving?", CVPR 2012, and the readmes of
 its development kits for tracking and for objects.
@@ -15,13 +15,13 @@ from vdet.track.track import FrameTracks
 
 _TRACK_COLUMNS = 17  # frame and id, then those of an object
 _TYPES = {None: "Car", "car": "Car", "vehicle": "Car", "truck": "Truck", "bus": "Truck"}
-"""KITTI's names of our classes. It has no bus; all other classes are Misc."""
-_BEFORE = "-1 -1 -10"  # truncated, occluded, alpha: not known
-_AFTER = "-1 -1 -1 -1000 -1000 -1000 -10"  # size, place and direction in metres: not known
+"""KITTI names of our classes. It has no bus; all other classes are Misc."""
+_BEFORE = "-1 -1 -10"  # truncated, occluded, alpha: unknown
+_AFTER = "-1 -1 -1 -1000 -1000 -1000 -10"  # size, place and direction in metres: unknown
 
 
 def _lines(frame: FrameTracks) -> Iterator[str]:
-    """Yield for each box the 17 columns of the format, and the score."""
+    """Yield the 17 columns of the format and the score for each box."""
     for track in frame.tracks:
         name = _TYPES.get(track.class_name, "Misc")
         corners = " ".join(f"{side:.2f}" for side in track.box.pixels)
@@ -36,8 +36,8 @@ def read_kitti(path: Path, data: bytes) -> SavedTracks:
     Raises
     ------
     TruthError
-        A line has another number of columns than the format or than the first line, or a column is
-        not a number.
+        A line has a wrong number of columns, or another one than the first line, or a column is not
+        a number.
     """
     counts = _TRACK_COLUMNS, _TRACK_COLUMNS + 1
     labels = label_lines(path, data, _track_label, form="KITTI tracking", counts=counts)
@@ -56,12 +56,12 @@ def _object_label(place: int, columns: Sequence[str]) -> Label:
 
 
 def read_kitti_pictures(pictures: Path, labels: Path) -> Iterator[LabelledPicture]:
-    """Yield the pictures of a set that have a file of labels, with 15 columns a line.
+    """Yield the images of a set that have a label file, with 15 columns per line.
 
     Raises
     ------
     TruthError
-        As `read_kitti`, or as `paired_files`.
+        As for `read_kitti` or `paired_files`.
     """
     for picture, file in paired_files(pictures, labels):
         if file:

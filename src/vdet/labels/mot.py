@@ -15,7 +15,7 @@ _TRUTH_COLUMNS, _RESULT_COLUMNS = 9, 10
 
 
 def _lines(frame: FrameTracks) -> Iterator[str]:
-    """Yield for each box: frame, id, left, top, width, height, score, -1, -1, -1."""
+    """Yield a line for each box: frame, id, left, top, width, height, score, -1, -1, -1."""
     for track in frame.tracks:
         x, y, width, height = track.box.xywh
         place = f"{x + 1},{y + 1},{width},{height}"
@@ -27,14 +27,14 @@ def read_mot(path: Path, data: bytes) -> SavedTracks:
 
     Results have ten columns: frame, id, left, top, width, height, confidence, -1, -1, -1. Truth has
     nine, as in `gt.txt`: frame, id, left, top, width, height, flag, class, visibility. Flag 0 marks
-    an ignore region, 1 a vehicle. The class is not used, because its numbers differ from tool to
-    tool; neither is the visibility.
+    an ignore region, 1 a vehicle. The class is not used, because its numbers differ between tools;
+    neither is the visibility.
 
     Raises
     ------
     TruthError
-        A line has another number of columns than the format or than the first line, a column is
-        not a number, or a flag is neither 0 nor 1.
+        A line has a wrong number of columns, or another one than the first line, a column is not a
+        number, or a flag is neither 0 nor 1.
     """
     counts = _TRUTH_COLUMNS, _RESULT_COLUMNS
     labels = label_lines(path, data, _label, form="MOTChallenge", counts=counts, separator=",")

@@ -1,4 +1,4 @@
-"""The limits of all files of boxes, and readers of their texts, lines and numbers."""
+"""The limits of all files of boxes, and parsers of their text, lines and numbers."""
 
 import codecs
 import io
@@ -15,20 +15,20 @@ from vdet.files import read_whole
 from vdet.labels.label import Label, line_error
 
 LIMIT = 10_000_000
-"""Largest frame number, id or pixel coordinate. Larger numbers are damage, and would overflow."""
+"""Maximum frame number, id or pixel coordinate. Larger numbers mean damage, and would overflow."""
 
 MAX_BYTES = 300_000_000
-"""Largest size of a file of boxes, unpacked."""
+"""Maximum size of a file of boxes, unpacked."""
 
 MAX_PART = 1_000_000
-"""Largest size of a line, in bytes."""
+"""Maximum size of a line, bytes."""
 
 MAX_LINES = 10_000_000
-"""Largest number of lines in a file of boxes."""
+"""Maximum number of lines in a file of boxes."""
 
 _LAST_NUMBER = re.compile(r"([0-9]{1,8})$", re.ASCII)
 _LATEST = 1e11
-"""Largest time in seconds, three thousand years of wall-clock time."""
+"""Maximum time in seconds, three thousand years of wall-clock time."""
 
 Number = Annotated[float, Field(ge=-LIMIT, le=LIMIT, allow_inf_nan=False)]
 Index = Annotated[int, Field(ge=0, le=LIMIT)]
@@ -81,14 +81,14 @@ def label_lines(
     path
         The file, for messages.
     parse
-        Function that takes the number of a line and its columns, and returns the label. Its
-        ValueError becomes the message.
+        Function that takes the number of a line and its columns, and returns the label. The text of
+        its `ValueError` becomes the message.
     form
         Name of the format, for messages.
     counts
-        How many columns a line may have; all lines have as many as the first. None: `parse` checks.
+        Allowed numbers of columns; all lines have as many as the first. None: `parse` checks.
     separator
-        Text between columns; None for spaces.
+        Separator of columns; None for spaces.
 
     Raises
     ------
@@ -112,7 +112,7 @@ def label_lines(
 
 
 def parse_number(text: str) -> float:
-    """Return the number in `text`. Raises ValueError if it is none, or its size exceeds `LIMIT`."""
+    """Return the number in `text`. Raises `ValueError` if it is invalid or exceeds `LIMIT`."""
     try:
         value = float(text)
     except ValueError:
@@ -123,7 +123,7 @@ def parse_number(text: str) -> float:
 
 
 def parse_whole(text: str) -> int:
-    """Return the whole number in `text`; `3` and `3.0` are both 3. Raises ValueError."""
+    """Return the whole number in `text`; `3` and `3.0` are both 3. Raises `ValueError`."""
     value = parse_number(text)
     if not value.is_integer():
         raise ValueError(f"{text.strip()!r:.40} is not a whole number")
@@ -131,7 +131,7 @@ def parse_whole(text: str) -> int:
 
 
 def frame_number(name: str) -> int | None:
-    """Return the number of a frame at the end of the name of its file; None if there is none."""
+    """Return the frame number at the end of a file name; None without one."""
     number = _LAST_NUMBER.search(PurePosixPath(name).stem)
     return int(number[1]) if number else None
 
@@ -139,12 +139,12 @@ def frame_number(name: str) -> int | None:
 def checked_times(path: Path, times: Times) -> dict[int, float]:
     """Return the time of each frame.
 
-    Times may be those of a wall clock. The first one may be negative, as in videos.
+    Times may be wall-clock times. The first one may be negative, as in videos.
 
     Raises
     ------
     TruthError
-        A time is not a number or is too large, or is less than that of an earlier frame.
+        A time is not a number, is too large, or is less than that of an earlier frame.
     """
     latest = -_LATEST
     for frame, (place, time) in sorted(times.items()):

@@ -1,4 +1,4 @@
-"""Labelled pictures: the values, and the checks that apply to every form."""
+"""Labelled images: their values, and the checks for every format."""
 
 import logging
 import math
@@ -18,32 +18,32 @@ from vdet.labels.roles import DEFAULT_ROLES, Roles, merge_riders
 from vdet.media.images import is_picture_name, read_image
 
 MAX_PICTURES = 200_000
-"""Largest number of pictures in one set."""
+"""Maximum number of images in one set."""
 
 MAX_BOXES = 2_000_000
-"""Largest number of boxes in one set."""
+"""Maximum number of boxes in one set."""
 
 _SLACK = 0.1
-"""How far beyond a side of the picture boxes may reach, as a fraction of it."""
+"""How far a box may extend beyond a side of the image, as a fraction of it."""
 
 log = logging.getLogger("vdet")
 
 
 @dataclass(frozen=True, slots=True)
 class LabelledPicture:
-    """A picture with its labels.
+    """An image with its labels.
 
     Attributes
     ----------
     path, file
-        The file of the picture, and the file of its labels.
+        The image file, and the file of its labels.
     labels
         From a reader: all labels of the file. In `LabelledPictures`: only vehicles and ignore
         regions, each with an area; `name` is a class of `Roles`.
     size
-        Width and height of the picture in pixels; None if the labels do not contain them.
+        Width and height of the image in pixels; None if the labels do not contain them.
     unlabelled
-        Classes that have no label although they may be in the picture.
+        Classes that are not labelled although the image may show them.
     """
 
     path: Path
@@ -68,7 +68,7 @@ class LabelledPicture:
         return np.array([label.ignored for label in self.labels], np.bool_)
 
     def read(self) -> Image:
-        """Read the picture, BGR uint8 `(H, W, 3)`.
+        """Read the image, BGR uint8 `(H, W, 3)`.
 
         Raises
         ------
@@ -85,11 +85,11 @@ class LabelledPicture:
 
 @dataclass(frozen=True, slots=True)
 class LabelledPictures:
-    """Labelled pictures of one source.
+    """Labelled images of one source.
 
     `name` is shown in tables. `others` are the labels that are neither vehicles nor ignore regions,
-    whose boxes are left out, and `ignored` those that make a box an ignore region; each with the
-    number of its boxes, the most frequent first.
+    whose boxes are omitted; `ignored` are the labels of ignore regions. Both have the number of
+    boxes of each label, the most frequent first.
     """
 
     name: str
@@ -101,16 +101,16 @@ class LabelledPictures:
 def checked_pictures(
     name: str, pictures: Iterable[LabelledPicture], roles: Roles = DEFAULT_ROLES
 ) -> LabelledPictures:
-    """Check the labels of a set, and leave out the labels that are not vehicles.
+    """Check the labels of a set, and omit the labels that are not vehicles.
 
-    A label that occurs twice in a picture counts once, and a warning says so.
+    A duplicate label in an image counts once, with a warning.
 
     Raises
     ------
     TruthError
-        There is not a picture, a picture is missing or appears twice, a box has no area, most boxes
-        cannot be pixels of their pictures, or there are more than `MAX_PICTURES`, `MAX_BOXES` in
-        all or `MAX_IN_FRAME` in one picture.
+        There is no image, an image is missing or appears twice, a box has no area, most boxes
+        cannot be pixels of their images, or there are more than `MAX_PICTURES`, more than
+        `MAX_BOXES` in total, or more than `MAX_IN_FRAME` in one image.
     """
     checked: dict[Path, LabelledPicture] = {}
     counts = Counter[str](), Counter[str]()
@@ -143,7 +143,7 @@ def checked_pictures(
 
 
 def _is_absurd(box: Corners, size: Size | None) -> bool:
-    """Return whether a box cannot be pixels: it has fractions, or two corners for its size."""
+    """Return whether a box cannot be in pixels: it has fractions, or two corners for its size."""
     pairs = zip(box[:2], box[2:], size or (math.inf, math.inf), strict=True)
     reaches_out = any(a < -_SLACK * side or b > side + _SLACK * side for a, b, side in pairs)
     return reaches_out or max(box[2:]) <= 1
@@ -152,7 +152,7 @@ def _is_absurd(box: Corners, size: Size | None) -> bool:
 def _with_roles(
     picture: LabelledPicture, roles: Roles, others: Counter[str], ignored: Counter[str]
 ) -> Iterator[Label]:
-    """Yield the vehicles and ignore regions of a picture, and count the labels of the others."""
+    """Yield the vehicles and ignore regions of an image, and count the other labels."""
     if not is_file(picture.path):
         raise TruthError(f"{printable(str(picture.path))}: not found, but {picture.file} labels it")
     count = 0
@@ -174,22 +174,22 @@ def _with_roles(
 
 
 def is_file(path: Path) -> bool:
-    """Return whether there is such a file; not where the name is too long for one."""
+    """Return whether a file exists; False if its name is too long."""
     return os.path.isfile(path)  # noqa: PTH113  # the method of `Path` raises
 
 
 def inside(name: str) -> str:
-    """Return the name of a picture in a file. Raises `ValueError` if it points outside the set."""
+    """Return an image name from a file. Raises `ValueError` if it points outside the set."""
     if PurePosixPath(name).is_absolute() or ".." in PurePosixPath(name).parts:
         raise ValueError(f"{printable(name)} points outside the set")
     return name
 
 
 def picture_folder(path: Path, name: str) -> Path:
-    """Return the folder that the names of pictures are relative to: the one with the first.
+    """Return the folder that image names are relative to: the one that has the first image.
 
-    It is that of the file of labels or at most two folders below; if the file is in `annotations`,
-    above that folder. Raises `TruthError` if there is none or several.
+    It is the folder of the label file or at most two folders below; if the file is in
+    `annotations`, below the parent folder. Raises `TruthError` if there is none or several.
     """
     near, shown = path.parent, printable(name)
     above = near.parent if near.name == "annotations" else near
@@ -204,10 +204,10 @@ def picture_folder(path: Path, name: str) -> Path:
 
 
 def paired_files(pictures: Path, labels: Path) -> Iterator[tuple[Path, Path | None]]:
-    """Yield the pictures below a folder, and the file of labels of the same name below another.
+    """Yield the images below a folder, with the label file of the same name below another.
 
-    Hidden files and others of the system or of a label tool are left out; a picture may have no
-    file of labels. Raises `TruthError` at the end if a file of labels has no picture of its name.
+    Hidden files and files of the system or of label tools are skipped; an image may have no label
+    file. Raises `TruthError` at the end if a label file has no image of its name.
     """
     found = filter(Path.is_file, labels.rglob("*.txt"))  # a FIFO may never end
     names = (file.relative_to(labels) for file in found)

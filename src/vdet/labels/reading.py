@@ -1,4 +1,4 @@
-"""Readers of tracks, predictions, truth and labelled pictures in any format."""
+"""Readers of tracks, predictions, ground truth and labelled images in any format."""
 
 import gc
 from collections.abc import Iterable, Iterator
@@ -18,11 +18,11 @@ from vdet.labels.roles import DEFAULT_ROLES, Roles, is_region
 from vdet.labels.yolo import read_yolo_pictures
 
 _FOLDERS = {("image_2", "label_2"): read_kitti_pictures, ("images", "labels"): read_yolo_pictures}
-"""Readers of sets with a file of labels for each picture, by the names of both folders."""
+"""Readers of sets with a label file for each image, by the names of both folders."""
 
 
 def read_tracks(path: Path, rate: float | None = None) -> SavedTracks:
-    """Read the tracks of a video from a file of any format; ignore regions are left out.
+    """Read the tracks of a video from a file in any format; ignore regions are omitted.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def read_tracks(path: Path, rate: float | None = None) -> SavedTracks:
         The file cannot be read, or has a mistake; the message names its place.
     """
     data = read_bytes(path)
-    gc.disable()  # a million labels have no cycles, and to look for some takes a fourth of the time
+    gc.disable()  # labels have no cycles, and looking for some takes a quarter of the time
     try:
         saved = recognize(path, data).read(path, data)
         regions = {name for name in {label.name for label in saved.labels} if is_region(name)}
@@ -60,7 +60,7 @@ def read_predictions(path: Path) -> LabelledVideo:
 
 
 def read_truth(path: Path, roles: Roles = DEFAULT_ROLES) -> LabelledVideo:
-    """Read the truth of a video from any format of tracks, as `read_true_labels` does."""
+    """Read the ground truth of a video from any format of tracks, as `read_true_labels` does."""
     saved = read_true_labels(path, roles)
     return LabelledVideo.of(saved.labels, saved.known)
 
@@ -68,13 +68,13 @@ def read_truth(path: Path, roles: Roles = DEFAULT_ROLES) -> LabelledVideo:
 def read_true_labels(path: Path, roles: Roles) -> SavedTracks:
     """Read the vehicles and ignore regions of a video from any format of tracks.
 
-    Boxes without a label are vehicles. In MOTChallenge flag 0 marks an ignore region, also in the
-    older form with ten columns.
+    Boxes without a label are vehicles. In MOTChallenge, flag 0 marks an ignore region, also in the
+    older variant with ten columns.
 
     Parameters
     ----------
     roles
-        Which labels are vehicles, which are ignore regions, and which are left out.
+        Which labels are vehicles, ignore regions, or omitted.
 
     Raises
     ------
@@ -88,13 +88,13 @@ def read_true_labels(path: Path, roles: Roles) -> SavedTracks:
     form = recognize(path, data)
     saved = form.read(path, data)
     labels: Iterable[Label] = saved.labels
-    if form is MOT:  # in the older form, the column of the score is the flag
+    if form is MOT:  # in the older variant, the score is the flag
         labels = (label._replace(ignored=label.score == 0 or label.ignored) for label in labels)
     return replace(saved, labels=checked_labels(path, _with_roles(path, labels, roles)))
 
 
 def _with_roles(path: Path, labels: Iterable[Label], roles: Roles) -> Iterator[Label]:
-    """Yield vehicles and ignore regions; the name of each is the class that its label means."""
+    """Yield vehicles and ignore regions; the name of each is the class of its label."""
     for label in labels:
         role = "vehicle" if label.name is None else roles.role_of(label.name)
         if role is None:
@@ -107,14 +107,14 @@ def _with_roles(path: Path, labels: Iterable[Label], roles: Roles) -> Iterator[L
 
 
 def read_labelled_pictures(path: Path, roles: Roles = DEFAULT_ROLES) -> LabelledPictures:
-    """Read labelled pictures of any form.
+    """Read labelled images in any format.
 
     Parameters
     ----------
     path
-        A COCO file, or a folder in one of the forms.
+        A COCO file, or a folder in one of the formats.
     roles
-        Which labels are vehicles, and which are ignore regions; the others are left out.
+        Which labels are vehicles, and which are ignore regions; the others are omitted.
 
     Raises
     ------
@@ -142,7 +142,7 @@ def _pictures(path: Path) -> Iterable[LabelledPicture]:
 
 
 def _files(path: Path) -> list[Path]:
-    """Return what may be a file of labels, if it is a regular file: a FIFO may never end."""
+    """Return the possible label files; only regular files, because a FIFO may never end."""
     if not path.is_dir():
         return [path] if path.suffix.lower() == ".json" and path.is_file() else []
     files = sorted(file for name in ("*.json", "annotations/*.json") for file in path.glob(name))

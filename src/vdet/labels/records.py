@@ -1,6 +1,6 @@
 """The formats of vdet itself, JSON lines and CSV; frames and pixels count from 0.
 
-JSON lines have a record for each frame, even one without a box. CSV has a row for each box.
+JSON lines have a record for each frame, even without a box. CSV has a row for each box.
 """
 
 import csv
@@ -36,7 +36,7 @@ _COLUMNS = (*_NEEDED, "score", "state", "class", "foot_x", "foot_y", "distance",
 _FOOT = slice(10, 12)  # columns
 
 CLOCK = "clock"
-"""Name of the fact and of the column that has the moment of a frame, in ISO 8601."""
+"""Name of the fact and the column with the clock time of a frame, ISO 8601."""
 
 _KINDS = {
     "frame": Index,
@@ -50,12 +50,12 @@ _KINDS = {
     "distance": Number | None,
     "lane": Annotated[int, Field(ge=-LIMIT, le=LIMIT)] | None,
 }
-"""What is known of a box, in pixels; the frame and the time, seconds, come first."""
+"""The values of a box, in pixels, after the frame and the time in seconds."""
 _OF_TRACK = tuple(_KINDS)[2:]
 _Values: Any = tuple[(*_KINDS.values(),)]  # type: ignore[misc]
 _ROWS: TypeAdapter[list[Any]] = TypeAdapter(list[_Values])
 _BLOCK = 300
-"""Rows that are checked at once; they fit into the cache."""
+"""Number of rows to check at once; they fit into the cache."""
 
 _Row = tuple[int, Sequence[Any]]
 """The line of a box in its file, and its values in the order of `_KINDS`."""
@@ -72,14 +72,14 @@ _RECORD = TypeAdapter(_Record)
 
 
 def _json_lines(frame: FrameTracks) -> Iterator[str]:
-    """Yield a record: `frame`, `time`, `tracks`, and the facts that are known about the frame."""
+    """Yield a record: `frame`, `time`, `tracks`, and the facts about the frame."""
     tracks = [track_record(track) for track in frame.tracks]
     record = {"frame": frame.index, "time": round(frame.time, 6), "tracks": tracks}
     yield json.dumps({**record, **frame.facts}) + "\n"
 
 
 def track_record(track: Track) -> dict[str, Any]:
-    """Return what is known of a track as values for JSON; boxes are rounded to whole pixels."""
+    """Return a track as values for JSON; boxes are rounded to whole pixels."""
     return {
         "id": track.id,
         **dict(zip(("x", "y", "width", "height"), track.box.xywh, strict=True)),
@@ -93,7 +93,7 @@ def track_record(track: Track) -> dict[str, Any]:
 
 
 def _csv_lines(frame: FrameTracks) -> Iterator[str]:
-    """Yield a row for each box; what is not known is an empty cell."""
+    """Yield a row for each box; unknown values are empty."""
     rows, clock = io.StringIO(), frame.facts.get(CLOCK)
     writer = csv.writer(rows, lineterminator="\n")
     for track in frame.tracks:
@@ -106,12 +106,12 @@ def _csv_lines(frame: FrameTracks) -> Iterator[str]:
 
 
 def read_json_lines(path: Path, data: bytes) -> SavedTracks:
-    """Read a record for every frame; keys that vdet does not know are ignored.
+    """Read a record for every frame; unknown keys are ignored.
 
     Raises
     ------
     TruthError
-        The file is empty, a line is not such a record, frames do not ascend, or a time is wrong.
+        The file is empty, a line is not such a record, frames do not increase, or a time is wrong.
     """
     found: Times = {}
     labels = limited(path, _labels(path, _json_rows(path, data, found), found))
@@ -126,13 +126,13 @@ def read_json_lines(path: Path, data: bytes) -> SavedTracks:
 def read_csv(path: Path, data: bytes) -> SavedTracks:
     """Read a table that has at least the columns frame, time, id, x, y, width and height.
 
-    Columns that vdet does not write are ignored. An empty cell counts as no cell.
+    Unknown columns are ignored. An empty cell counts as missing.
 
     Raises
     ------
     TruthError
-        A column is missing or appears twice, a row has another number of cells, a cell is not what
-        its column needs, or a time is wrong.
+        A column is missing or appears twice, a row has a wrong number of cells, a cell has a wrong
+        type, or a time is wrong.
     """
     found: Times = {}
     labels = limited(path, _labels(path, _csv_rows(path, data), found))
@@ -146,7 +146,7 @@ def read_csv(path: Path, data: bytes) -> SavedTracks:
 
 
 def _begin(path: Path, line: int, first: Mapping[str, Any]) -> datetime | None:
-    """Return the moment of time 0 from the time and the clock of the first line."""
+    """Return the clock time at time 0 from the time and clock of the first line."""
     clock = first.get(CLOCK)
     try:
         return moment(clock) - timedelta(seconds=float(first["time"])) if clock else None

@@ -1,6 +1,6 @@
 """The role of a labelled box in evaluation and training: vehicle, ignore region, or neither.
 
-Riders and what they ride are one object, as most sets of traffic pictures label them.
+A rider and the vehicle are one object, as in most sets of traffic images.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,18 +13,18 @@ from vdet.detect.classes import OUR_NAMES, WORDS, letters, our_name
 from vdet.labels.label import Label
 
 RIDER = "rider"
-"""A person on a motorcycle or a bicycle, labelled apart from what is ridden."""
+"""A person on a motorcycle or a bicycle, labelled separately."""
 
 _MACHINES = ("motorcycle", "bicycle")
-_MIN_COVERED = 0.1  # fraction of a rider's box that the box of what is ridden covers
+_MIN_COVERED = 0.1  # fraction of a rider's box covered by the box of the vehicle
 _IGNORED = ("tram", "train", "misc", "trailer", "caravan", RIDER)
 _REGIONS = ("ignore", "ignored", "ignore region", "ignored region", "ignored regions", "dont care")
 _REGION_LETTERS = tuple(dict.fromkeys(map(letters, _REGIONS)))
-_ANY_KIND = ("car", "truck", "bus")  # what "vehicle" among the classes of a detector includes
+_ANY_KIND = ("car", "truck", "bus")  # included in the class "vehicle" of a detector
 
 
 def _key(word: str) -> str:
-    """Return the class that a word means, else its letters."""
+    """Return the class of a word, else its letters."""
     return our_name(word) or letters(word)
 
 
@@ -37,7 +37,7 @@ class Roles:
     words
         The role of each known word.
     classes
-        The class that the letters of each class mean.
+        The class by the letters of its name.
     """
 
     words: Mapping[str, Role]
@@ -47,8 +47,8 @@ class Roles:
     def of(cls, roles: Mapping[str, Role], classes: Sequence[str]) -> Self:
         """Return the roles of words; a class without a role is a vehicle if it is in `classes`.
 
-        Other known classes are ignored. A class of `classes` whose role is "other" is ignored too:
-        the detector finds it, so it is not a part of the background.
+        Other known classes are ignored. A class in `classes` with the role "other" is also ignored:
+        the detector finds it, so it is not background.
         """
         words: dict[str, Role] = dict.fromkeys((*OUR_NAMES, *map(_key, _IGNORED)), "ignored")
         words.update(dict.fromkeys(map(_key, classes), "vehicle"))
@@ -60,9 +60,9 @@ class Roles:
 
     @classmethod
     def from_settings(cls, settings: Settings) -> Self:
-        """Return the roles of `labels.roles`, and of the classes that the detector finds.
+        """Return the roles by `labels.roles` and the classes of the detector.
 
-        "vehicle" among these includes cars, trucks and buses.
+        The class "vehicle" includes cars, trucks and buses.
         """
         classes = settings.detector.vehicle_classes
         any_kind = _ANY_KIND if "vehicle" in classes else ()
@@ -70,9 +70,9 @@ class Roles:
 
     @classmethod
     def for_training(cls, settings: Settings) -> Self:
-        """Return the roles of `labels.roles`, and of the classes that a network learns.
+        """Return the roles by `labels.roles` and the classes that a network learns.
 
-        A vehicle of unknown kind is learnt if the network learns cars, trucks or buses.
+        Vehicles of unknown kind are learnt if the network learns cars, trucks or buses.
         """
         classes = settings.train.net.classes
         unknown = () if set(_ANY_KIND).isdisjoint(classes) else ("vehicle",)
@@ -83,7 +83,7 @@ class Roles:
         return self.words.get(_key(label))
 
     def class_of(self, label: str) -> str | None:
-        """Return the class that a label means; None if it means none."""
+        """Return the class of a label; None if it has none."""
         return our_name(label) or self.classes.get(letters(label))
 
     @property
@@ -102,9 +102,9 @@ def is_region(label: str | None) -> bool:
 
 
 def merge_riders(labels: Sequence[Label]) -> list[Label]:
-    """Return labels in which a rider is part of the motorcycle or bicycle below.
+    """Merge riders into their motorcycles or bicycles.
 
-    A rider belongs to the one that covers most of the rider's box. One without remains.
+    A rider belongs to the one that covers most of the rider's box. Riders without one are kept.
     """
     machines = [row for row, label in enumerate(labels) if our_name(label.name or "") in _MACHINES]
     merged = dict(enumerate(labels))

@@ -1,13 +1,12 @@
-"""YOLO: a text file of labels for each picture or frame, and `data.yaml` with the classes.
+"""YOLO: a text file of labels for each image or frame, and `data.yaml` with the classes.
 
-A line is the number of a class, and the centre (x, y), width and height of the box as fractions of
-the frame, or the points of a polygon. Tracks lie in a zip file, and their lines end with the id.
-The standard form has no id, but Ultralytics writes it in tracking, and so does CVAT ("Ultralytics
-YOLO Detection Track"). The number of the frame, from 0, stands at the end of the file's name.
-`data.yaml` has the names of the classes, and for tracks also `width` and `height` of the frames in
-pixels, which others ignore.
-Source: docs.ultralytics.com, "Object detection datasets overview"; the CVAT manual, "Ultralytics
-YOLO".
+A line has the number of a class, and the centre (x, y), width and height of the box as fractions of
+the frame, or the points of a polygon. Tracks are in a zip file, and their lines end with the id.
+The standard format has no id, but Ultralytics writes it in tracking, and so does CVAT ("Ultralytics
+YOLO Detection Track"). The frame number, from 0, is at the end of the file name. `data.yaml` has
+the names of the classes, and for tracks also `width` and `height` of the frames in pixels, which
+other tools ignore. Source: docs.ultralytics.com, "Object detection datasets overview"; the CVAT
+manual, "Ultralytics YOLO".
 """
 
 import io
@@ -48,7 +47,7 @@ log = logging.getLogger("vdet")
 
 
 def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) -> None:
-    """Write the archive. Boxes end at the sides of the frame; one outside of it is left out."""
+    """Write the archive. Boxes are clipped to the frame; boxes outside it are omitted."""
     size = video.width, video.height
     classes: dict[str, int] = {}  # name: number, in the order of their numbers
     pictures = "".join(f"images/train/frame_{frame.index:06}.png\n" for frame in frames)
@@ -61,7 +60,7 @@ def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) ->
 
 
 def _write_pictures(file: BinaryIO, pictures: Sequence[PictureTracks]) -> None:
-    """Write the archive, which is unpacked beside the folder `images` with the pictures."""
+    """Write the archive, to be unpacked beside the folder `images`."""
     classes: dict[str, int] = {}
     texts: dict[str, str] = {}
     for picture in pictures:
@@ -87,7 +86,7 @@ def _description(pictures: str, classes: Iterable[str]) -> str:
 
 
 def _line(box: Box, name: str | None, size: Size, classes: dict[str, int], end: str = "") -> str:
-    """Return the line of a box, and give its class a number."""
+    """Return the line of a box, and number its class."""
     width, height = size
     box = box.rounded.clipped(width, height)
     if not box.area:
@@ -99,16 +98,16 @@ def _line(box: Box, name: str | None, size: Size, classes: dict[str, int], end: 
 
 
 def read_yolo(path: Path, data: bytes) -> SavedTracks:
-    """Read the labels of every frame, whose number from 0 stands at the end of its file's name.
+    """Read the labels of every frame; frame numbers, from 0, are at the end of file names.
 
-    A line may have the score before the id, as Ultralytics writes both. Where the first number is
-    1, a warning says that numbers count from 0.
+    A line may have the score before the id, as Ultralytics writes both. If the first number is 1, a
+    warning says that numbers count from 0.
 
     Raises
     ------
     TruthError
-        The archive is damaged, a name in it leads out of it, its labels are too large, there is no
-        `data.yaml` with names and the size of the frames, or a line is not of this form.
+        The archive is damaged, a name in it leads out of it, its labels are too large, `data.yaml`
+        with names and frame size is missing, or a line is invalid.
     """
     members = _members(path, data)
     described = [name for name in members if PurePosixPath(name).name == _DATA]
@@ -137,13 +136,13 @@ def read_yolo(path: Path, data: bytes) -> SavedTracks:
 
 
 def _members(path: Path, data: bytes) -> dict[str, bytes]:
-    """Return the files of labels and the descriptions in a zip file, by their names.
+    """Return the label files and descriptions in a zip file, by their names.
 
     Raises
     ------
     TruthError
-        The archive is damaged, a name in it leads out of it, or these files are larger than
-        `MAX_BYTES` together.
+        The archive is damaged, a name in it leads out of it, or these files exceed `MAX_BYTES` in
+        total.
     """
     try:
         names = [name for name in list_members(io.BytesIO(data)) if _is_wanted(PurePosixPath(name))]
@@ -162,7 +161,7 @@ def _is_wanted(name: PurePosixPath) -> bool:
 
 
 def _frame(path: Path, name: str) -> int:
-    """Return the number of the frame that a file of labels is of."""
+    """Return the frame number of a label file."""
     number = frame_number(name)
     if number is None:
         raise TruthError(f"{path}: {printable(name)} must end in a frame number")
@@ -170,7 +169,7 @@ def _frame(path: Path, name: str) -> int:
 
 
 def _described(data: bytes, where: str) -> tuple[Mapping[str, Any], list[str]]:
-    """Return the values of `data.yaml`, and in them the names of the classes."""
+    """Return the values of `data.yaml`, and the names of the classes in it."""
     if len(data) > MAX_DESCRIPTION:
         raise TruthError(f"{where}: is larger than {MAX_DESCRIPTION:,} bytes")
     try:
@@ -188,7 +187,7 @@ def _described(data: bytes, where: str) -> tuple[Mapping[str, Any], list[str]]:
 def _label(place: int, columns: Sequence[str], names: Sequence[str], size: Size) -> Label:
     """Return the label of a line: a box, or a polygon with three points or more, as its box.
 
-    What lies less than a pixel outside the frame is moved to its side.
+    Points less than a pixel outside the frame are moved to its side.
 
     Raises
     ------
@@ -225,13 +224,13 @@ def _track_label(place: int, columns: Sequence[str], names: Sequence[str], size:
 
 
 def read_yolo_pictures(pictures: Path, labels: Path) -> Iterator[LabelledPicture]:
-    """Yield the pictures of a set; one without a file of labels shows no vehicle.
+    """Yield the images of a set; one without a label file shows no vehicle.
 
     Raises
     ------
     TruthError
-        There is no `data.yaml` in the folder of the set or above it, a picture cannot be read, or
-        as `read_yolo` or `paired_files`.
+        `data.yaml` is missing in the folder of the set and above it, an image cannot be read, or as
+        for `read_yolo` or `paired_files`.
     """
     folder = pictures.parent
     data = next((p for p in (folder / _DATA, folder.parent / _DATA) if p.is_file()), None)

@@ -1,6 +1,6 @@
-"""The page over the videos of a batch, and the table of vehicles of all pages.
+"""The page over the videos of a batch, and the table of vehicles on all pages.
 
-The table is filtered and sorted in the browser, by `vehicles.js`.
+`vehicles.js` filters and sorts the table in the browser.
 """
 
 import json
@@ -18,9 +18,9 @@ from vdet.files import write_text
 from vdet.pages.render import PAGE_NAME, link_to, render
 
 NO_STILL = "data:image/jpeg;base64,"
-"""The still of a video without a frame."""
+"""Thumbnail of a video without a frame."""
 _NUMBERS = ("id", "first", "seconds", "speed", "distance", "lane")
-_UNKNOWN = (None, "")  # values that say nothing
+_UNKNOWN = (None, "")  # empty values
 
 
 class VehicleRow(BaseModel):
@@ -33,17 +33,17 @@ class VehicleRow(BaseModel):
     seconds
         How long it is shown.
     clock
-        `first` in ISO 8601; None where the clock is not known.
+        `first` as a clock time, ISO 8601; None if unknown.
     speed
-        Its median, km/h; None where it is not known.
+        Median speed, km/h; None if unknown.
     way
         The lines and zones where it was counted, in order.
     motion
-        Whether it drove or stood, as records say it; empty where that is not known.
+        Whether it drove or stood, as in records; empty if unknown.
     distance, lane
-        As records have them; None where they are not known.
+        As in records; None if unknown.
     picture
-        Address of its picture as seen from the page of its video; empty where there is none.
+        Address of its image relative to the page of its video; empty if there is none.
     """
 
     model_config = ConfigDict(frozen=True)
@@ -62,11 +62,11 @@ class VehicleRow(BaseModel):
 
 
 class VideoFacts(BaseModel):
-    """A video in numbers: pages over many videos are made from it.
+    """Key figures of a video, for the page over many videos.
 
-    `seconds` is how much of the video was searched, `most` how many vehicles were shown at once.
-    `counts` are by name, `conditions` say what makes them doubtful; `still` is a small picture as a
-    data URI. The player of its page begins at `start`, seconds in the video.
+    `seconds` is the duration of the processed part, `most` the maximum number of vehicles at once.
+    `counts` are by name, `conditions` are reasons to doubt them; `still` is a thumbnail as a data
+    URI. The player of its page begins at `start`, seconds in the video.
     """
 
     model_config = ConfigDict(frozen=True)
@@ -89,13 +89,13 @@ class Part:
     Attributes
     ----------
     name
-        That of the video.
+        Name of the video.
     page
-        Address of its page: empty for this page, None where it has no player.
+        Address of its page: empty for this page, None if it has no player.
     start
         Time in the video at which the player begins, seconds.
     folder
-        What comes before the addresses of pictures.
+        Prefix of the addresses of images.
     """
 
     name: str
@@ -106,11 +106,11 @@ class Part:
 
 
 def table_json(parts: Sequence[Part]) -> str:
-    """Return the columns of the table, as `vehicles.js` reads them.
+    """Return the columns of the table for `vehicles.js`.
 
-    Columns in which nothing is known are left out, and `texts` has the values of columns that are
-    numbers of texts: a browser reads 100,000 rows twice as fast. `counts` has the number of rows of
-    each video, and clocks count from `zero`.
+    Empty columns are omitted. Text columns are indices into `texts`, which a browser reads twice as
+    fast for 100,000 rows. `counts` has the number of rows of each video, and clock times count from
+    `zero`.
     """
     rows = [row for part in parts for row in part.rows]
     clocks = [_plain_seconds(row.clock) for row in rows]
@@ -138,22 +138,22 @@ def table_json(parts: Sequence[Part]) -> str:
         **{name: values for name, values in columns.items() if _is_known(values)},
     }
     text = json.dumps(table, separators=(",", ":"), ensure_ascii=False)
-    return text.replace("<", "\\u003c")  # nothing in it ends the element that holds it
+    return text.replace("<", "\\u003c")  # so that nothing in it ends the enclosing element
 
 
 def _is_known(values: Sequence[Any]) -> bool:
-    """Return whether a column says something; where there is no row, all columns are kept."""
+    """Return whether a column has a value; without rows, all columns are kept."""
     return not values or any(value not in _UNKNOWN for value in values)
 
 
 def _numbered(values: Sequence[str]) -> list[int]:
-    """Return the number of each value among the different ones."""
+    """Return the index of each value in the list of distinct values."""
     numbers = {value: number for number, value in enumerate(dict.fromkeys(values))}
     return [numbers[value] for value in values]
 
 
 def _plain_seconds(clock: str | None) -> int | None:
-    """Return the seconds of a moment since 1970, as if the clock of the camera had no zone."""
+    """Return a clock time as seconds since 1970, ignoring its zone."""
     if clock is None:
         return None
     plain = datetime.fromisoformat(clock).replace(tzinfo=None)
@@ -161,7 +161,7 @@ def _plain_seconds(clock: str | None) -> int | None:
 
 
 def write_index(videos: Sequence[tuple[str, Path, VideoFacts]], target: Path) -> None:
-    """Write the page over many videos: each has a name, a page as seen from it, and facts."""
+    """Write the page over many videos, given by name, path of the page, and key figures."""
     counts = sum((Counter(facts.counts) for _, _, facts in videos), Counter[str]())
     linked = [(name, link_to(page, Path()), facts) for name, page, facts in videos]
     parts = [

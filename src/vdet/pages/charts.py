@@ -1,7 +1,7 @@
 """Charts, which the templates of pages draw as SVG.
 
-Places along both axes are percentages, and text has the size of the page's text, so a chart can be
-read at any width.
+Positions along both axes are percentages, and text has the size of the page's text, so that charts
+are readable at any width.
 """
 
 import heapq
@@ -18,10 +18,10 @@ from vdet.draw.boxes import Color
 from vdet.errors import clock
 
 FILL, SOFT = "var(--fill)", "var(--soft)"
-"""Colours of the style: of what counts, and of what is less important."""
+"""Colours of the style sheet: for main and for secondary content."""
 
 _COLORS = ("#0f9d8a", "#d97706", "#6366f1", "#db2777", "#65a30d", "#0284c7", "#b45309", "#9333ea")
-_TICKS = 5  # most parts of an axis
+_TICKS = 5  # maximum number of intervals on an axis
 _TIMES = (1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400, 21600, 43200)
 _STEPS = 160  # of a number over time
 _NOTHING = 1e-9  # length of an axis whose ends are equal
@@ -29,7 +29,7 @@ _NOTHING = 1e-9  # length of an axis whose ends are equal
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """The ends of an axis, and its labels: `(value, text)` each."""
+    """The ends of an axis, and its labels as `(value, text)`."""
 
     low: float
     high: float
@@ -37,11 +37,11 @@ class Axis:
     title: str = ""
 
     def at(self, value: float) -> float:
-        """Return the place of a value on the axis, percent; that of an end for one beyond it."""
+        """Return the position of a value on the axis, percent, limited to its ends."""
         return min(max(0.0, self.width(self.low, value)), 100.0)
 
     def width(self, first: float, last: float) -> float:
-        """Return the distance of two values, percent of the axis."""
+        """Return the distance between two values, percent of the axis."""
         return round(100 * (last - first) / max(self.high - self.low, _NOTHING), 3)
 
 
@@ -70,7 +70,7 @@ class Plot:
 
 @dataclass(frozen=True, slots=True)
 class TimelineBar:
-    """A bar in a row of a timeline; a click leads to its `first` time in the video of the page."""
+    """A bar in a row of a timeline; a click jumps to its `first` time in the video."""
 
     row: int
     first: float
@@ -91,16 +91,16 @@ class Timeline:
 
 
 Series = dict[str, Counter[float]]
-"""How often something happened in each interval, by its name; intervals by their start, seconds."""
+"""Number of events in each interval, by name; intervals by their start, seconds."""
 
 
 def hex_color(bgr: Color) -> str:
-    """Return a colour as CSS has it."""
+    """Return a colour in CSS notation."""
     return "#{:02x}{:02x}{:02x}".format(*bgr[::-1])
 
 
 def time_text(seconds: float) -> str:
-    """Write a time as `m:ss` or `h:mm:ss`, with tenths where it is not a whole second."""
+    """Write a time as `m:ss` or `h:mm:ss`, with tenths if it is not a whole second."""
     return clock(seconds, 1).removesuffix(".0")
 
 
@@ -114,14 +114,14 @@ def time_axis(start: float, end: float, zero: float | None = None) -> Axis:
 
 
 def _time_text(seconds: float, zero: float | None) -> str:
-    """Write a time in the video, or the time of the day where it is known."""
+    """Write a time in the video, or the time of day if it is known."""
     if zero is None:
         return time_text(seconds)
     return strftime("%H:%M:%S", gmtime(round(seconds + zero))).removesuffix(":00")
 
 
 def number_axis(low: int, high: int, title: str = "") -> Axis:
-    """Return an axis of whole numbers in even parts, whose ends are round."""
+    """Return an axis of whole numbers with equal intervals and round ends."""
     steps = (item * 10**power for power in itertools.count() for item in (1, 2, 5))
     step = next(step for step in steps if high - low <= _TICKS * step)
     numbers = range(low // step, max(low // step + 1, math.ceil(high / step)) + 1)
@@ -132,7 +132,7 @@ def number_axis(low: int, high: int, title: str = "") -> Axis:
 def level_plot(
     spans: Sequence[tuple[float, float]], x: Axis, title: str, gaps: Sequence[tuple[float, float]]
 ) -> Plot:
-    """Return how many of the spans, each from its first to its last time, there are at once.
+    """Return a plot of the number of simultaneous spans, given by first and last time.
 
     `gaps` are times without frames.
     """
@@ -155,9 +155,9 @@ def level_plot(
 def interval_plot(
     series: Series, x: Axis, interval: int, title: str, zero: float | None = None
 ) -> Plot:
-    """Return a bar for each interval with an event, in which the series are stacked; and a legend.
+    """Return a plot with a bar for each interval with events, stacked by series, and a legend.
 
-    `interval` is in seconds, `zero` as of `time_axis`.
+    `interval` is in seconds, `zero` as for `time_axis`.
     """
     bars, most = list[Bar](), 1
     colors = dict(zip(series, itertools.cycle(_COLORS), strict=False))
@@ -175,7 +175,7 @@ def interval_plot(
 
 
 def histogram(values: Sequence[float], step: int, title: str, unit: str) -> Plot:
-    """Return how many values lie in each class of width `step`."""
+    """Return a histogram of values with classes of width `step`."""
     counts = Counter(int(value // step) for value in values)
     bars = []
     for number, count in sorted(counts.items()):
@@ -186,9 +186,9 @@ def histogram(values: Sequence[float], step: int, title: str, unit: str) -> Plot
 
 
 def pack_rows(spans: Iterable[tuple[float, float]]) -> list[int]:
-    """Return a row for each span, in order of their start; those at one time get different rows."""
+    """Return a row for each span, given in order of start; simultaneous spans differ in row."""
     rows: list[int] = []
-    free: list[tuple[float, int]] = []  # when the last span of a row ends, and the row
+    free: list[tuple[float, int]] = []  # end of the last span in a row, and the row
     for first, last in spans:
         row = heapq.heappop(free)[1] if free and free[0][0] < first else len(free)
         rows.append(row)

@@ -1,4 +1,4 @@
-"""A place where vehicles are counted: the page in which it is drawn, its settings, its picture."""
+"""The outputs of `vdet draw`: the page, proposed settings, and the image of a place."""
 
 import base64
 import zlib
@@ -26,11 +26,11 @@ from vdet.traffic.linking import VehiclePath, link_tracks
 from vdet.traffic.proposals import ProposedLine, propose_lines
 
 _PLACES = {"ground": "camera", "regions": "other", "lines": "traffic", "zones": "traffic"}
-"""The lists that the page changes, and the part of the file that each is in."""
+"""The lists that the page edits, and their section in the settings file."""
 
 
 class Drawing:
-    """What is drawn of a place.
+    """A place with the paths of its vehicles.
 
     Parameters
     ----------
@@ -39,14 +39,14 @@ class Drawing:
     frames
         The tracks of its vehicles.
     values
-        What settings files say so far, with fractions of the frame.
+        Values of the settings files so far, with points as fractions of the frame.
     facing
-        As of `propose_lines`.
+        As for `propose_lines`.
 
     Attributes
     ----------
     paths
-        Those of the vehicles that count.
+        Paths of the vehicles that count.
     proposals
         A line across each main stream.
     """
@@ -67,9 +67,9 @@ class Drawing:
         self.proposals: tuple[ProposedLine, ...] = propose_lines(self.paths, width, height, facing)
 
     def output(self, path: Path, name: str) -> bytes:
-        """Return the file that the suffix of `path` asks for: a page, settings or a picture.
+        """Return the content of a file by the suffix of `path`: a page, settings or an image.
 
-        `name` is that of the settings file that the page saves. Raises `ConfigError`.
+        `name` is the name of the settings file that the page saves. Raises `ConfigError`.
         """
         match path.suffix.lower():
             case ".html":
@@ -123,7 +123,7 @@ _PROPOSED = """\
 def split(
     values: Mapping[str, Any], size: tuple[int, int]
 ) -> tuple[dict[str, list[Any]], dict[str, list[str]]]:
-    """Return the places in settings, in pixels, and the lines of YAML of all the rest."""
+    """Return the places in settings, in pixels, and the rest as lines of YAML."""
     whole = in_pixels(values, size)
     sections = {"camera": whole.pop("camera"), "traffic": whole.pop("traffic", None) or {}}
     sections["other"] = whole
@@ -137,20 +137,20 @@ def split(
 
 
 def in_pixels(values: Mapping[str, Any], size: tuple[int, int]) -> dict[str, Any]:
-    """Return settings with pixels of frames of this size, width and height, for fractions."""
+    """Return settings with fractions converted to pixels of frames of this width and height."""
     camera = {**(values.get("camera") or {}), "size": list(size)}
     return to_pixels({**values, "camera": camera})
 
 
 def as_yaml(values: Mapping[str, Any]) -> list[str]:
-    """Return settings as the lines of a file."""
+    """Return settings as lines of YAML."""
     if not values:
         return []
     return yaml.dump(dict(values), Dumper=_Dumper, sort_keys=False, allow_unicode=True).splitlines()
 
 
 class _Dumper(yaml.SafeDumper):
-    """Writes lists on one line, apart from those of sections."""
+    """Writes lists on one line, except lists of sections."""
 
     def represent_sequence(self, tag: str, sequence: Any, flow_style: Any = None) -> Any:
         is_flat = not any(isinstance(item, dict) for item in sequence)
@@ -158,9 +158,10 @@ class _Dumper(yaml.SafeDumper):
 
 
 def pack_paths(paths: Sequence[VehiclePath]) -> dict[str, Any]:
-    """Return paths as JSON: second differences of rows, in planes of bytes, deflated.
+    """Return paths as values for JSON: second differences of rows, in byte planes, deflated.
 
-    Times are µs since the first row, feet hundredths of a pixel; the page turns them back exactly.
+    Times are µs since the first row, feet are hundredths of a pixel; the page restores them
+    exactly.
     """
     columns = [np.empty((4, 0))]
     for path in paths:

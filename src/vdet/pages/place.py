@@ -1,6 +1,6 @@
 """The traffic at a place, for pages and reports: lines, zones, paths and flows with their counts.
 
-Its picture is made of marks, which are painted into an image or written as SVG.
+Its image consists of marks, which are drawn into a frame or written as SVG.
 """
 
 import math
@@ -22,29 +22,29 @@ from vdet.traffic.crossings import Border, PlacedLine
 from vdet.traffic.records import VehicleRecord
 
 NOWHERE = "–"
-"""The end of a flow that was at one line or zone only."""
+"""Destination of a flow with a single line or zone."""
 
 _WIDEST = 0.012
 """Width of the arrow of the largest flow, as a fraction of the frame's width."""
 _SIDE = 0.04
 """Length of the arrows to the sides of a line, as a fraction of the frame's height."""
 _SHORTEST = 0.03
-"""Length of the shortest path that is drawn, as a fraction of the frame's width."""
+"""Minimum length of a path to draw, as a fraction of the frame's width."""
 _TIP = 0.012
 """Minimum length of the tip of an arrow, as a fraction of the frame's width."""
 _SHADE = 0.18
 """Opacity of the colour over a zone."""
 _SCALES = (1, 2, 5, 10, 20, 50, 100)
-"""Lengths of a scale, metres."""
+"""Possible lengths of the scale, metres."""
 _SCALE = 0.2
-"""Longest scale, as a fraction of the frame's width."""
+"""Maximum length of the scale, as a fraction of the frame's width."""
 _LOWEST = 0.96
-"""Row of a scale, at most, as a fraction of the frame's height."""
+"""Lowest row of the scale, as a fraction of the frame's height."""
 
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """A line through `points`, closed or an arrow; its label, if any, lies at `at`, in pixels."""
+    """A line through `points`, open, closed or an arrow; its label, if any, is at `at`, pixels."""
 
     points: Sequence[Point]
     color: Color
@@ -56,7 +56,7 @@ class Mark:
 
 
 def flows_of(counts: Counts) -> dict[Way, list[tuple[Event, Event]]]:
-    """Return the first and the last event of each vehicle, by flow, the largest flow first."""
+    """Return the first and last event of each vehicle by flow, the largest flow first."""
     flows: dict[Way, list[tuple[Event, Event]]] = {}
     for _, first, last in vehicle_flows([counts]):
         way = first.name, last.name if last else NOWHERE
@@ -71,9 +71,9 @@ def place_marks(
     ways: Mapping[int, Sequence[Point]],
     ground: Ground | None = None,
 ) -> list[Mark]:
-    """Return what is drawn over frames of this size, width and height in pixels.
+    """Return the marks to draw on frames of this width and height, pixels.
 
-    `ways` are the paths of tracks by their ids, pixels.
+    `ways` are the paths of tracks by id, pixels.
     """
     totals = {(total.name, total.direction): total.count for total in counts.totals}
     marks = [mark for border in borders for mark in border_marks(border, totals)]
@@ -100,7 +100,7 @@ def path_marks(records: Iterable[VehicleRecord], size: tuple[int, int]) -> Itera
 
 
 def _inside(path: Sequence[Point], size: tuple[int, int]) -> list[Point]:
-    """Return the points of a path that lie in the frame."""
+    """Return the points of a path inside the frame."""
     return [(x, y) for x, y in path if 0 <= x < size[0] and 0 <= y < size[1]]
 
 
@@ -111,9 +111,9 @@ def direction_color(start: Point, end: Point) -> Color:
 
 
 def border_marks(border: Border, totals: Mapping[Way, int], text: str = "") -> Iterator[Mark]:
-    """Yield a zone with its name and a text, or a line with its name and its counts.
+    """Yield the marks of a zone with its name and a text, or of a line with its name and counts.
 
-    The arrows to both sides are at the start of a line, where no vehicle crosses it.
+    The arrows to both sides are at the start of a line, beside the traffic.
     """
     height = border.size[1]
     width = boxes.line_width(np.empty((int(height), 0), np.uint8))
@@ -171,17 +171,17 @@ def with_marks(image: Image, marks: Iterable[Mark]) -> Image:
 
 
 def svg(image: Image, marks: Sequence[Mark]) -> str:
-    """Return a picture as SVG, with the image in it and the marks as shapes and text."""
+    """Return an SVG with the image embedded and the marks as shapes and text."""
     height, width = image.shape[:2]
     return render("place.svg", picture=image, width=width, height=height, marks=marks)
 
 
 @dataclass(frozen=True, slots=True)
 class TrafficPart:
-    """What a page shows of the counts of a video.
+    """The counts of a video for its page.
 
-    `totals` has a row for each direction, with speeds where they are known. `flows` has a row for
-    each flow, the largest first, with its colour in `colors`, and `picture` an arrow for each.
+    `totals` has a row for each direction, with speeds if they are known. `flows` has a row for each
+    flow, the largest first, with its colour in `colors`, and `picture` an arrow for each flow.
     """
 
     totals: Table
@@ -197,7 +197,7 @@ def traffic_part(
     borders: Sequence[Border] = (),
     ground: Ground | None = None,
 ) -> TrafficPart:
-    """Return the part of a page; `frame` is drawn over, with its lines and zones."""
+    """Return the counts for a page; lines, zones and flows are drawn on a copy of `frame`."""
     classes = sorted(set(map(class_of, counts.events)))
     several = classes if len(classes) > 1 else []
     flows = flows_of(counts)
@@ -229,6 +229,6 @@ def _totals(counts: Counts, classes: Sequence[str]) -> Table:
 
 
 def _numbers(events: Sequence[Event], classes: Sequence[str]) -> list[str]:
-    """Return how many events are of each class, and of all."""
+    """Return the number of events of each class, and in total."""
     found = Counter(map(class_of, events))
     return [*(str(found[name]) for name in classes), str(len(events))]

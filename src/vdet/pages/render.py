@@ -1,4 +1,4 @@
-"""From values to a page: one HTML file that loads nothing from the network, light and dark."""
+"""Render pages: one HTML file that loads nothing from the network, in light and dark mode."""
 
 import base64
 import os
@@ -18,13 +18,13 @@ from vdet.version import __version__
 Table = tuple[Sequence[str], Sequence[Sequence[str]]]
 """Headings and rows of text."""
 PAGE_NAME = "page.html"
-"""Name of the file of a page in its folder."""
+"""File name of a page in its folder."""
 TEMPLATES = Path(__file__).parent / "templates"
 _QUALITY = 84  # of JPEG pictures
 
 
 def render(template: str, **values: Any) -> str:
-    """Return the page that a file in `templates` makes of the values; all of them are escaped."""
+    """Render a file in `templates` with values, all of them escaped."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     environment = Environment(

@@ -1,4 +1,4 @@
-"""The page of a video: when vehicles were there, where, and what they looked like."""
+"""The page of a video: which vehicles appear, when, where, and their images."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -24,23 +24,23 @@ from vdet.traffic.speeds import KMH
 
 _MAX_VEHICLES = 300  # in the timeline, and with pictures
 _SPEED_STEP = 5  # km/h, of the classes of speeds
-_DOUBT = "#f3d9a4", "#333"  # colours of the row that says when the results are doubtful
+_DOUBT = "#f3d9a4", "#333"  # colours of the row with doubtful times
 _STOOD = {"standing": "standing", "unknown": "not seen moving"}
-_SMALL = 200  # columns of the still in the pages over many videos
+_SMALL = 200  # longer side of the thumbnail on the page over many videos
 
 
 @dataclass(frozen=True, slots=True)
 class Player:
-    """The video that a page shows.
+    """The video on a page.
 
     Attributes
     ----------
     name, address
-        Its file name, and its address for the page.
+        Its file name, and its address relative to the page.
     is_drawn
-        Whether it is an output, with the vehicles drawn in; else it is the source.
+        Whether it is the output with boxes drawn, or the source.
     start
-        Time of the frame with which it begins, seconds, as the tracks count it.
+        Time of its first frame in the tracks, seconds.
     """
 
     name: str
@@ -49,42 +49,41 @@ class Player:
     start: float
 
     def moment(self, time: float) -> str:
-        """Return where the player stands at a time of the tracks, seconds."""
+        """Return the position of the player at a time in the tracks, seconds."""
         return f"{max(0.0, time - self.start):.3f}"
 
 
 @dataclass(frozen=True, slots=True)
 class VideoPage:
-    """What the page of a video shows.
+    """The content of the page of a video.
 
     Attributes
     ----------
     start, end
-        When the first frame is shown, and when the last one ends, seconds as in the tracks.
+        Start of the first frame and end of the last one, seconds as in the tracks.
     thumbnails
-        By id, the time of a frame in seconds, and the picture of the vehicle as a data URI. A
-        vehicle may have none.
+        By id, the time of a frame in seconds, and the image of the vehicle as a data URI. A vehicle
+        may have none.
     poster
-        The frame with the most vehicles, BGR uint8; None if there was no frame.
+        The frame with the most vehicles, BGR uint8; None without frames.
     settings
         The settings of the run as YAML.
     counts
-        None where nothing is counted.
+        None if nothing is counted.
     interval
-        That of the counts over time, seconds.
+        Interval of the counts over time, seconds.
     gaps
         Times without frames, from the frame before to the one after, seconds.
     clock
-        When the video begins; None where it is not known.
+        Start time of the video; None if unknown.
     pictures
-        By id, the address of the picture of a vehicle as seen from the page, where the run writes
-        one.
+        By id, the address of the image of a vehicle relative to the page, if the run writes one.
     borders
         The lines and zones at which vehicles were counted.
     ground
-        The road plane, where it is known.
+        The road plane; None if unknown.
     findings
-        What makes the results doubtful.
+        Reasons to doubt the results.
     """
 
     video: VideoInfo
@@ -107,7 +106,7 @@ class VideoPage:
 
     @property
     def facts(self) -> VideoFacts:
-        """The video in numbers."""
+        """The key figures of the video."""
         return VideoFacts(
             start=self.player.start if self.player else 0.0,
             seconds=max(0.0, self.seconds),
@@ -127,17 +126,17 @@ class VideoPage:
 
     @property
     def _most(self) -> int:
-        """The most vehicles at once."""
+        """The maximum number of vehicles at once."""
         return 1 + max(charts.pack_rows(self._spans), default=-1)
 
     @property
     def _totals(self) -> dict[str, int]:
-        """The number of vehicles in each direction of a line or zone that has some."""
+        """The number of vehicles in each direction of a line or zone, without zeros."""
         totals = self.counts.totals if self.counts else ()
         return {f"{total.name}: {total.direction}": total.count for total in totals if total.count}
 
     def _rows(self, pictures: Mapping[int, str]) -> tuple[VehicleRow, ...]:
-        """Return the rows of the table, with the addresses of pictures by the ids of vehicles."""
+        """Return the rows of the table; `pictures` has addresses of images by vehicle id."""
         ways: dict[int, dict[str, None]] = {}
         for event in self.counts.events if self.counts else ():
             ways.setdefault(event.id, {})[event.name] = None
@@ -159,7 +158,7 @@ class VideoPage:
         )
 
     def html(self) -> str:
-        """Return the page; it loads nothing but the video."""
+        """Return the page; it loads only the video."""
         longest = sorted(self.records, key=lambda record: -record.seconds)[:_MAX_VEHICLES]
         shown = sorted(longest, key=lambda record: (record.first, record.id))
         x = charts.time_axis(self.start, self.end, self.zero)
@@ -185,17 +184,17 @@ class VideoPage:
 
     @property
     def _spans(self) -> list[tuple[float, float]]:
-        """When each vehicle is first and last shown, in the order of their first times."""
+        """When each vehicle is first and last shown, in order of their first times."""
         return sorted((record.first, record.last) for record in self.records)
 
     @property
     def seconds(self) -> float:
-        """How much of the video was searched."""
+        """The duration of the processed part of the video."""
         return self.end - self.start
 
     @property
     def zero(self) -> float | None:
-        """The second of the day at time 0; None where it is not known."""
+        """The second of the day at time 0; None if unknown."""
         return self.clock.second_of_day if self.clock else None
 
     def _figures(self) -> list[tuple[str, str]]:
@@ -214,9 +213,9 @@ class VideoPage:
         ]
 
     def _interval_plots(self, x: Axis) -> list[Plot]:
-        """Return vehicles, and the counts of lines and zones, by the intervals of the tables.
+        """Return plots of vehicles and of counts by the intervals of the tables.
 
-        There is nothing to compare where there is only one interval.
+        There are none if there is only one interval.
         """
         step, last = self.interval, self.end - float(1 / self.video.rate)
         begins = [self.start, *(end for _, end in self.gaps)]
@@ -237,7 +236,7 @@ class VideoPage:
         return [interval_plot(some, x, step, name, self.zero) for name, some in series if some]
 
     def _paths(self) -> Image | None:
-        """Return the frame with the paths of all vehicles."""
+        """Return the poster with the paths of all vehicles."""
         if self.poster is None:
             return None
         height, width = self.poster.shape[:2]
@@ -245,9 +244,9 @@ class VideoPage:
 
 
 def _timeline(shown: Sequence[VehicleRecord], findings: Sequence[Finding], x: Axis) -> Timeline:
-    """Return when each vehicle is shown; those that are not there at once share a row.
+    """Return when each vehicle is shown; vehicles that are not simultaneous share rows.
 
-    Where the results are doubtful, the first row says when.
+    The first row has the times at which the results are doubtful, if any.
     """
     spans = [
         TimelineBar(0, *at, item.text, *_DOUBT, item.code) for item in findings for at in item.spans
@@ -259,7 +258,7 @@ def _timeline(shown: Sequence[VehicleRecord], findings: Sequence[Finding], x: Ax
 
 
 def _spans(record: VehicleRecord, row: int) -> list[TimelineBar]:
-    """Return a bar for each time in which a vehicle is shown and not lost; the longest is named."""
+    """Return a bar for each time span in which a vehicle is tracked; the longest is labelled."""
     name = f" ({record.class_name})" if record.class_name else ""
     times = " to ".join(map(charts.time_text, (record.first, record.last)))
     title = f"vehicle {record.id}{name}: {times}"

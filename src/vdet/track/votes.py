@@ -1,7 +1,7 @@
-"""The class of a track: one vote over all that was seen of a vehicle.
+"""The class of a track: a vote of all searches that found the vehicle.
 
-Only trackers vote. A row of a track has its class so far; what is made at the end of a video, such
-as counts, records and pages, uses the class of the track's last row.
+Only trackers vote. Each row of a track has its class so far; counts, records and pages, made at the
+end of a video, use the class of the last row.
 """
 
 from collections import defaultdict
@@ -17,13 +17,13 @@ all votes that it needs. On pictures that it has not seen, the shipped network i
 """
 
 _OTHERS_NEED = 0.3
-"""Fraction of all votes that another class needs; a vehicle without such a class is `UNKNOWN`."""
+"""Fraction of all votes that another class needs; without one, the class is `UNKNOWN`."""
 
 _CLOSE = 0.05
-"""Fraction of the frame's area from which on a box shows all that a detector can tell apart."""
+"""Fraction of the frame's area above which a larger box does not help to tell classes apart."""
 
 _CUT_OFF = 0.1
-"""What a search that sees only a part of the vehicle counts: a cut-off truck looks like a car."""
+"""Weight of a search that shows only a part of the vehicle: a cut-off truck looks like a car."""
 
 
 class ClassVotes:
@@ -34,7 +34,7 @@ class ClassVotes:
 
     @property
     def winner(self) -> str | None:
-        """The class with most votes, or `UNKNOWN`; None where no detection had a class."""
+        """The class with the most votes, or `UNKNOWN`; None if no detection had a class."""
         if not self._sums:
             return None
         total, others = sum(self._sums.values()), dict(self._sums)
@@ -44,7 +44,7 @@ class ClassVotes:
         return name if others[name] >= _OTHERS_NEED * total else UNKNOWN
 
     def add(self, classes: Mapping[str, float], weight: float) -> None:
-        """Add what a search says: how likely each class is, and the weight of the search."""
+        """Add the votes of a search: the probability of each class, times the weight."""
         for name, likely in classes.items():
             self._sums[name] += weight * likely
 
@@ -54,7 +54,7 @@ class ClassVotes:
 
 
 def vote_weight(box: Float64Array, score: float, size: tuple[int, int]) -> float:
-    """Return how much a detection tells of the class: by its area, its score, and if it is whole.
+    """Return the weight of a detection for the class: by its area and score, and if it is whole.
 
     Parameters
     ----------

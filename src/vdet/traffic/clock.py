@@ -124,7 +124,7 @@ def _text(time: datetime) -> str:
 
 
 Span = tuple[float, float]
-"""Start and end of a part with video: times of its first and last frame, seconds."""
+"""Start and end of a time span, seconds; of a part with video, its first and last frame."""
 
 Moment = datetime | float | None
 """A clock time; without a clock, seconds in the video; None for several videos without one."""

@@ -1,8 +1,8 @@
 """Which vehicles hide others, and which tracks follow the same vehicle.
 
-On a flat road what is nearer stands lower in the picture. So of two vehicles that overlap the one
-with the lower bottom hides the other, and two boxes that overlap and stand level are of one
-vehicle: two would be in the same place.
+On a flat road, nearer vehicles are lower in the image. So of two overlapping vehicles, the one with
+the lower bottom hides the other; two overlapping boxes at the same level show one vehicle, because
+two would be in the same place.
 """
 
 import math
@@ -18,20 +18,20 @@ from vdet.track.motion.vehicle import Vehicle, carried
 
 _REACH = 0.75
 _REACH_GROWTH = 0.35
-"""How far from its expected place a lost vehicle may turn up, in sizes of the vehicle, and how much
-farther for each second that it was hidden.
+"""Maximum distance of a lost vehicle from its expected position, in sizes of the vehicle, and its
+growth per second that the vehicle was hidden.
 """
 
 _NEAR = 1.5
-"""How far from a hidden vehicle another one may be that comes out, in sizes of the vehicle."""
+"""Maximum distance from a hidden vehicle to one that emerges, in sizes of the vehicle."""
 
 _OPPOSED, _UP_AND_DOWN = 0.55, 0.1
-"""Product of two opposed velocities, in sizes a second, from which on they are of two vehicles, and
-the same of their vertical parts: who turns off changes the way across first, but not up and down.
+"""Minimum product of opposite velocities, in sizes per second, that belong to two vehicles, and the
+same for their vertical components: a turning vehicle first changes its horizontal motion.
 """
 
 _MAX_UNLIKE = 1.2
-"""Largest difference of the appearances of a lost vehicle and of one that may be it."""
+"""Maximum difference in appearance between a lost vehicle and a new one that may be the same."""
 
 _BESIDE = 0.4
 """Seconds for which two tracks may follow one vehicle before the first is lost.
@@ -40,33 +40,32 @@ A vehicle may drive away from its track while detections of its parts still hold
 """
 
 _BESIDE_UNLIKE = 0.6
-"""As `_MAX_UNLIKE`, for two tracks that were there at the same time."""
+"""As `_MAX_UNLIKE`, for two tracks that existed at the same time."""
 
 _GROWTH = 3.0
-"""How much larger or smaller its box may be then, as an area."""
+"""Maximum ratio of the areas of both boxes."""
 
 
 PART = 0.6
-"""A detection with more than this fraction inside a shown vehicle is a part of it."""
+"""A detection with more than this fraction inside another vehicle is a part of it."""
 
 HIDDEN = 0.5
-"""A vehicle is hidden where a nearer one covers more than this fraction of it."""
+"""A vehicle is hidden if a nearer one covers more than this fraction of it."""
 
 _LEVEL = 0.15
-"""Bottoms that differ by less than this fraction of the lesser height are level."""
+"""Bottoms that differ by less than this fraction of the smaller height are level."""
 
 _LEVEL_OVERLAP = 0.3
-"""Fraction of the smaller of two level boxes that lies in the other, where they are one vehicle."""
+"""Minimum fraction of the smaller of two level boxes inside the other if they show one vehicle."""
 
 _ALIKE = 0.5
-"""Intersection over union from which on two boxes are of one vehicle, level or not."""
+"""Minimum intersection over union of two boxes that show one vehicle, level or not."""
 
 _APART = 0.5
-"""Seconds after which two tracks that both see their vehicles show two, also where they are level.
-"""
+"""Seconds after which two tracks with detections are two vehicles, even if they are level."""
 
 CLEAR = 0.8
-"""A detection on a nearer vehicle that scores less than this fraction of its score is a part of it.
+"""A detection on a nearer vehicle is a part of it if its score is below this fraction of its score.
 """
 
 _DOUBTED = 0.5
@@ -76,14 +75,14 @@ may span two vehicles that were seen as one.
 
 
 def are_hidden(boxes: Float64Array, present: Sequence[bool]) -> BoolArray:
-    """Return for each box whether another one covers more than half of it and is not farther.
+    """Return for each box whether another one covers more than half of it and is not farther away.
 
     Parameters
     ----------
     boxes
         Shape `(n, 4)`: x1, y1, x2, y2 in pixels, each with an area.
     present
-        For each whether it can hide others.
+        Whether each of them can hide others.
     """
     bottoms = boxes[:, 3]
     farther = bottoms < (bottoms - _LEVEL * (bottoms - boxes[:, 1]))[:, np.newaxis]
@@ -93,9 +92,9 @@ def are_hidden(boxes: Float64Array, present: Sequence[bool]) -> BoolArray:
 
 
 def are_parts(boxes: Float64Array, scores: Float64Array) -> BoolArray:
-    """Return for each box, `(n, 4)`, whether most of it lies in one that scores higher.
+    """Return for each box, `(n, 4)`, whether most of it is inside one with a higher score.
 
-    A vehicle that comes out from behind another one has nearly the same score, and is not a part.
+    A vehicle that emerges from behind another one has nearly the same score, and is not a part.
 
     Returns
     -------
@@ -106,10 +105,10 @@ def are_parts(boxes: Float64Array, scores: Float64Array) -> BoolArray:
 
 
 def take_over_ids(vehicles: Sequence[Vehicle]) -> list[Vehicle]:
-    """Give the ids of lost vehicles to those newly confirmed where they should be by then.
+    """Pass the ids of lost vehicles to newly confirmed ones at their expected positions.
 
-    A single detection says too little of what it shows: a vehicle that is found again is followed
-    as a new one at first.
+    A single detection is not enough: a vehicle that is found again is tracked as a new one at
+    first.
 
     Returns
     -------
@@ -128,18 +127,18 @@ def take_over_ids(vehicles: Sequence[Vehicle]) -> list[Vehicle]:
 
 
 class Case(Enum):
-    """What a track is beside another one that is higher in rank."""
+    """Relation of a track to another one of higher rank."""
 
     APART = auto()
-    """Each follows a vehicle of its own."""
+    """Each shows its own vehicle."""
     DUPLICATE = auto()
-    """Both follow one vehicle: they become one track."""
+    """Both show one vehicle: they become one track."""
     PART = auto()
     """It is not confirmed, and shows the other's vehicle or a part of it: it is dropped."""
     EMERGING = auto()
-    """It may be a hidden vehicle that comes out, or one of two that the other spans."""
+    """It may be a hidden vehicle that emerges, or one of two that the other box spans."""
     HIDDEN = auto()
-    """It was apart, and follows the vehicle now that hides its own: it is lost."""
+    """It was apart, and now shows the vehicle that hides its own: it is lost."""
 
 
 class _Overlap(NamedTuple):
@@ -162,15 +161,15 @@ class _Overlap(NamedTuple):
 
 
 def without_duplicates(vehicles: Sequence[Vehicle], boxes: Float64Array) -> list[Vehicle]:
-    """Leave one track for each vehicle: the one with the highest score, or else the oldest one.
+    """Keep one track for each vehicle: the one with the highest score, else the oldest one.
 
-    It keeps the id that was not lost for longer. A track that is not confirmed replaces no other
+    It keeps the id that has not been lost for longer. An unconfirmed track does not replace another
     one; it stays beside it while its score is higher.
 
     Parameters
     ----------
     boxes
-        Their visible parts, `(n, 4)`.
+        Their visible parts, x1, y1, x2, y2, `(n, 4)`.
     """
     inside, alike = coverage(boxes, boxes), iou_matrix(boxes, boxes) > _ALIKE
     overlaps = np.maximum(inside, inside.T)
@@ -208,7 +207,7 @@ def without_duplicates(vehicles: Sequence[Vehicle], boxes: Float64Array) -> list
 
 
 def _case(vehicle: Vehicle, other: Vehicle, overlap: _Overlap, hidden: Sequence[Vehicle]) -> Case:
-    """Return what a track is beside another one, higher in rank, that it overlaps; both see."""
+    """Return the relation of a track to an overlapping one of higher rank; both are detected."""
     if min(vehicle.age, other.age) > _APART:
         if not overlap.alike:
             return Case.APART
@@ -226,17 +225,17 @@ def _case(vehicle: Vehicle, other: Vehicle, overlap: _Overlap, hidden: Sequence[
 
 
 def _comes_out(vehicle: Vehicle, nearer: Vehicle, hidden: Sequence[Vehicle]) -> bool:
-    """Return whether a `hidden` vehicle was near, and this one is as clear as the nearer."""
+    """Return whether a `hidden` vehicle was near, and this one is as clear as the nearer one."""
     is_clear = vehicle.detection_scores.value > CLEAR * nearer.detection_scores.value
     here = vehicle.state.mean[:, 0]
     return is_clear and any(_distance(vehicle.state.mean[:, 0], here) < _NEAR for vehicle in hidden)
 
 
 def _may_be(lost: Vehicle, new: Vehicle) -> bool:
-    """Return whether a vehicle that is seen again may be the lost one.
+    """Return whether a new vehicle may be the lost one.
 
-    It is where that one should be by then, looks like it, does not drive the other way, and was not
-    there before.
+    It is at the expected position, looks alike, does not drive the other way, and did not exist
+    before.
     """
     beside = lost.history.last_seen.time - new.begin
     if beside >= _BESIDE or _astray(lost, new) >= _REACH + _REACH_GROWTH * lost.hidden:
@@ -248,10 +247,10 @@ def _may_be(lost: Vehicle, new: Vehicle) -> bool:
 
 
 def _astray(lost: Vehicle, new: Vehicle) -> float:
-    """Return how far from its expected place a lost vehicle is if it is the new one, in sizes.
+    """Return the distance of a new vehicle from the expected position of a lost one, in sizes.
 
-    Where it is now counts too if only a part was seen first: of one that was hidden, or where the
-    first box has another size.
+    Its current position also counts if only a part may have been seen at first: the lost vehicle
+    was hidden, or the first box has another size.
     """
     last, first = lost.history.last_seen, new.history.moments[0]
     expected = carried(last.state.mean, max(first.time - last.time, 0.0))
@@ -261,7 +260,7 @@ def _astray(lost: Vehicle, new: Vehicle) -> float:
 
 
 def _distance(one: Float64Array, other: Float64Array) -> float:
-    """Return the distance of two places in mean sizes; infinite where the sizes do not agree.
+    """Return the distance of two positions in mean sizes; infinite if the sizes differ too much.
 
     Parameters
     ----------

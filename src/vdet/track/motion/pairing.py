@@ -1,4 +1,4 @@
-"""Which detection belongs to which vehicle, by places and looks.
+"""Assignment of detections to vehicles, by position and appearance.
 
 Source: the order of the rounds is the matching cascade of Wojke, Bewley and Paulus, "Simple Online
 and Realtime Tracking with a Deep Association Metric", 2017; the buffered intersection over union is
@@ -15,18 +15,17 @@ from vdet.boxes import Float64Array, Image, iou
 from vdet.media import Picture
 
 WIDEST_BUFFER = 0.25
-"""Most that a box is widened by on each side, fractions of its size."""
+"""Maximum widening of a box on each side, fraction of its size."""
 
 _FREE = -1
 
 _MARGIN = 0.15
-"""Fraction of a box's width and height at each side that is left out: much of it is background."""
+"""Fraction of width and height omitted at each side of a box: much of it is background."""
 
 _UNITS = 20.0, 6.0, 6.0
-"""Differences of luma, blue and red chroma, in levels, that count as one.
+"""Differences of luma, blue and red chroma, in levels, that count as one unit.
 
-Most vehicles differ by more from each other, and by less from themselves a second
-before.
+Most vehicles differ from each other by more, and from themselves a second ago by less.
 """
 
 
@@ -35,8 +34,8 @@ def buffered_iou(
 ) -> Float64Array:
     """Return how well each expected box fits each found one, 0 to 1, `(n, m)`.
 
-    Both boxes are widened by the buffer of the expected one, in fractions of their own sizes. So
-    two boxes that do not touch may still belong together where little is known of the motion.
+    Both boxes are widened by the buffer of the expected one, in fractions of their own sizes, so
+    boxes that do not touch can still match if the motion is uncertain.
 
     Parameters
     ----------
@@ -61,13 +60,13 @@ def appearances(picture: Picture | None, boxes: Float64Array) -> Float64Array:
     Parameters
     ----------
     picture
-        None where it is not known.
+        None if unknown.
     boxes
         float64 `(n, 4)`: x1, y1, x2, y2 in pixels, inside the picture, with an area.
 
     Returns
     -------
-    float64 `(n, 2, 3)`: levels from 0 to 255, as the planes hold them; NaN without a picture.
+    float64 `(n, 2, 3)`: levels from 0 to 255, as in the planes; NaN without a picture.
     """
     if picture is None or not len(boxes):
         return np.full((len(boxes), 2, 3), np.nan)
@@ -79,7 +78,7 @@ def appearances(picture: Picture | None, boxes: Float64Array) -> Float64Array:
 
 
 def differences(some: Float64Array, others: Float64Array) -> Float64Array:
-    """Return how much appearances, `(…, 2, 3)`, differ: 0 for equal ones, and for unknown ones."""
+    """Return the difference of appearances, `(…, 2, 3)`: 0 if they are equal or unknown."""
     units = (some - others) / _UNITS
     return np.asarray(np.sqrt(np.nan_to_num(units**2).mean(axis=(-2, -1))))
 
@@ -107,13 +106,13 @@ def pair(values: Float64Array, rounds: Sequence[Sequence[int]]) -> dict[int, int
     Parameters
     ----------
     values
-        Shape `(n, m)`: what a pair is worth; 0 where it must not be.
+        Shape `(n, m)`: the value of a pair; 0 if it is not allowed.
     rounds
-        Rows: those of a later round may only have what the earlier ones left.
+        Rows; those of a later round choose from the columns left by the earlier ones.
 
     Returns
     -------
-    The column of each paired row: in each round the pairs with the largest sum of values.
+    The column of each paired row; each round maximizes the sum of values.
     """
     left = values.copy()
     pairs: dict[int, int] = {}
@@ -126,14 +125,14 @@ def pair(values: Float64Array, rounds: Sequence[Sequence[int]]) -> dict[int, int
 def assign(values: Float64Array) -> list[tuple[int, int]]:
     """Return the pairs of row and column, each used at most once, with the largest sum.
 
-    `scipy.optimize.linear_sum_assignment` does the same, but importing it costs every run about
-    50 MB and a part of its start. Source: Jonker and Volgenant, "A Shortest Augmenting Path
-    Algorithm for Dense and Sparse Linear Assignment Problems", 1987, without its first phases.
+    Same as `scipy.optimize.linear_sum_assignment`, whose import would cost every run about 50 MB
+    and startup time. Source: Jonker and Volgenant, "A Shortest Augmenting Path Algorithm for Dense
+    and Sparse Linear Assignment Problems", 1987, without its first phases.
 
     Parameters
     ----------
     values
-        Float64 `(n, m)`, at least 0; pairs of value 0 are left out.
+        Float64 `(n, m)`, at least 0; pairs of value 0 are omitted.
     """
     rows, columns = values.shape
     if rows > columns:

@@ -1,12 +1,12 @@
-"""Where a vehicle is, how large, and how both change: a constant-velocity Kalman filter.
+"""Position and size of a vehicle and their changes: a constant-velocity Kalman filter.
 
 Source: Kalman, "A New Approach to Linear Filtering and Prediction Problems", 1960; the model of
 nearly constant velocity is that of Bar-Shalom, Li and Kirubarajan, "Estimation with Applications
 to Tracking and Navigation", 2001, section 6.2.2 (white noise acceleration in continuous time).
 
-The centre's x and y and the logarithms of width and height are four independent filters. All
-uncertainty is in fractions of the vehicle's size, so near and far vehicles, and small and large
-frames, are treated alike; times are seconds.
+x and y of the centre and the logarithms of width and height are four independent filters. All
+uncertainties are fractions of the vehicle's size, so that near and far vehicles, and small and
+large frames, are treated alike; times are in seconds.
 """
 
 from dataclasses import dataclass
@@ -17,16 +17,16 @@ import numpy as np
 from vdet.boxes import EDGE, Float64Array
 
 _MAX_NEARER = 0.3
-"""Largest change of the distance in a step that is believed, as a fraction of it."""
+"""Maximum change of the distance in a step, as a fraction of it."""
 
 _MAX_NEARER_RATE = 0.75
-"""The same of a second: what comes out from behind another vehicle seems to come nearer faster."""
+"""The same per second: a vehicle emerging from behind another seems to approach faster."""
 
 _ACCELERATION = 0.8
-"""Standard deviation of the change of velocity in a second, sizes of the vehicle a second."""
+"""Standard deviation of the change of velocity in a second, sizes of the vehicle per second."""
 
 _VELOCITY = 2.5
-"""Standard deviation of a new vehicle's velocity, sizes of the vehicle a second."""
+"""Standard deviation of a new vehicle's velocity, sizes of the vehicle per second."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,18 +37,18 @@ class MotionState:
     ----------
     mean
         float64 `(4, 2)`: centre x and y in full-frame pixels, log width and log height of the
-        whole vehicle in pixels; each with its change a second.
+        whole vehicle in pixels; each with its change per second.
     covariance
         float64 `(4, 2, 2)`: of each of the four and its change; lengths in fractions of the
         vehicle's width (x) and height (y).
     expected
-        The mean before what this frame showed; None in the first frame.
+        The mean before the correction by this frame; None in the first frame.
     gain
-        How a correction of this state corrects that of the frame before, `(4, 2, 2)`; None in the
-        first frame.
+        Gain by which a correction of this state corrects that of the previous frame, `(4, 2, 2)`;
+        None in the first frame.
     ways_in
-        For x and y the way into the frame, 1 or -1, if one of its sides cuts off the box that was
-        taken in; 0 where no side does, or both.
+        For x and y the direction into the frame, 1 or -1, if one of its sides cuts off the detected
+        box; 0 if none or both do.
     """
 
     mean: Float64Array
@@ -59,7 +59,7 @@ class MotionState:
 
     @classmethod
     def at_rest(cls, box: Float64Array, noise: float, size: tuple[int, int]) -> Self:
-        """Start at `box` with velocity 0; arguments as of `corrected`."""
+        """Start at `box` with velocity 0; arguments as for `corrected`."""
         mean = np.zeros((4, 2))
         mean[:, 0] = _measurement(box)
         covariance = np.tile(np.diag([noise**2, _VELOCITY**2]), (4, 1, 1))
@@ -72,7 +72,7 @@ class MotionState:
 
     @property
     def velocity(self) -> Float64Array:
-        """Velocity of the centre, x and y in sizes of the vehicle a second, `(2,)`."""
+        """Velocity of the centre, x and y in sizes of the vehicle per second, `(2,)`."""
         return np.asarray(self.mean[:2, 1] / np.exp(self.mean[2:, 0]))
 
     @property
@@ -83,8 +83,8 @@ class MotionState:
     def moved(self, seconds: float) -> Float64Array:
         """Return the mean `seconds` later.
 
-        What moves evenly on the road comes near as its size grows, and ever faster in the picture:
-        with a distance of Z, size and place change by 1 / Z and velocity by 1 / Z².
+        A vehicle that approaches at constant speed grows and moves ever faster in the image: at a
+        distance Z, size and position scale with 1 / Z and velocity with 1 / Z².
         """
         most = min(_MAX_NEARER, _MAX_NEARER_RATE * abs(seconds))
         nearer = float(np.clip(np.mean(self.mean[2:, 1]) * seconds, -most, most))
@@ -95,7 +95,7 @@ class MotionState:
         return np.asarray(mean)
 
     def predicted(self, seconds: float) -> "MotionState":
-        """Return what is expected of the next frame, `seconds` later."""
+        """Return the prediction for the next frame, `seconds` later."""
         step = np.array([[1.0, seconds], [0.0, 1.0]])
         drift = np.array([[seconds**3 / 3, seconds**2 / 2], [seconds**2 / 2, seconds]])
         covariance = step @ self.covariance @ step.T + _ACCELERATION**2 * drift
@@ -104,7 +104,7 @@ class MotionState:
         return MotionState(mean, covariance, mean, gain)
 
     def corrected(self, box: Float64Array, noise: float, size: tuple[int, int]) -> "MotionState":
-        """Take in a detected box.
+        """Return the state corrected by a detected box.
 
         Parameters
         ----------
@@ -155,12 +155,12 @@ def _measurement(box: Float64Array) -> Float64Array:
 def _measured(
     expected: Float64Array, box: Float64Array, ways_in: tuple[int, int]
 ) -> tuple[Float64Array, Float64Array, Float64Array]:
-    """Return the mean to correct, the measurement, and for each of the four 1 if it was seen, or 0.
+    """Return the mean to correct, the measurement, and 1 or 0 for each of the four if measured.
 
-    The box of a vehicle that comes in at a side grows with every frame though the vehicle does
-    not, and its centre moves at half the vehicle's speed. So only the inner edge of a cut-off box
-    counts; the width is what it was, or the visible part if that is more, and does not change by
-    itself. Above and below it is the same with the height.
+    The box of a vehicle that enters at a side grows with every frame although the vehicle does not,
+    and its centre moves at half the vehicle's speed. So only the inner edge of a cut-off box
+    counts; the width is kept, or set to the visible part if that is larger. The same holds for the
+    height at the top and bottom.
     """
     mean, measured, seen = expected.copy(), _measurement(box), np.ones(4)
     for axis, way in enumerate(ways_in):

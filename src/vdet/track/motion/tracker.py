@@ -18,7 +18,7 @@ FIRST_STEP = 0.04
 """Seconds that the first frame counts for."""
 
 _STAYS = 0.75
-"""Fraction of the minimum score from which on a vehicle that was shown before is shown again."""
+"""Fraction of the minimum score at which a vehicle that was shown before is still shown."""
 
 _CAR_HEIGHT = 0.8
 """Height of a car from behind as a fraction of its width."""
@@ -27,9 +27,9 @@ _OVERLAP = 0.3
 """Minimum intersection over union of a detection with the expected box of its vehicle."""
 
 _UNSURE = 0.2
-"""Fraction by which a vehicle that scores 0 has less claim to a detection than one that scores 1.
+"""Fraction by which the value of a pair is lower for a vehicle with score 0 than with score 1.
 
-A shadow that is taken for a vehicle does not keep the detections of those that drive over it.
+A shadow tracked as a vehicle then does not take the detections of vehicles driving over it.
 """
 
 
@@ -50,17 +50,17 @@ class MotionTracker:
         self._vehicles: list[Vehicle] = []
         self._ids = count(1)
         self._time: float | None = None
-        self._gone: list[Vehicle] = []  # not followed any more, but shown at earlier times
+        self._gone: list[Vehicle] = []  # no longer tracked, but shown at earlier times
 
     def update(self, detections: Boxes, time: float, picture: Picture | None = None) -> list[Track]:
-        """Follow the vehicles into the next frame and show them; as `VideoTracker.update`."""
+        """Track the vehicles into the next frame and show them; see `VideoTracker.update`."""
         self.observe(detections, time, picture)
         return self.at(time)
 
     def observe(self, detections: Boxes, time: float, picture: Picture | None = None) -> None:
-        """Follow the vehicles into the next frame; as `TimedTracker.observe`.
+        """Track the vehicles into the next frame; see `TimedTracker.observe`.
 
-        The part of a detection outside the frame does not count.
+        The parts of detections outside the frame are ignored.
         """
         observations = self._observations(detections, picture)
         seconds = FIRST_STEP if self._time is None else time - self._time
@@ -78,7 +78,7 @@ class MotionTracker:
                 vehicle.miss(look)
         self._keep(self._staying())
         left = [o for number, o in enumerate(observations) if number not in pairs.values()]
-        # One whose score is below the leak would never make a vehicle, however often it is seen.
+        # Detections with scores below the decay never add up to a vehicle.
         new = [Vehicle(o, look, self._settings) for o in left if o.score > self._settings.decay]
         vehicles = take_over_ids(self._vehicles + new)
         self._vehicles = without_duplicates(vehicles, self._boxes(vehicles))
@@ -89,7 +89,7 @@ class MotionTracker:
             vehicle.history.forget(before)
 
     def at(self, time: float) -> list[Track]:
-        """Return the vehicles shown at a time; as `TimedTracker.at`."""
+        """Return the vehicles shown at a time; see `TimedTracker.at`."""
         known = [*self._gone, *(vehicle for vehicle in self._vehicles if vehicle.confirmed)]
         placed = [(v, place) for v in known if (place := self._place(v, time)) is not None]
         every_box = self._visible([place.mean for _, place in placed])
@@ -109,7 +109,7 @@ class MotionTracker:
         return sorted(tracks, key=lambda track: track.id)
 
     def _place(self, vehicle: Vehicle, time: float) -> Place | None:
-        """Return where a vehicle is at a time, if it is to be shown then."""
+        """Return the place of a vehicle at a time; None if it is not shown then."""
         assert self._time is not None
         history = vehicle.history
         place = history.at(time, self._settings.look_ahead)
@@ -121,12 +121,12 @@ class MotionTracker:
         return Place(mean[:, 0], "predicted" if vehicle.unseen else "interpolated")
 
     def _keep(self, vehicles: list[Vehicle]) -> None:
-        """Follow only these vehicles; those that are confirmed can be shown at earlier times."""
+        """Track only these vehicles; the others, if confirmed, can be shown at earlier times."""
         self._gone += [v for v in self._vehicles if v.confirmed and v not in vehicles]
         self._vehicles = vehicles
 
     def _staying(self) -> list[Vehicle]:
-        """Return the vehicles that are neither over nor out of the frame."""
+        """Return the vehicles that are neither ended nor outside the frame."""
         are_inside = _are_large(self._boxes(self._vehicles))
         pairs = zip(self._vehicles, are_inside, strict=True)
         return [vehicle for vehicle, is_inside in pairs if is_inside and not vehicle.is_over]
@@ -147,15 +147,15 @@ class MotionTracker:
         return self._visible([vehicle.state.mean[:, 0] for vehicle in vehicles])
 
     def _hidden(self) -> BoolArray:
-        """Return for each vehicle whether one that is present hides it."""
+        """Return for each vehicle whether a present one hides it."""
         present = [vehicle.is_present for vehicle in self._vehicles]
         return are_hidden(self._boxes(self._vehicles), present)
 
     def _pair(self, observations: Sequence[Observation]) -> dict[int, int]:
         """Pair rows of vehicles with numbers of observations; present vehicles choose first.
 
-        The values are squared: one good pair is worth more than two poor ones. Lost vehicles are
-        found again by `take_over_ids`.
+        The values are squared, because one good pair is better than two poor ones. Lost vehicles
+        are found again by `take_over_ids`.
         """
         if not (self._vehicles and observations):
             return {}
@@ -176,10 +176,11 @@ class MotionTracker:
         return pair(values**2, [present, new])
 
     def _is_clear(self, vehicle: Vehicle, place: Place, box: Float64Array, score: float) -> bool:
-        """Return whether a vehicle is large enough and likely enough to be shown.
+        """Return whether a vehicle is large enough, and its score high enough, to be shown.
 
-        One that was shown before may be a little less likely. Of one that the left or right side of
-        the frame cuts off, the visible part is taken for a car as wide: a strip is not large.
+        A vehicle shown before may have a slightly lower score. If the left or right side of the
+        frame cuts it off, its size is that of a car as wide as the visible part: a strip is not
+        large.
         """
         left, _, right, _ = whole_box(place.mean)
         width, height = box[2:] - box[:2]
@@ -202,5 +203,5 @@ class MotionTracker:
 
 
 def _are_large(boxes: Float64Array) -> BoolArray:
-    """Return for each box, `(n, 4)`, whether no side is below a pixel."""
+    """Return for each box, `(n, 4)`, whether both sides are at least a pixel."""
     return np.asarray((boxes[:, 2:] - boxes[:, :2] >= 1).all(axis=1))

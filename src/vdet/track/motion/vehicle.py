@@ -1,6 +1,6 @@
-"""One vehicle: where it was, its motion, the evidence for it, and its score.
+"""One vehicle: its history, its motion, the evidence for it, and its score.
 
-The filter (`state`) knows only what came before a frame. What came after it corrects the estimate.
+The filter (`state`) uses only earlier frames. Later frames then correct its estimates.
 Source: Rauch, Tung and Striebel, "Maximum Likelihood Estimates of Linear Dynamic Systems", 1965.
 
 The evidence for a vehicle is a running sum that leaks, as in Page, "Continuous Inspection
@@ -25,24 +25,24 @@ SCORE_TIME = 0.5
 """Seconds over which the scores of detections are averaged."""
 
 _ENTRY = 0.4
-"""Seconds before the first detection in which a vehicle is shown that comes into the frame."""
+"""Seconds before its first detection during which an entering vehicle is shown."""
 
 _ENTERING = 0.1
-"""Minimum speed of a vehicle that comes into the frame, in its sizes a second."""
+"""Minimum speed of a vehicle that enters the frame, in its sizes per second."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Moment:
-    """A vehicle in a frame that was searched.
+    """A vehicle in a searched frame.
 
     Attributes
     ----------
     time
-        Of the frame, seconds.
+        Time of the frame, seconds.
     state
-        After the frame.
+        State after the frame.
     score
-        Of its detection; None where it was not detected.
+        Score of its detection; None if it was not detected.
     """
 
     time: float
@@ -52,7 +52,7 @@ class Moment:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Place:
-    """Where a vehicle is at a time.
+    """The place of a vehicle at a time.
 
     `mean` is centre x and y and log width and height, `(4,)`. `bridges` says that a search between
     the detections before and after this time missed the vehicle.
@@ -69,7 +69,7 @@ class History:
     Attributes
     ----------
     moments
-        By time; at least one of them has a detection.
+        In order of time; at least one has a detection.
     """
 
     def __init__(self, first: Moment) -> None:
@@ -87,20 +87,20 @@ class History:
         self._smoothed = None
 
     def forget(self, before: float) -> None:
-        """Drop the moments that say nothing of times after `before`, but keep a detection."""
+        """Drop moments that do not affect times after `before`, but keep a detection."""
         last = self.last_seen
         while self.moments[0] is not last and self.moments[1].time <= before:
             del self.moments[0]
             self._smoothed = None
 
     def join(self, earlier: "History") -> None:
-        """Put the moments of the same vehicle's earlier track before its own."""
+        """Prepend the moments of an earlier track of the same vehicle."""
         begin = self.moments[0].time
         self.moments[:0] = [moment for moment in earlier.moments if moment.time < begin]
         self._smoothed = None
 
     def scores(self, time: float) -> tuple[float, float]:
-        """Return the mean score of the detections around a time, and with 0 for each miss."""
+        """Return the mean score of the detections around a time, without and with misses as 0."""
         until = max(self.last_seen.time, time)
         kept = [
             (math.exp(-abs(moment.time - time) / SCORE_TIME), moment.score)
@@ -112,12 +112,12 @@ class History:
         return total / seen, total / sum(weight for weight, _ in kept)
 
     def at(self, time: float, longest_gap: float) -> Place | None:
-        """Return where the vehicle is at a time up to the latest moment; None if not known.
+        """Return the place at a time up to the latest moment; None if unknown.
 
         Parameters
         ----------
         longest_gap
-            Seconds between two detections over which misses are bridged.
+            Maximum seconds between two detections to bridge misses.
         """
         moments = self.moments
         seen = [number for number, moment in enumerate(moments) if moment.score is not None]
@@ -138,21 +138,21 @@ class History:
         """Return the mean at a time between the moments of two consecutive detections."""
         moments, means = self.moments, self.means()
         if all(moment.state.gain is not None for moment in moments[before + 1 : after + 1]):
-            # The misses between are of the same track.
+            # The misses in between belong to the same track.
             after = bisect_right(moments, time, key=lambda moment: moment.time)
             before = after - 1
         fraction = (time - moments[before].time) / (moments[after].time - moments[before].time)
         return np.asarray(means[before][:, 0] * (1 - fraction) + means[after][:, 0] * fraction)
 
     def _entering(self, first: int, time: float) -> Place | None:
-        """Return where the vehicle was before its first detection, if it came into the frame."""
+        """Return the place before the first detection, if the vehicle entered the frame then."""
         moment, mean = self.moments[first], self.means()[first]
         ways_in = moment.state.ways_in
         axis = 0 if ways_in[0] else 1
         speed = mean[axis, 1] * ways_in[axis]
         if moment.time - time > _ENTRY or speed < _ENTERING * math.exp(mean[axis + 2, 0]):
             return None
-        # Its size hardly shows where it is cut off.
+        # Its size is uncertain while it is cut off.
         return Place(carried(mean, time - moment.time), "interpolated")
 
     def means(self) -> list[Float64Array]:
@@ -169,25 +169,26 @@ class History:
 
 
 def carried(mean: Float64Array, seconds: float) -> Float64Array:
-    """Return centre and log size, `(4,)`, if so long the velocity of `mean` and the size stay."""
+    """Return centre and log size, `(4,)`, after `seconds` at constant velocity and size."""
     place = mean[:, 0].copy()
     place[:2] += mean[:2, 1] * seconds
     return place
 
 
 LONGEST_LOOK = 0.1
-"""Seconds for which one frame counts as evidence at most: a single frame must not be enough."""
+"""Maximum seconds that one frame counts as evidence: a single frame must not be enough."""
 
 _LONGEST_DOUBT = 0.6
-"""Seconds for which detections below the decay keep a vehicle present; at least `coast_seconds`.
-Far off, such weak ones lead from one vehicle to the next.
+"""Maximum seconds that detections below the decay keep a vehicle present; at least `coast_seconds`.
+
+In the distance, such weak detections lead from one vehicle to the next.
 """
 
 _SLOWING_TIME = 0.8
-"""Seconds in which the velocity of a vehicle unseen for longer than it is carried falls to 1/e."""
+"""Seconds in which the velocity of a vehicle unseen for over `coast_seconds` falls to 1/e."""
 
 _SETTLING_TIME = 0.4
-"""The same of the change of its size, from the first miss on: growth soon adds up to a lot."""
+"""The same for the change of its size, from the first miss on, because growth adds up quickly."""
 
 _APPEARANCE_TIME = 0.3
 """Seconds over which the appearance of the detections is averaged."""
@@ -197,14 +198,14 @@ _NOISE = 0.12
 """
 
 _MIN_SCORE = 0.05
-"""Below this score the box of a detection is not taken to be any less exact."""
+"""Below this score, the noise of a box does not increase further."""
 
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """A frame that is searched.
+    """A searched frame.
 
-    `time` and `seconds`, those since the searched frame before, are seconds; `size` is width and
+    `time` and `seconds` since the previous searched frame are in seconds; `size` is width and
     height in pixels.
     """
 
@@ -217,7 +218,7 @@ class Look:
 class Observation:
     """A detection inside the frame.
 
-    `box` is x1, y1, x2, y2 in pixels, float64 `(4,)`; `classes` says how likely each class is;
+    `box` is x1, y1, x2, y2 in pixels, float64 `(4,)`; `classes` has the probability of each class;
     `appearance` is `(2, 3)`, see `appearances`.
     """
 
@@ -234,7 +235,7 @@ class Observation:
 
 @dataclass(eq=False, slots=True)
 class RecentMean:
-    """A mean of values over the latest `SCORE_TIME`; older ones count less and less."""
+    """An exponentially weighted mean of values over the latest `SCORE_TIME`."""
 
     _sum: float = 0.0
     _weight: float = 0.0
@@ -252,7 +253,7 @@ class RecentMean:
 
 
 class Vehicle:
-    """What is remembered of a vehicle.
+    """A tracked vehicle.
 
     Parameters
     ----------
@@ -264,29 +265,29 @@ class Vehicle:
     state
         Its motion up to the latest frame.
     evidence
-        Seconds of detections with score 1, less the leak; from 0 to `needed`.
+        Seconds of detections with score 1, less the decay; from 0 to `confirm_seconds`.
     confirmed
-        Whether the evidence was enough once; only then it is shown.
+        Whether the evidence has ever been enough to show it.
     id
-        Given when it is first shown.
+        Assigned when it is first shown.
     unseen
         Seconds without a detection, up to the latest frame.
     hidden
         Seconds of these in which a nearer vehicle hid it.
     doubtful
-        Seconds without a detection that adds to the evidence.
+        Seconds without a detection that adds evidence.
     scores
         Mean score of the latest detections, 0 to 1; a frame without one counts as 0.
     detection_scores
-        The same, without the frames that have no detection.
+        The same, without frames that have no detection.
     votes
-        Its class, by what all detections say.
+        Votes of all detections for its class.
     history
-        Where it was in the latest frames.
+        Its moments in the latest frames.
     begin
         Time of its first detection, seconds.
     since
-        Time of the detection since which it has not been lost, seconds.
+        Time of the first detection since it was last lost, seconds.
     appearance
         Mean appearance of its latest detections, `(2, 3)`.
     """
@@ -306,7 +307,7 @@ class Vehicle:
 
     @property
     def is_present(self) -> bool:
-        """Whether it is known and was seen lately."""
+        """Whether it is confirmed and was seen recently."""
         longest = self._settings.coast_seconds
         is_seen = self.unseen <= longest and self.doubtful <= max(longest, _LONGEST_DOUBT)
         return self.confirmed and self.evidence > 0 and is_seen
@@ -330,7 +331,7 @@ class Vehicle:
         self.state = self.state.predicted(seconds)
 
     def see(self, observation: Observation, look: Look) -> None:
-        """Take in its detection in a frame."""
+        """Add its detection in a frame."""
         self.state = self.state.corrected(observation.box, observation.noise, look.size)
         self.history.add(Moment(look.time, self.state, observation.score))
         if not self.is_present:
@@ -341,7 +342,7 @@ class Vehicle:
         self._add(observation, look)
 
     def miss(self, look: Look) -> None:
-        """Note a frame without a detection of it."""
+        """Add a frame without a detection of it."""
         self.unseen += look.seconds
         lost = self.unseen > self._settings.coast_seconds
         motion = math.exp(-look.seconds / _SLOWING_TIME) if lost else 1.0
@@ -350,21 +351,21 @@ class Vehicle:
         self._weigh(0.0, look.seconds)
 
     def lose(self) -> None:
-        """Take it for lost: the latest detection shows another vehicle."""
+        """Mark it as lost: its latest detection shows another vehicle."""
         self.evidence = 0.0
         self.unseen = max(self.unseen, self._settings.coast_seconds)
 
     def take_over(self, other: "Vehicle") -> None:
-        """Go on with the id, the history and the votes of another track of the same vehicle."""
+        """Continue the id, history and votes of another track of the same vehicle."""
         self.id = self.id if other.id is None else other.id
         self.begin = min(self.begin, other.begin)
         self.history.join(other.history)
         self.votes.join(other.votes)
 
     def merge(self, other: "Vehicle") -> None:
-        """Take over the history of another track that follows the same vehicle now.
+        """Take over the history of another track that now shows the same vehicle.
 
-        The id is that of the track that was not lost for longer.
+        The id is that of the track that has not been lost for longer.
         """
         ids = [(item.since, item.id) for item in (self, other) if item.id is not None]
         self.take_over(other)
