@@ -4,18 +4,25 @@ from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from itertools import accumulate, pairwise
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import pytest
 
-from red_cars import CAR, PERSPECTIVE, drive, road
+from boxing import moved_to
+from red_cars import CAR, HEIGHT, PERSPECTIVE, WIDTH, drive, road
 from run.red_runs import follow, write
 from vdet.config.schema import MotionTrackerSettings, NetworkSettings, SvmSettings
+from vdet.detect.onnx.detector import NetworkDetector
+from vdet.detect.onnx.layouts import RawBoxes
+from vdet.detect.onnx.preparation import InputForm
+from vdet.detect.onnx.recognition import Recognized
 from vdet.errors import OutputError
 from vdet.media import Frame, Picture
-from vdet.run.loop import SearchRate
+from vdet.run.loop import Pipeline, SearchRate
 from vdet.run.result import FrameResult
 from vdet.run.sinks import Output
+from vdet.track.motion.tracker import MotionTracker
 
 PICTURE = Picture(road(CAR))
 OF_NETWORK, OF_SVM = NetworkSettings().searches_per_second, SvmSettings().searches_per_second
@@ -73,6 +80,48 @@ class TestSearchesASecond:
         assert set(range(120, 141)) <= set(chosen)
         before, after = ([n for n in chosen if a <= n < b] for a, b in ((0, 120), (160, 260)))
         assert {b - a for item in (before, after) for a, b in pairwise(item)} == {5}
+
+
+class RedNetwork:
+    """Finds what is red, as one car."""
+
+    form = InputForm(WIDTH, HEIGHT)
+
+    def find(self, picture: Picture, _: float) -> RawBoxes:
+        y, x = np.nonzero(picture.image[..., 2] > 2 * picture.image[..., 0].astype(int))
+        boxes = [(x.min(), y.min(), x.max() + 1, y.max() + 1)] if x.size else []
+        sides = np.array(boxes, np.float32).reshape(-1, 4)
+        return RawBoxes(sides, np.full(len(boxes), 0.9), np.zeros(len(boxes), np.int32))
+
+
+def searched_by_network(lefts: Sequence[int | None], rate: SearchRate, threads: int) -> list[int]:
+    """Return the frames that are searched if the car is here in each; None: it is not there."""
+    network, settings = cast("Recognized", RedNetwork()), NetworkSettings(classes=("car",))
+    detector = NetworkDetector(network, network, np.array([0, -1], np.int32), settings)
+    tracker = MotionTracker(MotionTrackerSettings(), WIDTH, HEIGHT)
+    places = [() if left is None else (moved_to(CAR, left, CAR.y1),) for left in lefts]
+    frames = [Frame(n, Fraction(n, 25), Picture(road(*place))) for n, place in enumerate(places)]
+    results = Pipeline(detector, tracker, rate=rate).follow(frames, threads=threads)
+    return [result.frame.index for result in results if result.searched]
+
+
+class TestWhereNothingMoves:
+    """A third of the searches is left, but none is missing while anything comes, moves or goes."""
+
+    @pytest.mark.parametrize("threads", [1, 4])
+    def test_the_rate_follows_the_traffic(self, threads: int) -> None:
+        passing = [*[None] * 50, *range(0, 250, 10), *[None] * 52]
+        found = searched_by_network(passing, SearchRate(OF_NETWORK), threads)
+        assert found == sorted({*range(0, 127, 6), *range(48, 79, 2)})
+
+    def test_a_car_that_stands_costs_as_little_as_an_empty_road(self) -> None:
+        for lefts in ([40] * 31, [None] * 31):
+            found = searched_by_network(lefts, SearchRate(OF_NETWORK), 2)
+            assert found == [0, 6, 12, 18, 24, 30]
+
+    @pytest.mark.parametrize("rate", [SearchRate(OF_NETWORK, stride=2), SearchRate()])
+    def test_a_rate_that_the_user_sets_is_kept(self, rate: SearchRate) -> None:
+        assert searched_by_network([None] * 20, rate, 2) == list(range(0, 20, rate.stride or 1))
 
 
 def test_frames_are_searched_so_many_times_a_second() -> None:

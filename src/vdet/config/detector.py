@@ -54,6 +54,9 @@ class NetworkSettings(DetectorSettings):
     kind: Literal["net"] = "net"
     """net: a network."""
     searches_per_second: Searches = 12.0
+    """Search at least this many frames per second of video, or about a third of them where nothing
+    moves; the tracker estimates the vehicles in the others. null: search all frames.
+    """
     min_score_still: Ratio = 0.45
     min_score: float = Field(0.03, gt=0, lt=1)
     """Ignore boxes with a lower score."""

@@ -12,7 +12,8 @@ class VideoDetector(Protocol):
     """Finds vehicles in the frames of one video, or in one single image.
 
     Each frame takes two steps: `search`, in parallel with other frames, then `detect`, in the order
-    of the frames.
+    of the frames. The attribute `is_stateless`, if it is there and true, says that `detect` keeps
+    nothing: frames may stay unsearched where nothing moves.
     """
 
     def search(self, picture: Picture, index: int | None) -> Any:

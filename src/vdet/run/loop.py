@@ -2,7 +2,7 @@
 
 `build` makes the `Pipeline` of a video, and `Pipeline.follow` passes its frames through:
 
-1. `search`, in threads: everything that needs only one frame;
+1. `search`, in threads: everything that needs no earlier frame, or only the last searched one;
 2. `observe`, in the order of the frames: the detections go to the tracker;
 3. a delay of `look_ahead` seconds of video, so that the tracker knows later detections;
 4. `complete`: the tracks at the time of the frame, and then every step.
@@ -12,14 +12,15 @@ import itertools
 import math
 from collections import deque
 from collections.abc import Generator, Iterable, Iterator, Sequence
+from concurrent.futures import Future
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
 from statistics import fmean
 from typing import Any
 
-from vdet.boxes import NO_BOXES, Boxes, Image
+from vdet.boxes import NO_BOXES, Boxes, Image, iou_matrix
 from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel, VideoDetector
 from vdet.errors import ConfigError, ImageError, VdetError
@@ -91,7 +92,65 @@ class SearchRate:
         return since >= min((apart - 0.5) * usual, longest)
 
 
-EVERY_FRAME = SearchRate()
+LONGEST_REST = 0.25
+"""Maximum time between two searches where nothing moves, seconds."""
+
+_MOST_TOGETHER = 16
+"""Maximum number of frames that are searched one after the other, and in memory together."""
+
+_NOTED = 0.15
+"""Minimum score of a box that must stay in its place, so that frames between are not searched."""
+
+_IN_PLACE = 0.9
+"""Minimum intersection over union of two boxes in the same place."""
+
+_Chosen = tuple[Frame, bool]
+"""A frame, and whether the rate of searches chooses it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stretch:
+    """Consecutive frames, of which the last one is searched first.
+
+    If it shows the same as the last one of the stretch before, the others are not searched.
+
+    Attributes
+    ----------
+    before
+        The candidates of the last frame of the stretch before; None: search all that are chosen.
+    found
+        The candidates of the last frame.
+    """
+
+    frames: Sequence[_Chosen]
+    before: Future[Any] | None
+    found: Future[Any] = field(default_factory=Future)
+
+
+def stretches(chosen: Iterable[_Chosen], longest: float) -> Iterator[Stretch]:
+    """Yield frames in stretches of at most `longest` seconds, but with one search if possible.
+
+    With 0, all that are chosen are searched.
+    """
+    frames: list[_Chosen] = []
+    before: Future[Any] | None = None
+    latest = end = -math.inf  # times of the latest search, and of the end of the stretch before
+    for frame, is_chosen in chosen:
+        frames.append((frame, is_chosen))
+        step, latest = (float(frame.time) - latest, float(frame.time)) if is_chosen else (0, latest)
+        is_full = is_chosen and latest + step - end > longest  # the next search would be too late
+        if is_full or len(frames) >= _MOST_TOGETHER:
+            yield (stretch := Stretch(frames, before if is_chosen else None))
+            frames, before, end = [], stretch.found if is_chosen and longest else None, latest
+    if frames:
+        yield Stretch(frames, None)
+
+
+def is_same(before: Boxes, after: Boxes) -> bool:
+    """Return whether two frames show the same vehicles in the same places."""
+    some, others = (boxes.sides[boxes.scores >= _NOTED] for boxes in (before, after))
+    in_place = iou_matrix(some, others) >= _IN_PLACE
+    return len(some) == len(others) and bool(in_place.any(axis=0).all())
 
 
 FIRST_FRAMES = 2
@@ -120,7 +179,7 @@ class Pipeline:
     detector: VideoDetector
     tracker: TimedTracker
     steps: Sequence[Step] = ()
-    rate: SearchRate = EVERY_FRAME
+    rate: SearchRate = SearchRate()
     look_ahead: Fraction = Fraction(0)
     is_still: bool = False
 
@@ -141,30 +200,40 @@ class Pipeline:
         ValueError
             The times of the frames do not increase.
         """
-        chosen = self.rate.choose(frames)
-        in_all = any(isinstance(step, ParallelStep) for step in self.steps)
-        with map_ordered(
-            self.search, chosen, threads, is_work=lambda pair: pair[1] or in_all
-        ) as found:
+        may_rest = self.rate.searches is not None and self.rate.stride is None
+        longest = LONGEST_REST if may_rest and getattr(self.detector, "is_stateless", False) else 0
+        parts = stretches(self.rate.choose(frames), longest)
+        with map_ordered(self.search, parts, threads) as done:
             observed = (
                 self.observe(frame, candidates, source, searched=searched)
-                for (frame, searched), candidates in found
+                for _, found in done
+                for frame, searched, candidates in found
             )
             for result in _delayed(observed, self.look_ahead):
                 yield self.complete(result)
 
-    def search(self, chosen: tuple[Frame, bool]) -> Any:
-        """Do everything that needs only one frame; return its candidates, None if not searched.
+    def search(self, stretch: Stretch) -> list[tuple[Frame, bool, Any]]:
+        """Search a stretch; return each frame, whether it was searched, and its candidates.
 
-        Several threads may call this at once.
+        Several threads may call this at once, if they begin with the stretches in their order.
         """
-        frame, searched = chosen
+        *others, last = stretch.frames
+        try:
+            found = self._search(*last)
+            stretch.found.set_result(found[-1])
+        except BaseException as error:
+            stretch.found.set_exception(error)  # another thread may wait for it
+            raise
+        before, detect = stretch.before, self.detector.detect
+        rests = before is not None and is_same(detect(before.result()), detect(found[-1]))
+        return [*(self._search(frame, chosen and not rests) for frame, chosen in others), found]
+
+    def _search(self, frame: Frame, is_due: bool) -> tuple[Frame, bool, Any]:
         for step in self.steps:
             if isinstance(step, ParallelStep):
                 step.prepare(frame)
-        if not searched:
-            return None
-        return self.detector.search(frame.picture, None if self.is_still else frame.index)
+        index = None if self.is_still else frame.index
+        return frame, is_due, self.detector.search(frame.picture, index) if is_due else None
 
     def observe(
         self, frame: Frame, candidates: Any, source: Path, *, searched: bool = True

@@ -19,8 +19,6 @@ R = TypeVar("R")
 JOIN_TIMEOUT = 2.0  # seconds for a thread to end
 DEPTH = 2  # items queued between two threads
 _END = object()  # follows the last item
-_AHEAD = 8
-"""Maximum number of items that `map_ordered` takes ahead per thread."""
 
 
 class _Thread(ThreadPoolExecutor):
@@ -94,38 +92,23 @@ def write_async(
 
 @contextmanager
 def map_ordered(
-    function: Callable[[T], R],
-    items: Iterable[T],
-    threads: int,
-    *,
-    is_work: Callable[[T], bool] = lambda _: True,
+    function: Callable[[T], R], items: Iterable[T], threads: int
 ) -> Iterator[Iterator[tuple[T, R]]]:
     """Yield an iterator of items with the results of `function`, computed in parallel, in order.
 
-    Items are taken ahead until every thread has one, and one more. Items for which `is_work` is
-    false have the result None and do not count, but at most `_AHEAD` items per thread are taken.
+    They are started in order too. Items are taken ahead until every thread has one, and one more.
     """
-    running: deque[tuple[T, Future[R] | None]] = deque()
-
-    def first() -> tuple[T, Any]:
-        item, future = running.popleft()
-        return item, future and future.result()
-
+    running: deque[tuple[T, Future[R]]] = deque()
     with ThreadPoolExecutor(threads, thread_name_prefix="vdet-search") as pool:
 
-        def start(item: T) -> Future[R]:
-            return pool.submit(copy_context().run, function, item)
-
-        def pairs() -> Iterator[tuple[T, Any]]:
+        def pairs() -> Iterator[tuple[T, R]]:
             for item in items:
-                running.append((item, start(item) if is_work(item) else None))
-                while (
-                    sum(future is not None for _, future in running) > threads
-                    or len(running) > _AHEAD * threads
-                ):
-                    yield first()
-            while running:
-                yield first()
+                running.append((item, pool.submit(copy_context().run, function, item)))
+                if len(running) > threads:
+                    first, future = running.popleft()
+                    yield first, future.result()
+            for item, future in running:
+                yield item, future.result()
 
         try:
             yield pairs()

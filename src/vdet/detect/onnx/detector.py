@@ -4,7 +4,7 @@ import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import cv2
 import numpy as np
@@ -66,6 +66,7 @@ class NetworkDetector:
     for_stills: Recognized
     numbers: Int32Array
     settings: NetworkSettings
+    is_stateless: ClassVar[bool] = True
 
     @property
     def unknown_classes(self) -> tuple[str, ...]:
