@@ -1,4 +1,4 @@
-"""The demo: drawn roads, both detectors on them, and what they find against the truth."""
+"""The demo: both detectors on synthetic roads, compared with the ground truth."""
 
 from collections.abc import Callable
 from functools import partial
@@ -30,16 +30,16 @@ from vdet.traffic.count_files import NOWHERE
 from vdet.traffic.counting import count_files
 
 ROADS = 6
-"""Drawn roads that the linear model learns from."""
+"""Number of synthetic roads to train the linear model on."""
 
 ROAD, TRUTH = "road.mp4", "truth.txt"
-"""The drawn video of a moving camera, and its true boxes."""
+"""The synthetic video of a moving camera, and its ground truth."""
 
 POLE, POLE_TRUTH, GATE = "pole.mp4", "pole.txt", "gate.yaml"
-"""The same from a pole, and the lines at which vehicles are counted."""
+"""The same from a pole, and the lines for counting."""
 
 PATCHES, MODEL = "patches.zip", "model.npz"
-"""The patches for the linear model, and the model, which has the metrics of its training."""
+"""The patches for the linear model, and the model with its metrics."""
 
 _GATE = """\
 # The lines of the demo, as fractions of the frame.
@@ -60,14 +60,14 @@ _BY_MODEL = {"tracks": "model.csv", "stages": "stages"}
 def run_demo(
     folder: Path, *, seed: int, overwrite: bool, announce: Callable[[str], object], steps: Steps
 ) -> list[str]:
-    """Draw two roads, find and count their vehicles, and compare them with the truth.
+    """Draw two roads, find and count their vehicles, and compare them with the ground truth.
 
-    The linear model is first trained on patches that are mined from other drawn roads.
+    The linear model is first trained on patches mined from other synthetic roads.
 
     Parameters
     ----------
     seed
-        Seed of everything that is drawn; the same seed gives the same data.
+        Seed of the scenes; the same seed gives the same data.
     overwrite
         Replace the files of an earlier demo.
     announce
@@ -77,7 +77,7 @@ def run_demo(
 
     Returns
     -------
-    The scores of each detector, and how many vehicles go from line to line: lines of text.
+    Lines of text: the scores of each detector, and the flows from line to line.
     """
     make_folder(folder)
     if not overwrite and any(folder.iterdir()):
@@ -110,7 +110,7 @@ def run_demo(
     sources = [VideoSource(road, road.with_suffix(".txt"), every=2) for road in roads]
     for source in sources:
         draw(busy_road(rng), source.path, source.truth)
-    model = load_svm(linear.svm, None)  # only the places of its windows matter
+    model = load_svm(linear.svm, None)  # only the positions of its windows matter
     mine(sources, folder / PATCHES, linear, model, limits=_LIMITS, overwrite=overwrite, steps=steps)
     learnt, _ = train(find_patches([folder / PATCHES]), linear, steps=steps)
     with staged(folder / MODEL, overwrite=overwrite) as temporary:
@@ -129,7 +129,7 @@ def run_demo(
 
 
 def _flows(folder: Path, scene: Scene, settings: Settings) -> list[list[str]]:
-    """Return the flows from the pole: how many vehicles were found, and how many are true."""
+    """Return the flows seen from the pole: vehicles found, and true ones."""
     size = scene.camera.width, scene.camera.height
     flows: dict[tuple[str, str], list[int]] = {}
     for number, name in enumerate((_ON_POLE["tracks"], POLE_TRUTH)):

@@ -1,4 +1,4 @@
-"""Commands whose help groups its options, and the program, which other packages extend."""
+"""Commands with grouped options in their help, and the program, which other packages extend."""
 
 import inspect
 import re
@@ -34,10 +34,10 @@ HEADINGS: Mapping[str, Sequence[str]] = {
 
 
 class Command(click.Command):
-    """A command of the program, which takes `-q` and `-v`; its help groups the options.
+    """A command of the program, with `-q` and `-v` and grouped options in its help.
 
     The docstring is the help: what the command does, its options as `Parameters`, and command lines
-    as `Examples`. What `vdet.cli.options` says of an option holds where the command says nothing.
+    as `Examples`. Options without a text have that of the docstring of `vdet.cli.options`.
     """
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
@@ -49,7 +49,7 @@ class Command(click.Command):
             if isinstance(option, click.Option) and option.help is None:
                 option.help = " ".join(texts.get(option.name or "", "").split())
         self.params += verbosity_options()
-        # click cuts only summaries that are not given.
+        # click truncates the summary unless it is set.
         self.short_help = re.split(r"(?<=\.)\s", (self.help or "").strip())[0]
 
     def format_options(self, context: click.Context, formatter: click.HelpFormatter) -> None:
@@ -72,11 +72,11 @@ class Command(click.Command):
 
 
 command = partial(click.command, cls=Command)
-"""Makes a command of a function and its docstring: see `Command`."""
+"""Makes a command from a function and its docstring: see `Command`."""
 
 
 class Program(click.Group):
-    """The program; a command is imported when it is run, or to list its summary.
+    """The program; commands are imported when they are run, or to list their summaries.
 
     Other packages register commands as entry points (`vdet.plugins`).
     """
@@ -86,12 +86,12 @@ class Program(click.Group):
         return sorted(plugin_names(COMMANDS))
 
     def get_command(self, _: click.Context, name: str) -> click.Command | None:
-        """Return a command, None if there is none of that name.
+        """Return a command; None if the name is unknown.
 
         Raises
         ------
         ConfigError
-            It belongs to another package, and cannot be loaded.
+            It belongs to another package that cannot be loaded.
         """
         if name not in built_in_names(COMMANDS) and name not in plugin_names(COMMANDS):
             self.commands = {own: load_plugin(COMMANDS, own) for own in built_in_names(COMMANDS)}

@@ -91,7 +91,7 @@ def count(
 
 
 def _totals(videos: "Mapping[str, Counts]") -> list[str]:
-    """Return the totals of all files, and of each where one has no clock."""
+    """Return the totals of all files, and of each file if one has no clock."""
     from vdet.evaluate.output import table
     from vdet.traffic.counts import direction_totals
 
@@ -108,7 +108,7 @@ def _totals(videos: "Mapping[str, Counts]") -> list[str]:
 
 
 def _matrix(videos: "Sequence[Counts]") -> list[str]:
-    """Return the flows between lines and zones over all files; nothing where there is only one."""
+    """Return the flows between lines and zones over all files; empty if there is only one."""
     from vdet.evaluate.output import table
     from vdet.traffic.count_files import flow_matrix
     from vdet.traffic.counts import flow_table

@@ -1,4 +1,4 @@
-"""`vdet demo`: the whole program on drawn roads."""
+"""`vdet demo`: the whole program on synthetic roads."""
 
 from pathlib import Path
 

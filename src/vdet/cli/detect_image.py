@@ -1,4 +1,4 @@
-"""`vdet detect-image`: find vehicles in pictures."""
+"""`vdet detect-image`: find vehicles in images."""
 
 import logging
 from contextlib import closing

@@ -1,4 +1,4 @@
-"""`vdet detect-video`: find and follow vehicles in one video, or in many."""
+"""`vdet detect-video`: find and follow vehicles in one video or many."""
 
 import logging
 import re
@@ -190,7 +190,7 @@ def detect_video(
 def _in_and_out(
     clips: tuple[Path, ...], wanted: list[Output], *, no_video: bool
 ) -> tuple[Path, list[Output]]:
-    """Return the source, and all outputs, with the video to write."""
+    """Return the source, and all outputs including the video."""
     source, *videos = clips
     is_beside = not (no_video or wanted or videos or source.is_dir() or "%" in source.name)
     if no_video == bool(videos) and not is_beside:
@@ -214,7 +214,7 @@ def _in_and_out(
 
 
 def _with_endings(outputs: list[Output], *, no_video: bool) -> list[Output]:
-    """Return the outputs of a batch: for each the ending of its name, after that of the video."""
+    """Return the outputs of a batch, whose paths are endings of names."""
     from vdet.run.sinks.protocol import sink_kind
 
     endings = []

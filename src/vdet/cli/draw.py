@@ -1,4 +1,4 @@
-"""`vdet draw`: a page in which lines are drawn over the paths of vehicles."""
+"""`vdet draw`: a page for drawing lines over the paths of vehicles."""
 
 import math
 from collections.abc import Iterable, Iterator
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from vdet.track.track import FrameTracks
 
 _MAX_SAMPLES = 20
-"""Number of frames that the picture of the place is made of; at least half as many."""
+"""Maximum number of frames for the image of the scene; at least half of them are used."""
 _STILL_FRAMES = 5000
-"""Number of frames of the video that are read for it where the tracks are known."""
+"""Number of frames to read for it if the tracks are known."""
 _OUTPUTS, _SETTINGS = (".html", ".jpg", ".png", ".svg"), (".yaml", ".yml")
 
 
@@ -88,7 +88,7 @@ def draw(
     if output and output.suffix.lower() != ".html" and not settings.traffic:
         raise ConfigError(f"{output}: nothing to draw; add lines or zones with -c FILE")
     with progress_steps(" frames") as steps:
-        # All vehicles: the page shows what regions leave out.
+        # Without regions, because the page shows their effect.
         run = Run(clip, (), settings.model_copy(update={"regions": ()}), start, end)
         image, frames = _watched(run, tracks, steps)
     settings.camera.check_frames(image.shape[1], image.shape[0])
@@ -108,7 +108,7 @@ def draw(
 
 
 def _watched(run: "Run", tracks: Path | None, steps: Steps) -> "tuple[Image, list[FrameTracks]]":
-    """Return the place, BGR uint8, without the vehicles of a video, and their tracks.
+    """Return the scene without vehicles, BGR uint8, and the tracks of a video.
 
     Raises
     ------
@@ -151,7 +151,7 @@ def _watched(run: "Run", tracks: Path | None, steps: Steps) -> "tuple[Image, lis
 
 
 def _spread(frames: "Iterable[Frame]") -> "list[Image]":
-    """Return some of the images, at even distances."""
+    """Return some of the images, evenly spaced."""
     images, step = list["Image"](), 1
     for number, frame in enumerate(frames):
         if number % step == 0:

@@ -1,4 +1,4 @@
-"""`vdet info`: what a file is, how a camera is described, whether vdet works; `vdet config`."""
+"""`vdet info` describes files, cameras and this machine; `vdet config` prints settings."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -17,13 +17,13 @@ from vdet.errors import counted, in_one_line, opencv_fault, printable
 from vdet.version import __version__
 
 Facts = dict[str, Any]
-"""Values for JSON, by name; each is also a line of text."""
+"""Values for JSON by name; each is also a line of text."""
 
 _BROKEN = "broken"
 _SPEED = 50
-"""Speed whose error is given where both places that it follows from are off by a pixel, km/h."""
+"""Speed whose error is printed for positions that are off by a pixel, km/h."""
 _ANY_SIZE = 1000, 1000
-"""Size of the frames, pixels, where points are fractions of them."""
+"""Size of the frames, pixels, if points are fractions."""
 
 
 @command()
@@ -62,7 +62,7 @@ def info(path: Path | None, **targets: Any) -> int:
 
 
 def _machine() -> Facts:
-    """Return what was found of everything that vdet needs, and whether all of it works."""
+    """Return the state of everything that vdet needs, and whether all of it works."""
     from vdet.config.loading import shipped_configs
     from vdet.workers import core_count
 
@@ -93,7 +93,7 @@ def _packages() -> Iterator[tuple[str, str]]:
 def _checked(check: Callable[[], str]) -> str:
     try:
         return check()
-    except Exception as error:  # whatever it is, it does not work
+    except Exception as error:  # any error means that it does not work
         return f"{_BROKEN}; {in_one_line(error)}; install vdet again"
 
 
@@ -114,7 +114,7 @@ def _shipped(path: Path) -> str:
 
 
 def _settings() -> Facts:
-    """Return what settings say of a camera, and how well the points of its ground fit."""
+    """Return lines, zones and the fit of the ground points in the settings of a camera."""
     import numpy as np
 
     from vdet.lanes.ground import ground_of

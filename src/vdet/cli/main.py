@@ -1,4 +1,4 @@
-"""The program: its commands, and the one place where errors become text and exit codes."""
+"""The program: its commands, and the place where errors become messages and exit codes."""
 
 import os
 import sys
@@ -26,9 +26,8 @@ click.version_option(__version__, prog_name="vdet")(cli)
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run the program and exit.
 
-    Exit codes: 0 success, 1 an error, 2 wrong usage, 3 some files of a batch failed, 130
-    interrupted. An error is one line on standard error; with `VDET_DEBUG=1` in the environment a
-    traceback follows.
+    Exit codes are in `vdet.errors`. An error is one line on standard error; with `VDET_DEBUG=1` in
+    the environment a traceback follows.
     """
     set_up_logs(verbose=False, quiet=False)
     try:
@@ -41,7 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         sys.exit(error.exit_code)
     except (KeyboardInterrupt, click.Abort):
         sys.exit(_print_error(["interrupted"], INTERRUPTED))
-    except BrokenPipeError:  # whoever read our output has ended
+    except BrokenPipeError:  # the reader of our output has ended
         _drop_unwritten()
         sys.exit(1)
     except Exception as error:
@@ -60,7 +59,7 @@ def _print_error(lines: Iterable[str], code: int) -> int:
 
 
 def _drop_unwritten() -> None:
-    """Drop what standard output does not take: Python would try it again as it ends."""
+    """Drop output that cannot be written, or Python would try again at exit."""
     try:
         sys.stdout.flush()
     except OSError:

@@ -1,4 +1,4 @@
-"""Standard error: lines, log records and progress bars that do not disturb one another."""
+"""Messages: lines, log records and progress bars that do not garble one another."""
 
 import logging
 import sys
@@ -22,31 +22,31 @@ REFRESH_INTERVAL = 1.0  # seconds
 
 
 def print_lines(*lines: str, err: bool = False) -> None:
-    """Print each text as one line; a progress bar moves below them.
+    """Print each text as one line, above any progress bar.
 
-    Texts may have names of files in them: a name could forge a line, or control the terminal.
+    Texts are escaped: a file name in them could forge a line, or control the terminal.
 
     Raises
     ------
     BrokenPipeError
-        Whoever read the stream has ended.
+        The reader of the stream has ended.
     OutputError
         It cannot be written for another reason.
     """
     name = Path("standard error" if err else "standard output")
-    bars = sys.modules.get("tqdm")  # imported where there is a bar
+    bars = sys.modules.get("tqdm")  # imported if there is a bar
     with bars.tqdm.external_write_mode() if bars else nullcontext(), output_errors(name):
         click.echo("\n".join(map(escaped, lines)), err=err)
 
 
 def is_quiet() -> bool:
-    """Return whether the running command was given `--quiet`."""
+    """Return whether the running command has `--quiet`."""
     context = click.get_current_context(silent=True)
     return bool(context and context.obj)
 
 
 def announce(*lines: str) -> None:
-    """Print lines on standard error, but not with `--quiet`."""
+    """Print lines on standard error, unless `--quiet` is set."""
     if lines and not is_quiet():
         print_lines(*lines, err=True)
 
@@ -60,12 +60,12 @@ class _LogHandler(logging.Handler):
 
 
 def set_up_logs(*, verbose: bool, quiet: bool) -> None:
-    """Print the log records of vdet: warnings and errors, with `verbose` all, else errors."""
+    """Print the log records of vdet: warnings and errors; all, or only errors, as set."""
     log = logging.getLogger("vdet")
     log.handlers = [_LogHandler()]
     log.propagate = False
     log.setLevel(logging.ERROR if quiet else logging.DEBUG if verbose else logging.WARNING)
-    # What Pillow says of damaged pictures is for developers.
+    # Messages of Pillow about damaged images are for developers.
     logging.getLogger("PIL").addHandler(logging.NullHandler())
     warnings.filterwarnings("ignore", module="PIL")
 
@@ -76,10 +76,10 @@ def _shows_bars() -> bool:
 
 @contextmanager
 def progress_steps(unit: str) -> Iterator[Steps]:
-    """Yield a function that ends the bar of the step before and starts one.
+    """Yield a function that ends the bar of the previous step and starts a new one.
 
-    It takes the name of the step and its total. A step that has a name and no total shows how long
-    it has taken, and disappears at its end. See `live_bar` for where there is no bar.
+    It takes the name of the step and its total. A step with a name and no total shows the elapsed
+    time, and disappears at its end. See `live_bar` for when there is no bar.
     """
     if not _shows_bars():
         yield no_steps
@@ -98,10 +98,9 @@ def progress_steps(unit: str) -> Iterator[Steps]:
 
 @contextmanager
 def live_bar(**options: Any) -> "Iterator[tqdm[Any]]":
-    """Give a bar that is drawn at least every `REFRESH_INTERVAL`: the program is at work.
+    """Yield a bar that is redrawn at least every `REFRESH_INTERVAL`, to show that work goes on.
 
-    There is no bar with `--quiet`, and where standard error is not a terminal: its `disable` is
-    then true.
+    With `--quiet`, or if standard error is not a terminal, the bar is disabled.
     """
     from tqdm import tqdm
 

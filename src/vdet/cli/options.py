@@ -1,7 +1,7 @@
-"""Options that several commands share, so that one flag means one thing everywhere.
+"""Options shared by several commands, so that a flag has one meaning everywhere.
 
-Commands do not get the values of those for settings and outputs: `read_settings` and
-`wanted_outputs` return what these ask for.
+The values of options for settings and outputs are not passed to commands: `read_settings` and
+`wanted_outputs` return them.
 
 Parameters
 ----------
@@ -74,9 +74,9 @@ class _Input(click.Path):
 
 
 PATH = click.Path(path_type=Path)
-"""A path; whether something is there is checked later."""
+"""A path; whether it exists is checked later."""
 INPUT = _Input(path_type=Path)
-"""The path of a file that is read: no output takes its place."""
+"""The path of an input file, which no output may replace."""
 POSITIVE = click.IntRange(1, 1_000_000_000)
 PROCESSES = click.IntRange(1, 256)
 """Number of threads or processes."""
@@ -115,13 +115,13 @@ def option(shown: str, kind: Any = None, *, name: str = "", **more: Any) -> Call
     Parameters
     ----------
     shown
-        Flags and placeholder of the value as the help shows them, as in "-o, --output FILE". An
-        option without a value has no placeholder.
+        Flags and placeholder as shown in the help, such as "-o, --output FILE". An option without a
+        value has no placeholder.
     kind
-        Type of the value; None for text, for the path of an input where the placeholder is FILE,
-        and for any path where it is DIR.
+        Type of the value; None: the path of an input for the placeholder FILE, any path for DIR,
+        otherwise text.
     name
-        The argument of the command; by default called as the option.
+        Argument of the command; by default the name of the option.
     more
         Further arguments of `click.option`.
     """
@@ -164,7 +164,7 @@ def check_file(output: Path, *suffixes: str, what: str, overwrite: bool) -> None
 
 
 def _keeping(what: str, make: Callable[[Any], Iterable[Any]] = list) -> dict[str, Any]:
-    """Return arguments of `option` with which a value is not passed to the command, but `_kept`."""
+    """Return arguments for `option` that store a value in `_kept` instead of passing it."""
 
     def keep(_: click.Context, __: click.Parameter, given: Any) -> None:
         if given not in (None, ()) and given is not False:
@@ -197,7 +197,7 @@ lanes_option = short_form("--lanes", "lanes.enabled")
 def settings_options(example: str, *more: Callable[..., Any]) -> Callable[[F], F]:
     """Add `more` options, `-c FILE` and `--set KEY=VALUE`: see `read_settings`.
 
-    `example` is an assignment for the help text that changes what the command does.
+    `example` is an assignment for the help text that has an effect on the command.
     """
     config = option(
         "-c, --config FILE",
@@ -224,10 +224,9 @@ def settings_options(example: str, *more: Callable[..., Any]) -> Callable[[F], F
 
 
 def read_settings(*, detector: str | None = None) -> "Settings":
-    """Read the settings that the options of the running command choose.
+    """Read the settings from the options of the running command: files, assignments, short forms.
 
-    They are files, assignments and short forms. `detector` is its kind where nothing chooses one.
-    Raises `ConfigError`.
+    `detector` is the kind of detector if nothing else chooses one. Raises `ConfigError`.
     """
     assignments = (*_kept("assignments"), *_kept("short forms"))
     if not (_kept("configs") or assignments or detector):
@@ -240,7 +239,7 @@ def read_settings(*, detector: str | None = None) -> "Settings":
 
 
 def read_for_whole_frames(*, detector: str | None = None) -> "Settings":
-    """Read them for a command that looks at whole frames; refuse regions as a `ConfigError`."""
+    """Read settings for a command that uses whole frames; regions are a `ConfigError`."""
     settings = read_settings(detector=detector)
     if settings.regions:
         raise ConfigError("regions: this command uses whole frames; remove the regions")
@@ -254,7 +253,7 @@ def _config_files() -> list[Path]:
 
 
 def own_values() -> dict[str, Any]:
-    """Return what the files say that are not shipped ones; see `given_values`."""
+    """Return the values of files that are not shipped; see `given_values`."""
     from vdet.config.loading import given_values, shipped_configs
 
     shipped = set(shipped_configs().values())
@@ -262,12 +261,12 @@ def own_values() -> dict[str, Any]:
 
 
 def config_names() -> list[str]:
-    """Return the files of settings as the user named them."""
+    """Return the settings files as the user named them."""
     return _kept("configs")
 
 
 def run_name(settings: "Settings") -> "RunName":
-    """Return which detector these settings measure."""
+    """Return a description of the detector that these settings select."""
     from vdet.detect.factory import model_file
     from vdet.evaluate.output import RunName
 
@@ -298,7 +297,7 @@ def _keys(values: Mapping[str, Any], before: str = "") -> Iterator[str]:
 
 
 def output_option(shown: str) -> Callable[[F], F]:
-    """Add the option of a sink, which asks for an output: see `wanted_outputs`."""
+    """Add an option that requests the output of a sink: see `wanted_outputs`."""
 
     def outputs(given: Sequence[Path]) -> list[Output]:
         return [Output(shown.split(maxsplit=1)[0].lstrip("-"), path) for path in given]
@@ -317,5 +316,5 @@ sink_option = option("--sink NAME=FILE", _parse_sink, multiple=True, **_keeping(
 
 
 def wanted_outputs() -> list[Output]:
-    """Return what each `output_option` and `sink_option` of the running command asks for."""
+    """Return the outputs requested by options of the running command."""
     return list(_kept("outputs"))

@@ -1,4 +1,4 @@
-"""Where a command puts what it found out: text, JSON, a page, and tables of counts."""
+"""Where a command writes its results: text, JSON and a page; options for counting."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -20,20 +20,20 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Results:
-    """Where a command puts what it measured: made of the values of `results_options`."""
+    """Where a command writes its results, from the values of `results_options`."""
 
     json_target: str | None
     overwrite: bool
     page: Path | None = None
 
     def checked(self) -> Self:
-        """Return this; refuse outputs that could not be written, before any work.
+        """Return self, after checking that the outputs can be written, before any work.
 
         Raises
         ------
         OutputError
-            A file already exists (and not `overwrite`), is an input, or cannot be written; or
-            both outputs are one file.
+            A file already exists (without `overwrite`), is an input, or cannot be written, or both
+            outputs are the same file.
         """
         paths = list(self._files.values())
         if len({path.resolve() for path in paths}) < len(paths):
@@ -45,7 +45,7 @@ class Results:
 
     @property
     def _files(self) -> dict[str, Path]:
-        """The files to write, by what they are."""
+        """The files to write, by kind."""
         from vdet.pages.render import PAGE_NAME
 
         page = self.page and self.page / PAGE_NAME
@@ -73,7 +73,7 @@ class Results:
             print_lines("", f"{self._files['page']}: the page", err=to_stderr)
 
     def print_report(self, report: "Report") -> None:
-        """Print and write what an evaluation found, as `print` does."""
+        """Print and write the report of an evaluation, as `print` does."""
         self.print(report.lines(), report.values, report.page)
 
 
@@ -92,7 +92,7 @@ def results_options(command: F) -> F:
 
 
 def check_counting(settings: "Settings", *, several: bool) -> None:
-    """Raise `click.UsageError` where settings do not fit the outputs or the videos."""
+    """Raise `click.UsageError` if the settings do not fit the outputs or the videos."""
     tables = {output.sink for output in options.wanted_outputs()} & {"counts", "flows"}
     if tables and not settings.traffic:
         raise click.UsageError(

@@ -1,1 +1,1 @@
-"""Detectors: which vehicles are in a frame. All of them have the same protocol."""
+"""Detectors: they find the vehicles in a frame, behind one protocol."""

@@ -1,4 +1,4 @@
-"""Classes of vehicles: their names in all outputs, and the words that mean them elsewhere."""
+"""Classes of vehicles: their names in all outputs, and their synonyms."""
 
 import re
 from collections.abc import Collection
@@ -8,7 +8,7 @@ OUR_NAMES = ("car", "truck", "bus", "motorcycle", "bicycle", "person", "vehicle"
 """The classes in all outputs; `vehicle` is a vehicle of unknown class."""
 
 UNKNOWN = "vehicle"
-"""Name of a vehicle whose class is not known, also for formats that need a name."""
+"""Name of a vehicle of unknown class, also for formats that need a name."""
 
 WORDS = {
     "car": ("car", "van", "suv", "taxi", "pickup", "pickup truck"),
@@ -19,16 +19,16 @@ WORDS = {
     "person": ("person", "pedestrian", "person sitting"),
     "vehicle": ("vehicle", "other vehicle", "rickshaw", "auto-rickshaw", "tuk-tuk", "tempo"),
 }
-"""For each of `OUR_NAMES` the words that label files and networks use."""
+"""Synonyms of `OUR_NAMES` in label files and networks."""
 
 
 def is_chosen(class_name: str | None, chosen: Collection[str]) -> bool:
-    """Return whether a vehicle is of one of the chosen classes; none means all."""
+    """Return whether a vehicle is of one of the chosen classes; empty means all."""
     return not chosen or (class_name or UNKNOWN) in chosen
 
 
 def in_file_name(class_name: str | None) -> str:
-    """Return a class as a part of the name of a file."""
+    """Return a class for use in a file name."""
     return re.sub(r"[^\w-]+", "-", class_name or UNKNOWN)
 
 
@@ -43,5 +43,5 @@ _NAMES = {letters(word): name for name, words in WORDS.items() for word in words
 
 @lru_cache(maxsize=1000)
 def our_name(label: str) -> str | None:
-    """Return which of `OUR_NAMES` a label means; None where it means none of them."""
+    """Return which of `OUR_NAMES` a label means; None if none."""
     return _NAMES.get(letters(label))

@@ -1,1 +1,1 @@
-"""Comparison of detections and tracks with the truth, metrics, and how the results are shown."""
+"""Comparison of detections and tracks with the ground truth, metrics, and reports."""

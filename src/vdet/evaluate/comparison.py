@@ -1,11 +1,11 @@
-"""Truth and predictions side by side, frame by frame: the input of every metric.
+"""Ground truth and predictions paired frame by frame: the input of every metric.
 
-Ignore regions are applied here, by one rule for all metrics. In every frame the predictions are
-first paired with the vehicles that count (IoU at least 0.5, largest sum of IoU). A prediction that
-is left over and has at least half of its own area in a single ignore region is dropped: it is
-neither right nor wrong; so is a prediction that is left over and `ignored` itself. The ignore
-regions are dropped too: they need not be found.
-Source: how the KITTI tracking benchmark treats DontCare, and COCO treats crowds at IoU 0.5.
+Ignore regions are applied here, by one rule for all metrics. In every frame, predictions are first
+paired with the vehicles that count (IoU at least 0.5, maximum sum of IoU). An unpaired prediction
+is dropped, as neither right nor wrong, if at least half of its area is in a single ignore region,
+or if it is `ignored` itself. The ignore regions are dropped too: they need not be found.
+
+Source: the treatment of DontCare by the KITTI tracking benchmark, and of crowds by COCO at IoU 0.5.
 """
 
 from collections.abc import Iterable, Sequence
@@ -24,12 +24,12 @@ MATCH_IOU = 0.5
 """A prediction with at least this overlap finds a vehicle."""
 
 MAX_IDS = 10_000
-"""Largest number of vehicles, and of tracks, in one video."""
+"""Maximum number of vehicles, and of tracks, in one video."""
 MAX_PAIRS = 25_000_000
-"""Largest number of pairs of a vehicle and a track, and of their boxes over all frames."""
+"""Maximum number of pairs of a vehicle and a track, and of their boxes over all frames."""
 
 UNMATCHED = -1
-"""Partner of a vehicle that no track has found."""
+"""Partner of a vehicle without a track."""
 
 _IGNORED_FRACTION = 0.5
 _KEEP_BONUS = 1000.0  # larger than any sum of overlaps
@@ -37,7 +37,7 @@ _KEEP_BONUS = 1000.0  # larger than any sum of overlaps
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ComparedFrame:
-    """The vehicles and the predictions that count in a frame, and how they are paired.
+    """The vehicles and predictions that count in a frame, and their pairs.
 
     Attributes
     ----------
@@ -84,13 +84,13 @@ class Comparison:
     Attributes
     ----------
     frames
-        The frames of several pooled videos stand one after the other.
+        The frames of pooled videos follow one another.
     vehicle_ids, track_ids
-        int64: the id in its file of every vehicle and track that has a box in `frames`.
+        int64: the id in its file of every vehicle and track with a box in `frames`.
     vehicle_names, track_names
-        The class of each of these, "vehicle" where it is not known.
+        The class of each of these, "vehicle" if unknown.
     step
-        Frames from one that the truth is about to the next; the smallest such number.
+        Minimum distance between two labelled frames.
     """
 
     frames: tuple[ComparedFrame, ...]
@@ -121,13 +121,13 @@ def compare(prediction: LabelledVideo, truth: LabelledVideo) -> Comparison:
     """Compare predictions with the truth of the same video: apply ignore regions and pair boxes.
 
     Boxes are paired at IoU 0.5 and above. A pair of the previous frame stays together if it still
-    overlaps enough; the others are paired so that the sum of IoU is largest. As in TrackEval, a
-    frame without vehicles or without predictions does not count as the previous frame.
+    overlaps enough; the others are paired to maximize the sum of IoU. As in TrackEval, a frame
+    without vehicles or predictions does not count as the previous frame.
     Source: Bernardin and Stiefelhagen, "Evaluating Multiple Object Tracking Performance: The CLEAR
     MOT Metrics", 2008.
 
-    Predictions in frames that the truth is not about are left out. If the truth covers only a part
-    of the video, cut the predictions with `until` first; otherwise all later ones are false alarms.
+    Predictions in unlabelled frames are omitted. If the truth covers only a part of the video, cut
+    the predictions with `until` first; otherwise all later ones are false alarms.
 
     Raises
     ------
@@ -187,7 +187,7 @@ def pool(comparisons: Sequence[Comparison]) -> Comparison:
 
 
 def assign(weights: npt.NDArray[Any]) -> tuple[Int64Array, Int64Array]:
-    """Pair rows with columns, each at most once, so that the sum of the weights is largest.
+    """Pair rows with columns, each at most once, to maximize the sum of the weights.
 
     Parameters
     ----------
@@ -206,7 +206,7 @@ def assign(weights: npt.NDArray[Any]) -> tuple[Int64Array, Int64Array]:
 
 
 def at_least(overlaps: Float64Array, threshold: float) -> BoolArray:
-    """Return where `overlaps` reach `threshold`, up to the rounding of a float64."""
+    """Return where `overlaps` reach `threshold`, up to rounding of float64."""
     return np.asarray(overlaps >= threshold - np.finfo(np.float64).eps)
 
 
@@ -253,7 +253,7 @@ ALPHAS = np.arange(0.05, 0.99, 0.05)
 
 
 def delays(comparison: Comparison) -> tuple[int | None, ...]:
-    """Return the frames from the first that has a vehicle to its first match, by vehicle.
+    """Return the number of frames from the appearance of each vehicle to its first match.
 
     None: the vehicle is never found.
     """
@@ -266,7 +266,7 @@ def delays(comparison: Comparison) -> tuple[int | None, ...]:
 
 
 def id_switches(comparison: Comparison) -> int:
-    """Return how often a vehicle is found by another track than when it was last found."""
+    """Return how often a vehicle is matched by another track than in its last match."""
     last = np.full(len(comparison.vehicle_ids), UNMATCHED)
     switches = 0
     for frame in comparison.frames:
@@ -279,8 +279,7 @@ def id_switches(comparison: Comparison) -> int:
 def fragmentations(comparison: Comparison) -> int:
     """Return how often a vehicle is found again after it was missed or absent.
 
-    As in TrackEval, frames without any prediction are skipped: a gap that consists of such frames
-    does not count.
+    As in TrackEval, frames without predictions are skipped: a gap of such frames does not count.
     """
     before = np.zeros(len(comparison.vehicle_ids), np.bool_)
     starts = np.zeros(len(comparison.vehicle_ids), np.int64)
@@ -294,9 +293,9 @@ def fragmentations(comparison: Comparison) -> int:
 
 
 def identity_matches(comparison: Comparison) -> int:
-    """Return how many boxes agree at IoU 0.5 if each vehicle has at most one track.
+    """Return how many boxes match at IoU 0.5 if each vehicle has at most one track.
 
-    Whole vehicles are paired with whole tracks so that the number is largest.
+    Whole vehicles are paired with whole tracks to maximize this number.
     """
     agreements = np.zeros((len(comparison.vehicle_ids), len(comparison.track_ids)))
     for frame in comparison.frames:

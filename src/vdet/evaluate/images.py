@@ -1,4 +1,4 @@
-"""Scores of a detector in labelled pictures: at one score and at every score."""
+"""Scores of a detector in labelled images: at one score threshold and at all."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -22,15 +22,15 @@ from vdet.run.threads import map_ordered
 
 @dataclass(frozen=True, slots=True)
 class Counting:
-    """The rule that says which boxes count.
+    """The rule for which boxes count.
 
     Attributes
     ----------
     score
         Detections with at least this score count.
     min_width
-        Vehicles narrower than this fraction of the picture's width are ignore regions, and narrower
-        detections count only if they find a vehicle.
+        Vehicles narrower than this fraction of the image's width are ignore regions, and narrower
+        detections count only if they match a vehicle.
     """
 
     score: float
@@ -39,12 +39,12 @@ class Counting:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasuredImage:
-    """A searched picture, compared with its labels as a video of one frame.
+    """A searched image, compared with its labels like a video of one frame.
 
     Attributes
     ----------
     every, shown
-        The vehicles beside the detections of every score, and beside those that count.
+        The vehicles compared with the detections of every score, and with those that count.
     """
 
     picture: LabelledPicture
@@ -53,7 +53,7 @@ class MeasuredImage:
 
     @classmethod
     def of(cls, picture: LabelledPicture, width: int, found: Boxes, counting: Counting) -> Self:
-        """Compare the detections with the labels of a picture that is `width` pixels wide."""
+        """Compare the detections with the labels of an image, `width` pixels wide."""
         minimum = counting.min_width * width
         regions = picture.ignored | (_widths(picture.boxes) < minimum)
         truth = _one_frame(picture.boxes, np.ones(len(regions)), regions, picture.classes)
@@ -90,8 +90,8 @@ class ImageScores(DetectionScores):
     ap50, ap50_95
         Average precision over all scores.
     best_f1, best_score
-        The highest F1 that any score gives, and that score, 0 without vehicles or detections; of
-        the mean, one score for all.
+        The highest F1 at any score, and that score; 0 without vehicles or detections. The mean uses
+        one score for all sources.
     """
 
     images: int
@@ -104,7 +104,7 @@ class ImageScores(DetectionScores):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasuredSet:
-    """The pictures of one source, as labelled and as measured, all detections, and the scores."""
+    """The images of one source, labelled and measured, all detections, and the scores."""
 
     labelled: LabelledPictures
     images: tuple[MeasuredImage, ...]
@@ -114,7 +114,7 @@ class MeasuredSet:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ImagesResult:
-    """The sources of pictures with their scores, and the rule for counting."""
+    """The measured sources, and the rule for which boxes count."""
 
     counting: Counting
     sources: tuple[MeasuredSet, ...]
@@ -146,22 +146,22 @@ def evaluate_images(
     threads: int = 1,
     progress: Progress = no_progress,
 ) -> ImagesResult:
-    """Search all pictures, each on its own, and score each set.
+    """Search all images, each on its own, and score each set.
 
     Parameters
     ----------
     model
-        A detector that shows detections of every score, or at least those of `counting.score`.
+        A detector that returns detections of every score, or at least of `counting.score`.
     progress
-        Called with the number of pictures; what it returns is called with 1 for each.
+        Called with the number of images; the function it returns is called with 1 for each.
 
     Raises
     ------
     ImageError
-        A picture cannot be read or searched; the message names it.
+        An image cannot be read or searched; the message names it.
     """
     advance = progress(sum(len(set_.pictures) for set_ in sets))
-    whole = PictureSearch(model, Settings())  # the whole picture, and no step
+    whole = PictureSearch(model, Settings())  # the whole image, without steps
 
     def search(labelled: LabelledPicture) -> MeasuredImage:
         image = labelled.read()

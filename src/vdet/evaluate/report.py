@@ -1,4 +1,4 @@
-"""How evaluations are shown: as text, as values for JSON, and on a page with the mistakes."""
+"""Reports of evaluations: as text, as values for JSON, and as a page with the mistakes."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -30,7 +30,7 @@ _MAX_PICTURES, _MAX_CROPS = 9, 24  # of each source; of each video
 _SCALE = 3.0  # width of the part around a box, in sizes of the box
 
 _Seen = tuple[int, Float64Array, float]
-"""A frame with a mistake, the box, and its best IoU with any box of the other side."""
+"""Number of a frame with a mistake, the box, and its best IoU with any box of the other side."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +42,7 @@ class Mistake:
     what
         `missed vehicle` or `false alarm, track`.
     id
-        Of the vehicle in the truth, or of the track.
+        Id of the true vehicle, or of the track.
     first, middle, last
         Numbers of frames, from 1.
     boxes
@@ -50,8 +50,8 @@ class Mistake:
     box
         x1, y1, x2, y2 in the middle frame, pixels.
     overlap
-        Mean over the frames of the best IoU with any box of the other side. Near 0: there is no
-        such box. Below 0.5: the box fits badly. Above: the box is matched with another one.
+        Mean over the frames of the best IoU with any box of the other side. Near 0: no such box.
+        Below 0.5: a poor fit. Above: the other box is matched with another one.
     """
 
     what: str
@@ -65,7 +65,7 @@ class Mistake:
 
     @property
     def name(self) -> str:
-        """What the mistake is, as text."""
+        """The mistake, as text."""
         return f"{self.what} {self.id}"
 
     @property
@@ -77,7 +77,7 @@ class Mistake:
 def mistakes(comparison: Comparison) -> tuple[Mistake, ...]:
     """Return all mistakes, the longest first.
 
-    Frames in which a vehicle or a track does not count are not mistakes, and split one.
+    Frames in which a vehicle or a track does not count are not mistakes, and split a mistake.
     """
     seen: dict[tuple[str, int], list[_Seen]] = defaultdict(list)
     for frame in comparison.frames:
@@ -90,7 +90,7 @@ def mistakes(comparison: Comparison) -> tuple[Mistake, ...]:
                 seen[what, int(ids[row])].append((frame.number, boxes[row], overlap))
     found = []
     for (what, id_), frames in seen.items():
-        # Numbers of frames that follow one another are at one distance from their places.
+        # Consecutive frames have a constant difference between number and position.
         runs = groupby(enumerate(frames), lambda placed: placed[1][0] - comparison.step * placed[0])
         found += [_mistake(what, id_, [item for _, item in run]) for _, run in runs]
     return tuple(sorted(found, key=lambda one: (-one.boxes, one.first, one.what, one.id)))
@@ -113,9 +113,9 @@ class Tile:
 
 
 def worst_tiles(source: MeasuredSet) -> Iterator[Tile]:
-    """Yield the pictures with the most mistakes among what counts.
+    """Yield the images with the most mistakes.
 
-    Raises `ImageError` if a picture can no longer be read.
+    Raises `ImageError` if an image can no longer be read.
     """
     scored = [(score_boxes(image.shown), image) for image in source.images]
     scored.sort(key=lambda pair: -pair[0][1] - pair[0][2])
@@ -181,7 +181,7 @@ _HEADINGS = {
     "false_tracks": "false tracks", "mean_delay": "delay", "right": "named right",
     "confused": "confused with",
 }  # fmt: skip
-"""Headings of columns, where they are not the name of the attribute."""
+"""Headings of columns that differ from the name of the attribute."""
 
 _MAX_MISTAKES = 10  # listed for a video
 
@@ -193,11 +193,11 @@ class Report:
     Attributes
     ----------
     head, tables, notes
-        What was measured; scores first; lines of text.
+        The measured detector; tables, scores first; further lines of text.
     values
-        For JSON.
+        Values for JSON.
     sheets
-        Pictures of mistakes by the name of their source, made when the page is.
+        Images of mistakes by the name of their source, made with the page.
     """
 
     head: Sequence[str]
@@ -207,21 +207,21 @@ class Report:
     sheets: Sequence[tuple[str, Iterable[Tile]]] = ()
 
     def lines(self) -> list[str]:
-        """Return all but the pictures as text, with an empty line between two parts."""
+        """Return everything except the images as text, with empty lines between parts."""
         tables = (table(*item) for item in self.tables if item[1])
         parts = filter(None, (self.head, *tables, self.notes))
         return [line for part in parts for line in ("", *part)][1:]
 
     def page(self) -> str:
-        """Return a page as HTML; the last row of the scores stands on top.
+        """Return a page as HTML; the last row of the scores is at the top.
 
-        Raises `ImageError` or `VideoError` if what it shows can no longer be read.
+        Raises `ImageError` or `VideoError` if a source can no longer be read.
         """
         return render("eval.html", report=self, sheets=[(n, list(t)) for n, t in self.sheets])
 
 
 def images_report(result: ImagesResult, name: RunName) -> Report:
-    """Show the scores of labelled pictures: a row for each source, and one for their mean."""
+    """Report the scores of labelled images: a row for each source, and their mean."""
     rows = [(source.labelled.name, source.scores) for source in result.sources]
     sources = [
         {"source": title, **asdict(scores), "not_vehicles": dict(source.labelled.others)}
@@ -244,12 +244,12 @@ def images_report(result: ImagesResult, name: RunName) -> Report:
 
 
 def video_report(clips: Sequence[ClipResult], name: RunName) -> Report:
-    """Show the scores of labelled videos: a row for each, and one for the total of several."""
+    """Report the scores of labelled videos: a row for each, and the total of several."""
     return _clips_report(clips, name.line, name.values)
 
 
 def tracks_report(clip: ClipResult, truth: Path) -> Report:
-    """Show the scores of a file of tracks."""
+    """Report the scores of a file of tracks."""
     report = _clips_report([clip], f"compared with {truth} by vdet {__version__}", {})
     (values,), classes = report.values["videos"], report.values["classes"]
     return replace(report, values=values | {"classes": classes})
@@ -282,7 +282,7 @@ def _clip_values(clip: ClipResult) -> dict[str, Any]:
 
 
 def _score_table(first: str, columns: Sequence[str], named: Iterable[tuple[str, object]]) -> Table:
-    """Return a table of scores and their names; `first` is the heading of the names."""
+    """Return a table of named scores; `first` is the heading of the names."""
     headings = [first, *(_HEADINGS.get(column, column) for column in columns)]
     rows = [[name, *(figure(getattr(scores, key)) for key in columns)] for name, scores in named]
     return headings, rows

@@ -1,4 +1,4 @@
-"""How well vehicles are found, at one score and at every score; and all metrics of a video."""
+"""Detection scores at one threshold and at all, and all metrics of a video."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -25,8 +25,8 @@ _MOSTLY_LOST = 0.2
 class DetectionScores:
     """Counts of boxes over all frames and their ratios, 0 to 1; 0 if there is nothing to divide by.
 
-    `matches` are true boxes found at IoU 0.5, `false_positives` predictions that found nothing,
-    `misses` true boxes that were not found. `mean_iou` is the mean over the matches.
+    `matches` are true boxes found at IoU 0.5, `false_positives` predictions without a match,
+    `misses` true boxes without a match. `mean_iou` is the mean over the matches.
     """
 
     matches: int
@@ -54,7 +54,7 @@ class Scores(DetectionScores):
     motp
         Mean IoU of the matches, as `mean_iou`.
     id_switches
-        Matches of a vehicle by another track than its last match, at any distance in time.
+        Matches of a vehicle by another track than in its last match, however long ago.
     fragmentations
         How often a vehicle is found again after it was missed or absent.
     mostly_tracked, partly_tracked, mostly_lost
@@ -64,11 +64,11 @@ class Scores(DetectionScores):
     hota, deta, assa
         HOTA and its two factors, detection accuracy and association accuracy, 0 to 1.
     vehicles, vehicle_boxes, tracks, track_boxes
-        What was counted, without ignore regions and the predictions dropped for them.
+        Numbers without ignore regions and the predictions dropped for them.
     delays
-        For every vehicle the frames from its appearance to its first match; None: it has none.
+        For every vehicle, frames from its appearance to its first match; None without a match.
     mean_delay
-        Mean over the vehicles that were found; None if none was.
+        Mean over the vehicles found; None if none was.
     false_tracks
         Number of tracks with more than half of their boxes unmatched.
     """
@@ -98,12 +98,12 @@ class Scores(DetectionScores):
 
 
 def score(prediction: LabelledVideo, truth: LabelledVideo) -> Scores:
-    """Score the predictions for a video against its truth."""
+    """Score the predictions for a video against its ground truth."""
     return score_comparison(compare(prediction, truth))
 
 
 def score_boxes(comparison: Comparison) -> tuple[int, int, int, float, float, float, float]:
-    """Score a comparison without regard to ids and scores: the fields of `DetectionScores`."""
+    """Score a comparison, ignoring ids and scores; return the fields of `DetectionScores`."""
     frames = comparison.frames
     vehicles = sum(len(frame.vehicles) for frame in frames)
     tracks = sum(len(frame.tracks) for frame in frames)
@@ -144,9 +144,9 @@ def ratio(part: float, whole: float) -> float:
 class RankedPredictions:
     """All predictions by descending score, and which of them are right.
 
-    Each finds the vehicle of its frame that it overlaps most among those that no prediction before
-    it has found. Those of equal score are taken in the order of the frames, so that without scores
-    they describe a single operating point.
+    Each one finds the vehicle in its frame that it overlaps most, among those not yet found by an
+    earlier prediction. Equal scores are in the order of the frames, so that predictions without
+    scores describe a single operating point.
     Source: the COCO detection evaluation (pycocotools).
 
     Attributes
@@ -166,7 +166,7 @@ class RankedPredictions:
     def average_precisions(self) -> tuple[float, float]:
         """Return the average precision at IoU 0.5, and its mean over `IOU_THRESHOLDS`, 0 to 1.
 
-        It is the mean of the precision at the 101 recalls 0, 0.01 … 1; 0 if there are not vehicles.
+        It is the mean precision at the 101 recalls 0, 0.01 … 1; 0 without vehicles.
         """
         if not self.vehicles or not len(self.scores):
             return 0.0, 0.0
@@ -174,7 +174,7 @@ class RankedPredictions:
         return precisions[0], float(np.mean(precisions))
 
     def f1_at(self, scores: Float64Array) -> Float64Array:
-        """Return F1 where predictions with at least each of these scores count, float64 `(k,)`."""
+        """Return F1 at each of these score thresholds, float64 `(k,)`."""
         counted = np.searchsorted(-self.scores, -scores, side="right")
         right = np.concatenate([[0], np.cumsum(self.right[0])])[counted]
         return np.asarray(2 * right / np.maximum(1, counted + self.vehicles))
@@ -217,17 +217,16 @@ def _average_precision(right: BoolArray, vehicles: int) -> float:
 
 @dataclass(frozen=True, slots=True)
 class ClassResult:
-    """How well the vehicles of one class are found and named.
+    """How well the vehicles of one class are found and classified.
 
     Attributes
     ----------
     vehicles, found, right
-        All of them; those that are found; those that are found and named as this class.
+        Number of vehicles; of those found; of those found with this class.
     precision, recall, f1
-        Of tracks that name the class; those that find a vehicle of unknown kind are left out.
+        Of tracks with this class, without those that find a vehicle of unknown kind.
     named
-        The number of vehicles that are found, by the class of their tracks, the most frequent
-        first.
+        Number of found vehicles by the class of their tracks, the most frequent first.
     """
 
     name: str
@@ -241,15 +240,15 @@ class ClassResult:
 
     @property
     def confused(self) -> str:
-        """The other classes by which vehicles are named, with their numbers."""
+        """The other classes given to these vehicles, with their numbers."""
         return ", ".join(f"{name} {n}" for name, n in self.named.items() if name != self.name)
 
 
 def class_results(comparison: Comparison) -> tuple[ClassResult, ...]:
-    """Return a result for each class that has vehicles; none if no track has a class.
+    """Return a result for each class with vehicles; empty if no track has a class.
 
     A vehicle has the class of the track that finds it in most frames. A track with more than half
-    of its boxes unmatched is a false alarm. A picture is a video of one frame.
+    of its boxes unmatched is a false alarm. An image counts as a video of one frame.
     """
     if not set(comparison.track_names) - {UNKNOWN}:
         return ()

@@ -25,7 +25,7 @@ _DEFAULT = Settings()
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Clip:
-    """A video and the truth of its first frames; of all, if the truth has no last frame."""
+    """A video and its ground truth, for the first frames or for all."""
 
     video: Path
     truth_path: Path
@@ -34,10 +34,10 @@ class Clip:
 
 @dataclass(frozen=True, eq=False)
 class ClipResult:
-    """One video compared with its truth, or several videos taken as one.
+    """One video compared with its ground truth, or several videos pooled.
 
-    `name` is shown in tables; `video` is the file, None if a file of tracks is scored. The frames
-    up to `until`, counted from 1, are compared.
+    `name` is shown in tables; `video` is the file, None if a file of tracks is scored. Frames up to
+    `until`, counted from 1, are compared.
     """
 
     name: str
@@ -52,7 +52,7 @@ class ClipResult:
 
 
 def total(clips: Sequence[ClipResult]) -> ClipResult:
-    """Return the result of all videos, taken as one."""
+    """Return the pooled result of all videos."""
     return ClipResult("total", pool([clip.comparison for clip in clips]))
 
 
@@ -66,7 +66,7 @@ def open_clip(
     until
         Number of the last frame to use, from 1; None: the last that the truth covers.
     settings
-        With the classes that are looked for, and the roles of labels.
+        For the classes to detect, and the roles of labels.
 
     Raises
     ------
@@ -80,9 +80,9 @@ def open_clip(
 def score_files(
     prediction: Path, truth_path: Path, until: int | None = None, settings: Settings = _DEFAULT
 ) -> ClipResult:
-    """Score a file of tracks against a file of truth; arguments as of `open_clip`.
+    """Score a file of tracks against a file of ground truth; arguments as for `open_clip`.
 
-    Tracks in later frames are left out.
+    Tracks in later frames are omitted.
 
     Raises
     ------
@@ -100,17 +100,17 @@ def score_files(
 def evaluate_clip(
     clip: Clip, settings: Settings, model: DetectorModel, progress: Progress = no_progress
 ) -> ClipResult:
-    """Find the vehicles of a clip, as `vdet.run.video.open_video` does, and score them.
+    """Find the vehicles in a clip with `vdet.run.video.open_video`, and score them.
 
-    Vehicles of the truth that stand outside the regions are ignored.
+    True vehicles outside the regions are ignored.
 
     Parameters
     ----------
     model
         The detector of the settings.
     progress
-        Called with the expected number of frames (None: unknown); what it returns is called with
-        the number of frames done since the last call.
+        Called with the expected number of frames, None if unknown; the function it returns is
+        called with the number of frames done since the last call.
 
     Raises
     ------

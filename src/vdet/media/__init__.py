@@ -1,4 +1,4 @@
-"""Video and pictures: frames with exact times, sound carried over, sizes limited."""
+"""Video and images: frames with exact times, copied sound, limited sizes."""
 
 from vdet.media.frame import ColorTags, Frame, Picture, Planes, VideoInfo
 

@@ -1,4 +1,4 @@
-"""Cut parts out of a video: whole key-frame intervals are copied, without encoding them again."""
+"""Cut parts out of a video: copy whole key-frame intervals, or encode exact frames."""
 
 import math
 from collections.abc import Iterable, Iterator
@@ -16,11 +16,11 @@ from vdet.media.images import is_picture_name
 from vdet.media.reader import VideoReader
 from vdet.media.writer import VIDEO_SUFFIXES, VideoWriter
 
-_SOUND_LAG = 1  # seconds of pictures after the end in which sound of the part is still read
+_SOUND_LAG = 1  # seconds of video after the end in which sound of the part may still follow
 
 
 def can_copy(source: Path) -> bool:
-    """Return whether parts of a video can be copied: one can seek in it, and its clock is one."""
+    """Return whether parts of a video can be copied: it is seekable, and has one clock."""
     if is_pipe(source) or not source.is_file() or is_picture_name(source):
         return False
     with open_input(source) as container:
@@ -28,19 +28,19 @@ def can_copy(source: Path) -> bool:
 
 
 def copied_suffix(source: Path) -> str:
-    """Return the suffix of copied parts: that of the source, or .mkv, which holds any codec."""
+    """Return the suffix of copied parts: that of the source, or .mkv, which supports any codec."""
     suffix = source.suffix.lower()
     return suffix if suffix in VIDEO_SUFFIXES else ".mkv"
 
 
 def copy_part(source: Path, start: Fraction, end: Fraction, target: Path) -> None:
-    """Copy the key-frame intervals in which a part of a video lies, with its sound.
+    """Copy the key-frame intervals that contain a part of a video, with its sound.
 
     Parameters
     ----------
     start, end
-        Times of frames as `Frame.time` has them, seconds. The copy begins at the last key frame at
-        or before `start`, and ends before the first one at or after `end`.
+        Times as in `Frame.time`, seconds. The copy begins at the last key frame at or before
+        `start`, and ends before the first one at or after `end`.
 
     Raises
     ------
@@ -68,7 +68,7 @@ def _moved_to_zero(
 ) -> "Iterator[Packet[Stream]]":
     """Yield the packets from the first key frame to the first one at or after `end`.
 
-    `pictures` is the index of the stream with key frames. The first one is moved to second 0.
+    `pictures` is the index of the video stream. The first key frame is moved to second 0.
     """
     begin: Fraction | float = math.inf
     stop: Fraction | float = math.inf
@@ -96,7 +96,7 @@ def encode_part(
     start, end
         Seconds from the first frame; frames with start ≤ time < end are written.
 
-    Errors as of `VideoReader` and `VideoWriter`.
+    Errors as for `VideoReader` and `VideoWriter`.
     """
     with (
         VideoReader(source, start=start, end=end, settings=settings.input) as reader,

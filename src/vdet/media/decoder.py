@@ -1,4 +1,4 @@
-"""Decode a picture stream from its first picture, or from a key frame, despite damage."""
+"""Decode a video stream from its first picture, or from a key frame, despite damage."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -15,31 +15,31 @@ from vdet.media import demux
 from vdet.media.demux import ClockUnwrapper
 from vdet.media.images import find_sequence, read_encoded
 
-_LONGEST_GROUP = 600  # packets from one key frame to the next, which are held in memory
+_LONGEST_GROUP = 600  # maximum packets between key frames, which are kept in memory
 _COUNTABLE = ("av1", "h264", "hevc", "libdav1d", "mjpeg", "mpeg2video", "mpeg4", "png", "vp9")
-"""Codecs of which every packet makes one picture."""
-_MAX_LATE = 32  # periods; a picture later than that follows a clock that was set back
-_FLAGGED = 2  # last packets of a part, of which bytes seem to be missing where the next one begins
+"""Codecs with one picture per packet."""
+_MAX_LATE = 32  # periods; a later picture means that the clock was set back
+_FLAGGED = 2  # last packets of a part that seem incomplete where the next part begins
 
 
 @dataclass(slots=True)
 class Damage:
-    """Counts the errors, and the corrupt and missing pictures, of one stream.
+    """Counts errors, and corrupt and missing pictures, of one stream.
 
-    Nothing is lost before there is evidence of damage: the first packets of a whole file may make
-    no picture. With evidence, as many pictures are lost as there are errors, or as there are
-    packets without a picture if these are more.
+    Nothing counts as lost without evidence of damage: the first packets of an intact file may not
+    yield pictures. With evidence, the number of lost pictures is that of errors, or of packets
+    without a picture if this is larger.
 
     Attributes
     ----------
     period
         Time from one picture to the next, in units of the stream's time base.
     errors
-        Places in the file that cannot be read, and packets that cannot be decoded.
+        Unreadable places in the file, and packets that cannot be decoded.
     restarts
-        How often the clock restarts: the last packets before that are flagged, but not corrupt.
+        How often the clock restarts: the last packets before are flagged, but not corrupt.
     without_picture
-        Packets that made no picture; counted at the end of the stream.
+        Packets without a picture, counted at the end of the stream.
     """
 
     period: Fraction
@@ -59,12 +59,12 @@ class Damage:
 
     @property
     def lost(self) -> int:
-        """Pictures that should be there and are not."""
+        """Number of missing pictures."""
         return max(self.errors, self.without_picture * self.is_evident)
 
     @property
     def damaged(self) -> int:
-        """Pictures lost, and pictures decoded with errors."""
+        """Number of pictures lost or decoded with errors."""
         return max(self.lost + self._corrupt_pictures, self._flagged)
 
     @property
@@ -74,7 +74,7 @@ class Damage:
     def receive(self, picture: av.VideoFrame) -> bool:
         """Count a picture; return whether it is usable.
 
-        One that comes late, where there is damage, is not usable: it counts as lost.
+        A late picture in a damaged stream is not usable, and counts as lost.
         """
         if self.is_evident and None not in (picture.pts, self._last):
             late = (self._last or 0) - (picture.pts or 0)
@@ -87,31 +87,31 @@ class Damage:
 
 
 class Decoder:
-    """The pictures of the first stream of moving pictures, in order of presentation.
+    """The pictures of the first video stream, in order of presentation.
 
     Parameters
     ----------
     frame_rate
-        Of numbered pictures, per second; None: as their names say, else `ASSUMED_RATE`.
+        Rate of numbered images, per second; None: by their names, else `ASSUMED_RATE`.
 
     Attributes
     ----------
     before
-        Number of frames that are shown before the first picture.
+        Number of frames before the first picture.
     damage
-        What was damaged so far.
+        The damage so far.
     clock
-        Says whether, and how often, the clock restarts.
+        Knows whether, and how often, the clock restarts.
     ticks
-        When each of numbered pictures is shown, in units of the time base; a range where their
-        names do not say.
+        Presentation times of numbered images, in units of the time base; a range if their names are
+        not times.
     is_countable
         Whether frames can be counted without decoding them.
 
     Raises
     ------
     VideoError
-        The file cannot be read, or has no moving pictures.
+        The file cannot be read, or has no video stream.
     """
 
     def __init__(self, path: Path, frame_rate: float | None) -> None:
@@ -132,17 +132,17 @@ class Decoder:
             self._packets = self._read_pictures(sequence.files)
 
     def skip_to(self, time: int, first: int) -> bool:
-        """Begin at the last key frame that is not after a time, and count the frames before it.
+        """Begin at the last key frame at or before a time, and count the frames before it.
 
         Parameters
         ----------
         time, first
-            That time, and the time of the first frame, in units of the time base.
+            This time, and the time of the first frame, in units of the time base.
 
         Returns
         -------
-        False where the frames cannot be counted without decoding them: packets have no times, or
-        are damaged, or key frames are very rare. The decoder is then of no more use.
+        False if the frames cannot be counted without decoding them: packets have no times or are
+        damaged, or key frames are very rare. The decoder is then unusable.
         """
         group: list[Packet[Stream]] = []
         key, times = first, list[int]()
@@ -153,20 +153,20 @@ class Decoder:
             if packet.is_keyframe and packet.pts <= time:
                 key, group = packet.pts, []
             group.append(packet)
-            if not packet.is_discard:  # else the file says that it is not shown
+            if not packet.is_discard:  # otherwise the file marks it as hidden
                 times.append(packet.pts)
             if packet.dts is not None and packet.dts > time:
                 break
         self.before = sum(first <= pts < key for pts in times)
         following = chain(group, self._packets)
-        # What is shown before the key frame may need older pictures.
+        # Pictures before the key frame may need older ones.
         self._packets = (packet for packet in following if packet.pts is None or packet.pts >= key)
         return True
 
     def pictures(self) -> Iterator[av.VideoFrame]:
         """Yield the pictures that can be decoded."""
         for packet in chain(self._packets, (None,)):
-            if packet and not packet.is_discard:  # else the file says that it is not shown
+            if packet and not packet.is_discard:  # otherwise the file marks it as hidden
                 self.damage.packets += 1
             try:
                 decoded = self.stream.codec_context.decode(packet)
@@ -183,13 +183,13 @@ class Decoder:
         for packet in self.clock.unwrap(found):
             if packet.stream_index == self.stream.index:
                 if self._is_avi and self.stream.codec_context.has_b_frames:
-                    packet.pts = packet.dts = None  # AVI has no times of presentation
+                    packet.pts = packet.dts = None  # AVI has no presentation times
                 self.damage.corrupt_packets += packet.is_corrupt
                 self.damage.restarts = self.clock.restarts
                 yield packet
 
     def _read_pictures(self, files: Iterable[Path]) -> "Iterator[Packet[Stream]]":
-        """Yield numbered pictures as packets."""
+        """Yield numbered images as packets."""
         for file, tick in zip(files, self.ticks, strict=True):
             try:
                 packet: Packet[Stream] = Packet(read_encoded(file))

@@ -20,25 +20,25 @@ from vdet.media.frame import Coding, ColorTags, Tags, VideoInfo
 from vdet.media.images import Orientation, find_sequence, read_header
 
 MAX_PIXELS = 8192 * 4608
-"""Of a frame. 8K video, in both its widths, has fewer; a damaged header may claim far more."""
+"""Maximum for a frame. 8K video, in both widths, has fewer; a damaged header may claim more."""
 
-_MAX_BOXES = 200_000  # of an MP4 file that are looked at
+_MAX_BOXES = 200_000  # maximum number of boxes of an MP4 file to read
 
 _STREAM = re.compile(r"[a-z][a-z0-9+.-]+:/|-$", re.IGNORECASE)  # "rtsp://…" as a path, or "-"
-_MAX_FAILURES = 100  # in a row; a file with nothing but errors must end too
+_MAX_FAILURES = 100  # in a row; a file with only errors must end too
 
-# Formats that contain their pictures. Not among them are formats that name other files or addresses
-# to be opened (such as playlists), and text that would be drawn as a picture.
+# Formats that contain their pictures: not formats that refer to other files or addresses (such as
+# playlists), nor text that would be rendered as a picture.
 _FORMATS = (
     "apng,asf,av1,avi,cavsvideo,dhav,dv,flv,gif,h263,h264,hevc,ivf,live_flv,m4v,matroska,mjpeg,"
     "mov,mpeg,mpegts,mpegtsraw,mpegvideo,mpjpeg,mxf,nut,obu,ogg,rm,vc1,vvc,wtv,yuv4mpegpipe"
 )
 SAFELY = {"format_whitelist": _FORMATS, "max_pixels": str(MAX_PIXELS)}
-"""Options for opening any file: only these formats, and decoders that probe no larger frames."""
+"""Options for opening any file: only these formats, and no larger frames when probing."""
 
 
 def open_input(path: Path, frame_rate: float | None = None) -> InputContainer:
-    """Open a video file for reading, or the first of numbered pictures (`img_%04d.png`, a folder).
+    """Open a video file for reading, or the first of numbered images (`img_%04d.png`, a folder).
 
     Parameters
     ----------
@@ -48,19 +48,19 @@ def open_input(path: Path, frame_rate: float | None = None) -> InputContainer:
     Raises
     ------
     VideoError
-        There is no such file, it cannot be read, it is not a video, or an address; a picture is
+        The file does not exist, cannot be read, is not a video, or is an address; an image is
         missing.
     """
     refuse_stream(path)
-    # "a:b.mp4" would be taken for a protocol; an absolute name is not.
+    # "a:b.mp4" would be treated as a protocol; an absolute name is not.
     name, options = str(path.absolute()), SAFELY
-    # FFmpeg may take raw Motion JPEG for a pipe of pictures, which is not read.
+    # FFmpeg may treat raw Motion JPEG as a pipe of images, which is not allowed.
     kind = "mjpeg" if path.suffix.lower() in (".mjpeg", ".mjpg") else None
     if sequence := find_sequence(path):
         name, kind = str(sequence.files[0].absolute()), "image2"
         rate, _ = sequence.timing(frame_rate)
         options = {"framerate": f"{rate.numerator}/{rate.denominator}", "pattern_type": "none"}
-    elif not os.path.exists(path):  # noqa: PTH110  # False, too, where it cannot be looked at
+    elif not os.path.exists(path):  # noqa: PTH110  # also False if it is not accessible
         raise VideoError(f"{path}: not found; check the name")
     record_input(path)
     try:
@@ -77,16 +77,16 @@ def refuse_stream(path: Path) -> None:
 
 
 def is_pipe(path: Path) -> bool:
-    """Return whether `path` can be read only once, as a FIFO."""
+    """Return whether `path` can be read only once, like a FIFO."""
     return path.exists() and not path.is_file() and not path.is_dir()
 
 
 def packets(
     container: InputContainer, streams: Iterable[Stream], on_error: Callable[[], None]
 ) -> "Iterator[Packet[Stream]]":
-    """Yield the packets of `streams` in file order; skip what cannot be read, and other streams.
+    """Yield the packets of `streams` in file order; skip unreadable places, and other streams.
 
-    `on_error` is called at each place where something had to be skipped.
+    `on_error` is called for each place that is skipped.
     """
     wanted = {stream.index: stream for stream in streams}
     for other in set(container.streams) - set(wanted.values()):
@@ -96,10 +96,10 @@ def packets(
         try:
             for packet in container.demux(*wanted.values()):
                 failures = 0
-                if packet.size:  # an empty one would end the decoder
+                if packet.size:  # an empty packet would end the decoder
                     yield packet
             return
-        except IndexError:  # PyAV's, at the end, if a stream appeared during the reading
+        except IndexError:  # from PyAV, at the end, if a stream appeared while reading
             return
         except av.FFmpegError:
             failures += 1
@@ -113,7 +113,7 @@ _MAX_TERM = 1_000_000  # of a rate as a fraction; the encoder has 32-bit integer
 
 
 def picture_stream(container: InputContainer, path: Path) -> VideoStream:
-    """Return the first stream of moving pictures, which is not a cover or a thumbnail.
+    """Return the first video stream that is not a cover or thumbnails.
 
     Raises
     ------
@@ -128,7 +128,7 @@ def picture_stream(container: InputContainer, path: Path) -> VideoStream:
 
 
 def moving_streams(container: InputContainer) -> list[VideoStream]:
-    """Return the streams of moving pictures: not those of a cover or of thumbnails."""
+    """Return the video streams, without covers and thumbnails."""
     stills = Disposition.attached_pic | Disposition.timed_thumbnails
     return [stream for stream in container.streams.video if not stream.disposition & stills]
 
@@ -146,7 +146,7 @@ def joined_videos(path: Path) -> int:
             length = int.from_bytes(head[:4])
             if length == 1:  # it follows, in 64 bits
                 length = int.from_bytes(head[8:])
-            if length < 8:  # at the end of the file, too
+            if length < 8:  # also at the end of the file
                 break
             position += length
     return found
@@ -158,7 +158,7 @@ def describe(path: Path, stream: VideoStream, first: av.VideoFrame) -> VideoInfo
     time_base = time_base_of(stream)
     rate = rate_of(stream)
     start = (first.pts or 0) * time_base
-    # The longest stream may be longer than the picture.
+    # The longest stream may be longer than the video stream.
     longest = Fraction(container.duration, av.time_base) if container.duration else None
     duration = stated_duration(stream, start) or longest
     turn = Orientation.of_frame(first)
@@ -188,7 +188,7 @@ def describe(path: Path, stream: VideoStream, first: av.VideoFrame) -> VideoInfo
 
 
 def _tags(stream: VideoStream) -> Tags:
-    """Return metadata of the recording; their names differ between containers."""
+    """Return metadata of the recording; the names differ between containers."""
     metadata = stream.metadata | stream.container.metadata
     found = {name.lower(): value for name, value in metadata.items()}
     location = found.get("location") or found.get("com.apple.quicktime.location.iso6709")
@@ -196,10 +196,10 @@ def _tags(stream: VideoStream) -> Tags:
 
 
 def stated_duration(stream: VideoStream, start: Fraction) -> Fraction | None:
-    """Return the time from the first frame to the end of the stream, as the file declares it.
+    """Return the declared time from the first frame to the end of the stream, seconds.
 
-    In seconds; None where it declares none. `start` is the time of the first frame. In MP4, frames
-    may be hidden before it. Matroska declares the time of the end in a tag.
+    None if it is not declared. `start` is the time of the first frame. In MP4, hidden frames may
+    precede it. Matroska declares the end in a tag.
     """
     if stream.duration:
         return ((stream.start_time or 0) + stream.duration) * time_base_of(stream) - start
@@ -210,7 +210,7 @@ def stated_duration(stream: VideoStream, start: Fraction) -> Fraction | None:
 
 
 def rate_of(stream: VideoStream) -> Fraction:
-    """Return the average rate in pictures per second; 25 where the file states none."""
+    """Return the average frame rate; 25 if the file does not declare one."""
     for rate in (stream.average_rate, stream.guessed_rate):
         if rate and (near := rate.limit_denominator(_MAX_TERM)) > 0:
             return near
@@ -223,27 +223,27 @@ def time_base_of(stream: VideoStream) -> Fraction:
 
 
 _TS_DISCONT = 0x0200  # FFmpeg's flag of such formats: AVFMT_TS_DISCONT
-_BACK = Fraction(1, 10)  # seconds; a clock that goes back by more begins a part
-_FORTH = 10  # seconds; a clock that goes forth by more begins a part, as in FFmpeg's own program
+_BACK = Fraction(1, 10)  # seconds; a larger step back begins a new part
+_FORTH = 10  # seconds; a larger jump forward begins a new part, as in the ffmpeg program
 
 
 class ClockUnwrapper:
-    """Puts packets on one time line; their order stays that of the file.
+    """Moves packets to one continuous time line, in file order.
 
-    Each stream comes to the next part where its own clock jumps: near a joint, packets of both
-    parts alternate. The first stream that comes to a part decides its offset.
+    Each stream enters the next part where its own clock jumps, because packets of both parts
+    alternate near the joint. The first stream in a part determines its offset.
 
     Parameters
     ----------
     container
-        Where its clock cannot restart, packets pass as they are.
+        If its clock cannot restart, packets are not changed.
     pictures
-        The stream whose restarts count.
+        The video stream, whose restarts count.
 
     Attributes
     ----------
     streams
-        Those whose packets are needed: the pictures, and all sound where the clock may restart.
+        Streams whose packets are needed: video, and all sound if the clock may restart.
     may_restart
         Whether the clock may restart in files of this format.
     restarts
@@ -257,12 +257,12 @@ class ClockUnwrapper:
         self.streams: list[Stream] = [pictures, *sounds]
         self._pictures = pictures.index
         self._period = 1 / rate_of(pictures)
-        self._offsets = [Fraction(0)]  # of each part, seconds; the first keeps its clock
-        self._part_of: dict[int, int] = {}  # the number of the part that each stream has come to
-        self._ends: dict[int, Fraction] = {}  # of each stream, seconds of the one time line
+        self._offsets = [Fraction(0)]  # of each part, seconds; the first part keeps its clock
+        self._part_of: dict[int, int] = {}  # the current part of each stream
+        self._ends: dict[int, Fraction] = {}  # of each stream, seconds on the time line
 
     def unwrap(self, packets: "Iterable[Packet[Stream]]") -> "Iterator[Packet[Stream]]":
-        """Yield `packets`, those of `streams` and maybe of others, with continuous times."""
+        """Yield `packets`, of `streams` and possibly others, with continuous times."""
         for packet in packets:
             ticks = packet.pts if packet.dts is None else packet.dts
             if self.may_restart and ticks is not None:
@@ -283,7 +283,7 @@ class ClockUnwrapper:
         packet.dts = None if packet.dts is None else packet.dts + shift
 
     def _part_at(self, stream: int, begin: Fraction) -> int:
-        """Return the part in which a stream goes on at a time of its clock; it may be a new one."""
+        """Return the part, maybe a new one, in which a stream continues at a time of its clock."""
         newest, end = self._part_of.get(self._pictures, 0), self._ends.get(stream)
         for number in range(self._part_of.setdefault(stream, newest), len(self._offsets)):
             time = begin + self._offsets[number]

@@ -1,4 +1,4 @@
-"""A frame of a video: its picture (BGR, or the planes of a decoder), its time, and its video."""
+"""A frame of a video: its pixels (BGR, or decoder planes), its time, and its video."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -17,18 +17,21 @@ from vdet.boxes import Float64Array, Image
 from vdet.media.images import Orientation, from_16_bits, to_ycrcb
 
 Layers = tuple[Image, Image, Image]
-"""Luma, blue and red chroma, uint8 each; chroma may be of half the size of luma."""
+"""Luma, blue and red chroma, uint8 each; chroma may have half the size of luma."""
 
 LUMA_WEIGHTS = {"bt601": (0.299, 0.114), "bt709": (0.2126, 0.0722)}
 """Weights of red and blue in luma, ITU-R BT.601 and BT.709."""
 
 _PLANAR = ("yuv420p", "yuvj420p")
 _MATRICES: dict[int, Literal["bt601", "bt709"]] = {1: "bt709", 2: "bt601", 5: "bt601", 6: "bt601"}
-"""By code of ITU-T H.273; untagged video is taken for BT.601."""
+"""By code of ITU-T H.273; untagged video is treated as BT.601."""
 MATRIX_CODES = {"bt601": 6, "bt709": 1}
-"""Those that are written."""
+"""The codes to write."""
 
-_LUMA_STEPS, _CHROMA_STEPS = 219 / 255, 224 / 255  # of the limited range, for one of the full range
+_LUMA_STEPS, _CHROMA_STEPS = (
+    219 / 255,
+    224 / 255,
+)  # limited-range steps per full-range step
 
 
 def _table(new_base: float, base: float, steps: float) -> Image:
@@ -45,7 +48,7 @@ _LIMITED_LUMA, _LIMITED_CHROMA = _table(16, 0, _LUMA_STEPS), _table(128, 128, _C
 class Coding:
     """A coding of colours: its matrix, and whether luma uses 0 to 255 or 16 to 235.
 
-    The common coding of all pictures is BT.601 with the full range, as in OpenCV's YCrCb.
+    The common coding is BT.601 with full range, as in OpenCV's YCrCb.
     """
 
     matrix: Literal["bt601", "bt709"] = "bt601"
@@ -55,7 +58,7 @@ class Coding:
     def of(cls, picture: av.VideoFrame) -> "Coding | None":
         """Return the coding of a decoded 4:2:0 picture; None for other pixel formats."""
         matrix = _MATRICES.get(picture.colorspace)
-        is_flipped = any(plane.line_size < 0 for plane in picture.planes)  # rows from below
+        is_flipped = any(plane.line_size < 0 for plane in picture.planes)  # rows from bottom to top
         if picture.format.name not in _PLANAR or matrix is None or is_flipped:
             return None
         full_range = picture.color_range == ColorRange.JPEG or picture.format.name == "yuvj420p"
@@ -67,7 +70,7 @@ class Coding:
         return stretched if self.matrix == "bt601" else _recoded(stretched, _FROM_BT709)
 
     def to_bgr(self, layers: Layers) -> Image:
-        """Convert values of this coding to BGR, uint8 `(H, W, 3)`, of the size of luma."""
+        """Convert values of this coding to BGR, uint8 `(H, W, 3)`, in the size of luma."""
         luma, *chroma = self.to_common(layers)
         blue, red = (_as_large(item, luma) for item in chroma)
         return np.asarray(cv2.cvtColor(cv2.merge([luma, red, blue]), cv2.COLOR_YCrCb2BGR), np.uint8)
@@ -118,7 +121,7 @@ def _as_large(values: npt.NDArray[Any], luma: Image) -> npt.NDArray[Any]:
 
 
 class Planes:
-    """A picture of H × W pixels as planes; they share the memory of `picture`.
+    """A picture of H × W pixels as planes that share the memory of `picture`.
 
     Attributes
     ----------
@@ -127,7 +130,7 @@ class Planes:
     blue, red
         Chroma, uint8 `(⌈H / 2⌉, ⌈W / 2⌉)`; a value stands for 2 × 2 pixels.
     is_own
-        Whether nothing else uses the picture, so that it may be changed and encoded.
+        Whether nothing else uses the picture, so it may be changed and encoded.
     """
 
     def __init__(self, picture: av.VideoFrame, coding: Coding, *, is_own: bool = False) -> None:
@@ -155,7 +158,7 @@ class Planes:
 
     @classmethod
     def blank(cls, width: int, height: int, coding: Coding) -> "Planes":
-        """Return planes of their own, with any values; `width` × `height` pixels."""
+        """Return new planes with undefined values; `width` × `height` pixels."""
         picture = av.VideoFrame(width, height, "yuv420p")
         picture.colorspace = MATRIX_CODES[coding.matrix]
         picture.color_range = ColorRange.JPEG if coding.full_range else ColorRange.MPEG
@@ -167,14 +170,14 @@ class Planes:
         return self
 
     def copy(self, used: "Planes | None" = None) -> "Planes":
-        """Return a copy that may be changed; the memory of `used`, of this size, is taken."""
+        """Return a copy that may be changed; it reuses the memory of `used`, of the same size."""
         height, width = self.shape
         return (used or self.blank(width, height, self.coding))._filled(self.layers)
 
     def to_image(self) -> Image:
-        """Return the picture as BGR uint8 `(H, W, 3)`; a value of chroma counts for 2 × 2 pixels.
+        """Return the picture as BGR uint8 `(H, W, 3)`; a chroma value applies to 2 × 2 pixels.
 
-        The error is 1 to 4 levels, more for planes of colours that BGR does not have.
+        The error is 1 to 4 levels, more for colours outside BGR.
         """
         height, width = self.shape
         if self.coding == Coding() and not (height % 2 or width % 2):  # OpenCV is faster
@@ -201,7 +204,7 @@ def _plane(picture: av.VideoFrame, number: int) -> Image:
 
 
 class Picture:
-    """An upright picture. It shares the memory of its pixels, which must not be changed.
+    """An upright picture; it shares the memory of its pixels, which must not be changed.
 
     Parameters
     ----------
@@ -238,13 +241,13 @@ class Picture:
 
 
 _16_BITS = ("gray16", "ya16", "rgb48", "rgba64")
-"""Beginnings of the names of formats of 16-bit pictures, as in PNG and TIFF."""
+"""Prefixes of pixel formats with 16 bits, as in PNG and TIFF."""
 
 
 def bgr_of(picture: av.VideoFrame) -> Image:
     """Return a decoded picture as BGR uint8 `(H, W, 3)`.
 
-    Colour matrix and range are those of its tags; without tags, BT.601 and limited. For 16-bit
+    Colour matrix and range are taken from its tags; without tags, BT.601 and limited. For 16-bit
     values see `from_16_bits`.
     """
     if coding := Coding.of(picture):
@@ -262,8 +265,8 @@ UNSPECIFIED = 2  # in each of the three code tables of ITU-T H.273
 class Frame:
     """One frame of a video.
 
-    `index` counts all frames of the file from 0. `time` is the exact presentation time in seconds
-    as the file has it (its first frame need not be at 0).
+    `index` counts all frames of the file from 0. `time` is the exact presentation time in the file,
+    seconds (the first frame need not be at 0).
     """
 
     index: int
@@ -287,7 +290,7 @@ class ColorTags:
 
 @dataclass(frozen=True, slots=True)
 class Tags:
-    """Metadata of the recording, as the file has them; None where it has none."""
+    """Metadata of the recording in the file; None if missing."""
 
     creation_time: str | None = None
     location: str | None = None

@@ -1,4 +1,4 @@
-"""Pictures, read upright to BGR uint8 and written whole, and numbered ones, which are a video."""
+"""Images: reading upright as BGR uint8, encoding, and numbered images, which are a video."""
 
 import io
 import logging
@@ -24,10 +24,10 @@ from vdet.errors import ImageError, VideoError
 from vdet.files import read_whole, record_input
 
 MAX_PICTURE_PIXELS = 2**25
-"""A picture of more pixels is not read: an 8K frame has fewer, a decompression bomb far more."""
+"""Maximum number of pixels: an 8K frame has fewer, a decompression bomb far more."""
 MAX_PICTURE_SIDE = 2**15
 MAX_BYTES = 256_000_000
-"""Of a picture's file: enough for `MAX_PICTURE_PIXELS` of 16 bits without compression."""
+"""Maximum size of an image file: enough for `MAX_PICTURE_PIXELS` of 16 bits, uncompressed."""
 PICTURE_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp"})
 
 _FORMATS = ("PNG", "JPEG", "BMP", "TIFF", "WEBP")
@@ -49,7 +49,7 @@ _TURNS = {90: cv2.ROTATE_90_COUNTERCLOCKWISE, 180: cv2.ROTATE_180, 270: cv2.ROTA
 
 @dataclass(frozen=True, slots=True)
 class Orientation:
-    """How a coded picture becomes upright: mirrored left to right, or not, and then turned.
+    """How a coded picture becomes upright: mirrored left to right or not, then rotated.
 
     `rotation` is counter-clockwise: 0, 90, 180 or 270 degrees.
     """
@@ -59,7 +59,7 @@ class Orientation:
 
     @property
     def is_sideways(self) -> bool:
-        """Whether width and height change places."""
+        """Whether width and height are swapped."""
         return self.rotation in (90, 270)
 
     @classmethod
@@ -75,7 +75,7 @@ class Orientation:
 
 
 def upright(image: Image, orientation: Orientation) -> Image:
-    """Turn and mirror `image` as `orientation` says."""
+    """Rotate and mirror `image` by `orientation`."""
     turned: cv2.typing.MatLike = cv2.flip(image, 1) if orientation.mirrored else image
     if orientation.rotation:
         turned = cv2.rotate(turned, _TURNS[orientation.rotation])
@@ -83,9 +83,9 @@ def upright(image: Image, orientation: Orientation) -> Image:
 
 
 def read_image(path: Path) -> Image:
-    """Read a picture, turned upright as its EXIF data say.
+    """Read an image, rotated upright by its EXIF data.
 
-    A JPEG file that was cut off is read as far as it goes, with a warning.
+    A truncated JPEG file is read up to the cut, with a warning.
 
     Returns
     -------
@@ -95,9 +95,9 @@ def read_image(path: Path) -> Image:
     Raises
     ------
     ImageError
-        The file cannot be read, is a pipe, is not a PNG, JPEG, BMP, TIFF or WebP picture, or is
-        larger than `MAX_BYTES`; the picture has more than `MAX_PICTURE_PIXELS`, or a side longer
-        than `MAX_PICTURE_SIDE`.
+        The file cannot be read, is a pipe, is not a PNG, JPEG, BMP, TIFF or WebP image, or is
+        larger than `MAX_BYTES`; the image has more than `MAX_PICTURE_PIXELS`, or a side longer than
+        `MAX_PICTURE_SIDE`.
     """
     data = read_encoded(path)
     image = _decode(data, path)
@@ -107,19 +107,19 @@ def read_image(path: Path) -> Image:
 
 
 def is_picture_name(path: Path) -> bool:
-    """Return whether a file is named as a picture, and is not hidden."""
+    """Return whether a file has the name of an image, and is not hidden."""
     return path.suffix.lower() in PICTURE_SUFFIXES and not path.name.startswith(".")
 
 
 def read_header(path: Path) -> tuple[tuple[int, int], Orientation]:
-    """Return width and height of the upright picture, pixels, and its orientation.
+    """Return width and height of the upright image, pixels, and its orientation.
 
     Only the header is decoded.
 
     Raises
     ------
     ImageError
-        As `read_image`.
+        As for `read_image`.
     """
     picture = _open(read_encoded(path), path)
     width, height = picture.size
@@ -130,14 +130,14 @@ def read_header(path: Path) -> tuple[tuple[int, int], Orientation]:
 
 
 def read_encoded(path: Path) -> bytes:
-    """Return the content of the file of a picture. Raises `ImageError`."""
+    """Return the content of an image file. Raises `ImageError`."""
     if path.is_fifo():  # it may never end, or never begin
         raise ImageError(f"{path}: can be read only once; save it to a file first")
     return read_whole(path, limit=MAX_BYTES, what="picture", error=ImageError)
 
 
 def decode_image(data: bytes) -> Image | None:
-    """Decode an encoded picture as `read_image` does; None where that is impossible."""
+    """Decode an encoded image like `read_image`; None if it is not readable."""
     try:
         return _decode(data, Path())
     except ImageError:
@@ -145,7 +145,7 @@ def decode_image(data: bytes) -> Image | None:
 
 
 def encode_image(image: Image, path: Path) -> bytes:
-    """Encode a picture in the format that the suffix of `path` names. Raises `ImageError`."""
+    """Encode an image in the format of the suffix of `path`. Raises `ImageError`."""
     with suppress(cv2.error):
         written, data = cv2.imencode(path.suffix, image)
         if written:
@@ -156,20 +156,20 @@ def encode_image(image: Image, path: Path) -> bytes:
 def from_16_bits(values: npt.NDArray[np.uint16]) -> Image:
     """Scale 16-bit values to 8 bits.
 
-    Where none is above 4095, they are those of a camera with 12 bits, whose white is 4095.
+    If none is above 4095, the camera has 12 bits, and 4095 is white.
     """
     white = _12_BITS if values.max(initial=0) <= _12_BITS else _16_BITS
     return np.asarray(cv2.convertScaleAbs(values, alpha=255 / white), np.uint8)
 
 
 def _is_cut_off(data: bytes) -> bool:
-    """Return whether a JPEG file ends within its picture. It may hold others, as thumbnails."""
+    """Return whether a JPEG file is truncated within its image. It may also have thumbnails."""
     return data.startswith(b"\xff\xd8") and data.rfind(_JPEG_END) < data.rfind(_JPEG_SCAN)
 
 
 @contextmanager
 def _refusing(path: Path) -> Iterator[None]:
-    """Turn what Pillow raises into an `ImageError` that names `path`."""
+    """Convert errors of Pillow to an `ImageError` that names `path`."""
     try:
         yield
     except MemoryError:
@@ -181,7 +181,7 @@ def _refusing(path: Path) -> Iterator[None]:
 
 
 def _open(data: bytes, path: Path) -> ImageFile:
-    """Read the header of a picture. Raises `ImageError`, which names `path`."""
+    """Read the header of an image. Raises `ImageError`, which names `path`."""
     with _refusing(path):
         picture = pillow.open(io.BytesIO(data), formats=_FORMATS)
     if max(picture.size) > MAX_PICTURE_SIDE or math.prod(picture.size) > MAX_PICTURE_PIXELS:
@@ -190,30 +190,30 @@ def _open(data: bytes, path: Path) -> ImageFile:
 
 
 def _orientation(picture: ImageFile) -> Orientation:
-    with suppress(Exception):  # of many kinds, where the EXIF data are damaged
-        # The method of a PNG picture would decode it, in search of EXIF data behind it.
+    with suppress(Exception):  # many kinds, if the EXIF data are damaged
+        # The method of a PNG image would decode it to find EXIF data at its end.
         return Orientation.of_exif(pillow.Image.getexif(picture).get(_ORIENTATION, 1))
     return Orientation()
 
 
 def _decode(data: bytes, path: Path) -> Image:
     picture = _open(data + _JPEG_END if _is_cut_off(data) else data, path)
-    # Pillow itself turns TIFF.
+    # Pillow itself rotates TIFF.
     turn = Orientation() if picture.format == "TIFF" else _orientation(picture)
     with _refusing(path):
         return upright(_to_bgr(picture, data), turn)
 
 
 def _to_bgr(picture: ImageFile, data: bytes) -> Image:
-    """Decode and convert a picture, which was opened from `data`."""
+    """Decode and convert an image that was opened from `data`."""
     has_16_bits = any(";16" in str(tile.args) for tile in picture.tile)
     picture.load()
-    if has_16_bits:  # of which Pillow keeps 8
+    if has_16_bits:  # Pillow keeps only 8
         values = cv2.imdecode(np.frombuffer(data, np.uint8), _ALL_BITS)
         return from_16_bits(np.asarray(values, np.uint16))
     if picture.mode == "F":
         raise ValueError("grey values in floating point")
-    picture.info.pop("transparency", None)  # it is dropped; Pillow would warn of some kinds
+    picture.info.pop("transparency", None)  # it is dropped; Pillow would warn about some kinds
     rgb = picture if picture.mode == "RGB" else picture.convert("RGB")
     return np.asarray(cv2.cvtColor(np.asarray(rgb), cv2.COLOR_RGB2BGR), np.uint8)
 
@@ -221,7 +221,7 @@ def _to_bgr(picture: ImageFile, data: bytes) -> Image:
 def to_ycrcb(image: Image) -> tuple[Image, Image, Image]:
     """Return luma, red and blue chroma of an image, BGR `(H, W, 3)`; uint8 `(H, W)` each."""
     both = cv2.cvtColor(image, cv2.COLOR_BGR2YCrCb)
-    # cv2.split fails where the garbage collector looks at its unfinished tuple in another thread.
+    # cv2.split fails if the garbage collector sees its unfinished tuple in another thread.
     luma, red, blue = (np.asarray(cv2.extractChannel(both, n), np.uint8) for n in range(3))
     return luma, red, blue
 
@@ -229,19 +229,19 @@ def to_ycrcb(image: Image) -> tuple[Image, Image, Image]:
 _PATTERN = re.compile(r"((?:[^%]|%%)*)%(?:0([1-9]\d*))?d((?:[^%]|%%)*)", re.ASCII)
 _LAST_NUMBER = re.compile(r".*?(\d+)\D*\.\w+", re.ASCII | re.DOTALL)
 ASSUMED_RATE = 25.0
-"""Pictures per second, where neither the settings nor the names say."""
+"""Images per second, if neither the settings nor the names determine it."""
 
 
 @dataclass(frozen=True, slots=True)
 class PictureSequence:
-    """Pictures that are a video.
+    """Images that form a video.
 
     Attributes
     ----------
     files
-        The pictures, in order.
+        The images, in order.
     ticks, tick
-        When each picture was taken after the first one, if its name says so; the unit in seconds.
+        Time of each image after the first one, if names are times; the unit in seconds.
     """
 
     files: tuple[Path, ...]
@@ -249,23 +249,23 @@ class PictureSequence:
     tick: int = 1
 
     def timing(self, frame_rate: float | None) -> tuple[Fraction, Sequence[int]]:
-        """Return the rate of the pictures, per second, and when each is shown, in such periods."""
+        """Return the rate of the images, per second, and the time of each, in periods of it."""
         if self.ticks and frame_rate is None:
             return Fraction(1, self.tick), self.ticks
         return Fraction(str(frame_rate or ASSUMED_RATE)), range(len(self.files))
 
 
 def find_sequence(path: Path) -> PictureSequence | None:
-    """Return the pictures that the pattern or the folder `path` names; None where it is neither.
+    """Return the images of the pattern or folder `path`; None if it is neither.
 
-    They may begin at any number, and rise by any step. In the name of a folder, a per cent sign
-    means itself.
+    Numbers may begin anywhere, and increase by any constant step. In the name of a folder, a per
+    cent sign is literal.
 
     Raises
     ------
     VideoError
-        The folder cannot be read, there is no such picture in it, or one is missing. The pictures
-        of a folder are not one sequence.
+        The folder cannot be read, contains no such image, one is missing, or the images of a folder
+        are not one sequence.
     """
     pattern = None if path.exists() else _PATTERN.fullmatch(path.name)
     if not (pattern or path.is_dir()):
@@ -296,7 +296,7 @@ def find_sequence(path: Path) -> PictureSequence | None:
 
 
 def _by_the_clock(files: tuple[Path, ...]) -> PictureSequence | None:
-    """Return the pictures if all their names are times, each another one."""
+    """Return the images if all their names are different times."""
     times = {time: file for file in files if (time := ClockSettings().time_in(file.name))}
     if len(times) < len(files) or len({time.tzinfo for time in times}) > 1:
         return None
@@ -308,7 +308,7 @@ def _by_the_clock(files: tuple[Path, ...]) -> PictureSequence | None:
 
 
 def _form(before: str, digits: str | None, after: str) -> re.Pattern[str]:
-    """Return what matches the names that a pattern makes."""
+    """Return a regular expression for the names of a pattern."""
     before, after = (re.escape(part.replace("%%", "%")) for part in (before, after))
     number = r"0|[1-9]\d*" if digits is None else rf"\d{{{digits}}}|[1-9]\d{{{digits},}}"
     return re.compile(f"{before}({number}){after}", re.ASCII | re.DOTALL)

@@ -26,47 +26,48 @@ from vdet.media.images import ASSUMED_RATE, Orientation, upright
 _log = logging.getLogger("vdet")
 _DEFAULTS = InputSettings()
 _MAX_SIDE = 16_384  # pixels; H.264 cannot be written larger
-_TOLERANCE = Fraction(1, 100)  # fraction of its duration, or frames, that a whole file may lack
+_TOLERANCE = Fraction(1, 100)  # fraction of its duration that an intact file may lack
 
 
 class VideoReader:
     """The frames of a video file, in order; a context manager. They can be read once.
 
-    It gives the frames with ``start <= time - info.start < end``, and at most `frames` of them.
-    Seconds count from the file's first frame, as in a player. Decoding begins at the key frame
-    before `start` where the frames before it can be counted (see `Decoder`). Elsewhere all
-    frames are decoded, and those before `start` are dropped. The frames given are the same.
+    It yields the frames with ``start <= time - info.start < end``, at most `frames` of them.
+    Seconds count from the first frame of the file, as in a player. Decoding begins at the key frame
+    before `start` if the frames before it can be counted (see `Decoder`). Otherwise all frames are
+    decoded, and those before `start` are dropped; the result is the same.
 
-    The first stream of moving pictures is read. Frames are turned upright, and mirrored where the
-    file says so. HDR (PQ or HLG) is converted to BT.709. A frame of another size
-    than the first is scaled to it. Where the clock of a recording restarts, its parts follow one
-    another. A time that is missing, or not later than the one before, is guessed from the rate.
-    Damaged packets are skipped. At the end, one warning (logger "vdet") says how many frames were
-    lost or damaged, whether the file ends before its declared end, how often the clock restarts,
-    which frames were scaled, and what of the file was not used (other video streams, HDR).
+    The first video stream is read. Frames are rotated upright, and numbered images also mirrored,
+    as the file says. HDR (PQ or HLG) is converted to BT.709. Frames of another size than the first
+    are scaled to it. If the clock of a recording restarts, its parts follow one another. A time
+    that is missing, or not later than the previous one, is estimated from the frame rate.
+
+    Damaged packets are skipped. At the end, one warning (logger "vdet") reports the number of
+    frames lost or damaged, an early end of the file, restarts of the clock, scaled frames, and
+    unused video streams.
 
     Parameters
     ----------
     path
-        The file; or numbered pictures, as `img_%04d.png`, from any number on, without a gap.
+        The file, or numbered images such as `img_%04d.png`, without a gap.
     start, end
         Seconds after the file's first frame; None for no limit.
     frames
         Maximum number of frames; None for no limit.
     settings
-        How much damage is tolerated, and the rate of numbered pictures.
+        How much damage is tolerated, and the rate of numbered images.
 
     Attributes
     ----------
     length
-        Seconds from the first frame to the end of the last; None where that is not known. Before
-        all frames were read it is what the file declares.
+        Seconds from the first frame to the end of the last; None if unknown. It is the declared
+        length until all frames are read.
 
     Raises
     ------
     VideoError
-        The file is missing, is not a video, or not one frame of it can be decoded. After the last
-        frame: more of the frames read were lost or damaged than `settings` tolerates.
+        The file is missing, is not a video, or no frame can be decoded. After the last frame: more
+        frames were lost or damaged than `settings` tolerates.
     """
 
     def __init__(
@@ -103,12 +104,12 @@ class VideoReader:
 
     @property
     def damaged(self) -> int:
-        """Frames lost, or shown with errors, so far."""
+        """Number of frames lost or damaged so far."""
         return self._decoder.damage.damaged
 
     @property
     def expected(self) -> int | None:
-        """About how many frames there will be; None where the file does not say."""
+        """The approximate number of frames; None if the file does not declare it."""
         if (last := self.info.frames) is None:
             return None
         if self._end is not None:
@@ -126,12 +127,12 @@ class VideoReader:
         self.close()
 
     def close(self) -> None:
-        """Close the file; there are no more frames."""
+        """Close the file; no more frames can be read."""
         self._frames.close()
         self._decoder.container.close()
 
     def _assumptions(self) -> Iterator[str]:
-        """Yield what is read in another way than the file, or the user, may mean."""
+        """Yield assumptions that the user should know."""
         if isinstance(self._decoder.ticks, range) and self._settings.frame_rate is None:
             yield f"{ASSUMED_RATE:.0f} images per second are assumed; set input.frame_rate"
         if self._decoder.container.streams.audio and not self.info.has_sound:
@@ -172,7 +173,7 @@ class VideoReader:
                 yield Frame(index, time, self._upright(picture))
 
     def _upright(self, picture: av.VideoFrame) -> Picture:
-        """Return a picture as its planes if these need no conversion, else as BGR."""
+        """Return a picture as planes if they need no conversion, else as BGR."""
         info = self.info
         form = Coding.of(picture), picture.width, picture.height
         has_same_form = form == (info.coding, info.width, info.height)
@@ -211,7 +212,7 @@ class VideoReader:
             self._faults.append(f"ends early: {index + 1} of {info.frames} frames could be read")
 
     def _report(self) -> None:
-        """Refuse a video that is too damaged; warn of any other fault."""
+        """Refuse a video that is too damaged; warn about other faults."""
         damaged, total = self.damaged, self._decoder.damage.pictures + self._decoder.damage.lost
         if damaged:
             self._faults.insert(0, f"{damaged} of {total} frames damaged or lost")
@@ -229,7 +230,7 @@ class VideoReader:
 
 
 def _standard_range(transfer: int, stream: VideoStream) -> Graph | None:
-    """Return the filter that makes standard range (BT.709) of HDR video; None for other video."""
+    """Return the filter that converts HDR video to BT.709; None for other video."""
     if transfer not in demux.HDR_TRANSFERS:
         return None
     graph = Graph()
@@ -244,9 +245,9 @@ def _standard_range(transfer: int, stream: VideoStream) -> Graph | None:
 
 
 def next_time(last: Fraction | None, stated: Fraction | None, period: Fraction) -> Fraction:
-    """Return the time of a frame, later than that of the frame before, `last`; in seconds.
+    """Return the time of a frame, later than that of the previous frame, `last`; seconds.
 
-    It is the `stated` one where that is so, else one frame period after the frame before.
+    It is the `stated` time if that is later, else one period after the previous frame.
     """
     if last is None:
         return stated or Fraction(0)

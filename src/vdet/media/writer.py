@@ -27,11 +27,10 @@ _log = logging.getLogger("vdet")
 class SoundCopy:
     """Copies the packets of every sound stream of `source` to `target`, bit for bit.
 
-    Times stay relative to the picture: second `origin` of the source becomes second 0 of the
-    target. What begins earlier is left out, except one packet where the target can hide it (mp4 and
-    mov): a decoder needs it to start from. Damaged packets, and a stream that the target cannot
-    hold, are left out with a warning (logger "vdet"). Make the copy before anything is written to
-    `target`.
+    Times stay relative to the video: second `origin` of the source becomes second 0 of the target.
+    Earlier packets are dropped, except one if the target can hide it (mp4 and mov), because a
+    decoder needs it to start. Damaged packets, and streams that the target does not support, are
+    dropped with a warning (logger "vdet"). Create it before anything is written to `target`.
 
     Raises
     ------
@@ -52,18 +51,18 @@ class SoundCopy:
         self._next = next(self._packets, None)
 
     def copy(self, until: Fraction | None) -> None:
-        """Copy what begins before second `until` of the target; for None, all that is left."""
+        """Copy packets that begin before second `until` of the target; None for all."""
         while packet := self._next:
             if until is not None and (packet.pts or 0) * packet.time_base >= until:
                 return
             try:
                 self._target.mux(packet)
-            except av.InvalidDataError:  # found while it is repacked for another container
+            except av.InvalidDataError:  # found when repacking for another container
                 self._left_out += 1
             self._next = next(self._packets, None)
 
     def close(self) -> None:
-        """Close the source; warn of packets that could not be copied."""
+        """Close the source; warn about packets that could not be copied."""
         if self._left_out:
             fault = "damaged, or without a time of their own"
             _log.warning("%s: %d sound packets dropped: %s", self._path, self._left_out, fault)
@@ -71,7 +70,7 @@ class SoundCopy:
         self._source.close()
 
     def _add_streams(self) -> dict[int, AudioStream]:
-        """Add those streams to the target that it can hold, by their index in the source."""
+        """Add the supported streams to the target, by their index in the source."""
         streams, target = {}, self._target
         for stream in self._source.streams.audio:
             codec = stream.codec_context
@@ -84,7 +83,7 @@ class SoundCopy:
         return streams
 
     def _moved(self) -> "Generator[Packet[Stream], None, None]":
-        """Yield the packets to copy, with their times and their stream in the target."""
+        """Yield the packets to copy, with their times and stream in the target."""
         if not self._streams:
             return
         needed = self._clock.streams if self._clock.may_restart else ()
@@ -109,11 +108,11 @@ class SoundCopy:
 VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv")
 
 _X264 = "b-adapt=0:scenecut=0:sync-lookahead=1"
-"""Parameters of x264. It does not search the next frames for cuts, nor for the best kind of each:
-that takes a tenth of a run, and saves 1 % of the file. It keeps few frames in memory.
+"""Parameters of x264: no search of later frames for scene cuts and frame types, which would take a
+tenth of a run and save 1 % of the file size; and few frames in memory.
 """
 _LARGEST_AT_ONCE = 1920 * 1088
-"""Pixels of the largest frames of which several are encoded at once; that takes more memory."""
+"""Maximum pixels of frames that are encoded in parallel, which takes more memory."""
 _MARK = "made by vdet"
 _MP4 = (b"ftyp", b"styp", b"moov", b"moof", b"mdat", b"free", b"skip", b"wide")  # first boxes
 _FINEST = 10_000_000  # ticks a second; more is not safe in mp4 players
@@ -122,11 +121,11 @@ _FINEST = 10_000_000  # ticks a second; more is not safe in mp4 players
 def may_replace_video(path: Path) -> bool:
     """Return whether a video may replace this file: vdet wrote it, or it is not a video.
 
-    `VideoWriter` marks what it writes in the comment of the file. What cannot be opened but begins
-    like an MP4 file is kept: it may be a recording that was cut off, and could be repaired.
+    `VideoWriter` marks its files in the metadata comment. An unreadable file that begins like an
+    MP4 file is kept: it may be a truncated recording that can be repaired.
     """
     if not path.is_file():
-        return path.is_symlink()  # it leads nowhere
+        return path.is_symlink()  # its target does not exist
     try:
         with av.open(str(path.absolute()), options=SAFELY, metadata_errors="replace") as container:
             tags = {key.lower(): value for key, value in container.metadata.items()}
@@ -143,33 +142,33 @@ class VideoWriter:
     The file is complete only when the ``with`` block has ended without an exception. For an output
     that appears complete or not at all, write to a file from `vdet.files.OutputFiles`.
 
-    The first frame is shown at second 0, every other exactly as long after it as in the source
-    (mkv: to the millisecond), the last for one period of the average rate. Sides of odd length grow
-    by one pixel, the last row or column repeated: 4:2:0 needs even ones. Colours are coded as the
-    planes of the source are (`VideoInfo.coding`), and tagged so if the source was tagged at all.
-    Planes that were not changed are encoded as they were decoded. Sound packets are copied,
-    not encoded again. Creation time, location and title are kept.
+    The first frame is at second 0, all others keep their exact distance from it (mkv: to the
+    millisecond), and the last one lasts one period of the average rate. Odd sides grow by one
+    pixel, which repeats the last row or column, because 4:2:0 needs even sides. Colours are coded
+    like the planes of the source (`VideoInfo.coding`), and tagged if the source is tagged.
+    Unchanged planes are encoded as decoded. Sound packets are copied, not encoded again. Creation
+    time, location and title are kept.
 
     Parameters
     ----------
     path
         The file to write, .mp4, .mov or .mkv.
     info
-        Of the source; frames must have its width and height.
+        Properties of the source; frames must have its width and height.
     settings
-        Codec, preset and quality.
+        Preset and quality.
     name
-        The name of the file in messages, where that is not `path`.
+        The name of the file in messages, if it is not `path`.
     whole_sound
-        True: the sound goes on to its own end. False: it ends with the last frame written, which
-        is right where the frames are only a part of the source.
+        True: copy the sound to its end. False: end it with the last frame, for a part of the
+        source.
     threads
-        Of the encoder; None lets it choose.
+        Number of threads of the encoder; None: it chooses.
 
     Raises
     ------
     OutputError
-        The suffix is another, or the file cannot be written (from every method).
+        The suffix is not supported, or the file cannot be written (from every method).
     VideoError
         No frame was written (at the end), or the source of the sound cannot be opened.
     """
@@ -223,7 +222,7 @@ class VideoWriter:
                 self._sound.copy(since)
 
     def _check_pause(self, seconds: Fraction) -> None:
-        """Refuse more ticks from one frame to the next than mp4 can hold."""
+        """Raise `OutputError` for a pause between two frames that is too long for mp4."""
         ticks = seconds * max(self._time_base.denominator, 20_000)  # FFmpeg writes no coarser ones
         if ticks >= 2**31 and self._container.format.name != "matroska":
             raise OutputError(f"{self._name}: cannot hold a pause of {int(seconds)} s; use .mkv")
@@ -243,7 +242,7 @@ class VideoWriter:
                 self._sound.close()
 
     def _finish(self) -> None:
-        """Write what is left: frames that the encoder holds back, sound, the file's index."""
+        """Write the rest: frames in the encoder, sound, and the index of the file."""
         if self._origin is None:
             raise VideoError(f"{self._name}: no frames to write; check the times")
         self._container.mux(self._stream.encode(None))
@@ -254,7 +253,7 @@ class VideoWriter:
 
     @contextlib.contextmanager
     def _naming_the_file(self) -> Iterator[None]:
-        if self._failure:  # FFmpeg crashes where packets come after its header failed
+        if self._failure:  # FFmpeg crashes if packets follow after its header failed
             raise self._failure
         try:
             yield

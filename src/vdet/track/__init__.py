@@ -1,1 +1,1 @@
-"""Detections of consecutive frames become tracks: the trackers, each behind one protocol."""
+"""Trackers: they turn detections of consecutive frames into tracks, behind one protocol."""

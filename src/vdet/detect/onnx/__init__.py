@@ -1,1 +1,1 @@
-"""Networks in ONNX files as detectors: our own, and those that the usual tools export."""
+"""Networks in ONNX files as detectors: our own, and exports of common tools."""

@@ -21,10 +21,10 @@ from vdet.draw.boxes import GREEN, draw_box
 from vdet.errors import ModelError
 from vdet.media import Picture
 
-_MAX_BOXES = 10_000  # before suppression, those of the highest scores
+_MAX_BOXES = 10_000  # before suppression, by highest score
 
 Candidates = tuple[RawBoxes, InputForm, float]
-"""The boxes before suppression, the input that they were found in, and the minimum score."""
+"""The boxes before suppression, the form of the input, and the minimum score."""
 
 SHIPPED = Path(__file__).parents[2] / "models" / "net.onnx"
 
@@ -57,9 +57,9 @@ class NetworkModel:
 class NetworkDetector:
     """Finds vehicles in frames of one size: a `VideoDetector` without state.
 
-    `for_stills` is the network for still pictures. `numbers` has the index of each class of the
-    network in `detector.classes`, -1 for those that are not wanted; its last entry, -1, stands for
-    unknown classes.
+    `for_stills` is the network for single images. `numbers` has the index of each class of the
+    network in `detector.classes`, -1 for other classes; its last entry, -1, stands for unknown
+    classes.
     """
 
     network: Recognized
@@ -70,7 +70,7 @@ class NetworkDetector:
 
     @property
     def unknown_classes(self) -> tuple[str, ...]:
-        """Classes of the settings that the network does not know; some are asked for by default."""
+        """Classes in the settings that the network does not know, except the default ones."""
         known = [self.settings.classes[number] for number in self.numbers if number >= 0]
         known += NetworkSettings().classes
         return tuple(name for name in self.settings.classes if name not in known)
@@ -103,7 +103,7 @@ class NetworkDetector:
         )
 
     def stage_pictures(self, image: Image, detections: Boxes) -> dict[str, Image]:
-        """Return the network's input as a picture, and the boxes before suppression."""
+        """Return images of the network's input, and of the boxes before suppression."""
         boxes = image.copy()
         raw, form = detections.trace
         for box, score in zip(raw.boxes.round().astype(int).tolist(), raw.scores, strict=True):
@@ -112,7 +112,7 @@ class NetworkDetector:
 
 
 def our_classes(names: Sequence[str], wanted: Sequence[str]) -> list[int]:
-    """Return the index of each class of a network in `wanted`, -1 if it is not wanted."""
+    """Return the index in `wanted` of each class of a network, -1 if it is missing."""
     numbers = {name: number for number, name in enumerate(wanted)}
     return [numbers.get(our_name(name) or name.strip().lower(), -1) for name in names]
 
@@ -136,9 +136,9 @@ def suppress(boxes: Float32Array, scores: Float32Array, overlap: float) -> Int64
 
 
 def trained_on(path: Path) -> tuple[str, ...]:
-    """Return the names of the sets that a network of ours and its bases were trained on.
+    """Return the names of the sets that our network and its bases were trained on.
 
-    Other networks do not name them.
+    Other networks have no such names.
     """
     header = read_header(Session(path))
     provenance: Any = header.provenance if header else None

@@ -1,4 +1,4 @@
-"""Layouts of outputs: functions that turn the output of a network into boxes."""
+"""Output layouts: functions that convert the output of a network to boxes."""
 
 import math
 from collections.abc import Callable
@@ -10,10 +10,10 @@ from vdet.boxes import Float32Array, Int32Array
 from vdet.detect.onnx.session import Array
 
 STRIDES = (8, 16, 32)
-"""Pixels of the input between the cells of each level."""
+"""Distance between the cells of each level, pixels of the input."""
 
 Cells = tuple[Float32Array, Float32Array]
-"""Middles `(cells, 2)`, x and y in pixels of the input, and strides `(cells,)` of all cells."""
+"""Centres `(cells, 2)`, x and y in pixels of the input, and strides `(cells,)` of all cells."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -22,8 +22,8 @@ class RawBoxes:
 
     `boxes` float32 `(n, 4)`: x1, y1, x2, y2, pixels of the input or of the frame; `scores` float32
     `(n,)`, 0 to 1; `classes` int32 `(n,)`: indices in the names of the network or of the settings;
-    `class_scores` float32 `(n, len(names))`: how likely each is, None where the network only says
-    which class is the best.
+    `class_scores` float32 `(n, len(names))`: probability of each class, None if the network outputs
+    only the best class.
     """
 
     boxes: Float32Array
@@ -33,7 +33,7 @@ class RawBoxes:
 
 
 OutputLayout = Callable[[Array, float], RawBoxes]
-"""Turns an output into boxes in pixels of the input; leaves out scores below a limit."""
+"""Converts an output to boxes in pixels of the input; drops scores below a minimum."""
 
 
 def our_cells(
@@ -77,7 +77,7 @@ def final_rows(output: Array, minimum: float) -> RawBoxes:
 
 
 def cell_centers(width: int, height: int) -> Cells:
-    """Return the middle and the stride of all cells of an input."""
+    """Return centre and stride of all cells of an input."""
     centers, strides = [], []
     for stride in STRIDES:
         y, x = np.mgrid[: height // stride, : width // stride]
@@ -89,7 +89,7 @@ def cell_centers(width: int, height: int) -> Cells:
 def _raw(
     boxes: Array, scores: Array, classes: Array, class_scores: Array | None = None
 ) -> RawBoxes:
-    """Return the boxes; each row of `class_scores`, at least 0, becomes one whose sum is 1."""
+    """Return the boxes; each row of `class_scores`, at least 0, is normalized to a sum of 1."""
     if class_scores is not None:
         class_scores = np.nan_to_num(class_scores.astype(np.float32).clip(1e-9, 1))
         class_scores /= class_scores.sum(axis=1, keepdims=True)

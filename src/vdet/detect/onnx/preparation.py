@@ -1,4 +1,4 @@
-"""From a frame to the input of a network, and from boxes in the input back to the frame."""
+"""Convert frames to the input of a network, and boxes in the input back to the frame."""
 
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -12,7 +12,7 @@ from vdet.media import Picture
 
 _MULTIPLE = 32  # of pixels: the stride of the coarsest cells
 GREY = 114
-"""Value of pixels of the input beyond the frame."""
+"""Value of input pixels outside the frame."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,14 +34,14 @@ class InputForm:
     dtype: type[np.generic] = np.uint8
 
     def prepare(self, picture: Picture) -> tuple[npt.NDArray[Any], "Placement"]:
-        """Return the input that shows a frame, and where the frame lies in it."""
+        """Return the input for a frame, and the placement of the frame in it."""
         image, place = self.scaled(picture)
         if self.dtype is np.uint8:
             return image[np.newaxis], place
         return cv2.dnn.blobFromImage(image, 1 / 255, swapRB=True).astype(self.dtype), place
 
     def scaled(self, picture: Picture) -> tuple[Image, "Placement"]:
-        """Return the input as a picture, BGR uint8, and where the frame lies in it."""
+        """Return the input as an image, BGR uint8, and the placement of the frame in it."""
         width, height = self.width, self.height
         if self.dtype is not np.uint8:
             factor = min(width / picture.width, height / picture.height)
@@ -58,26 +58,26 @@ class InputForm:
 
 
 class Placement(NamedTuple):
-    """Where a frame lies in the input: its top left pixel and its scales x and y."""
+    """Placement of a frame in the input: its top-left pixel, and its scales in x and y."""
 
     left: int
     top: int
     scales: tuple[float, float]
 
     def to_frame(self, boxes: Float32Array) -> Float32Array:
-        """Return boxes of the input, `(n, 4)` x1, y1, x2, y2, in pixels of the frame."""
+        """Convert boxes in the input, `(n, 4)` x1, y1, x2, y2, to pixels of the frame."""
         offset = np.array([self.left, self.top] * 2, np.float32)
         return np.asarray((boxes - offset) / np.array(self.scales * 2, np.float32))
 
 
 def size_of_area(width: int, height: int, pixels: float) -> tuple[int, int]:
-    """Return width and height of about `pixels` in the shape of a frame, for our own networks."""
+    """Return an input size of about `pixels`, in the aspect ratio of a frame, for our networks."""
     factor = (pixels / (width * height)) ** 0.5 / _MULTIPLE
     return max(1, round(width * factor)) * _MULTIPLE, max(1, round(height * factor)) * _MULTIPLE
 
 
 def _scaled_picture(picture: Picture, width: int, height: int) -> Image:
-    """Return a picture as BGR in another size; planes are scaled before they are converted."""
+    """Return a picture as BGR in another size; planes are scaled before conversion."""
     planes = picture.planes
     if planes is None:
         return _scaled(picture.image, width, height)
@@ -86,9 +86,9 @@ def _scaled_picture(picture: Picture, width: int, height: int) -> Image:
 
 
 def _scaled(image: Image, width: int, height: int) -> Image:
-    """Return the image in another size; it is halved first while it is more than twice as large.
+    """Return an image in another size; it is halved first while it is more than twice as large.
 
-    Thus every pixel counts, as in an area average, in a fraction of its time.
+    So every pixel counts, as in an area average, in a fraction of the time.
     """
     while image.shape[1] >= 2 * width and image.shape[0] >= 2 * height:
         half = max(width, image.shape[1] // 2), max(height, image.shape[0] // 2)

@@ -28,26 +28,26 @@ from vdet.media import Picture
 _MAX_SIDE = 16_384
 _MAX_PIXELS = 16_000_000
 _MAX_FINAL_ROWS = 1000
-_NORMALISED = 2.0  # pixels of the input: no box of an ordinary network ends nearer to the corner
-_USUAL_SIZE = 640, 640  # of exports with an input of any size
+_NORMALISED = 2.0  # pixels of the input: boxes that all end nearer to the corner are fractions
+_USUAL_SIZE = 640, 640  # for exports with a dynamic input size
 _STILL_PIXELS = 1.44
-"""Pixels of the input for a still picture, as a multiple of those for a frame of a video."""
+"""Input pixels for a single image, as a multiple of those for a video frame."""
 
 _TYPES: dict[str, type[np.generic]] = {"tensor(float)": np.float32, "tensor(float16)": np.float16}
-"""What onnxruntime calls the types of inputs."""
+"""Names of input types in onnxruntime."""
 
 COCO = tuple(Path(__file__).with_name("coco.txt").read_text("utf-8").splitlines())
-"""The 80 classes of the COCO data set in the order that detectors number them."""
+"""The 80 classes of the COCO data set, in the order used by detectors."""
 
 HEADER_KEY = "vdet"
-"""Key of the metadata that holds the header."""
+"""Metadata key of the header."""
 
 
 class Calibration(Section):
     """Score of a box: sigmoid(slope · x + offset), where x is the output of the network.
 
-    It is the fraction of boxes with such an output that show a vehicle, fitted on cameras that were
-    left out of trainings (Platt, 1999).
+    It is the fraction of boxes with this output that show a vehicle, fitted on held-out cameras
+    (Platt, 1999).
     """
 
     slope: float = Field(2.675, gt=0, le=100)
@@ -60,17 +60,17 @@ class Header(Section):
     format: Literal[1] = 1
     classes: tuple[str, ...] = Field(min_length=1, max_length=1000)
     pixels: int = Field(147_456, ge=1024, le=_MAX_PIXELS)
-    """Of the scaled frame of a video; a still picture has `_STILL_PIXELS` times as many."""
+    """Pixels of the scaled video frame; a single image has `_STILL_PIXELS` times as many."""
     calibration: Calibration = Calibration()
     by_class: dict[str, Calibration] = Field({}, max_length=1000)
-    """The calibration of boxes that the network names so; of other classes, `calibration`."""
+    """The calibration of boxes by class; `calibration` for other classes."""
     provenance: dict[str, Any] = Field({})
-    """What it was trained on and how, and its metrics."""
+    """Training data, training settings and metrics."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Recognized:
-    """A network whose input and output are known.
+    """A network with a known form of input and output.
 
     Attributes
     ----------
@@ -83,9 +83,9 @@ class Recognized:
     form
         The form of its input.
     layout
-        Turns its output into boxes.
+        Converts its output to boxes.
     header
-        The header of a network of ours; None for others.
+        The header of our networks; None for others.
     """
 
     session: Session
@@ -98,8 +98,8 @@ class Recognized:
     def for_frames(self, width: int, height: int, *, are_stills: bool = False) -> "Recognized":
         """Return the network with an input for frames of one size, width and height in pixels.
 
-        Only the input of our networks depends on it. It is larger for still pictures, to find
-        smaller vehicles: they need not keep up with a video.
+        Only the input of our networks depends on it. It is larger for single images, to find
+        smaller vehicles, because they take less time than a video.
         """
         if self.header is None:
             return self
@@ -130,17 +130,17 @@ class Recognized:
 
 
 def recognize(session: Session, names: Sequence[str] = ()) -> Recognized:
-    """Find the form of a network's input and output.
+    """Determine the form of a network's input and output.
 
     Parameters
     ----------
     names
-        Names of its classes, instead of those in the file.
+        Names of its classes; replaces those in the file.
 
     Raises
     ------
     ModelError
-        The network has an unknown form; the message says how it differs.
+        The form is unknown; the message says how it differs.
     """
     if len(session.inputs) != 1:
         raise _unknown(session, f"it has {len(session.inputs)} inputs, not one")
@@ -154,7 +154,7 @@ def recognize(session: Session, names: Sequence[str] = ()) -> Recognized:
 
 
 def read_header(session: Session) -> Header | None:
-    """Return the header of a network of ours, None for another one. Raises `ModelError`."""
+    """Return the header of our network, None for another one. Raises `ModelError`."""
     if HEADER_KEY not in session.metadata:
         return None
     try:
@@ -164,7 +164,7 @@ def read_header(session: Session) -> Header | None:
 
 
 def _ours(session: Session, header: Header, size: tuple[int, int]) -> Recognized:
-    """Return a network of ours with an input of one size, width and height in pixels."""
+    """Return our network with an input of one size, width and height in pixels."""
     scores = [header.by_class.get(name, header.calibration) for name in header.classes]
     lines = np.array([(score.slope, score.offset) for score in scores], np.float32)
     layout = partial(our_cells, cells=cell_centers(*size), calibration=lines)
@@ -172,7 +172,7 @@ def _ours(session: Session, header: Header, size: tuple[int, int]) -> Recognized
 
 
 def _foreign(session: Session, names: tuple[str, ...]) -> Recognized:
-    """Return a network of another tool, by the shape of its output for a black picture."""
+    """Return a network of another tool, by the shape of its output for a black image."""
     own_names, size = _ultralytics_metadata(session)
     names = names or own_names
     form = _letterbox(session, size)
@@ -193,14 +193,14 @@ def _foreign(session: Session, names: tuple[str, ...]) -> Recognized:
 
 
 def _ultralytics_metadata(session: Session) -> tuple[tuple[str, ...], tuple[int, int]]:
-    """Return the names of the classes, if they are known, and the usual size of the input."""
+    """Return the names of the classes, if known, and the usual input size."""
     metadata = session.metadata
     try:
         names, side = (ast.literal_eval(metadata.get(key, "None")) for key in ("names", "imgsz"))
         listed = names.values() if isinstance(names, dict) else names or ()
         size = (int(side[1]), int(side[0])) if side else _USUAL_SIZE
         known = tuple(map(str, listed))
-    except Exception as error:  # of many kinds: the text is any
+    except Exception as error:  # many kinds: the text may be anything
         raise _unknown(session, "its metadata cannot be read") from error
     task = metadata.get("task", "detect")
     if task != "detect":
@@ -209,7 +209,7 @@ def _ultralytics_metadata(session: Session) -> tuple[tuple[str, ...], tuple[int,
 
 
 def _letterbox(session: Session, usual: tuple[int, int]) -> InputForm:
-    """Return the form of the input, of the `usual` width and height if it may have any."""
+    """Return the form of the input, with the `usual` size if it is dynamic."""
     (slot,) = session.inputs
     sides = [side if isinstance(side, int) and side > 0 else None for side in slot.shape]
     if len(sides) != 4 or sides[0] not in (1, None) or sides[1] not in (3, None):

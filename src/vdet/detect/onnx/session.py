@@ -1,4 +1,4 @@
-"""An ONNX file that onnxruntime has loaded, with limits for its time and its memory."""
+"""An ONNX file loaded by onnxruntime, with limits on time and memory."""
 
 import os
 import threading
@@ -18,24 +18,24 @@ from vdet.workers import core_count
 Array = npt.NDArray[Any]
 
 MAX_BYTES = 500_000_000
-"""Largest ONNX file that is read."""
+"""Maximum size of an ONNX file."""
 MAX_SECONDS = 60
-"""Longest time for one picture."""
-_MAX_MEMORY = 1_000_000_000  # bytes while it runs, for each core: so many pictures run at once
+"""Maximum time for one image."""
+_MAX_MEMORY = 1_000_000_000  # bytes per core while it runs: one image per core
 _MAX_METADATA = 200_000  # characters of one value
 
-_SILENT = 4  # level of onnxruntime's own messages: every error is raised too
+_SILENT = 4  # log level of onnxruntime, because every error is also raised
 
 
 class Session:
-    """A network that is ready to run; threads may share it.
+    """A network ready to run; threads may share it.
 
     Attributes
     ----------
     inputs
         Each has a `name`, a `shape` and a `type`, such as `tensor(float)`.
     output_shapes
-        As the file declares them; a length that depends on the input is a name.
+        Declared shapes; lengths that depend on the input are names.
 
     Raises
     ------
@@ -57,18 +57,18 @@ class Session:
                 data,
                 _limited_options(),
                 providers=["CPUExecutionProvider"],
-                disabled_optimizers=["ConstantFolding"],  # it computes without these limits
+                disabled_optimizers=["ConstantFolding"],  # it ignores these limits
             )
             self.metadata: Mapping[str, str] = self._session.get_modelmeta().custom_metadata_map
             self.inputs = self._session.get_inputs()
             self.output_shapes = [output.shape for output in self._session.get_outputs()]
-        except Exception as error:  # onnxruntime raises kinds of its own, and plain ones
+        except Exception as error:  # onnxruntime raises its own kinds, and built-in ones
             raise ModelError(f"{path}: onnxruntime cannot load it: {_in_words(error)}") from error
         if any(len(value) > _MAX_METADATA for value in self.metadata.values()):
             raise ModelError(f"{path}: has metadata of more than {_MAX_METADATA:,} characters")
 
     def run(self, values: Array) -> list[Array]:
-        """Return all outputs for the values of the only input.
+        """Return all outputs for the values of the single input.
 
         Raises
         ------
@@ -77,9 +77,13 @@ class Session:
         """
         options, outputs = self._new_options(), Future[list[Array]]()
         options.log_severity_level = _SILENT
-        call = values, options, outputs  # one long operation cannot be stopped: it is left behind
+        call = (
+            values,
+            options,
+            outputs,
+        )  # one long operation cannot be stopped: it is abandoned
         threading.Thread(target=self._run, args=call, name="vdet-network", daemon=True).start()
-        for _ in range(MAX_SECONDS):  # seconds in which this process was stopped do not count
+        for _ in range(MAX_SECONDS):  # time in which this process was stopped does not count
             with suppress(TimeoutError):
                 return outputs.result(1)
         options.terminate = True
@@ -89,7 +93,7 @@ class Session:
         try:
             found = self._session.run(None, {self.inputs[0].name: values}, options)
             outputs.set_result([np.asarray(item) for item in found])
-        except Exception as error:  # onnxruntime raises kinds of its own
+        except Exception as error:  # onnxruntime raises its own kinds
             outputs.set_exception(self._failed(_in_words(error)))
 
     def _failed(self, reason: str) -> ModelError:
@@ -97,22 +101,22 @@ class Session:
 
 
 def _limited_options() -> Any:
-    """Return options for one thread, since frames run in parallel, and with a limit of memory."""
+    """Return options for one thread, because frames run in parallel, and a memory limit."""
     import onnxruntime
 
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
-    options.enable_mem_pattern = False  # it reserves more than is used
+    options.enable_mem_pattern = False  # it would reserve more than is used
     options.log_severity_level = _SILENT
     options.add_session_config_entry("session.use_env_allocators", "1")
-    # Weights in other files would be read from this folder; none can be in it.
+    # External weights would be read from this folder, which cannot exist.
     folder = "session.model_external_initializers_file_folder_path"
     options.add_session_config_entry(folder, os.devnull)
     cpu = onnxruntime.OrtMemoryInfo(
         "Cpu", onnxruntime.OrtAllocatorType.ORT_ARENA_ALLOCATOR, 0, onnxruntime.OrtMemType.DEFAULT
     )
     limit = onnxruntime.OrtArenaCfg({"max_mem": core_count() * _MAX_MEMORY})
-    with suppress(Exception):  # older versions keep the first one, and say so
+    with suppress(Exception):  # older versions keep the first one, and raise
         onnxruntime.create_and_register_allocator(cpu, limit)
     return options
 

@@ -1,4 +1,4 @@
-"""The linear model as the kind of detector `svm`: windows → heat → hot regions → detections."""
+"""The detector `svm`, a linear model: windows → heat → hot regions → detections."""
 
 import logging
 from collections import deque
@@ -29,14 +29,14 @@ log = logging.getLogger("vdet")
 
 
 Candidates = tuple[Windows, bool]
-"""All windows that were searched, and whether in a still picture rather than in a video."""
+"""All searched windows, and whether they are from a single image."""
 
 
 @dataclass(frozen=True, slots=True)
 class Trace:
-    """What the stage pictures of a frame need.
+    """Data for the stage images of a frame.
 
-    `hits` are the windows of at least `detector.search.probability`, `heat` is the heatmap of the
+    `hits` are the windows with at least `detector.search.probability`, `heat` is the heatmap of the
     last frames, `grids` are the window sets.
     """
 
@@ -66,13 +66,13 @@ class SvmModel:
         return SvmDetector(self.model, self.settings, width, height, horizon=horizon)
 
     def _horizon(self, images: Sequence[Image]) -> float:
-        """Return the row of the horizon, as a fraction of the height, and report it."""
+        """Return the row of the horizon, as a fraction of the height, and log it."""
         perspective = self.settings.search.perspective
         if not perspective.sizes:
             return DEFAULT_HORIZON  # no window set depends on it
         horizon = perspective.horizon
         if horizon is None and (horizon := find_horizon(images)) is None:
-            # A folder may hold many pictures without a horizon: only videos warn.
+            # A folder may have many images without a horizon: only videos warn.
             level = logging.WARNING if len(images) > 1 else logging.INFO
             found = f"no horizon found: {DEFAULT_HORIZON} of the height is assumed"
             log.log(level, "%s; set detector.search.perspective.horizon", found)
@@ -82,11 +82,12 @@ class SvmModel:
 
 
 MAX_WINDOWS = 100_000
-"""Maximum number of windows in a frame; more take minutes. The shipped settings lay about 2,700."""
+"""Maximum number of windows in a frame; more take minutes. Shipped settings have about 2,700."""
 
 _ALIGNMENT = 16
-"""The searched part begins at a multiple of this many pixels of the frame, so that it can be halved
-as the windows in it are."""
+"""The searched part begins at a multiple of this many pixels, so that it can be halved like its
+windows.
+"""
 
 
 class SvmDetector:
@@ -97,8 +98,7 @@ class SvmDetector:
     width, height
         Size of the frames, pixels.
     horizon
-        Row of the horizon, fraction of the frames' height, for the sets that follow the
-        perspective.
+        Row of the horizon, fraction of the frames' height, for the perspective sets.
     engine
         Makes the search of a grid.
 
@@ -152,10 +152,10 @@ class SvmDetector:
         return Windows(self._boxes, probabilities, self._weights, vehicles), index is None
 
     def detect(self, candidates: Candidates) -> Boxes:
-        """Add the hits of the next frame to the heat, and return what is hot.
+        """Add the hits of the next frame to the heat, and return the detections.
 
-        A still picture counts as `heat.frames` frames that all show it, so that thresholds mean the
-        same as in video.
+        A single image counts as `heat.frames` identical frames, so that thresholds have the same
+        meaning as in video.
         """
         windows, is_still = candidates
         hits = windows.hits(self._settings.search.probability)
@@ -174,7 +174,7 @@ class SvmDetector:
         return self._shown_in_still(found) if is_still else found
 
     def stage_pictures(self, image: Image, detections: Boxes) -> dict[str, Image]:
-        """Return three pictures of a frame, BGR uint8 `(H, W, 3)`: windows, hits, heat."""
+        """Return three images of a frame, BGR uint8 `(H, W, 3)`: windows, hits, heat."""
         trace = detections.trace
         windows, hits = (image * 0.6).astype(np.uint8), image.copy()
         for number, grid in enumerate(trace.grids):
@@ -182,7 +182,7 @@ class SvmDetector:
             draw_box(windows, boxes[0].union(boxes[-1]), color)
             example = boxes[number * grid.columns // len(trace.grids)]
             draw_box(windows, example, color, f"{grid.size} px: {len(grid)} windows")
-        for row in np.argsort(trace.hits.probabilities).tolist():  # the likeliest is on top
+        for row in np.argsort(trace.hits.probabilities).tolist():  # the most likely is on top
             box = Box.sized(*trace.hits.boxes[row].tolist())
             draw_box(hits, box, GREEN, f"{trace.hits.probabilities[row]:.2f}")
         heat = blend_heat(image, trace.heat)
@@ -197,7 +197,7 @@ class SvmDetector:
         return [region for region in inside if region.box.area]
 
     def _shown_in_still(self, found: Boxes) -> Boxes:
-        """Return the detections that are strong and large enough, without those inside another."""
+        """Return strong and large detections, without those nested in another."""
         settings = self._settings
         smallest = np.array(settings.min_size_still) * self._size
         large = (found.sides[:, 2:] - found.sides[:, :2] >= smallest).all(axis=1)
@@ -225,8 +225,7 @@ def shipped_model(settings: SvmSettings) -> Path:
 def load_svm(settings: SvmSettings, path: Path | None) -> SvmModel:
     """Load a linear model; `path` is its file, None for the shipped one.
 
-    Features that the settings give must be those that the model was trained with. Where they give
-    none, the model's own are used.
+    Features in the settings must equal those of the model. Without any, the model's own are used.
 
     Raises
     ------
@@ -238,7 +237,7 @@ def load_svm(settings: SvmSettings, path: Path | None) -> SvmModel:
 
 
 def requested_features(settings: SvmSettings) -> FeatureSettings | None:
-    """Return the features that a model must have; None where the settings give none."""
+    """Return the features that a model must have; None if the settings have none."""
     return settings.features if "features" in settings.model_fields_set else None
 
 

@@ -14,7 +14,7 @@ from vdet.config.detector import FeatureSettings
 from vdet.media.images import to_ycrcb
 
 Channels = tuple[Image, Image, Image]
-"""Luma, red and blue (YCrCb), uint8 `(H, W)` each; those in `halved`, `(H / 2, W / 2)`."""
+"""Luma, red and blue (YCrCb), uint8 `(H, W)` each; halved channels `(H / 2, W / 2)`."""
 
 
 class FeatureExtractor:
@@ -84,7 +84,7 @@ def histogram(channel: Image, bins: int) -> npt.NDArray[np.intp]:
 
 
 def cut_window(image: Image, x: int, y: int, width: int, height: int) -> Image:
-    """Return a window of an image; beyond its sides, the outermost pixels are repeated."""
+    """Return a window of an image; outside the image, the outermost pixels are repeated."""
     rows = np.arange(y, y + height).clip(0, image.shape[0] - 1)
     columns = np.arange(x, x + width).clip(0, image.shape[1] - 1)
     return np.asarray(image[rows[:, np.newaxis], columns])
@@ -99,7 +99,7 @@ def resize(image: Image, width: int, height: int) -> Image:
     """Resize an image so that each of its pixels counts.
 
     It is halved (each pixel the mean of four) while it is at least twice as large and both sides
-    are even. It is then resized bilinearly, or by area where it is still at least twice as large.
+    are even. Then it is resized bilinearly, or by area if it is still at least twice as large.
     """
     while (
         image.shape[0] >= 2 * height

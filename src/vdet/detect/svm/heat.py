@@ -19,7 +19,7 @@ from vdet.detect.svm.windows import Windows
 
 @dataclass(frozen=True, slots=True)
 class Heat:
-    """A heatmap: float32 `values`, each of them for `shrink` × `shrink` pixels of the frame."""
+    """A heatmap: float32 `values`, each for `shrink` × `shrink` pixels of the frame."""
 
     values: Float32Array
     shrink: int = 1
@@ -41,7 +41,7 @@ class HotRegion:
     centroid
         Its centre of mass `(x, y)`, pixels of the frame.
     strength
-        The highest heat in it; of a region found by votes, their weight.
+        The highest heat in it; for a region found by votes, their weight.
     """
 
     box: Box
@@ -52,7 +52,7 @@ class HotRegion:
 _BLUR = 15
 """Side of the Gaussian kernel that blurs the heat, in pixels of `REFERENCE_HEIGHT` rows."""
 _SHRINK = 4
-"""Pixels across and down that a value of the heat covers, with votes; 1 with outlines."""
+"""Width and height in pixels of a heat value, with votes; 1 with outlines."""
 
 
 def sum_heat(recent: Sequence[Windows], size: tuple[int, int], settings: HeatSettings) -> Heat:
@@ -85,10 +85,10 @@ def sum_heat(recent: Sequence[Windows], size: tuple[int, int], settings: HeatSet
 
 
 def find_regions(heat: Heat, threshold: float) -> list[HotRegion]:
-    """Return the connected regions where `heat` is above `threshold`, from the top left on.
+    """Return the connected regions where `heat` is above `threshold`, from top to bottom.
 
     A region with a hole is one region: only outer contours count. The centroid is that of the
-    filled contour (`cv2.moments`), or the middle of the box where the contour is a line or a point.
+    filled contour (`cv2.moments`), or the centre of the box if the contour is a line or a point.
     """
     hot = (heat.values > threshold).astype(np.uint8)
     contours, _ = cv2.findContours(hot, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)

@@ -1,7 +1,7 @@
 """The horizon of a camera over a road: the row where the lines of the road meet.
 
-Lane lines, barriers, kerbs and roofs run along the road, so in the picture they meet in its
-vanishing point. Line segments vote for it (von Gioi et al., "LSD: a Line Segment Detector", 2012).
+Lane lines, barriers, kerbs and roofs run along the road, so in the image they meet in its vanishing
+point. Line segments vote for it (von Gioi et al., "LSD: a Line Segment Detector", 2012).
 """
 
 from collections.abc import Sequence
@@ -12,13 +12,13 @@ import numpy as np
 from vdet.boxes import Float64Array, Image
 
 DEFAULT_HORIZON = 0.58
-"""Where dashboard cameras usually have it, fraction of the height; used where none is found."""
+"""Usual horizon of dashboard cameras, fraction of the height; used if none is found."""
 
-_MAX_ASPECT = 4  # height over width of a picture that can show a road
-_WIDTH = 640  # pixels, of the picture in which segments are detected
+_MAX_ASPECT = 4  # maximum height over width of an image of a road
+_WIDTH = 640  # pixels of the image in which segments are detected
 _MIN_LENGTH = 0.02  # of a segment, fraction of the width
 _SLOPES = (12.0, 75.0)  # degrees from the horizontal; vehicles are flatter, poles are steeper
-_MAX_SINE = 0.05  # of the angle between a segment and the direction to the point it votes for
+_MAX_SINE = 0.05  # of the angle between a segment and the direction to its vanishing point
 _MIN_SEGMENTS = 8  # on each side
 _ROWS = np.arange(0.30, 0.75, 0.01)
 _COLUMNS = np.arange(0.25, 0.76, 0.02)
@@ -34,7 +34,7 @@ def find_horizon(images: Sequence[Image]) -> float | None:
 
     Returns
     -------
-    0.30 to 0.74 in steps of 0.01; None where too few lines run along the road.
+    0.30 to 0.74 in steps of 0.01; None if too few lines run along the road.
     """
     height, width = images[0].shape[:2] if images else (1, 0)
     if height > _MAX_ASPECT * width:
@@ -69,7 +69,7 @@ def _segment_ends(image: Image) -> Float64Array:
 def _sum_votes(ends: Float64Array, aspect: float) -> Float64Array:
     """Sum the votes of segments, `(n, 4)`, for each point, `(rows, columns)`.
 
-    A segment votes for points above its middle, by its length.
+    A segment votes for points above its centre, weighted by its length.
     """
     directions = ends[:, 2:] - ends[:, :2]
     lengths = np.hypot(directions[:, 0], directions[:, 1])

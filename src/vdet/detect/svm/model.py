@@ -1,8 +1,8 @@
-"""The linear model: weights, probabilities, and the file that holds them.
+"""The linear model: weights, probabilities, and the model file.
 
-A model is a linear SVM and a sigmoid that turns its decision value into a probability (Platt 1999).
-That of the original has three of them, its members; its probability is the mean over the members.
-Features are not scaled before: their scaling is part of the weights.
+A model is a linear SVM and a sigmoid that converts its decision value to a probability (Platt
+1999). The original has three of them, its members; its probability is the mean over the members.
+Features are not scaled: the scaling is part of the weights.
 """
 
 import io
@@ -24,7 +24,7 @@ from vdet.files import read_whole
 
 FORMAT, FORMAT_VERSION = "vdet model", 2
 MAX_VALUE = 1e9
-"""Largest absolute value of any number in a model; with larger ones, sigmoids could overflow."""
+"""Maximum absolute value of any number in a model; larger ones could overflow sigmoids."""
 _MAX_BYTES = 64_000_000
 _NAMES = ("weights", "biases", "slopes", "offsets")
 _BOX_NAMES = ("box_weights", "box_biases")
@@ -58,15 +58,15 @@ class LinearModel:
     Attributes
     ----------
     features
-        What the features are.
+        Settings of the features.
     weights
         float32 `(k, n)`.
     biases, slopes, offsets
         float32 `(k,)`.
     provenance
-        Where the model comes from: data set, metrics, versions; JSON values.
+        Training data, metrics and versions, as values for JSON.
     box_regression
-        None where no training patch came with the box of its vehicle.
+        None if no training patch had the box of its vehicle.
     """
 
     features: FeatureSettings
@@ -78,7 +78,7 @@ class LinearModel:
     box_regression: BoxRegression | None = None
 
     def probabilities(self, vectors: Float32Array) -> Float32Array:
-        """Return the probability that each vector is of a vehicle, `(m, n)` → `(m,)`."""
+        """Return the probability of a vehicle for each vector, `(m, n)` → `(m,)`."""
         return self.to_probabilities(vectors @ self.weights.T + self.biases)
 
     def to_probabilities(self, values: Float32Array) -> Float32Array:
@@ -116,8 +116,8 @@ def load_model(path: Path, features: FeatureSettings | None = None) -> LinearMod
     Raises
     ------
     ModelError
-        The file cannot be read or is damaged; it is of another version or was trained with other
-        features; its arrays do not fit its features; a value is not finite, or larger than
+        The file cannot be read or is damaged; it has another version or was trained with other
+        features; its arrays do not match its features; a value is not finite or exceeds
         `MAX_VALUE`.
     """
     data = read_whole(path, limit=_MAX_BYTES, what="model", error=ModelError)
@@ -155,7 +155,7 @@ def _read(archive: zipfile.ZipFile) -> LinearModel:
 
 
 def _read_array(archive: zipfile.ZipFile, name: str) -> npt.NDArray[Any]:
-    """Return an array of the file; one with another length than it claims is a `ValueError`."""
+    """Return an array of the file. Raises `ValueError` if its length is not the declared one."""
     data = read_member(archive, f"{name}.npy", limit=_MAX_BYTES)
     file = io.BytesIO(data)
     np.lib.format.read_magic(file)

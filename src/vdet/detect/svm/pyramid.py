@@ -10,22 +10,22 @@ from vdet.media import Picture
 
 
 class FramePyramid:
-    """The searched rows of one frame at full size and, made when needed, at half, quarter … size.
+    """The searched rows of one frame at full size and, on demand, at half, quarter … size.
 
-    It has luma, red and blue: the planes of a picture that has them, where a value of chroma stands
-    for 2 × 2 pixels. Otherwise it has BGR, which is converted last, as in training.
+    It has luma, red and blue if the picture has planes, with chroma at half size. Otherwise it has
+    BGR, which is converted last, as in training.
 
     Parameters
     ----------
     picture
         Upright, H × W pixels.
     features
-        They say which channels are halved.
+        Determine which channels are halved.
     top, bottom
-        First row that is searched, even; first row below, None for the frame's end.
+        First row to search, even; first row below, None for the end of the frame.
     margin
-        Number of columns, even, that are searched beyond the left and right of the frame; they
-        repeat its outermost columns.
+        Even number of columns to search beyond the left and right of the frame; they repeat the
+        outermost columns.
     """
 
     def __init__(
@@ -60,7 +60,7 @@ class FramePyramid:
 
 
 class _Levels:
-    """A channel, or BGR, at full, half, quarter … size, made of what it is at `level`."""
+    """A channel, or BGR, at full, half, quarter … size, made from its data at `level`."""
 
     def __init__(self, channel: Image, level: int = 0) -> None:
         self._levels = {level: channel}

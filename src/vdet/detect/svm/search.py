@@ -1,11 +1,11 @@
 """The dense search of a window set in a frame.
 
-A strip of the frame is described once for all the windows in it. A strip is what a grid covers, at
-the scale where a window is a patch. Windows that are whole cells apart share its HOG blocks
-(`Blocks`), which is fast: so are the sets that follow the perspective. A grid of which every second
-window is whole cells apart is searched as four such grids. The windows of any other grid share only
-the gradients of the strip (`Gradients`): so do those of 128 pixels of the original. All share sums
-over its pixels (`table_sums`).
+Features are computed once for a strip of the frame: the area of a grid, at the scale at which a
+window is a patch. Windows at distances of whole cells share its HOG blocks (`Blocks`), which is
+fast; this includes the perspective sets. If this holds for every second window of a grid, it is
+searched as four such grids. Windows of other grids share only the gradients of the strip
+(`Gradients`), such as those of 128 pixels of the original. All windows share sums over pixels
+(`table_sums`).
 """
 
 import cv2
@@ -18,15 +18,16 @@ from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.pyramid import FramePyramid
 from vdet.detect.svm.windows import WINDOW_SIDES, IndexArray, WindowGrid
 
-_MIN_SIDE = 0.2  # of the smallest vehicle that a window can show, sides of the window
+_MIN_SIDE = 0.2  # minimum side of a vehicle in a window, sides of the window
 
 
 MAX_PHASES = 2
-"""Most grids of shared blocks, across and down, that a grid is split into; with more of them,
-sharing only the gradients is faster."""
+"""Maximum number of grids with shared blocks, across and down, that a grid is split into; with
+more, sharing only the gradients is faster.
+"""
 
 BATCH = 8192
-"""Number of windows whose vectors are in memory at once."""
+"""Maximum number of windows whose vectors are in memory at once."""
 
 
 _Part = tuple[IndexArray, tuple[slice, slice, int, int], IndexArray, IndexArray]
@@ -57,7 +58,7 @@ class DenseSearch:
         ]
 
     def search(self, frame: FramePyramid, probability: float) -> tuple[Float32Array, Float32Array]:
-        """Search a frame; windows of at least this probability are hits.
+        """Search a frame; windows with at least this probability are hits.
 
         Returns
         -------
@@ -91,7 +92,7 @@ def _part(grid: WindowGrid, patch: int, n: int, column: int, row: int) -> _Part:
 
 
 class Blocks:
-    """The HOG of windows that are whole cells apart: each block of the strip is computed once.
+    """HOG of windows at distances of whole cells: each block of the strip is computed once.
 
     `x` and `y`, `(n,)`, are the top-left pixels of windows in the strip.
     """
@@ -138,7 +139,7 @@ class Blocks:
 
 
 class Gradients:
-    """The HOG of windows at any pixels: gradients are shared (`HOGDescriptor.compute`)."""
+    """HOG of windows at any pixels: only gradients are shared (`HOGDescriptor.compute`)."""
 
     def __init__(self, strip: Channels, features: FeatureSettings) -> None:
         self._strip, self._features = strip, features
@@ -166,12 +167,12 @@ def table_sums(
     x: IndexArray,
     y: IndexArray,
 ) -> Float32Array:
-    """Sum what the pixels of windows add: their colour histograms times weights.
+    """Return the colour histograms of windows times weights, as sums over pixels.
 
     Parameters
     ----------
     tables
-        float32 `(m, 3, 256)`: what a pixel adds, by channel and value.
+        float32 `(m, 3, 256)`: contribution of a pixel by channel and value.
     x, y
         Top-left pixels of the windows in the strip, `(n,)`.
 

@@ -1,11 +1,11 @@
-"""Hot regions split into vehicles by the votes of the hits in them.
+"""Split hot regions into vehicles by the votes of the hits in them.
 
-Each hit votes for a box, that of the vehicle in its window. A vote has two weights. `presence`,
-for there being a vehicle, is the hit's probability, which soon nears 1. `position`, for where the
-box is, grows without bound, and is highest for the window that fits the vehicle best.
+Each hit votes for the box of the vehicle in its window. A vote has two weights. `presence`, for the
+existence of a vehicle, is the probability of the hit, which soon approaches 1. `position`, for the
+place of the box, is unbounded, and is highest for the window that fits the vehicle best.
 
-The box that most votes agree with is a vehicle. These votes are averaged and removed, and the rest
-vote again. This is greedy non-maximum suppression that averages boxes instead of picking one, as
+The box with the most agreement is a vehicle. Its votes are averaged and removed, and the rest vote
+again. This is greedy non-maximum suppression that averages boxes instead of picking one, as
 Viola & Jones merge detections ("Robust Real-Time Face Detection", 2004, section 5.6).
 """
 
@@ -19,10 +19,10 @@ from vdet.detect.svm.heat import HotRegion
 from vdet.detect.svm.windows import Windows
 
 MAX_VOTES = 400
-"""Maximum number of votes in a group of regions: the time grows with the square of their number."""
+"""Maximum number of votes in a group of regions, because time grows with its square."""
 
 _MAX_PROBABILITY = 1 - 2**-24
-"""Higher ones are lowered to it, because the position weight of 1 is infinite."""
+"""Limit of probabilities, because the position weight of 1 is infinite."""
 
 _AGREEMENT = 0.35
 """Minimum intersection over union of two boxes that agree."""
@@ -31,10 +31,10 @@ _INSIDE = 0.7
 """A box with more than this fraction inside a larger vehicle is a part of it."""
 
 _SHARPNESS = 4.0
-"""Power of -log(1 - probability) that is a hit's `position` weight: the best fit counts most."""
+"""Exponent of -log(1 - probability) in the `position` weight, so that the best fit counts most."""
 
 _FAR_STRONGER = 4
-"""How many times the weight of the box around it a box needs, so that it is not a part of it."""
+"""Minimum ratio of weights for a box inside another one to be kept."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +46,7 @@ class Votes:
     boxes
         float64 `(n, 4)`: x1, y1, x2, y2, pixels of the frame.
     presence
-        float64 `(n,)`: weight for there being a vehicle.
+        float64 `(n,)`: weight for the existence of a vehicle.
     position
         float64 `(n,)`, above 0: weight for the place of the box.
     """
@@ -59,8 +59,8 @@ class Votes:
     def of(hits: Sequence[Windows], size: tuple[int, int]) -> "Votes":
         """Collect the votes of the hits of some frames.
 
-        Boxes are cut off at the sides of the frame of `size` (width and height, pixels): windows
-        can only guess how far a vehicle reaches beyond, so their guesses need not agree.
+        Boxes are clipped to the frame of `size` (width and height, pixels), because windows can
+        only guess how far a vehicle extends beyond it.
         """
         boxes = from_xywh(np.concatenate([some.vehicles for some in hits]))
         weights = np.concatenate([hit.weights for hit in hits], dtype=np.float64)
@@ -73,7 +73,7 @@ class Votes:
     def within(self, boxes: Iterable[Box]) -> "Votes":
         """Return the votes whose centre lies in one of `boxes`, each once.
 
-        Of more than `MAX_VOTES`, those of highest `position` are returned.
+        At most `MAX_VOTES` are returned, those with the highest `position`.
         """
         x, y = ((self.boxes[:, :2] + self.boxes[:, 2:]) / 2).T
         inside = np.zeros(len(x), np.bool_)
@@ -88,9 +88,9 @@ class Votes:
 def split_regions(regions: Sequence[HotRegion], votes: Votes, minimum: float) -> list[HotRegion]:
     """Return the vehicles that the votes in the regions agree on, strongest first in each region.
 
-    Regions whose boxes overlap are split as one, so that no vote counts twice. A box inside a
-    larger one is kept only if it is far stronger; the tracker, or `SvmDetector` in a still picture,
-    shows one of the two. `minimum` is the minimum weight of the votes that agree on a vehicle.
+    Regions whose boxes overlap are split together, so that no vote counts twice. A box inside a
+    larger one is kept only if it is far stronger; the tracker, or `SvmDetector` for a single image,
+    shows one of the two. `minimum` is the minimum weight of agreeing votes.
     """
     groups = _overlapping([region.box for region in regions])
     found = [vehicle for group in groups for vehicle in _vehicles(votes.within(group), minimum)]
@@ -105,7 +105,7 @@ def split_regions(regions: Sequence[HotRegion], votes: Votes, minimum: float) ->
 
 
 def _overlapping(boxes: Iterable[Box]) -> list[list[Box]]:
-    """Group boxes: two that overlap, directly or by others, are in one group."""
+    """Group boxes that overlap, directly or through others."""
     groups: list[list[Box]] = []
     for box in boxes:
         joined, apart = [box], []
@@ -122,7 +122,7 @@ def _vehicles(votes: Votes, minimum: float) -> Iterator[tuple[Float64Array, floa
     """Yield boxes `(4,)` that votes agree on, and their weights of position and presence."""
     overlaps = iou_matrix(votes.boxes, votes.boxes)
     presence, position = votes.presence.copy(), votes.position.copy()
-    # Presence only falls: once no box has enough, none will be found any more.
+    # Presence only falls: when no box has enough, no more will be found.
     while position.any() and (overlaps @ presence).max() >= minimum:
         agreed = np.where(position > 0, overlaps @ position, 0)
         mode = int(agreed.argmax())

@@ -1,10 +1,10 @@
-"""Windows: where they lie in a frame, and their probabilities.
+"""Windows: their positions in a frame, and their probabilities.
 
-Sets over fixed rows follow the overlap rule of the original system, which lays 423 + 408 = 831
-windows over a frame of 1280×720. Other sets follow the perspective: on a flat road, a vehicle of
+Sets over fixed rows follow the overlap rule of the original system, which places 423 + 408 = 831
+windows on a frame of 1280×720. Other sets follow the perspective: on a flat road, a vehicle of
 width w stands on the row horizon + w · (height of the camera) / (real width of the vehicle). The
-farther it is, the smaller it is, and the nearer to the horizon. So the horizon alone places the
-sets of all sizes.
+farther away, the smaller it is, and the nearer to the horizon. So the horizon determines the rows
+of all sizes.
 """
 
 import math
@@ -23,17 +23,18 @@ from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
 IndexArray = npt.NDArray[np.intp]
 
 WINDOW_SIDES = np.array([-0.5, -0.5, 0.5, 0.5], np.float32)
-"""The sides of a vehicle that fills its window."""
+"""Sides of a vehicle that fills its window."""
 
 _HIGHEST, _LOWEST = 0.6, 1.1
-"""Distance from the horizon down to the bottoms of the highest and of the lowest windows of a set
-that follows the perspective, in sides of a window."""
+"""Distance from the horizon down to the bottoms of the highest and lowest windows of a perspective
+set, in sides of a window.
+"""
 
 _BEYOND = 0.7
-"""Fraction of a window of such a set that may lie beyond the left or right of the frame."""
+"""Fraction of a window of such a set that may be beyond the left or right of the frame."""
 
 _MAX_ASPECT = 16 / 9
-"""Of a wider frame, which shows more to the sides, the height times this counts as the width."""
+"""Wider frames, which show more to the sides, count as having this aspect ratio."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,12 +48,12 @@ class Windows:
     probabilities
         float32 `(n,)`, 0 to 1.
     weights
-        float32 `(n,)`: one over the number of windows of the same set that cover a pixel.
+        float32 `(n,)`: 1 / number of windows of the same set that cover a pixel.
     vehicles
-        float32 `(n, 4)`: x, y, width, height of the vehicle in a window, pixels of the frame. Only
-        hits have one that differs from the window, and only where the model has a box regression.
+        float32 `(n, 4)`: x, y, width, height of the vehicle in a window, pixels of the frame. It
+        differs from the window only for hits, and only if the model has a box regression.
 
-    Windows and vehicles may reach beyond the frame.
+    Windows and vehicles may extend beyond the frame.
     """
 
     boxes: Int32Array
@@ -64,7 +65,7 @@ class Windows:
         return len(self.boxes)
 
     def hits(self, probability: float) -> "Windows":
-        """Return the windows of at least this probability, in the same order."""
+        """Return the windows with at least this probability, in the same order."""
         keep = self.probabilities >= probability
         columns: tuple[Any, ...] = self.boxes, self.probabilities, self.weights, self.vehicles
         return Windows(*(column[keep] for column in columns))
@@ -98,7 +99,7 @@ class WindowGrid:
 
     @property
     def weight(self) -> float:
-        """One over the number of windows that cover a pixel in the middle of the grid."""
+        """1 / number of windows that cover a pixel in the middle of the grid."""
         along = max(1.0, float(self.size / self.step))
         return 1 / (min(self.columns, along) * min(self.rows, along))
 
@@ -129,8 +130,8 @@ def lay_grids(
 ) -> list[WindowGrid]:
     """Lay the window sets over a frame of `width` × `height` pixels.
 
-    `horizon` is its row, as a fraction of the frame's height. Sets of which no window fits are left
-    out.
+    `horizon` is its row, as a fraction of the frame's height. Sets without a fitting window are
+    omitted.
     """
     search = scale_lengths(settings.search, height / REFERENCE_HEIGHT)
     grids = [lay_grid(window, width, height) for window in search.windows]
@@ -154,7 +155,7 @@ def lay_grid(settings: WindowSettings, width: int, height: int) -> WindowGrid:
 
     Returns
     -------
-    The grid; without windows where the band or the frame is smaller than a window.
+    The grid; without windows if the band or the frame is smaller than a window.
     """
     size, top = settings.size, settings.top
     bottom = max(settings.bottom, top + size)  # scaling may have rounded a row away
@@ -183,8 +184,8 @@ def lay_perspective(
 
     Returns
     -------
-    One grid for each size, in the order given. Sizes of which no window fits are left out; of
-    several sizes that are rounded to the same one, the first is laid.
+    One grid for each size, in the same order, without sizes for which no window fits, and without
+    sizes that are rounded to the same one.
     """
     cells = features.patch // features.hog.cell
     grids: list[WindowGrid] = []
