@@ -38,6 +38,8 @@ from vdet.errors import ImageError, VdetError
 from vdet.evaluate.scores import Scores
 from vdet.evaluate.video import score_files
 from vdet.files import record_input, recorded_inputs
+from vdet.labels.formats import Format
+from vdet.labels.label import Label, SavedTracks
 from vdet.media import Frame, Picture
 from vdet.media.images import read_image
 from vdet.progress import no_progress, reporting
@@ -46,7 +48,7 @@ from vdet.run.loop import Parts
 from vdet.run.pictures import PictureJob, PictureSearch, run_pictures
 from vdet.run.result import FrameResult
 from vdet.run.sinks import Output
-from vdet.run.sinks.protocol import SinkContext, SinkKind, check_sinks
+from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind, check_sinks
 from vdet.run.steps import Step, StepContext
 from vdet.run.video import Results, Run, RunTotals, open_video, run_video
 from vdet.track.factory import TrackerKind, make_tracker
@@ -56,12 +58,13 @@ from vdet.traffic.counts import Counts, Event
 from vdet.traffic.records import VehicleRecord
 
 __all__ = (
-    "Box", "Boxes", "Counts", "Detector", "DetectorKind", "DetectorModel", "DetectorSettings",
-    "Event", "Finding", "Frame", "FrameResult", "FrameTracks", "Output", "Picture", "Results",
-    "Run", "RunTotals", "Scores", "Settings", "SinkContext", "SinkKind", "Step", "StepContext",
-    "Track", "Tracker", "TrackerKind", "TrackerSettings", "VdetError", "VehicleRecord",
-    "VideoDetector", "VideoTracker", "count", "detect_image", "detect_video", "evaluate_tracks",
-    "follow", "load_settings", "vehicles",
+    "BaseSink", "BatchTotal", "Box", "Boxes", "Counts", "Detector", "DetectorKind",
+    "DetectorModel", "DetectorSettings", "Event", "Finding", "Format", "Frame", "FrameResult",
+    "FrameTracks", "Label", "Output", "Picture", "Results", "Run", "RunTotals", "SavedTracks",
+    "Scores", "Settings", "SinkContext", "SinkKind", "Step", "StepContext", "Track", "Tracker",
+    "TrackerKind", "TrackerSettings", "VdetError", "VehicleRecord", "VideoDetector",
+    "VideoTracker", "count", "detect_image", "detect_video", "evaluate_tracks", "follow",
+    "load_settings", "vehicles",
 )  # fmt: skip
 
 PathName = str | PathLike[str]
