@@ -1,1 +1,1 @@
-"""The linear SVM: patches, mining, fitting, and how good a model is on patches."""
+"""The linear SVM: patches, mining, fitting, and its accuracy on patches."""

@@ -1,9 +1,9 @@
-"""Labelled patches in folders or zip files, each in a group; a zip file can be written too.
+"""Read labelled patches from folders or zip files, by group; write them to a zip file.
 
 The layout is that of the Udacity set: `vehicles/<group>/*.png` and `non-vehicles/<group>/*.png`, in
 folders, in zip files, or one class in each. A table beside these folders, `boxes.csv`, may give the
-sides of the vehicle in a patch. Patches that show a vehicle off their centre or of another size
-then lie in `boxes/<group>/`.
+sides of the vehicle in a patch. Patches with a vehicle off their centre or of another size are then
+in `boxes/<group>/`.
 """
 
 import csv
@@ -33,9 +33,9 @@ COLUMNS = ("name", "left", "top", "right", "bottom")
 MAX_PATCH_BYTES = 16_000_000
 
 Sides = tuple[float, float, float, float]
-"""Left, top, right and bottom of a vehicle, from the patch's centre, in widths and heights of it.
+"""Left, top, right and bottom of a vehicle from the centre of a patch, in its widths and heights.
 
-Right and down are positive; NaN for a side that is not known, for instance outside the frame.
+Right and down are positive; NaN for an unknown side, for example outside the frame.
 """
 
 UNKNOWN: Sides = (math.nan, math.nan, math.nan, math.nan)
@@ -44,7 +44,7 @@ UNKNOWN: Sides = (math.nan, math.nan, math.nan, math.nan)
 
 @dataclass(frozen=True, slots=True)
 class PatchFile:
-    """The place of a patch: `name` in the zip file or folder `source`."""
+    """A patch file: `name` in the zip file or folder `source`."""
 
     source: Path
     name: str
@@ -56,7 +56,7 @@ class PatchFile:
 
     @property
     def is_boxed(self) -> bool:
-        """Whether it lies in `boxes/` and belongs to neither class; it has `sides`."""
+        """Whether it is in `boxes/` and belongs to neither class; it has `sides`."""
         return self.group.split("/")[0] == BOXED
 
     def __str__(self) -> str:
@@ -70,8 +70,8 @@ def find_patches(sources: Sequence[Path]) -> list[PatchFile]:
     ------
     DataError
         A source cannot be read or has no patch, one of the two classes has no patch, a table of
-        boxes is damaged, or a zip file has a member whose name occurs twice or leads out of the
-        archive, or which is a symbolic link.
+        boxes is damaged, or a zip file has a member that is a symbolic link, or whose name occurs
+        twice or leads out of the archive.
     """
     files = [file for source in dict.fromkeys(sources) for file in _find_in(source)]
     for name, vehicle in CLASSES.items():
@@ -100,7 +100,7 @@ def _find_in(source: Path) -> list[PatchFile]:
 
 
 def _patch_file(source: Path, name: str, boxes: Mapping[str, Sides]) -> PatchFile | None:
-    """Return the patch of a file name in a source; None if it is not a patch."""
+    """Return the patch file of a name in a source; None if it is not a patch."""
     path = PurePosixPath(name)
     if is_hidden(path) or path.suffix.lower() not in PICTURE_SUFFIXES:
         return None
@@ -121,7 +121,7 @@ def _numeric(name: str) -> list[tuple[int, str]]:
 
 
 def read_patches(files: Sequence[PatchFile]) -> Iterator[Image | None]:
-    """Yield the picture of each patch, BGR uint8 of any size; None for a broken one."""
+    """Yield the image of each patch, BGR uint8 of any size; None if it is unreadable."""
     return map(decode_image, _contents((file.source, file.name) for file in files))
 
 
@@ -163,12 +163,12 @@ def _sides(values: Sequence[str]) -> Sides:
 
 
 AddPatch = Callable[[str, Image, Sides | None], None]
-"""Adds a patch (BGR uint8), by its name, with the sides of its vehicle."""
+"""Adds a patch (BGR uint8) by name, with the sides of its vehicle."""
 
 
 @contextmanager
 def patch_archive(path: Path, *, overwrite: bool = False) -> Iterator[AddPatch]:
-    """Write a zip file of patches, as PNG pictures, and a table of all sides with four decimals.
+    """Write a zip file of patches as PNG images, with a table of all sides to four decimals.
 
     It appears at `path` if the block ends without an error. The same patches give the same bytes.
     Raises `OutputError`.

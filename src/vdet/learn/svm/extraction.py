@@ -1,4 +1,4 @@
-"""Patch files and the samples made of them → feature vectors."""
+"""Feature vectors of patch files and of samples made from them."""
 
 import zlib
 from collections.abc import Callable, Iterator, Sequence
@@ -17,14 +17,14 @@ from vdet.run.threads import map_ordered
 from vdet.workers import core_count
 
 TEST_FRACTION = 0.2
-"""Fraction of the patches that is held out for the test."""
+"""Fraction of the patches held out for testing."""
 
 RowNumbers = npt.NDArray[np.intp]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LabelledVectors:
-    """Feature vectors of patches, each before those of the samples made of it.
+    """Feature vectors of patches, each followed by those of its samples.
 
     Attributes
     ----------
@@ -35,7 +35,7 @@ class LabelledVectors:
     sides
         float32 `(n, 4)`: left, top, right, bottom of each vehicle, NaN for unknown sides.
     origins
-        intp `(n,)`: the number of the patch that a row shows or was made of.
+        intp `(n,)`: the number of the patch that a row shows or was made from.
     files
         The file of each patch.
     """
@@ -67,7 +67,7 @@ class LabelledVectors:
         return self.vehicle[self.patches]
 
     def of(self, kept: BoolArray) -> "LabelledVectors":
-        """Return a copy of the kept patches, bool `(patches,)`, with the samples made of them."""
+        """Return a copy of the kept patches, bool `(patches,)`, with their samples."""
         used = kept[self.origins]
         files = [file for file, is_kept in zip(self.files, kept, strict=True) if is_kept]
         origins = (np.cumsum(kept) - 1)[self.origins[used]]
@@ -83,12 +83,12 @@ def extract(
     jobs: int | None = None,
     progress: Callable[[int], object] = lambda _: None,
 ) -> LabelledVectors:
-    """Describe all patches; the result has the order of `files`.
+    """Compute the features of all patches, in the order of `files`.
 
     Parameters
     ----------
     augmented
-        Describe the samples made of each patch too. They depend on the patch alone.
+        Also make samples from each patch. They depend only on the patch.
     jobs
         Number of threads; None: one for each core.
     progress
@@ -124,9 +124,9 @@ def extract(
 
 
 def hold_out(groups: npt.NDArray[np.str_]) -> BoolArray:
-    """Choose the test patches: the last ones of each group, at least one and never all of it.
+    """Choose the test patches: the last ones of each group, at least one and never all.
 
-    Consecutive video frames, which are near-duplicates, are then on the same side, except where the
+    Consecutive video frames, which are near-duplicates, are then in the same part, except where the
     two parts meet.
 
     Parameters
@@ -147,8 +147,7 @@ def hold_out(groups: npt.NDArray[np.str_]) -> BoolArray:
 
 
 CUT, PART = 0.15, 0.05
-"""Fractions of the patches, and of their mirror images, that are cut off; of which a part is taken.
-"""
+"""Fractions of the patches and their mirror images for cut-off samples, and for parts."""
 
 _CUT_WIDTHS = (0.15, 0.5)  # of the patch's width
 _PART_SIDES = (0.4, 0.6)  # of its width and height
@@ -156,10 +155,10 @@ _PART_SIDES = (0.4, 0.6)  # of its width and height
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PatchSample:
-    """A picture to learn from.
+    """An image to learn from.
 
     `image` is BGR uint8 `(H, W, 3)`. `sides` is float32 `(4,)`: left, top, right and bottom of the
-    vehicle as `vdet.learn.svm.dataset.Sides` has them, NaN for unknown ones.
+    vehicle as in `vdet.learn.svm.dataset.Sides`, NaN if unknown.
     """
 
     image: Image
@@ -168,7 +167,7 @@ class PatchSample:
 
 
 def augment(sample: PatchSample, rng: np.random.Generator) -> Iterator[PatchSample]:
-    """Yield the samples made of a patch: its mirror image, and now and then a cut or a part."""
+    """Yield samples of a patch: its mirror image, and randomly a cut-off copy or a part."""
     mirror = mirrored(sample)
     yield mirror
     for whole in (sample, mirror):
@@ -186,12 +185,12 @@ def mirrored(sample: PatchSample) -> PatchSample:
 
 
 def cut_off(sample: PatchSample, fraction: float, *, left: bool) -> PatchSample:
-    """Return a sample cut off by the side of a frame; its outermost column is repeated beyond.
+    """Return a sample cut off by the side of a frame; its outermost column is repeated.
 
     Parameters
     ----------
     fraction
-        How much of the width is cut off.
+        Fraction of the width to cut off.
     left
         True for the frame's left side, False for its right side.
     """

@@ -1,11 +1,12 @@
-"""Scale, fit and calibrate: feature vectors → a `LinearModel`; and fit the sides of vehicles.
+"""Fit a `LinearModel` to feature vectors: scale, fit and calibrate; and fit the sides of vehicles.
 
-The classifier is that of scikit-learn's `LinearSVC`: squared hinge loss, L2 penalty on weights and
-bias. liblinear, which `LinearSVC` calls, copies float32 data to six times their size; L-BFGS needs
+The classifier is the same as `LinearSVC` of scikit-learn: squared hinge loss, L2 penalty on weights
+and bias. liblinear, used by `LinearSVC`, copies float32 data to six times their size; L-BFGS needs
 only products of the data with a vector.
-Sources: of the solver, Liu and Nocedal, "On the Limited Memory BFGS Method for Large Scale
-Optimization", 1989; of the calibration, Platt, "Probabilistic outputs for support vector machines",
-1999.
+
+Sources: for the solver, Liu and Nocedal, "On the Limited Memory BFGS Method for Large Scale
+Optimization", 1989; for the calibration, Platt, "Probabilistic outputs for support vector
+machines", 1999.
 """
 
 import logging
@@ -25,11 +26,11 @@ from vdet.learn.svm.extraction import LabelledVectors
 log = logging.getLogger("vdet")
 
 FOLDS = 3
-"""Folds of the cross-validation that calibrates."""
+"""Number of cross-validation folds for the calibration."""
 MAX_ITERATIONS = 1000
-"""Most iterations of the solver."""
+"""Maximum number of iterations of the solver."""
 PENALTY = 1.0
-"""Ridge penalty of the weights of scaled features that find sides, for each row."""
+"""Ridge penalty per row on the weights of scaled features for the sides."""
 
 _SMALL_SPREAD = 0.05
 """Added to the spread of each feature, as a fraction of the mean spread: limits the weights of
@@ -43,8 +44,8 @@ _TOLERANCE = 1e-9  # of the loss, relative to that of zero weights
 def fit(rows: LabelledVectors, settings: Settings) -> LinearModel:
     """Scale the features, fit a linear SVM, and calibrate it by a sigmoid.
 
-    The sigmoid is fitted to the patches alone, each scored by an SVM that was fitted without it and
-    without the samples made of it. The scaling becomes part of the weights.
+    The sigmoid is fitted only to patches, each scored by an SVM fitted without it and its samples.
+    The scaling becomes part of the weights.
 
     Parameters
     ----------
@@ -83,7 +84,7 @@ def _fit_svm(
     vectors: Float32Array, vehicle: BoolArray, used: BoolArray, penalty: float
 ) -> Float64Array:
     """Fit a linear SVM to the used rows; return the weights, and the bias last."""
-    # All vectors take part in the products: a copy of some would take their memory again.
+    # The products include all vectors, because a copy of some would double their memory.
     signs = np.where(vehicle, used, -1.0 * used).astype(np.float32)
     scale = 1 / (penalty * np.count_nonzero(used))  # the loss of zero weights becomes 1
 
@@ -108,7 +109,7 @@ def _fit_svm(
 def _fit_sigmoid(scores: Float64Array, vehicle: BoolArray) -> tuple[float, float]:
     """Return slope and offset of the sigmoid 1 / (1 + exp(slope · score + offset)).
 
-    The targets are Platt's: not quite 1 and 0, and the less so the fewer patches there are.
+    The targets are those of Platt: not quite 1 and 0, depending on the number of patches.
     """
     positives, negatives = np.count_nonzero(vehicle), np.count_nonzero(~vehicle)
     targets = np.where(vehicle, (positives + 1) / (positives + 2), 1 / (negatives + 2))
@@ -121,12 +122,12 @@ def _fit_sigmoid(scores: Float64Array, vehicle: BoolArray) -> tuple[float, float
 def fit_boxes(
     data: LabelledVectors, held: BoolArray, hog_length: int
 ) -> tuple[BoxRegression | None, float | None]:
-    """Fit on the patches that are not held out and measure the error on the others.
+    """Fit on the patches that are not held out, and measure the error on the others.
 
     Parameters
     ----------
     data
-        Patches of which some have known sides.
+        Patches, some of them with known sides.
     held
         Which patches are held out, bool `(patches,)`.
     hog_length
@@ -134,8 +135,8 @@ def fit_boxes(
 
     Returns
     -------
-    The regression, and the mean absolute error on the known sides of patches that are held out, as
-    a fraction of the patch's side. Either is None if it has no patches.
+    The regression, and the mean absolute error on the known sides of held-out patches, as a
+    fraction of the patch's side. Either is None if there are no such patches.
     """
     known: BoolArray = np.asarray(np.isfinite(data.sides).any(axis=1))
     learnt, tested = known & ~held[data.origins], data.patches[held & known[data.patches]]
@@ -147,7 +148,7 @@ def fit_boxes(
 
 
 def fit_sides(hogs: Float32Array, sides: Float32Array) -> BoxRegression:
-    """Fit the sides of vehicles' boxes to HOG vectors; a side that is never known is always 0.
+    """Fit the sides of vehicles to HOG vectors; a side that is never known is predicted as 0.
 
     Parameters
     ----------

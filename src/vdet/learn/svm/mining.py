@@ -1,9 +1,9 @@
-"""Mining: labelled videos → a zip file of patches for the training.
+"""Mining: cut patches for the training out of labelled videos, into a zip file.
 
-Vehicles and false alarms are cut out of the frames: each window of a frame is compared with each
-vehicle, and some of each kind become patches. Lengths are in sides of the window, from its centre.
-A vehicle that the left or right side of the frame cuts off is located by its visible side; the
-place of its other side is unknown.
+Each window of a frame is compared with each vehicle, and some windows of each kind become patches:
+vehicles and false alarms. Lengths are in sides of the window, from its centre. A vehicle that is
+cut off by the left or right side of the frame is located by its visible side; the other side is
+unknown.
 
 Source of mining false alarms: Sung & Poggio, "Example-based Learning for View-based Human Face
 Detection", 1998; for HOG and linear SVM, Dalal & Triggs, 2005, section 4.
@@ -35,18 +35,19 @@ from vdet.run.loop import named_errors, peek
 
 PatchKind = Literal["vehicle", "box", "false alarm", "part"]
 """`vehicle`: the window fits a vehicle. `box`: it shows one off its centre or of another size.
-`false alarm`: it is taken for a vehicle, but there is none. `part`: it is taken for a vehicle, but
-shows only a part of one."""
+`false alarm`: classified as a vehicle, but there is none. `part`: classified as a vehicle, but it
+shows only a part of one.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class MiningLimits:
     """Maximum numbers of windows to choose in a frame.
 
-    For each vehicle, at most `per_vehicle` windows that fit it, and as many others that show it. In
-    the whole frame, at most `false_alarms` windows where no vehicle is, and `parts` that show only
-    a part of one: with many parts, fewer vehicles are found as a whole. False alarms and parts have
-    at least `probability`.
+    For each vehicle, `per_vehicle` windows that fit it, and as many others that show it. In the
+    whole frame, `false_alarms` windows without a vehicle, and `parts` that show only a part of one:
+    with many parts, fewer whole vehicles are found. False alarms and parts have at least
+    `probability`.
     """
 
     per_vehicle: int = 16
@@ -58,7 +59,7 @@ class MiningLimits:
 LIMITS = MiningLimits()
 
 _MAX_COVERED = 0.3
-"""Largest fraction of a false alarm that a vehicle or an ignore region may cover."""
+"""Maximum fraction of a false alarm covered by a vehicle or an ignore region."""
 
 _EDGE = 0.002  # of the frame's width: a box this close to a side of the frame is cut off by it
 
@@ -86,7 +87,7 @@ def choose_windows(
     Parameters
     ----------
     windows
-        All windows of the frame, with the probabilities of the model that is to be improved.
+        All windows of the frame, with the probabilities of the model to improve.
     labelled, ignored
         float64 `(n, 4)`: x1, y1, x2, y2, pixels, of the true vehicles and the ignore regions of the
         frame; bool `(n,)`: which are ignore regions.
@@ -126,15 +127,15 @@ class WindowComparison:
     sides
         float64 `(n, 4)`: left, top, right, bottom of the vehicle, NaN where the frame cuts it off.
     distances
-        float64 `(n,)`: distance of the two centres, the larger of across and down; infinite where
-        the window neither fits nor shows the vehicle, nor overlaps it otherwise.
+        float64 `(n,)`: distance of the two centres, the larger of across and down; infinite if the
+        window neither fits nor shows the vehicle, nor overlaps it otherwise.
     fits
-        bool `(n,)`: the window is a good picture of the vehicle.
+        bool `(n,)`: the window is a good image of the vehicle.
     shows
         bool `(n,)`: the vehicle is too small, too large or off the centre.
     part
-        bool `(n,)`: the window lies in the vehicle, which is far too large for it. It counts as no
-        picture of a vehicle, even if it `shows` one.
+        bool `(n,)`: the window is inside the vehicle, which is far too large for it. It is not an
+        image of a vehicle, even if it `shows` one.
     """
 
     sides: Float64Array
@@ -154,7 +155,7 @@ def compare_windows(
     windows
         `(n, 4)`: x1, y1, x2, y2 of squares, frame pixels.
     vehicle
-        `(4,)`: the same of the part of the vehicle's box inside the frame.
+        `(4,)`: the same for the part of the vehicle's box inside the frame.
     frame_width
         Width of the frame, pixels.
     """
@@ -189,7 +190,7 @@ def _between(values: Float64Array, low: float, high: float) -> BoolArray:
 
 
 def cut_sides(vehicle: Float64Array, frame_width: int) -> BoolArray:
-    """Return whether the left and right side of the frame cut a box `(4,)` off, bool `(2,)`."""
+    """Return whether the left and right side of the frame cut off a box `(4,)`, bool `(2,)`."""
     edge = _EDGE * frame_width
     return np.array([vehicle[0] <= edge, vehicle[2] >= frame_width - edge])
 
@@ -209,9 +210,9 @@ _FOLDERS: dict[PatchKind, str] = {
 class VideoSource:
     """A labelled video.
 
-    Of the frames `first` to `last`, counted from 1, that the truth is about, every `every`-th is
-    used. Those in which a side of the frame cuts a vehicle off are rare and hard to learn, so all
-    of them are used. If `last` is None, it is the last frame of the truth.
+    Of the labelled frames `first` to `last`, counted from 1, every `every`-th is used, and all in
+    which a side of the frame cuts off a vehicle, because these are rare and hard to learn. If
+    `last` is None, it is the last labelled frame.
     """
 
     path: Path
@@ -225,12 +226,12 @@ class VideoSource:
     ) -> Iterator[tuple[Frame, Windows, LabelledVideo]]:
         """Yield the frames to use, with their windows and their labels.
 
-        `progress` gets the number of frames that are read.
+        `progress` receives the number of frames read.
 
         Raises
         ------
         TruthError
-            The truth cannot be used, or has nothing about these frames.
+            The ground truth cannot be used, or has no labels for these frames.
         VideoError
             The video cannot be read or searched.
         """
@@ -270,18 +271,18 @@ def mine(
     overwrite: bool = False,
     steps: Steps = no_steps,
 ) -> tuple[int, Counter[PatchKind]]:
-    """Search the labelled frames and write patches for the training.
+    """Search the labelled frames, and write patches for training.
 
-    The patches of `video.mp4` lie in the groups `mined_video` of `vehicles/`, `boxes/` and
-    `non-vehicles/`. Those of parts lie in `non-vehicles/mined_video_parts/`. The name of a patch
-    has its frame and window.
+    The patches of `video.mp4` are in the groups `mined_video` of `vehicles/`, `boxes/` and
+    `non-vehicles/`, those of parts in `non-vehicles/mined_video_parts/`. The name of a patch has
+    its frame and window.
 
     Parameters
     ----------
     output
         The zip file to write; `overwrite` replaces an existing one.
     model
-        The model whose false alarms are searched for.
+        The model whose false alarms to find.
     limits
         Maximum numbers of patches in a frame, and the minimum probability of false alarms.
     steps
@@ -294,11 +295,11 @@ def mine(
     Raises
     ------
     TruthError
-        Labels cannot be used, or have nothing about the frames.
+        Labels cannot be used, or there are none for these frames.
     VideoError
         A video cannot be read or searched.
     DataError
-        There is nothing to learn from these frames, or two sources have one name.
+        There is nothing to learn from these frames, or two sources have the same name.
     OutputError
         The zip file cannot be written.
     """

@@ -1,4 +1,4 @@
-"""From patch files to a model with its metrics, and the test of a model on patches."""
+"""Train a model on patch files, with metrics, and test models on patches."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -30,7 +30,7 @@ class Classification:
     Attributes
     ----------
     precision, recall
-        None where nothing is predicted to be a vehicle, or where there is none.
+        None if nothing is predicted to be a vehicle, or if there are no vehicles.
     confusion
         Number of patches: found vehicles, missed vehicles; false alarms, other non-vehicles.
     groups
@@ -46,7 +46,7 @@ class Classification:
 
     @classmethod
     def of(cls, vehicle: BoolArray, predicted: BoolArray, groups: npt.NDArray[np.str_]) -> Self:
-        """Compare the truth, bool `(n,)`, with the prediction, bool `(n,)`; groups are `(n,)`."""
+        """Compare truth and prediction, bool `(n,)` each; groups are `(n,)`."""
         right, cells = vehicle == predicted, 2 * ~vehicle + ~predicted
         found, missed, alarms, others = np.bincount(cells, minlength=4).tolist()
         return cls(
@@ -72,18 +72,18 @@ class Classification:
 
 @dataclass(frozen=True, slots=True)
 class TrainingMetrics:
-    """The metrics of a training run: fitted on a part of the patches, tested on the others.
+    """The metrics of a training: fitted on a part of the patches, tested on the others.
 
     Attributes
     ----------
     groups
         Number of patches of each group.
     samples
-        Number of samples that the classifier learned from: patches, and what was made of them.
+        Number of samples for the classifier: patches, and samples made from them.
     train_accuracy
         Accuracy on the patches among them.
     box_error
-        Mean absolute error of the regression on known sides of tested patches, as a fraction of the
+        Mean absolute error of the regression on known sides of test patches, as a fraction of the
         patch's side; None if no sides are known.
     """
 
@@ -114,16 +114,16 @@ def train(
     jobs: int | None = None,
     steps: Steps = no_steps,
 ) -> tuple[LinearModel, TrainingMetrics]:
-    """Describe the patches, fit a model on a part of them, and test it on the others.
+    """Compute features, fit a model on a part of the patches, and test it on the others.
 
     Parameters
     ----------
     files
         If some have known sides, the model learns to find the sides of vehicles.
     jobs
-        Number of threads that describe patches; None: one for each core.
+        Number of threads that compute features; None: one per core.
     steps
-        Called at the start of each step, with the number of patches to describe or None.
+        Called at the start of each step, with the number of patches or None.
 
     Returns
     -------
@@ -133,7 +133,7 @@ def train(
     Raises
     ------
     DataError
-        Patches are unreadable, or there are too few to learn from.
+        Patches are unreadable, or too few.
     """
     data, held, model = _fit_part(files, settings, jobs=jobs, steps=steps)
     learnt, tested = ~(held | data.is_boxed), held & ~data.is_boxed
@@ -160,9 +160,9 @@ def evaluate_patches(
     jobs: int | None = None,
     steps: Steps = no_steps,
 ) -> Classification:
-    """Test a ready model on all patches, or train one and test it on those that were held out.
+    """Test a given model on all patches, or train one and test it on the held-out patches.
 
-    Parameters and errors are those of `train`.
+    Parameters and errors as for `train`.
     """
     files = [file for file in files if not file.is_boxed]
     if model is None:
@@ -176,7 +176,7 @@ def evaluate_patches(
 def _fit_part(
     files: Sequence[PatchFile], settings: Settings, *, jobs: int | None, steps: Steps
 ) -> tuple[LabelledVectors, BoolArray, LinearModel]:
-    """Describe the patches, and fit a model to those of both classes that are not held out.
+    """Compute features, and fit a model to the patches of both classes that are not held out.
 
     Returns
     -------
@@ -193,7 +193,7 @@ def _fit_part(
 
 
 def _classify(model: LinearModel, data: LabelledVectors, chosen: BoolArray) -> Classification:
-    """Compare the chosen patches, bool `(patches,)`, with what the model says."""
+    """Compare the chosen patches, bool `(patches,)`, with the predictions of the model."""
     probabilities = model.probabilities(data.vectors[data.patches[chosen]])
     predicted = probabilities >= THRESHOLD
     return Classification.of(data.labels[chosen], predicted, data.groups[chosen])
