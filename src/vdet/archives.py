@@ -1,4 +1,4 @@
-"""Zip files: those from outside are read with limits, so that a small file cannot do harm."""
+"""Zip files, read with limits, so that a malicious one can do no harm."""
 
 import stat
 import zipfile
@@ -29,7 +29,7 @@ def open_archive(file: Path | IO[bytes]) -> zipfile.ZipFile:
 
 
 def store(archive: zipfile.ZipFile, name: str, data: str | bytes) -> None:
-    """Write a member without the time and the system, so that the same data give the same file."""
+    """Write a member without time and system, so that the same data give the same file."""
     info = zipfile.ZipInfo(name)  # of the earliest time
     info.compress_type = archive.compression
     info.create_system = 3  # Unix; the default depends on the system
@@ -38,7 +38,7 @@ def store(archive: zipfile.ZipFile, name: str, data: str | bytes) -> None:
 
 
 def is_hidden(name: PurePath) -> bool:
-    """Return whether a name in a set is hidden, or is one that macOS adds to its zip files."""
+    """Return whether a name is that of a hidden file, or one that macOS adds to zip files."""
     return any(part.startswith((".", "__MACOSX")) for part in name.parts)
 
 
@@ -48,8 +48,8 @@ def list_members(file: Path | IO[bytes]) -> list[str]:
     Raises
     ------
     ArchiveError
-        It is not a zip file or is damaged, a name occurs twice or leads out of the folder that the
-        archive would be unpacked in, or a member is a symbolic link.
+        It is not a zip file or is damaged, a name occurs twice or leads out of the archive's
+        folder, or a member is a symbolic link.
     """
     with open_archive(file) as archive:
         members = [member for member in archive.infolist() if not member.is_dir()]

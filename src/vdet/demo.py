@@ -60,7 +60,7 @@ _BY_MODEL = {"tracks": "model.csv", "stages": "stages"}
 def run_demo(
     folder: Path, *, seed: int, overwrite: bool, announce: Callable[[str], object], steps: Steps
 ) -> list[str]:
-    """Draw two roads, find and count their vehicles, and compare them with the ground truth.
+    """Render two roads, detect and count their vehicles, and compare them with the ground truth.
 
     The linear model is first trained on patches mined from other synthetic roads.
 
@@ -129,7 +129,7 @@ def run_demo(
 
 
 def _flows(folder: Path, scene: Scene, settings: Settings) -> list[list[str]]:
-    """Return the flows seen from the pole: vehicles found, and true ones."""
+    """Return the flows seen from the pole: vehicles counted, and true ones."""
     size = scene.camera.width, scene.camera.height
     flows: dict[tuple[str, str], list[int]] = {}
     for number, name in enumerate((_ON_POLE["tracks"], POLE_TRUTH)):

@@ -11,16 +11,16 @@ Segment = tuple[Point, Point]
 def side_of(start: Point, end: Point, point: Point) -> float:
     """Return the distance of a point from the line through `start` and `end`.
 
-    It is positive on the right of someone who looks from `start` to `end`, negative on the left.
+    It is positive to the right, as seen from `start` towards `end`, and negative to the left.
     """
     (ax, ay), (bx, by), (x, y) = start, end, point
     return ((bx - ax) * (y - ay) - (by - ay) * (x - ax)) / math.hypot(bx - ax, by - ay)
 
 
 def meeting(path: Segment, segment: Segment) -> float | None:
-    """Return where a path meets a segment, as a fraction of its length from its start.
+    """Return where a path meets a segment, as a fraction of the path's length.
 
-    Both include their ends. The result is None where they do not meet, and where they overlap.
+    Both include their ends. None if they do not meet, or overlap.
     """
     (ax, ay), (bx, by) = path
     (cx, cy), (dx, dy) = segment
@@ -41,7 +41,7 @@ def sides(corners: Sequence[Point]) -> list[Segment]:
 def crosses_itself(corners: Sequence[Point]) -> bool:
     """Return whether sides of a polygon cross or touch, apart from neighbours at their corner.
 
-    This is so of a polygon without an area.
+    A polygon without an area counts as one that does.
     """
     if len(set(corners)) < len(corners):
         return True

@@ -65,7 +65,7 @@ class Regions:
 
 
 def lay_regions(settings: Sequence[RegionSettings], width: int, height: int) -> Regions | None:
-    """Lay the regions of the settings over frames; None for the whole frame.
+    """Return the regions of the settings in frames of this size; None for the whole frame.
 
     Errors as of `Regions`.
     """
@@ -73,7 +73,7 @@ def lay_regions(settings: Sequence[RegionSettings], width: int, height: int) -> 
 
 
 def check_masks(settings: Sequence[RegionSettings]) -> None:
-    """Refuse masks that cannot be read, before any work. Raises `ImageError`."""
+    """Check that all masks can be read. Raises `ImageError`."""
     for setting in settings:
         if setting.mask:
             read_header(Path(setting.mask))

@@ -1,4 +1,4 @@
-"""What only some systems have. Where it is missing, its protection is left out, here alone."""
+"""Signals and file locks that only some systems have; elsewhere, vdet does without."""
 
 import contextlib
 import os
@@ -42,7 +42,7 @@ def lock(descriptor: int) -> bool:
 
 @contextlib.contextmanager
 def locked_folder(folder: Path) -> Iterator[bool]:
-    """Lock a folder in the block, and give whether it is locked; errors as of `lock`."""
+    """Lock a folder for a `with` block; yield whether it is locked. Errors are those of `lock`."""
     if fcntl is None:
         yield False
         return

@@ -29,7 +29,7 @@ class Document:
     places: dict[Key, str] = field(default_factory=dict)
 
     def place_of(self, key: Key) -> str:
-        """Return the place of a key, or of the nearest thing in or around it that has one."""
+        """Return the place of a key, or of the nearest one in or around it."""
         for length in range(len(key), -1, -1):
             for at, place in self.places.items():
                 if at[:length] == key[:length]:
@@ -38,7 +38,7 @@ class Document:
 
 
 def format_key(key: Key) -> str:
-    """Write a path as a user would: `detector.search.windows[0].size`."""
+    """Return a path as users write it: `detector.search.windows[0].size`."""
     text = ""
     for part in key:
         name = printable(str(part))
@@ -47,10 +47,10 @@ def format_key(key: Key) -> str:
 
 
 class _Loader(yaml.SafeLoader):
-    """Safe YAML with text as keys, each once, and without aliases and tags.
+    """Safe YAML without aliases, tags, duplicate keys, and keys that are not text.
 
-    A few aliases can expand to billions of values, a tag can ask for any kind of value; settings
-    need neither. `key_marks` are the places of all keys, each where its name stands.
+    A few aliases can expand to billions of values, and a tag can ask for any type; settings need
+    neither. `key_marks` are the places of all keys.
     """
 
     def __init__(self, text: str) -> None:
@@ -66,7 +66,7 @@ class _Loader(yaml.SafeLoader):
         return super().compose_node(parent, index)
 
     def read(self, node: yaml.Node, key: Key) -> Any:
-        """Return the value of a node, and add the marks of it and of all that is in it."""
+        """Return the value of a node, and add the marks of all keys in it."""
         self.key_marks.setdefault(key, node.start_mark)
         if isinstance(node, yaml.SequenceNode):
             return [self.read(item, (*key, index)) for index, item in enumerate(node.value)]
@@ -130,7 +130,7 @@ def parse_document(text: str, name: str) -> Document:
 
 
 def parse_assignment(text: str) -> Document:
-    """Read `key.key=value` as `--set` takes it.
+    """Parse `key.key=value`, as `--set` accepts it.
 
     Raises
     ------

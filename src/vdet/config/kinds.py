@@ -1,4 +1,4 @@
-"""The kinds of detectors and trackers: which there are, and the settings of each."""
+"""The kinds of detectors and trackers, and the settings of each."""
 
 from pathlib import Path
 from typing import Any
@@ -44,7 +44,7 @@ def kind_settings(section: str, name: str) -> type[Section]:
 
 
 def with_kind(section: str, values: Any) -> Any:
-    """Turn the values of a section with kinds into the settings of their kind."""
+    """Validate the values of a section as the settings of their kind."""
     if values is not None and not isinstance(values, dict):
         return values
     kind = (values or {}).get("kind", default_kind(section))
@@ -52,6 +52,6 @@ def with_kind(section: str, values: Any) -> Any:
 
 
 def kind_of_model(path: Path) -> str | None:
-    """Return the kind of detector that a model file is for; None where its ending does not say."""
+    """Return the kind of detector that a model file is for; None if its suffix does not tell."""
     kinds = {SvmSettings.model_suffix: "svm", NetworkSettings.model_suffix: "net"}
     return kinds.get(path.suffix.lower())

@@ -29,7 +29,7 @@ _CONFIGS = (_PACKAGE / "configs", _PACKAGE.parents[1] / "configs")
 
 
 def find_config(name: str) -> Path:
-    """Return the shipped config of a name (`seed`), else the config file at that path (`./seed`).
+    """Return the shipped config of this name (`seed`), else the config file at this path.
 
     Raises
     ------
@@ -53,8 +53,8 @@ def load_settings(
 ) -> Settings:
     """Read settings: defaults, then the files at `paths`, then assignments such as `output.crf=18`.
 
-    `detector` is the kind of detector where no layer chooses one, or a model file that is for one;
-    None for the default.
+    `detector` is the kind of detector if no layer chooses one, or a model file, which tells the
+    kind; None for the default.
 
     A list in a later layer replaces the whole list of an earlier one. Where a layer chooses another
     kind of detector or tracker than the layers below, that section starts from the defaults of this
@@ -84,7 +84,7 @@ def load_settings(
 
 
 def given_values(paths: Sequence[Path]) -> dict[str, Any]:
-    """Return what files say, merged and not checked: points as fractions, paths as they stand.
+    """Return the merged values of files, unchecked: points as fractions, paths as written.
 
     Raises
     ------
@@ -100,7 +100,7 @@ def _with_fractions(layer: Document) -> Document:
 
 
 def _read_file(path: Path) -> Document:
-    """Read a file as a layer: with fractions, and paths as seen from the working folder."""
+    """Read a file as a layer, with points as fractions and paths relative to the working folder."""
 
     def from_here(name: Any) -> Any:
         return str(path.parent / name) if isinstance(name, str) else name
@@ -127,7 +127,7 @@ def _joined(below: Any, above: Any) -> Any:
 
 
 def _with_kinds_over(below: Document, above: Document) -> Document:
-    """Lay a document over another one; a section in which it chooses another kind starts anew."""
+    """Lay a document over another one; a section whose kind it changes starts anew."""
     values = dict(below.values)
     for name in GROUPS:
         kind = inside(above.values, name, "kind")
@@ -163,7 +163,7 @@ def _expected(mistake: ErrorDetails, key: Key) -> str:
 
 
 def _unknown(key: Key, section: type[Section]) -> str:
-    """Name the other kind that has an unknown key, or the key that is meant, or all known ones."""
+    """Return a hint: the kind that has this key, the key probably meant, or all known ones."""
     name, group, known = str(key[-1]), str(key[0]), list(section.model_fields)
     if len(key) == 2 and group in GROUPS:
         owners = [kind for kind in plugin_names(GROUPS[group]) if name in _keys_of(group, kind)]

@@ -171,7 +171,7 @@ _DIGITS = 3  # of pixels
 def to_fractions(values: dict[str, Any]) -> dict[str, Any]:
     """Return settings with `camera.size` with the points as fractions of the frame.
 
-    What is not a point, or not a size, stays: it is refused with all other mistakes.
+    What is not a point or a size is kept, to be reported with all other mistakes.
     """
     return _scaled(values, lambda value, side: value / side)
 

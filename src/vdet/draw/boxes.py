@@ -1,4 +1,4 @@
-"""What is drawn on images and planes: lines, boxes with labels, and regions."""
+"""Draws lines, boxes with labels, and regions on images and planes."""
 
 import colorsys
 import math
@@ -51,7 +51,7 @@ def draw_lines(
 def draw_arrow(
     surface: Surface, start: Point, end: Point, color: Color, width: int, *, tip: float
 ) -> None:
-    """Draw an arrow whose tip has the fraction `tip` of its length."""
+    """Draw an arrow; `tip` is the length of its tip, as a fraction of the whole."""
     first, last = ((round(x), round(y)) for x, y in (start, end))
     for layer, value, halved in _layers(surface, color):
         thickness = max(1, round(width / 2**halved))
@@ -63,7 +63,7 @@ def write_text(
 ) -> None:
     """Write a line of text with its lower left corner at `origin`, and only inside `within`.
 
-    `scale` is the size as OpenCV counts it.
+    `scale` is OpenCV's font scale.
     """
     x1, y1, x2, y2 = corners = _visible(surface, within)
     if x1 >= x2 or y1 >= y2:
@@ -80,7 +80,7 @@ def write_text(
 
 @lru_cache(maxsize=256)
 def _text_mask(text: str, place: tuple[int, int], scale: float, shape: tuple[int, int]) -> Image:
-    """Return how much of each pixel a text covers; labels often stay for many frames."""
+    """Return how much of each pixel a text covers; cached, as labels often stay for many frames."""
     mask = np.zeros(shape, np.uint8)
     cv2.putText(mask, text, place, _FONT, scale, 255, _stroke(scale), cv2.LINE_AA)
     return mask
@@ -123,7 +123,7 @@ def _halved(mask: Image, x: int, y: int) -> Image:
 
 
 def _visible(surface: Surface, box: Box) -> tuple[int, int, int, int]:
-    """Return the sides of the part of a box that lies in the surface."""
+    """Return the part of a box that lies in the surface."""
     height, width = surface.shape[:2]
     return box.rounded.clipped(width, height).pixels
 
@@ -170,7 +170,7 @@ _BETTER = 0.1
 
 
 def color_of(number: int) -> Color:
-    """Return a bright colour for an id; neighbouring ids differ clearly."""
+    """Return a bright colour for an id; the colours of consecutive ids differ clearly."""
     return of_hue(0.33 + number * _GOLDEN_RATIO, 0.85)
 
 
@@ -194,11 +194,11 @@ def draw_box(
     Parameters
     ----------
     surface
-        It is changed.
+        Drawn on in place.
     box
         In pixels of the surface; it may reach beyond it.
     dashed
-        Whether the outline has gaps. This marks a vehicle that is lost.
+        Whether the outline is dashed, as for a lost vehicle.
     """
     width = line_width(surface)
     for part in _outline(box.rounded, width, _DASH * width if dashed else None):

@@ -93,7 +93,7 @@ def calibrate(paths: Iterable[Path], pattern: Pattern) -> Calibration:
 
 
 def find_corners(image: Image, pattern: Pattern) -> Float32Array | None:
-    """Return the inner corners of a board to a fraction of a pixel, `(n, 2)`; None without one."""
+    """Return the inner corners of a board to sub-pixel accuracy, `(n, 2)`; None without a board."""
     gray = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
     scale = min(1.0, math.sqrt(MAX_SEARCH_PIXELS / gray.size))
     small = cv2.resize(gray, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
@@ -110,7 +110,7 @@ def find_corners(image: Image, pattern: Pattern) -> Float32Array | None:
 
 
 def _find_board(path: Path, pattern: Pattern) -> BoardPhoto | str:
-    """Search the board in a photograph; return the reason if the photograph cannot be used."""
+    """Find the board in a photograph; return the reason if the photograph cannot be used."""
     try:
         image = read_image(path)
     except ImageError as error:
@@ -124,7 +124,7 @@ def _find_board(path: Path, pattern: Pattern) -> BoardPhoto | str:
 def _without(
     skipped: Mapping[Path, str], photos: Sequence[BoardPhoto], pattern: Pattern
 ) -> list[BoardPhoto]:
-    """Return the photographs that are not skipped; refuse too few of them."""
+    """Return the photographs that are not skipped; raise an error if too few are left."""
     kept = [photo for photo in photos if photo.path not in skipped]
     if len(kept) < MIN_PHOTOS:
         raise ImageError(
@@ -140,7 +140,7 @@ def _fit(
 ) -> tuple[LensSettings | None, list[float]]:
     """Fit a camera to the corners of all photographs; return it and each photograph's error.
 
-    There is no camera if all boards are seen from one side: these fit any focal length. An error
+    There is no camera if all boards are seen from one side: any focal length fits those. An error
     is the root mean square distance of the corners to the model's, pixels.
     """
     board = np.zeros((pattern[0] * pattern[1], 3), np.float32)  # a square is 1 unit long

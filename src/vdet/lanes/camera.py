@@ -25,7 +25,7 @@ Maps = tuple[cv2.typing.MatLike, cv2.typing.MatLike]
 
 
 def warped(layer: Image, maps: Maps, outside: int = 0) -> Image:
-    """Return a layer of a picture with its pixels moved; it is `outside` beyond its sides."""
+    """Return a remapped layer of a picture; pixels from beyond its edges are `outside`."""
     border = cv2.BORDER_CONSTANT, (outside,)
     return np.asarray(cv2.remap(layer, *maps, cv2.INTER_LINEAR, None, *border), np.uint8)
 
@@ -88,7 +88,7 @@ class Undistorter:
 
 
 def save_camera(lens: LensSettings, path: Path, *, overwrite: bool = False) -> None:
-    """Write a lens as YAML that `-c` takes. Raises `OutputError`."""
+    """Write a lens as YAML that `-c` accepts. Raises `OutputError`."""
     heading = "# A camera, written by `vdet calibrate`; lengths are pixels of its photographs.\n"
     text = yaml.safe_dump({"camera": {"lens": lens.model_dump(mode="json")}}, sort_keys=False)
     write_whole(path, heading + text, overwrite=overwrite)
@@ -134,13 +134,13 @@ class TopView:
         self._to_top = np.asarray(np.linalg.inv(self._warp), np.float64)
 
     def pixels(self) -> Float64Array:
-        """Return the pixels of the undistorted frame, `(rows, columns, 2)`, that it shows."""
+        """Return the pixels of the undistorted frame that the view shows, `(rows, columns, 2)`."""
         rows, columns = np.mgrid[: len(self.distances), : len(self.laterals)]
         shown = _transform(self._warp, np.column_stack([columns.ravel(), rows.ravel()]))
         return shown.reshape(*rows.shape, 2)
 
     def picture(self, frame: Image) -> Image:
-        """Return what it shows of an undistorted frame."""
+        """Return an undistorted frame as seen from above."""
         size = len(self.laterals), len(self.distances)
         flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
         return np.asarray(cv2.warpPerspective(frame, self._warp, size, flags=flags), np.uint8)
@@ -150,7 +150,7 @@ class TopView:
         return _transform(self._to_frame, np.asarray(np.column_stack([x, z]), np.float64))
 
     def sight(self, pixel: tuple[float, float]) -> tuple[float, float]:
-        """Return x / z and 1 / z of the ground point that a pixel of the undistorted frame shows.
+        """Return x / z and 1 / z of the ground point at a pixel of the undistorted frame.
 
         1 / z, in 1/m, is proportional to the rows below the horizon; it is 0 there, and negative
         above it. x / z does not depend on the scale of the ground, and has no unit.

@@ -35,7 +35,7 @@ LinePositions = tuple[Float64Array, Float64Array]
 
 @dataclass(frozen=True, slots=True)
 class LinePaint:
-    """Painted rows that may belong to one line: distances and lateral positions, metres `(n,)`."""
+    """Paint that may belong to one line: its distances and lateral positions, metres `(n,)`."""
 
     z: Float64Array
     x: Float64Array
@@ -72,8 +72,7 @@ _WINDOW = 3.0
 def paint_mask(luma: Image, blue: Image) -> Image:
     """Return 255 for paint and 0 for the rest, uint8 `(rows, columns)`.
 
-    `luma` and `blue` chroma are those of the road from above, uint8 `(rows, columns)`, in the
-    common coding.
+    `luma` and `blue` (chroma) show the road from above, uint8 `(rows, columns)`, in limited range.
     """
     width = round(_LINE_WIDTH * ACROSS) | 1  # odd, so that the blur does not shift lines
     reach = round(_REACH * ACROSS)
@@ -97,7 +96,7 @@ def _larger_side(channel: Image, reach: int) -> Image:
 def hide(mask: Image, top_view: TopView, boxes: Iterable[Box]) -> Image:
     """Return the mask with `HIDDEN` where vehicles, boxes in the undistorted frame, hide the road.
 
-    Seen from above, they stretch over everything behind them.
+    Seen from above, a vehicle covers everything behind it.
     """
     farthest = top_view.outline[:, 1].min()
     hidden = mask.copy()
@@ -114,7 +113,7 @@ def hide(mask: Image, top_view: TopView, boxes: Iterable[Box]) -> Image:
 def paint_along(
     mask: Image, top_view: TopView, lines: Sequence[Float64Array], margin: float
 ) -> list[LinePaint]:
-    """Return, for each line, the middle of its paint in each row, within `margin` metres of it.
+    """Return the middle of the paint within `margin` metres of each line, row by row.
 
     Each of `lines` is the x of one line in each row, metres `(rows,)`. A row is left out if a part
     of it is hidden near the line: the middle of the rest would be wrong.
@@ -161,7 +160,7 @@ def find_base(mask: Image, top_view: TopView) -> tuple[float, float] | None:
 
 
 def slide_windows(mask: Image, top_view: TopView, base: tuple[float, float]) -> LinePositions:
-    """Follow both lines with sliding windows, from near to far; return the windows' middles.
+    """Follow both lines with sliding windows, from near to far; return the windows' centres.
 
     The lines of a lane run in parallel, so both windows of a step move together, by the paint in
     either. Windows without paint move on as before.
@@ -212,7 +211,7 @@ _MEMORY = 0.6
 
 @dataclass(frozen=True, slots=True)
 class LaneCurves:
-    """Both lines of a lane: second order in the distance ahead, metres to the right."""
+    """Both lines of a lane: metres to the right, as second-order curves of the distance ahead."""
 
     bend: float
     """Half the curvature, 1/m, positive in a bend to the right."""
@@ -301,9 +300,9 @@ class FrameFit:
 
 
 def fit_near(mask: Image, top_view: TopView, last: LaneCurves) -> FrameFit | None:
-    """Fit the lane near its last curves; one seen line is enough.
+    """Fit the lane near its last curves; one visible line is enough.
 
-    None if neither is seen, or if a line has moved too far since the last frame.
+    None if neither is visible, or if a line has moved too far since the last frame.
     """
     fit = _fit(mask, top_view, last.at(top_view.distances), last)
     near = top_view.distances[-1:]
@@ -312,7 +311,7 @@ def fit_near(mask: Image, top_view: TopView, last: LaneCurves) -> FrameFit | Non
 
 
 def fit_new(mask: Image, top_view: TopView) -> FrameFit | None:
-    """Find a lane by histogram and sliding windows; None unless both lines are seen."""
+    """Find a lane by histogram and sliding windows; None unless both lines are visible."""
     base = find_base(mask, top_view)
     if base is None:
         return None
@@ -340,7 +339,7 @@ def _fit(mask: Image, top_view: TopView, positions: LinePositions, guess: LaneCu
 
 
 def _is_plausible(curves: LaneCurves, top_view: TopView) -> bool:
-    """Check width, parallel lines and bend against those of real roads."""
+    """Check that width, parallelism and bend are those of real roads."""
     return (
         abs(curves.width - top_view.lane_width) <= WIDTH_TOLERANCE
         and abs(curves.pitch) * top_view.length * curves.width <= _CONVERGENCE

@@ -1,7 +1,7 @@
 """The road plane of a camera: from pixels to metres, fitted to points whose metres are known.
 
 The plane is taken as flat. A homography (Hartley and Zisserman 2004, ch. 4) is fitted so that the
-squared distances in pixels are smallest, because pixels are what is read off a picture.
+squared distances in pixels are smallest, because it is pixels that are read off a picture.
 """
 
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ class Ground:
     error, pixel_error
         Root mean square distance of the points from the fit, metres and pixels.
     row
-        Metres that a row of pixels makes at the points, the median.
+        Metres of road per row of pixels at the points, the median.
     """
 
     to_metres: Float64Array
@@ -50,7 +50,7 @@ class Ground:
 
     @property
     def scale_error(self) -> float:
-        """Relative standard deviation of lengths, where a point is off by a pixel at least."""
+        """Relative standard deviation of lengths, for points that are off by at least a pixel."""
         return self.row * max(self.pixel_error, 1.0) / self.length
 
     def place(self, pixels: Float64Array) -> Float64Array:

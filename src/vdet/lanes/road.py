@@ -1,7 +1,7 @@
 """The road in the frames of a video: its lane, places on it, and their drawings.
 
-`RoadFinder.observe` does what needs one frame alone. `RoadFinder.update` takes the frames in their
-order: it fits the lane near the last one, or finds a new one, and smooths it over time.
+`RoadFinder.observe` does the work that needs one frame only. `RoadFinder.update` takes the frames
+in order: it fits the lane near the last one, or finds a new one, and smooths it over time.
 """
 
 import math
@@ -57,7 +57,7 @@ class Lane:
     right: Float64Array
 
     def record(self) -> dict[str, Any]:
-        """Return plain values for JSON, of the same meaning.
+        """Return plain values for JSON.
 
         `radius` (None on a straight road), `offset` and `width` are metres, rounded to millimetres;
         all are None where the camera is not described.
@@ -71,7 +71,7 @@ class Lane:
 
 @dataclass(frozen=True, slots=True)
 class RoadPosition:
-    """The place of a point on the road."""
+    """Where a point is on the road."""
 
     distance: float
     """Metres along the road from below the camera's lens."""
@@ -83,7 +83,7 @@ class RoadPosition:
 def position_on_road(
     foot: tuple[float, float], curves: LaneCurves, top_view: TopView
 ) -> RoadPosition | None:
-    """Return where on the road a point is that a pixel of the undistorted frame shows.
+    """Return where on the road the point at a pixel of the undistorted frame is.
 
     `foot` is `(x, y)`; whole numbers are pixel centres. None if it is above or near the horizon, or
     farther than the lane is known.
@@ -132,7 +132,7 @@ class Road:
     """Moves boxes and points of the frame to the undistorted one."""
 
     def without_metres(self) -> "Road":
-        """Return the road as a camera sees it that nobody described."""
+        """Return the road without what only a described camera can tell."""
         lane = self.lane and replace(self.lane, radius=None, offset=None, width=None)
         return replace(self, lane=lane, curves=None)
 
@@ -141,13 +141,13 @@ class Road:
         return self.lane.record() if self.lane else None
 
     def cuts(self, box: Box) -> bool:
-        """Return whether the left, right or lower edge of the frame cuts its box."""
+        """Return whether the left, right or lower edge of the frame cuts the vehicle's box."""
         height, width = self.view.picture.height, self.view.picture.width
         beside = box.x1 <= EDGE * width or box.x2 >= (1 - EDGE) * width
         return bool(beside or box.y2 >= (1 - EDGE) * height)
 
     def position(self, foot: tuple[float, float]) -> RoadPosition | None:
-        """Return where on the road a vehicle is that stands at `foot` in the frame.
+        """Return where on the road a vehicle with its foot at `foot` in the frame is.
 
         `foot` is `(x, y)` in pixels; whole numbers are the edges of pixels, as in boxes. None
         without a lane or metres, and where the lane does not reach: see `position_on_road`.
@@ -160,7 +160,7 @@ class Road:
 
 @dataclass(frozen=True, slots=True)
 class _LaneState:
-    """What the frames so far say about the lane."""
+    """What the frames so far tell about the lane."""
 
     fit: FrameFit
     unseen: tuple[int, int]
@@ -199,7 +199,7 @@ class RoadFinder:
         """Where the pixels of the top view lie in the frame, and in its chroma."""
 
     def observe(self, picture: Picture) -> FrameView:
-        """Mark the paint in the top view of a frame, which is made without undistorting it all."""
+        """Mark the paint in the top view of a frame, without undistorting the whole frame."""
         of_frame, of_chroma = self._maps
         if planes := picture.planes:
             luma, blue = warped(planes.luma, of_frame), warped(planes.blue, of_chroma, outside=128)
@@ -212,7 +212,7 @@ class RoadFinder:
     def update(self, view: FrameView, vehicles: Iterable[Box] = ()) -> Road:
         """Return the road in the next frame.
 
-        `vehicles` are the boxes of those in it. They hide paint.
+        `vehicles` are the boxes of the vehicles in it, which hide paint.
         """
         placed = [self._undistorter.box(box) for box in vehicles]
         view = replace(view, mask=hide(view.mask, self._top_view, placed))
@@ -273,7 +273,7 @@ def draw_lane(surface: Surface, lane: Lane) -> None:
 def lane_text(lane: Lane) -> tuple[str, ...]:
     """Return two lines of text: the lane's width and bend, and the camera's place in it.
 
-    There is none for a lane without metres.
+    It is empty for a lane without metres.
     """
     if lane.width is None or lane.offset is None:
         return ()

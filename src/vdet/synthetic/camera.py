@@ -1,4 +1,4 @@
-"""The pinhole camera: from points in metres to pixels, and outlines filled with colours.
+"""The pinhole camera, which projects points in metres to pixels; filled outlines; colours.
 
 Points are metres: x to the right of the camera, y up from the ground, z ahead of the camera,
 measured along the road. Pixels are x to the right, y down, whole numbers at pixel centres.
@@ -20,7 +20,7 @@ _SHIFT = 4  # fractional bits of the coordinates given to OpenCV
 
 @dataclass(frozen=True, slots=True)
 class PinholeCamera:
-    """A level camera over a flat road; the row of the horizon stands for its tilt.
+    """A camera above a flat road; the row of its horizon stands for its tilt.
 
     `width`, `height`, `focal` and `horizon` are pixels, `above_ground` is metres. `curvature` is
     that of the road ahead in 1/m, positive to the right: the road's centre at distance z is
@@ -36,12 +36,12 @@ class PinholeCamera:
 
     @classmethod
     def dashboard(cls, width: int, height: int, curvature: float = 0.0) -> "PinholeCamera":
-        """Return a usual dashboard camera: at 720 rows, focal length 1152 and horizon row 410."""
+        """Return a typical dashboard camera: at 720 rows, focal length 1152 and horizon row 410."""
         return cls(width, height, 1.6 * height, 0.57 * height, curvature=curvature)
 
     @classmethod
     def pole(cls, width: int, height: int, above_ground: float = 8.0) -> "PinholeCamera":
-        """Return a camera on a pole; it sees the road from 1.2 times its height on."""
+        """Return a camera on a pole; it sees the road beyond 1.2 times its height."""
         return cls(width, height, 1.1 * height, 0.08 * height, above_ground)
 
     def project(self, points: Float64Array) -> Float64Array:
@@ -75,7 +75,7 @@ def beyond_near(polygon: Float64Array) -> Float64Array:
 def fill_outline(image: Image, outline: Float64Array, color: Color, *, smooth: bool = True) -> None:
     """Fill an outline of pixels `(n, 2)`; an empty outline changes nothing.
 
-    The edges are smooth, or all pixels that they touch have the colour.
+    Its edges are either smooth, or filled in every pixel that they touch.
     """
     if len(outline):
         fixed = np.rint(outline * (1 << _SHIFT)).astype(np.int32)
@@ -83,12 +83,12 @@ def fill_outline(image: Image, outline: Float64Array, color: Color, *, smooth: b
 
 
 def shaded(color: Color, factor: float) -> Color:
-    """Return a colour made darker (below 1) or lighter (above 1)."""
+    """Return a colour made darker (factor below 1) or lighter (above 1)."""
     blue, green, red = (min(255, max(0, round(value * factor))) for value in color)
     return blue, green, red
 
 
 def mixed(color: Color, other: Color, fraction: float) -> Color:
-    """Return a colour mixed with this fraction, 0 to 1, of another one."""
+    """Return a colour mixed with a fraction, 0 to 1, of another one."""
     blue, green, red = (round(a + (b - a) * fraction) for a, b in zip(color, other, strict=True))
     return blue, green, red

@@ -1,7 +1,7 @@
-"""Rendering: from scenes to frames, and to a video file.
+"""Renders scenes as frames and as video files.
 
-Sky, colours of the ground and solid lines are painted once a scene. Dashes, the texture of the
-ground, plants and vehicles are drawn in each frame.
+Sky, ground colours and solid lines are painted once per scene; dashes, ground texture, plants and
+vehicles are drawn in each frame.
 """
 
 from collections.abc import Iterator
@@ -39,7 +39,7 @@ image rows at station 0."""
 
 
 class Renderer:
-    """Draws the frames of one scene; sky and resting parts of the ground are painted once."""
+    """Draws the frames of one scene; sky and static parts of the ground are painted once."""
 
     def __init__(self, scene: Scene) -> None:
         camera, road = scene.camera, scene.road
@@ -87,7 +87,7 @@ class Renderer:
         cv2.multiply(ground, cv2.merge([gain, gain, gain]), dst=ground, scale=1 / _NEUTRAL)
 
     def _expose(self, image: Image, index: int) -> Image:
-        """Return the image with the blur of a lens, and the exposure and noise of a sensor."""
+        """Return the image with lens blur, exposure and sensor noise."""
         soft = cv2.GaussianBlur(image, (3, 3), 0.6)
         exposed = cv2.convertScaleAbs(soft, alpha=self._scene.light.gain)
         x, y = np.random.default_rng([self._scene.seed, 4, index]).integers(0, _SHIFT, 2)

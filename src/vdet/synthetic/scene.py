@@ -1,4 +1,4 @@
-"""Road scenes: their description, plain values in metres and seconds, and random ones from a seed.
+"""Descriptions of road scenes in metres and seconds, also random ones from a seed.
 
 The same scene always gives the same images and the same truth. Lateral positions are metres to
 the right of the camera. A `station` is metres along the road from where the clip begins. The road's
@@ -107,7 +107,7 @@ class Waypoint:
 
 @dataclass(frozen=True, slots=True)
 class SceneVehicle:
-    """A car or a lorry. It exists from its first to its last waypoint, straight between."""
+    """A car or a lorry that exists, and moves straight, from its first waypoint to its last."""
 
     id: int
     path: tuple[Waypoint, ...]
@@ -124,7 +124,7 @@ class SceneVehicle:
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """A clip of `frames` frames at `rate` a second, from a camera that moves at `speed` m/s."""
+    """A clip of `frames` frames at `rate` per second, from a camera that moves at `speed` m/s."""
 
     camera: PinholeCamera
     road: Carriageway
@@ -146,7 +146,7 @@ class Scene:
         return self.speed * self.time(index)
 
     def brightness(self, station: float) -> float:
-        """Return the light on a vehicle at a station, 0 to 1."""
+        """Return the light that falls on a vehicle at a station, 0 to 1."""
         light = 1.0
         for shadow in self.light.shadows:
             if (station - shadow.station) % PERIOD < shadow.length:
@@ -207,9 +207,9 @@ def demo_scene(seed: int, *, width: int = 960, height: int = 540) -> Scene:
 
 
 def pole_scene(seed: int) -> Scene:
-    """Return a road from a pole: 10 s, two lanes away from the camera and two to it, two cars each.
+    """Return 10 s of a road seen from a pole: two lanes in each direction, two cars in each lane.
 
-    All cars come from outside the frame, and leave it or are far away in the end.
+    All cars come from outside the frame, and in the end have left it or are far away.
     """
     rng = np.random.default_rng(seed)
     scene = empty_road(rng, PinholeCamera.pole(960, 540), lane=1, lanes=4, seed=seed)
@@ -226,7 +226,7 @@ def pole_scene(seed: int) -> Scene:
 
 
 def busy_road(rng: np.random.Generator) -> Scene:
-    """Return a road of 40 frames, each with its own vehicles, two in each lane, to learn from.
+    """Return 40 frames of a road to train on, each with its own vehicles, two per lane.
 
     The camera is so fast that consecutive frames show different places.
     """

@@ -1,4 +1,4 @@
-"""The true boxes of the vehicles in a scene, from the outlines drawn."""
+"""The true boxes of the vehicles in a scene, from the outlines that are drawn."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,7 +23,7 @@ _WHITE = 255, 255, 255
 class TrueBox:
     """The place of a vehicle in a frame, without its shadow on the ground.
 
-    `box` bounds the part inside the frame, also where nearer vehicles hide it. `hidden` is the
+    `box` bounds the part inside the frame, including what nearer vehicles hide. `hidden` is the
     fraction of this part that they hide, 0 to 1.
     """
 
@@ -33,7 +33,7 @@ class TrueBox:
 
 
 def true_boxes(scene: Scene, index: int) -> tuple[TrueBox, ...]:
-    """Return the vehicles of which a part lies inside frame `index`, ordered by id."""
+    """Return the vehicles that are at least partly inside frame `index`, ordered by id."""
     camera = scene.camera
     covered = np.zeros((camera.height, camera.width), np.uint8)
     found = []
@@ -52,7 +52,7 @@ def must_be_found(vehicle: TrueBox, frame_height: int) -> bool:
     """Return whether a vehicle must be found: it is large enough, and at most half of it is hidden.
 
     The smallest size is `SMALLEST` in a frame of 720 rows and grows with the frame. For a vehicle
-    that the frame's edge cuts, the size of the part inside decides.
+    that the frame's edge cuts, the size of the part inside counts.
     """
     width, height = (length * frame_height / 720 for length in SMALLEST)
     large = vehicle.box.width >= width and vehicle.box.height >= height

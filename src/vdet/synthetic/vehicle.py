@@ -1,8 +1,8 @@
-"""A vehicle as a solid of flat facets, and its drawing.
+"""Draws a vehicle as a solid of flat facets.
 
-Coordinates of a vehicle are metres: x to the right of its middle, y up from the ground, z ahead of
-its rear. The lower body is a prism, the cabin a frustum on top of it. Lights, plate, windows and
-wheels are facets painted on them.
+Its coordinates are metres: x to the right of its middle, y up from the ground, z ahead of its rear.
+The lower body is a prism, the cabin a frustum on top of it. Lights, plate, windows and wheels are
+facets painted on them.
 """
 
 from functools import lru_cache
@@ -179,7 +179,7 @@ def _disc(x: float, axle: float, radius: float) -> Float64Array:
 
 
 def _inset(quad: Float64Array, left: float, right: float) -> Float64Array:
-    """Return the part of a quad between two fractions of its width, without 14 % below and above.
+    """Return the part of a quad between two fractions of its width, less 14 % at bottom and top.
 
     The corners of a quad are lower left, upper left, upper right, lower right.
     """

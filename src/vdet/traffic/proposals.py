@@ -51,7 +51,7 @@ COMPASS = ("N", "NE", "E", "SE", "S", "SW", "W", "NW")
 
 @dataclass(frozen=True, slots=True)
 class ProposedLine:
-    """A line that a stream of `vehicles` crosses to the left of someone who looks along it.
+    """A line that a stream of `vehicles` crosses, to the left as seen along the line.
 
     `left` is the name of the direction of the stream, `right` of the other one. `start` and `end`
     are in pixels.
@@ -67,7 +67,7 @@ class ProposedLine:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Candidate:
-    """A line across a `way`, and the numbers of the vehicles it is for and of others it meets.
+    """A line across a `way`, and the indices of its own vehicles and of others that cross it.
 
     `place` is where it is on a path, an index of `_PLACES`.
     """
@@ -79,7 +79,7 @@ class _Candidate:
     others: Int64Array
 
     def gain(self, left: BoolArray) -> int:
-        """Return how many vehicles it adds to those that are `left`, less all others; 0 for few."""
+        """Return how many of the vehicles `left` it counts, less all others; 0 if too few."""
         own = int(left[self.own].sum())
         others = len(self.others) + len(self.own) - own
         is_enough = own >= max(_MIN_VEHICLES, _MIN_FRACTION * len(left))
@@ -130,7 +130,7 @@ def _directions(way: Float64Array, facing: str | None) -> tuple[str, str]:
 
 
 class _Streams:
-    """The points of all paths: where, in which direction, of which vehicle and group, how far."""
+    """The points of all paths: place, direction, vehicle, group, and fraction of the path."""
 
     def __init__(self, paths: Sequence[VehiclePath], width: int, height: int) -> None:
         rows = [_spaced(path, _SPACING * width) for path in paths]
@@ -153,7 +153,7 @@ class _Streams:
                         yield candidate
 
     def _across(self, row: int, place: int) -> _Candidate | None:
-        """Return the line across a path at one of its points; None where it is for nobody."""
+        """Return the line across a path at one of its points; None if it counts no vehicle."""
         base, way, numbers = self._points[row], self._ways[row], self._numbers
         across = np.array([-way[1], way[0]])
         ahead, aside = (self._points - base) @ way, (self._points - base) @ across

@@ -1,14 +1,14 @@
 """The speed of each vehicle on the road plane.
 
-1. A vehicle is at the foot of its box. From there the plane gives its place in metres.
+1. A vehicle stands at the foot of its box, which the plane maps to a place in metres.
 2. The foot is its nearest point. Its middle is half its extent farther away, which depends on where
    it heads; its length follows from the width of its box.
 3. Velocity is the slope of a straight line, fitted by weighted least squares to the places of
-   `WINDOW` seconds (Cleveland 1979 without the robust steps). Places weigh as exactly as a row of
-   pixels is there. Places far off the line are dropped, and the line is fitted again.
+   `WINDOW` seconds (Cleveland 1979 without the robust steps). Places are weighted by the precision
+   of a row of pixels there. Places far off the line are dropped, and the line is fitted again.
 4. The standard deviation has two parts. One follows from the scatter about the lines; neighbouring
-   places err alike, so they count as fewer. The other holds for the whole vehicle: the box may end
-   too low or too high, and the plane is as exact as the pixels it was fitted to.
+   places have similar errors, so they count as fewer. The other applies to the whole vehicle: the
+   box may end too low or too high, and the plane is only as exact as the pixels it was fitted to.
 """
 
 import math
@@ -56,7 +56,7 @@ _NOTHING = 1e-9
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Speeds:
-    """Where a vehicle is in metres, and how fast, at each of its `times`, float64 `(n,)` each.
+    """Where a vehicle is, in metres, and how fast it is at each of its `times`, float64 `(n,)`.
 
     Attributes
     ----------
@@ -76,11 +76,11 @@ class Speeds:
 
     @property
     def metres(self) -> float:
-        """The length of the way."""
+        """Length of the path."""
         return float(self._ways.sum())
 
     def quantile(self, fraction: float) -> float:
-        """Return the speed below which the vehicle covers this fraction of its way, m/s."""
+        """Return the speed below which the vehicle covers this fraction of its path, m/s."""
         order = np.argsort(self.speeds)
         gone = np.cumsum(self._ways[order])
         if not gone[-1]:
@@ -105,7 +105,7 @@ class Speeds:
     def between(self, first: float, last: float) -> float | None:
         """Return the mean speed from the place at a time to that at a later one, m/s.
 
-        It rests on two places alone, so it checks what is smoothed. None where one is unknown.
+        It uses these two places only, so it checks the smoothed speeds. None where one is unknown.
         """
         if not self.times[0] <= first < last <= self.times[-1]:
             return None
@@ -137,7 +137,7 @@ class SpeedMeter:
         self._known: dict[int, Speeds | None] = {}
 
     def add(self, frame: FrameTracks) -> None:
-        """Add the next frame. Vehicles that are lost, or cut off by the frame, are left out."""
+        """Add the next frame. Lost vehicles, and those that the frame cuts off, are left out."""
         left, right, bottom = self._sides
         for track in frame.tracks:
             box = track.box
@@ -180,7 +180,7 @@ def _kmh(speed: float | None) -> float | None:
 
 
 def measure(ground: Ground, rows: Float64Array) -> Speeds | None:
-    """Return the speeds of a vehicle; None where too little of its way is in the calibrated area.
+    """Return the speeds of a vehicle; None if too little of its path is in the calibrated area.
 
     `rows` are time, x and y of the foot, width and height of the box, `(n, 5)`.
     """
@@ -205,7 +205,7 @@ def measure(ground: Ground, rows: Float64Array) -> Speeds | None:
 def _common(ground: Ground, rows: Float64Array) -> float:
     """Return the relative standard deviation of all speeds of a vehicle.
 
-    A box that ends too low moves the first and the last place; the difference is a wrong way.
+    A box that ends too low moves the first and the last place; the difference is false movement.
     """
     first, last = rows[[0, -1], 1:3]
     low = [(0, _FOOT_ERROR * height) for height in rows[[0, -1], 4]]
@@ -218,7 +218,7 @@ def _common(ground: Ground, rows: Float64Array) -> float:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Sight:
-    """How a vehicle is seen: its `places` in metres, and what pixels are there.
+    """How a vehicle is seen: its `places` in metres, and what a pixel amounts to there.
 
     `depth` points across the rows of pixels, away from the camera, with length 1. `away` is the way
     along a column that is 1 m deep. Both are `(n, 2)`. `widths` are those of the box in metres,
@@ -234,7 +234,7 @@ class _Sight:
 
     @classmethod
     def of(cls, ground: Ground, rows: Float64Array) -> "_Sight":
-        """Return the sight of all `rows` of `measure`; weights are NaN where it is not known."""
+        """Return the sight for all `rows` of `measure`; weights are NaN where it is unknown."""
         around = rows[:, 1:3] - _AROUND[:, np.newaxis]
         places, above, left = ground.place(around.reshape(-1, 2)).reshape(around.shape)
         away, beside = above - places, left - places
@@ -246,9 +246,9 @@ class _Sight:
         return cls(rows[:, 0], places, depth, away, pixel * rows[:, 3], weights)
 
     def middles(self, velocities: Float64Array) -> Float64Array:
-        """Return the middles of the vehicle on the road, `(n, 2)`.
+        """Return the vehicle's centres on the road, `(n, 2)`.
 
-        While it stands, it heads where it moves before or after.
+        While it stands, its heading is that of its movement before or after.
         """
         speeds = np.hypot(*velocities.T)
         moves = speeds >= _MOVES

@@ -1,4 +1,4 @@
-"""The tracker of the original system: regions of the heatmap become cars, by these rules.
+"""The tracker of the original system, which turns regions of the heatmap into cars by these rules.
 
 The code and the tests use these numbers. The constants are the original's; all of them are
 settings, under `tracker` with `kind: rules`. A region is a detection, and its peak is the
@@ -6,7 +6,7 @@ strength of the detection.
 
 1.  Regions narrower or lower than 50 px are ignored.
 2.  A region's cars are those whose centroid it contains.
-3.  Several cars: those count whose latest image is found within 50 px of where it was.
+3.  Several cars: only those count whose latest image is found within 50 px of where it was.
 4.  If those overlap by more than 40 px they become one new car, shown at once.
 5.  Otherwise they stay apart and move to where they were found.
 6.  One car, and a peak above 4: it needs only 3 detections in a row to be shown.

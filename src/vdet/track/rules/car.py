@@ -25,14 +25,14 @@ class Region:
     classes: Mapping[str, float] = field(default_factory=dict)
 
     def moved(self, x: float, y: float) -> "Region":
-        """Return it with the top left corner of its box at another place."""
+        """Return the region with the top left corner of its box moved to a point."""
         centroid = self.centroid[0] + x - self.box.x1, self.centroid[1] + y - self.box.y1
         box = Box.sized(x, y, self.box.width, self.box.height)
         return replace(self, box=box, centroid=centroid)
 
 
 class Car:
-    """What is remembered of a car.
+    """A car, as the tracker remembers it.
 
     Every detection, by region or by match, adds a region, of which the last `history` are kept.
     `box`, `centroid` and `score` are their averages, so they exist from the first detection on.
@@ -40,7 +40,7 @@ class Car:
     Attributes
     ----------
     id
-        Given when the car is first shown; None before.
+        Assigned when the car is first shown; None before.
     needed
         Detections in a row before the car is shown.
     in_a_row
@@ -57,7 +57,7 @@ class Car:
     centroid
         Average centroid, `(x, y)`.
     votes
-        Its class, by what all regions say.
+        Votes of all its regions for its class.
     """
 
     box: Box
@@ -89,7 +89,7 @@ class Car:
         return is_young_and_missed or is_only_matched or self.misses >= self._settings.max_misses
 
     def is_filled_by(self, region: Region) -> bool:
-        """Return whether a region is wide enough to be all of the car (rules 7 and 8)."""
+        """Return whether a region is wide enough to be the whole car (rules 7 and 8)."""
         minimum = min(self._settings.wide, self._settings.good_fraction * self.box.width)
         return region.box.width > minimum
 
@@ -99,7 +99,7 @@ class Car:
         return abs(region.box.width - width) <= self._settings.combined_tolerance * width
 
     def see(self, region: Region, image: Image, *, by_match: bool = False) -> None:
-        """Add a detection in the frame `image`; the region lies in it."""
+        """Add a detection; its region lies inside the frame `image`."""
         self._image = region.box.cut(image).copy()
         if not by_match:
             box, size = np.array(astuple(region.box)), (image.shape[1], image.shape[0])
@@ -114,7 +114,7 @@ class Car:
         self.misses = 0
 
     def miss(self) -> None:
-        """Note a frame without a detection."""
+        """Record a frame without a detection."""
         self.in_a_row = 0
         self.misses += 1
 
@@ -124,16 +124,16 @@ class Car:
             self.needed = min(self.needed, self._settings.confident_detections_needed)
 
     def vouch(self) -> None:
-        """Let it count as detected often enough to be shown."""
+        """Count the car as detected often enough to be shown."""
         needed = self._settings.detections_needed
         self.in_a_row, self.count = max(self.in_a_row, needed), max(self.count, needed)
 
     def find_in(self, image: Image) -> Region | None:
         """Return the latest detection where its image fits the frame `image` best.
 
-        It may have moved by `match_distance` pixels in a straight line; nothing farther around it
-        is searched. None where nothing scores `match_score`, and for an image of one colour, which
-        fits anything flat.
+        It may have moved by up to `match_distance` pixels in a straight line; nothing farther away
+        is searched. None if nothing scores `match_score`, and for an image of one colour, which
+        fits any flat area.
         """
         last, distance = self._seen[-1], self._settings.match_distance
         if (self._image == self._image[0, 0]).all():
@@ -152,7 +152,7 @@ class Car:
 
 
 def combine(first: Region, second: Region) -> Region:
-    """Return the two as one: box around both, centroids weighted by box area, the higher peak."""
+    """Combine two regions: the box around both, centroids weighted by area, the higher peak."""
     one, two = first.box.area, second.box.area
     (x1, y1), (x2, y2) = first.centroid, second.centroid
     centroid = (x1 * one + x2 * two) / (one + two), (y1 * one + y2 * two) / (one + two)

@@ -1,4 +1,4 @@
-"""The rules tracker: which cars there are, frame after frame, by rules 1 to 17.
+"""The rules tracker, which follows cars from frame to frame by rules 1 to 17.
 
 Where the description of the original system can be read in two ways, this is the choice:
 
@@ -43,12 +43,12 @@ from vdet.track.track import State, Track
 
 
 class RulesTracker:
-    """The cars of one video; make a new one for every video, ids start at 1 in each.
+    """Tracks the cars of one video. Make a new one for every video: ids start at 1.
 
     Parameters
     ----------
     settings
-        Lengths already scaled to the frame.
+        With lengths already scaled to the frame.
 
     Attributes
     ----------
@@ -72,7 +72,7 @@ class RulesTracker:
         time: float,  # noqa: ARG002 - the rules count frames
         picture: Picture | None = None,
     ) -> list[Track]:
-        """Follow the cars into the next frame as `VideoTracker.update`; `picture` is needed."""
+        """Follow the cars into the next frame, as `VideoTracker.update`; `picture` is required."""
         if picture is None:
             raise ValueError("the rules tracker needs the frame; pass its image")
         regions = large_enough(detections, picture.width, picture.height, self._settings)
@@ -186,7 +186,7 @@ class RulesTracker:
         return True
 
     def _search(self, car: Car, image: Image) -> None:
-        """Rule 13: the image of a shown car is searched in the frame."""
+        """Rule 13: search the frame for the image of a shown car."""
         found = None if car.id is None else car.find_in(image)
         if found is None:
             car.miss()
@@ -203,7 +203,7 @@ class RulesTracker:
 def large_enough(
     detections: Boxes, frame_width: int, frame_height: int, settings: RulesTrackerSettings
 ) -> list[Region]:
-    """Return the regions, clipped to the frame, that are not narrower or lower than allowed.
+    """Return the regions, clipped to the frame, that are large enough.
 
     Rule 1. The part of a region outside the frame does not count.
     """
