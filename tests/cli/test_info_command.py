@@ -137,5 +137,5 @@ def test_another_opencv_over_ours_is_named_with_the_cure(
         "\"pip install 'opencv-python-headless<5'\"\n"
     )
     assert f"cv2: broken; {cure}" in run("info").out
-    monkeypatch.setattr("vdet.config.rendering.render", fail)
+    monkeypatch.setattr("vdet.config.rendering.render_settings", fail)
     assert run("config").err == f"vdet: {cure}"
