@@ -130,7 +130,7 @@ def index_page(path: Path, videos: int = 10_000, each: int = 10) -> None:
                 seconds=round(float(20 * rng.random()), 1),
                 clock=f"2026-05-{number % 28 + 1:02}T{number % 24:02}:30:07+02:00",
                 speed=round(float(90 * rng.random()), 1),
-                way=("", "north → south", "south → north")[rng.integers(3)],
+                lines=("", "north → south", "south → north")[rng.integers(3)],
             )
             for n in range(each)
         )

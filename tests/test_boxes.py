@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vdet.boxes import Box, Boxes, Detection, are_nested, coverage, iou_matrix, visible
+from vdet.boxes import Box, Boxes, Detection, are_nested, clipped, coverage, iou_matrix
 
 places = st.integers(-50, 50)
 boxes = st.builds(Box.sized, places, places, st.integers(0, 60), st.integers(0, 60))
@@ -62,7 +62,7 @@ def test_the_overlaps_of_columns_are_those_of_single_boxes(one: Box, other: Box)
     assert covered == pytest.approx(one.intersection(other).area / one.area)
     part = one.clipped(20, 30)
     if part.area:
-        assert visible(columns(one), (20, 30)).tolist() == columns(part).tolist()
+        assert clipped(columns(one), (20, 30)).tolist() == columns(part).tolist()
 
 
 @pytest.mark.parametrize(

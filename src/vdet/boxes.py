@@ -379,7 +379,7 @@ def are_nested(boxes: Float64Array, scores: npt.ArrayLike) -> BoolArray:
     return np.asarray(((inside | inside.T) & higher).any(axis=1))
 
 
-def visible(boxes: Float64Array, size: tuple[int, int]) -> Float64Array:
+def clipped(boxes: Float64Array, size: tuple[int, int]) -> Float64Array:
     """Clip boxes `(n, 4)` to a frame of `size`, width and height; they may lose their area."""
     return np.minimum(np.maximum(boxes, 0), (*size, *size))  # np.clip is three times slower
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vdet.boxes import NO_BOXES, Boxes, Image, visible
+from vdet.boxes import NO_BOXES, Boxes, Image, clipped
 from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel, VideoDetector, stage_pictures_of
 from vdet.files import OutputFiles
@@ -49,7 +49,7 @@ def check_detector(model: DetectorModel, images: Sequence[Image]) -> None:
     still = model.for_video(width, height, shown[:1])
     in_still = _detect(still, shown[0], None)
     for boxes in (*found, in_still):
-        inside = visible(boxes.sides, (width, height))
+        inside = clipped(boxes.sides, (width, height))
         assert np.array_equal(inside, boxes.sides), "a box lies outside the frame"
     for name, picture in stage_pictures_of(still)(shown[0], in_still).items():
         is_image = picture.dtype == np.uint8 and picture.ndim == 3

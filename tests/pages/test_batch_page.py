@@ -24,7 +24,7 @@ VIDEOS = {
         row(
             *(1, "car", 0.0),
             clock="2026-05-01T07:00:02+02:00",
-            way="north → south",
+            lines="north → south",
             speed=51.5,
             motion="drove",
             distance=18.2,
@@ -65,11 +65,11 @@ def test_its_table_has_every_vehicle(tmp_path: Path) -> None:
         "zero": 1777618802,
         "texts": {
             "class": ["car", "vehicle", NASTY],
-            "way": ["north → south", ""],
+            "lines": ["north → south", ""],
             "state": ["drove", ""],
         },
         "class": [0, 1, 2, 0],
-        "way": [0, 1, 1, 1],
+        "lines": [0, 1, 1, 1],
         "state": [0, 1, 1, 1],
         "id": [1, 2, 1, 2],
         "first": [0.0, 1.0, 3.5, 2.0],

@@ -222,7 +222,7 @@ def test_the_facts_have_the_counts_and_a_row_for_each_vehicle() -> None:
     assert facts.rows == (
         VehicleRow(
             id=1, class_name=None, first=0.0, seconds=2.0, clock="2026-05-01T07:00:00+00:00",
-            way="north → south", picture="../a.crops/vehicle-0001.jpg",
+            lines="north → south", picture="../a.crops/vehicle-0001.jpg",
         ),
         VehicleRow(
             id=2, class_name="truck", first=2.0, seconds=0.1, clock="2026-05-01T07:00:02+00:00"

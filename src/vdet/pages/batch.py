@@ -36,7 +36,7 @@ class VehicleRow(BaseModel):
         `first` as a clock time, ISO 8601; None if unknown.
     speed
         Median speed, km/h; None if unknown.
-    way
+    lines
         The lines and zones where it was counted, in order.
     motion
         Whether it drove or stood, as in records; empty if unknown.
@@ -54,7 +54,7 @@ class VehicleRow(BaseModel):
     seconds: float
     clock: str | None = None
     speed: float | None = None
-    way: str = ""
+    lines: str = ""
     motion: str = ""
     distance: float | None = None
     lane: int | None = None
@@ -117,7 +117,7 @@ def table_json(parts: Sequence[Part]) -> str:
     zero = min((clock for clock in clocks if clock is not None), default=0)
     texts = {
         "class": [row.class_name or UNKNOWN for row in rows],
-        "way": [row.way for row in rows],
+        "lines": [row.lines for row in rows],
         "state": [row.motion for row in rows],
     }
     columns: dict[str, list[Any]] = {

@@ -110,8 +110,8 @@ class Drawing:
         counts = count_frames(self._frames, self._settings, self._size)
         lines, zones = place(self._settings.traffic, *self._size)
         ground = ground_of(self._settings.camera, *self._size)
-        ways = {key: path.points.tolist() for path in self.paths for _, key in path.tracks}
-        return place_marks(self._size, (*lines, *zones), counts, ways, ground)
+        paths = {key: path.points.tolist() for path in self.paths for _, key in path.tracks}
+        return place_marks(self._size, (*lines, *zones), counts, paths, ground)
 
 
 _PROPOSED = """\

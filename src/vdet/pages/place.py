@@ -17,11 +17,11 @@ from vdet.lanes.ground import Ground
 from vdet.pages.charts import hex_color
 from vdet.pages.render import Table, render
 from vdet.polygons import Point
-from vdet.traffic.counts import Counts, Event, Way, class_of, vehicle_flows
+from vdet.traffic.counts import Counts, Direction, Event, class_of, vehicle_flows
 from vdet.traffic.crossings import Border, PlacedLine
 from vdet.traffic.records import VehicleRecord
 
-NOWHERE = "–"
+_NO_OTHER = "–"
 """Destination of a flow with a single line or zone."""
 
 _WIDEST = 0.012
@@ -55,12 +55,12 @@ class Mark:
     is_arrow: bool = False
 
 
-def flows_of(counts: Counts) -> dict[Way, list[tuple[Event, Event]]]:
+def flows_of(counts: Counts) -> dict[tuple[str, str], list[tuple[Event, Event]]]:
     """Return the first and last event of each vehicle by flow, the largest flow first."""
-    flows: dict[Way, list[tuple[Event, Event]]] = {}
+    flows: dict[tuple[str, str], list[tuple[Event, Event]]] = {}
     for _, first, last in vehicle_flows([counts]):
-        way = first.name, last.name if last else NOWHERE
-        flows.setdefault(way, []).append((first, last or first))
+        flow = first.name, last.name if last else _NO_OTHER
+        flows.setdefault(flow, []).append((first, last or first))
     return dict(sorted(flows.items(), key=lambda flow: -len(flow[1])))
 
 
@@ -68,20 +68,20 @@ def place_marks(
     size: tuple[int, int],
     borders: Sequence[Border],
     counts: Counts,
-    ways: Mapping[int, Sequence[Point]],
+    paths: Mapping[int, Sequence[Point]],
     ground: Ground | None = None,
 ) -> list[Mark]:
     """Return the marks to draw on frames of this width and height, pixels.
 
-    `ways` are the paths of tracks by id, pixels.
+    `paths` are those of tracks by id, pixels.
     """
     totals = {(total.name, total.direction): total.count for total in counts.totals}
     marks = [mark for border in borders for mark in border_marks(border, totals)]
     flows = flows_of(counts)
     most = max(map(len, flows.values()), default=1)
     for number, trips in enumerate(flows.values()):
-        paths = sorted((ways[last.id] for _, last in trips if last.id in ways), key=len)
-        middle = paths[len(paths) // 2] if paths else ()
+        shown = sorted((paths[last.id] for _, last in trips if last.id in paths), key=len)
+        middle = shown[len(shown) // 2] if shown else ()
         path = _inside(middle, size)
         if len(path) > 1:
             wide = max(2, round(_WIDEST * size[0] * len(trips) / most))
@@ -110,7 +110,7 @@ def direction_color(start: Point, end: Point) -> Color:
     return boxes.of_hue(angle / (2 * math.pi), 0.8)
 
 
-def border_marks(border: Border, totals: Mapping[Way, int], text: str = "") -> Iterator[Mark]:
+def border_marks(border: Border, totals: Mapping[Direction, int], text: str = "") -> Iterator[Mark]:
     """Yield the marks of a zone with its name and a text, or of a line with its name and counts.
 
     The arrows to both sides are at the start of a line, beside the traffic.
@@ -202,14 +202,14 @@ def traffic_part(
     several = classes if len(classes) > 1 else []
     flows = flows_of(counts)
     rows = [
-        (*way, *_numbers([first for first, _ in trips], several)) for way, trips in flows.items()
+        (*flow, *_numbers([first for first, _ in trips], several)) for flow, trips in flows.items()
     ]
     colors = [hex_color(boxes.color_of(number)) for number in range(len(flows))]
     picture = None
     if frame is not None:
-        ways = {record.id: record.path for record in records}
+        paths = {record.id: record.path for record in records}
         size = frame.shape[1], frame.shape[0]
-        picture = with_marks(frame, place_marks(size, borders, counts, ways, ground))
+        picture = with_marks(frame, place_marks(size, borders, counts, paths, ground))
     table = ("from", "to", *several, "vehicles"), rows
     return TrafficPart(_totals(counts, several), table, colors, picture)
 
@@ -217,12 +217,12 @@ def traffic_part(
 def _totals(counts: Counts, classes: Sequence[str]) -> Table:
     headings = ("line or zone", "direction", *classes, "vehicles", "median km/h", "85 % km/h")
     rows = []
-    for way in counts.ways:
-        events = [event for event in counts.events if (event.name, event.direction) == way]
+    for direction in counts.directions:
+        events = [event for event in counts.events if (event.name, event.direction) == direction]
         speeds = [event.speed for event in events if event.speed is not None]
         numbers = np.quantile(speeds, [0.5, 0.85]).tolist() if speeds else []
         shown = [f"{number:.0f}" for number in numbers] or ["–", "–"]
-        rows.append((*way, *_numbers(events, classes), *shown))
+        rows.append((*direction, *_numbers(events, classes), *shown))
     if all(event.speed is None for event in counts.events):
         return headings[:-2], [row[:-2] for row in rows]
     return headings, rows

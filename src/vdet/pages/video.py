@@ -137,9 +137,9 @@ class VideoPage:
 
     def _rows(self, pictures: Mapping[int, str]) -> tuple[VehicleRow, ...]:
         """Return the rows of the table; `pictures` has addresses of images by vehicle id."""
-        ways: dict[int, dict[str, None]] = {}
+        lines: dict[int, dict[str, None]] = {}
         for event in self.counts.events if self.counts else ():
-            ways.setdefault(event.id, {})[event.name] = None
+            lines.setdefault(event.id, {})[event.name] = None
         return tuple(
             VehicleRow(
                 id=record.id,
@@ -148,7 +148,7 @@ class VideoPage:
                 seconds=round(record.seconds, 1),
                 clock=self.clock and self.clock.at(record.first).isoformat(timespec="seconds"),
                 speed=round(KMH * record.speeds.quantile(0.5), 1) if record.speeds else None,
-                way=" → ".join(ways.get(record.id, ())),
+                lines=" → ".join(lines.get(record.id, ())),
                 motion=record.motion or "",
                 distance=None if record.distance is None else round(record.distance, 1),
                 lane=record.lane,

@@ -88,21 +88,21 @@ def flows_content(path: Path, videos: Videos, interval: int | None = None) -> An
 
 
 def wide_table(rows: Sequence[CountRow | FlowRow], between: str) -> list[Sequence[Any]]:
-    """Return a table with a row for each interval, a column for each way and class, and sums.
+    """Return a table with a row for each interval, a column for each pair and class, and sums.
 
-    `between` is the text between the two names of a way.
+    `between` is the text between the two names of a pair.
     """
     found: Counter[tuple[Any, ...]] = Counter()
     cells = [_cells(row) for row in rows]
-    for start, end, *way, name, count in cells:
+    for start, end, *pair, name, count in cells:
         for interval in ((start, end), (ALL, "")):
-            for column in ((*way, name), (*way, ALL), (ALL,)):
+            for column in ((*pair, name), (*pair, ALL), (ALL,)):
                 found[*interval, *column] += count
     intervals = dict.fromkeys(tuple(row[:2]) for row in cells)
     classes = dict.fromkeys(row[4] for row in cells)
-    ways = dict.fromkeys(tuple(row[2:4]) for row in cells)
-    columns = [*((*way, name) for way in ways for name in (*classes, ALL)), (ALL,)]
-    heading = (*(f"{between.join(way)}, {name}" for *way, name in columns[:-1]), ALL)
+    pairs = dict.fromkeys(tuple(row[2:4]) for row in cells)
+    columns = [*((*pair, name) for pair in pairs for name in (*classes, ALL)), (ALL,)]
+    heading = (*(f"{between.join(pair)}, {name}" for *pair, name in columns[:-1]), ALL)
     times = (*intervals, (ALL, ""))
     body = ((*time, *(found[*time, *column] for column in columns)) for time in times)
     return [("start", "end", *heading), *body]
@@ -118,7 +118,7 @@ def flow_matrix(videos: Sequence[Counts], rows: Iterable[FlowRow]) -> dict[str, 
 
 
 def _matrix_columns(videos: Iterable[Counts]) -> tuple[str, ...]:
-    return ("from", *dict.fromkeys(name for video in videos for name, _ in video.ways), NOWHERE)
+    return ("from", *dict.fromkeys(name for one in videos for name, _ in one.directions), NOWHERE)
 
 
 def _join(table: str, videos: Mapping[str, Any], path: Path) -> None:

@@ -10,7 +10,7 @@ from vdet.config.schema import Settings
 from vdet.detect.classes import is_chosen
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Span, add_frame
-from vdet.traffic.counts import Counts, Event, Way
+from vdet.traffic.counts import Counts, Direction, Event
 from vdet.traffic.crossings import VANISH, Border, Crossing, PlacedLine, crossings, place
 from vdet.traffic.linking import GAP, TrackLinker, VehiclePath
 
@@ -64,9 +64,9 @@ class VehicleCounter:
         self._borders: tuple[Border, ...] = (*self.lines, *self.zones)
         self.linker = TrackLinker(width, height, begun)
         self._ended: list[_Passage] = []
-        self._tally: Counter[Way] = Counter()  # of those
+        self._tally: Counter[Direction] = Counter()  # of those
         self._latest: FrameTracks | None = None
-        self._so_far: Counter[Way] = Counter()
+        self._so_far: Counter[Direction] = Counter()
         self._counted = -math.inf
 
     def update(self, frame: FrameTracks) -> None:
@@ -87,12 +87,12 @@ class VehicleCounter:
         passages = self._ended + self._passages(self.linker.open_paths())
         events = [event for passage in passages for event in passage.events]
         events.sort(key=lambda item: (item.time, item.frame, item.id, item.name))
-        ways = tuple((border.name, way) for border in self._borders for way in border.directions)
+        pairs = tuple((border.name, name) for border in self._borders for name in border.directions)
         zones, spans = tuple(zone.name for zone in self.zones), tuple(self.spans) or ((0.0, 0.0),)
         warnings = tuple(_line_warnings(self.lines, passages))
-        return Counts(tuple(events), ways, zones, spans, warnings=warnings)
+        return Counts(tuple(events), pairs, zones, spans, warnings=warnings)
 
-    def so_far(self) -> Counter[Way]:
+    def so_far(self) -> Counter[Direction]:
         """Return the count of each direction so far; vehicles in a zone have not left it.
 
         The counts may be `_OLDEST` seconds old, so that this can be called for each frame.

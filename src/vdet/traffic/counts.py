@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-Way = tuple[str, str]
-"""Name of a line or zone, and a direction."""
+Direction = tuple[str, str]
+"""Name of a line or zone, and of a direction."""
 
 _IN = ENTER, APPEAR
 
@@ -143,7 +143,7 @@ class Counts:
 
     Attributes
     ----------
-    ways
+    directions
         Each direction of each line and zone.
     zones
         The names of the zones.
@@ -156,7 +156,7 @@ class Counts:
     """
 
     events: tuple[Event, ...]
-    ways: tuple[Way, ...]
+    directions: tuple[Direction, ...]
     zones: tuple[str, ...]
     spans: tuple[Span, ...] = ((0.0, 0.0),)
     clock: Clock | None = None
@@ -209,8 +209,8 @@ class Counts:
             raise ConfigError(what) from error
         parts: dict[str, Counter[str]] = {}
         for row in self.table(interval):
-            way = f"{row.name} {row.direction}"
-            part, bar = (way, str(row.start)[:16]) if interval else (row.class_name, way)
+            label = f"{row.name} {row.direction}"
+            part, bar = (label, str(row.start)[:16]) if interval else (row.class_name, label)
             parts.setdefault(part, Counter())[bar] += row.count
         axes = axes or plt.gca()
         heights = Counter[str]()
@@ -226,12 +226,12 @@ class Counts:
 
 def direction_totals(videos: Sequence[Counts]) -> tuple[DirectionTotal, ...]:
     """Return the totals of each direction over all videos."""
-    classes: dict[Way, Counter[str]] = {way: Counter() for video in videos for way in video.ways}
+    classes = {key: Counter[str]() for video in videos for key in video.directions}
     for event in (event for video in videos for event in video.events):
         classes[event.name, event.direction][event.class_name or ""] += 1
     return tuple(
-        DirectionTotal(*way, found.total(), {name: found[name] for name in sorted(found) if name})
-        for way, found in classes.items()
+        DirectionTotal(*key, found.total(), {name: found[name] for name in sorted(found) if name})
+        for key, found in classes.items()
     )
 
 
@@ -254,8 +254,8 @@ def count_table(videos: Sequence[Counts], interval: int | None = None) -> list[C
         for which, video in enumerate(videos)
         for event in video.events
     )
-    ways = dict.fromkeys(way for video in videos for way in video.ways)
-    return _rows(CountRow, intervals, found, ways)
+    directions = dict.fromkeys(key for video in videos for key in video.directions)
+    return _rows(CountRow, intervals, found, directions)
 
 
 def flow_table(videos: Sequence[Counts], interval: int | None = None) -> list[FlowRow]:
@@ -269,9 +269,9 @@ def flow_table(videos: Sequence[Counts], interval: int | None = None) -> list[Fl
     for which, first, last in vehicle_flows(videos):
         flow = first.name, last.name if last else None
         found[intervals.number(which, first.time), flow, class_of(first)] += 1
-    names = dict.fromkeys(name for video in videos for name, _ in video.ways)
+    names = dict.fromkeys(name for video in videos for name, _ in video.directions)
     order = {name: number for number, name in enumerate((*names, None))}
-    flows = sorted({way for _, way, _ in found}, key=lambda way: [order[name] for name in way])
+    flows = sorted({flow for _, flow, _ in found}, key=lambda flow: [order[name] for name in flow])
     return _rows(FlowRow, intervals, found, flows)
 
 
@@ -325,9 +325,9 @@ def _zone_row(
     changes = sum(change > 0 for _, change, _ in visits), sum(change < 0 for _, change, _ in visits)
     mean = round(used / covered, 3) if covered else float(inside)
     stay = round(sum(stays) / len(stays), 3) if stays else None
-    ways = name, *changes, mean, max(levels), stay, max(stays, default=None)
+    use = name, *changes, mean, max(levels), stay, max(stays, default=None)
     start, until = intervals.moments(number)
-    return ZoneRow(start, until, *ways)
+    return ZoneRow(start, until, *use)
 
 
 def _intervals(videos: Sequence[Counts], interval: int | None) -> Intervals:
@@ -347,13 +347,13 @@ def _rows(
     make: Callable[..., R],
     intervals: Intervals,
     found: _Found,
-    ways: Iterable[tuple[str, str | None]],
+    pairs: Iterable[tuple[str, str | None]],
 ) -> list[R]:
     """Return a row for each interval, direction and class that occurs, even if its count is 0."""
     classes = sorted({name for _, _, name in found}) or [UNKNOWN]
-    keys = [(way, name) for way in ways for name in classes]
+    keys = [(pair, name) for pair in pairs for name in classes]
     return [
-        make(*intervals.moments(number), *way, name, found[number, way, name])
+        make(*intervals.moments(number), *pair, name, found[number, pair, name])
         for number in intervals.numbers
-        for way, name in keys
+        for pair, name in keys
     ]

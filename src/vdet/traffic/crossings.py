@@ -134,9 +134,9 @@ Border = PlacedLine | Zone
 def distances_to(segments: Sequence[Segment], points: Float64Array) -> Float64Array:
     """Return how far points `(n, 2)` are from the nearest points of segments `(m)`, `(n, m)`."""
     starts, ends = np.array(segments).swapaxes(0, 1)
-    ways, there = ends - starts, points[:, np.newaxis] - starts
-    fractions = np.clip((there * ways).sum(axis=2) / (ways**2).sum(axis=1), 0, 1)
-    return np.asarray(np.hypot(*np.moveaxis(there - fractions[..., np.newaxis] * ways, 2, 0)))
+    vectors, there = ends - starts, points[:, np.newaxis] - starts
+    fractions = np.clip((there * vectors).sum(axis=2) / (vectors**2).sum(axis=1), 0, 1)
+    return np.asarray(np.hypot(*np.moveaxis(there - fractions[..., np.newaxis] * vectors, 2, 0)))
 
 
 def _are_inside(corners: Sequence[Point], points: Float64Array) -> BoolArray:
@@ -230,9 +230,9 @@ def _changes(path: VehiclePath, border: Border) -> Iterator[Crossing]:
             continue
         if settled is not None:
             fraction, time, place = _meeting(path, border, row)
-            way = math.inf if crossed is None else math.dist(crossed, place)
-            if not (is_clear[rows] | (path.heights[rows] <= way)).any():
-                continue  # a way back that is too short
+            distance = math.inf if crossed is None else math.dist(crossed, place)
+            if not (is_clear[rows] | (path.heights[rows] <= distance)).any():
+                continue  # it is not far enough from there
             crossed = None if fraction is None else place
             if fraction is not None:
                 at = row if fraction else row - 1
@@ -264,7 +264,7 @@ def _settling(
 def _meeting(path: VehiclePath, border: Border, row: int) -> tuple[float | None, float, Point]:
     """Return where a path meets a border between a row and the previous one.
 
-    Returns the fraction of the way, None if they do not meet, and the time and position.
+    Returns the fraction of the distance, None if they do not meet, and the time and position.
     """
     (ax, ay), (bx, by) = path.points[row - 1 : row + 1].tolist()
     before, after = path.times[row - 1 : row + 1].tolist()

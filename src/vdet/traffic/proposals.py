@@ -1,6 +1,6 @@
 """Lines across the main streams of a video, proposed from the paths of its vehicles.
 
-Vehicles that head the same way at both ends of their paths form a group. The streams of a group are
+Vehicles with the same headings at both ends of their paths form a group. The streams of a group are
 where a line across the road meets its vehicles side by side. Lines are chosen one by one
 (greedily): the one that counts most vehicles of its group that no line counts so far, less all
 others that cross it.
@@ -26,13 +26,13 @@ _MAX_TRIED = 30
 _PLACES = (0.5, 0.4, 0.6, 0.3, 0.7)
 """Where on a path lines are tried, as fractions of its length; the first ones are better."""
 _CLEAR = 0.12
-"""Smallest way from where a vehicle is first or last seen to a line, as a fraction of its path."""
+"""Minimum distance of a line from either end of a vehicle's path, as a fraction of its length."""
 _GAP, _MARGIN = 4.0, 0.5
 """Largest gap between vehicles of one stream, and how far a line goes on beyond the outermost one,
 in heights of their boxes.
 """
-_SAME_WAY = 0.7
-"""Smallest cosine of the angle between a line's normal and the ways of the vehicles it counts."""
+_SAME_HEADING = 0.7
+"""Smallest cosine of the angle between a line's normal and the heading of a vehicle it counts."""
 _GROUP = 1.25
 """Distance of groups: of unit vectors of the first and of the last heading, together."""
 _MAX_OTHERS = 0.34
@@ -41,7 +41,7 @@ _NEAR_BEST = 0.9
 """Fraction of the best result from which a better place is taken."""
 _SPACING, _AROUND = 0.01, 4
 """Distance of the points of a path, as a fraction of the frame's width, and the number of points
-before and after one that its way follows from.
+before and after one that give its heading.
 """
 _WORDS = ("right", "down", "left", "up")
 _NAMES = ("north", "northeast", "east", "southeast", "south", "southwest", "west", "northwest")
@@ -67,13 +67,13 @@ class ProposedLine:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Candidate:
-    """A line across a `way`, and the indices of its own vehicles and of others that cross it.
+    """A line across a `heading`, and the indices of its own vehicles and of others that cross it.
 
     `place` is where it is on a path, an index of `_PLACES`.
     """
 
     ends: Segment
-    way: Float64Array
+    heading: Float64Array
     place: int
     own: Int64Array
     others: Int64Array
@@ -111,7 +111,7 @@ def propose_lines(
         best = max(gain for gain, _ in gains)
         good = (item for gain, item in gains if gain >= _NEAR_BEST * best)
         line = min(good, key=lambda item: item.place)
-        ahead, back = _directions(line.way, facing)
+        ahead, back = _directions(line.heading, facing)
         names[ahead] += 1
         name = f"{ahead} {names[ahead]}" if names[ahead] > 1 else ahead
         lines.append(ProposedLine(name, *line.ends, ahead, back, int(left[line.own].sum())))
@@ -120,9 +120,9 @@ def propose_lines(
     return tuple(lines)
 
 
-def _directions(way: Float64Array, facing: str | None) -> tuple[str, str]:
-    """Return the names of a direction in the picture and of the opposite one."""
-    turn = round(math.atan2(way[1], way[0]) / (math.pi / 2)) % 4
+def _directions(heading: Float64Array, facing: str | None) -> tuple[str, str]:
+    """Return the names of the direction of a heading and of the opposite one."""
+    turn = round(math.atan2(heading[1], heading[0]) / (math.pi / 2)) % 4
     if facing is None:
         return _WORDS[turn], _WORDS[turn - 2]
     ahead = COMPASS.index(facing) + 2 * (1 + turn)
@@ -137,7 +137,7 @@ class _Streams:
         self._size = width, height
         self._numbers = np.repeat(np.arange(len(paths)), [len(row) for row in rows])
         joined = np.concatenate(rows)
-        self._points, self._ways = joined[:, :2], joined[:, 2:4]
+        self._points, self._headings = joined[:, :2], joined[:, 2:4]
         self._heights, self._gone = joined[:, 4:].T
         self._groups = _groups(rows)[self._numbers]
 
@@ -154,14 +154,14 @@ class _Streams:
 
     def _across(self, row: int, place: int) -> _Candidate | None:
         """Return the line across a path at one of its points; None if it counts no vehicle."""
-        base, way, numbers = self._points[row], self._ways[row], self._numbers
-        across = np.array([-way[1], way[0]])
-        ahead, aside = (self._points - base) @ way, (self._points - base) @ across
+        base, heading, numbers = self._points[row], self._headings[row], self._numbers
+        across = np.array([-heading[1], heading[0]])
+        ahead, aside = (self._points - base) @ heading, (self._points - base) @ across
         at = np.flatnonzero(((ahead[:-1] < 0) != (ahead[1:] < 0)) & (numbers[:-1] == numbers[1:]))
         at = at[np.argsort(aside[at])]
         own = at[
             (self._groups[at] == self._groups[row])
-            & (self._ways[at] @ way >= _SAME_WAY)
+            & (self._headings[at] @ heading >= _SAME_HEADING)
             & (np.abs(self._gone[at] - 0.5) <= 0.5 - _CLEAR)
         ]
         if not len(own):
@@ -177,20 +177,20 @@ class _Streams:
         start, end = map(tuple, ends.tolist())
         who = np.unique(numbers[own])
         others = np.setdiff1d(numbers[at[(beside >= low) & (beside <= high)]], who)
-        return _Candidate((start, end), way, place, who, others) if start != end else None
+        return _Candidate((start, end), heading, place, who, others) if start != end else None
 
 
 def _spaced(path: VehiclePath, spacing: float) -> Float64Array:
-    """Return points of a path: x, y, the way x and y, the height, the fraction gone: `(n, 6)`."""
+    """Return points of a path: x, y, heading x and y, height, fraction of the length: `(n, 6)`."""
     feet, heights = path.points[: path.seen], path.heights[: path.seen]
     along = np.concatenate([[0], np.cumsum(np.hypot(*np.diff(feet, axis=0).T))])
     at = np.linspace(0, along[-1], max(9, math.ceil(along[-1] / spacing) + 1))
     x, y, height = (np.interp(at, along, values) for values in (*feet.T, heights))
     rows = np.arange(len(at))
     after, before = np.minimum(rows + _AROUND, rows[-1]), np.maximum(rows - _AROUND, 0)
-    ways = np.array([x[after] - x[before], y[after] - y[before]])
-    ways /= np.maximum(np.hypot(*ways), 1e-9)
-    return np.column_stack([x, y, *ways, height, at / along[-1]])
+    headings = np.array([x[after] - x[before], y[after] - y[before]])
+    headings /= np.maximum(np.hypot(*headings), 1e-9)
+    return np.column_stack([x, y, *headings, height, at / along[-1]])
 
 
 def _groups(rows: Sequence[Float64Array]) -> Int64Array:

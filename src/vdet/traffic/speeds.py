@@ -42,8 +42,8 @@ _MAX_ALIKE = 0.9
 """Largest correlation of neighbouring places that is believed."""
 _MOVES = 1.0
 """Minimum speed of a vehicle that heads somewhere, m/s."""
-_MIN_WAY = 1.0
-"""Shortest way that a relative error is taken of, metres."""
+_MIN_DISTANCE = 1.0
+"""Shortest distance of which a relative error is taken, metres."""
 _GONE = 10.0
 """Seconds after which a vehicle that is not shown has ended."""
 _SPACING = 0.2
@@ -77,12 +77,12 @@ class Speeds:
     @property
     def metres(self) -> float:
         """Length of the path."""
-        return float(self._ways.sum())
+        return float(self._covered.sum())
 
     def quantile(self, fraction: float) -> float:
         """Return the speed below which the vehicle covers this fraction of its path, m/s."""
         order = np.argsort(self.speeds)
-        gone = np.cumsum(self._ways[order])
+        gone = np.cumsum(self._covered[order])
         if not gone[-1]:
             return 0.0
         return float(self.speeds[order][np.searchsorted(gone, fraction * gone[-1])])
@@ -113,7 +113,7 @@ class Speeds:
         return float(np.hypot(*np.diff(ends)[:, 0])) / (last - first)
 
     @property
-    def _ways(self) -> Float64Array:
+    def _covered(self) -> Float64Array:
         """Metres covered at each time: half of those to the times before and after it."""
         steps = np.diff(self.times, prepend=self.times[0], append=self.times[-1])
         return np.asarray(self.speeds * (steps[:-1] + steps[1:]) / 2, np.float64)
@@ -210,9 +210,9 @@ def _common(ground: Ground, rows: Float64Array) -> float:
     first, last = rows[[0, -1], 1:3]
     low = [(0, _FOOT_ERROR * height) for height in rows[[0, -1], 4]]
     places = ground.place(np.array([first, last, first + low[0], last + low[1]]))
-    way, moved = places[1] - places[0], places[3] - places[2]
-    length = max(float(np.hypot(*way)), _MIN_WAY)
-    box = float(np.hypot(*(moved - way))) / length
+    driven, moved = places[1] - places[0], places[3] - places[2]
+    length = max(float(np.hypot(*driven)), _MIN_DISTANCE)
+    box = float(np.hypot(*(moved - driven))) / length
     return math.hypot(0.0 if math.isnan(box) else box, ground.scale_error)
 
 
@@ -220,8 +220,8 @@ def _common(ground: Ground, rows: Float64Array) -> float:
 class _Sight:
     """How a vehicle is seen: its `places` in metres, and what a pixel amounts to there.
 
-    `depth` points across the rows of pixels, away from the camera, with length 1. `away` is the way
-    along a column that is 1 m deep. Both are `(n, 2)`. `widths` are those of the box in metres,
+    `depth` points across the rows of pixels, away from the camera, with length 1. `away` points
+    along a column, and is 1 m deep. Both are `(n, 2)`. `widths` are those of the box in metres,
     `weights` those of the places.
     """
 

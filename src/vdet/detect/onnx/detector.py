@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import cv2
 import numpy as np
 
-from vdet.boxes import Box, Boxes, Float32Array, Image, Int32Array, Int64Array, visible
+from vdet.boxes import Box, Boxes, Float32Array, Image, Int32Array, Int64Array, clipped
 from vdet.config.schema import NetworkSettings
 from vdet.detect.classes import our_name
 from vdet.detect.factory import DetectorKind
@@ -79,7 +79,7 @@ class NetworkDetector:
         """Return the vehicles, in pixels of the frame."""
         network = self.for_stills if index is None else self.network
         raw = network.find(picture, self.settings.min_score)
-        boxes = visible(raw.boxes.astype(np.float64), (picture.width, picture.height))
+        boxes = clipped(raw.boxes.astype(np.float64), (picture.width, picture.height))
         is_known = (raw.classes >= 0) & (raw.classes < len(self.numbers))
         numbers = self.numbers[np.where(is_known, raw.classes, -1)]
         keep = (numbers >= 0) & (boxes[:, 2:] - boxes[:, :2] >= 1).all(axis=1)  # not with a NaN

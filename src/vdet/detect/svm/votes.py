@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vdet.boxes import BoolArray, Box, Float64Array, area, coverage, from_xywh, iou_matrix, visible
+from vdet.boxes import BoolArray, Box, Float64Array, area, clipped, coverage, from_xywh, iou_matrix
 from vdet.detect.svm.heat import HotRegion
 from vdet.detect.svm.windows import Windows
 
@@ -66,7 +66,7 @@ class Votes:
         weights = np.concatenate([hit.weights for hit in hits], dtype=np.float64)
         probabilities = np.concatenate([hit.probabilities for hit in hits], dtype=np.float64)
         bounded = np.clip(probabilities, 1 - _MAX_PROBABILITY, _MAX_PROBABILITY)
-        position, inside = (-np.log1p(-bounded)) ** _SHARPNESS, visible(boxes, size)
+        position, inside = (-np.log1p(-bounded)) ** _SHARPNESS, clipped(boxes, size)
         seen = (inside[:, 2:] - inside[:, :2] >= 1).all(axis=1)
         return Votes(inside[seen], (probabilities * weights)[seen], position[seen])
 

@@ -13,7 +13,7 @@ data.counts.forEach((count, video) => {
 });
 const known = new Set(Object.keys(data));
 if (data.names.length < 2) known.delete("video");
-for (const name of ["way", "state", "speed", "distance", "lane", "clock", "picture"]) {
+for (const name of ["lines", "state", "speed", "distance", "lane", "clock", "picture"]) {
   data[name] ??= new Array(data.class.length).fill(null);
 }
 
@@ -25,7 +25,7 @@ const columns = [
   { name: "time", text: timeText, key: i => data.clock[i] ?? data.first[i], link: true },
   { name: "seconds", text: i => data.seconds[i].toFixed(1), key: i => data.seconds[i] },
   { name: "km/h", text: i => number(data.speed[i]), key: i => data.speed[i], used: "speed" },
-  { name: "lines", text: i => text("way", i), key: i => text("way", i), used: "way" },
+  { name: "lines", text: i => text("lines", i), key: i => text("lines", i), used: "lines" },
   { name: "lane", text: i => data.lane[i] ?? "–", key: i => data.lane[i], used: "lane" },
   { name: "metres", text: i => number(data.distance[i]), key: i => data.distance[i], used: "distance" },
   { name: "moves", text: i => text("state", i), key: i => text("state", i), used: "state" },
@@ -76,7 +76,7 @@ function filtered() {
     if (high) tests.push(i => column[i] !== null && column[i] <= Number(high));
   };
   const moment = value => value && String(Date.parse(`${value}Z`) / 1000 - data.zero);
-  ["class", "way", "state", "lane"].forEach(choice);
+  ["class", "lines", "state", "lane"].forEach(choice);
   for (const name of ["seconds", "speed", "distance"]) {
     limits(data[name], values[`${name}-min`], values[`${name}-max`]);
   }
@@ -183,7 +183,7 @@ function fill(name, values) {
 const head = document.querySelector("#found thead tr");
 if (known.has("picture")) head.append(document.createElement("th"));
 head.append(...columns.map(heading));
-for (const name of ["class", "way", "state"]) fill(name, data.texts[name]);
+for (const name of ["class", "lines", "state"]) fill(name, data.texts[name]);
 const lanes = [...new Set(data.lane)].filter(lane => lane !== null).sort((a, b) => a - b);
 form.elements.lane.append(...lanes.map(lane => new Option(lane)));
 for (const element of form.querySelectorAll("[data-needs]")) {

@@ -5,7 +5,7 @@ from itertools import count
 
 import numpy as np
 
-from vdet.boxes import BoolArray, Box, Boxes, Float64Array, are_nested, visible
+from vdet.boxes import BoolArray, Box, Boxes, Float64Array, are_nested, clipped
 from vdet.config.schema import MotionTrackerSettings
 from vdet.media import Picture
 from vdet.track.motion.association import are_hidden, are_parts, take_over_ids, without_duplicates
@@ -132,7 +132,7 @@ class MotionTracker:
         return [vehicle for vehicle, is_inside in pairs if is_inside and not vehicle.is_over]
 
     def _observations(self, detections: Boxes, picture: Picture | None) -> list[Observation]:
-        boxes = visible(detections.sides, self._size)
+        boxes = clipped(detections.sides, self._size)
         columns = detections.scores.tolist(), detections.likely_classes
         rows = zip(boxes, *columns, appearances(picture, boxes), strict=True)
         large = _are_large(boxes)
@@ -140,7 +140,7 @@ class MotionTracker:
 
     def _visible(self, means: Sequence[Float64Array]) -> Float64Array:
         """Return the part in the frame of each centre and size, `(n, 4)`; see `Place`."""
-        return visible(whole_box(np.reshape(means, (-1, 4))), self._size)
+        return clipped(whole_box(np.reshape(means, (-1, 4))), self._size)
 
     def _boxes(self, vehicles: Sequence[Vehicle]) -> Float64Array:
         """Return the visible parts of vehicles, `(n, 4)`."""
