@@ -223,9 +223,7 @@ class Boxes:
         if isinstance(rows, int | np.integer):
             return next(iter(self[[int(rows)]]))
         if not isinstance(rows, slice):
-            rows = (
-                np.asarray(rows) if len(rows) else slice(0)
-            )  # an empty list makes an array of floats
+            rows = np.asarray(rows) if len(rows) else slice(0)  # an empty array has floats
         return Boxes(
             self.sides[rows],
             self.scores[rows],

@@ -51,9 +51,8 @@ traffic:
 """
 _BY_NETWORK = {"video": "found.mp4", "tracks": "found.csv"}
 _ON_POLE = {"video": "counted.mp4", "tracks": "pole.csv", "flows": "flows.csv", "page": "page"}
-_LIMITS = MiningLimits(
-    per_vehicle=2, false_alarms=6, parts=3, probability=0
-)  # drawn cars are alike
+_LIMITS = MiningLimits(per_vehicle=2, false_alarms=6, parts=3, probability=0)
+"""Few, because drawn cars are alike."""
 _BY_MODEL = {"tracks": "model.csv", "stages": "stages"}
 
 

@@ -266,9 +266,7 @@ def _make_temporary(parent: Path, cleanup: contextlib.ExitStack) -> Path:
         # An interrupt may come as soon as the folder exists.
         cleanup.callback(shutil.rmtree, folder, ignore_errors=True)
         parent.mkdir(parents=True, exist_ok=True)  # a failed run may have removed it
-        with contextlib.suppress(
-            FileNotFoundError, BlockingIOError
-        ):  # another run removed it as stale
+        with contextlib.suppress(FileNotFoundError, BlockingIOError):  # removed as stale
             folder.mkdir(0o700)  # private content stays private while it is written
             cleanup.enter_context(locked_folder(folder))
             folder.lstat()

@@ -28,10 +28,7 @@ _MATRICES: dict[int, Literal["bt601", "bt709"]] = {1: "bt709", 2: "bt601", 5: "b
 MATRIX_CODES = {"bt601": 6, "bt709": 1}
 """The codes to write."""
 
-_LUMA_STEPS, _CHROMA_STEPS = (
-    219 / 255,
-    224 / 255,
-)  # limited-range steps per full-range step
+_LUMA_STEPS, _CHROMA_STEPS = 219 / 255, 224 / 255  # limited-range steps per full-range step
 
 
 def _table(new_base: float, base: float, steps: float) -> Image:

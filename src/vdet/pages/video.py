@@ -248,13 +248,11 @@ def _timeline(shown: Sequence[VehicleRecord], findings: Sequence[Finding], x: Ax
 
     The first row has the times at which the results are doubtful, if any.
     """
-    spans = [
-        TimelineBar(0, *at, item.text, *_DOUBT, item.code) for item in findings for at in item.spans
-    ]
-    first, rows = bool(spans), charts.pack_rows((record.first, record.last) for record in shown)
+    bars = [TimelineBar(0, *at, it.text, *_DOUBT, it.code) for it in findings for at in it.spans]
+    first, rows = bool(bars), charts.pack_rows((record.first, record.last) for record in shown)
     for record, row in zip(shown, rows, strict=True):
-        spans += _spans(record, first + row)
-    return Timeline("When each vehicle is shown", x, spans)
+        bars += _spans(record, first + row)
+    return Timeline("When each vehicle is shown", x, bars)
 
 
 def _spans(record: VehicleRecord, row: int) -> list[TimelineBar]:

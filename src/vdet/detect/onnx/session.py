@@ -77,11 +77,7 @@ class Session:
         """
         options, outputs = self._new_options(), Future[list[Array]]()
         options.log_severity_level = _SILENT
-        call = (
-            values,
-            options,
-            outputs,
-        )  # one long operation cannot be stopped: it is abandoned
+        call = values, options, outputs  # one long operation cannot be stopped: it is abandoned
         threading.Thread(target=self._run, args=call, name="vdet-network", daemon=True).start()
         for _ in range(MAX_SECONDS):  # time in which this process was stopped does not count
             with suppress(TimeoutError):
