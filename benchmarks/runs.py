@@ -70,9 +70,7 @@ def run_times(path: Path, folder: Path, rounds: int) -> dict[str, tuple[float, f
     model, linear = load_detector(default.detector), load_detector(svm.detector)
 
     def detect(
-        detector: DetectorModel,
-        outputs: tuple[Output, ...] = video,
-        settings: Settings = default,
+        detector: DetectorModel, outputs: tuple[Output, ...] = video, settings: Settings = default
     ) -> None:
         run_video(Run(path, outputs, settings, frames=FRAMES, overwrite=True), Parts(detector))
 

@@ -23,19 +23,11 @@ DECODED = 60
 _OF_SVM, _OF_NETWORK = 3, 2
 """Every N-th frame is searched of the project video, which has 25 frames a second."""
 
-_STRIDES = {
-    "svm dense": _OF_SVM,
-    "svm detection": _OF_SVM,
-    "network detection": _OF_NETWORK,
-}
+_STRIDES = {"svm dense": _OF_SVM, "svm detection": _OF_SVM, "network detection": _OF_NETWORK}
 
 
 def search_times(
-    path: Path,
-    pictures: Sequence[Picture],
-    svm: ShippedConfig,
-    seed: ShippedConfig,
-    rounds: int,
+    path: Path, pictures: Sequence[Picture], svm: ShippedConfig, seed: ShippedConfig, rounds: int
 ) -> dict[str, float]:
     """Return seconds for a frame of a video, for the dense searches and their references.
 

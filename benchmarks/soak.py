@@ -164,10 +164,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         loop_video(find_video(folder), folder / "long.mp4", frames)
-        outputs = (
-            Output("video", folder / "out.mp4"),
-            Output("tracks", folder / "out.jsonl"),
-        )
+        outputs = (Output("video", folder / "out.mp4"), Output("tracks", folder / "out.jsonl"))
         run = Run(folder / "long.mp4", outputs, frames=frames)
         totals = run_video(run, Parts(load_detector(run.settings.detector)), progress=monitor)
     print(file=sys.stderr)

@@ -104,10 +104,7 @@ class Detector:
     """
 
     def __init__(
-        self,
-        settings: Settings | None = None,
-        *,
-        detector: AnyDetector | None = None,
+        self, settings: Settings | None = None, *, detector: AnyDetector | None = None
     ) -> None:
         self._settings, self._model, _ = _resolved(settings, detector, None)
         self.for_video = self._model.for_video

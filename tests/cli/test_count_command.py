@@ -225,10 +225,7 @@ def test_each_video_of_a_batch_has_its_counts_and_all_have_a_total(
 
 @pytest.mark.parametrize(
     "command",
-    [
-        ("eval", "images", "pictures"),
-        ("mine", "red.mp4", "--truth", "gt.txt", "-o", "mined.zip"),
-    ],
+    [("eval", "images", "pictures"), ("mine", "red.mp4", "--truth", "gt.txt", "-o", "mined.zip")],
 )
 def test_a_command_that_looks_at_whole_frames_refuses_them(
     run: Run, command: tuple[str, ...]

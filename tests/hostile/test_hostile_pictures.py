@@ -73,9 +73,7 @@ def test_damaged_pictures_are_read_or_refused(tmp_path: Path) -> None:
         damaged = mutated(whole, seed=seed, count=MUTATIONS)
         contents |= {f"{number}-{name}": data for number, data in enumerate(damaged)}
     trials = try_files(
-        tmp_path,
-        contents,
-        lambda path, out: ["detect-image", path, "-o", out, *FEW_WINDOWS],
+        tmp_path, contents, lambda path, out: ["detect-image", path, "-o", out, *FEW_WINDOWS]
     )
     assert len(trials) == MUTATIONS * len(FORMATS) + len(BOMBS)
     assert {trial.code for trial in trials} == {0, 1}

@@ -83,11 +83,7 @@ def road() -> Scene:
 
 
 @pytest.fixture(scope="module")
-def files(
-    road: Scene,
-    undistorter: Undistorter,
-    tmp_path_factory: pytest.TempPathFactory,
-) -> Files:
+def files(road: Scene, undistorter: Undistorter, tmp_path_factory: pytest.TempPathFactory) -> Files:
     folder = tmp_path_factory.mktemp("lanes")
     names = ("clip.mp4", "frame.png", "plain.png", "bare.png", "camera.yaml", "my.yaml", "red.npz")
     made = Files(*(folder / name for name in names))

@@ -11,13 +11,7 @@ from red_cars import CAR, SETTINGS, road
 from run.conftest import Register
 from run.red_runs import model_for
 from vdet.errors import ImageError, OutputError
-from vdet.run.pictures import (
-    PictureJob,
-    PictureSearch,
-    find_images,
-    plan_pictures,
-    run_pictures,
-)
+from vdet.run.pictures import PictureJob, PictureSearch, find_images, plan_pictures, run_pictures
 from vdet.run.result import FrameResult
 from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import SinkContext, SinkKind

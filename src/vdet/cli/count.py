@@ -32,10 +32,7 @@ log = logging.getLogger("vdet")
 @options.settings_options("traffic.min_seen_seconds=0.5")
 @options.overwrite_option
 def count(
-    tracks: tuple[Path, ...],
-    size: tuple[int, int] | None,
-    rate: float | None,
-    overwrite: bool,
+    tracks: tuple[Path, ...], size: tuple[int, int] | None, rate: float | None, overwrite: bool
 ) -> None:
     """Count the vehicles of track files at lines and in zones.
 

@@ -30,10 +30,7 @@ log = logging.getLogger("vdet")
 @options.settings_options("detector.min_score_still=0.5", options.model_option)
 @options.overwrite_option
 def detect_image(
-    images: tuple[Path, ...],
-    output: Path | None,
-    stages: Path | None,
-    overwrite: bool,
+    images: tuple[Path, ...], output: Path | None, stages: Path | None, overwrite: bool
 ) -> int:
     """Find vehicles in images.
 

@@ -29,15 +29,7 @@ from vdet.errors import TruthError
 from vdet.files import record_input
 from vdet.labels.documents import json_values
 from vdet.labels.formats import Format, PictureTracks, SourceVideo, last_classes
-from vdet.labels.label import (
-    MAX_LABELS,
-    NO_ID,
-    Label,
-    SavedTracks,
-    Size,
-    from_size,
-    line_error,
-)
+from vdet.labels.label import MAX_LABELS, NO_ID, Label, SavedTracks, Size, from_size, line_error
 from vdet.labels.parsing import (
     LIMIT,
     Index,

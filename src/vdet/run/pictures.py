@@ -63,11 +63,7 @@ def find_images(paths: Sequence[Path]) -> dict[Path, Path]:
 
 
 def plan_pictures(
-    sources: Mapping[Path, Path],
-    out: Path | None,
-    stages: Path | None,
-    *,
-    overwrite: bool,
+    sources: Mapping[Path, Path], out: Path | None, stages: Path | None, *, overwrite: bool
 ) -> list[PictureJob]:
     """Choose the outputs of each image, and check them before any work.
 

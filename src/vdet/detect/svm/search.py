@@ -161,11 +161,7 @@ class Gradients:
 
 
 def table_sums(
-    strip: Channels,
-    tables: Float32Array,
-    features: FeatureSettings,
-    x: IndexArray,
-    y: IndexArray,
+    strip: Channels, tables: Float32Array, features: FeatureSettings, x: IndexArray, y: IndexArray
 ) -> Float32Array:
     """Return the colour histograms of windows times weights, as sums over pixels.
 

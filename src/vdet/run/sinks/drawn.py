@@ -39,10 +39,7 @@ class Overlay:
     """
 
     def __init__(
-        self,
-        settings: Settings,
-        video: VideoInfo | None,
-        counter: VehicleCounter | None = None,
+        self, settings: Settings, video: VideoInfo | None, counter: VehicleCounter | None = None
     ) -> None:
         self._settings, self._draw = settings, settings.draw
         self._longest = self._draw.trails if video else None
