@@ -256,6 +256,16 @@ def test_what_each_type_of_kitti_means(tmp_path: Path) -> None:
     assert image.boxes[0].tolist() == [1, 2, 11, 22]
 
 
+def test_a_rider_is_read_as_a_part_of_what_is_ridden(tmp_path: Path) -> None:
+    path = write_kitti(tmp_path, SCENE)
+    boxes = {"Motorcycle": "10 20 30 40", "Rider": "12 5 28 35", "rider": "60 5 70 35"}
+    rows = [f"{kind} 0 0 0 {box} 1 1 4 2 1 20 -1.6\n" for kind, box in boxes.items()]
+    path.write_text("".join(rows), encoding="utf-8")
+    image = read_labelled_pictures(tmp_path).pictures[0]
+    assert image.boxes.tolist() == [[10, 5, 30, 40], [60, 5, 70, 35]]
+    assert (image.classes[0], image.ignored.tolist()) == ("motorcycle", [False, True])
+
+
 class TestYolo:
     def test_names_may_lie_above_and_be_numbered(self, tmp_path: Path) -> None:
         write_yolo(tmp_path / "train", SCENE)

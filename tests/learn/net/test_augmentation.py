@@ -131,3 +131,7 @@ def test_weather_comes_in_some_pictures_and_night_is_dark() -> None:
     assert 60 <= len(changed) <= 180
     assert 20 <= len(dark) <= 90
     assert any(image.max() > 220 for image in dark)  # lamps
+    bright = [image for image in changed if np.median(image) >= 120]
+    rainy = [image for image in bright if np.ptp(image, axis=1).max()]  # fog fills whole rows
+    assert 20 <= len(rainy) <= 70
+    assert any(np.median(image) < 185 for image in rainy)  # as behind spray
