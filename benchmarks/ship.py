@@ -62,8 +62,8 @@ def ship(weights: Path, results: Path | None, output: Path) -> Header:
         raise DataError(f"{weights}: is not a network of vdet train-net")
     if results is not None:
         values = json.loads(results.read_text(encoding="utf-8"))
-        found = values.get(OURS) or values.get(str(weights))
-        if found is None:
+        found = values.get(OURS) or values.get(str(weights), {})
+        if "calibration" not in found:
             raise DataError(f"{results}: has no calibration for {weights}")
         calibrated = {name: found[name] for name in ("calibration", "by_class")}
         header = Header.model_validate(header.model_dump() | calibrated)

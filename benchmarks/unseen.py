@@ -2,8 +2,9 @@
 
 The cameras of all sets are dealt into folds. Each training leaves one fold out, and its network
 searches the pictures of that fold; the last training leaves the video out too, and its network
-follows the vehicles in it. All detections together give the calibration of the shipped network
-(`make ship`), for all boxes and by class. Networks given by `--model` search the same pictures.
+follows the vehicles in it. Every picture is searched as `vdet eval images` does, for the tables,
+and as a frame of a video: these detections give the calibration of the shipped network (`make
+ship`), for all boxes and by class. Networks given by `--model` search the same pictures.
 
 Checkpoints, networks and findings are kept in the folder `--work`: a stopped run resumes there.
 """
@@ -19,14 +20,15 @@ from typing import Any
 import numpy as np
 from sklearn.linear_model import LogisticRegression
 
-from vdet.boxes import BoolArray, Float64Array, Int64Array
+from vdet.boxes import BoolArray, Float64Array, Image, Int64Array
 from vdet.config.loading import load_settings
 from vdet.config.schema import NetworkSettings, Settings
 from vdet.detect.classes import OUR_NAMES, UNKNOWN
 from vdet.detect.factory import load_detector
-from vdet.detect.onnx.detector import trained_on
+from vdet.detect.onnx.detector import NetworkDetector, trained_on
 from vdet.detect.onnx.recognition import Calibration, read_header
 from vdet.detect.onnx.session import Session
+from vdet.detect.protocol import DetectorModel
 from vdet.evaluate.comparison import MATCH_IOU, ComparedFrame
 from vdet.evaluate.images import Counting, MeasuredImage, evaluate_images
 from vdet.evaluate.output import RunName, figure, table
@@ -130,12 +132,29 @@ class Findings:
         return cls(tuple(Finding(*row) for row in values["rows"]), values["objects"])
 
 
-def measure(sets: Sequence[LabelledPictures], network: Path, classes: Sequence[str]) -> Findings:
-    """Search pictures and compare every detection with the labels."""
+@dataclass(frozen=True, slots=True)
+class _AsFrames:
+    """A network that searches each image once, like a frame of a video."""
+
+    model: DetectorModel
+
+    def for_video(self, width: int, height: int, images: Sequence[Image]) -> NetworkDetector:
+        detector = self.model.for_video(width, height, images)
+        assert isinstance(detector, NetworkDetector)
+        return replace(detector, larger=detector.network)
+
+
+def measure(
+    sets: Sequence[LabelledPictures], network: Path, classes: Sequence[str], *, as_frames: bool
+) -> Findings:
+    """Search pictures, each as an image or a frame of a video, and compare all with the labels."""
     settings = NetworkSettings(
         model=str(network), min_score=_MIN_SCORE, classes=(*classes, UNKNOWN)
     ).showing_all()
-    model, rows, objects = load_detector(settings), [], {}
+    model: DetectorModel = load_detector(settings)
+    if as_frames:
+        model = _AsFrames(model)
+    rows, objects = [], {}
     for labelled in sets:
         name = Path(labelled.name).name
         counting = Counting(0.0, _MIN_WIDTHS[name in _HIGH])
@@ -192,31 +211,45 @@ def fit(rows: Sequence[Finding], given: Calibration) -> Calibration:
     )
 
 
-def summarize(findings: Findings, given: Calibration) -> dict[str, Any]:
-    """Return the best F1 of every set and class, and the calibrations, as JSON values."""
+def summarize(findings: Findings) -> dict[str, Any]:
+    """Return the best F1 of every set and class, as JSON values."""
     totals = sum(map(Counter, findings.objects.values()), Counter[str]())
-    known = sorted(totals.keys() - {UNKNOWN}, key=(*OUR_NAMES, *sorted(totals)).index)
-    by_class: dict[str, list[Finding]] = {name: [] for name in known}
+    by_class = _by_class(findings)
     by_set: dict[str, list[Finding]] = {name: [] for name in findings.objects}
     for row in findings.rows:
         by_set[row.set].append(row)
-        by_class.setdefault(row.named, []).append(row)
     sets = {
         name: _scores(by_set[name], None, sum(counts.values()))
         for name, counts in findings.objects.items()
         if counts
     }
     classes = {
-        name: _scores([row for row in rows if row.found != UNKNOWN], name, totals[name])
-        for name, rows in by_class.items()
+        name: _scores([row for row in by_class[name] if row.found != UNKNOWN], name, totals[name])
+        for name in sorted(by_class.keys() - {UNKNOWN}, key=(*OUR_NAMES, *sorted(by_class)).index)
     }
-    calibrations = {
+    return {"sets": sets, "classes": classes}
+
+
+def calibrate(findings: Findings, given: Calibration) -> dict[str, Any]:
+    """Return the calibrations of all boxes and of each class with enough of them, as JSON values.
+
+    `given` is the calibration of the network that gave the scores.
+    """
+    by_class = {
         name: fit(rows, given).model_dump()
-        for name, rows in by_class.items()
+        for name, rows in _by_class(findings).items()
         if sum(row.found is not None for row in rows) >= _ENOUGH
     }
-    common = fit(findings.rows, given).model_dump()
-    return {"sets": sets, "classes": classes, "calibration": common, "by_class": calibrations}
+    return {"calibration": fit(findings.rows, given).model_dump(), "by_class": by_class}
+
+
+def _by_class(findings: Findings) -> dict[str, list[Finding]]:
+    """Return the detections of each class that is detected or labelled."""
+    names = {row.named for row in findings.rows}.union(*findings.objects.values())
+    rows: dict[str, list[Finding]] = {name: [] for name in sorted(names)}
+    for row in findings.rows:
+        rows[row.named].append(row)
+    return rows
 
 
 def _scores(rows: Sequence[Finding], name: str | None, objects: int) -> dict[str, float]:
@@ -242,8 +275,9 @@ def summary_lines(name: str, summary: dict[str, Any]) -> Iterator[str]:
             for one, values in summary[part].items()
         ]
         yield from table((part, "objects", "best F1", "at score", "AP50"), rows)
-    for one, values in {"all": summary["calibration"], **summary["by_class"]}.items():
-        yield f"calibration of {one}: slope {values['slope']}, offset {values['offset']}"
+    if "calibration" in summary:
+        for one, values in {"all": summary["calibration"], **summary["by_class"]}.items():
+            yield f"calibration of {one}: slope {values['slope']}, offset {values['offset']}"
     yield ""
 
 
@@ -298,16 +332,17 @@ class Unseen:
         train_to_file(sources, self.settings.train.net, output, base=self._base, progress=progress)
         return output
 
-    def findings(self, network: Path, fold: int) -> Findings:
-        """Search the pictures of a fold, unless that is done, and return the findings."""
-        path = self._work / f"found_{network.stem}_{fold}.json"
+    def findings(self, network: Path, fold: int, way: str) -> Findings:
+        """Search the pictures of a fold as `way` says, unless that is done; return the findings."""
+        path = self._work / f"{way}_{network.stem}_{fold}.json"
         if not path.exists():
             sets = [
                 replace(labelled, pictures=_those(labelled.pictures, folds == fold))
                 for labelled, folds in zip(self._sets, self._dealt, strict=True)
             ]
             sets = [labelled for labelled in sets if labelled.pictures]
-            measure(sets, network, self.settings.train.net.classes).save(path)
+            classes = self.settings.train.net.classes
+            measure(sets, network, classes, as_frames=way == "frames").save(path)
             print(f"{path}: searched", flush=True)
         return Findings.load(path)
 
@@ -334,21 +369,22 @@ def main() -> None:
     arguments = parser.parse_args()
     arguments.work.mkdir(parents=True, exist_ok=True)
     unseen = Unseen(arguments)
-    found: dict[str, list[Findings]] = defaultdict(list)
+    found: dict[str, list[list[Findings]]] = defaultdict(list)
     networks: dict[str, Path] = {}
     for fold in range(arguments.folds):
         networks = {OURS: unseen.network(fold)} if arguments.steps else {}
         networks |= {str(model): model for model in arguments.model}
         for name, network in networks.items():
-            found[name].append(unseen.findings(network, fold))
+            found[name].append(
+                [unseen.findings(network, fold, way) for way in ("images", "frames")]
+            )
     results = {}
     for name, parts in found.items():
         header = read_header(Session(networks[name]))
-        if header and header.by_class:
-            print(f"{name}: has a calibration by class, so none is fitted to its scores\n")
-            continue
-        given = header.calibration if header else Calibration(slope=1, offset=0)
-        results[name] = summarize(Findings.joined(parts), given)
+        images, frames = map(Findings.joined, zip(*parts, strict=True))
+        results[name] = summarize(images)
+        if header and not header.by_class:
+            results[name] |= calibrate(frames, header.calibration)
         print("\n".join(summary_lines(name, results[name])))
     for model in arguments.model:
         seen = trained_on(model)

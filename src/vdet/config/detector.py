@@ -57,7 +57,7 @@ class NetworkSettings(DetectorSettings):
     """Search at least this many frames per second of video, or about a third of them where nothing
     moves; the tracker estimates the vehicles in the others. null: search all frames.
     """
-    min_score_still: Ratio = 0.45
+    min_score_still: Ratio = 0.4
     min_score: float = Field(0.03, gt=0, lt=1)
     """Ignore boxes with a lower score."""
     nms_iou: Ratio = 0.55

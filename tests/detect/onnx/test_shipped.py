@@ -1,18 +1,24 @@
 """The shipped network: it loads, fits the limits on size, and finds drawn vehicles."""
 
+from dataclasses import astuple
+
 import numpy as np
 import pytest
 
+from vdet.boxes import iou_matrix
 from vdet.config.schema import NetworkSettings
 from vdet.detect.factory import load_detector
-from vdet.detect.onnx.detector import SHIPPED
+from vdet.detect.onnx.detector import SHIPPED, NetworkDetector
 from vdet.detect.onnx.recognition import recognize
 from vdet.detect.onnx.session import Session
-from vdet.detect.protocol import stage_pictures_of
 from vdet.media import Picture
+from vdet.synthetic.render import Renderer
+from vdet.synthetic.scene import demo_scene
+from vdet.synthetic.truth import must_be_found, true_boxes
 from vdet.testing import check_detector
 
 MAX_BYTES = 2_500_000
+FRAME = 40
 SIZES = [(1280, 720), (640, 480), (1242, 375), (270, 480), (64, 64)]
 
 
@@ -32,14 +38,19 @@ def test_it_passes_the_checks_of_detectors_in_frames_of_any_shape(width: int, he
     check_detector(load_detector(NetworkSettings()), images)
 
 
-def test_a_still_picture_has_a_larger_input_than_a_frame() -> None:
-    detector = load_detector(NetworkSettings()).for_video(1280, 720, [])
-    image = np.zeros((720, 1280, 3), np.uint8)
-    inputs = []
-    for index in (0, None):
-        detections = detector.detect(detector.search(Picture(image), index))
-        inputs.append(stage_pictures_of(detector)(image, detections)["input"].shape)
-    assert inputs == [(352, 640, 3), (416, 768, 3)]
+def test_a_still_picture_is_also_searched_mirrored_with_a_larger_input() -> None:
+    """Both searches find each drawn vehicle where it is."""
+    scene = demo_scene(0)
+    width, height = scene.camera.width, scene.camera.height
+    detector = load_detector(NetworkSettings()).for_video(width, height, [])
+    assert isinstance(detector, NetworkDetector)
+    assert (detector.network.form.width, detector.larger.form.width) == (640, 896)
+    boxes = [astuple(item.box) for item in true_boxes(scene, FRAME) if must_be_found(item, height)]
+    searches, _, minimum = detector.search(Picture(Renderer(scene).image(FRAME)), None)
+    assert [len(searches), minimum] == [2, NetworkSettings().min_score_still]
+    for found in searches:
+        overlap = iou_matrix(np.array(boxes), found.boxes.astype(float))
+        assert (overlap.max(axis=1) > 0.7).all()
 
 
 def test_it_says_which_classes_it_does_not_know() -> None:

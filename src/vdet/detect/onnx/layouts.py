@@ -2,11 +2,11 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vdet.boxes import Float32Array, Int32Array
+from vdet.boxes import BoolArray, Float32Array, Int32Array, Int64Array
 from vdet.detect.onnx.session import Array
 
 STRIDES = (8, 16, 32)
@@ -30,6 +30,17 @@ class RawBoxes:
     scores: Float32Array
     classes: Int32Array
     class_scores: Float32Array | None = None
+
+    def rows(self, rows: Int64Array | BoolArray) -> "RawBoxes":
+        """Return some of the boxes."""
+        likely = None if self.class_scores is None else self.class_scores[rows]
+        return RawBoxes(self.boxes[rows], self.scores[rows], self.classes[rows], likely)
+
+    def mirrored(self, width: int) -> "RawBoxes":
+        """Return the boxes in the mirror image of a picture of this width."""
+        mirrored = self.boxes.copy()
+        mirrored[:, [2, 0]] = width - self.boxes[:, [0, 2]]
+        return replace(self, boxes=mirrored)
 
 
 OutputLayout = Callable[[Array, float], RawBoxes]

@@ -30,9 +30,6 @@ _MAX_PIXELS = 16_000_000
 _MAX_FINAL_ROWS = 1000
 _NORMALISED = 2.0  # pixels of the input: boxes that all end nearer to the corner are fractions
 _USUAL_SIZE = 640, 640  # for exports with a dynamic input size
-_STILL_PIXELS = 1.44
-"""Input pixels for a single image, as a multiple of those for a video frame."""
-
 _TYPES: dict[str, type[np.generic]] = {"tensor(float)": np.float32, "tensor(float16)": np.float16}
 """Names of input types in onnxruntime."""
 
@@ -60,7 +57,7 @@ class Header(Section):
     format: Literal[1] = 1
     classes: tuple[str, ...] = Field(min_length=1, max_length=1000)
     pixels: int = Field(147_456, ge=1024, le=_MAX_PIXELS)
-    """Pixels of the scaled video frame; a single image has `_STILL_PIXELS` times as many."""
+    """Pixels of the scaled video frame."""
     calibration: Calibration = Calibration()
     by_class: dict[str, Calibration] = Field({}, max_length=1000)
     """The calibration of boxes by class; `calibration` for other classes."""
@@ -95,15 +92,14 @@ class Recognized:
     layout: OutputLayout
     header: Header | None = None
 
-    def for_frames(self, width: int, height: int, *, are_stills: bool = False) -> "Recognized":
+    def for_frames(self, width: int, height: int, scale: float = 1.0) -> "Recognized":
         """Return the network with an input for frames of one size, width and height in pixels.
 
-        Only the input of our networks depends on it. It is larger for single images, to find
-        smaller vehicles, because they take less time than a video.
+        Only the input of our networks depends on it; it has `scale` times as many pixels as usual.
         """
         if self.header is None:
             return self
-        pixels = min(_MAX_PIXELS, self.header.pixels * (_STILL_PIXELS if are_stills else 1))
+        pixels = min(_MAX_PIXELS, self.header.pixels * scale)
         return _ours(self.session, self.header, size_of_area(width, height, pixels))
 
     def find(self, picture: Picture, minimum: float) -> RawBoxes:
