@@ -52,13 +52,15 @@ _KINDS = {
 }
 """The values of a box, in pixels, after the frame and the time in seconds."""
 _OF_TRACK = tuple(_KINDS)[2:]
-_Values: Any = tuple[(*_KINDS.values(),)]  # type: ignore[misc]
-_ROWS: TypeAdapter[list[Any]] = TypeAdapter(list[_Values])
+_Columns: Any = tuple[(*(list[kind] for kind in _KINDS.values()),)]  # type: ignore[misc,valid-type]
+_TABLE: TypeAdapter[Any] = TypeAdapter(_Columns)
 _BLOCK = 300
 """Number of rows to check at once; they fit into the cache."""
 
 _Row = tuple[int, Sequence[Any]]
-"""The line of a box in its file, and its values in the order of `_KINDS`."""
+"""The line of a box in its file, and its cells."""
+_Block = tuple[Sequence[int], Sequence[Sequence[Any]]]
+"""The lines of boxes, and their columns in the order of `_KINDS`."""
 
 
 class _Record(TypedDict):
@@ -114,7 +116,7 @@ def read_json_lines(path: Path, data: bytes) -> SavedTracks:
         The file is empty, a line is not such a record, frames do not increase, or a time is wrong.
     """
     found: Times = {}
-    labels = limited(path, _labels(path, _json_rows(path, data, found), found))
+    labels = limited(path, _labels(path, _blocks(_json_rows(path, data, found)), found))
     times = checked_times(path, found)
     if not times:
         raise TruthError(f"{path}: is empty; it should have a record for every frame")
@@ -135,7 +137,7 @@ def read_csv(path: Path, data: bytes) -> SavedTracks:
         type, or a time is wrong.
     """
     found: Times = {}
-    labels = limited(path, _labels(path, _csv_rows(path, data), found))
+    labels = limited(path, _labels(path, _csv_blocks(path, data), found))
     times = checked_times(path, found)
     (_, head), *rows = islice(numbered_lines(path, data), 2)
     begin = None
@@ -154,22 +156,31 @@ def _begin(path: Path, line: int, first: Mapping[str, Any]) -> datetime | None:
         raise line_error(path, line, f"clock: {error}") from error
 
 
-def _labels(path: Path, rows: Iterable[_Row], times: Times) -> Iterator[Label]:
+def _labels(path: Path, blocks: Iterable[_Block], times: Times) -> Iterator[Label]:
     """Yield the label of each row, and put the time of its frame into `times`."""
+    for lines, columns in blocks:
+        try:
+            values = _TABLE.validate_python(columns)
+        except ValidationError as error:
+            first = min(error.errors(), key=lambda mistake: mistake["loc"][1])
+            column, row = map(int, first["loc"][:2])
+            what = f"{tuple(_KINDS)[column]}: {first['msg']}"
+            raise line_error(path, lines[row], what) from error
+        frames, seconds, ids, *sides, scores, states, names, feet, distances, lanes = values
+        times.update(zip(frames, zip(lines, seconds, strict=True), strict=True))
+        numbers, regions = [frame + 1 for frame in frames], [False] * len(lines)
+        scores = [1.0 if score is None else score for score in scores]
+        states = [state or "detected" for state in states]
+        boxes = map(from_size, *sides)
+        known = numbers, ids, scores, regions, states, feet, distances, lanes
+        yield from map(Label._make, zip(lines, boxes, names, *known, strict=True))
+
+
+def _blocks(rows: Iterable[_Row]) -> Iterator[_Block]:
     left = iter(rows)
     while block := list(islice(left, _BLOCK)):
         lines, cells = zip(*block, strict=True)
-        try:
-            values = _ROWS.validate_python(cells)
-        except ValidationError as error:
-            at, column = error.errors()[0]["loc"][:2]
-            what = f"{tuple(_KINDS)[int(column)]}: {error.errors()[0]['msg']}"
-            raise line_error(path, lines[int(at)], what) from error
-        for line, row in zip(lines, values, strict=True):
-            frame, time, id_, x, y, width, height, score, state, name, *known = row
-            times[frame] = line, time
-            box, score = from_size(x, y, width, height), 1.0 if score is None else score
-            yield Label(line, box, name, frame + 1, id_, score, False, state or "detected", *known)
+        yield lines, tuple(zip(*cells, strict=True))
 
 
 def _json_rows(path: Path, data: bytes, times: Times) -> Iterator[_Row]:
@@ -188,7 +199,7 @@ def _json_rows(path: Path, data: bytes, times: Times) -> Iterator[_Row]:
             yield line, (last, time, *map(track.get, _OF_TRACK))
 
 
-def _csv_rows(path: Path, data: bytes) -> Iterator[_Row]:
+def _csv_blocks(path: Path, data: bytes) -> Iterator[_Block]:
     """Yield the rows of a table; an empty cell is None, and so is one of a missing column."""
     lines = numbered_lines(path, data)
     names = _cells(path, *next(lines, (1, "")))
@@ -196,15 +207,21 @@ def _csv_rows(path: Path, data: bytes) -> Iterator[_Row]:
         needed = ", ".join(_NEEDED)
         raise line_error(path, 1, f"the header must name each of these columns once: {needed}")
     pick = itemgetter(*(names.index(name) if name in names else -1 for name in _COLUMNS))
+    for numbers, columns in _blocks(_csv_rows(path, lines, len(names))):
+        found = pick((*columns, [""] * len(numbers)))
+        known = [[cell or None for cell in cells] if "" in cells else cells for cells in found]
+        feet = zip(*known[_FOOT], strict=True)
+        known[_FOOT] = [[None if None in foot else foot for foot in feet]]
+        yield numbers, known
+
+
+def _csv_rows(path: Path, lines: Iterable[tuple[int, str]], columns: int) -> Iterator[_Row]:
     for line, content in lines:
         cells = _cells(path, line, content)
-        if len(cells) != len(names):
-            what = f"has {len(cells)} cells, but the header has {len(names)}"
+        if len(cells) != columns:
+            what = f"has {len(cells)} cells, but the header has {columns}"
             raise line_error(path, line, f"this line {what}")
-        cells.append("")
-        row: list[Any] = [cell or None for cell in pick(cells)]
-        row[_FOOT] = [None if None in row[_FOOT] else row[_FOOT]]
-        yield line, row
+        yield line, cells
 
 
 def _cells(path: Path, line: int, content: str) -> list[str]:

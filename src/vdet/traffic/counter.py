@@ -11,7 +11,15 @@ from vdet.detect.classes import is_chosen
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Span, add_frame
 from vdet.traffic.counts import Counts, Direction, Event
-from vdet.traffic.crossings import VANISH, Border, Crossing, PlacedLine, crossings, place
+from vdet.traffic.crossings import (
+    VANISH,
+    Border,
+    Crossing,
+    PlacedLine,
+    crossings,
+    lines_near,
+    place,
+)
 from vdet.traffic.linking import GAP, TrackLinker, VehiclePath
 
 _OLDEST = 0.2
@@ -125,9 +133,8 @@ class VehicleCounter:
         for name, some in found.items():
             events += [_event(path, name, crossing) for crossing in some]
             heights[name] = path.heights[[crossing.row for crossing in some]].tolist()
-        missed = [
-            line.name for line in self.lines if not found[line.name] and line.is_near(points, reach)
-        ]
+        others = [line for line in self.lines if not found[line.name]]
+        missed = [line.name for line in lines_near(others, points, reach)]
         return _Passage(events, heights, missed)
 
 

@@ -74,10 +74,6 @@ class PlacedLine:
         x, y = points.T
         return np.asarray(side_of(self.end, self.start, (x, y)))
 
-    def is_near(self, points: Float64Array, reach: Float64Array) -> bool:
-        """Return whether one of the points `(n, 2)` is within its reach, `(n,)`, of the line."""
-        return bool((distances_to([(self.start, self.end)], points)[:, 0] <= reach).any())
-
     def meeting(self, path: Segment) -> float | None:
         """Return the fraction of `path` at which it meets the line; None if it does not."""
         return meeting(path, self.reach)
@@ -137,6 +133,16 @@ def distances_to(segments: Sequence[Segment], points: Float64Array) -> Float64Ar
     vectors, there = ends - starts, points[:, np.newaxis] - starts
     fractions = np.clip((there * vectors).sum(axis=2) / (vectors**2).sum(axis=1), 0, 1)
     return np.asarray(np.hypot(*np.moveaxis(there - fractions[..., np.newaxis] * vectors, 2, 0)))
+
+
+def lines_near(
+    lines: Sequence[PlacedLine], points: Float64Array, reach: Float64Array
+) -> Iterator[PlacedLine]:
+    """Yield the lines that have one of the points `(n, 2)` within its reach, `(n,)`."""
+    if lines:
+        distances = distances_to([(line.start, line.end) for line in lines], points)
+        are_near = (distances <= reach[:, np.newaxis]).T
+        yield from (line for line, rows in zip(lines, are_near, strict=True) if rows.any())
 
 
 def _are_inside(corners: Sequence[Point], points: Float64Array) -> BoolArray:

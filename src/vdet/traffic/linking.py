@@ -8,6 +8,7 @@ from array import array
 from collections.abc import Container, Iterable
 from dataclasses import dataclass, field
 from operator import itemgetter
+from struct import Struct
 
 import numpy as np
 
@@ -40,10 +41,11 @@ _ONWARD = 0.2, 0.3
 """Seconds after which a lost vehicle is taken to have driven on; two places settle a crossing."""
 _LATEST = 20
 """Number of places that its velocity follows from; each step counts half as much as the next."""
-_COLUMNS = 7
-"""Numbers that are kept of a frame: time, x and y of the foot, y1 and y2 of the box, score, and the
-number of the frame.
+_COLUMNS = 10
+"""Numbers that are kept of a frame: time, x and y of the foot, x1 and y1 of the box, score, the
+number of the frame, the id of the track, x2 and y2 of the box.
 """
+_ROW = Struct(f"{_COLUMNS}d")
 _STAY, _STANDS = 250, 0.05
 """Number of places of which only the first and the last are kept where a vehicle stands: where all
 lie within this fraction of the height of its box. So memory does not grow with parked vehicles.
@@ -143,11 +145,10 @@ class TrackLinker:
         lost = [] if shown <= self._vehicles.keys() else self._lost(shown)
         for track in frame.tracks:
             vehicle = self._vehicles.get(track.id) or self._begin(track, lost)
-            *_, width, height = track.box.xywh
-            vehicle.see(track, self._now, frame.index, (width + height) / 2)
+            vehicle.see(track, self._now, frame.index)
             if vehicle.is_another():
                 paths.append(self._split(track.id))
-            self._vehicles[track.id].name(track, height)
+            self._vehicles[track.id].classes[track.id] = track.class_name
         return paths
 
     def start_video(self) -> None:
@@ -171,7 +172,7 @@ class TrackLinker:
             is_old = self._now - vehicle.shown > GAP
             if key in shown or is_old or vehicle.is_leaving(width, height):
                 continue
-            before, now = vehicle.onward(self._now)[:, 1:4].tolist()
+            before, now = vehicle.onward(self._now)[:, [1, 2, 4]].tolist()
             if 0 <= now[0] <= width and 0 <= now[1] <= height:
                 lost += [(key, *before), (key, *now)]
         return lost
@@ -198,6 +199,7 @@ class TrackLinker:
         """Return the path until a vehicle was out of sight; since then it is another one."""
         self.begun += 1
         vehicle = self._vehicles[key]
+        vehicle.size = max(vehicle.size, _largest(_table(vehicle.rows)))
         tracks, rows = vehicle.tracks.copy(), vehicle.rows[vehicle.back or 0 :]
         other = _Vehicle(self.begun, vehicle.box, self._now, tracks, rows, size=vehicle.size)
         self._vehicles[key] = other
@@ -218,9 +220,9 @@ class _Vehicle:
     rows
         All that was seen of it, one frame after the other: see `_table`.
     classes
-        By track its largest height, pixels, and its class so far.
+        The class so far of each track.
     size
-        That of `VehiclePath`.
+        That of `VehiclePath`, without `rows`.
     back
         Where in `rows` it came back after it was out of sight, until it is clear who that is.
     """
@@ -230,26 +232,24 @@ class _Vehicle:
     shown: float
     tracks: list[tuple[float, int]] = field(default_factory=list)
     rows: "array[float]" = field(default_factory=lambda: array("d"))
-    classes: dict[int, tuple[int, str | None]] = field(default_factory=dict)
+    classes: dict[int, str | None] = field(default_factory=dict)
     size: float = 0.0
     back: int | None = None
 
-    def see(self, track: Track, time: float, frame: int, size: float) -> None:
-        """Add the next frame that shows it; `size` is that of its box, pixels."""
+    def see(self, track: Track, time: float, frame: int) -> None:
+        """Add the next frame that shows it."""
         if time - self.shown > _OUT_OF_SIGHT:
             self.back = len(self.rows)
-        self.box, self.shown = track.box, time
-        self.size = max(self.size, size)
-        self.rows.extend((time, *track.foot, self.box.y1, self.box.y2, track.score, frame))
+        self.box = box = track.box
+        self.shown, (x, y) = time, track.foot
+        known = track.score, frame, track.id
+        row = _ROW.pack(time, x, y, box.x1, box.y1, *known, box.x2, box.y2)
+        self.rows.frombytes(row)  # three times faster than `extend`
         if len(self.rows) % (_STAY * _COLUMNS) == 0 and self.back is None:
             stay = _table(self.rows[-_STAY * _COLUMNS :])
-            if np.ptp(stay[:, 1:3], axis=0).max() <= _STANDS * stay[-1, 3]:
+            if np.ptp(stay[:, 1:3], axis=0).max() <= _STANDS * stay[-1, 4]:
+                self.size = max(self.size, _largest(stay))
                 del self.rows[(1 - _STAY) * _COLUMNS : -_COLUMNS]
-
-    def name(self, track: Track, height: int) -> None:
-        """Take in the class so far of its track, and the height of its box, pixels."""
-        largest, _ = self.classes.get(track.id, (0, None))
-        self.classes[track.id] = max(largest, height), track.class_name
 
     def is_another(self) -> bool:
         """Return whether it drives the other way than before it was out of sight."""
@@ -257,7 +257,7 @@ class _Vehicle:
             return False
         before = _velocity(self.rows[: self.back])
         first, *_, last = _table(self.rows[self.back :])
-        way, speed, height = complex(*(last - first)[1:3]), abs(before), last[3]
+        way, speed, height = complex(*(last - first)[1:3]), abs(before), last[4]
         onward = (way * before.conjugate()).real / max(speed, 1e-9)
         is_another = speed > _LEAVES * height
         is_another &= onward < -max(_TURNED * height, _OPPOSITE * abs(way))
@@ -283,23 +283,30 @@ class _Vehicle:
         """Return its path; if it was lost, it drives on for a moment."""
         rows = _table(self.rows)
         seen, last = len(rows), rows[-1]
-        if now - last[0] > GAP and math.dist(last[1:3], rows[0, 1:3]) > last[3]:
+        if now - last[0] > GAP and math.dist(last[1:3], rows[0, 1:3]) > last[4]:
             rows = np.concatenate([rows, self.onward(*np.add(last[0], _ONWARD))[1:]])
-        times, points, (heights, scores, frames) = rows[:, 0], rows[:, 1:3], rows[:, 3:].T
-        _, name = max(reversed(self.classes.values()), key=itemgetter(0))
-        who = self.number, name, tuple(self.tracks), seen
-        return VehiclePath(*who, times, points, heights, scores, frames, self.size)
+        times, points, (heights, scores, frames, ids) = rows[:, 0], rows[:, 1:3], rows[:, 4:].T
+        largest = max(reversed(self.classes), key=lambda key: heights[ids == key].max(initial=0))
+        who = self.number, self.classes[largest], tuple(self.tracks), seen
+        size = max(self.size, _largest(rows))
+        return VehiclePath(*who, times, points, heights, scores, frames, size)
 
 
 def _table(rows: "array[float]") -> Float64Array:
-    """Return times, x and y of feet, heights of boxes, scores and frames: `(n, 6)`.
+    """Return times, feet, widths and heights of boxes, scores, frames and ids: `(n, 8)`.
 
     They are as exact as files of tracks hold them, so that both count alike.
     """
-    times, x, y, top, bottom, scores, frames = np.array(rows).reshape(-1, _COLUMNS).T
-    heights = np.maximum(1, np.floor(bottom + 0.5) - np.floor(top + 0.5))
-    feet = np.rint(100 * x) / 100, np.rint(100 * y) / 100
-    return np.column_stack([times, *feet, heights, scores, frames])
+    table = np.array(rows).reshape(-1, _COLUMNS)
+    table[:, 1:3] = np.rint(100 * table[:, 1:3]) / 100
+    sizes = np.floor(table[:, 8:] + 0.5) - np.floor(table[:, 3:5] + 0.5)
+    table[:, 3:5] = np.maximum(1, sizes)
+    return table[:, :8]
+
+
+def _largest(table: Float64Array) -> float:
+    """Return the largest mean of the width and the height of a box, pixels."""
+    return float(table[:, 3:5].mean(axis=1).max())
 
 
 def _velocity(rows: "array[float]") -> complex:

@@ -161,7 +161,9 @@ class SpeedMeter:
 
 def with_speeds(counts: Counts, meter: SpeedMeter | None) -> Counts:
     """Return the counts of a video with the speeds of its vehicles at their events."""
-    known = meter.speeds() if meter else {}
+    if not meter:
+        return counts
+    known = meter.speeds()
     latest: dict[int, float] = {}
     events = []
     for event in counts.events:
