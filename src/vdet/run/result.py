@@ -3,7 +3,7 @@
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Protocol, cast
+from typing import TYPE_CHECKING, Any, Protocol, cast
 
 import cv2
 
@@ -11,9 +11,11 @@ from vdet.boxes import Boxes
 from vdet.conditions.finding import Findings
 from vdet.detect.classes import is_chosen
 from vdet.draw.boxes import color_of, draw_box
-from vdet.lanes.road import Road
 from vdet.media import Frame
 from vdet.track.track import FrameTracks, Track
+
+if TYPE_CHECKING:  # loaded with `--lanes`
+    from vdet.lanes.road import Road
 
 
 class Fact(Protocol):
@@ -65,7 +67,7 @@ class FrameResult:
     searched: bool = True
 
     @property
-    def road(self) -> Road | None:
+    def road(self) -> "Road | None":
         """The lane; None if lane finding is disabled."""
         return cast("Road | None", self.facts.get("lane"))
 

@@ -7,16 +7,18 @@ not enable it.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
-from vdet.conditions.watch import Conditions
 from vdet.config.schema import Settings
-from vdet.lanes.road import FrameView, Road, RoadFinder
 from vdet.media import Frame, VideoInfo
 from vdet.plugins import STEPS, load_plugin
 from vdet.regions import Regions
 from vdet.run.result import CONDITIONS, Facts, FrameResult
 from vdet.track.track import Track
+
+if TYPE_CHECKING:  # what an image does not need is loaded where it is used
+    from vdet.conditions.watch import Conditions
+    from vdet.lanes.road import FrameView, Road, RoadFinder
 
 
 class Step(Protocol):
@@ -79,8 +81,12 @@ def make_steps(context: StepContext, others: Sequence[Step] = ()) -> list[Step]:
     settings, width, height = context.settings, context.width, context.height
     steps: list[Step | None] = []
     if context.video is not None:
+        from vdet.conditions.watch import Conditions
+
         steps.append(ConditionStep(Conditions(settings, width, context.unknown)))
     if settings.lanes.enabled:
+        from vdet.lanes.road import RoadFinder
+
         roads = RoadFinder(settings.camera.lens, settings.lanes, width, height)
         has_metres = settings.lack_of_metres is None
         steps.append(LaneStep(roads, settings.detector.foot, has_metres=has_metres))
@@ -93,7 +99,7 @@ def make_steps(context: StepContext, others: Sequence[Step] = ()) -> list[Step]:
 class LaneStep:
     """Finds the lane, and with `has_metres` the distance and the lane of each vehicle."""
 
-    def __init__(self, roads: RoadFinder, foot: float, *, has_metres: bool = True) -> None:
+    def __init__(self, roads: "RoadFinder", foot: float, *, has_metres: bool = True) -> None:
         self._has_metres = has_metres
         self._roads = roads
         self._foot = foot
@@ -112,7 +118,7 @@ class LaneStep:
         return replace(result, tracks=tracks, facts={**result.facts, "lane": road})
 
 
-def with_positions(tracks: Sequence[Track], road: Road, foot: float) -> tuple[Track, ...]:
+def with_positions(tracks: Sequence[Track], road: "Road", foot: float) -> tuple[Track, ...]:
     """Return the tracks of a frame with the `distance` and the `lane` of their feet.
 
     Both are None without a lane, for a vehicle whose lower edge is cut off by the frame, and where
@@ -147,7 +153,7 @@ class RegionStep:
 class ConditionStep:
     """Watches for reasons to doubt the results, without changing them."""
 
-    def __init__(self, conditions: Conditions) -> None:
+    def __init__(self, conditions: "Conditions") -> None:
         self._conditions = conditions
 
     def apply(self, result: FrameResult) -> FrameResult:

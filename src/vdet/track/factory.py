@@ -13,8 +13,6 @@ from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
 from vdet.config.tracker import RulesTrackerSettings
 from vdet.media import Picture
 from vdet.plugins import TRACKERS, load_plugin
-from vdet.track.motion.tracker import MotionTracker
-from vdet.track.rules.tracker import RulesTracker
 from vdet.track.track import State, TimedTracker, Track, VideoTracker
 
 
@@ -93,9 +91,17 @@ def _moved(track: Track, end: Track, fraction: float) -> Track:
     return replace(track, box=Box(*sides), whole_foot=(x, y), state=state)
 
 
-def _make_rules(settings: RulesTrackerSettings, _width: int, height: int) -> RulesTracker:
+def _make_motion(settings: MotionTrackerSettings, width: int, height: int) -> VideoTracker:
+    from vdet.track.motion.tracker import MotionTracker
+
+    return MotionTracker(settings, width, height)
+
+
+def _make_rules(settings: RulesTrackerSettings, _width: int, height: int) -> VideoTracker:
+    from vdet.track.rules.tracker import RulesTracker
+
     return RulesTracker(scale_lengths(settings, height / REFERENCE_HEIGHT))
 
 
-MOTION = TrackerKind(MotionTrackerSettings, MotionTracker)
+MOTION = TrackerKind(MotionTrackerSettings, _make_motion)
 RULES = TrackerKind(RulesTrackerSettings, _make_rules)
