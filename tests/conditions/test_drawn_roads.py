@@ -1,6 +1,7 @@
 """Findings on a drawn road that changes: the right one in time, and none without a change."""
 
 from dataclasses import replace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from benchmarks.conditions import EXPECTED, SETTINGS, Road
 
 from vdet import load_settings
 from vdet.boxes import NO_BOXES
+from vdet.conditions import visibility
 from vdet.conditions.visibility import findings
 from vdet.conditions.watch import Conditions, planes_of
 from vdet.config.schema import Code, ConditionSettings, Settings
@@ -51,6 +53,18 @@ def found(settings: Settings, width: int = 640, unknown: tuple[str, ...] = ()) -
     for number in range(10):
         conditions.add(number / 2, Picture(image), NO_BOXES, ())
     return [finding.code for finding in conditions.findings().found]
+
+
+@pytest.mark.parametrize("apart", [6 / 30, 6 / 25, 6 / 24])
+def test_every_search_of_an_empty_road_is_analysed(
+    apart: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    look = Mock(side_effect=visibility.look)
+    monkeypatch.setattr(visibility, "look", look)
+    conditions, image = Conditions(SETTINGS, 640), np.full((90, 640, 3), 90, np.uint8)
+    for number in range(50):
+        conditions.add(number * apart, Picture(image), NO_BOXES, ())
+    assert look.call_count == 50
 
 
 def test_what_the_settings_make_doubtful_is_said() -> None:
