@@ -17,7 +17,7 @@ from vdet.detect.onnx.detector import NetworkDetector
 from vdet.detect.onnx.layouts import RawBoxes
 from vdet.detect.onnx.preparation import InputForm
 from vdet.detect.onnx.recognition import Recognized
-from vdet.errors import OutputError
+from vdet.errors import ModelError, OutputError
 from vdet.media import Frame, Picture
 from vdet.run.loop import Pipeline, SearchRate
 from vdet.run.result import FrameResult
@@ -94,13 +94,15 @@ class RedNetwork:
         return RawBoxes(sides, np.full(len(boxes), 0.9), np.zeros(len(boxes), np.int32))
 
 
-def searched_by_network(lefts: Sequence[int | None], rate: SearchRate, threads: int) -> list[int]:
+def searched_by_network(
+    lefts: Sequence[int | None], rate: SearchRate, threads: int, fps: Fraction = Fraction(25)
+) -> list[int]:
     """Return the frames that are searched if the car is here in each; None: it is not there."""
     network, settings = cast("Recognized", RedNetwork()), NetworkSettings(classes=("car",))
     detector = NetworkDetector(network, network, np.array([0, -1], np.int32), settings)
     tracker = MotionTracker(MotionTrackerSettings(), WIDTH, HEIGHT)
     places = [() if left is None else (moved_to(CAR, left, CAR.y1),) for left in lefts]
-    frames = [Frame(n, Fraction(n, 25), Picture(road(*place))) for n, place in enumerate(places)]
+    frames = [Frame(n, n / fps, Picture(road(*place))) for n, place in enumerate(places)]
     results = Pipeline(detector, tracker, rate=rate).follow(frames, threads=threads)
     return [result.frame.index for result in results if result.searched]
 
@@ -118,6 +120,31 @@ class TestWhereNothingMoves:
         for lefts in ([40] * 31, [None] * 31):
             found = searched_by_network(lefts, SearchRate(OF_NETWORK), 2)
             assert found == [0, 6, 12, 18, 24, 30]
+
+    @pytest.mark.parametrize(
+        ("fps", "apart"),
+        [(Fraction(24), 6), (Fraction(24_000, 1001), 6), (Fraction(60_000, 1001), 15)],
+    )
+    def test_rates_of_films_and_of_television_rest_as_long(self, fps: Fraction, apart: int) -> None:
+        found = searched_by_network([None] * 91, SearchRate(OF_NETWORK), 2, fps)
+        assert found == list(range(0, 91, apart))
+
+    @pytest.mark.parametrize("at", [0, 6])
+    @pytest.mark.parametrize("threads", [1, 4])
+    def test_an_error_ends_threads_that_wait_for_its_frame(
+        self, at: int, threads: int, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        find = RedNetwork.find
+
+        def fail_on_cars(network: RedNetwork, picture: Picture, minimum: float) -> RawBoxes:
+            found = find(network, picture, minimum)
+            if len(found.boxes):
+                raise ModelError("shows a car")
+            return found
+
+        monkeypatch.setattr(RedNetwork, "find", fail_on_cars)
+        with pytest.raises(ModelError, match="shows a car"):
+            searched_by_network([*[None] * at, 40, *[None] * 50], SearchRate(OF_NETWORK), threads)
 
     @pytest.mark.parametrize("rate", [SearchRate(OF_NETWORK, stride=2), SearchRate()])
     def test_a_rate_that_the_user_sets_is_kept(self, rate: SearchRate) -> None:

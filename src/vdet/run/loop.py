@@ -37,7 +37,8 @@ _STEPS = 25
 _SLACK = 0.1
 """Tolerance of the distance between searches, 1 / `searches`, in frames.
 
-With 12 searches per second, every second frame is searched at 23.976 frames/s, as at 24.
+With 12 searches per second, every second frame is searched at 23.976 frames/s, as at 24. In the
+same way, `LONGEST_REST` may be exceeded by this fraction of the usual distance between searches.
 """
 
 
@@ -138,7 +139,8 @@ def stretches(chosen: Iterable[_Chosen], longest: float) -> Iterator[Stretch]:
     for frame, is_chosen in chosen:
         frames.append((frame, is_chosen))
         step, latest = (float(frame.time) - latest, float(frame.time)) if is_chosen else (0, latest)
-        is_full = is_chosen and latest + step - end > longest  # the next search would be too late
+        following = latest + (1 - _SLACK) * step  # the next search
+        is_full = is_chosen and following - end > longest
         if is_full or len(frames) >= _MOST_TOGETHER:
             yield (stretch := Stretch(frames, before if is_chosen else None))
             frames, before, end = [], stretch.found if is_chosen and longest else None, latest
