@@ -12,7 +12,7 @@ class VideoDetector(Protocol):
     """Finds vehicles in the frames of one video, or in one single image.
 
     Each frame takes two steps: `search`, in parallel with other frames, then `detect`, in the order
-    of the frames. The attribute `is_stateless`, if it is there and true, says that `detect` keeps
+    of the frames. The attribute `is_stateless`, if present and true, means that `detect` keeps
     nothing: frames may stay unsearched where nothing moves.
     """
 
