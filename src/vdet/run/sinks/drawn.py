@@ -3,14 +3,13 @@
 import zlib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from vdet.config.schema import Settings
 from vdet.detect.classes import OUR_NAMES
 from vdet.draw import boxes
 from vdet.draw.boxes import Color, Surface, draw_lines
 from vdet.errors import OutputError
-from vdet.lanes.road import draw_lane
 from vdet.media import Frame, Picture, Planes, VideoInfo
 from vdet.media.images import PICTURE_SUFFIXES, encode_image
 from vdet.media.writer import VIDEO_SUFFIXES, VideoWriter, may_replace_video
@@ -19,8 +18,10 @@ from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import BaseSink, SinkContext, SinkKind
 from vdet.run.threads import write_async
 from vdet.track.track import Track
-from vdet.traffic.counter import VehicleCounter
 from vdet.workers import core_count
+
+if TYPE_CHECKING:
+    from vdet.traffic.counter import VehicleCounter
 
 VIDEO_LABELS = ("id", "class"), ("id",)
 PICTURE_LABELS = ("class", "score"), ("score",)
@@ -39,7 +40,7 @@ class Overlay:
     """
 
     def __init__(
-        self, settings: Settings, video: VideoInfo | None, counter: VehicleCounter | None = None
+        self, settings: Settings, video: VideoInfo | None, counter: "VehicleCounter | None" = None
     ) -> None:
         self._settings, self._draw = settings, settings.draw
         self._longest = self._draw.trails if video else None
@@ -55,6 +56,8 @@ class Overlay:
         """
         surface = result.frame.picture.copy(used)
         if result.road and result.road.lane:
+            from vdet.lanes.road import draw_lane
+
             draw_lane(surface, result.road.lane)
         shown = sorted(result.tracks, key=lambda track: track.box.y2)  # farthest first
         if self._counter:
@@ -103,7 +106,7 @@ def _class_number(name: str | None) -> int:
     return zlib.crc32(name.encode()) if name else 0
 
 
-def draw_running_counts(surface: Surface, counter: VehicleCounter) -> None:
+def draw_running_counts(surface: Surface, counter: "VehicleCounter") -> None:
     """Draw the lines and zones with their current counts; vehicles are drawn over them."""
     from vdet.pages.place import border_marks, draw_marks
 
