@@ -5,16 +5,17 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import TYPE_CHECKING, Any, Literal, cast
 
-import av
 import cv2
 import numpy as np
 import numpy.typing as npt
-from av.video.reformatter import ColorRange
 
 from vdet.boxes import Float64Array, Image
 from vdet.media.images import Orientation, from_16_bits, to_ycrcb
+
+if TYPE_CHECKING:  # an image needs no PyAV
+    import av
 
 Layers = tuple[Image, Image, Image]
 """Luma, blue and red chroma, uint8 each; chroma may have half the size of luma."""
@@ -52,12 +53,14 @@ class Coding:
     full_range: bool = False
 
     @classmethod
-    def of(cls, picture: av.VideoFrame) -> "Coding | None":
+    def of(cls, picture: "av.VideoFrame") -> "Coding | None":
         """Return the coding of a decoded 4:2:0 picture; None for other pixel formats."""
         matrix = _MATRICES.get(picture.colorspace)
         is_flipped = any(plane.line_size < 0 for plane in picture.planes)  # rows from bottom to top
         if picture.format.name not in _PLANAR or matrix is None or is_flipped:
             return None
+        from av.video.reformatter import ColorRange
+
         full_range = picture.color_range == ColorRange.JPEG or picture.format.name == "yuvj420p"
         return cls(matrix, full_range)
 
@@ -130,7 +133,7 @@ class Planes:
         Whether nothing else uses the picture, so it may be changed and encoded.
     """
 
-    def __init__(self, picture: av.VideoFrame, coding: Coding, *, is_own: bool = False) -> None:
+    def __init__(self, picture: "av.VideoFrame", coding: Coding, *, is_own: bool = False) -> None:
         self.picture = picture
         self.coding = coding
         self.is_own = is_own
@@ -156,6 +159,9 @@ class Planes:
     @classmethod
     def blank(cls, width: int, height: int, coding: Coding) -> "Planes":
         """Return new planes with undefined values; `width` × `height` pixels."""
+        import av
+        from av.video.reformatter import ColorRange
+
         picture = av.VideoFrame(width, height, "yuv420p")
         picture.colorspace = MATRIX_CODES[coding.matrix]
         picture.color_range = ColorRange.JPEG if coding.full_range else ColorRange.MPEG
@@ -193,7 +199,7 @@ class Planes:
         return self.luma, self.blue, self.red
 
 
-def _plane(picture: av.VideoFrame, number: int) -> Image:
+def _plane(picture: "av.VideoFrame", number: int) -> Image:
     plane = picture.planes[number]
     values = np.frombuffer(cast(bytes, plane), np.uint8)  # it is not typed as such
     rows = values[: plane.line_size * plane.height].reshape(plane.height, plane.line_size)
@@ -241,7 +247,7 @@ _16_BITS = ("gray16", "ya16", "rgb48", "rgba64")
 """Prefixes of pixel formats with 16 bits, as in PNG and TIFF."""
 
 
-def bgr_of(picture: av.VideoFrame) -> Image:
+def bgr_of(picture: "av.VideoFrame") -> Image:
     """Return a decoded picture as BGR uint8 `(H, W, 3)`.
 
     Colour matrix and range are taken from its tags; without tags, BT.601 and limited. For 16-bit

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import av
 import cv2
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +22,9 @@ from vdet.boxes import Image
 from vdet.config.camera import ClockSettings
 from vdet.errors import ImageError, VideoError
 from vdet.files import read_whole, record_input
+
+if TYPE_CHECKING:
+    import av
 
 MAX_PICTURE_PIXELS = 2**25
 """Maximum number of pixels: an 8K frame has fewer, a decompression bomb far more."""
@@ -69,7 +72,7 @@ class Orientation:
         return cls(turns[number], mirrored=number in (2, 4, 5, 7))
 
     @classmethod
-    def of_frame(cls, picture: av.VideoFrame) -> "Orientation":
+    def of_frame(cls, picture: "av.VideoFrame") -> "Orientation":
         """Return the nearest quarter turn of a decoded frame, by its display matrix."""
         return cls(round(picture.rotation / 90) * 90 % 360)
 
