@@ -86,7 +86,7 @@ def _search_rows(times: dict[str, float]) -> list[Measurement]:
         row("network / decoding to planes", "network beside decoding", decoding, "–"),
         row(
             "network / svm.yaml, detection of a frame",
-            "network detection", "svm detection", "≤ 1.2", "0.8",
+            "network detection", "svm detection", "≤ 1.8", "1.4",
         ),
     ]  # fmt: skip
 
@@ -136,7 +136,7 @@ def _run_rows(times: Times, played: float) -> list[Measurement]:
             "detect-video --flows --begin --ground / without",
             "detect with flows", "detect", "≤ 1.03",
         ),
-        row("length / detect-video --no-video", "played", "detect only", "≥ 10", "14"),
+        row("length / detect-video --no-video", "played", "detect only", "≥ 7", "10"),
         row("length / detect-video --no-video -c svm", "played", "detect only with svm", "–"),
     ]  # fmt: skip
 
