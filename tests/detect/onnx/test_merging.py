@@ -41,11 +41,10 @@ def test_boxes_of_two_searches_become_one_list() -> None:
         ([0, 0, 100, 40], 0.2, [0.4, 0.6]),
     )
     # Odds: 1.65 √(1 · 9) = 4.95, and 1.65 √(4 · 0.25) = 1.65; of one search, half the score.
-    assert listed(combine(first, second)) == [
+    assert listed(combine(first, second, 0.55)) == [
         ([200, 0, 300, 50], pytest.approx(4.95 / 5.95, abs=1e-4), 0),
         ([0, 0, 100, 48], pytest.approx(1.65 / 2.65, abs=1e-4), 0),
         ([500, 0, 540, 20], 0.3, 1),
-        ([206, 0, 306, 50], 0.2, 0),
     ]
 
 
@@ -53,7 +52,7 @@ def test_boxes_of_two_searches_become_one_list() -> None:
 def test_a_search_may_find_nothing(count: int) -> None:
     found = raw(([0, 0, 100, 50], 0.8, [1, 0])).rows(np.arange(count))
     expected = [([0, 0, 100, 50], 0.4, 0)][:count]
-    assert listed(combine(found, raw())) == listed(combine(raw(), found)) == expected
+    assert listed(combine(found, raw(), 0.55)) == listed(combine(raw(), found, 0.55)) == expected
 
 
 def test_a_box_in_the_mirror_image() -> None:

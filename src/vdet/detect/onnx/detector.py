@@ -1,7 +1,6 @@
 """A network in an ONNX file as a detector, of the kind `net`."""
 
 import contextlib
-import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -103,9 +102,10 @@ class NetworkDetector:
     def detect(self, candidates: Candidates) -> Boxes:
         """Return one box for each vehicle."""
         searches, form, minimum = candidates
-        found = functools.reduce(
-            combine, (suppress(raw, self.settings.nms_iou) for raw in searches)
-        )
+        overlap = self.settings.nms_iou
+        found, *others = (suppress(raw, overlap) for raw in searches)
+        for other in others:
+            found = combine(found, other, overlap)
         found = found.rows(found.scores >= minimum)
         return Boxes(
             found.boxes,

@@ -26,13 +26,14 @@ def suppress(found: RawBoxes, overlap: float) -> RawBoxes:
     return found.rows(np.asarray(kept, np.int64).reshape(-1))
 
 
-def combine(first: RawBoxes, second: RawBoxes) -> RawBoxes:
+def combine(first: RawBoxes, second: RawBoxes, overlap: float) -> RawBoxes:
     """Return the boxes of two searches of one picture, the best first; both have `class_scores`.
 
     Two boxes that overlap each other the most become their mean, weighted by score. Its score is
     the geometric mean of the odds of both, raised by a constant; a box that one search did not find
     keeps half its score. With both rules, fitted to cameras that were held out from a training, the
-    score stays the fraction of boxes that are right.
+    score stays the fraction of boxes that are right. Then a box is removed if its intersection over
+    union with a better one exceeds `overlap`, or that of boxes of one vehicle.
 
     Source: Solovyev, Wang and Gabruseva, "Weighted boxes fusion: Ensembling boxes from different
     object detection models", 2021.
@@ -54,7 +55,7 @@ def combine(first: RawBoxes, second: RawBoxes) -> RawBoxes:
     likely = joined(first.class_scores, second.class_scores)
     classes = likely.argmax(axis=1).astype(np.int32)
     found = RawBoxes(joined(first.boxes, second.boxes), scores, classes, likely)
-    return found.rows(np.argsort(-scores, kind="stable"))
+    return suppress(found, min(overlap, _SAME_IOU))
 
 
 def _pairs(boxes: Float32Array, others: Float32Array) -> tuple[Int64Array, Int64Array]:
