@@ -332,9 +332,9 @@ class Unseen:
         train_to_file(sources, self.settings.train.net, output, base=self._base, progress=progress)
         return output
 
-    def findings(self, network: Path, fold: int, way: str) -> Findings:
-        """Search the pictures of a fold as `way` says, unless that is done; return the findings."""
-        path = self._work / f"{way}_{network.stem}_{fold}.json"
+    def findings(self, network: Path, fold: int, *, as_frames: bool) -> Findings:
+        """Search the pictures of a fold, unless that is done, and return the findings."""
+        path = self._work / f"{'frames' if as_frames else 'images'}_{network.stem}_{fold}.json"
         if not path.exists():
             sets = [
                 replace(labelled, pictures=_those(labelled.pictures, folds == fold))
@@ -342,7 +342,7 @@ class Unseen:
             ]
             sets = [labelled for labelled in sets if labelled.pictures]
             classes = self.settings.train.net.classes
-            measure(sets, network, classes, as_frames=way == "frames").save(path)
+            measure(sets, network, classes, as_frames=as_frames).save(path)
             print(f"{path}: searched", flush=True)
         return Findings.load(path)
 
@@ -376,7 +376,7 @@ def main() -> None:
         networks |= {str(model): model for model in arguments.model}
         for name, network in networks.items():
             found[name].append(
-                [unseen.findings(network, fold, way) for way in ("images", "frames")]
+                [unseen.findings(network, fold, as_frames=as_frames) for as_frames in (False, True)]
             )
     results = {}
     for name, parts in found.items():
