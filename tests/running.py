@@ -35,7 +35,7 @@ frames = VideoReader.__iter__
 
 def held(reader):
     for frame in frames(reader):
-        if frame.index == 100:
+        if frame.index == 40:
             (folder / "held" / str(os.getpid())).touch()
             while not (folder / "open").exists():
                 time.sleep(0.02)
@@ -87,7 +87,7 @@ def names(folder: Path) -> list[str]:
 
 @dataclass(frozen=True)
 class Gate:
-    """Holds videos at their hundredth frame until it is opened, however slow the machine.
+    """Holds videos at frame 40 until it is opened, however slow the machine.
 
     It works in programs that are started with its `folder` on `PYTHONPATH`.
     """
@@ -99,7 +99,7 @@ class Gate:
         (self.folder / "sitecustomize.py").write_text(HOLDS_VIDEOS)
 
     def held(self) -> list[int]:
-        """Return the processes in which a video has come to its hundredth frame."""
+        """Return the processes in which a video has come to frame 40."""
         return [int(path.name) for path in (self.folder / "held").iterdir()]
 
     def open(self) -> None:

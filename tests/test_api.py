@@ -361,7 +361,7 @@ def test_follow_may_be_left_while_a_frame_is_read(
     def slow(self: VideoReader) -> Iterator[vdet.Frame]:
         for number, frame in enumerate(deliver(self)):
             yield frame
-            if number == 7:
+            if number == 1:
                 reads.set()
                 goes_on.wait(10)
 
@@ -372,7 +372,8 @@ def test_follow_may_be_left_while_a_frame_is_read(
     monkeypatch.setattr(VideoReader, "__iter__", slow)
     monkeypatch.setattr(VideoReader, "close", noted)
     monkeypatch.setattr("vdet.run.threads.JOIN_TIMEOUT", 0.1)
-    results = vdet.follow(clip_path)
+    at_once = vdet.load_settings(assignments=["detector.stride=1", "tracker.look_ahead=0"])
+    results = vdet.follow(clip_path, settings=at_once)
     next(results)
     assert reads.wait(10)
     results.close()

@@ -1,5 +1,6 @@
 """The process of the program: signals, standard streams, and threads of the libraries."""
 
+import gc
 import os
 import signal
 import sys
@@ -13,12 +14,14 @@ from vdet.workers import SINGLE_THREADED
 
 CLEANUP_TIMEOUT = 10.0  # seconds between a signal and a forced exit
 _SENT_AGAIN = 20
+_NEW_OBJECTS = 20_000  # between two collections: what loading the libraries makes is no garbage
 _STDOUT, _STDERR = 1, 2
 
 
 def run() -> NoReturn:
     """Run the program and exit: see `vdet.cli.main`. SIGTERM and SIGHUP act like Ctrl-C."""
     open_streams()
+    gc.set_threshold(_NEW_OBJECTS)
     for name, value in SINGLE_THREADED.items():
         os.environ.setdefault(name, value)
     # A killed worker leaves semaphores, which loky removes with a warning that users do not need.

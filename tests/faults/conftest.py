@@ -45,14 +45,14 @@ def gate(tmp_path_factory: pytest.TempPathFactory) -> Gate:
 
 @pytest.fixture(scope="session")
 def long_clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A clip of 600 frames."""
-    return write_drive(tmp_path_factory.mktemp("long") / "long.mp4", frames=600)
+    """A clip of 100 frames."""
+    return write_drive(tmp_path_factory.mktemp("long") / "long.mp4", frames=100)
 
 
 @pytest.fixture(scope="session")
 def clips(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder of two clips of 300 frames, and one of five."""
+    """A folder of two clips of 100 frames, and one of five."""
     folder = tmp_path_factory.mktemp("clips")
-    for name, frames in (("a", 300), ("b", 300), ("short", 5)):
+    for name, frames in (("a", 100), ("b", 100), ("short", 5)):
         write_drive(folder / f"{name}.mp4", frames)
     return folder
