@@ -8,13 +8,14 @@ if disabled := os.environ.get("OPENCV_CPU_DISABLE"):  # before the first import 
     os.environ["OPENCV_CPU_DISABLE"] = disabled.replace("_", "-")
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
 
 from drawn_patches import write_patches
+from running import Outcome
 from vdet.cli import main
 from vdet.config.schema import Settings, SvmSettings, SvmTrainingSettings, TrainSettings
 from vdet.detect.svm.model import save_model
@@ -26,15 +27,6 @@ from vdet.synthetic.scene import Scene, demo_scene
 # Seeded, so that a run of the tests says the same twice; and no test is a timing.
 settings.register_profile("vdet", derandomize=True, deadline=None)
 settings.load_profile("vdet")
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What a run of the program left behind."""
-
-    code: int
-    out: str
-    err: str
 
 
 Run = Callable[..., Outcome]

@@ -16,7 +16,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from conftest import Outcome
 from red_cars import HEIGHT, WIDTH, car_at, road
 from vdet.config.schema import OutputSettings
 from vdet.media import Frame, Picture, VideoInfo
@@ -24,6 +23,16 @@ from vdet.media.reader import VideoReader
 from vdet.media.writer import VideoWriter
 
 SOON = 300.0  # seconds; a limit for what takes a moment, on a very busy machine
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a run of the program left behind."""
+
+    code: int
+    out: str
+    err: str
+
 
 HOLDS_VIDEOS = """
 import os, time
