@@ -35,7 +35,7 @@ from vdet.evaluate.output import RunName, figure, table
 from vdet.evaluate.report import video_report
 from vdet.evaluate.scores import RankedPredictions
 from vdet.evaluate.video import evaluate_clip, open_clip
-from vdet.files import write_json
+from vdet.files import json_text, write_whole
 from vdet.labels.pictures import LabelledPicture, LabelledPictures
 from vdet.labels.reading import read_labelled_pictures
 from vdet.labels.roles import Roles
@@ -123,7 +123,8 @@ class Findings:
     def save(self, path: Path) -> None:
         """Write the findings as JSON."""
         rows = [[row.set, row.named, round(row.score, 5), row.found] for row in self.rows]
-        write_json({"objects": self.objects, "rows": rows}, str(path), overwrite=True)
+        text = json_text({"objects": self.objects, "rows": rows})
+        write_whole(path, text, overwrite=True)
 
     @classmethod
     def load(cls, path: Path) -> "Findings":
@@ -389,7 +390,7 @@ def main() -> None:
     for model in arguments.model:
         seen = trained_on(model)
         print(f"{model} has seen: {', '.join(seen) or 'not known'}")
-    write_json(results, str(arguments.work / "results.json"), overwrite=True)
+    write_whole(arguments.work / "results.json", json_text(results), overwrite=True)
     if arguments.steps:
         print("\n".join(video_lines(unseen.clip, networks[OURS], unseen.settings)))
 

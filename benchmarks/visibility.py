@@ -34,7 +34,7 @@ from vdet.detect.factory import load_detector
 from vdet.detect.onnx.detector import SHIPPED
 from vdet.detect.protocol import DetectorModel
 from vdet.evaluate.output import table
-from vdet.files import write_json
+from vdet.files import json_text, write_whole
 from vdet.labels.pictures import LabelledPicture
 from vdet.labels.reading import read_labelled_pictures
 from vdet.media import Picture
@@ -138,7 +138,7 @@ def _searched(roads: Path, networks: Sequence[Path], number: int) -> list[Search
                 for turn, number in enumerate(numbers)
                 for item in _both(path.stem, labelled.pictures[number], turn, models[folds[number]])
             ]
-            write_json([asdict(item) for item in found], str(path), overwrite=True)
+            write_whole(path, json_text([asdict(item) for item in found]), overwrite=True)
         left -= 2 * len(numbers)
         print(f"{path.stem}: searched; {_minutes(left)} left", flush=True)
         rows = json.loads(path.read_text(encoding="utf-8"))

@@ -14,7 +14,7 @@ from vdet.detect.svm.model import save_model
 from vdet.errors import OutputError
 from vdet.evaluate.output import table
 from vdet.evaluate.scores import score
-from vdet.files import make_folder, staged, write_whole
+from vdet.files import make_folder, write_whole
 from vdet.labels.reading import read_predictions, read_truth
 from vdet.learn.svm.dataset import find_patches
 from vdet.learn.svm.mining import MiningLimits, VideoSource, mine
@@ -112,8 +112,7 @@ def run_demo(
     model = load_svm(linear.svm, None)  # only the positions of its windows matter
     mine(sources, folder / PATCHES, linear, model, limits=_LIMITS, overwrite=overwrite, steps=steps)
     learnt, _ = train(find_patches([folder / PATCHES]), linear, steps=steps)
-    with staged(folder / MODEL, overwrite=overwrite) as temporary:
-        save_model(learnt, temporary)
+    save_model(learnt, folder / MODEL, overwrite=overwrite)
     announce("4/4 finding the vehicles with the linear model …")
     chosen = linear.svm.model_copy(update={"model": str(folder / MODEL)})
     find(ROAD, _BY_MODEL, linear.model_copy(update={"detector": chosen}))

@@ -34,13 +34,6 @@ class ConfigError(VdetError, ValueError):
         return "\n".join(self.args)
 
 
-def check_positive(**numbers: int | None) -> None:
-    """Raise a `ConfigError` that names the first number below 1; None is skipped."""
-    for name, number in numbers.items():
-        if number is not None and number < 1:
-            raise ConfigError(f"{name}: is {number}; must be at least 1")
-
-
 class DataError(VdetError, ValueError):
     """The training patches cannot be used."""
 

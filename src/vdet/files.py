@@ -324,23 +324,15 @@ def write_whole(path: Path, text: str, *, overwrite: bool = False) -> None:
 
 
 def print_now(text: str) -> None:
-    """Write to standard output and flush, so that an error is raised here."""
-    sys.stdout.write(text)
-    sys.stdout.flush()
+    """Write to standard output and flush, so that errors are raised here, as `OutputError`."""
+    with output_errors(Path("standard output")):
+        sys.stdout.write(text)
+        sys.stdout.flush()
 
 
 def json_text(values: Any, *, ensure_ascii: bool = True) -> str:
     """Return values as JSON, indented; only ASCII can be printed everywhere."""
     return json.dumps(values, indent=2, allow_nan=False, ensure_ascii=ensure_ascii) + "\n"
-
-
-def write_json(values: Any, target: str, *, overwrite: bool = False) -> None:
-    """Write to the file `target`, or to standard output for `-`. Raises `OutputError`."""
-    if target == "-":
-        with output_errors(Path("standard output")):
-            print_now(json_text(values))
-    else:
-        write_whole(Path(target), json_text(values), overwrite=overwrite)
 
 
 def read_whole(path: Path, *, limit: int, what: str, error: type[VdetError]) -> bytes:

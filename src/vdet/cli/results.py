@@ -11,7 +11,7 @@ from vdet.cli import options
 from vdet.cli.messages import print_lines, progress_steps
 from vdet.cli.options import F, option, overwrite_option, short_form
 from vdet.errors import OutputError
-from vdet.files import OutputFiles, check_output, json_text, output_errors, write_json, write_text
+from vdet.files import OutputFiles, check_output, json_text, output_errors, print_now, write_text
 
 if TYPE_CHECKING:
     from vdet.config.schema import Settings
@@ -68,7 +68,7 @@ class Results:
                     text = make_page() if what == "page" else json_text(values)
                     write_text(files.stage_folder(path.parent) / path.name, text)
             if to_stderr:
-                write_json(values, "-")
+                print_now(json_text(values))
         if self.page:
             print_lines("", f"{self._files['page']}: the page", err=to_stderr)
 

@@ -8,7 +8,7 @@ from vdet.cli import options
 from vdet.cli.command import command
 from vdet.cli.messages import live_bar, print_lines, progress_steps
 from vdet.errors import DataError, counted
-from vdet.files import check_output, staged
+from vdet.files import check_output
 
 
 @command()
@@ -46,8 +46,7 @@ def train(data: tuple[Path, ...], output: Path, jobs: int | None, overwrite: boo
     files = find_patches(data)
     with progress_steps("") as steps:
         model, metrics = fit_model(files, settings, jobs=jobs, steps=steps)
-    with staged(output, overwrite=overwrite) as temporary:
-        save_model(model, temporary)
+    save_model(model, output, overwrite=overwrite)
     print_lines(*metrics.lines(), "", f"{output}: the model")
 
 

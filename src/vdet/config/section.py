@@ -4,12 +4,8 @@ from typing import Annotated, Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-
-class _FrameLength:
-    """Marks a length in pixels of a frame `REFERENCE_HEIGHT` rows high (see `scale_lengths`)."""
-
-
-FRAME_LENGTH = _FrameLength()
+FRAME_LENGTH = "pixels of a frame of `REFERENCE_HEIGHT` rows"
+"""Marks a length that `scale_lengths` scales."""
 REFERENCE_HEIGHT = 720
 """Rows of the frames that lengths in frame pixels are given for."""
 Pixels = Annotated[int, Field(ge=0, le=100_000), FRAME_LENGTH]

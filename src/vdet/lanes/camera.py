@@ -53,8 +53,7 @@ class Undistorter:
         """Return an undistorted image; it is black outside the camera's view."""
         if not self._camera:
             return image.copy()
-        model = self._matrix, self._distortion, np.eye(3), self._matrix
-        return warped(image, cv2.initUndistortRectifyMap(*model, self._size, cv2.CV_16SC2))
+        return np.asarray(cv2.undistort(image, self._matrix, self._distortion), np.uint8)
 
     def points(self, points: Float64Array) -> Float64Array:
         """Return where pixels `(n, 2)` of the frame lie in the undistorted frame, `(n, 2)`."""

@@ -14,7 +14,7 @@ from vdet.conditions.finding import Finding
 from vdet.config.schema import Settings
 from vdet.detect.factory import as_model
 from vdet.detect.protocol import VideoDetector, stage_pictures_of
-from vdet.errors import FrameSizeError, VideoError, check_positive
+from vdet.errors import ConfigError, FrameSizeError, VideoError
 from vdet.files import OutputFiles, record_input, recorded_inputs
 from vdet.media.reader import VideoReader
 from vdet.progress import Progress, no_progress
@@ -68,7 +68,9 @@ class Run:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "source", Path(self.source))  # notebooks pass text
-        check_positive(frames=self.frames, threads=self.threads)
+        for name, number in (("frames", self.frames), ("threads", self.threads)):
+            if number is not None and number < 1:
+                raise ConfigError(f"{name}: is {number}; must be at least 1")
 
     @property
     def is_part(self) -> bool:

@@ -20,7 +20,7 @@ from vdet.archives import open_archive, read_member
 from vdet.boxes import Float32Array
 from vdet.config.detector import FeatureSettings
 from vdet.errors import ModelError
-from vdet.files import read_whole
+from vdet.files import read_whole, staged
 
 FORMAT, FORMAT_VERSION = "vdet model", 2
 MAX_VALUE = 1e9
@@ -87,8 +87,8 @@ class LinearModel:
         return np.asarray((1 / (1 + np.exp(exponent))).mean(axis=1), np.float32)
 
 
-def save_model(model: LinearModel, path: Path) -> None:
-    """Write a model as `.npz` without pickle: arrays and a JSON header."""
+def save_model(model: LinearModel, path: Path, *, overwrite: bool = False) -> None:
+    """Write a model as `.npz` without pickle: arrays and a JSON header. Raises `OutputError`."""
     header = {
         "format": FORMAT,
         "version": FORMAT_VERSION,
@@ -96,7 +96,7 @@ def save_model(model: LinearModel, path: Path) -> None:
         "provenance": model.provenance,
     }
     text, arrays = np.frombuffer(json.dumps(header).encode(), np.uint8), _arrays(model)
-    with path.open("wb") as file:
+    with staged(path, overwrite=overwrite) as temporary, temporary.open("wb") as file:
         np.savez_compressed(file, header=text, **arrays)
 
 
