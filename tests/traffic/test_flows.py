@@ -134,11 +134,11 @@ def test_counts_are_a_table_of_pandas_and_bars_of_matplotlib(
 def test_zones_have_entries_exits_and_occupancy_by_interval() -> None:
     stays = through((0, 100, 400), (4, 500, 400), (10, 520, 400))
     rows = counts(frames(GOES_EAST, stays), ZONE).zone_use(5)
-    assert [(row.start, row.entered, row.left, row.most) for row in rows] == [
+    assert [(row.start, row.entered, row.left, row.max) for row in rows] == [
         (0, 2, 0, 2), (5, 0, 1, 2), (10, 0, 1, 1),
     ]  # fmt: skip
     assert [row.mean for row in rows] == pytest.approx([4 / 5, (2 * 2 + 3) / 5, 1], abs=0.02)
-    assert rows[1].mean_stay == rows[1].longest_stay == pytest.approx(4, abs=0.02)
+    assert rows[1].mean_stay == rows[1].max_stay == pytest.approx(4, abs=0.02)
 
 
 class TestSeveralVideos:
@@ -297,7 +297,7 @@ class TestFiles:
         row, *_ = rows_of(tmp_path / "c.zones.csv")
         assert row == {
             "start": "0.0", "end": "5.0", "name": "zone", "entered": "1", "left": "0",
-            "mean": "0.4", "most": "1", "mean_stay": "", "longest_stay": "",
+            "mean": "0.4", "max": "1", "mean_stay": "", "max_stay": "",
         }  # fmt: skip
 
     def test_events_have_clock_times(self, tmp_path: Path) -> None:

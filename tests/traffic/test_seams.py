@@ -59,8 +59,8 @@ def test_a_vehicle_on_the_line_at_the_seam_counts_once(tmp_path: File) -> None:
 
 def test_a_stay_goes_on_beyond_the_seam(tmp_path: File) -> None:
     (row,) = zone_table(count(write_halves(tmp_path, FOLLOWING, STANDS)))
-    assert (row.entered, row.left, row.most) == (1, 1, 1)
-    assert row.longest_stay == pytest.approx(16, abs=0.05)
+    assert (row.entered, row.left, row.max) == (1, 1, 1)
+    assert row.max_stay == pytest.approx(16, abs=0.05)
 
 
 @pytest.mark.parametrize("begin", ["070009", "070011"])

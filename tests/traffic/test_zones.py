@@ -63,7 +63,7 @@ def test_a_vehicle_that_stands_the_whole_time_is_not_counted_and_one_that_parks_
     [flow] = [row for row in found.flows() if row.count]
     assert (flow.origin, flow.destination) == ("zone", None)
     [use] = found.zone_use()
-    assert (use.entered, use.left, use.most) == (1, 1, 1)
+    assert (use.entered, use.left, use.max) == (1, 1, 1)
     assert found.warnings == counts(frames(visit), ZONE, LINE).warnings
 
 
@@ -105,6 +105,6 @@ def test_stays_follow_from_the_events() -> None:
     later = through((1, 200, 420), (9, 1000, 420))
     last = through((5.5, 900, 380), (9, 450, 380))
     (stay,) = counts(frames(ACROSS, later, last, seconds=9), ZONE).zone_use()
-    assert stay.most == 2
-    assert stay.longest_stay == pytest.approx(4, abs=0.01)
+    assert stay.max == 2
+    assert stay.max_stay == pytest.approx(4, abs=0.01)
     assert stay.mean_stay == pytest.approx((4 + 4 + 9 - (5.5 + 3.5 * 100 / 450)) / 3, abs=0.01)

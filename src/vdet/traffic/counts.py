@@ -120,9 +120,9 @@ class ZoneRow:
     ----------
     entered, left
         Vehicles that entered or appeared, and that left or vanished.
-    mean, most
+    mean, max
         Mean and maximum number of vehicles inside, over the video in the interval.
-    mean_stay, longest_stay
+    mean_stay, max_stay
         Of the vehicles that left or vanished, seconds; None if none did.
     """
 
@@ -132,9 +132,9 @@ class ZoneRow:
     entered: int
     left: int
     mean: float
-    most: int
+    max: int
     mean_stay: float | None
-    longest_stay: float | None
+    max_stay: float | None
 
 
 @dataclass(frozen=True, slots=True)

@@ -58,7 +58,7 @@ def test_a_run_counts_the_red_car(red_clip: Path, tmp_path: Path) -> None:
         ("gate", "out"): 1, ("gate", "in"): 0, ("yard", "enter"): 1, ("yard", "exit"): 0,
         ("yard", "appear"): 0, ("yard", "vanish"): 1,
     }  # fmt: skip
-    assert whole["zones"][0]["most"] == 1
+    assert whole["zones"][0]["max"] == 1
 
 
 def test_running_counts_are_drawn_if_asked_for(red_clip: Path, tmp_path: Path) -> None:
