@@ -134,7 +134,9 @@ def index_page(path: Path, videos: int = 10_000, each: int = 10) -> None:
             )
             for n in range(each)
         )
-        facts = VideoFacts(seconds=600, frames=15000, vehicles=each, most=3, still=still, rows=rows)
+        facts = VideoFacts(
+            seconds=600, frames=15000, vehicles=each, max_at_once=3, still=still, rows=rows
+        )
         name = f"day{number // 100}/clip{number:05}"
         written.append((name, Path(f"{name}.page/page.html"), facts))
     write_index(written, path)

@@ -11,7 +11,7 @@ NASTY = "</script><b>"
 
 
 def facts(*rows: VehicleRow, start: float = 0.0) -> VideoFacts:
-    numbers = {"seconds": 2.08, "frames": 52, "vehicles": len(rows), "most": 1}
+    numbers = {"seconds": 2.08, "frames": 52, "vehicles": len(rows), "max_at_once": 1}
     return VideoFacts(start=start, **numbers, still=NO_STILL, rows=rows)
 
 

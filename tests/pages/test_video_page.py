@@ -217,7 +217,7 @@ def test_the_facts_have_the_counts_and_a_row_for_each_vehicle() -> None:
     clock = Clock(datetime(2026, 5, 1, 7, tzinfo=UTC), "as given", UTC)
     known = {1: "../a.crops/vehicle-0001.jpg"}
     facts = replace(page(), counts=counts, clock=clock, pictures=known).facts
-    assert (facts.frames, facts.vehicles, facts.most) == (52, 2, 1)
+    assert (facts.frames, facts.vehicles, facts.max_at_once) == (52, 2, 1)
     assert facts.counts == {"north: in": 1, "south: in": 1, "</script><b>: in": 8}
     assert facts.rows == (
         VehicleRow(

@@ -7,7 +7,7 @@ import json
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -64,9 +64,9 @@ class VehicleRow(BaseModel):
 class VideoFacts(BaseModel):
     """Key figures of a video, for the page over many videos.
 
-    `seconds` is the duration of the processed part, `most` the maximum number of vehicles at once.
-    `counts` are by name, `conditions` are reasons to doubt them; `still` is a thumbnail as a data
-    URI. The player of its page begins at `start`, seconds in the video.
+    `seconds` is the duration of the processed part, `max_at_once` the maximum number of vehicles
+    at a time. `counts` are by name, `conditions` are reasons to doubt them; `still` is a thumbnail
+    as a data URI. The player of its page begins at `start`, seconds in the video.
     """
 
     model_config = ConfigDict(frozen=True)
@@ -75,7 +75,7 @@ class VideoFacts(BaseModel):
     seconds: float = Field(ge=0)
     frames: int = Field(ge=0)
     vehicles: int = Field(ge=0)
-    most: int = Field(ge=0)
+    max_at_once: int = Field(ge=0)
     still: str = Field(pattern=r"^data:image/jpeg;base64,[A-Za-z0-9+/=]*$")
     counts: dict[str, int] = {}
     conditions: tuple[str, ...] = ()
@@ -94,15 +94,17 @@ class Part:
         Address of its page: empty for this page, None if it has no player.
     start
         Time in the video at which the player begins, seconds.
-    folder
-        Prefix of the addresses of images.
     """
 
     name: str
     page: str | None
     start: float
-    folder: str
     rows: Sequence[VehicleRow]
+
+    @property
+    def folder(self) -> str:
+        """Prefix of the addresses of images."""
+        return (self.page or "").removesuffix(PAGE_NAME)
 
 
 def table_json(parts: Sequence[Part]) -> str:
@@ -156,17 +158,13 @@ def _plain_seconds(clock: str | None) -> int | None:
     """Return a clock time as seconds since 1970, ignoring its zone."""
     if clock is None:
         return None
-    plain = datetime.fromisoformat(clock).replace(tzinfo=None)
-    return round((plain - datetime(1970, 1, 1)).total_seconds())
+    return round(datetime.fromisoformat(clock).replace(tzinfo=UTC).timestamp())
 
 
 def write_index(videos: Sequence[tuple[str, Path, VideoFacts]], target: Path) -> None:
     """Write the page over many videos, given by name, path of the page, and key figures."""
     counts = sum((Counter(facts.counts) for _, _, facts in videos), Counter[str]())
     linked = [(name, link_to(page, Path()), facts) for name, page, facts in videos]
-    parts = [
-        Part(name, page, facts.start, page.removesuffix(PAGE_NAME), facts.rows)
-        for name, page, facts in linked
-    ]
+    parts = [Part(name, page, facts.start, facts.rows) for name, page, facts in linked]
     page = render("index.html", videos=linked, counts=counts, table=table_json(parts))
     write_text(target, page)

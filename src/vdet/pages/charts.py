@@ -8,7 +8,7 @@ import heapq
 import itertools
 import math
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from time import gmtime, strftime
 
@@ -81,43 +81,28 @@ class TimelineBar:
     label: str
 
 
-@dataclass(frozen=True, slots=True)
-class Timeline:
-    """Spans in rows."""
-
-    title: str
-    x: Axis
-    spans: Sequence[TimelineBar]
-
-
-Series = dict[str, Counter[float]]
-"""Number of events in each interval, by name; intervals by their start, seconds."""
-
-
 def hex_color(bgr: Color) -> str:
     """Return a colour in CSS notation."""
     return "#{:02x}{:02x}{:02x}".format(*bgr[::-1])
 
 
-def time_text(seconds: float) -> str:
-    """Write a time as `m:ss` or `h:mm:ss`, with tenths if it is not a whole second."""
-    return clock(seconds, 1).removesuffix(".0")
+def time_text(seconds: float, zero: float | None = None) -> str:
+    """Write a time in the video as `m:ss` or `h:mm:ss`, with tenths if it is not a whole second.
+
+    With `zero`, the second of the day at time 0, it is the time of day.
+    """
+    if zero is None:
+        return clock(seconds, 1).removesuffix(".0")
+    return strftime("%H:%M:%S", gmtime(round(seconds + zero))).removesuffix(":00")
 
 
 def time_axis(start: float, end: float, zero: float | None = None) -> Axis:
-    """Return an axis of times in seconds; `zero` is the second of the day at time 0, if known."""
+    """Return an axis of times in seconds; `zero` as for `time_text`."""
     length, since = max(end - start, _NOTHING), zero or 0.0
     step = next((step for step in _TIMES if length / step <= _TICKS), length / _TICKS)
     numbers = range(math.ceil((start + since) / step), math.floor((end + since) / step) + 1)
     times = [number * step - since for number in numbers]
-    return Axis(start, end, [(time, _time_text(time, zero)) for time in times])
-
-
-def _time_text(seconds: float, zero: float | None) -> str:
-    """Write a time in the video, or the time of day if it is known."""
-    if zero is None:
-        return time_text(seconds)
-    return strftime("%H:%M:%S", gmtime(round(seconds + zero))).removesuffix(":00")
+    return Axis(start, end, [(time, time_text(time, zero)) for time in times])
 
 
 def number_axis(low: int, high: int, title: str = "") -> Axis:
@@ -153,25 +138,30 @@ def level_plot(
 
 
 def interval_plot(
-    series: Series, x: Axis, interval: int, title: str, zero: float | None = None
+    series: Mapping[str, Counter[float]],
+    x: Axis,
+    interval: int,
+    title: str,
+    zero: float | None = None,
 ) -> Plot:
     """Return a plot with a bar for each interval with events, stacked by series, and a legend.
 
-    `interval` is in seconds, `zero` as for `time_axis`.
+    A series has the number of events in each interval, by its start in seconds. `interval` is in
+    seconds, `zero` as for `time_text`.
     """
-    bars, most = list[Bar](), 1
+    bars, highest = list[Bar](), 1
     colors = dict(zip(series, itertools.cycle(_COLORS), strict=False))
     for at in sorted(set().union(*series.values())):
         below = 0
         for name, counts in series.items():
             if count := counts[at]:
-                tip = f"{_time_text(at, zero)}: {count} {name}"
+                tip = f"{time_text(at, zero)}: {count} {name}"
                 place = at + 0.1 * interval, at + 0.9 * interval, below, below + count
                 bars.append(Bar(*place, colors[name], tip))
                 below += count
-        most = max(most, below)
+        highest = max(highest, below)
     legend = [(f"{name}: {counts.total()}", colors[name]) for name, counts in series.items()]
-    return Plot(title, x, number_axis(0, most), bars, legend=legend)
+    return Plot(title, x, number_axis(0, highest), bars, legend=legend)
 
 
 def histogram(values: Sequence[float], step: int, title: str, unit: str) -> Plot:

@@ -17,7 +17,7 @@ from vdet.config.schema import Settings
 from vdet.detect.classes import UNKNOWN
 from vdet.lanes.ground import ground_of
 from vdet.media.images import encode_image
-from vdet.pages.place import Mark, place_marks, svg, with_marks
+from vdet.pages.place import Mark, place_marks, with_marks
 from vdet.pages.render import TEMPLATES, jpeg_uri, render
 from vdet.track.track import FrameTracks
 from vdet.traffic.counting import count_frames
@@ -78,7 +78,9 @@ class Drawing:
                 return self._proposed_settings().encode()
         marks = self._marks()
         if path.suffix.lower() == ".svg":
-            return svg(self._image, marks).encode("utf-8", "backslashreplace")
+            width, height = self._size
+            page = render("place.svg", picture=self._image, width=width, height=height, marks=marks)
+            return page.encode("utf-8", "backslashreplace")
         return encode_image(with_marks(self._image, marks), path)
 
     def _page(self, name: str) -> str:

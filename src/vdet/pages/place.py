@@ -15,7 +15,7 @@ from vdet.draw import boxes
 from vdet.draw.boxes import Color, Surface
 from vdet.lanes.ground import Ground
 from vdet.pages.charts import hex_color
-from vdet.pages.render import Table, render
+from vdet.pages.render import Table
 from vdet.polygons import Point
 from vdet.traffic.counts import Counts, Direction, Event, class_of, vehicle_flows
 from vdet.traffic.crossings import Border, PlacedLine
@@ -168,12 +168,6 @@ def with_marks(image: Image, marks: Iterable[Mark]) -> Image:
     drawn = image.copy()
     draw_marks(drawn, marks)
     return drawn
-
-
-def svg(image: Image, marks: Sequence[Mark]) -> str:
-    """Return an SVG with the image embedded and the marks as shapes and text."""
-    height, width = image.shape[:2]
-    return render("place.svg", picture=image, width=width, height=height, marks=marks)
 
 
 @dataclass(frozen=True, slots=True)

@@ -35,8 +35,7 @@ def render(template: str, **values: Any) -> str:
         lstrip_blocks=True,
     )
     environment.filters |= {"counted": counted, "jpeg": jpeg_uri, "hex": hex_color}
-    environment.filters["clock"] = time_text
-    environment.filters["line"] = lambda text: escaped(str(text))
+    environment.filters |= {"clock": time_text, "line": lambda text: escaped(str(text))}
     return environment.get_template(template).render(values, version=__version__)
 
 

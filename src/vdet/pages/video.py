@@ -13,7 +13,7 @@ from vdet.lanes.ground import Ground
 from vdet.media import VideoInfo
 from vdet.pages import charts
 from vdet.pages.batch import NO_STILL, Part, VehicleRow, VideoFacts, table_json
-from vdet.pages.charts import Axis, Plot, Timeline, TimelineBar, hex_color, interval_plot
+from vdet.pages.charts import Axis, Plot, TimelineBar, hex_color, interval_plot
 from vdet.pages.place import path_marks, traffic_part, with_marks
 from vdet.pages.render import jpeg_uri, render
 from vdet.traffic.clock import Clock, Intervals
@@ -112,7 +112,7 @@ class VideoPage:
             seconds=max(0.0, self.seconds),
             frames=self.frames,
             vehicles=len(self._driven),
-            most=self._most,
+            max_at_once=self._max_at_once,
             still=NO_STILL if self.poster is None else jpeg_uri(self.poster, _SMALL),
             counts=self._totals,
             conditions=tuple(item.text for item in self.findings if item.severity == "warning"),
@@ -125,7 +125,7 @@ class VideoPage:
         return [record for record in self.records if record.has_driven]
 
     @property
-    def _most(self) -> int:
+    def _max_at_once(self) -> int:
         """The maximum number of vehicles at once."""
         return 1 + max(charts.pack_rows(self._spans), default=-1)
 
@@ -173,13 +173,13 @@ class VideoPage:
             figures=self._figures(),
             shown=shown,
             level_plot=charts.level_plot(self._spans, x, "Number of vehicles at once", self.gaps),
-            timeline=_timeline(shown, self.findings, x),
+            timeline=("When each vehicle is shown", x, _timeline(shown, self.findings)),
             interval_plots=self._interval_plots(x),
             speed_plot=charts.histogram(speeds, _SPEED_STEP, title, "km/h") if speeds else None,
             traffic=self.counts
             and traffic_part(self.counts, self.records, self.poster, self.borders, self.ground),
             paths=self._paths(),
-            table=table_json([Part("", page, start, "", rows)]),
+            table=table_json([Part("", page, start, rows)]),
         )
 
     @property
@@ -207,7 +207,7 @@ class VideoPage:
             (named(len(driven), "vehicle"), str(len(driven))),
             *((named(n, name), str(n)) for name, n in classes.most_common(4)),
             *((_STOOD[motion], str(n)) for motion, n in stood.items() if motion in _STOOD),
-            ("most at once", str(self._most)),
+            ("most at once", str(self._max_at_once)),
             ("mean seconds shown", f"{shown:.1f}"),
             *((name, str(count)) for name, count in self._totals.items()),
         ]
@@ -243,8 +243,8 @@ class VideoPage:
         return with_marks(self.poster, path_marks(self.records, (width, height)))
 
 
-def _timeline(shown: Sequence[VehicleRecord], findings: Sequence[Finding], x: Axis) -> Timeline:
-    """Return when each vehicle is shown; vehicles that are not simultaneous share rows.
+def _timeline(shown: Sequence[VehicleRecord], findings: Sequence[Finding]) -> list[TimelineBar]:
+    """Return bars of when each vehicle is shown; vehicles that are not simultaneous share rows.
 
     The first row has the times at which the results are doubtful, if any.
     """
@@ -252,7 +252,7 @@ def _timeline(shown: Sequence[VehicleRecord], findings: Sequence[Finding], x: Ax
     first, rows = bool(bars), charts.pack_rows((record.first, record.last) for record in shown)
     for record, row in zip(shown, rows, strict=True):
         bars += _spans(record, first + row)
-    return Timeline("When each vehicle is shown", x, bars)
+    return bars
 
 
 def _spans(record: VehicleRecord, row: int) -> list[TimelineBar]:

@@ -43,7 +43,7 @@ def test_a_run_writes_a_page_that_shows_the_video_of_the_run(
     (video,) = made.all("video")
     assert video["src"] == "../out.mp4"
     facts = totals.summaries[tmp_path / "page"]
-    assert (facts["frames"], facts["vehicles"], facts["most"]) == (COUNT, 1, 1)
+    assert (facts["frames"], facts["vehicles"], facts["max_at_once"]) == (COUNT, 1, 1)
     assert facts["seconds"] == pytest.approx(COUNT / 25)
     (table,) = re.findall('id="vehicles">(.*?)<', (tmp_path / "page" / "page.html").read_text())
     (thumbnail,) = json.loads(table)["picture"]
