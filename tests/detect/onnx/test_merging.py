@@ -1,10 +1,17 @@
 """One box for each vehicle, of the boxes of one search or of two."""
 
+from dataclasses import dataclass
+from typing import cast
+
 import numpy as np
 import pytest
 
+from vdet.config.schema import NetworkSettings
+from vdet.detect.onnx.detector import NetworkDetector, combined_classes, our_classes
 from vdet.detect.onnx.layouts import RawBoxes
 from vdet.detect.onnx.merging import combine, suppress
+from vdet.detect.onnx.recognition import Recognized
+from vdet.media import Picture
 
 
 def raw(*rows: tuple[list[float], float, list[float]]) -> RawBoxes:
@@ -59,3 +66,35 @@ def test_a_box_in_the_mirror_image() -> None:
     found = raw(([10, 20, 40, 50], 0.8, [1, 0]))
     assert listed(found.mirrored(100)) == [([60, 20, 90, 50], 0.8, 0)]
     assert listed(found.mirrored(100).mirrored(100)) == listed(found)
+
+
+@dataclass(frozen=True)
+class FixedSearch:
+    """A network of two classes that finds the same box in all pictures."""
+
+    found: RawBoxes
+
+    def find(self, *_: object) -> RawBoxes:
+        return self.found
+
+
+def found_in_image(first: list[float], second: list[float], *classes: str) -> dict[str, float]:
+    """Return classes and scores of a vehicle; both searches give scores of car and truck for it."""
+    settings = NetworkSettings(classes=classes)
+    numbers = np.array([*our_classes(("car", "truck"), combined_classes(settings)), -1], np.int32)
+    network, larger = (
+        cast("Recognized", FixedSearch(raw(([40, 20, 60, 40], 0.8, likely))))
+        for likely in (first, second)
+    )
+    detector = NetworkDetector(network, larger, numbers, settings)
+    detections = detector.detect(detector.search(Picture(np.zeros((60, 100, 3), np.uint8)), None))
+    names = [str(name) for name in detections.class_names]
+    return dict(zip(names, detections.scores.round(4).tolist(), strict=True))
+
+
+def test_a_vehicle_that_two_searches_name_differently_is_found_by_both() -> None:
+    """With fewer classes, an image has the same vehicles of these classes, with the same scores."""
+    every = found_in_image([0.9, 0.1], [0.3, 0.7], "car", "truck")
+    assert every == {"car": pytest.approx(6.6 / 7.6, abs=1e-4)}  # odds: 1.65 √(4 · 4)
+    assert found_in_image([0.9, 0.1], [0.3, 0.7], "car") == every
+    assert found_in_image([0.9, 0.1], [0.3, 0.7], "truck") == {}

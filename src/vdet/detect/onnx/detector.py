@@ -14,7 +14,6 @@ from vdet.detect.classes import our_name
 from vdet.detect.factory import DetectorKind
 from vdet.detect.onnx.layouts import RawBoxes
 from vdet.detect.onnx.merging import combine, suppress
-from vdet.detect.onnx.preparation import InputForm
 from vdet.detect.onnx.recognition import Recognized, read_header, recognize
 from vdet.detect.onnx.session import Session
 from vdet.draw.boxes import GREEN, draw_box
@@ -24,8 +23,10 @@ from vdet.media import Picture
 _LARGER = 2.0
 """Pixels of the larger input for a single image, as a multiple of those for a frame of a video."""
 
-Candidates = tuple[list[RawBoxes], InputForm, float]
-"""The boxes of each search before suppression, the form of the first input, the minimum score."""
+Candidates = tuple[list[RawBoxes], float]
+"""The boxes of each search before suppression, and the minimum score."""
+
+_USUAL = NetworkSettings().classes
 
 SHIPPED = Path(__file__).parents[2] / "models" / "net.onnx"
 
@@ -42,9 +43,9 @@ class NetworkModel:
     def __init__(self, path: Path, settings: NetworkSettings) -> None:
         self._settings = settings
         self._recognized = recognize(Session(path), settings.class_names or ())
-        names, wanted = self._recognized.names, settings.classes
-        self._numbers = np.array([*our_classes(names, wanted), -1], np.int32)
-        if (self._numbers < 0).all():
+        names = self._recognized.names
+        self._numbers = np.array([*our_classes(names, combined_classes(settings)), -1], np.int32)
+        if not np.isin(np.arange(len(settings.classes)), self._numbers).any():
             raise ModelError(f"{path}: knows none of detector.classes, only {', '.join(names)}")
 
     def for_video(self, width: int, height: int, images: Sequence[Image]) -> "NetworkDetector":  # noqa: ARG002
@@ -60,7 +61,7 @@ class NetworkDetector:
 
     Our networks search a single image twice, the second time mirrored and with a larger input, as
     `larger`; for networks of other tools, `larger` is `network`. `numbers` has the index of each
-    class of the network in `detector.classes`, -1 for other classes; its last entry, -1, stands for
+    class of the network in `combined_classes`, -1 for other classes; its last entry, -1, stands for
     unknown classes.
     """
 
@@ -73,57 +74,70 @@ class NetworkDetector:
     @property
     def unknown_classes(self) -> tuple[str, ...]:
         """Classes in the settings that the network does not know, except the default ones."""
-        known = [self.settings.classes[number] for number in self.numbers if number >= 0]
-        known += NetworkSettings().classes
-        return tuple(name for name in self.settings.classes if name not in known)
+        return tuple(
+            name
+            for number, name in enumerate(self.settings.classes)
+            if number not in self.numbers and name not in _USUAL
+        )
 
     def search(self, picture: Picture, index: int | None) -> Candidates:
-        """Return the vehicles, in pixels of the frame."""
-        searches = [self._find(self.network, picture)]
-        minimum = self.settings.min_score
-        if index is None:
-            minimum = max(minimum, self.settings.min_score_still)
-            if self.larger is not self.network:
-                mirrored = Picture(np.ascontiguousarray(picture.image[:, ::-1]))
-                searches.append(self._find(self.larger, mirrored).mirrored(picture.width))
-        return searches, self.network.form, minimum
+        """Return the vehicles, in pixels of the frame.
 
-    def _find(self, network: Recognized, picture: Picture) -> RawBoxes:
-        """Return the boxes of the classes in the settings before suppression."""
+        Two searches may name a vehicle differently, so they include the classes that are only
+        removed when both are combined.
+        """
+        settings, is_still = self.settings, index is None
+        minimum = max(settings.min_score, settings.min_score_still if is_still else 0)
+        if not is_still or self.larger is self.network:
+            return [self._find(self.network, picture, settings.classes)], minimum
+        classes = combined_classes(settings)
+        mirrored = Picture(np.ascontiguousarray(picture.image[:, ::-1]))
+        second = self._find(self.larger, mirrored, classes).mirrored(picture.width)
+        return [self._find(self.network, picture, classes), second], minimum
+
+    def _find(self, network: Recognized, picture: Picture, names: Sequence[str]) -> RawBoxes:
+        """Return the boxes of the named classes, the first of `combined_classes`, unsuppressed."""
         raw = network.find(picture, self.settings.min_score)
         boxes = clipped(raw.boxes.astype(np.float64), (picture.width, picture.height))
         is_known = (raw.classes >= 0) & (raw.classes < len(self.numbers))
         numbers = self.numbers[np.where(is_known, raw.classes, -1)]
-        keep = (numbers >= 0) & (boxes[:, 2:] - boxes[:, :2] >= 1).all(axis=1)  # not with a NaN
-        wanted = self.numbers[:-1, np.newaxis] == np.arange(len(self.settings.classes))
+        keep = (numbers >= 0) & (numbers < len(names))
+        keep &= (boxes[:, 2:] - boxes[:, :2] >= 1).all(axis=1)  # not with a NaN
+        wanted = self.numbers[:-1, np.newaxis] == np.arange(len(names))
         likely = None if raw.class_scores is None else raw.class_scores[keep] @ wanted
         return RawBoxes(boxes[keep].astype(np.float32), raw.scores[keep], numbers[keep], likely)
 
     def detect(self, candidates: Candidates) -> Boxes:
         """Return one box for each vehicle."""
-        searches, form, minimum = candidates
+        searches, minimum = candidates
         overlap = self.settings.nms_iou
         found, *others = (suppress(raw, overlap) for raw in searches)
         for other in others:
             found = combine(found, other, overlap)
-        found = found.rows(found.scores >= minimum)
+        names = self.settings.classes
+        found = found.rows((found.scores >= minimum) & (found.classes < len(names)))
+        likely = found.class_scores
         return Boxes(
             found.boxes,
             found.scores,
             classes=found.classes,
-            names=self.settings.classes,
-            data={} if found.class_scores is None else {"class_scores": found.class_scores},
-            trace=(searches, form),
+            names=names,
+            data={} if likely is None else {"class_scores": likely[:, : len(names)]},
+            trace=searches,
         )
 
     def stage_pictures(self, image: Image, detections: Boxes) -> dict[str, Image]:
         """Return images of the network's input, and of the boxes before suppression."""
         boxes = image.copy()
-        searches, form = detections.trace
-        for raw in searches:
+        for raw in detections.trace:
             for box, score in zip(raw.boxes.round().astype(int).tolist(), raw.scores, strict=True):
                 draw_box(boxes, Box(*box), GREEN, f"{score:.2f}")
-        return {"input": form.scaled(Picture(image))[0], "candidates": boxes}
+        return {"input": self.network.form.scaled(Picture(image))[0], "candidates": boxes}
+
+
+def combined_classes(settings: NetworkSettings) -> tuple[str, ...]:
+    """Return the classes in the settings, then the other usual ones."""
+    return tuple(dict.fromkeys((*settings.classes, *_USUAL)))
 
 
 def our_classes(names: Sequence[str], wanted: Sequence[str]) -> list[int]:
