@@ -33,7 +33,10 @@ _BUILT_IN: dict[str, dict[str, str]] = {
         "train-net": "vdet.cli.train:train_net",
     },
     DETECTORS: {"svm": "vdet.detect.svm.detector:SVM", "net": "vdet.detect.onnx.detector:NET"},
-    TRACKERS: {"motion": "vdet.track.factory:MOTION", "rules": "vdet.track.factory:RULES"},
+    TRACKERS: {
+        "motion": "vdet.track.motion.tracker:MOTION",
+        "rules": "vdet.track.rules.tracker:RULES",
+    },
     SINKS: {
         name: f"vdet.run.sinks.{module}:{name.upper()}"
         for module, names in {

@@ -8,9 +8,7 @@ from typing import Any
 import numpy as np
 
 from vdet.boxes import Box, Boxes
-from vdet.config.schema import MotionTrackerSettings, Settings, TrackerSettings
-from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
-from vdet.config.tracker import RulesTrackerSettings
+from vdet.config.schema import Settings, TrackerSettings
 from vdet.media import Picture
 from vdet.plugins import TRACKERS, load_plugin
 from vdet.track.track import State, TimedTracker, Track, VideoTracker
@@ -89,19 +87,3 @@ def _moved(track: Track, end: Track, fraction: float) -> Track:
     x, y, *sides = (first + (last - first) * fraction).tolist()
     state: State = "predicted" if track.state == "predicted" else "interpolated"
     return replace(track, box=Box(*sides), whole_foot=(x, y), state=state)
-
-
-def _make_motion(settings: MotionTrackerSettings, width: int, height: int) -> VideoTracker:
-    from vdet.track.motion.tracker import MotionTracker
-
-    return MotionTracker(settings, width, height)
-
-
-def _make_rules(settings: RulesTrackerSettings, _width: int, height: int) -> VideoTracker:
-    from vdet.track.rules.tracker import RulesTracker
-
-    return RulesTracker(scale_lengths(settings, height / REFERENCE_HEIGHT))
-
-
-MOTION = TrackerKind(MotionTrackerSettings, _make_motion)
-RULES = TrackerKind(RulesTrackerSettings, _make_rules)

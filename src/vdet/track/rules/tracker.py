@@ -36,8 +36,10 @@ from dataclasses import replace
 from itertools import combinations, count
 
 from vdet.boxes import Boxes, Image
+from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
 from vdet.config.tracker import RulesTrackerSettings
 from vdet.media import Picture
+from vdet.track.factory import TrackerKind
 from vdet.track.rules.car import Car, Region, combine
 from vdet.track.track import State, Track
 
@@ -225,3 +227,10 @@ def _any_overlap(regions: Iterable[Region], pixels: int) -> bool:
     """Return whether two regions overlap by more than `pixels`, across and down (rule 4)."""
     common = (one.box.intersection(other.box) for one, other in combinations(regions, 2))
     return any(box.width > pixels and box.height > pixels for box in common)
+
+
+def _make(settings: RulesTrackerSettings, _width: int, height: int) -> RulesTracker:
+    return RulesTracker(scale_lengths(settings, height / REFERENCE_HEIGHT))
+
+
+RULES = TrackerKind(RulesTrackerSettings, _make)
