@@ -356,7 +356,7 @@ def test_follow_may_be_left_while_a_frame_is_read(
     clip_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     reads, goes_on, closed = threading.Event(), threading.Event(), threading.Event()
-    deliver, close = VideoReader.__iter__, VideoReader.close
+    deliver, leave = VideoReader.__iter__, VideoReader.__exit__
 
     def slow(self: VideoReader) -> Iterator[vdet.Frame]:
         for number, frame in enumerate(deliver(self)):
@@ -365,12 +365,12 @@ def test_follow_may_be_left_while_a_frame_is_read(
                 reads.set()
                 goes_on.wait(10)
 
-    def noted(self: VideoReader) -> None:
-        close(self)
+    def noted(self: VideoReader, *raised: object) -> None:
+        leave(self, *raised)
         closed.set()
 
     monkeypatch.setattr(VideoReader, "__iter__", slow)
-    monkeypatch.setattr(VideoReader, "close", noted)
+    monkeypatch.setattr(VideoReader, "__exit__", noted)
     monkeypatch.setattr("vdet.run.threads.JOIN_TIMEOUT", 0.1)
     at_once = vdet.load_settings(assignments=["detector.stride=1", "tracker.look_ahead=0"])
     results = vdet.follow(clip_path, settings=at_once)

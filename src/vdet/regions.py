@@ -39,20 +39,19 @@ class Regions:
     def __init__(self, settings: Sequence[RegionSettings], width: int, height: int) -> None:
         self.included: dict[str, list[Point]] = {}
         self.excluded: dict[str, list[Point]] = {}
-        shape = height, width
-        inside, outside = np.zeros(shape, np.uint8), np.zeros(shape, np.uint8)
+        polygons = {"include": self.included, "exclude": self.excluded}
+        layers = {kind: np.zeros((height, width), np.uint8) for kind in polygons}
         for setting in settings:
-            is_included = setting.kind == "include"
-            layer = inside if is_included else outside
+            layer = layers[setting.kind]
             if setting.mask:
                 layer |= _read_mask(setting.mask, width, height)
             else:
                 corners = [(x * width, y * height) for x, y in setting.points or ()]
-                (self.included if is_included else self.excluded)[setting.name] = corners
+                polygons[setting.kind][setting.name] = corners
                 # With the pixels of its sides.
                 cv2.fillPoly(layer, [np.floor(corners).astype(np.int32)], 1)
         shows_all = not any(setting.kind == "include" for setting in settings)
-        self.pixels: BoolArray = (shows_all | (inside > 0)) & (outside == 0)
+        self.pixels: BoolArray = (shows_all | (layers["include"] > 0)) & (layers["exclude"] == 0)
 
     def contains(self, point: Point) -> bool:
         """Return whether a vehicle whose foot is at a point, x and y in pixels, is shown.

@@ -124,10 +124,6 @@ class VideoReader:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Close the file; no more frames can be read."""
         self._frames.close()
         self._decoder.container.close()
 
