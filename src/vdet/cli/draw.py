@@ -1,30 +1,16 @@
 """`vdet draw`: a page for drawing lines over the paths of vehicles."""
 
-import math
-from collections.abc import Iterable, Iterator
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from vdet.cli import options
 from vdet.cli.command import command
 from vdet.cli.messages import print_lines, progress_steps
-from vdet.errors import ConfigError, TruthError, VideoError, counted
+from vdet.errors import ConfigError, counted
 from vdet.files import OutputFiles, output_errors
-from vdet.progress import Steps
 
-if TYPE_CHECKING:
-    from vdet.boxes import Image
-    from vdet.media.frame import Frame
-    from vdet.run.video import Run
-    from vdet.track.track import FrameTracks
-
-_MAX_SAMPLES = 20
-"""Maximum number of frames for the image of the scene; at least half of them are used."""
-_STILL_FRAMES = 5000
-"""Number of frames to read for it if the tracks are known."""
 _OUTPUTS, _SETTINGS = (".html", ".jpg", ".png", ".svg"), (".yaml", ".yml")
 
 
@@ -75,6 +61,7 @@ def draw(
     vdet draw in.mp4 -c gate.yaml -o place.jpg
     """
     from vdet.pages.drawing import Drawing
+    from vdet.run.scene import read_scene
     from vdet.run.video import Run
 
     outputs = [path for path in (output, propose) if path]
@@ -90,7 +77,7 @@ def draw(
     with progress_steps(" frames") as steps:
         # Without regions, because the page shows their effect.
         run = Run(clip, (), settings.model_copy(update={"regions": ()}), start, end)
-        image, frames = _watched(run, tracks, steps)
+        image, frames = read_scene(run, tracks, steps)
     settings.camera.check_frames(image.shape[1], image.shape[0])
     drawing = Drawing(image, frames, settings, options.own_values(), facing)
     if propose and not drawing.proposals:
@@ -105,69 +92,3 @@ def draw(
         *(f"{path}: {counted(len(drawing.paths), 'vehicle')}" for path in outputs),
         *(f"{line.name}: {counted(line.vehicles, 'vehicle')}" for line in lines),
     )
-
-
-def _watched(run: "Run", tracks: Path | None, steps: Steps) -> "tuple[Image, list[FrameTracks]]":
-    """Return the scene without vehicles, BGR uint8, and the tracks of a video.
-
-    Raises
-    ------
-    VdetError
-        The clip or the file of tracks cannot be used.
-    """
-    import numpy as np
-
-    from vdet.detect.factory import load_detector
-    from vdet.media.images import is_picture_name, read_image
-    from vdet.media.reader import VideoReader
-    from vdet.run.loop import Parts
-    from vdet.run.video import open_video
-
-    clip, settings = run.source, run.settings
-    if is_picture_name(clip) and "%" not in clip.name:
-        return read_image(clip), _saved(tracks, None, run) if tracks else []
-    found: list[FrameTracks] = []
-
-    def frames() -> "Iterator[Frame]":
-        if tracks:
-            with VideoReader(
-                clip, start=run.start, end=run.end, frames=_STILL_FRAMES, settings=settings.input
-            ) as reader:
-                found.extend(_saved(tracks, float(reader.info.rate), run))
-                steps("reading the scene", None)
-                yield from reader
-            return
-        with open_video(run, Parts(load_detector(settings.detector))) as video:
-            advance = steps("", video.reader.expected)
-            for result in video.results:
-                found.append(result.frame_tracks)
-                yield result.frame
-                advance(1)
-
-    images = _spread(frames())
-    if not images:
-        raise VideoError(f"{clip}: no frames in this part; check --start and --end")
-    return np.median(images, axis=0).astype(np.uint8), found
-
-
-def _spread(frames: "Iterable[Frame]") -> "list[Image]":
-    """Return some of the images, evenly spaced."""
-    images, step = list["Image"](), 1
-    for number, frame in enumerate(frames):
-        if number % step == 0:
-            images.append(frame.image)
-        if len(images) > _MAX_SAMPLES:
-            images, step = images[::2], 2 * step
-    return images
-
-
-def _saved(tracks: Path, rate: float | None, run: "Run") -> "list[FrameTracks]":
-    """Return the frames of a file of tracks. Raises `TruthError`."""
-    from vdet.labels.reading import read_tracks
-
-    saved = read_tracks(tracks, rate)
-    if not saved.has_times:
-        raise TruthError(f"{tracks}: has no times; CLIP must be the video")
-    start = -math.inf if run.start is None else run.start
-    end = math.inf if run.end is None else run.end
-    return [frame for frame in saved if start <= frame.time < end]

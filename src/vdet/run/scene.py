@@ -1,0 +1,89 @@
+"""The scene that a camera shows, and the tracks of its vehicles, for `vdet draw`."""
+
+import math
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+import numpy as np
+
+from vdet.boxes import Image
+from vdet.detect.factory import load_detector
+from vdet.errors import TruthError, VideoError
+from vdet.labels.reading import read_tracks
+from vdet.media import Frame
+from vdet.media.images import is_picture_name, read_image
+from vdet.media.reader import VideoReader
+from vdet.progress import Steps
+from vdet.run.loop import Parts
+from vdet.run.video import Run, open_video
+from vdet.track.track import FrameTracks
+
+_MAX_SAMPLES = 20
+"""Maximum number of frames for the image of the scene; at least half of them are used."""
+_STILL_FRAMES = 5000
+"""Number of frames to read for it if the tracks are known."""
+
+
+def read_scene(run: Run, tracks: Path | None, steps: Steps) -> tuple[Image, list[FrameTracks]]:
+    """Return the scene without vehicles, BGR uint8 `(H, W, 3)`, and the tracks of its vehicles.
+
+    The image is the median of frames of the video, or the source if that is an image.
+
+    Parameters
+    ----------
+    tracks
+        A file of tracks; None: detect the vehicles in the video.
+
+    Raises
+    ------
+    VdetError
+        The source or the file of tracks cannot be used.
+    """
+    if is_picture_name(run.source) and "%" not in run.source.name:
+        return read_image(run.source), _saved(tracks, None, run) if tracks else []
+    found: list[FrameTracks] = []
+    images = _spread(_known(run, tracks, found, steps) if tracks else _detected(run, found, steps))
+    if not images:
+        raise VideoError(f"{run.source}: no frames in this part; check --start and --end")
+    return np.median(images, axis=0).astype(np.uint8), found
+
+
+def _known(run: Run, tracks: Path, found: list[FrameTracks], steps: Steps) -> Iterator[Frame]:
+    """Yield the first frames, and add all saved tracks to `found`."""
+    with VideoReader(
+        run.source, start=run.start, end=run.end, frames=_STILL_FRAMES, settings=run.settings.input
+    ) as reader:
+        found += _saved(tracks, float(reader.info.rate), run)
+        steps("reading the scene", None)
+        yield from reader
+
+
+def _detected(run: Run, found: list[FrameTracks], steps: Steps) -> Iterator[Frame]:
+    """Yield all frames, and add their tracks to `found`."""
+    with open_video(run, Parts(load_detector(run.settings.detector))) as video:
+        advance = steps("", video.reader.expected)
+        for result in video.results:
+            found.append(result.frame_tracks)
+            yield result.frame
+            advance(1)
+
+
+def _spread(frames: Iterable[Frame]) -> list[Image]:
+    """Return some of the images, evenly spaced."""
+    images, step = list[Image](), 1
+    for number, frame in enumerate(frames):
+        if number % step == 0:
+            images.append(frame.image)
+        if len(images) > _MAX_SAMPLES:
+            images, step = images[::2], 2 * step
+    return images
+
+
+def _saved(tracks: Path, rate: float | None, run: Run) -> list[FrameTracks]:
+    """Return the frames of a file of tracks. Raises `TruthError`."""
+    saved = read_tracks(tracks, rate)
+    if not saved.has_times:
+        raise TruthError(f"{tracks}: has no times; CLIP must be the video")
+    start = -math.inf if run.start is None else run.start
+    end = math.inf if run.end is None else run.end
+    return [frame for frame in saved if start <= frame.time < end]
