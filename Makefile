@@ -23,7 +23,7 @@ PATCHES = $(DATA)/vehicles.zip $(DATA)/non-vehicles.zip
 help:  ## print this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-8s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 
-demo: $(READY)  ## find vehicles on a drawn road, train on drawn patches, compare with the truth
+demo: $(READY)  ## find vehicles on synthetic roads, train a linear model, compare both with the ground truth
 	$(BIN)/vdet demo demo --overwrite
 
 test: lint types tests  ## everything that CI checks
@@ -53,14 +53,14 @@ dist: $(TOOLS)  ## build the wheel, install it into an empty environment, and tr
 bench: $(TOOLS)  ## measure speed and memory, as ratios of one run
 	$(BIN)/python -m benchmarks
 
-soak: $(TOOLS)  ## check that nothing grows in a run of 20,000 frames (some minutes, 1 GB in TMPDIR)
+soak: $(TOOLS)  ## check that nothing grows in a run of 20,000 frames (minutes, 1 GB in TMPDIR)
 	$(BIN)/python -m benchmarks.soak
 
 folds: $(TOOLS)  ## check every threshold on frames that the model has not seen (after make model)
 	$(BIN)/python -m benchmarks.folds $(DATA)/project_video.mp4 $(TRUTH) \
 		$(PATCHES) build/model/mined.zip
 
-data:  ## fetch the patch set (125 MB) into data/; data/README.md says what it is
+data:  ## download the patch set (125 MB) into data/; data/README.md says what it is
 	cd data && for name in vehicles non-vehicles; do \
 		curl --fail --location --continue-at - --output $$name.zip \
 			https://s3.amazonaws.com/udacity-sdc/Vehicle_Tracking/$$name.zip || exit 1; \
@@ -75,7 +75,7 @@ model: $(TOOLS)  ## train the shipped models again: patches and video in DATA, t
 	$(BIN)/vdet train $(PATCHES) -c seed -o build/model/seed.npz --overwrite
 	cp build/model/svm.npz build/model/seed.npz src/vdet/models/
 
-net: $(TOOLS)  ## train the shipped network on (hours): sets of pictures in ROADS, video in DATA
+net: $(TOOLS)  ## continue training the shipped network (hours): sets of images in ROADS, video in DATA
 	mkdir -p build/net
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check torch --constraint constraints.txt
 	$(BIN)/vdet train-net $(sort $(wildcard $(ROADS)/*/)) -o build/net/net.onnx --overwrite \
@@ -90,7 +90,7 @@ unseen: $(TOOLS)  ## measure on cameras left out of FOLDS trainings of STEPS ste
 ship: $(TOOLS)  ## make WEIGHTS, calibrated by the results of make unseen, the shipped network
 	$(BIN)/python -m benchmarks.ship $(WEIGHTS) $(addprefix --results ,$(wildcard $(UNSEEN)/results.json))
 
-picture: $(TOOLS)  ## draw the pictures of the README
+picture: $(TOOLS)  ## draw the images of the README
 	$(BIN)/python -m docs.pictures
 
 commands: $(READY)  ## write docs/commands.md, the help of every command
@@ -99,7 +99,7 @@ commands: $(READY)  ## write docs/commands.md, the help of every command
 # The versions in constraints.txt are the ones that the tests were last run with.
 $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
-		|| { echo "vdet needs Python 3.11 or later; give it as PYTHON=…"; exit 1; }
+		|| { echo "vdet needs Python 3.11 or later; run make PYTHON=…"; exit 1; }
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check \
 		--editable . --constraint constraints.txt

@@ -123,7 +123,7 @@ def run_demo(
         scores.append([name, *(f"{ratio:.2f}" for ratio in ratios), str(found.id_switches)])
     compared = table(("", "precision", "recall", "F1", "IDF1", "id switches"), scores)
     flows = _flows(folder, pole, counting)
-    return [*compared, "", *table(("from", "to", "vehicles", "in truth"), flows)]
+    return [*compared, "", *table(("from", "to", "vehicles", "true"), flows)]
 
 
 def _flows(folder: Path, scene: Scene, settings: Settings) -> list[list[str]]:

@@ -53,7 +53,7 @@ def check_detector(model: DetectorModel, images: Sequence[Image]) -> None:
         assert np.array_equal(inside, boxes.sides), "a box lies outside the frame"
     for name, picture in stage_pictures_of(still)(shown[0], in_still).items():
         is_image = picture.dtype == np.uint8 and picture.ndim == 3
-        assert is_image, f"stage picture {name} is not uint8 of shape (H, W, 3)"
+        assert is_image, f"stage image {name} is not uint8 of shape (H, W, 3)"
     assert np.array_equal(shown, images), "the detector changed a frame"
 
 

@@ -52,8 +52,8 @@ def test_a_part_of_the_video(run: Run, clip_path: Path, model_path: Path, tmp_pa
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("--tracks", "t.csv"), "pass one OUT, or --no-video"),
-        (("out.mp4", "--no-video"), "pass one OUT, or --no-video"),
+        (("--tracks", "t.csv"), "pass either OUT or --no-video"),
+        (("out.mp4", "--no-video"), "pass either OUT or --no-video"),
         (("--no-video",), "no output; add one"),
         (("out.mp4", "--stages", "x"), "--stages and --at must be used together"),
         (("out.mp4", "--start", "5", "--end", "5"), "--end must be later"),

@@ -46,7 +46,7 @@ def data_of(page: str) -> dict[str, Any]:
 def test_a_page_has_the_vehicles_that_the_run_finds(run: Run, red: tuple[str, ...]) -> None:
     write_drive(Path("in.mp4"), 50)
     result = run("draw", "in.mp4", "-o", "gate.html", *red, "-c", "lines.yaml")
-    assert (result.code, result.out) == (0, "gate.html: 1 vehicle\n"), result.err
+    assert (result.code, result.out) == (0, "gate.html: written, 1 vehicle\n"), result.err
     data = data_of("gate.html")
     assert (data["name"], data["size"]) == ("lines.yaml", [320, 240])
     assert "  crf: 30" in data["rest"]["other"]
@@ -60,7 +60,7 @@ def test_the_picture_shows_no_vehicle_that_moves(run: Run) -> None:
     Path("far.yaml").write_text(far)
     given = ("--tracks-from", "none.csv", "-c", "far.yaml")
     result = run("draw", "in.mp4", "-o", "place.png", *given)
-    assert (result.code, result.out) == (0, "place.png: 0 vehicles\n"), result.err
+    assert (result.code, result.out) == (0, "place.png: written, 0 vehicles\n"), result.err
     image = cv2.imread("place.png")
     assert image is not None
     blue, green, red = image[60:].astype(int).transpose(2, 0, 1)
@@ -70,7 +70,9 @@ def test_the_picture_shows_no_vehicle_that_moves(run: Run) -> None:
 def test_proposed_lines_work_at_once_beside_what_a_file_has(run: Run) -> None:
     tracks = ("--tracks-from", "tracks.csv")
     result = run("draw", "frame.png", *tracks, "-c", "lines.yaml", "--propose", "new.yaml")
-    assert (result.code, result.out) == (0, "new.yaml: 6 vehicles\nright: 6 vehicles\n"), result.err
+    assert (result.code, result.out) == (0, "new.yaml: written, 6 vehicles\nright: 6 vehicles\n"), (
+        result.err
+    )
     settings = load_settings([Path("new.yaml")])
     assert [line.name for line in settings.traffic.lines] == ["gate", "right"]
     assert settings.output.crf == 30
@@ -89,7 +91,8 @@ def test_proposed_lines_work_at_once_beside_what_a_file_has(run: Run) -> None:
 def test_a_part_of_saved_tracks_is_used(run: Run, part: tuple[str, str], vehicles: int) -> None:
     tracks = ("--tracks-from", "tracks.csv")
     result = run("draw", "frame.png", *tracks, *part, "-o", "gate.html")
-    assert (result.code, result.out.splitlines()[:1]) == (0, [f"gate.html: {vehicles} vehicles"])
+    said = f"gate.html: written, {vehicles} vehicles"
+    assert (result.code, result.out.splitlines()[:1]) == (0, [said])
 
 
 def test_the_picture_for_a_report_has_lines_flows_and_numbers(run: Run) -> None:

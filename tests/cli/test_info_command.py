@@ -21,7 +21,7 @@ MODELS = Path(__file__).parents[2] / "src" / "vdet" / "models"
 @pytest.mark.parametrize(
     ("name", "lines"),
     [
-        ("svm.npz", ("kind: linear model of vdet", "learnt boxes: True")),
+        ("svm.npz", ("kind: linear model of vdet", "learnt boxes: yes")),
         ("net.onnx", ("form: vdet", "input for 1280x720: 640x352", "classes: car; truck; bus")),
     ],
 )
@@ -49,7 +49,7 @@ def test_another_network_says_what_it_was_taken_for(run: Run, tmp_path: Path) ->
 def test_a_video_is_described(run: Run, tmp_path: Path) -> None:
     path = write_clip(tmp_path / "in.mov", size=(160, 96), rotation=90, sounds=["aac", "pcm_mulaw"])
     result = run("info", path, "--json", tmp_path / "facts.json", code=0)
-    for line in ("rotation: 90", "frames: 12", "sounds: aac; pcm_mulaw", "horizon: unknown"):
+    for line in ("rotation: 90", "frames: 12", "audio: aac; pcm_mulaw", "horizon: unknown"):
         assert line in result.out
     values = json.loads((tmp_path / "facts.json").read_text())
     assert (values["width"], values["height"], values["declared_frames"]) == (160, 96, 12)
@@ -65,7 +65,7 @@ def test_numbered_pictures_are_a_video_and_one_picture_is_not(run: Run, tmp_path
     for path, words in (
         (tmp_path, "frames: 3"),
         (tmp_path / "img_%d.png", "frames: 3"),
-        (tmp_path / "img_1.png", "kind: picture\nwidth: 160\nheight: 96"),
+        (tmp_path / "img_1.png", "kind: image\nwidth: 160\nheight: 96"),
     ):
         result = run("info", path)
         assert (result.code, words in result.out) == (0, True), result.out + result.err
@@ -116,11 +116,11 @@ def test_what_does_not_work_is_named_with_what_to_do(
     monkeypatch.setattr("vdet.detect.factory.load_detector", fail)
     result = run("info")
     assert result.code == 1
-    assert "dask (extra dask): absent; pip install dask\n" in result.out
+    assert "dask (extra dask): not installed; pip install dask\n" in result.out
     assert "numpy: broken; pip install numpy\n" in result.out
     assert "codec h264: broken; " in result.out
     assert "settings default: broken; net.onnx: is damaged; install vdet again\n" in result.out
-    assert result.out.endswith("works: False\n")
+    assert result.out.endswith("works: no\n")
 
 
 def test_another_opencv_over_ours_is_named_with_the_cure(

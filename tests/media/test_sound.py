@@ -70,7 +70,7 @@ def test_damaged_sound_does_not_affect_the_picture(tmp_path: Path, warnings: War
     target = copy(source, tmp_path / "out.mp4")
     (warning,) = warnings()
     assert warning.startswith(f"{source}: ")
-    assert "sound packets dropped: damaged" in warning
+    assert "audio packets dropped: damaged" in warning
     with VideoReader(target) as reader:
         assert len(list(reader)) == 50
     assert sound_of(target)
@@ -86,4 +86,4 @@ def test_the_sound_of_a_pipe_is_left_out_with_a_warning(tmp_path: Path, warnings
     with av.open(str(target)) as container:
         assert container.streams.video[0].frames == 12
         assert not container.streams.audio
-    assert warnings() == [f"{pipe}: its sound is dropped: a pipe can be read only once"]
+    assert warnings() == [f"{pipe}: its audio is dropped: a pipe can be read only once"]

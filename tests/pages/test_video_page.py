@@ -82,7 +82,7 @@ class TestVideoPage:
     def test_it_says_what_was_found(self) -> None:
         text = seen(page()).text
         for words in ("Vehicles in a.mp4", "52 frames", "320 × 240 pixels", "2vehicles", "1truck",
-                      "most at once", "crf: 25"):  # fmt: skip
+                      "maximum at once", "crf: 25"):  # fmt: skip
             assert words in text
 
     def test_the_folders_of_the_clip_are_nobodys_business(self) -> None:
@@ -230,14 +230,14 @@ def test_the_facts_have_the_counts_and_a_row_for_each_vehicle() -> None:
     )  # fmt: skip
 
 
-class TestDoubts:
+class TestFindings:
     FINDING = Finding("dark", "it <was> dark", ((0.5, 1.5),), "warning", 0.3)
 
     def test_what_makes_it_doubtful_is_listed_with_its_times(self) -> None:
         made = seen(replace(page(), findings=(self.FINDING,)))
         assert "it <was> dark" in made.text
-        assert "Doubts" in made.text
-        assert "Doubts" not in seen(page()).text
+        assert "Findings" in made.text
+        assert "Findings" not in seen(page()).text
 
     def test_its_times_are_a_row_above_the_vehicles(self) -> None:
         plain, marked = (replace(page(), findings=found) for found in ((), (self.FINDING,)))

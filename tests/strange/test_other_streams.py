@@ -61,7 +61,7 @@ def test_sound_that_the_container_cannot_hold_is_left_out_with_a_warning(
     assert_whole(shown, list(range(12)))
     assert shown.sounds == {}
     (warning,) = shown.warnings
-    assert "clip.avi: its sound (pcm_mulaw) is empty, or cannot go into mp4; left out" in warning
+    assert "clip.avi: its audio (pcm_mulaw) is empty, or cannot go into mp4; left out" in warning
 
 
 def test_frames_that_change_size_are_scaled_to_the_first_with_a_warning(

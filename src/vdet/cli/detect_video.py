@@ -194,7 +194,7 @@ def _in_and_out(
     source, *videos = clips
     is_beside = not (no_video or wanted or videos or source.is_dir() or "%" in source.name)
     if no_video == bool(videos) and not is_beside:
-        raise click.UsageError("pass one OUT, or --no-video; or -d DIR for several videos")
+        raise click.UsageError("pass either OUT or --no-video; for several videos, add -d DIR")
     from vdet.media.writer import may_replace_video
     from vdet.run.sinks.protocol import sink_kind
 
@@ -235,6 +235,7 @@ def _process_one(run: "Run") -> bool:
     from vdet.detect.factory import load_detector
     from vdet.run.loop import Parts
     from vdet.run.result import findings_in
+    from vdet.run.sinks.protocol import STANDARD_OUTPUT
     from vdet.run.video import run_video
 
     parts = Parts(load_detector(run.settings.detector))
@@ -244,7 +245,8 @@ def _process_one(run: "Run") -> bool:
     rate = totals.frames / totals.seconds
     found = f"{counted(totals.frames, 'frame')}, {counted(totals.tracks, 'track')}"
     announce(f"{run.source}: {found}, {totals.seconds:.1f} s, {rate:.1f} frames/s")
-    announce(*(f"{output.path}: written" for output in run.outputs if output.sink == "video"))
+    paths = [output.path for output in run.outputs if output.path != STANDARD_OUTPUT]
+    announce(*(f"{path}: written" for path in paths))
     if totals.clock and run.settings.traffic:
         announce(f"{run.source}: begins {totals.clock}")
     return findings_in(totals.facts).is_doubtful

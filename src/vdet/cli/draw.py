@@ -39,8 +39,8 @@ def draw(
 ) -> None:
     """Write a page for drawing lines and zones over the paths of vehicles.
 
-    CLIP is a video, or with --tracks-from also an image of one frame. The page shows live counts
-    for each line, and saves settings for -c. It is one file and needs no network.
+    CLIP is a video, or an image of one frame, which has paths only with --tracks-from. The page
+    shows live counts for each line, and saves settings for -c. It needs no network.
 
     Parameters
     ----------
@@ -89,6 +89,6 @@ def draw(
                 files.stage(path).write_bytes(drawing.output(path, name))
     lines = drawing.proposals if propose else ()
     print_lines(
-        *(f"{path}: {counted(len(drawing.paths), 'vehicle')}" for path in outputs),
+        *(f"{path}: written, {counted(len(drawing.paths), 'vehicle')}" for path in outputs),
         *(f"{line.name}: {counted(line.vehicles, 'vehicle')}" for line in lines),
     )

@@ -87,7 +87,7 @@ def _packages() -> Iterator[tuple[str, str]]:
         try:
             yield name, version(package)
         except PackageNotFoundError:
-            yield name, f"{'absent' if extra else _BROKEN}; pip install {package}"
+            yield name, f"{'not installed' if extra else _BROKEN}; pip install {package}"
 
 
 def _checked(check: Callable[[], str]) -> str:
@@ -153,6 +153,8 @@ def _settings() -> Facts:
 def _text(value: Any) -> str:
     if isinstance(value, list):
         return "; ".join(map(printable, value)) or "none"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
     if isinstance(value, float):
         return f"{value:.6g}"
     return "unknown" if value is None else str(value)
@@ -197,7 +199,7 @@ def _picture(path: Path) -> Facts:
 
     image = read_image(path)
     height, width = image.shape[:2]
-    return {"kind": "picture", "width": width, "height": height, "horizon": find_horizon([image])}
+    return {"kind": "image", "width": width, "height": height, "horizon": find_horizon([image])}
 
 
 def _video(path: Path) -> Facts:
@@ -226,7 +228,7 @@ def _video(path: Path) -> Facts:
             "rate": float(info.rate),
             "start": float(info.start),
             "seconds": None if info.duration is None else float(info.duration),
-            "sounds": [
+            "audio": [
                 sound.codec_context.name if sound.codec_context else "unknown"
                 for sound in container.streams.audio
             ],

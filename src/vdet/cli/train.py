@@ -138,8 +138,8 @@ def train_net(
 
     Examples
     --------
-    vdet train-net pictures/city pictures/motorway -o mine.onnx
-    vdet train-net pictures/ -o mine.onnx --video drive.mp4 drive-truth.txt
+    vdet train-net images/city images/motorway -o mine.onnx
+    vdet train-net images/ -o mine.onnx --video drive.mp4 drive-truth.txt
     """
     if not data and not clips:
         raise click.UsageError("nothing to learn from; pass DATA or --video")

@@ -178,7 +178,7 @@ _HEADINGS = {
     "f1": "F1", "ap50": "AP50", "mean_iou": "IoU", "false_positives": "false alarms",
     "images": "pictures", "best_f1": "best F1", "best_score": "at score", "misses": "missed",
     "mota": "MOTA", "idf1": "IDF1", "hota": "HOTA", "id_switches": "switches",
-    "false_tracks": "false tracks", "mean_delay": "delay", "right": "named right",
+    "false_tracks": "false tracks", "mean_delay": "delay", "right": "right class",
     "confused": "confused with",
 }  # fmt: skip
 """Headings of columns that differ from the name of the attribute."""

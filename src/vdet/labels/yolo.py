@@ -66,7 +66,7 @@ def _write_pictures(file: BinaryIO, pictures: Sequence[PictureTracks]) -> None:
     for picture in pictures:
         name = f"labels/{picture.path.with_suffix('.txt').as_posix()}"
         if name in texts:
-            what = "YOLO needs pictures with different names; this one occurs with two endings"
+            what = "YOLO needs images with different names; this one occurs with two endings"
             raise OutputError(f"{picture.path.with_suffix('')}: {what}")
         lines = (_line(t.box, t.class_name, picture.size, classes) for t in picture.tracks)
         texts[name] = "".join(lines)

@@ -132,7 +132,7 @@ class VideoReader:
         if isinstance(self._decoder.ticks, range) and self._settings.frame_rate is None:
             yield f"{ASSUMED_RATE:.0f} images per second are assumed; set input.frame_rate"
         if self._decoder.container.streams.audio and not self.info.has_sound:
-            yield "its sound is dropped: a pipe can be read only once"
+            yield "its audio is dropped: a pipe can be read only once"
         streams = len(demux.moving_streams(self._decoder.container))
         if streams > 1:
             yield f"has {streams} video streams; only the first is used"

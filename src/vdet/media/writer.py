@@ -65,7 +65,7 @@ class SoundCopy:
         """Close the source; warn about packets that could not be copied."""
         if self._left_out:
             fault = "damaged, or without a time of their own"
-            _log.warning("%s: %d sound packets dropped: %s", self._path, self._left_out, fault)
+            _log.warning("%s: %d audio packets dropped: %s", self._path, self._left_out, fault)
         self._packets.close()
         self._source.close()
 
@@ -78,7 +78,7 @@ class SoundCopy:
                 streams[stream.index] = target.add_stream_from_template(stream)
             else:
                 name = codec.name if codec else "unknown codec"
-                fault = f"its sound ({name}) is empty, or cannot go into {target.format.name}"
+                fault = f"its audio ({name}) is empty, or cannot go into {target.format.name}"
                 _log.warning("%s: %s; left out", self._path, fault)
         return streams
 

@@ -207,8 +207,8 @@ class VideoPage:
             (named(len(driven), "vehicle"), str(len(driven))),
             *((named(n, name), str(n)) for name, n in classes.most_common(4)),
             *((_STOOD[motion], str(n)) for motion, n in stood.items() if motion in _STOOD),
-            ("most at once", str(self._max_at_once)),
-            ("mean seconds shown", f"{shown:.1f}"),
+            ("maximum at once", str(self._max_at_once)),
+            ("mean seconds in view", f"{shown:.1f}"),
             *((name, str(count)) for name, count in self._totals.items()),
         ]
 

@@ -686,7 +686,7 @@ async function openPage(data) {
       return el("button", { class: "row", "aria-pressed": each === item(), onclick: choose },
         el("b", {}, each.name ?? `ground ${index + 1}`), el("span", {}, counts ?? note));
     }));
-    get("list").replaceChildren(...(rows.length ? rows : [el("p", {}, "Nothing drawn yet.")]));
+    get("list").replaceChildren(...(rows.length ? rows : [el("p", {}, "Nothing drawn yet. Choose Line or Zone to begin.")]));
   }
 
   function showResults() {

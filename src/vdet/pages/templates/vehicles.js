@@ -28,7 +28,7 @@ const columns = [
   { name: "lines", text: i => text("lines", i), key: i => text("lines", i), used: "lines" },
   { name: "lane", text: i => data.lane[i] ?? "–", key: i => data.lane[i], used: "lane" },
   { name: "metres", text: i => number(data.distance[i]), key: i => data.distance[i], used: "distance" },
-  { name: "moves", text: i => text("state", i), key: i => text("state", i), used: "state" },
+  { name: "motion", text: i => text("state", i), key: i => text("state", i), used: "state" },
 ].filter(column => !column.used || known.has(column.used));
 
 const form = document.getElementById("filters");

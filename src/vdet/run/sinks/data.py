@@ -101,7 +101,7 @@ class LabelSink(BaseSink):
         self._pictures.append(PictureTracks(place, size, result.tracks))
 
 
-LABELS = SinkKind(LabelSink, picture_suffixes, "labels of pictures", takes="pictures")
+LABELS = SinkKind(LabelSink, picture_suffixes, "labels of images", takes="pictures")
 
 
 class JsonSink(BaseSink):

@@ -118,7 +118,7 @@ def _crop_name(vehicle: VehicleRecord, time: float) -> str:
 
 
 CROPS = SinkKind(
-    CropSink, what="pictures of vehicles", folder_pattern="vehicle-*-at-*s.*", takes="videos"
+    CropSink, what="images of vehicles", folder_pattern="vehicle-*-at-*s.*", takes="videos"
 )
 
 
