@@ -2,7 +2,6 @@
 
 import zlib
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from vdet.config.schema import Settings
@@ -15,7 +14,7 @@ from vdet.media.images import PICTURE_SUFFIXES, encode_image
 from vdet.media.writer import VIDEO_SUFFIXES, VideoWriter, may_replace_video
 from vdet.polygons import Point
 from vdet.run.result import FrameResult
-from vdet.run.sinks.protocol import BaseSink, SinkContext, SinkKind
+from vdet.run.sinks.protocol import BaseSink, SinkKind
 from vdet.run.threads import write_async
 from vdet.track.track import Track
 from vdet.workers import core_count
@@ -159,10 +158,7 @@ VIDEO = SinkKind(VideoSink, VIDEO_SUFFIXES, "videos", takes="videos", may_replac
 class PictureSink(BaseSink):
     """Writes one image."""
 
-    def __init__(self, path: Path, context: SinkContext) -> None:
-        super().__init__(path, context)
-        self._overlay = Overlay(context.settings, None)
-        self._is_done = False
+    _is_done = False
 
     def write(self, result: FrameResult) -> None:
         """Draw the vehicles, and write the image.
@@ -172,8 +168,8 @@ class PictureSink(BaseSink):
         if self._is_done:
             raise OutputError(f"{self.path}: is for one image; for several, use a folder")
         self._is_done = True
-        data = encode_image(Picture(self._overlay.draw(result)).image, self.path)
-        self.context.files.stage(self.path).write_bytes(data)
+        drawn = Picture(Overlay(self.context.settings, None).draw(result))
+        self.context.files.stage(self.path).write_bytes(encode_image(drawn.image, self.path))
 
 
 PICTURE = SinkKind(PictureSink, sorted(PICTURE_SUFFIXES), "pictures", takes="pictures")

@@ -35,10 +35,7 @@ _THUMBNAIL = 200  # longer side of the picture of a vehicle, pixels
 class StagesSink(BaseSink):
     """Writes stage images of the first searched frame at or after the time `SinkContext.at`."""
 
-    def __init__(self, path: Path, context: SinkContext) -> None:
-        super().__init__(path, context)
-        self._time = context.at + (context.video.start if context.video else 0)
-        self._is_done = False
+    _is_done = False
 
     def finish(self) -> None:
         """Raise `OutputError` if there is no frame at this time."""
@@ -49,7 +46,8 @@ class StagesSink(BaseSink):
 
     def write(self, result: FrameResult) -> None:
         """Write the images if this is the frame."""
-        if self._is_done or not result.searched or result.frame.time < self._time:
+        time = self.context.at + (self.context.video.start if self.context.video else 0)
+        if self._is_done or not result.searched or result.frame.time < time:
             return
         self._is_done = True
         pictures = self.context.stage_pictures(result.frame.image, result.detections)
@@ -249,17 +247,14 @@ def scenes(records: Iterable[VehicleRecord], margin: float) -> list[Scene]:
 class ClipSink(BaseSink):
     """Cuts the clips at the end of the run; with lines or zones, only of counted vehicles."""
 
-    def __init__(self, path: Path, context: SinkContext) -> None:
-        super().__init__(path, context)
-        self._folder = context.files.stage_folder(path, _NAME)
-
     def finish(self) -> None:
         """Write the clips."""
+        folder = self.context.files.stage_folder(self.path, _NAME)
         settings, source = self.context.settings, self.video.path
         copies = not settings.clips.exact and can_copy(source)
         suffix = copied_suffix(source) if copies else ".mp4"
         for scene in scenes(self._chosen(), settings.clips.margin):
-            target = self._folder / f"{self._name(scene)}{suffix}"
+            target = folder / f"{self._name(scene)}{suffix}"
             sides = scene.start, scene.end
             start, end = (Fraction(side).limit_denominator(_PRECISION) for side in sides)
             if copies:
