@@ -1,5 +1,6 @@
 """`vdet info` describes files, cameras and this machine; `vdet config` prints settings."""
 
+import math
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import asdict
@@ -115,11 +116,9 @@ def _shipped(path: Path) -> str:
 
 def _settings() -> Facts:
     """Return lines, zones and the fit of the ground points in the settings of a camera."""
-    import numpy as np
-
     from vdet.lanes.ground import ground_of
     from vdet.traffic.crossings import place
-    from vdet.traffic.speeds import KMH, WINDOW
+    from vdet.traffic.speeds import KMH, precision_at
 
     settings = read_settings()
     size = settings.camera.size or _ANY_SIZE
@@ -138,13 +137,10 @@ def _settings() -> Facts:
         f"({ground.pixel_error:.1f} px, root mean square), over {ground.length:.0f} m"
     )
     for line in lines:
-        x, y = np.mean([line.start, line.end], axis=0)
-        here, beside, above = ground.place(np.array([(x, y), (x + 1, y), (x, y - 1)]))
-        across, along = np.hypot(*(beside - here)), np.hypot(*(above - here))
-        error = 100 * np.hypot(ground.scale_error, 2**0.5 * along / (WINDOW * _SPEED / KMH))
+        across, along, error = precision_at(line, ground, _SPEED / KMH)
         facts[f"at {line.name}"] = (
-            f"a pixel is {across:.3f} × {along:.3f} m, {_SPEED} km/h ± {error:.1f} %"
-            if np.isfinite(along)
+            f"a pixel is {across:.3f} × {along:.3f} m, {_SPEED} km/h ± {100 * error:.1f} %"
+            if math.isfinite(along)
             else "too far from the points of the ground, no speeds"
         )
     return facts

@@ -21,6 +21,7 @@ from vdet.boxes import EDGE, Float64Array
 from vdet.lanes.ground import Ground
 from vdet.track.track import FrameTracks
 from vdet.traffic.counts import Counts
+from vdet.traffic.crossings import PlacedLine
 
 WINDOW = 1.0
 """Seconds of a path that give one velocity."""
@@ -175,6 +176,18 @@ def with_speeds(counts: Counts, meter: SpeedMeter | None) -> Counts:
         speed, deviation, mean = map(_kmh, values)
         events.append(replace(event, speed=speed, speed_sd=deviation, mean_speed=mean))
     return replace(counts, events=tuple(events))
+
+
+def precision_at(line: PlacedLine, ground: Ground, speed: float) -> tuple[float, float, float]:
+    """Return metres of road across and along in a pixel at the middle of a line, and an error.
+
+    The error is the standard deviation of a `speed`, m/s, as a fraction of it, for feet that are
+    off by a pixel. All are NaN far from the points of the ground.
+    """
+    x, y = np.mean([line.start, line.end], axis=0)
+    here, beside, above = ground.place(np.array([(x, y), (x + 1, y), (x, y - 1)]))
+    across, along = np.hypot(*(beside - here)), np.hypot(*(above - here))
+    return across, along, np.hypot(ground.scale_error, 2**0.5 * along / (WINDOW * speed))
 
 
 def _kmh(speed: float | None) -> float | None:
