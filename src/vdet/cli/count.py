@@ -108,9 +108,8 @@ def _matrix(videos: "Sequence[Counts]") -> list[str]:
     """Return the flows between lines and zones over all files; empty if there is only one."""
     from vdet.evaluate.output import table
     from vdet.traffic.count_files import flow_matrix
-    from vdet.traffic.counts import flow_table
 
-    matrix = flow_matrix(videos, flow_table(videos))
+    matrix = flow_matrix(videos)
     if len(matrix) < 2:
         return []
     rows = [(name, *map(str, row.values())) for name, row in matrix.items()]

@@ -107,7 +107,7 @@ def track_formats() -> list[Format]:
 
 def track_suffixes() -> list[str]:
     """Return the endings of files of tracks."""
-    return [track_format.suffix for track_format in track_formats()]
+    return [form.suffix for form in track_formats()]
 
 
 def picture_suffixes() -> list[str]:
@@ -117,11 +117,8 @@ def picture_suffixes() -> list[str]:
 
 def format_for(path: Path) -> Format | None:
     """Return the format by the ending of a name; None if it is unknown."""
-    name = path.name.lower()
-    fitting = [
-        track_format for track_format in track_formats() if name.endswith(track_format.suffix)
-    ]
-    return max(fitting, key=lambda item: len(item.suffix), default=None)
+    fitting = [form for form in track_formats() if path.name.lower().endswith(form.suffix)]
+    return max(fitting, key=lambda form: len(form.suffix), default=None)
 
 
 _AMBIGUOUS = (".txt", ".csv")

@@ -75,15 +75,15 @@ def flows_content(path: Path, videos: Videos, interval: int | None = None) -> An
     Parameters and errors as for `counts_content`.
     """
     every = list(videos.values())
-    rows = tables.flow_table(every, interval)
+    rows, matrix = tables.flow_table(every, interval), flow_matrix(every)
     if is_json(path):
-        content = {"flows": _items(_FLOWS, rows), "matrix": flow_matrix(every, rows)}
+        content = {"flows": _items(_FLOWS, rows), "matrix": matrix}
         return _json(videos, interval, content, events=False)
     if _is_table(path, ".wide"):
         return wide_table(rows, " to ")
     if _is_table(path, ".matrix"):
-        matrix = flow_matrix(every, rows)
-        return [_matrix_columns(every), *((name, *row.values()) for name, row in matrix.items())]
+        body = ((origin, *row.values()) for origin, row in matrix.items())
+        return [("from", *matrix, NOWHERE), *body]
     return [_FLOWS, *map(_cells, rows)]
 
 
@@ -108,17 +108,14 @@ def wide_table(rows: Sequence[CountRow | FlowRow], between: str) -> list[Sequenc
     return [("start", "end", *heading), *body]
 
 
-def flow_matrix(videos: Sequence[Counts], rows: Iterable[FlowRow]) -> dict[str, dict[str, int]]:
-    """Return the number of vehicles over all intervals and classes, by origin and destination."""
-    found: Counter[tuple[str, str]] = Counter()
-    for row in rows:
-        found[row.origin, row.destination or NOWHERE] += row.count
-    _, *ends = _matrix_columns(videos)
-    return {origin: {end: found[origin, end] for end in ends} for origin in ends[:-1]}
-
-
-def _matrix_columns(videos: Iterable[Counts]) -> tuple[str, ...]:
-    return ("from", *dict.fromkeys(name for one in videos for name, _ in one.directions), NOWHERE)
+def flow_matrix(videos: Sequence[Counts]) -> dict[str, dict[str, int]]:
+    """Return the number of vehicles by origin and destination, which may be `NOWHERE`."""
+    found = Counter(
+        (first.name, last.name if last else NOWHERE)
+        for _, first, last in tables.vehicle_flows(videos)
+    )
+    names = dict.fromkeys(name for video in videos for name, _ in video.directions)
+    return {origin: {end: found[origin, end] for end in (*names, NOWHERE)} for origin in names}
 
 
 def _join(table: str, videos: Mapping[str, Any], path: Path) -> None:

@@ -20,7 +20,7 @@ from vdet.traffic.crossings import (
     lines_near,
     place,
 )
-from vdet.traffic.linking import GAP, TrackLinker, VehiclePath
+from vdet.traffic.linking import MAX_GAP, TrackLinker, VehiclePath
 
 _OLDEST = 0.2
 """Seconds after which running counts are recomputed."""
@@ -113,7 +113,7 @@ class VehicleCounter:
                 (event.name, event.direction)
                 for some in still
                 for event in some.events
-                if event.direction != VANISH or now - event.time > GAP
+                if event.direction != VANISH or now - event.time > MAX_GAP
             )
         return self._so_far
 

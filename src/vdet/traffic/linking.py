@@ -1,7 +1,4 @@
-"""From tracks to paths: which tracks one vehicle has, and where it was in each frame.
-
-Rule 8 of `vdet.traffic` is here.
-"""
+"""Links tracks to the paths of vehicles: rule 8 of `vdet.traffic`."""
 
 import math
 from array import array
@@ -15,50 +12,50 @@ import numpy as np
 from vdet.boxes import Box, Float64Array
 from vdet.track.track import FrameTracks, Track
 
-GAP = 1.0
-"""Longest time between the end of a track and the start of one that continues it, seconds."""
-REMEMBERED = 10.0
-"""Seconds for which a vehicle that is not shown is remembered; trackers keep ids for less."""
-_MOVED = 0.5
-"""Distance by which a vehicle that drives has moved, as a multiple of its size."""
+MAX_GAP = 1.0
+"""Maximum seconds between the end of a track and the start of the one that continues it."""
 DURATION_DIGITS = 4
-"""Decimals of a duration in seconds that are compared: times are rounded."""
+"""Decimals to which durations are rounded before they are compared, because times are rounded."""
 
-_LEAVES = 0.1
-"""Lowest speed of a vehicle that leaves the frame, in heights of its box per second."""
-_OUT_OF_SIGHT = 0.5
-"""Seconds that a vehicle is not shown before it is looked at whether it is the same one."""
-_JUDGED = 1.0
-"""Seconds after which that is clear."""
-_TURNED, _OPPOSITE = 0.15, 0.6
-"""Way back after which it is another one: in heights of its box, and as a fraction of all its way.
+_KEEP_SECONDS = 10.0
+"""Seconds for which a vehicle out of sight is kept; trackers keep ids for less."""
+_HIDDEN_SECONDS, _DECISION_SECONDS = 0.5, 1.0
+"""A track that was not shown for the first may be another vehicle, which the second decides."""
+_TURN_HEIGHTS, _TURN_FRACTION = 0.15, 0.6
+"""Distance backwards that makes it another vehicle: in heights of its box, and as a fraction of the
+whole distance since it reappeared.
 """
-_REACH = 0.5
-"""Farthest that the next track begins from where the last one ended or would be, in heights."""
+_MAX_DISTANCE = 0.5
+"""Maximum distance from the last or expected position of a lost vehicle to the start of the track
+that continues it, in heights of the larger box.
+"""
 _MAX_GROWTH = 2.0
-"""Largest ratio of the heights of the last box of a track and the first one of the next."""
-_ONWARD = 0.2, 0.3
-"""Seconds after which a lost vehicle is taken to have driven on; two places settle a crossing."""
-_LATEST = 20
-"""Number of places that its velocity follows from; each step counts half as much as the next."""
+"""Maximum ratio of the heights of the last box of a track and the first one of the next."""
+_EXTRAPOLATED = 0.2, 0.3
+"""Seconds after its last position at which a lost vehicle gets another; two settle a crossing."""
+_MOVED = 0.5
+"""Distance that a vehicle must move to have driven, as a fraction of its size."""
+_LEAVING_SPEED = 0.1
+"""Minimum speed of a vehicle that leaves the frame or turns, in heights of its box per second."""
+_VELOCITY_ROWS = 20
+"""Number of rows that give the velocity; each step has half the weight of the next."""
+_PARKED_ROWS, _PARKED_EXTENT = 250, 0.05
+"""Of so many rows within this fraction of the box height only the first and last are kept, so that
+parked vehicles need no memory.
+"""
 _COLUMNS = 10
-"""Numbers that are kept of a frame: time, x and y of the foot, x1 and y1 of the box, score, the
-number of the frame, the id of the track, x2 and y2 of the box.
+"""Numbers stored for a frame: time, x and y of the foot, x1 and y1 of the box, score, number of the
+frame, id of the track, x2 and y2 of the box.
 """
 _ROW = Struct(f"{_COLUMNS}d")
-_STAY, _STANDS = 250, 0.05
-"""Number of places of which only the first and the last are kept where a vehicle stands: where all
-lie within this fraction of the height of its box. So memory does not grow with parked vehicles.
-"""
-
 
 _Lost = tuple[int, float, float, float]
-"""The key of a vehicle that is lost, x and y of a foot, and the height of its box, pixels."""
+"""Key of a lost vehicle, x and y of its last or expected foot, and height of its box, pixels."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VehiclePath:
-    """Where a vehicle was, from all its tracks; a row for each frame that shows it.
+    """The positions of a vehicle, from all its tracks; a row for each frame that shows it.
 
     Attributes
     ----------
@@ -67,19 +64,19 @@ class VehiclePath:
     class_name
         The last class of its track; of several tracks, of the one that shows it largest.
     tracks
-        From when it had which track: times and ids.
+        Start time and id of each track.
     seen
-        Number of frames that show it. Rows after these are where it would have driven on.
+        Number of frames that show it. Later rows are extrapolated.
     times
-        Seconds, `(n,)`, as are the others.
+        float64 `(n,)`, as are the other columns; seconds.
     points
         Feet, pixels, `(n, 2)`.
     heights
-        Of its box, pixels.
+        Heights of its box, pixels.
     scores, frames
         Scores of its tracks, and numbers of the frames.
     size
-        Largest mean of the width and the height of its box, pixels.
+        Maximum of the mean of width and height of its box, pixels.
     """
 
     vehicle: int
@@ -109,7 +106,7 @@ class VehiclePath:
 
 
 def has_moved(points: Float64Array, size: float) -> bool:
-    """Return whether what is at points `(n, 2)` was ever half its size, pixels, from the first."""
+    """Return whether one of points `(n, 2)` is half a vehicle's size or more from the first one."""
     return bool(np.hypot(*(points - points[0]).T).max() >= _MOVED * size)
 
 
@@ -126,7 +123,7 @@ class TrackLinker:
     Attributes
     ----------
     begun
-        How many vehicles have begun. The numbers of vehicles go on from that of another linker.
+        Number of vehicles so far, including those of another linker whose numbers it continues.
     """
 
     def __init__(self, width: int, height: int, begun: int = 0) -> None:
@@ -137,55 +134,57 @@ class TrackLinker:
 
     def add(self, frame: FrameTracks) -> list[VehiclePath]:
         """Add the next frame; return the paths that have ended."""
-        self._now = round(frame.time, 6)  # as files hold it
-        oldest = self._now - REMEMBERED
-        ended = [key for key, vehicle in self._vehicles.items() if vehicle.shown < oldest]
+        self._now = round(frame.time, 6)  # as in files
+        oldest = self._now - _KEEP_SECONDS
+        ended = [key for key, vehicle in self._vehicles.items() if vehicle.last_seen < oldest]
         paths = [self._vehicles.pop(key).path(self._now) for key in ended]
         shown = {track.id for track in frame.tracks}
         lost = [] if shown <= self._vehicles.keys() else self._lost(shown)
         for track in frame.tracks:
             vehicle = self._vehicles.get(track.id) or self._begin(track, lost)
-            vehicle.see(track, self._now, frame.index)
-            if vehicle.is_another():
-                paths.append(self._split(track.id))
+            vehicle.add(track, self._now, frame.index)
+            if vehicle.has_turned():
+                self.begun += 1
+                self._vehicles[track.id] = vehicle.split(self.begun)
+                paths.append(vehicle.path(self._now))
             self._vehicles[track.id].classes[track.id] = track.class_name
         return paths
 
     def start_video(self) -> None:
-        """Take the ids of the next frames for those of other tracks: they are of another video."""
+        """Treat the ids of the next frames as other tracks, because they are of another video."""
         self._vehicles = {-vehicle.number: vehicle for vehicle in self._vehicles.values()}
 
     def open_paths(self) -> list[VehiclePath]:
-        """Return the paths so far of the vehicles that may still be shown again."""
+        """Return the paths so far of the vehicles that may be shown again."""
         return [vehicle.path(self._now) for vehicle in self._vehicles.values()]
 
     def _lost(self, shown: Container[int]) -> list[_Lost]:
-        """Return the vehicles that may go on under a new id: they just disappeared in the frame.
+        """Return the last and the expected position of each vehicle that was just lost.
 
-        Those with a key in `shown` go on anyway. One that would be outside the frame now has left:
-        a vehicle that appears there is another one. Each has two rows, for the place where it was
-        last and for that where it would be now.
+        Vehicles with a key in `shown` are not lost. Those that leave, or would now be outside the
+        frame, are omitted: a vehicle that appears there is another one.
         """
         width, height = self._size
         lost: list[_Lost] = []
         for key, vehicle in self._vehicles.items():
-            is_old = self._now - vehicle.shown > GAP
+            is_old = self._now - vehicle.last_seen > MAX_GAP
             if key in shown or is_old or vehicle.is_leaving(width, height):
                 continue
-            before, now = vehicle.onward(self._now)[:, [1, 2, 4]].tolist()
-            if 0 <= now[0] <= width and 0 <= now[1] <= height:
-                lost += [(key, *before), (key, *now)]
+            last, expected = vehicle.extrapolated(self._now)[:, [1, 2, 4]].tolist()
+            if 0 <= expected[0] <= width and 0 <= expected[1] <= height:
+                lost += [(key, *last), (key, *expected)]
         return lost
 
     def _begin(self, track: Track, lost: Iterable[_Lost]) -> "_Vehicle":
-        """Remember a new vehicle, or the nearest of the lost ones that goes on as this track."""
-        foot, (*_, height) = track.written_foot, track.box.xywh
-        near: list[tuple[float, int]] = []
-        for key, x, y, other in lost:
-            distance, larger = math.dist(foot, (x, y)), max(height, other)
-            is_alike = larger <= _MAX_GROWTH * min(height, other)
-            if key in self._vehicles and is_alike and distance <= _REACH * larger:  # not taken yet
-                near.append((distance, key))
+        """Return the nearest lost vehicle that the track continues, or a new one."""
+        foot, height = track.written_foot, track.box.xywh[3]
+        near = [
+            (distance, key)
+            for key, x, y, other in lost
+            if key in self._vehicles  # no other track continues it
+            and max(height, other) <= _MAX_GROWTH * min(height, other)
+            and (distance := math.dist(foot, (x, y))) <= _MAX_DISTANCE * max(height, other)
+        ]
         if near:
             vehicle = self._vehicles.pop(min(near, key=itemgetter(0))[1])
         else:
@@ -195,84 +194,81 @@ class TrackLinker:
         self._vehicles[track.id] = vehicle
         return vehicle
 
-    def _split(self, key: int) -> VehiclePath:
-        """Return the path until a vehicle was out of sight; since then it is another one."""
-        self.begun += 1
-        vehicle = self._vehicles[key]
-        vehicle.size = max(vehicle.size, _largest(_table(vehicle.rows)))
-        tracks, rows = vehicle.tracks.copy(), vehicle.rows[vehicle.back or 0 :]
-        other = _Vehicle(self.begun, vehicle.box, self._now, tracks, rows, size=vehicle.size)
-        self._vehicles[key] = other
-        del vehicle.rows[vehicle.back or 0 :]
-        return vehicle.path(self._now)
-
 
 @dataclass(slots=True)
 class _Vehicle:
-    """A vehicle that may still be shown again.
+    """A vehicle that may be shown again.
 
     Attributes
     ----------
-    box, shown
-        Its last box, and when it was shown, seconds.
+    box, last_seen
+        Its last box, and the time of that frame, seconds.
     tracks
-        Those of `VehiclePath`.
+        As in `VehiclePath`.
     rows
-        All that was seen of it, one frame after the other: see `_table`.
+        The numbers of all its frames, one frame after the other: see `_table`.
     classes
         The class so far of each track.
     size
-        That of `VehiclePath`, without `rows`.
-    back
-        Where in `rows` it came back after it was out of sight, until it is clear who that is.
+        As in `VehiclePath`, of rows that were removed.
+    returned
+        Index in `rows` at which it reappeared, until `has_turned` is decided.
     """
 
     number: int
     box: Box
-    shown: float
+    last_seen: float
     tracks: list[tuple[float, int]] = field(default_factory=list)
     rows: "array[float]" = field(default_factory=lambda: array("d"))
     classes: dict[int, str | None] = field(default_factory=dict)
     size: float = 0.0
-    back: int | None = None
+    returned: int | None = None
 
-    def see(self, track: Track, time: float, frame: int) -> None:
+    def add(self, track: Track, time: float, frame: int) -> None:
         """Add the next frame that shows it."""
-        if time - self.shown > _OUT_OF_SIGHT:
-            self.back = len(self.rows)
+        if time - self.last_seen > _HIDDEN_SECONDS:
+            self.returned = len(self.rows)
         self.box = box = track.box
-        self.shown, (x, y) = time, track.foot
+        self.last_seen, (x, y) = time, track.foot
         known = track.score, frame, track.id
         row = _ROW.pack(time, x, y, box.x1, box.y1, *known, box.x2, box.y2)
         self.rows.frombytes(row)  # three times faster than `extend`
-        if len(self.rows) % (_STAY * _COLUMNS) == 0 and self.back is None:
-            stay = _table(self.rows[-_STAY * _COLUMNS :])
-            if np.ptp(stay[:, 1:3], axis=0).max() <= _STANDS * stay[-1, 4]:
-                self.size = max(self.size, _largest(stay))
-                del self.rows[(1 - _STAY) * _COLUMNS : -_COLUMNS]
+        if len(self.rows) % (_PARKED_ROWS * _COLUMNS) == 0 and self.returned is None:
+            latest = _table(self.rows[-_PARKED_ROWS * _COLUMNS :])
+            if np.ptp(latest[:, 1:3], axis=0).max() <= _PARKED_EXTENT * latest[-1, 4]:
+                self.size = max(self.size, _max_size(latest))
+                del self.rows[(1 - _PARKED_ROWS) * _COLUMNS : -_COLUMNS]
 
-    def is_another(self) -> bool:
-        """Return whether it drives the other way than before it was out of sight."""
-        if self.back is None or self.shown - self.rows[self.back] < _JUDGED:
+    def has_turned(self) -> bool:
+        """Return whether it moves backwards since it reappeared, and so is another vehicle."""
+        if self.returned is None or self.last_seen - self.rows[self.returned] < _DECISION_SECONDS:
             return False
-        before = _velocity(self.rows[: self.back])
-        first, *_, last = _table(self.rows[self.back :])
+        before = _velocity(self.rows[: self.returned])
+        first, *_, last = _table(self.rows[self.returned :])
         way, speed, height = complex(*(last - first)[1:3]), abs(before), last[4]
         onward = (way * before.conjugate()).real / max(speed, 1e-9)
-        is_another = speed > _LEAVES * height
-        is_another &= onward < -max(_TURNED * height, _OPPOSITE * abs(way))
-        if not is_another:
-            self.back = None
-        return bool(is_another)
+        backward = max(_TURN_HEIGHTS * height, _TURN_FRACTION * abs(way))
+        has_turned = bool(speed > _LEAVING_SPEED * height and onward < -backward)
+        if not has_turned:
+            self.returned = None
+        return has_turned
+
+    def split(self, number: int) -> "_Vehicle":
+        """Move the rows since it reappeared to a new vehicle, and return that."""
+        self.size = max(self.size, _max_size(_table(self.rows)))
+        rows = self.rows[self.returned :]
+        del self.rows[self.returned :]
+        tracks = self.tracks.copy()
+        return _Vehicle(number, self.box, self.last_seen, tracks, rows, size=self.size)
 
     def is_leaving(self, width: int, height: int) -> bool:
-        """Return whether it moves out at the edge of the frame, and so was not lost."""
+        """Return whether it is at the edge of the frame and moves outwards."""
         x1, y1, x2, y2 = self.box.pixels
         outward = complex((x2 >= width - 1) - (x1 <= 1), (y2 >= height - 1) - (y1 <= 1))
-        return (_velocity(self.rows) * outward.conjugate()).real > _LEAVES * (y2 - y1)
+        return (_velocity(self.rows) * outward.conjugate()).real > _LEAVING_SPEED * (y2 - y1)
 
-    def onward(self, *times: float) -> Float64Array:
-        """Return its last row, and those of later times if it moves on."""
+    def extrapolated(self, *times: float) -> Float64Array:
+        """Return its last row, and a row for each later time at constant velocity."""
         rows = np.repeat(_table(self.rows[-_COLUMNS:]), 1 + len(times), axis=0)
         rows[1:, 0] = times
         velocity = _velocity(self.rows)
@@ -280,22 +276,22 @@ class _Vehicle:
         return rows
 
     def path(self, now: float) -> VehiclePath:
-        """Return its path; if it was lost, it drives on for a moment."""
+        """Return its path; a lost vehicle that has moved continues for a moment."""
         rows = _table(self.rows)
         seen, last = len(rows), rows[-1]
-        if now - last[0] > GAP and math.dist(last[1:3], rows[0, 1:3]) > last[4]:
-            rows = np.concatenate([rows, self.onward(*np.add(last[0], _ONWARD))[1:]])
+        if now - last[0] > MAX_GAP and math.dist(last[1:3], rows[0, 1:3]) > last[4]:
+            rows = np.concatenate([rows, self.extrapolated(*np.add(last[0], _EXTRAPOLATED))[1:]])
         times, points, (heights, scores, frames, ids) = rows[:, 0], rows[:, 1:3], rows[:, 4:].T
         largest = max(reversed(self.classes), key=lambda key: heights[ids == key].max(initial=0))
-        who = self.number, self.classes[largest], tuple(self.tracks), seen
-        size = max(self.size, _largest(rows))
-        return VehiclePath(*who, times, points, heights, scores, frames, size)
+        known = self.number, self.classes[largest], tuple(self.tracks), seen
+        size = max(self.size, _max_size(rows))
+        return VehiclePath(*known, times, points, heights, scores, frames, size)
 
 
 def _table(rows: "array[float]") -> Float64Array:
     """Return times, feet, widths and heights of boxes, scores, frames and ids: `(n, 8)`.
 
-    They are as exact as files of tracks hold them, so that both count alike.
+    They are rounded as in files of tracks, so that counts of saved tracks are the same.
     """
     table = np.array(rows).reshape(-1, _COLUMNS)
     table[:, 1:3] = np.rint(100 * table[:, 1:3]) / 100
@@ -304,14 +300,14 @@ def _table(rows: "array[float]") -> Float64Array:
     return table[:, :8]
 
 
-def _largest(table: Float64Array) -> float:
-    """Return the largest mean of the width and the height of a box, pixels."""
+def _max_size(table: Float64Array) -> float:
+    """Return the maximum of the mean of width and height of a box, pixels."""
     return float(table[:, 3:5].mean(axis=1).max())
 
 
 def _velocity(rows: "array[float]") -> complex:
-    """Return the velocity at the end of a path, x and y in pixels a second."""
-    steps = np.diff(_table(rows[-_LATEST * _COLUMNS :])[:, :3], axis=0)
+    """Return the velocity at the end of a path, x and y in pixels per second."""
+    steps = np.diff(_table(rows[-_VELOCITY_ROWS * _COLUMNS :])[:, :3], axis=0)
     steps = steps[steps[:, 0] > 0]
     if not len(steps):
         return 0j
