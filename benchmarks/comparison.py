@@ -6,9 +6,6 @@ With `pip install supervision trackers`, the rows of LineZone and ByteTrack are 
 page has the commands of the other programs. F1 on held-out cameras is not measured here.
 """
 
-import os
-import subprocess
-import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import astuple, replace
@@ -18,6 +15,7 @@ from statistics import fmean
 from typing import Any
 
 import vdet
+from benchmarks.rounds import seconds_of
 from vdet.config.detector import NetworkSettings
 from vdet.config.places import LineSettings, TrafficSettings
 from vdet.config.schema import Settings
@@ -116,13 +114,6 @@ def pause_scene() -> Scene:
 
     vehicles = (*later(1, 20, 0), *later(2, 50, 8))
     return replace(pole_scene(1), vehicles=vehicles, frames=1000)
-
-
-def seconds_of(*command: str) -> float:
-    """Return the processor time of a Python program."""
-    before = os.times()
-    subprocess.run([sys.executable, *command], check=True, stdout=subprocess.DEVNULL)
-    return sum(b - a for a, b in zip(before[2:4], os.times()[2:4], strict=True))
 
 
 def main() -> None:

@@ -8,7 +8,7 @@ the fifth.
 import argparse
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import astuple, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -16,6 +16,7 @@ import joblib
 import numpy as np
 import numpy.typing as npt
 
+from benchmarks.drawn_traffic import shown_labels
 from vdet.boxes import NO_BOXES, Boxes
 from vdet.config.loading import load_settings
 from vdet.config.schema import Settings
@@ -23,7 +24,7 @@ from vdet.detect.svm.detector import Candidates, SvmDetector, SvmModel
 from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.windows import Windows
 from vdet.evaluate.scores import score
-from vdet.labels.label import Label, LabelledVideo
+from vdet.labels.label import LabelledVideo
 from vdet.labels.reading import read_truth
 from vdet.learn.svm.dataset import PatchFile, find_patches
 from vdet.learn.svm.extraction import extract
@@ -197,12 +198,7 @@ def _tracks(searched: SearchedVideo, model: LinearModel, settings: Settings) -> 
     unseen = Picture(np.zeros((1, 1, 3), np.uint8))
     frames = (Frame(n, n / searched.rate, unseen) for n in range(searched.frames))
     found = Searched(detector, searched.windows)
-    rows = [
-        Label(0, astuple(track.box), frame=result.frame.index + 1, id=track.id)
-        for result in Pipeline(found, tracker, rate=searched.searches).follow(frames)
-        for track in result.tracks
-    ]
-    return LabelledVideo.of(rows)
+    return shown_labels(Pipeline(found, tracker, rate=searched.searches).follow(frames))
 
 
 def _f1_by_block(found: LabelledVideo, truth: LabelledVideo) -> list[float]:

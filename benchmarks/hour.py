@@ -1,13 +1,11 @@
 """`vdet count` on the tracks of an hour: seconds for 1.2 million boxes at ten lines."""
 
-import os
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks.rounds import seconds_of
 from vdet.boxes import Box
 from vdet.labels.formats import TrackWriter, format_for
 from vdet.track.track import FrameTracks, Track
@@ -31,11 +29,7 @@ def seconds_of_count(folder: Path, suffix: str) -> float:
     tracks, lines = folder / f"hour{suffix}", folder / "lines.yaml"
     write_hour(tracks)
     lines.write_text(_lines(), encoding="utf-8")
-    command = [sys.executable, "-m", "vdet", "--quiet", "count", str(tracks), "-c", str(lines)]
-    before = os.times()
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-    user, system = (b - a for a, b in zip(before[2:4], os.times()[2:4], strict=True))
-    return user + system
+    return seconds_of("-m", "vdet", "--quiet", "count", str(tracks), "-c", str(lines))
 
 
 def _lines() -> str:

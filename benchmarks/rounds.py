@@ -1,8 +1,11 @@
 """Interleaved timing: each task runs once a round, so that a slow moment affects all of them."""
 
+import os
 import random
 import resource
 import statistics
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Mapping
 
@@ -31,6 +34,13 @@ def measure_both(tasks: Mapping[str, Task], rounds: int) -> dict[str, tuple[floa
                 walls[name].append(time.perf_counter() - began)
                 busy[name].append(_processor_time() - worked)
     return {name: (statistics.median(walls[name]), statistics.median(busy[name])) for name in tasks}
+
+
+def seconds_of(*arguments: str) -> float:
+    """Return the processor time of Python with these arguments, which must succeed."""
+    before = os.times()
+    subprocess.run([sys.executable, *arguments], check=True, stdout=subprocess.DEVNULL)
+    return sum(b - a for a, b in zip(before[2:4], os.times()[2:4], strict=True))
 
 
 def _processor_time() -> float:

@@ -177,13 +177,13 @@ def pool(comparisons: Sequence[Comparison]) -> Comparison:
         ]
         vehicles += len(one.vehicle_ids)
         tracks += len(one.track_ids)
-    ids = (
+    return Comparison(
+        tuple(frames),
         joined(one.vehicle_ids for one in comparisons),
         joined(one.track_ids for one in comparisons),
+        tuple(name for one in comparisons for name in one.vehicle_names),
+        tuple(name for one in comparisons for name in one.track_names),
     )
-    vehicle_names = tuple(name for one in comparisons for name in one.vehicle_names)
-    track_names = tuple(name for one in comparisons for name in one.track_names)
-    return Comparison(tuple(frames), *ids, vehicle_names, track_names)
 
 
 def assign(weights: npt.NDArray[Any]) -> tuple[Int64Array, Int64Array]:

@@ -161,16 +161,8 @@ def _with_boxes(image: Image, frame: ComparedFrame) -> Image:
 
 _OF_BOXES = "precision", "recall", "f1", "ap50", "mean_iou", "false_positives"
 _OF_PICTURES = "images", "vehicles", *_OF_BOXES, "best_f1", "best_score"
-_OF_VIDEO = (
-    *_OF_BOXES,
-    "misses",
-    "mota",
-    "idf1",
-    "hota",
-    "id_switches",
-    "false_tracks",
-    "mean_delay",
-)
+_OF_TRACKS = "mota", "idf1", "hota", "id_switches", "false_tracks", "mean_delay"
+_OF_VIDEO = *_OF_BOXES, "misses", *_OF_TRACKS
 _OF_CLASSES = "vehicles", "found", "right", "precision", "recall", "f1", "confused"
 """The columns of tables: attributes of scores."""
 

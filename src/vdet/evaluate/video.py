@@ -89,10 +89,8 @@ def score_files(
     TruthError
         A file cannot be used.
     """
-    found, truth = (
-        read_predictions(prediction),
-        read_truth(truth_path, Roles.from_settings(settings)),
-    )
+    found = read_predictions(prediction)
+    truth = read_truth(truth_path, Roles.from_settings(settings))
     last = until or truth.last_frame
     return ClipResult(str(prediction), compare(found.until(last), truth.until(last)), last)
 

@@ -14,6 +14,7 @@ from torch import Tensor  # noqa: E402
 from learn.net.blocks import block_picture, block_source  # noqa: E402
 from vdet.config.schema import NetworkSettings, NetworkTrainingSettings  # noqa: E402
 from vdet.detect.onnx.detector import NetworkModel  # noqa: E402
+from vdet.detect.onnx.layouts import cell_centers  # noqa: E402
 from vdet.detect.onnx.recognition import Header  # noqa: E402
 from vdet.errors import DataError  # noqa: E402
 from vdet.learn.net import network  # noqa: E402
@@ -22,7 +23,6 @@ from vdet.learn.net.network import (  # noqa: E402  # noqa: E402
     Network,
     Vehicles,
     assign,
-    cell_centers,
     class_weights,
     decode,
     flatten,
@@ -53,7 +53,7 @@ def test_overlaps_of_boxes_that_share_a_third_and_of_boxes_apart() -> None:
 
 
 class TestAssignment:
-    CENTERS, STRIDES = cell_centers(128, 256)
+    CENTERS, STRIDES = map(torch.from_numpy, cell_centers(256, 128))
 
     def assigned(self, *boxes: tuple[float, float, float, float]) -> tuple[Tensor, Tensor]:
         """Return the rows of the vehicles and the cells that are to find them."""
@@ -159,7 +159,7 @@ def test_the_classes_of_a_base_are_found_by_their_names(tmp_path: Path) -> None:
 
 
 def test_what_looks_like_a_class_without_labels_is_no_background() -> None:
-    centers, _ = cell_centers(32, 64)
+    centers = torch.from_numpy(cell_centers(64, 32)[0])
     everywhere, left = [0.0, 0, 64, 32], [0.0, 0, 32, 32]
     regions = Vehicles(
         torch.tensor([0, 1]), torch.tensor([everywhere, left]), torch.tensor([2, UNKNOWN])

@@ -1,5 +1,6 @@
 import json
 import shutil
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from vdet.detect.svm.model import load_model, save_model
 from vdet.errors import DataError
 from vdet.learn.svm.dataset import PatchFile, find_patches
 from vdet.learn.svm.extraction import LabelledVectors, extract, hold_out
-from vdet.learn.svm.training import train
+from vdet.learn.svm.training import evaluate_patches, train
 from vdet.media.images import read_image
 from writing import write_image
 
@@ -163,3 +164,20 @@ def test_with_boxes_a_model_finds_the_sides_of_vehicles(
     assert error < 0.06
     assert report.groups == GROUPS | {"boxes/near": 40}
     assert "boxes/near" not in report.test.groups, "they belong to neither class"
+
+
+def test_a_new_model_is_tested_on_the_last_patches_of_each_folder(
+    data: Path, tmp_path: Path
+) -> None:
+    copy = shutil.copytree(data, tmp_path / "copy")
+    shutil.copy(copy / "vehicles/far/0.png", copy / "non-vehicles/sky/9.png")
+    steps: list[tuple[str, int | None]] = []
+
+    def start(what: str, total: int | None) -> Callable[[int], object]:
+        steps.append((what, total))
+        return lambda _: None
+
+    found = evaluate_patches(find_patches([copy]), SETTINGS, steps=start)
+    assert (found.patches, found.accuracy) == (2 + 4 + 3 + 2, 10 / 11)
+    assert found.groups["non-vehicles/sky"] == 0.5
+    assert steps == [("describing patches", 57), ("fitting the classifier", None)]

@@ -13,8 +13,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from vdet.detect.onnx import layouts
-from vdet.detect.onnx.layouts import STRIDES
+from vdet.detect.onnx.layouts import STRIDES, cell_centers
 from vdet.learn.net.sources import UNKNOWN, NetSource
 
 STEM = 16
@@ -113,12 +112,6 @@ class Network(nn.Module):
         return [head(tower(level)) for level, tower, head in parts]
 
 
-def cell_centers(height: int, width: int) -> tuple[Tensor, Tensor]:
-    """Return the middle `(cells, 2)`, x and y in pixels, and the stride `(cells,)` of all cells."""
-    centers, strides = layouts.cell_centers(width, height)
-    return torch.from_numpy(centers), torch.from_numpy(strides)
-
-
 def flatten(levels: Sequence[Tensor]) -> Tensor:
     """Return the outputs of all levels as one table, `(B, cells, 5 + classes)`."""
     return torch.cat([level.flatten(2).transpose(1, 2) for level in levels], 1)
@@ -197,7 +190,8 @@ def loss_of(network: Network, batch: Batch, weights: Tensor) -> Tensor:
     0 for others (Li et al., "Generalized Focal Loss", 2020). Boxes are compared by generalised
     overlap, classes by cross entropy.
     """
-    centers, strides = cell_centers(*batch.pictures.shape[2:])
+    height, width = batch.pictures.shape[2:]
+    centers, strides = map(torch.from_numpy, cell_centers(width, height))
     raw = flatten(network(batch.pictures))
     scores, boxes = raw[..., 0], decode(raw[..., 1:5], centers, strides)
     row, cell, iou = assign(scores, boxes, batch.vehicles, centers, strides)

@@ -157,7 +157,6 @@ def evaluate_patches(
     settings: Settings,
     model: LinearModel | None = None,
     *,
-    jobs: int | None = None,
     steps: Steps = no_steps,
 ) -> Classification:
     """Test a given model on all patches, or train one and test it on the held-out patches.
@@ -166,15 +165,15 @@ def evaluate_patches(
     """
     files = [file for file in files if not file.is_boxed]
     if model is None:
-        data, held, model = _fit_part(files, settings, jobs=jobs, steps=steps)
+        data, held, model = _fit_part(files, settings, steps=steps)
         return _classify(model, data, held)
     progress = steps("describing patches", len(files))
-    data = extract(files, model.features, augmented=False, jobs=jobs, progress=progress)
+    data = extract(files, model.features, augmented=False, progress=progress)
     return _classify(model, data, np.ones(len(files), np.bool_))
 
 
 def _fit_part(
-    files: Sequence[PatchFile], settings: Settings, *, jobs: int | None, steps: Steps
+    files: Sequence[PatchFile], settings: Settings, *, jobs: int | None = None, steps: Steps
 ) -> tuple[LabelledVectors, BoolArray, LinearModel]:
     """Compute features, and fit a model to the patches of both classes that are not held out.
 
