@@ -1,9 +1,8 @@
-"""Lines across the main streams of a video, proposed from the paths of its vehicles.
+"""Proposed lines across the main streams of a video, from the paths of its vehicles.
 
-Vehicles with the same headings at both ends of their paths form a group. The streams of a group are
-where a line across the road meets its vehicles side by side. Lines are chosen one by one
-(greedily): the one that counts most vehicles of its group that no line counts so far, less all
-others that cross it.
+Vehicles with the same headings at both ends of their paths form a group. A stream is the part of a
+group that crosses a line across the road side by side. Lines are chosen greedily: the next is the
+one that counts most vehicles of its group that are not counted yet, minus all others that cross it.
 """
 
 import math
@@ -18,43 +17,42 @@ from vdet.polygons import Point, Segment, meeting
 from vdet.traffic.linking import VehiclePath
 
 _MIN_LENGTH = 1.5
-"""Length of the shortest path that counts, in heights of the vehicle's largest box."""
+"""Minimum length of a path, in heights of the vehicle's largest box."""
 _MIN_VEHICLES, _MIN_FRACTION = 5, 0.08
-"""Smallest stream that gets a line: vehicles, and as a fraction of all."""
+"""Minimum vehicles of a stream that gets a line: their number, and as a fraction of all."""
 _MAX_TRIED = 30
-"""Number of paths of a group along which lines are tried."""
+"""Maximum number of paths of a group along which lines are tried."""
 _PLACES = (0.5, 0.4, 0.6, 0.3, 0.7)
-"""Where on a path lines are tried, as fractions of its length; the first ones are better."""
-_CLEAR = 0.12
-"""Minimum distance of a line from either end of a vehicle's path, as a fraction of its length."""
-_GAP, _MARGIN = 4.0, 0.5
-"""Largest gap between vehicles of one stream, and how far a line goes on beyond the outermost one,
-in heights of their boxes.
+"""Where lines are tried along a path, as fractions of its length; the first ones are better."""
+_MIN_FROM_END = 0.12
+"""Minimum distance of a line from both ends of a path, as a fraction of its length."""
+_MAX_GAP, _MARGIN = 4.0, 0.5
+"""Maximum gap between vehicles of a stream, and length of a line beyond the outermost one, in
+heights of their boxes.
 """
-_SAME_HEADING = 0.7
-"""Smallest cosine of the angle between a line's normal and the heading of a vehicle it counts."""
-_GROUP = 1.25
-"""Distance of groups: of unit vectors of the first and of the last heading, together."""
+_MIN_COSINE = 0.7
+"""Minimum cosine of the angle between the normal of a line and the heading of a vehicle."""
+_GROUP_DISTANCE = 1.25
+"""Distance between groups: of the unit vectors of the first and the last heading, together."""
 _MAX_OTHERS = 0.34
-"""Largest number of others that cross a line, as a fraction of the vehicles that it is for."""
+"""Maximum number of other vehicles that cross a line, as a fraction of its own."""
 _NEAR_BEST = 0.9
-"""Fraction of the best result from which a better place is taken."""
+"""Fraction of the maximum gain at which a better place along the path is preferred."""
 _SPACING, _AROUND = 0.01, 4
-"""Distance of the points of a path, as a fraction of the frame's width, and the number of points
-before and after one that give its heading.
+"""Distance of the points of a path, as a fraction of the frame's width; number of points before and
+after a point from which its heading follows.
 """
 _WORDS = ("right", "down", "left", "up")
 _NAMES = ("north", "northeast", "east", "southeast", "south", "southwest", "west", "northwest")
 COMPASS = ("N", "NE", "E", "SE", "S", "SW", "W", "NW")
-"""Directions in which a camera may look."""
+"""Directions in which a camera can look."""
 
 
 @dataclass(frozen=True, slots=True)
 class ProposedLine:
-    """A line that a stream of `vehicles` crosses, to the left as seen along the line.
+    """A line that a stream of `vehicles` crosses to the left, seen from `start` to `end`, pixels.
 
-    `left` is the name of the direction of the stream, `right` of the other one. `start` and `end`
-    are in pixels.
+    `left` is the name of the stream's direction, `right` that of the opposite one.
     """
 
     name: str
@@ -69,7 +67,7 @@ class ProposedLine:
 class _Candidate:
     """A line across a `heading`, and the indices of its own vehicles and of others that cross it.
 
-    `place` is where it is on a path, an index of `_PLACES`.
+    `place` is the index in `_PLACES` of its place on a path.
     """
 
     ends: Segment
@@ -78,11 +76,11 @@ class _Candidate:
     own: Int64Array
     others: Int64Array
 
-    def gain(self, left: BoolArray) -> int:
-        """Return how many of the vehicles `left` it counts, less all others; 0 if too few."""
-        own = int(left[self.own].sum())
+    def gain(self, uncounted: BoolArray) -> int:
+        """Return the number of `uncounted` vehicles of its own, minus all others; 0 if too few."""
+        own = int(uncounted[self.own].sum())
         others = len(self.others) + len(self.own) - own
-        is_enough = own >= max(_MIN_VEHICLES, _MIN_FRACTION * len(left))
+        is_enough = own >= max(_MIN_VEHICLES, _MIN_FRACTION * len(uncounted))
         return own - others if is_enough and others <= _MAX_OTHERS * own else 0
 
 
@@ -96,7 +94,7 @@ def propose_lines(
     width, height
         Size of the frames, pixels.
     facing
-        Where the camera looks, one of `COMPASS`; None where that is not known.
+        Direction of the camera, one of `COMPASS`; None if unknown.
     """
     moving = [
         path
@@ -106,22 +104,23 @@ def propose_lines(
     if len(moving) < _MIN_VEHICLES:
         return ()
     candidates = list(_Streams(moving, width, height).candidates())
-    left, lines, names = np.ones(len(moving), np.bool_), [], Counter[str]()
-    while gains := [(gain, item) for item in candidates if (gain := item.gain(left))]:
+    uncounted, lines, names = np.ones(len(moving), np.bool_), [], Counter[str]()
+    while gains := [(gain, item) for item in candidates if (gain := item.gain(uncounted))]:
         best = max(gain for gain, _ in gains)
         good = (item for gain, item in gains if gain >= _NEAR_BEST * best)
         line = min(good, key=lambda item: item.place)
         ahead, back = _directions(line.heading, facing)
         names[ahead] += 1
         name = f"{ahead} {names[ahead]}" if names[ahead] > 1 else ahead
-        lines.append(ProposedLine(name, *line.ends, ahead, back, int(left[line.own].sum())))
-        left[line.own] = False
+        vehicles = int(uncounted[line.own].sum())
+        lines.append(ProposedLine(name, *line.ends, ahead, back, vehicles))
+        uncounted[line.own] = False
         candidates = [item for item in candidates if meeting(item.ends, line.ends) is None]
     return tuple(lines)
 
 
 def _directions(heading: Float64Array, facing: str | None) -> tuple[str, str]:
-    """Return the names of the direction of a heading and of the opposite one."""
+    """Return the names of the direction of a heading and of the opposite direction."""
     turn = round(math.atan2(heading[1], heading[0]) / (math.pi / 2)) % 4
     if facing is None:
         return _WORDS[turn], _WORDS[turn - 2]
@@ -130,7 +129,7 @@ def _directions(heading: Float64Array, facing: str | None) -> tuple[str, str]:
 
 
 class _Streams:
-    """The points of all paths: place, direction, vehicle, group, and fraction of the path."""
+    """The points of all paths: position, heading, vehicle, group, and fraction of the path."""
 
     def __init__(self, paths: Sequence[VehiclePath], width: int, height: int) -> None:
         rows = [_spaced(path, _SPACING * width) for path in paths]
@@ -161,15 +160,15 @@ class _Streams:
         at = at[np.argsort(aside[at])]
         own = at[
             (self._groups[at] == self._groups[row])
-            & (self._headings[at] @ heading >= _SAME_HEADING)
-            & (np.abs(self._gone[at] - 0.5) <= 0.5 - _CLEAR)
+            & (self._headings[at] @ heading >= _MIN_COSINE)
+            & (np.abs(self._gone[at] - 0.5) <= 0.5 - _MIN_FROM_END)
         ]
         if not len(own):
             return None
         height = float(np.median(self._heights[own]))
-        parts = np.concatenate([[0], np.cumsum(np.diff(aside[own]) > _GAP * height)])
+        parts = np.concatenate([[0], np.cumsum(np.diff(aside[own]) > _MAX_GAP * height)])
         own = own[parts == parts[np.argmin(np.abs(aside[own]))]]
-        # It ends half the way to the next vehicle of another stream.
+        # The line ends halfway to the next vehicle of another stream.
         (low, high), beside = aside[own[[0, -1]]].tolist(), aside[at]
         low = max([low - _MARGIN * height, *((low + beside[beside < low]) / 2)])
         high = min([high + _MARGIN * height, *((high + beside[beside > high]) / 2)])
@@ -194,11 +193,11 @@ def _spaced(path: VehiclePath, spacing: float) -> Float64Array:
 
 
 def _groups(rows: Sequence[Float64Array]) -> Int64Array:
-    """Return the number of the group of each path: where it heads first and last."""
+    """Return the number of the group of each path, by its first and last heading."""
     from scipy.cluster.hierarchy import fcluster, linkage
 
     quarters = [row[[0, len(row) // 4, 3 * len(row) // 4, -1], :2] for row in rows]
     headings = np.diff(quarters, axis=1)[:, [0, 2]]
     headings /= np.maximum(np.linalg.norm(headings, axis=2, keepdims=True), 1e-9)
     tree = linkage(headings.reshape(-1, 4), "average")
-    return np.asarray(fcluster(tree, _GROUP, "distance") - 1, np.int64)
+    return np.asarray(fcluster(tree, _GROUP_DISTANCE, "distance") - 1, np.int64)

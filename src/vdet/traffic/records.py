@@ -1,4 +1,4 @@
-"""A record of each vehicle, made from the tracks of its frames; its best picture; their files."""
+"""A record and the best image of each vehicle, from its tracks; files of records."""
 
 import math
 from collections import Counter
@@ -19,9 +19,9 @@ from vdet.traffic.speeds import KMH, SpeedMeter, Speeds
 from vdet.traffic.tables import VIDEO, is_json, join_tables, plain_moment, write_content
 
 PATH_STEP = 0.01
-"""Distance after which a path gets its next point, as a fraction of the frame's width.
+"""Minimum distance between points of a path, as a fraction of the frame's width.
 
-Shorter moves are jitter of the boxes.
+Shorter movements are jitter of the boxes.
 """
 
 _COLUMNS = (
@@ -31,18 +31,18 @@ _COLUMNS = (
     *("x", "y", "width", "height"),
     *("metres", "speed", "speed_85", "speed_sd", "motion", "distance", "lane"),
 )
-"""Columns of a `.csv`; `clock` is the moment of `first`, x, y, width and height are those of the
-largest box, speeds are km/h, `distance` is the smallest one from the camera, metres.
+"""Columns of a `.csv`. `clock` is the clock time of `first`; x, y, width and height are the largest
+box; speeds are in km/h; `distance` is the minimum distance from the camera, metres.
 """
 
 _STANDING = 60.0
 """Seconds after which a vehicle that has not moved is standing."""
-_MIDDLING = 0.6
-"""Mean score below which what never moved, where nothing ever drove, is taken for a false alarm."""
+_MIN_STILL_SCORE = 0.6
+"""Minimum mean score of a vehicle that never moved, where none drove; others are false alarms."""
 
 Motion = Literal["drove", "standing", "unknown"]
-"""Whether a vehicle moved before a still camera; "unknown": it did not, but was seen for less than
-a minute.
+"""Whether a vehicle moved, as seen by a still camera; "unknown": it did not, but was shown for less
+than a minute.
 """
 
 
@@ -59,25 +59,25 @@ class VehicleRecord:
     largest
         The box with the largest area, pixels.
     seconds
-        How long it is shown. A frame is shown until the next one, the last frame as long as the one
-        before it.
+        How long it is shown. A frame lasts until the next one, the last frame as long as the
+        previous one.
     states
         Number of frames that show it in each state of `Track`.
     best_score, sum_of_scores
-        Over these frames; a score is 0 to 1.
+        Over these frames, 0 to 1.
     class_name
-        That of its last frame: see `vdet.track.votes`.
+        The class in its last frame: see `vdet.track.votes`.
     path
-        Where it stood (`Track.foot`): the first point, a point after each step, and the last point.
-        Frames in which it was lost do not count, unless it was in all.
+        Feet (`Track.foot`): the first, one after each step of `PATH_STEP`, and the last. Predicted
+        ones are omitted, unless all are.
     followed
-        From when to when it is shown without being lost, seconds; all of it, if it always is.
+        Spans in which it is shown and not predicted, seconds; if it always is, the whole span.
     speeds
-        None where they are not known.
+        None if unknown.
     motion
-        None where the camera may have moved.
+        None if the camera may have moved.
     distance
-        The smallest one from the camera, metres; None where it is not known.
+        Minimum distance from the camera, metres; None if unknown.
     lanes
         Number of frames that show it in each lane, as `Track.lane` counts them.
     """
@@ -101,12 +101,12 @@ class VehicleRecord:
 
     @property
     def lane(self) -> int | None:
-        """The lane in which most frames show it; None where none is known."""
+        """Its most frequent lane; None if unknown."""
         return next((lane for lane, _ in self.lanes.most_common(1)), None)
 
     @property
     def has_driven(self) -> bool:
-        """Whether it moved, or may have: it is not known to have stood."""
+        """Whether it moved, or may have, because the camera may have moved."""
         return self.motion in (None, "drove")
 
     @property
@@ -125,7 +125,7 @@ class VehicleRecord:
         return self.length / self.frame_width
 
     def add(self, track: Track, time: float, before: float | None = None) -> None:
-        """Add the next frame that shows it; `before` is the time of the frame before."""
+        """Add the next frame that shows it; `before` is the time of the previous frame."""
         self.last = time
         self.sum_of_scores += track.score
         self.best_score = max(self.best_score, track.score)
@@ -147,13 +147,13 @@ class VehicleRecord:
         self.states[track.state] += 1
 
     def judge(self) -> None:
-        """Set `motion`, before a camera that stood still."""
+        """Set `motion`, for a still camera."""
         stood: Motion = "standing" if self.seconds >= _STANDING else "unknown"
         size = (self.largest.width + self.largest.height) / 2
         self.motion = "drove" if has_moved(np.array(self.path), size) else stood
 
     def _go_to(self, point: Point) -> None:
-        """Continue the path; its last point stays only if it is a step away from the one before."""
+        """Continue the path; a last point less than a step from the previous one is replaced."""
         step = PATH_STEP * self.frame_width
         if len(self.path) > 1 and math.dist(self.path[-2], self.path[-1]) < step:
             self.path.pop()
@@ -161,7 +161,7 @@ class VehicleRecord:
 
 
 class VehicleRecords:
-    """Makes the records from frame to frame; it keeps no frame.
+    """Makes the records, frame by frame, without keeping frames.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ class VehicleRecords:
         self._period = 0.0
 
     def add(self, frame: FrameTracks) -> None:
-        """Add the next frame. Frames without a vehicle may be left out."""
+        """Add the next frame. Frames without a vehicle may be omitted."""
         before = None
         if self._latest:
             frames = max(1, frame.index - self._latest.index)
@@ -195,8 +195,8 @@ class VehicleRecords:
     ) -> tuple[VehicleRecord, ...]:
         """Return the records by id, with the speeds of a meter; call it once, at the end.
 
-        `is_still` says whether the camera stood still. Then each has its `motion`, and what looks
-        like a false alarm is left out: it never moved, nothing drove there, its score is middling.
+        If the camera `is_still`, they have a `motion`, and probable false alarms are omitted: those
+        that never moved, where nothing drove, with a low mean score.
         """
         self._show()
         for number, speeds in (meter.speeds() if meter else {}).items():
@@ -211,7 +211,7 @@ class VehicleRecords:
             record
             for record in records
             if record.has_driven
-            or record.mean_score >= _MIDDLING
+            or record.mean_score >= _MIN_STILL_SCORE
             or any(map(record.largest.contains, ways))
         )
 
@@ -223,7 +223,7 @@ class VehicleRecords:
 def records_content(
     records: Iterable[VehicleRecord], path: Path, clock: Clock | None = None
 ) -> list[Any]:
-    """Return what the file `path` says of the records, as `write_content` takes it."""
+    """Return the content of the file `path`, for `write_content`."""
     rows = [_row(record, clock) for record in records]
     if is_json(path):
         return [_item(row) for row in rows]
@@ -231,7 +231,7 @@ def records_content(
 
 
 def join_records(videos: Mapping[str, list[Any]], target: Path) -> None:
-    """Write one file over many videos, from the content for each; each record gets its video."""
+    """Write one file for many videos, from the content for each; records have their video."""
     if is_json(target):
         items = [{VIDEO: name, **item} for name, items in videos.items() for item in items]
         write_content(target, items)
@@ -240,7 +240,7 @@ def join_records(videos: Mapping[str, list[Any]], target: Path) -> None:
 
 
 def _row(record: VehicleRecord, clock: Clock | None) -> dict[str, Any]:
-    """Return the values of a record by the names of the columns."""
+    """Return the values of a record by column."""
     begin = plain_moment(clock and clock.at(round(record.first, 3)))
     times = round(record.first, 6), round(record.last, 6), round(record.seconds, 3)
     states = [record.states[state] for state in get_args(State)]
@@ -259,7 +259,7 @@ def _row(record: VehicleRecord, clock: Clock | None) -> dict[str, Any]:
 
 
 def _item(row: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a row as values for JSON, with the path and the largest box as objects."""
+    """Return a row for JSON, with the path and the largest box as objects."""
 
     def values(*names: str) -> dict[str, Any]:
         return {name: row[name] for name in names}
@@ -270,19 +270,16 @@ def _item(row: Mapping[str, Any]) -> dict[str, Any]:
     return values(*_COLUMNS[:11]) | places | values(*_COLUMNS[-7:])
 
 
-_PADDING = 0.1  # margin around a vehicle, as a fraction of the width and the height of its box
-_MINIMUM = 24  # shortest side of a box that gets a picture, pixels
+_PADDING = 0.1  # margin around a vehicle, as a fraction of the width and height of its box
+_MIN_SIDE = 24  # minimum side of a box that gets an image, pixels
 
 _Merit = tuple[bool, float]
-"""Whether the vehicle is whole in the frame; its area in pixels times its score."""
+"""Whether the frame shows the whole vehicle; its area in pixels times its score."""
 
 
 @dataclass(frozen=True, slots=True)
 class Crop:
-    """A picture of a vehicle.
-
-    `time` is that of the frame in seconds, `image` BGR uint8 `(H, W, 3)`.
-    """
+    """An image of a vehicle: `time` of the frame in seconds, and BGR uint8 `(H, W, 3)`."""
 
     id: int
     time: float
@@ -290,10 +287,10 @@ class Crop:
 
 
 class BestCrops:
-    """Finds the best picture of each vehicle, frame by frame.
+    """Finds the best image of each vehicle, frame by frame.
 
-    It keeps pictures only of vehicles that the last frame shows. Those of other vehicles are
-    returned, so the memory does not grow with the length of the video.
+    Only images of vehicles in the last frame are kept in memory. The others are returned, so memory
+    does not grow with the length of the video.
     """
 
     def __init__(self) -> None:
@@ -305,8 +302,8 @@ class BestCrops:
 
         Returns
         -------
-        The best pictures so far of the vehicles that this frame no longer shows. If a vehicle comes
-        back and gets a better picture, it is returned again.
+        The best images so far of the vehicles that this frame no longer shows. If a vehicle
+        reappears and gets a better image, it is returned again.
         """
         shown = {track.id for track in frame.tracks}
         gone = [self._best.pop(number) for number in sorted(self._best.keys() - shown)]
@@ -318,14 +315,14 @@ class BestCrops:
         return gone
 
     def end(self) -> list[Crop]:
-        """Return the pictures of the vehicles that the last frame shows."""
+        """Return the images of the vehicles that the last frame shows."""
         return [crop for _, crop in sorted(self._best.items())]
 
 
 def _merit(track: Track, picture: Picture) -> _Merit | None:
-    """Return None where the vehicle was not seen, or is too small."""
+    """Return None if the vehicle is not detected in this frame, or too small."""
     box = track.box.rounded
-    if track.state != "detected" or min(box.width, box.height) < _MINIMUM:
+    if track.state != "detected" or min(box.width, box.height) < _MIN_SIDE:
         return None
     inside = box.x2 < picture.width and box.y2 < picture.height
     is_whole = inside and min(box.x1, box.y1) > 0
