@@ -30,7 +30,7 @@ from vdet.detect.onnx.recognition import Calibration, read_header
 from vdet.detect.onnx.session import Session
 from vdet.detect.protocol import DetectorModel
 from vdet.evaluate.comparison import MATCH_IOU, ComparedFrame
-from vdet.evaluate.images import Counting, MeasuredImage, evaluate_images
+from vdet.evaluate.images import Counting, MeasuredImage, best_f1, evaluate_images
 from vdet.evaluate.output import RunName, figure, table
 from vdet.evaluate.report import video_report
 from vdet.evaluate.scores import RankedPredictions
@@ -257,14 +257,9 @@ def _scores(rows: Sequence[Finding], name: str | None, objects: int) -> dict[str
     """Return the scores of detections; with a name, those are right that find its class."""
     right = [row.found is not None if name is None else row.found == name for row in rows]
     result = ranked(rows, right, objects)
-    values = result.f1_at(result.scores) if len(rows) else np.zeros(1)
-    at = float(result.scores[np.argmax(values)]) if len(rows) else 0.0
-    return {
-        "objects": objects,
-        "best_f1": float(values.max()),
-        "at_score": at,
-        "ap50": result.average_precisions()[0],
-    }
+    best, at_score = best_f1([result])
+    ap50, _ = result.average_precisions()
+    return {"objects": objects, "best_f1": best, "at_score": at_score, "ap50": ap50}
 
 
 def summary_lines(name: str, summary: dict[str, Any]) -> Iterator[str]:

@@ -80,7 +80,7 @@ def test_the_shipped_model_classifies_the_last_patches_of_every_folder(
     extractor = FeatureExtractor(shipped.model.features)
     side = shipped.model.features.patch
     patches = read_patches(chosen)
-    vectors = extractor.describe_all(to_patch(p, side) for p in patches if p is not None)
+    vectors = np.stack([extractor.describe(to_patch(p, side)) for p in patches if p is not None])
     assert len(vectors) == len(chosen) > 300
     predicted = shipped.model.probabilities(vectors) >= 0.5
     assert np.mean(predicted == [file.vehicle for file in chosen]) >= 0.95

@@ -129,8 +129,8 @@ class ImagesResult:
             total = sum(getattr(score, name) for score in scores)
             is_count = isinstance(total, int)
             means[name] = total if is_count else fmean(getattr(item, name) for item in known)
-        best_f1, best_score = _best([source.ranked for source in self.sources])
-        return ImageScores(**means | {"best_f1": best_f1, "best_score": best_score})
+        best, at_score = best_f1([source.ranked for source in self.sources])
+        return ImageScores(**means | {"best_f1": best, "best_score": at_score})
 
     @property
     def comparison(self) -> Comparison:
@@ -184,11 +184,11 @@ def score_source(labelled: LabelledPictures, images: Sequence[MeasuredImage]) ->
     found = score_boxes(pool([image.shown for image in images]))
     ranked = rank_predictions(pool([image.every for image in images]))
     counts, precisions = (len(images), ranked.vehicles), ranked.average_precisions()
-    scores = ImageScores(*found, *counts, *precisions, *_best([ranked]))
+    scores = ImageScores(*found, *counts, *precisions, *best_f1([ranked]))
     return MeasuredSet(labelled, tuple(images), ranked, scores)
 
 
-def _best(sources: Sequence[RankedPredictions]) -> tuple[float, float]:
+def best_f1(sources: Sequence[RankedPredictions]) -> tuple[float, float]:
     """Return the highest mean F1 at any one score, and that score; 0 without vehicles."""
     known = [ranked for ranked in sources if ranked.vehicles and len(ranked.scores)]
     if not known:

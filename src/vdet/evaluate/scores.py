@@ -9,7 +9,7 @@ import numpy as np
 
 from vdet.boxes import BoolArray, Float64Array
 from vdet.detect.classes import OUR_NAMES, UNKNOWN
-from vdet.evaluate import comparison as metrics
+from vdet.evaluate import tracking
 from vdet.evaluate.comparison import ComparedFrame, Comparison, compare, counts
 from vdet.labels.label import LabelledVideo
 
@@ -121,18 +121,18 @@ def score_comparison(comparison: Comparison) -> Scores:
     boxes, vehicles = int(lengths.sum()), len(lengths)
     found = counts((frame.found for frame in comparison.frames), vehicles) / lengths
     tracked, lost = int(np.sum(found > _MOSTLY_TRACKED)), int(np.sum(found < _MOSTLY_LOST))
-    delays = metrics.delays(comparison)
+    delays = tracking.delays(comparison)
     known = [delay for delay in delays if delay is not None]
-    switches, agreeing = metrics.id_switches(comparison), metrics.identity_matches(comparison)
+    switches, agreeing = tracking.id_switches(comparison), tracking.identity_matches(comparison)
     precisions = rank_predictions(comparison).average_precisions()
-    mota, gaps = ratio(matches - alarms - switches, boxes), metrics.fragmentations(comparison)
+    mota, gaps = ratio(matches - alarms - switches, boxes), tracking.fragmentations(comparison)
     covered = tracked, vehicles - tracked - lost, lost
     identity = ratio(2 * agreeing, boxes + shown), ratio(agreeing, shown), ratio(agreeing, boxes)
     sizes = vehicles, boxes, len(comparison.track_ids), shown
     waits = delays, fmean(known) if known else None
     matched = *detection, *precisions, mota, overlap, switches, gaps, *covered, *identity
     false = len(comparison.false_tracks())
-    return Scores(*matched, *metrics.hota(comparison), *sizes, *waits, false)
+    return Scores(*matched, *tracking.hota(comparison), *sizes, *waits, false)
 
 
 def ratio(part: float, whole: float) -> float:

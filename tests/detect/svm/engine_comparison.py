@@ -69,7 +69,7 @@ def fitted(features: FeatureSettings, members: int = 1) -> LinearModel:
     """Fit a model by ridge regression, each member on other patches."""
     patches, labels = _patches()
     extractor = FeatureExtractor(features)
-    vectors = extractor.describe_all(to_patch(patch, features.patch) for patch in patches)
+    vectors = np.stack([extractor.describe(to_patch(patch, features.patch)) for patch in patches])
     parts = [np.arange(len(labels)) % (members + 1) != i for i in range(members)]
     fits = [_ridge(vectors[part].astype(np.float64), labels[part]) for part in parts]
     weights, biases = (np.array(item, np.float32) for item in zip(*fits, strict=True))

@@ -3,8 +3,6 @@
 Source: Dalal & Triggs, "Histograms of Oriented Gradients for Human Detection", 2005.
 """
 
-from collections.abc import Iterable
-
 import cv2
 import numpy as np
 import numpy.typing as npt
@@ -49,11 +47,6 @@ class FeatureExtractor:
         hogs = [np.ravel(hog.compute(channel)) for hog, channel in pairs]
         histograms = [histogram(channel, self.settings.histogram.bins) for channel in channels]
         return np.concatenate([*hogs, *histograms], dtype=np.float32)
-
-    def describe_all(self, patches: Iterable[Image]) -> Float32Array:
-        """Compute the features of patches one by one; float32 `(n, settings.length)`."""
-        vectors = [self.describe(patch) for patch in patches]
-        return np.reshape(vectors, (-1, self.settings.length)).astype(np.float32, copy=False)
 
 
 def split(image: Image, settings: FeatureSettings) -> Channels:

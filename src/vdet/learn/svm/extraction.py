@@ -110,7 +110,7 @@ def extract(
             yield [whole, *(augment(whole, rng) if augmented else ())]
 
     def describe(same: Sequence[PatchSample]) -> Float32Array:
-        return extractor.describe_all(to_patch(item.image, features.patch) for item in same)
+        return np.stack([extractor.describe(to_patch(item.image, features.patch)) for item in same])
 
     vectors: list[Float32Array] = []
     labels: list[tuple[bool, Float32Array, int]] = []
