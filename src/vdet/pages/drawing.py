@@ -62,8 +62,8 @@ class Drawing:
         height, width = image.shape[:2]
         self._image, self._frames, self._size = image, frames, (width, height)
         self._settings, self._values = settings, values
-        confirmed, every = settings.traffic.min_seen_seconds, link_tracks(frames, width, height)
-        self.paths: list[VehiclePath] = [item for item in every if item.seconds >= confirmed]
+        minimum, linked = settings.traffic.min_seen_seconds, link_tracks(frames, width, height)
+        self.paths: list[VehiclePath] = [path for path in linked if path.seconds >= minimum]
         self.proposals: tuple[ProposedLine, ...] = propose_lines(self.paths, width, height, facing)
 
     def output(self, path: Path, name: str) -> bytes:

@@ -22,17 +22,17 @@ from vdet.traffic.crossings import (
 )
 from vdet.traffic.linking import MAX_GAP, TrackLinker, VehiclePath
 
-_OLDEST = 0.2
+_MAX_AGE = 0.2
 """Seconds after which running counts are recomputed."""
-_NEAR = 0.5
+_NEAR_LINE = 0.5
 """Distance within which the end of a track is at a line, in heights of its box."""
-_FEW = 0.05
+_FEW_WRONG = 0.05
 """Fraction of the crossings of a line up to which wrong tracks there cause no warning."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Passage:
-    """What a vehicle did: its events, and by line or zone the heights of its box then, pixels.
+    """The events of a vehicle, and by line or zone the heights of its box at these, pixels.
 
     `missed` are the lines at which its path begins or ends without crossing them.
     """
@@ -47,8 +47,8 @@ class VehicleCounter:
 
     Parameters
     ----------
-    begun
-        Number of vehicles before the first one.
+    started
+        Number of vehicles counted before.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class VehicleCounter:
     spans
         The parts with video, seconds.
     linker
-        Counts how many vehicles have begun.
+        Knows how many vehicles have started.
 
     Raises
     ------
@@ -65,12 +65,12 @@ class VehicleCounter:
         `camera.size` has another aspect ratio than `width` × `height` pixels.
     """
 
-    def __init__(self, settings: Settings, width: int, height: int, begun: int = 0) -> None:
+    def __init__(self, settings: Settings, width: int, height: int, started: int = 0) -> None:
         self._settings = settings
         self.lines, self.zones = place(settings.traffic, width, height)
         self.spans: list[Span] = []
         self._borders: tuple[Border, ...] = (*self.lines, *self.zones)
-        self.linker = TrackLinker(width, height, begun)
+        self.linker = TrackLinker(width, height, started)
         self._ended: list[_Passage] = []
         self._tally: Counter[Direction] = Counter()  # of those
         self._latest: FrameTracks | None = None
@@ -83,7 +83,8 @@ class VehicleCounter:
         self._latest = frame
         ended = self._passages(self.linker.add(frame))
         self._ended += ended
-        self._tally.update((event.name, event.direction) for some in ended for event in some.events)
+        events = (event for passage in ended for event in passage.events)
+        self._tally.update((event.name, event.direction) for event in events)
 
     def start_video(self) -> None:
         """Treat the ids of the next frames as other tracks, because they are of another video."""
@@ -103,16 +104,16 @@ class VehicleCounter:
     def so_far(self) -> Counter[Direction]:
         """Return the count of each direction so far; vehicles in a zone have not left it.
 
-        The counts may be `_OLDEST` seconds old, so that this can be called for each frame.
+        The counts may be `_MAX_AGE` seconds old, so that this can be called for each frame.
         """
         now = self.spans[-1][1]
-        if now - self._counted >= _OLDEST:
+        if now - self._counted >= _MAX_AGE:
             self._counted = now
             still = self._passages(self.linker.open_paths())
             self._so_far = self._tally + Counter(
                 (event.name, event.direction)
-                for some in still
-                for event in some.events
+                for passage in still
+                for event in passage.events
                 if event.direction != VANISH or now - event.time > MAX_GAP
             )
         return self._so_far
@@ -128,11 +129,11 @@ class VehicleCounter:
         last, (start, _), (_, now) = path.seen - 1, self.spans[0], self.spans[-1]
         # The ends of the path, except at the ends of the video.
         rows = [row for row in (0, last) if start < path.times[row] < now]
-        points, reach = path.points[rows], _NEAR * path.heights[rows]
+        points, reach = path.points[rows], _NEAR_LINE * path.heights[rows]
         events, heights = list[Event](), {}
-        for name, some in found.items():
-            events += [_event(path, name, crossing) for crossing in some]
-            heights[name] = path.heights[[crossing.row for crossing in some]].tolist()
+        for name, crossed in found.items():
+            events += [_event(path, name, crossing) for crossing in crossed]
+            heights[name] = path.heights[[crossing.row for crossing in crossed]].tolist()
         others = [line for line in self.lines if not found[line.name]]
         missed = [line.name for line in lines_near(others, points, reach)]
         return _Passage(events, heights, missed)
@@ -150,7 +151,7 @@ def _line_warnings(lines: Sequence[PlacedLine], passages: Sequence[_Passage]) ->
     """Yield a sentence for each problem of a line that the tracks of a run show."""
     for line in lines if passages else ():
         found = [heights for passage in passages if (heights := passage.heights[line.name])]
-        few = _FEW * len(found)
+        few = _FEW_WRONG * len(found)
         missed = sum(line.name in passage.missed for passage in passages)
         again = sum(len(heights) > 1 for heights in found)
         if not found:

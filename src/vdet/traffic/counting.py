@@ -68,9 +68,9 @@ def count_files(
         clock = find_clock(path, settings, None, saved.times.get(0, 0.0), saved.begin)
         place = _size(settings, size or saved.size)
         first = min(saved.times.values(), default=None)
-        if group is None or not group.goes_on(place, clock, first):
+        if group is None or not group.precedes(place, clock, first):
             counted |= group.counts() if group else {}
-            group = _Group(settings, place, group.counter.linker.begun if group else 0)
+            group = _Group(settings, place, group.counter.linker.started if group else 0)
         group.add(str(path), clock, first or 0.0, saved)
         advance(1)
     return counted | (group.counts() if group else {})
@@ -115,14 +115,14 @@ class _Video:
 class _Group:
     """Videos that follow one another, with one counter."""
 
-    def __init__(self, settings: Settings, size: tuple[int, int], begun: int = 0) -> None:
+    def __init__(self, settings: Settings, size: tuple[int, int], started: int = 0) -> None:
         settings.camera.check_frames(*size)
         self._size = size
         self._ground = ground_of(settings.camera, *size)
-        self.counter = VehicleCounter(settings, *size, begun)
+        self.counter = VehicleCounter(settings, *size, started)
         self._videos: list[_Video] = []
 
-    def goes_on(self, size: tuple[int, int], clock: Clock | None, first: float | None) -> bool:
+    def precedes(self, size: tuple[int, int], clock: Clock | None, first: float | None) -> bool:
         """Return whether a video follows the last one; `first` is the time of its first frame."""
         before = self._videos[-1]
         if not (clock and before.clock and first is not None and size == self._size):
@@ -143,7 +143,7 @@ class _Group:
             if first + shift - before.end < _SEAM:
                 shift = before.end + _STEP - first
             self.counter.start_video()
-        begun, latest = len(self.counter.spans), -math.inf
+        span_count, latest = len(self.counter.spans), -math.inf
         for frame in frames:
             if not latest <= frame.time < math.inf:
                 raise TruthError(
@@ -154,7 +154,7 @@ class _Group:
             self.counter.update(replace(frame, time=latest + shift) if shift else frame)
             if meter:
                 meter.add(frame)
-        new = self.counter.spans[begun:] or [(first + shift, first + shift)]
+        new = self.counter.spans[span_count:] or [(first + shift, first + shift)]
         spans = tuple((round(begin - shift, 6), round(end - shift, 6)) for begin, end in new)
         self._videos.append(_Video(name, clock, spans, shift, meter))
 

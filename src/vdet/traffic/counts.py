@@ -301,9 +301,9 @@ def zone_table(videos: Sequence[Counts], interval: int | None = None) -> list[Zo
                 visit = time, 1 if event.direction in _IN else -1, event.seconds
                 visits[intervals.number_at(time)].append(visit)
         inside = 0
-        for number, some in visits.items():
-            rows.append(_zone_row(name, intervals, number, some, inside))
-            inside += sum(change for _, change, _ in some)
+        for number, changes in visits.items():
+            rows.append(_zone_row(name, intervals, number, changes, inside))
+            inside += sum(change for _, change, _ in changes)
     return rows
 
 

@@ -122,12 +122,12 @@ class TrackLinker:
 
     Attributes
     ----------
-    begun
+    started
         Number of vehicles so far, including those of another linker whose numbers it continues.
     """
 
-    def __init__(self, width: int, height: int, begun: int = 0) -> None:
-        self.begun = begun
+    def __init__(self, width: int, height: int, started: int = 0) -> None:
+        self.started = started
         self._size = width, height
         self._now = -math.inf
         self._vehicles: dict[int, _Vehicle] = {}  # by the id of the track
@@ -144,8 +144,8 @@ class TrackLinker:
             vehicle = self._vehicles.get(track.id) or self._begin(track, lost)
             vehicle.add(track, self._now, frame.index)
             if vehicle.has_turned():
-                self.begun += 1
-                self._vehicles[track.id] = vehicle.split(self.begun)
+                self.started += 1
+                self._vehicles[track.id] = vehicle.split(self.started)
                 paths.append(vehicle.path(self._now))
             self._vehicles[track.id].classes[track.id] = track.class_name
         return paths
@@ -188,8 +188,8 @@ class TrackLinker:
         if near:
             vehicle = self._vehicles.pop(min(near, key=itemgetter(0))[1])
         else:
-            self.begun += 1
-            vehicle = _Vehicle(self.begun, track.box, self._now)
+            self.started += 1
+            vehicle = _Vehicle(self.started, track.box, self._now)
         vehicle.tracks.append((self._now, track.id))
         self._vehicles[track.id] = vehicle
         return vehicle

@@ -174,9 +174,9 @@ class _Streams:
         high = min([high + _MARGIN * height, *((high + beside[beside > high]) / 2)])
         ends = np.clip(np.rint([base + low * across, base + high * across]), 0, self._size)
         start, end = map(tuple, ends.tolist())
-        who = np.unique(numbers[own])
-        others = np.setdiff1d(numbers[at[(beside >= low) & (beside <= high)]], who)
-        return _Candidate((start, end), heading, place, who, others) if start != end else None
+        vehicles = np.unique(numbers[own])
+        others = np.setdiff1d(numbers[at[(beside >= low) & (beside <= high)]], vehicles)
+        return _Candidate((start, end), heading, place, vehicles, others) if start != end else None
 
 
 def _spaced(path: VehiclePath, spacing: float) -> Float64Array:

@@ -141,8 +141,8 @@ class VehicleRecord:
             self.followed.clear()
         if track.state != "predicted" or only_lost:
             self._go_to(track.foot)
-            goes_on = bool(self.followed) and self.followed[-1][1] == before
-            first = self.followed.pop()[0] if goes_on else time
+            continues = bool(self.followed) and self.followed[-1][1] == before
+            first = self.followed.pop()[0] if continues else time
             self.followed.append((first, time))
         self.states[track.state] += 1
 

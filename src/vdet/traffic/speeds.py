@@ -24,9 +24,9 @@ from vdet.traffic.counts import Counts
 from vdet.traffic.crossings import PlacedLine
 
 WINDOW = 1.0
-"""Seconds of a path that give one velocity."""
+"""Length of the part of a path that a velocity is fitted to, seconds."""
 MIN_SECONDS = 0.5
-"""Minimum seconds of a path that give a speed."""
+"""Minimum duration of a path with a speed, seconds."""
 KMH = 3.6
 """km/h in 1 m/s."""
 
@@ -35,36 +35,37 @@ _SLIMNESS = 0.4
 _LENGTHS = 1.5, 20.0
 """Lengths of vehicles, metres."""
 _OUTLIERS = 0.1, 4.0
-"""Distances of a place from the line up to which it is kept: in heights of the box, and in median
-distances; the larger one counts."""
+"""Maximum distance of a place from the line: in heights of the box, or in median distances; the
+larger one applies.
+"""
 _FOOT_ERROR = 0.03
 """Standard deviation of the height at which a box ends, as a fraction of its height."""
-_MAX_ALIKE = 0.9
-"""Largest correlation of neighbouring places that is believed."""
+_MAX_CORRELATION = 0.9
+"""Maximum correlation of neighbouring places that is assumed."""
 _MOVES = 1.0
-"""Minimum speed of a vehicle that heads somewhere, m/s."""
+"""Minimum speed at which the heading of a vehicle is known, m/s."""
 _MIN_DISTANCE = 1.0
-"""Shortest distance of which a relative error is taken, metres."""
+"""Minimum distance for a relative error, metres."""
 _GONE = 10.0
-"""Seconds after which a vehicle that is not shown has ended."""
+"""Seconds after its last frame at which a vehicle is measured."""
 _SPACING = 0.2
 """Minimum seconds between the speeds that are kept."""
 _AROUND = np.array([(0, 0), (0, 1), (1, 0)])
 """Offsets to a pixel, the one above it and the one to its left."""
-_COLUMNS = 5  # of what is known of a vehicle in a frame
+_COLUMNS = 5  # numbers stored for a vehicle in a frame
 _NOTHING = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Speeds:
-    """Where a vehicle is, in metres, and how fast it is at each of its `times`, float64 `(n,)`.
+    """The places and speeds of a vehicle at some `times`, seconds, float64 `(n,)`.
 
     Attributes
     ----------
     places
-        `(n, 2)`, as measured, metres.
+        As measured, metres, `(n, 2)`.
     speeds, deviations
-        Smoothed, and the standard deviation from the scatter of the places, m/s.
+        Smoothed speeds, and their standard deviations from the scatter of the places, m/s.
     common
         Relative standard deviation that all speeds of the vehicle share.
     """
@@ -96,7 +97,7 @@ class Speeds:
         return float(np.hypot(scatter, self.common * self.quantile(0.5)))
 
     def at(self, time: float) -> tuple[float, float] | None:
-        """Return the speed and its standard deviation at a time, m/s; None where it is unknown."""
+        """Return the speed and its standard deviation at a time, m/s; None if unknown."""
         if not self.times[0] <= time <= self.times[-1]:
             return None
         known = self.speeds, self.deviations
@@ -104,9 +105,9 @@ class Speeds:
         return speed, float(np.hypot(scatter, self.common * speed))
 
     def between(self, first: float, last: float) -> float | None:
-        """Return the mean speed from the place at a time to that at a later one, m/s.
+        """Return the mean speed between the places at two times, m/s; None if one is unknown.
 
-        It uses these two places only, so it checks the smoothed speeds. None where one is unknown.
+        It uses only these two places, so it checks the smoothed speeds.
         """
         if not self.times[0] <= first < last <= self.times[-1]:
             return None
@@ -121,12 +122,12 @@ class Speeds:
 
 
 class SpeedMeter:
-    """Measures the speeds of the vehicles of one video, from frame to frame.
+    """Measures the speeds of the vehicles of a video, frame by frame.
 
     Parameters
     ----------
     ground
-        The road plane, which is kept.
+        The road plane.
     width, height
         Size of the frames, pixels.
     """
@@ -138,7 +139,7 @@ class SpeedMeter:
         self._known: dict[int, Speeds | None] = {}
 
     def add(self, frame: FrameTracks) -> None:
-        """Add the next frame. Lost vehicles, and those that the frame cuts off, are left out."""
+        """Add the next frame. Predicted boxes, and those cut off by the frame, are omitted."""
         left, right, bottom = self._sides
         for track in frame.tracks:
             box = track.box
@@ -151,7 +152,7 @@ class SpeedMeter:
             del self._rows[number]
 
     def speeds(self) -> dict[int, Speeds]:
-        """Return the speeds so far of the vehicles by their ids, where they are known."""
+        """Return the known speeds so far, by the ids of the vehicles."""
         known = self._known | {number: self._measured(number) for number in self._rows}
         return {number: speeds for number, speeds in known.items() if speeds}
 
@@ -166,15 +167,13 @@ def with_speeds(counts: Counts, meter: SpeedMeter | None) -> Counts:
         return counts
     known = meter.speeds()
     latest: dict[int, float] = {}
-    events = []
-    for event in counts.events:
-        values: list[float | None] = [None] * 3
+    events = list(counts.events)
+    for row, event in enumerate(events):
         if speeds := known.get(event.id):
             mean = speeds.between(latest.get(event.id, math.inf), event.time)
-            values = [*(speeds.at(event.time) or (None, None)), mean]
-        latest[event.id] = event.time
-        speed, deviation, mean = map(_kmh, values)
-        events.append(replace(event, speed=speed, speed_sd=deviation, mean_speed=mean))
+            speed, deviation, mean = map(_kmh, (*(speeds.at(event.time) or (None, None)), mean))
+            events[row] = replace(event, speed=speed, speed_sd=deviation, mean_speed=mean)
+            latest[event.id] = event.time
     return replace(counts, events=tuple(events))
 
 
@@ -199,22 +198,22 @@ def measure(ground: Ground, rows: Float64Array) -> Speeds | None:
 
     `rows` are time, x and y of the foot, width and height of the box, `(n, 5)`.
     """
-    rows = rows[np.isfinite(_Sight.of(ground, rows).weights)]
+    rows = rows[np.isfinite(_Geometry.of(ground, rows).weights)]
     if len(rows) < 3 or rows[-1, 0] - rows[0, 0] < MIN_SECONDS:
         return None
-    seen = _Sight.of(ground, rows)
-    _, fitted, _ = seen.lines(seen.places)
-    off = np.hypot(*(seen.places - fitted).T) * np.sqrt(seen.weights)  # in heights of the box
-    is_near = off <= max(_OUTLIERS[0], _OUTLIERS[1] * float(np.median(off)))
-    seen = _Sight.of(ground, rows[is_near])
-    rough, *_ = seen.lines(seen.places)
-    middles = seen.middles(rough)
-    velocities, _, deviations = seen.lines(middles)
-    speeds = np.hypot(*velocities.T)
-    at = np.arange(seen.times[0], seen.times[-1] + _SPACING, _SPACING)
-    thin = np.unique(np.minimum(np.searchsorted(seen.times, at), len(speeds) - 1))
-    common = _common(ground, rows[is_near])
-    return Speeds(seen.times[thin], middles[thin], speeds[thin], deviations[thin], common)
+    whole = _Geometry.of(ground, rows)
+    _, fitted, _ = whole.lines(whole.places)
+    off = np.hypot(*(whole.places - fitted).T) * np.sqrt(whole.weights)  # in heights of the box
+    rows = rows[off <= max(_OUTLIERS[0], _OUTLIERS[1] * float(np.median(off)))]
+    clean = _Geometry.of(ground, rows)
+    rough, *_ = clean.lines(clean.places)
+    middles = clean.middles(rough)
+    velocities, _, deviations = clean.lines(middles)
+    speeds, times = np.hypot(*velocities.T), clean.times
+    at = np.arange(times[0], times[-1] + _SPACING, _SPACING)
+    kept = np.unique(np.minimum(np.searchsorted(times, at), len(times) - 1))
+    common = _common(ground, rows)
+    return Speeds(times[kept], middles[kept], speeds[kept], deviations[kept], common)
 
 
 def _common(ground: Ground, rows: Float64Array) -> float:
@@ -232,12 +231,12 @@ def _common(ground: Ground, rows: Float64Array) -> float:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Sight:
-    """How a vehicle is seen: its `places` in metres, and what a pixel amounts to there.
+class _Geometry:
+    """The `places` of a vehicle in metres, `(n, 2)`, and the geometry of the pixels there.
 
-    `depth` points across the rows of pixels, away from the camera, with length 1. `away` points
-    along a column, and is 1 m deep. Both are `(n, 2)`. `widths` are those of the box in metres,
-    `weights` those of the places.
+    `depth` is the unit vector across the rows of pixels, away from the camera. `away` points along
+    a column of pixels, and is 1 m deep. Both are `(n, 2)`. `widths` are the widths of the box in
+    metres, `weights` the weights of the places, `(n,)`.
     """
 
     times: Float64Array
@@ -248,8 +247,8 @@ class _Sight:
     weights: Float64Array
 
     @classmethod
-    def of(cls, ground: Ground, rows: Float64Array) -> "_Sight":
-        """Return the sight for all `rows` of `measure`; weights are NaN where it is unknown."""
+    def of(cls, ground: Ground, rows: Float64Array) -> "_Geometry":
+        """Return the geometry for all `rows` of `measure`; unknown weights are NaN."""
         around = rows[:, 1:3] - _AROUND[:, np.newaxis]
         places, above, left = ground.place(around.reshape(-1, 2)).reshape(around.shape)
         away, beside = above - places, left - places
@@ -261,9 +260,9 @@ class _Sight:
         return cls(rows[:, 0], places, depth, away, pixel * rows[:, 3], weights)
 
     def middles(self, velocities: Float64Array) -> Float64Array:
-        """Return the vehicle's centres on the road, `(n, 2)`.
+        """Return the vehicle's centres on the road, metres, `(n, 2)`.
 
-        While it stands, its heading is that of its movement before or after.
+        While it stands, its heading is interpolated between those before and after.
         """
         speeds = np.hypot(*velocities.T)
         moves = speeds >= _MOVES
@@ -309,7 +308,7 @@ class _Sight:
             fitted[:, axis] = origin[axis] + mean + velocities[:, axis] * (t - middle)
         heading = velocities / np.maximum(np.hypot(*velocities.T), _NOTHING)[:, None]
         off = np.sum((places - fitted) * heading, axis=1) * np.sqrt(weights)
-        alike = np.sum(off[1:] * off[:-1]) / max(float(np.sum(off**2)), _NOTHING)
-        alike = float(np.clip(alike, 0, _MAX_ALIKE))
-        variance = np.mean(off**2) * (1 + alike) / (1 - alike)
+        products = float(np.sum(off[1:] * off[:-1])) / max(float(np.sum(off**2)), _NOTHING)
+        correlation = min(max(0.0, products), _MAX_CORRELATION)
+        variance = np.mean(off**2) * (1 + correlation) / (1 - correlation)
         return velocities, fitted, np.sqrt(variance / spread)
