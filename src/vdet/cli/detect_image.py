@@ -11,6 +11,7 @@ from vdet.cli import options
 from vdet.cli.command import command
 from vdet.cli.messages import print_lines, progress_steps
 from vdet.errors import ImageError, counted, failure_code
+from vdet.workers import PICTURES, core_count, return_freed_memory
 
 if TYPE_CHECKING:
     from vdet.run.result import FrameResult
@@ -64,7 +65,6 @@ def detect_image(
     from vdet.regions import check_masks
     from vdet.run.pictures import PictureSearch, find_images, plan_pictures, run_pictures
     from vdet.run.sinks.protocol import check_sinks
-    from vdet.workers import PICTURES, core_count, return_freed_memory
 
     return_freed_memory(*PICTURES)
     check_masks(settings.regions)

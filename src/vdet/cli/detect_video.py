@@ -17,12 +17,12 @@ from vdet.cli.messages import announce, print_lines, progress_steps
 from vdet.cli.results import check_counting, counting_options
 from vdet.errors import DOUBTFUL, counted, failure_code
 from vdet.run.sinks import Output
+from vdet.workers import DaskCluster, LocalProcesses, Workers, core_count
 
 if TYPE_CHECKING:
     from vdet.batch.manifest import Record
     from vdet.batch.run import Plan
     from vdet.run.video import Run
-    from vdet.workers import Workers
 
 log = logging.getLogger("vdet")
 
@@ -262,7 +262,6 @@ def _print_plan(plan: "Plan") -> int:
 def _process_batch(plan: "Plan", jobs: int | None, scheduler: str | None) -> tuple[int, bool]:
     """Process a batch; return the exit code, and whether a result is doubtful."""
     from vdet.batch.run import run_batch
-    from vdet.workers import DaskCluster, LocalProcesses, core_count
 
     cores = core_count()
     jobs = max(1, min(jobs or cores, len(plan.runs)))

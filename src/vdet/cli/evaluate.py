@@ -11,6 +11,7 @@ from vdet.cli import options
 from vdet.cli.command import command
 from vdet.cli.messages import progress_steps
 from vdet.cli.results import Results, facts_options, results_options
+from vdet.workers import PICTURES, core_count, return_freed_memory
 
 _data = click.argument("data", nargs=-1, required=True, type=options.INPUT, metavar="DATA...")
 
@@ -41,7 +42,6 @@ def images(data: tuple[Path, ...], min_width: float, **targets: Any) -> None:
     from vdet.evaluate.report import images_report
     from vdet.labels.reading import read_labelled_pictures
     from vdet.labels.roles import Roles
-    from vdet.workers import PICTURES, core_count, return_freed_memory
 
     return_freed_memory(*PICTURES)
     detector, roles = settings.detector, Roles.from_settings(settings)

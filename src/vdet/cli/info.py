@@ -16,6 +16,7 @@ from vdet.cli.options import INPUT, config_names, read_settings, settings_option
 from vdet.cli.results import Results, facts_options
 from vdet.errors import counted, in_one_line, opencv_fault, printable
 from vdet.version import __version__
+from vdet.workers import core_count
 
 Facts = dict[str, Any]
 """Values for JSON by name; each is also a line of text."""
@@ -65,7 +66,6 @@ def info(path: Path | None, **targets: Any) -> int:
 def _machine() -> Facts:
     """Return the state of everything that vdet needs, and whether all of it works."""
     from vdet.config.loading import shipped_configs
-    from vdet.workers import core_count
 
     found = {"vdet": f"{__version__}, on {core_count()} cores", **dict(_packages())}
     found["cv2"] = f"{_BROKEN}; {fault}" if (fault := opencv_fault()) else "ok"

@@ -9,6 +9,7 @@ from vdet.cli.command import command
 from vdet.cli.messages import live_bar, print_lines, progress_steps
 from vdet.errors import DataError, counted
 from vdet.files import check_output
+from vdet.workers import limit_library_threads
 
 
 @command()
@@ -152,7 +153,6 @@ def train_net(
         raise DataError(f"{error.name} is not installed; pip install torch onnx") from error
     from vdet.labels.reading import read_labelled_pictures
     from vdet.labels.roles import Roles
-    from vdet.workers import limit_library_threads
 
     limit_library_threads()
     roles = Roles.for_training(settings)
