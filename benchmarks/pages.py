@@ -120,7 +120,7 @@ const whole = setInterval(() => {
 def index_page(path: Path, videos: int = 10_000, each: int = 10) -> None:
     """Write the page of a batch."""
     rng = np.random.default_rng(1)
-    still, written = jpeg_uri(STILL), []
+    still, written = jpeg_uri(STILL), dict[str, dict[str, object]]()
     for number in range(videos):
         rows = tuple(
             VehicleRow(
@@ -137,8 +137,8 @@ def index_page(path: Path, videos: int = 10_000, each: int = 10) -> None:
         facts = VideoFacts(
             seconds=600, frames=15000, vehicles=each, max_at_once=3, still=still, rows=rows
         )
-        name = f"day{number // 100}/clip{number:05}"
-        written.append((name, Path(f"{name}.page/page.html"), facts))
+        summary = {"folder": f"clip{number:05}.page", **facts.model_dump()}
+        written[f"day{number // 100}/clip{number:05}"] = summary
     write_index(written, path)
 
 

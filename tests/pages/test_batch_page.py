@@ -38,8 +38,11 @@ VIDEOS = {
 
 def index(folder: Path, videos: dict[str, VideoFacts]) -> str:
     """Write the page over these videos, and return it."""
-    pages = [(name, Path(f"{name}.page", "page.html"), found) for name, found in videos.items()]
-    write_index(pages, folder / "index.html")
+    summaries = {
+        name: {"folder": f"{Path(name).name}.page", **found.model_dump()}
+        for name, found in videos.items()
+    }
+    write_index(summaries, folder / "index.html")
     return (folder / "index.html").read_text(encoding="utf-8")
 
 

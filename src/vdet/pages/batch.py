@@ -5,7 +5,7 @@
 
 import json
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -161,10 +161,13 @@ def _plain_seconds(clock: str | None) -> int | None:
     return round(datetime.fromisoformat(clock).replace(tzinfo=UTC).timestamp())
 
 
-def write_index(videos: Sequence[tuple[str, Path, VideoFacts]], target: Path) -> None:
-    """Write the page over many videos, given by name, path of the page, and key figures."""
-    counts = sum((Counter(facts.counts) for _, _, facts in videos), Counter[str]())
-    linked = [(name, link_to(page, Path()), facts) for name, page, facts in videos]
+def write_index(videos: Mapping[str, Mapping[str, Any]], target: Path) -> None:
+    """Write the page over many videos, from the folder of each page and its `VideoFacts`."""
+    linked = []
+    for name, values in videos.items():
+        page = Path(name).parent / values["folder"] / PAGE_NAME
+        linked.append((name, link_to(page, Path()), VideoFacts(**values)))
+    counts = sum((Counter(facts.counts) for _, _, facts in linked), Counter[str]())
     parts = [Part(name, page, facts.start, facts.rows) for name, page, facts in linked]
-    page = render("index.html", videos=linked, counts=counts, table=table_json(parts))
-    write_text(target, page)
+    html = render("index.html", videos=linked, counts=counts, table=table_json(parts))
+    write_text(target, html)

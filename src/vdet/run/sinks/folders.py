@@ -1,11 +1,10 @@
 """The sinks that write a folder: `stages`, `crops`, `clips` and `page`."""
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
 
 from vdet.boxes import Image
 from vdet.config.rendering import render_settings
@@ -17,7 +16,7 @@ from vdet.lanes.road import stage_pictures
 from vdet.media import Picture
 from vdet.media.cutting import can_copy, copied_suffix, copy_part, encode_part
 from vdet.media.images import encode_image, is_picture_name
-from vdet.pages.batch import VideoFacts, write_index
+from vdet.pages.batch import write_index
 from vdet.pages.render import PAGE_NAME, jpeg_uri, link_to
 from vdet.pages.video import Player, VideoPage
 from vdet.regions import lay_regions
@@ -206,15 +205,7 @@ class PageSink(BaseSink):
         return [output.path for output in self.context.outputs if output.sink == sink]
 
 
-def _write_index(summaries: Mapping[str, dict[str, Any]], target: Path) -> None:
-    pages = [
-        (name, Path(name).parent / facts["folder"] / PAGE_NAME, VideoFacts(**facts))
-        for name, facts in summaries.items()
-    ]
-    write_index(pages, target)
-
-
-_INDEX = BatchTotal("index", _write_index, suffix=".html")
+_INDEX = BatchTotal("index", write_index, suffix=".html")
 PAGE = SinkKind(PageSink, what="pages", folder_pattern=PAGE_NAME, takes="videos", total=_INDEX)
 
 
