@@ -183,8 +183,17 @@ def score_source(labelled: LabelledPictures, images: Sequence[MeasuredImage]) ->
     """Return the scores of one source."""
     found = score_boxes(pool([image.shown for image in images]))
     ranked = rank_predictions(pool([image.every for image in images]))
-    counts, precisions = (len(images), ranked.vehicles), ranked.average_precisions()
-    scores = ImageScores(*found, *counts, *precisions, *best_f1([ranked]))
+    ap50, ap50_95 = ranked.average_precisions()
+    best, at_score = best_f1([ranked])
+    scores = ImageScores(
+        **vars(found),
+        images=len(images),
+        vehicles=ranked.vehicles,
+        ap50=ap50,
+        ap50_95=ap50_95,
+        best_f1=best,
+        best_score=at_score,
+    )
     return MeasuredSet(labelled, tuple(images), ranked, scores)
 
 

@@ -118,11 +118,12 @@ def worst_tiles(source: MeasuredSet) -> Iterator[Tile]:
     Raises `ImageError` if an image can no longer be read.
     """
     scored = [(score_boxes(image.shown), image) for image in source.images]
-    scored.sort(key=lambda pair: -pair[0][1] - pair[0][2])
-    for (_, alarms, misses, *_), image in scored[:_MAX_PICTURES]:
-        if alarms or misses:
+    scored.sort(key=lambda pair: -pair[0].false_positives - pair[0].misses)
+    for scores, image in scored[:_MAX_PICTURES]:
+        if scores.false_positives or scores.misses:
             (frame,), picture = image.shown.frames, image.picture
-            caption = f"{misses} missed, {counted(alarms, 'false alarm')}"
+            alarms = counted(scores.false_positives, "false alarm")
+            caption = f"{scores.misses} missed, {alarms}"
             yield Tile(_with_boxes(picture.read(), frame), picture.path.name, caption)
 
 

@@ -102,8 +102,8 @@ def score(prediction: LabelledVideo, truth: LabelledVideo) -> Scores:
     return score_comparison(compare(prediction, truth))
 
 
-def score_boxes(comparison: Comparison) -> tuple[int, int, int, float, float, float, float]:
-    """Score a comparison, ignoring ids and scores; return the fields of `DetectionScores`."""
+def score_boxes(comparison: Comparison) -> DetectionScores:
+    """Score a comparison, ignoring ids and scores."""
     frames = comparison.frames
     vehicles = sum(len(frame.vehicles) for frame in frames)
     tracks = sum(len(frame.tracks) for frame in frames)
@@ -111,28 +111,46 @@ def score_boxes(comparison: Comparison) -> tuple[int, int, int, float, float, fl
     overlap = sum(float(frame.iou[frame.rows, frame.columns].sum()) for frame in frames)
     precision, recall = ratio(matches, tracks), ratio(matches, vehicles)
     ratios = precision, recall, ratio(2 * matches, tracks + vehicles), ratio(overlap, matches)
-    return matches, tracks - matches, vehicles - matches, *ratios
+    return DetectionScores(matches, tracks - matches, vehicles - matches, *ratios)
 
 
 def score_comparison(comparison: Comparison) -> Scores:
     """Score a comparison: one video, or several that `pool` has joined."""
-    matches, alarms, *_, overlap = detection = score_boxes(comparison)
+    detection, delays = score_boxes(comparison), tracking.delays(comparison)
+    known = [delay for delay in delays if delay is not None]
     lengths, shown = comparison.vehicle_lengths(), int(comparison.track_lengths().sum())
     boxes, vehicles = int(lengths.sum()), len(lengths)
     found = counts((frame.found for frame in comparison.frames), vehicles) / lengths
     tracked, lost = int(np.sum(found > _MOSTLY_TRACKED)), int(np.sum(found < _MOSTLY_LOST))
-    delays = tracking.delays(comparison)
-    known = [delay for delay in delays if delay is not None]
     switches, agreeing = tracking.id_switches(comparison), tracking.identity_matches(comparison)
-    precisions = rank_predictions(comparison).average_precisions()
-    mota, gaps = ratio(matches - alarms - switches, boxes), tracking.fragmentations(comparison)
-    covered = tracked, vehicles - tracked - lost, lost
-    identity = ratio(2 * agreeing, boxes + shown), ratio(agreeing, shown), ratio(agreeing, boxes)
-    sizes = vehicles, boxes, len(comparison.track_ids), shown
-    waits = delays, fmean(known) if known else None
-    matched = *detection, *precisions, mota, overlap, switches, gaps, *covered, *identity
-    false = len(comparison.false_tracks())
-    return Scores(*matched, *tracking.hota(comparison), *sizes, *waits, false)
+    right = detection.matches - detection.false_positives - switches
+    ap50, ap50_95 = rank_predictions(comparison).average_precisions()
+    hota, deta, assa = tracking.hota(comparison)
+    return Scores(
+        **vars(detection),
+        ap50=ap50,
+        ap50_95=ap50_95,
+        mota=ratio(right, boxes),
+        motp=detection.mean_iou,
+        id_switches=switches,
+        fragmentations=tracking.fragmentations(comparison),
+        mostly_tracked=tracked,
+        partly_tracked=vehicles - tracked - lost,
+        mostly_lost=lost,
+        idf1=ratio(2 * agreeing, boxes + shown),
+        idp=ratio(agreeing, shown),
+        idr=ratio(agreeing, boxes),
+        hota=hota,
+        deta=deta,
+        assa=assa,
+        vehicles=vehicles,
+        vehicle_boxes=boxes,
+        tracks=len(comparison.track_ids),
+        track_boxes=shown,
+        delays=delays,
+        mean_delay=fmean(known) if known else None,
+        false_tracks=len(comparison.false_tracks()),
+    )
 
 
 def ratio(part: float, whole: float) -> float:

@@ -99,8 +99,7 @@ class NetworkDetector:
         """Return the boxes of the named classes, the first of `combined_classes`, unsuppressed."""
         raw = network.find(picture, self.settings.min_score)
         boxes = clipped(raw.boxes.astype(np.float64), (picture.width, picture.height))
-        is_known = (raw.classes >= 0) & (raw.classes < len(self.numbers))
-        numbers = self.numbers[np.where(is_known, raw.classes, -1)]
+        numbers = self.numbers[raw.classes.clip(-1, len(self.numbers) - 1)]
         keep = (numbers >= 0) & (numbers < len(names))
         keep &= (boxes[:, 2:] - boxes[:, :2] >= 1).all(axis=1)  # not with a NaN
         wanted = self.numbers[:-1, np.newaxis] == np.arange(len(names))
