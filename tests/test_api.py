@@ -385,5 +385,5 @@ def test_follow_may_be_left_while_a_frame_is_read(
 def test_a_tracker_refuses_times_that_do_not_increase(time: float) -> None:
     tracker = vdet.Tracker(640, 360)
     tracker.update(vdet.Boxes([], []), 0.5)
-    with pytest.raises(ValueError, match=r"^time: .* s is not after the 0\.5 s of"):
+    with pytest.raises(ValueError, match=r"^time: .* s; must be after the previous frame, 0\.5 s$"):
         tracker.update(vdet.Boxes([], []), time)

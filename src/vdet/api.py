@@ -97,6 +97,11 @@ def load_settings(config: Paths = (), assignments: Sequence[str] = ()) -> Settin
 class Detector:
     """Finds vehicles in single images; `follow` and the others also accept it as a detector.
 
+    Parameters
+    ----------
+    detector
+        A model file, a name such as "svm", or an object; None: as set.
+
     Raises
     ------
     ConfigError, ModelError
@@ -113,7 +118,6 @@ class Detector:
         """Find the vehicles in an image: the path of a file, or an array, BGR uint8 `(H, W, 3)`.
 
         Each image is searched on its own; `follow` also uses the other frames of a video.
-
         Raises `ImageError` if it cannot be read or is too small to search, `TypeError` or
         `ValueError` if it is neither a path nor such an array.
         """
@@ -164,7 +168,7 @@ class Tracker:
     def observe(self, detections: Boxes, time: float, image: Image | Picture | None = None) -> None:
         """Track the vehicles into the next frame; arguments and errors as for `update`."""
         if not self._time < time < math.inf:
-            raise ValueError(f"time: {time} s is not after the {self._time} s of the frame before")
+            raise ValueError(f"time: {time} s; must be after the previous frame, {self._time} s")
         picture = Picture(image) if isinstance(image, np.ndarray) else image
         self._tracker.observe(detections, time, picture)
         self._time = time
@@ -205,8 +209,7 @@ def follow(
     frames
         Maximum number of frames to process.
 
-    The video is opened when the first frame is requested; `VideoError` is raised then if it cannot
-    be read or searched.
+    Raises `VideoError` with the first frame if the video cannot be read or searched.
     """
     part = {"start": _exact(start), "end": _exact(end), "frames": frames}
     run, parts = _run(source, settings, detector, tracker, steps, **part)
@@ -328,8 +331,10 @@ def evaluate_tracks(tracks: PathName, truth: PathName, *, until: int | None = No
 
     Parameters
     ----------
+    tracks, truth
+        Files in any format that `vdet eval tracks` reads.
     until
-        Number of the last frame to use, from 1; None: the last one of the ground truth.
+        Number of the last frame to compare, from 1; None: the last one of the ground truth.
 
     Raises `TruthError` if a file cannot be used.
     """

@@ -100,12 +100,12 @@ def detect_video(
     page
         Write a report about the vehicles, page.html, into DIR. With -d, an ending such as .page.
     clips
-        Write a clip of each time in which vehicles are shown (with lines or zones: counted) into
-        DIR. With -d, an ending such as .clips.
+        Write a clip of each time span with vehicles into DIR; with lines or zones, only with
+        counted vehicles. With -d, an ending such as .clips.
     margin
         Time added to a clip before and after (`clips.margin`).
     exact
-        Cut clips at exact frames, which encodes them. By default, whole key-frame intervals are
+        Cut clips at exact frames by encoding them again. By default, whole key-frame intervals are
         copied (`clips.exact`).
     counts
         Write counts at lines and zones: .csv has the events, .totals.csv, .wide.csv and .zones.csv
