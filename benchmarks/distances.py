@@ -10,19 +10,17 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import pairwise, product
-from pathlib import Path
 
 import numpy as np
 
-from benchmarks.drawn_traffic import TruePlace, lane_view, traffic_scene, true_places
+from benchmarks.drawn_traffic import TruePlace, follow, lane_view, traffic_scene, true_places
 from vdet.boxes import Image
 from vdet.config.loading import find_config, load_settings
 from vdet.config.schema import Settings
 from vdet.detect.factory import load_detector
 from vdet.lanes.curves import LaneCurves
 from vdet.lanes.road import Road, RoadFinder
-from vdet.media import Frame, Picture, VideoInfo
-from vdet.run.loop import Parts, build, peek
+from vdet.media import Frame, Picture
 from vdet.run.steps import LaneStep, with_positions
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.render import Renderer
@@ -185,15 +183,11 @@ class Shown:
 
     def __call__(self, drive: Drive) -> Iterator[Sample]:
         """Give the shown vehicles that must be found."""
-        camera, rate = drive.scene.camera, drive.scene.rate
-        video = VideoInfo(Path("clip.mp4"), camera.width, camera.height, rate, 1 / rate)
+        rate, lanes = drive.scene.rate, LaneStep(drive.finder(), self.settings.detector.foot)
         clip = (
             Frame(i, Fraction(i) / rate, Picture(image)) for i, image in enumerate(drive.images())
         )
-        first, all_frames = peek(clip)
-        lanes = LaneStep(drive.finder(), self.settings.detector.foot)
-        pipeline = build(Parts(self.model, steps=[lanes]), self.settings, video, first)
-        for result in pipeline.follow(all_frames):
+        for result in follow(self.model, self.settings, drive.scene, clip, lanes):
             index = result.frame.index
             if index in COUNTED:
                 yield from _matched(drive.at(index), index, result.tracks)

@@ -15,6 +15,7 @@ from vdet.media import Frame, Picture, Planes, VideoInfo
 from vdet.media.frame import Coding
 from vdet.run.loop import Parts, build, peek
 from vdet.run.result import FrameResult
+from vdet.run.steps import Step
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.scene import (
     LANE_WIDTH,
@@ -83,13 +84,13 @@ def as_planes(frame: Frame) -> Frame:
 
 
 def follow(
-    model: DetectorModel, settings: Settings, scene: Scene, clip: Iterable[Frame]
+    model: DetectorModel, settings: Settings, scene: Scene, clip: Iterable[Frame], *steps: Step
 ) -> Iterator[FrameResult]:
     """Find and follow the vehicles in the frames of a scene; yield the result of each."""
     camera, rate = scene.camera, scene.rate
     video = VideoInfo(Path("clip.mp4"), camera.width, camera.height, rate, 1 / rate)
     images, every = peek(clip)
-    return build(Parts(model), settings, video, images).follow(every)
+    return build(Parts(model, steps=steps), settings, video, images).follow(every)
 
 
 def shown_labels(results: Iterable[FrameResult]) -> LabelledVideo:

@@ -26,6 +26,15 @@ import numpy as np
 Row = list[float]  # frame from 1, id, x, y, width, height, then score or ignored (0 or 1)
 Scene = tuple[list[Row], list[Row]]  # truth, prediction
 
+TRACKEVAL = {
+    "matches": "CLR_TP", "false_positives": "CLR_FP", "misses": "CLR_FN",
+    "precision": "CLR_Pr", "recall": "CLR_Re", "f1": "CLR_F1", "mota": "MOTA", "motp": "MOTP",
+    "id_switches": "IDSW", "fragmentations": "Frag",
+    "mostly_tracked": "MT", "partly_tracked": "PT", "mostly_lost": "ML",
+    "idf1": "IDF1", "idp": "IDP", "idr": "IDR", "hota": "HOTA", "deta": "DetA", "assa": "AssA",
+}  # fmt: skip
+"""Our names of metrics, and those of trackeval; a metric with several thresholds is their mean."""
+
 FRAMES = 24
 HERE = Path(__file__).parents[1] / "tests" / "evaluate" / "golden"
 
@@ -188,30 +197,10 @@ def tracking_scores(scene: Scene) -> dict[str, float]:
         raw = dataset.get_raw_seq_data("ours", "0000")
         data = dataset.get_preprocessed_seq_data(raw, "car")
         quiet = {"PRINT_CONFIG": False}
-        clear = metrics.CLEAR(quiet).eval_sequence(data)
-        identity = metrics.Identity(quiet).eval_sequence(data)
-        hota = metrics.HOTA().eval_sequence(data)
-    return {
-        "matches": clear["CLR_TP"],
-        "false_positives": clear["CLR_FP"],
-        "misses": clear["CLR_FN"],
-        "precision": clear["CLR_Pr"],
-        "recall": clear["CLR_Re"],
-        "f1": clear["CLR_F1"],
-        "mota": clear["MOTA"],
-        "motp": clear["MOTP"],
-        "id_switches": clear["IDSW"],
-        "fragmentations": clear["Frag"],
-        "mostly_tracked": clear["MT"],
-        "partly_tracked": clear["PT"],
-        "mostly_lost": clear["ML"],
-        "idf1": identity["IDF1"],
-        "idp": identity["IDP"],
-        "idr": identity["IDR"],
-        "hota": hota["HOTA"].mean(),
-        "deta": hota["DetA"].mean(),
-        "assa": hota["AssA"].mean(),
-    }
+        found: dict[str, Any] = {}
+        for metric in (metrics.CLEAR(quiet), metrics.Identity(quiet), metrics.HOTA()):
+            found |= metric.eval_sequence(data)
+    return {name: np.mean(found[theirs]) for name, theirs in TRACKEVAL.items()}
 
 
 def detection_scores(scene: Scene) -> dict[str, float]:
