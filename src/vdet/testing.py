@@ -96,7 +96,7 @@ def check_tracker(make: Callable[[int, int], VideoTracker]) -> None:
 
 def _check_tracks(tracks: Sequence[Track]) -> None:
     ids = [track.id for track in tracks]
-    assert ids == sorted(set(ids)), f"ids {ids} are not in order, or one comes twice"
+    assert ids == sorted(set(ids)), f"ids {ids} are not in order, or one occurs twice"
     for track in tracks:
         assert track.id > 0, f"id {track.id} is not positive"
         assert 0 <= track.score <= 1, f"score {track.score} is not in 0 to 1"
@@ -137,7 +137,7 @@ def _write(kind: SinkKind, path: Path, settings: Settings, *, still: bool, fails
                 sink.write(result)
                 assert (result.frame.image == _scene(index)).all(), "the sink changed the frame"
             traffic.end()
-            assert not _is_there(path), "the output is there before the run has ended"
+            assert not _is_there(path), "the output exists before the run has ended"
             if fails:
                 raise KeyboardInterrupt
 

@@ -39,7 +39,7 @@ def test_a_folder_with_a_bad_file_from_the_first_run_to_the_last(
     first = run(*arguments)
     assert first.code == 3
     assert re.search(rf"{clips}/a\.mp4: 12 frames, \d tracks?, ", first.err)
-    assert f"vdet: error: {clips}/bad.mp4: cannot be opened, is not a video" in first.err
+    assert f"vdet: {clips}/bad.mp4: cannot be opened, is not a video" in first.err
     assert first.err.count("bad.mp4") == 1, "an error is printed once"
     assert first.err.splitlines()[-1] == f"{out}: 2 files done, 1 failed"
     made = ["a.csv", "a.mp4", "day2/b.csv", "day2/b.mp4", "manifest.jsonl"]

@@ -147,7 +147,7 @@ def test_fractions_need_the_size_of_the_frames(run: Run, tmp_path: Path) -> None
     lines.write_text("traffic: {lines: [{name: gate, start: [0.5, 0], end: [0.5, 1]}]}")
     result = run("count", tracks, "-c", lines)
     assert result.code == 1
-    assert "pass --size, as in 1280x720" in result.err
+    assert "pass --size, such as 1280x720" in result.err
     result = run("count", tracks, "-c", lines, "--size", "320x240", code=0)
     assert result.out.split()[6:9] == ["gate", "left", "1"]
 

@@ -33,7 +33,7 @@ def test_a_full_disk_fails_what_does_not_fit(launch: Start, clips: Path, tmp_pat
     assert errors["short"] is None
     for name in ("a", "b"):
         assert errors[name] == f"{tmp_path / name}.mp4: cannot be written: File too large"
-        assert f"vdet: error: {errors[name]}\n" in result.err
+        assert f"vdet: {errors[name]}\n" in result.err
 
 
 def _give_up_root_access_to_files() -> None:

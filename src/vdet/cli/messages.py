@@ -52,11 +52,11 @@ def announce(*lines: str) -> None:
 
 
 class _LogHandler(logging.Handler):
-    """Prints log records as messages, with the level of warnings and errors."""
+    """Prints log records as messages; warnings are marked."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        level = "" if record.levelno < logging.WARNING else f"{record.levelname.lower()}: "
-        print_lines(f"vdet: {level}{record.getMessage()}", err=True)
+        mark = "warning: " if record.levelno == logging.WARNING else ""
+        print_lines(f"vdet: {mark}{record.getMessage()}", err=True)
 
 
 def set_up_logs(*, verbose: bool, quiet: bool) -> None:

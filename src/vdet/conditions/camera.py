@@ -92,7 +92,7 @@ class CameraWatch:
         rests = len(after) > 3 and np.quantile(_distances(after, after), 0.95) <= _LIMIT
         if rests and end == times[-1]:
             what = f"the camera moved at {clock(int(start))}, {much}"
-            text = f"{what}: lines, zones and regions fit only before or after; process both apart"
+            text = f"{what}: lines, zones and regions fit only one part; process both separately"
             return [Finding("camera-moved", text, ((start, end),), value=size)]
         what = f"the camera moves {when(spans)}, {much}"
         text = f"{what}: lines, zones and regions do not fit then; do not trust counts and speeds"

@@ -271,7 +271,7 @@ class LabelledVideo:
         """Refuse boxes of the file `path` beyond a video's last frame. Raises `TruthError`."""
         last = int(self.frames.max(initial=0))
         if last > frames:
-            what = f"has a box in frame {last} of a video of {frames}; is it another video's?"
+            what = f"has a box in frame {last} of a video of {frames}; is it for another video?"
             raise TruthError(f"{path}: {what}")
 
     def frame(self, number: int) -> "LabelledVideo":

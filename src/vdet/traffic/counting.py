@@ -90,7 +90,7 @@ def _size(settings: Settings, size: tuple[int, int] | None) -> tuple[int, int]:
         raise ConfigError("no lines or zones to count at; add them to the settings")
     if size := size or settings.camera.size:
         return size
-    raise ConfigError("the lines are fractions of the frame; pass --size, as in 1280x720")
+    raise ConfigError("the lines are fractions of the frame; pass --size, such as 1280x720")
 
 
 @dataclass(frozen=True, slots=True)
