@@ -26,8 +26,8 @@ from vdet.run.video import Run, run_video
 from vdet.synthetic.render import write_clip
 from vdet.synthetic.scene import Scene, busy_road, demo_scene, pole_scene
 from vdet.synthetic.truth import write_truth
-from vdet.traffic.count_files import NOWHERE
 from vdet.traffic.counting import count_files
+from vdet.traffic.output import NOWHERE
 
 ROADS = 6
 """Number of synthetic roads to train the linear model on."""

@@ -48,8 +48,8 @@ _BUILT_IN: dict[str, dict[str, str]] = {
     },
     FORMATS: {
         "mot": "vdet.labels.mot:MOT",
-        "csv": "vdet.labels.records:CSV",
-        "jsonl": "vdet.labels.records:JSON_LINES",
+        "csv": "vdet.labels.native:CSV",
+        "jsonl": "vdet.labels.native:JSON_LINES",
         "coco": "vdet.labels.coco:COCO",
         "kitti": "vdet.labels.kitti:KITTI",
         "yolo": "vdet.labels.yolo:YOLO",

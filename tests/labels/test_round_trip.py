@@ -22,8 +22,8 @@ from vdet.labels.formats import Format, PictureTracks, track_formats
 from vdet.labels.kitti import KITTI
 from vdet.labels.label import SavedTracks
 from vdet.labels.mot import MOT
+from vdet.labels.native import CSV, JSON_LINES
 from vdet.labels.pictures import LabelledPicture
-from vdet.labels.records import CSV, JSON_LINES
 from vdet.labels.yolo import YOLO, read_yolo_pictures
 from vdet.track.track import FrameTracks, State, Track
 from writing import write_image

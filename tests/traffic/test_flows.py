@@ -18,8 +18,8 @@ from vdet.config.places import LineSettings
 from vdet.errors import ConfigError
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Clock
-from vdet.traffic.count_files import counts_content, flows_content, join_counts
 from vdet.traffic.counts import Counts, count_table, flow_table, zone_table
+from vdet.traffic.output import counts_content, flows_content, join_counts
 from vdet.traffic.tables import write_content
 
 WEST = LineSettings(name="west", start=(200, 200), end=(200, 600))

@@ -9,7 +9,7 @@ import pytest
 from traffic.scenes import Path, frames, settings_for, through
 from vdet.config.places import LineSettings, ZoneSettings
 from vdet.labels.formats import TrackWriter
-from vdet.labels.records import JSON_LINES
+from vdet.labels.native import JSON_LINES
 from vdet.traffic.counting import count_files
 from vdet.traffic.counts import Counts, flow_table, zone_table
 

@@ -64,8 +64,8 @@ def count(
         raise click.UsageError("no lines or zones to count at; add a settings file with -c FILE")
     check_counting(settings, several=len(tracks) > 1)
     from vdet.run.sinks.protocol import check_sinks
-    from vdet.traffic.count_files import counts_content, flows_content
     from vdet.traffic.counting import count_files
+    from vdet.traffic.output import counts_content, flows_content
     from vdet.traffic.tables import write_content
 
     outputs = options.wanted_outputs()
@@ -107,7 +107,7 @@ def _totals(videos: "Mapping[str, Counts]") -> list[str]:
 def _matrix(videos: "Sequence[Counts]") -> list[str]:
     """Return the flows between lines and zones over all files; empty if there is only one."""
     from vdet.evaluate.output import table
-    from vdet.traffic.count_files import flow_matrix
+    from vdet.traffic.output import flow_matrix
 
     matrix = flow_matrix(videos)
     if len(matrix) < 2:

@@ -27,8 +27,8 @@ from vdet.boxes import Box
 from vdet.detect.classes import UNKNOWN
 from vdet.errors import TruthError
 from vdet.files import record_input
-from vdet.labels.documents import json_values
 from vdet.labels.formats import Format, PictureTracks, SourceVideo, last_classes
+from vdet.labels.json_stream import json_values
 from vdet.labels.label import MAX_LABELS, NO_ID, Label, SavedTracks, Size, from_size, line_error
 from vdet.labels.parsing import (
     LIMIT,

@@ -51,10 +51,8 @@ def numbered_lines(path: Path | str, data: bytes) -> Iterator[tuple[int, str]]:
     TruthError
         The content is not UTF-8, has more than `MAX_LINES`, or a line is longer than `MAX_PART`.
     """
-    file = io.BytesIO(data)
-    file.seek(len(codecs.BOM_UTF8) if data.startswith(codecs.BOM_UTF8) else 0)
     try:
-        for number, line in enumerate(file, start=1):
+        for number, line in enumerate(io.BytesIO(data.removeprefix(codecs.BOM_UTF8)), start=1):
             if len(line) > MAX_PART:
                 raise line_error(path, number, f"the line is longer than {MAX_PART:,} bytes")
             if number > MAX_LINES:

@@ -26,6 +26,7 @@ The counts of a video depend only on its tracks (`FrameTracks`), live or from a 
 
 `linking` joins the tracks of each vehicle to a path. `crossings` places lines and zones in the
 frame, and computes the crossings of one path and one line or zone, without state. `counter`
-collects the events, `counts` has the events and the tables computed from them, `clock` the start
-time of a video and the intervals of all tables and pages, and `count_files` writes the files.
+collects the events while frames are processed, and `counting` those of saved tracks. `counts` has
+the events and the tables computed from them, `clock` the start time of a video and the intervals of
+all tables and pages, and `output` the files of counts and flows.
 """

@@ -196,18 +196,18 @@ class Intervals:
         ranges = [(self.number_at(first), self.number_at(last)) for first, last in self._every]
         self.numbers = sorted({n for first, last in ranges for n in range(first, last + 1)})
 
-    def seconds(self, which: int, time: float) -> float:
+    def seconds(self, index: int, time: float) -> float:
         """Convert a time in one of the videos to the seconds of the intervals.
 
         The time of an event may be slightly before or after the frames: the nearest one is used.
         """
-        seconds, spans = self._zeros[which] + time, self._spans[which]
+        seconds, spans = self._zeros[index] + time, self._spans[index]
         first, last = next((span for span in reversed(spans) if span[0] <= seconds), spans[0])
         return min(max(seconds, first), last)
 
-    def number(self, which: int, time: float) -> int:
+    def number(self, index: int, time: float) -> int:
         """Return the number of the interval of a time in one of the videos."""
-        return self.number_at(self.seconds(which, time))
+        return self.number_at(self.seconds(index, time))
 
     def number_at(self, seconds: float) -> int:
         """Return the number of the interval of `seconds`."""
@@ -223,9 +223,9 @@ class Intervals:
             return self._first, self._last
         return float(number * self._length), float((number + 1) * self._length)
 
-    def start_in(self, which: int, number: int) -> float:
+    def start_in(self, index: int, number: int) -> float:
         """Return the start of an interval, in the time of one of the videos."""
-        return round(self._ends(number)[0] - self._zeros[which], 3)
+        return round(self._ends(number)[0] - self._zeros[index], 3)
 
     def covered(self, number: int) -> float:
         """Return the seconds of video in an interval."""

@@ -250,8 +250,8 @@ def count_table(videos: Sequence[Counts], interval: int | None = None) -> list[C
     """
     intervals = _intervals(videos, interval)
     found: _Found = Counter(
-        (intervals.number(which, event.time), (event.name, event.direction), class_of(event))
-        for which, video in enumerate(videos)
+        (intervals.number(index, event.time), (event.name, event.direction), class_of(event))
+        for index, video in enumerate(videos)
         for event in video.events
     )
     directions = dict.fromkeys(key for video in videos for key in video.directions)
@@ -266,9 +266,9 @@ def flow_table(videos: Sequence[Counts], interval: int | None = None) -> list[Fl
     """
     intervals = _intervals(videos, interval)
     found: _Found = Counter()
-    for which, first, last in vehicle_flows(videos):
+    for index, first, last in vehicle_flows(videos):
         flow = first.name, last.name if last else None
-        found[intervals.number(which, first.time), flow, class_of(first)] += 1
+        found[intervals.number(index, first.time), flow, class_of(first)] += 1
     names = dict.fromkeys(name for video in videos for name, _ in video.directions)
     order = {name: number for number, name in enumerate((*names, None))}
     flows = sorted({flow for _, flow, _ in found}, key=lambda flow: [order[name] for name in flow])
@@ -281,12 +281,12 @@ def vehicle_flows(videos: Sequence[Counts]) -> Iterator[tuple[int, Event, Event 
     The number of the video of the first event precedes them; the last is None if there is only one.
     """
     trips: dict[int, list[tuple[int, Event]]] = {}
-    for which, video in enumerate(videos):
+    for index, video in enumerate(videos):
         for event in video.events:
             if event.name not in video.zones or event.direction in _IN:
-                trips.setdefault(event.vehicle, []).append((which, event))
-    for (which, first), *others in trips.values():
-        yield which, first, others[-1][1] if others else None
+                trips.setdefault(event.vehicle, []).append((index, event))
+    for (index, first), *others in trips.values():
+        yield index, first, others[-1][1] if others else None
 
 
 def zone_table(videos: Sequence[Counts], interval: int | None = None) -> list[ZoneRow]:
@@ -295,9 +295,9 @@ def zone_table(videos: Sequence[Counts], interval: int | None = None) -> list[Zo
     rows = []
     for name in dict.fromkeys(name for video in videos for name in video.zones):
         visits: dict[int, list[_Visit]] = {number: [] for number in intervals.numbers}
-        for which, video in enumerate(videos):
+        for index, video in enumerate(videos):
             for event in (event for event in video.events if event.name == name):
-                time = intervals.seconds(which, event.time)
+                time = intervals.seconds(index, event.time)
                 visit = time, 1 if event.direction in _IN else -1, event.seconds
                 visits[intervals.number_at(time)].append(visit)
         inside = 0

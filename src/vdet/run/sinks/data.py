@@ -20,14 +20,14 @@ from vdet.labels.formats import (
     picture_suffixes,
     track_suffixes,
 )
-from vdet.labels.records import CLOCK, JSON_LINES, track_record
+from vdet.labels.native import CLOCK, JSON_LINES, track_record
 from vdet.run.result import FrameResult, findings_in
 from vdet.run.sinks.protocol import STANDARD_OUTPUT, BaseSink, BatchTotal, SinkContext, SinkKind
-from vdet.traffic import count_files
+from vdet.traffic import output
 from vdet.traffic.records import join_records, records_content
 from vdet.traffic.tables import SUFFIXES, check_table, write_content
 
-MakeContent = Callable[[Path, count_files.Videos, int | None], Any]
+MakeContent = Callable[[Path, output.Videos, int | None], Any]
 
 
 class TrackSink(BaseSink):
@@ -190,7 +190,7 @@ def _count_sink(make: MakeContent, path: Path, context: SinkContext) -> TableSin
 COUNTS, FLOWS = (
     SinkKind(partial(_count_sink, make), ends, what, takes="videos", total=BatchTotal("all", join))
     for what, make, ends, join in (
-        ("counts", count_files.counts_content, count_files.COUNT_SUFFIXES, count_files.join_counts),
-        ("flows", count_files.flows_content, count_files.FLOW_SUFFIXES, count_files.join_flows),
+        ("counts", output.counts_content, output.COUNT_SUFFIXES, output.join_counts),
+        ("flows", output.flows_content, output.FLOW_SUFFIXES, output.join_flows),
     )
 )
