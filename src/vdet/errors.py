@@ -129,7 +129,7 @@ def named(count: int, noun: str) -> str:
     return noun if count == 1 else noun + ("es" if noun.endswith(("s", "x", "ch")) else "s")
 
 
-def clock(seconds: float | Fraction, digits: int = 0, *, hours: bool = False) -> str:
+def clock_text(seconds: float | Fraction, digits: int = 0, *, hours: bool = False) -> str:
     """Return a time as `1:05`, or `2:01:05` for hours; `digits` is the number of decimals."""
     whole, part = divmod(round(abs(seconds) * 10**digits), 10**digits)
     minutes, rest = divmod(whole, 60)

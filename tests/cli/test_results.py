@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from vdet.cli.results import Results
+from vdet.cli.results import ResultFiles
 from vdet.errors import OutputError, VideoError
 from vdet.files import record_input, recorded_inputs
 
@@ -13,33 +13,34 @@ def test_a_page_and_numbers_that_cannot_be_written_are_refused_before_any_work(
     tmp_path: Path,
 ) -> None:
     folder, target = tmp_path / "a" / "b", tmp_path / "a.json"
-    results = Results(str(target), page=folder, overwrite=False)
+    results = ResultFiles(str(target), page=folder, overwrite=False)
     results.checked()
     assert not list(tmp_path.iterdir()), "a run that fails leaves no folder"
     results.print(["F1"], {"f1": 0.5}, lambda: "precious")
-    for kept in (results, Results(str(target), overwrite=False), Results(None, False, folder)):
+    one, other = ResultFiles(str(target), overwrite=False), ResultFiles(None, False, folder)
+    for kept in (results, one, other):
         with pytest.raises(OutputError, match="already exists; use --overwrite"):
             kept.checked()
-    Results(str(target), page=folder, overwrite=True).checked()
+    ResultFiles(str(target), page=folder, overwrite=True).checked()
     with recorded_inputs():
         record_input(target)
         with pytest.raises(OutputError, match="is the input itself"):
-            Results(str(target), overwrite=True).checked()
+            ResultFiles(str(target), overwrite=True).checked()
     with pytest.raises(OutputError, match=r"the folder .*page\.html is not a folder"):
-        Results(None, page=folder / "page.html", overwrite=True).checked()
+        ResultFiles(None, page=folder / "page.html", overwrite=True).checked()
     with pytest.raises(OutputError, match="is used for two outputs"):
-        Results(str(folder / "page.html"), page=folder, overwrite=True).checked()
+        ResultFiles(str(folder / "page.html"), page=folder, overwrite=True).checked()
 
 
 def test_numbers_may_lie_in_the_new_folder_of_the_page(tmp_path: Path) -> None:
-    results = Results(str(tmp_path / "a" / "a.json"), page=tmp_path / "a", overwrite=False)
+    results = ResultFiles(str(tmp_path / "a" / "a.json"), page=tmp_path / "a", overwrite=False)
     results.checked()
     results.print([], {"f1": 0.5}, lambda: "html")
     assert {file.name for file in (tmp_path / "a").iterdir()} == {"a.json", "page.html"}
 
 
 def test_numbers_and_page_appear_together_or_not_at_all(tmp_path: Path) -> None:
-    results = Results(str(tmp_path / "a.json"), page=tmp_path / "page", overwrite=False)
+    results = ResultFiles(str(tmp_path / "a.json"), page=tmp_path / "page", overwrite=False)
 
     def fail() -> str:
         raise VideoError("in.mp4: is gone")

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vdet.errors import clock
+from vdet.errors import clock_text
 from vdet.pages import charts
 from vdet.pages.charts import interval_plot, level_plot, number_axis, time_axis, time_text
 
@@ -27,7 +27,7 @@ def test_times_have_tenths_where_they_are_not_whole(seconds: float, text: str) -
     [(0, "0:00:00.000"), (59.9996, "0:01:00.000"), (3600 * 12 + 61.5, "12:01:01.500")],
 )
 def test_times_can_have_hours_and_milliseconds(seconds: float, text: str) -> None:
-    assert clock(Fraction(seconds), 3, hours=True) == text
+    assert clock_text(Fraction(seconds), 3, hours=True) == text
 
 
 def test_axes_have_round_numbers() -> None:

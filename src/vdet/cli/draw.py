@@ -68,9 +68,8 @@ def draw(
     settings = options.read_settings()
     if not outputs:
         raise click.UsageError("no output; use -o FILE or --propose FILE")
-    for path, suffixes in ((output, _OUTPUTS), (propose, _SETTINGS)):
+    for path, suffixes, what in ((output, _OUTPUTS, "pages"), (propose, _SETTINGS, "settings")):
         if path:
-            what = "pages" if path is output else "settings"
             options.check_file(path, *suffixes, what=what, overwrite=overwrite)
     if output and output.suffix.lower() != ".html" and not settings.traffic:
         raise ConfigError(f"{output}: nothing to draw; add lines or zones with -c FILE")

@@ -10,7 +10,7 @@ import click
 from vdet.cli import options
 from vdet.cli.command import command
 from vdet.cli.messages import progress_steps
-from vdet.cli.results import Results, facts_options, results_options
+from vdet.cli.results import ResultFiles, facts_options, results_options
 from vdet.workers import PICTURES, core_count, return_freed_memory
 
 _data = click.argument("data", nargs=-1, required=True, type=options.INPUT, metavar="DATA...")
@@ -47,7 +47,7 @@ def images(data: tuple[Path, ...], min_width: float, **targets: Any) -> None:
     detector, roles = settings.detector, Roles.from_settings(settings)
     model = load_detector(detector.showing_all())
     sets = [read_labelled_pictures(path, roles) for path in data]
-    results = Results(**targets).checked()
+    results = ResultFiles(**targets).checked()
     counting = Counting(detector.min_score_still, min_width)
     with progress_steps(" images") as steps:
         progress = partial(steps, "")
@@ -81,7 +81,7 @@ def patches(data: tuple[Path, ...], **targets: Any) -> None:
 
     path = Path(settings.svm.model) if settings.svm.model else None
     model = load_model(path, requested_features(settings.svm)) if path else None
-    results = Results(**targets).checked()
+    results = ResultFiles(**targets).checked()
     files = find_patches(data)
     with progress_steps("") as steps:
         result = evaluate_patches(files, settings, model, steps=steps)
@@ -110,7 +110,7 @@ def tracks(prediction: Path, truth: Path, until: int | None, **targets: Any) -> 
     from vdet.evaluate.report import tracks_report
     from vdet.evaluate.video import score_files
 
-    results = Results(**targets).checked()
+    results = ResultFiles(**targets).checked()
     with progress_steps("") as steps:
         steps("comparing", None)
         result = score_files(prediction, truth, until, options.read_settings())
@@ -144,7 +144,7 @@ def video(
 
     check_masks(settings.regions)
     model = load_detector(settings.detector)
-    results = Results(**targets).checked()
+    results = ResultFiles(**targets).checked()
     clips = [open_clip(*pair, until, settings) for pair in pairs]
     with progress_steps(" frames") as steps:
         found = [evaluate_clip(clip, settings, model, partial(steps, "")) for clip in clips]

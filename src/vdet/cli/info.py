@@ -13,7 +13,7 @@ import click
 from vdet.cli.command import command
 from vdet.cli.messages import print_lines
 from vdet.cli.options import INPUT, config_names, read_settings, settings_options
-from vdet.cli.results import Results, facts_options
+from vdet.cli.results import ResultFiles, facts_options
 from vdet.errors import counted, in_one_line, opencv_fault, printable
 from vdet.version import __version__
 from vdet.workers import core_count
@@ -50,7 +50,7 @@ def info(path: Path | None, **targets: Any) -> int:
     """
     from vdet.media.images import is_picture_name
 
-    results = Results(**targets).checked()
+    results = ResultFiles(**targets).checked()
     if path is None:
         facts = _settings() if config_names() else _machine()
     else:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Results:
+class ResultFiles:
     """Where a command writes its results, from the values of `results_options`."""
 
     json_target: str | None
@@ -82,12 +82,12 @@ _page_option = option("--page DIR")
 
 
 def facts_options(command: F) -> F:
-    """Add `--json FILE` and `--overwrite`: arguments of `Results`."""
+    """Add `--json FILE` and `--overwrite`: arguments of `ResultFiles`."""
     return _json_option(overwrite_option(command))
 
 
 def results_options(command: F) -> F:
-    """Add `--json FILE`, `--page DIR` and `--overwrite`: arguments of `Results`."""
+    """Add `--json FILE`, `--page DIR` and `--overwrite`: arguments of `ResultFiles`."""
     return _json_option(_page_option(overwrite_option(command)))
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from vdet.boxes import Box, Float32Array, Float64Array, Image
 from vdet.conditions.finding import Finding, joined, when
-from vdet.errors import clock
+from vdet.errors import clock_text
 
 _LIMIT = 0.01
 """Displacement of a camera that is not reported, as a fraction of the frame's width."""
@@ -91,7 +91,7 @@ class CameraWatch:
         after = places[is_known & (times > start + 1)]
         rests = len(after) > 3 and np.quantile(_distances(after, after), 0.95) <= _LIMIT
         if rests and end == times[-1]:
-            what = f"the camera moved at {clock(int(start))}, {much}"
+            what = f"the camera moved at {clock_text(int(start))}, {much}"
             text = f"{what}: lines, zones and regions fit only one part; process both separately"
             return [Finding("camera-moved", text, ((start, end),), value=size)]
         what = f"the camera moves {when(spans)}, {much}"

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from vdet.config.schema import Code
-from vdet.errors import clock
+from vdet.errors import clock_text
 from vdet.traffic.clock import Span
 
 Severity = Literal["warning", "note"]
@@ -90,4 +90,4 @@ def when(spans: Sequence[Span]) -> str:
     """Return "from 0:05 to 0:32"; for several spans, the longest and the number of others."""
     first, last = max(spans, key=lambda span: span[1] - span[0])
     others = f" (and {len(spans) - 1} more)" if len(spans) > 1 else ""
-    return f"from {clock(int(first))} to {clock(int(last))}{others}"
+    return f"from {clock_text(int(first))} to {clock_text(int(last))}{others}"

@@ -15,7 +15,7 @@ from time import gmtime, strftime
 import numpy as np
 
 from vdet.draw.boxes import Color
-from vdet.errors import clock
+from vdet.errors import clock_text
 
 FILL, SOFT = "var(--fill)", "var(--soft)"
 """Colours of the style sheet: for main and for secondary content."""
@@ -92,7 +92,7 @@ def time_text(seconds: float, zero: float | None = None) -> str:
     With `zero`, the second of the day at time 0, it is the time of day.
     """
     if zero is None:
-        return clock(seconds, 1).removesuffix(".0")
+        return clock_text(seconds, 1).removesuffix(".0")
     return strftime("%H:%M:%S", gmtime(round(seconds + zero))).removesuffix(":00")
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from vdet.boxes import BoolArray, Float32Array, Image, Int64Array
 from vdet.config.schema import Settings
-from vdet.errors import printable
+from vdet.errors import counted, printable
 from vdet.labels.label import Label, spread_frames
 from vdet.labels.pictures import LabelledPicture, LabelledPictures
 from vdet.labels.reading import read_true_labels
@@ -116,18 +116,17 @@ class SourceReport:
 
     def lines(self) -> Iterator[str]:
         """Yield as lines of text what is learnt, and what not."""
-        learnt = _counted(self.vehicles) or "nothing to learn"
-        plural = "" if self.pictures == 1 else "s"
-        yield f"{self.name}: {self.pictures:,} image{plural}; {learnt}"
+        learnt = _listed(self.vehicles) or "nothing to learn"
+        yield f"{self.name}: {counted(self.pictures, 'image')}; {learnt}"
         if self.unlabelled:
             yield f"  not labelled, so not background: {', '.join(self.unlabelled)}"
         if self.ignored:
-            yield f"  ignored: {_counted(self.ignored)}"
+            yield f"  ignored: {_listed(self.ignored)}"
         if self.background:
-            yield f"  background, as their label is unknown: {_counted(self.background)}"
+            yield f"  background, as their label is unknown: {_listed(self.background)}"
 
 
-def _counted(counts: Counts) -> str:
+def _listed(counts: Counts) -> str:
     return ", ".join(f"{count:,} {printable(name)}" for name, count in counts.items())
 
 

@@ -10,7 +10,7 @@ from vdet.boxes import Image
 from vdet.config.rendering import render_settings
 from vdet.detect.classes import UNKNOWN, in_file_name
 from vdet.draw.boxes import WHITE, color_of, draw_box, draw_label, draw_regions
-from vdet.errors import OutputError, clock
+from vdet.errors import OutputError, clock_text
 from vdet.files import write_text
 from vdet.lanes.road import stage_pictures
 from vdet.media import Picture
@@ -255,15 +255,13 @@ class ClipSink(BaseSink):
                 encode_part(source, *part, target, settings)
 
     def _chosen(self) -> Sequence[VehicleRecord]:
-        records, counts = self.traffic.vehicles, self.traffic.counts()
-        if counts is None:
-            return records
-        counted = {event.id for event in counts.events}
-        return [record for record in records if record.id in counted]
+        counts, records = self.traffic.counts(), self.traffic.vehicles
+        counted = {event.id for event in counts.events} if counts else ()
+        return [record for record in records if counts is None or record.id in counted]
 
     def _name(self, scene: Scene) -> str:
         (first, *others), when = scene.vehicles, self.traffic.clock
-        moment = clock(int(first.first), hours=True).zfill(8).replace(":", "-")
+        moment = clock_text(int(first.first), hours=True).zfill(8).replace(":", "-")
         if when:
             moment = when.at(first.first).strftime("%Y-%m-%dT%H-%M-%S")
         more = f"+{len(others)}" if others else ""
