@@ -11,7 +11,7 @@ from labels.saving import car, frame, written
 from vdet.boxes import Box
 from vdet.errors import TruthError
 from vdet.evaluate.comparison import MAX_IDS, compare
-from vdet.labels import coco, kitti, label, records
+from vdet.labels import coco, kitti, label, native
 from vdet.labels.label import MAX_IN_FRAME
 from vdet.labels.mot import MOT
 from vdet.labels.reading import read_predictions, read_truth
@@ -24,7 +24,7 @@ FRAMES = [
 ]
 RESULTS, KITTI, COCO, CSV, JSONL = (
     written(form, FRAMES).decode()
-    for form in (MOT, kitti.KITTI, coco.COCO, records.CSV, records.JSON_LINES)
+    for form in (MOT, kitti.KITTI, coco.COCO, native.CSV, native.JSON_LINES)
 )
 KITTI += "3 -1 DontCare -1 -1 -10 300 40 350 80 -1 -1 -1 -1000 -1000 -1000 -10 0\n"
 WORDS = (
