@@ -100,8 +100,8 @@ def detect_video(
     page
         Write a report about the vehicles, page.html, into DIR. With -d, an ending such as .page.
     clips
-        Write a clip of each time span with vehicles into DIR; with lines or zones, only with
-        counted vehicles. With -d, an ending such as .clips.
+        Write a clip of each time span with vehicles into DIR. With lines or zones, only counted
+        vehicles have clips. With -d, an ending such as .clips.
     margin
         Time added to a clip before and after (`clips.margin`).
     exact
