@@ -70,7 +70,7 @@ class ResultFiles:
             if to_stderr:
                 print_now(json_text(values))
         if self.page:
-            print_lines("", f"{self._files['page']}: the page", err=to_stderr)
+            print_lines("", f"{self._files['page']}: written", err=to_stderr)
 
     def print_report(self, report: "Report") -> None:
         """Print and write the report of an evaluation, as `print` does."""

@@ -48,7 +48,7 @@ def train(data: tuple[Path, ...], output: Path, jobs: int | None, overwrite: boo
     with progress_steps("") as steps:
         model, metrics = fit_model(files, settings, jobs=jobs, steps=steps)
     save_model(model, output, overwrite=overwrite)
-    print_lines(*metrics.lines(), "", f"{output}: the model")
+    print_lines(*metrics.lines(), "", f"{output}: written")
 
 
 @command()
@@ -169,4 +169,4 @@ def train_net(
         done = train_to_file(
             sources, settings.train.net, output, base=base, overwrite=overwrite, progress=advance
         )
-    print_lines(done, f"{output}: the network")
+    print_lines(done, f"{output}: written")
