@@ -36,10 +36,6 @@ def test_read_as_tracks_regions_are_left_out_and_types_are_classes(tmp_path: Pat
             kitti_line(1, 3, "Car") + " 0.9",
             "KITTI tracking has 17 columns separated by spaces; this line has 18",
         ),
-        (
-            "2,7,1,1,20,10,1,3,1",
-            "KITTI tracking has 17 columns separated by spaces; this line has 1",
-        ),
         (kitti_line(1, 3, "Car", "10 20 nan 60"), "'nan' is not a number"),
         (kitti_line(1, 3, "Car").replace("1 3", "1 x", 1), "'x' is not a number"),
     ],

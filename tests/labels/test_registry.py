@@ -43,7 +43,6 @@ def test_the_content_tells_the_format_where_the_name_leaves_it_open(
         ("gt.txt", "1;1;10;20;30;40", "columns must be separated by commas or spaces, not by ';'"),
         ("a.csv", "frame;time;id", "columns must be separated by commas or spaces, not by ';'"),
         ("t.xml", "<annotations>", r"t\.xml: XML is not supported; export the labels as COCO"),
-        ("a.txt", "1,1,1,1,9,9,0.9,0,1", "with nine columns, column 7 must be a flag, 0 or 1, but"),
     ],
 )
 def test_what_other_tools_write_is_refused_in_words_that_fit(
