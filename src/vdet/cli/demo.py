@@ -35,15 +35,20 @@ def demo(folder: Path, seed: int, overwrite: bool) -> None:
 
     with progress_steps("") as steps:
         result = run_demo(folder, seed=seed, overwrite=overwrite, announce=announce, steps=steps)
+    files = {
+        "found.mp4": "the road with the vehicles that the network found",
+        "found.csv": f"their tracks; {folder / TRUTH} has the ground truth",
+        "counted.mp4": "the road from the pole, with lines and counts",
+        "page/page.html": f"its page; {folder / 'flows.csv'} has the flows",
+        "stages": "every stage of the linear model in one frame",
+        MODEL: "the linear model; vdet info --json prints its metrics",
+    }
+    paths = {str(folder / name): text for name, text in files.items()}
+    width = max(map(len, paths))
     print_lines(
         *result,
         "",
         "Results:",
-        f"  {folder / 'found.mp4'}  the road with the vehicles that the network found",
-        f"  {folder / 'counted.mp4'}  the road from the pole, with lines and counts",
-        f"  {folder / 'page' / 'page.html'}  its page; {folder / 'flows.csv'} has the flows",
-        f"  {folder / 'found.csv'}  the tracks; {folder / TRUTH} has the ground truth",
-        f"  {folder / 'stages'}/  every stage of the linear model in one frame",
-        f"  {folder / MODEL}  the linear model; vdet info --json prints its metrics",
-        "Next, try your own video:  vdet detect-video in.mp4 out.mp4",
+        *(f"  {path:{width}}  {text}" for path, text in paths.items()),
+        "Next, try your own video:  vdet detect-video in.mp4",
     )
