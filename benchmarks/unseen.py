@@ -36,8 +36,8 @@ from vdet.evaluate.report import video_report
 from vdet.evaluate.scores import RankedPredictions
 from vdet.evaluate.video import evaluate_clip, open_clip
 from vdet.files import json_text, write_whole
-from vdet.labels.pictures import LabelledPicture, LabelledPictures
-from vdet.labels.reading import read_labelled_pictures
+from vdet.labels.images import LabelledImage, LabelledImages
+from vdet.labels.reading import read_labelled_images
 from vdet.labels.roles import Roles
 
 OURS = "trained without them"
@@ -77,7 +77,7 @@ def camera_of(set_: str, picture: Path) -> str:
     return _SAME_CAMERA.get(set_, set_)
 
 
-def deal(sets: Sequence[LabelledPictures], folds: int) -> list[Int64Array]:
+def deal(sets: Sequence[LabelledImages], folds: int) -> list[Int64Array]:
     """Return the fold of every picture of all sets: in turn, camera by camera of a set.
 
     The sets that are one camera each are dealt like the cameras of one set.
@@ -86,7 +86,7 @@ def deal(sets: Sequence[LabelledPictures], folds: int) -> list[Int64Array]:
     dealt = []
     for labelled in sets:
         name, numbers = Path(labelled.name).name, []
-        for picture in labelled.pictures:
+        for picture in labelled.images:
             camera = camera_of(name, picture.path)
             known = cameras["" if camera == _SAME_CAMERA.get(name, name) else name]
             numbers.append(known.setdefault(camera, len(known)) % folds)
@@ -146,7 +146,7 @@ class _AsFrames:
 
 
 def measure(
-    sets: Sequence[LabelledPictures], network: Path, classes: Sequence[str], *, as_frames: bool
+    sets: Sequence[LabelledImages], network: Path, classes: Sequence[str], *, as_frames: bool
 ) -> Findings:
     """Search pictures, each as an image or a frame of a video, and compare all with the labels."""
     settings = NetworkSettings(
@@ -296,7 +296,7 @@ class Unseen:
         self._paths = sorted(path for path in arguments.roads.iterdir() if path.is_dir())
         classes = self.settings.train.net.classes
         labels = Roles.of({}, (*classes, UNKNOWN))
-        self._sets = [read_labelled_pictures(path, labels) for path in self._paths]
+        self._sets = [read_labelled_images(path, labels) for path in self._paths]
         self._dealt = deal(self._sets, self._folds)
         self._sources: list[Any] = []
 
@@ -305,19 +305,19 @@ class Unseen:
         output: Path = self._work / f"without_{fold}.onnx"
         if output.exists():
             return output
-        from vdet.learn.net.sources import NetSource, clip_source, picture_source
+        from vdet.learn.net.sources import NetSource, clip_source, image_source
         from vdet.learn.net.training import train_to_file
 
         if not self._sources:
             roles = Roles.for_training(self.settings)
-            sets = [read_labelled_pictures(path, roles) for path in self._paths]
-            self._sources = [picture_source(labelled, self.settings) for labelled in sets]
+            sets = [read_labelled_images(path, roles) for path in self._paths]
+            self._sources = [image_source(labelled, self.settings) for labelled in sets]
         sources = []
         for (source, report), folds in zip(self._sources, self._dealt, strict=True):
             kept = np.flatnonzero(folds != fold).tolist()
             part = NetSource(source.name, [source.samples[number] for number in kept])
             if kept:
-                sources.append((part, replace(report, pictures=len(kept))))
+                sources.append((part, replace(report, images=len(kept))))
         if fold < self._folds - 1:
             sources.append(clip_source(*self.clip, self.settings))
 
@@ -333,17 +333,17 @@ class Unseen:
         path = self._work / f"{'frames' if as_frames else 'images'}_{network.stem}_{fold}.json"
         if not path.exists():
             sets = [
-                replace(labelled, pictures=_those(labelled.pictures, folds == fold))
+                replace(labelled, images=_those(labelled.images, folds == fold))
                 for labelled, folds in zip(self._sets, self._dealt, strict=True)
             ]
-            sets = [labelled for labelled in sets if labelled.pictures]
+            sets = [labelled for labelled in sets if labelled.images]
             classes = self.settings.train.net.classes
             measure(sets, network, classes, as_frames=as_frames).save(path)
             print(f"{path}: searched", flush=True)
         return Findings.load(path)
 
 
-def _those(pictures: Sequence[LabelledPicture], flags: BoolArray) -> tuple[LabelledPicture, ...]:
+def _those(pictures: Sequence[LabelledImage], flags: BoolArray) -> tuple[LabelledImage, ...]:
     return tuple(pictures[number] for number in np.flatnonzero(flags).tolist())
 
 

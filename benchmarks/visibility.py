@@ -35,8 +35,8 @@ from vdet.detect.onnx.detector import SHIPPED
 from vdet.detect.protocol import DetectorModel
 from vdet.evaluate.output import table
 from vdet.files import json_text, write_whole
-from vdet.labels.pictures import LabelledPicture
-from vdet.labels.reading import read_labelled_pictures
+from vdet.labels.images import LabelledImage
+from vdet.labels.reading import read_labelled_images
 from vdet.media import Picture
 
 _WORK = Path("build/conditions")
@@ -125,8 +125,8 @@ def _searched(roads: Path, networks: Sequence[Path], number: int) -> list[Search
     models = [
         load_detector(settings.model_copy(update={"model": str(network)})) for network in networks
     ]
-    sets = [read_labelled_pictures(path) for path in sorted(roads.iterdir()) if path.is_dir()]
-    chosen = [_spread(len(labelled.pictures), number) for labelled in sets]
+    sets = [read_labelled_images(path) for path in sorted(roads.iterdir()) if path.is_dir()]
+    chosen = [_spread(len(labelled.images), number) for labelled in sets]
     left = 2 * sum(map(len, chosen))
     print(f"{left // 2} pictures, each as it is and changed: {_minutes(left)}", flush=True)
     searches = []
@@ -136,7 +136,7 @@ def _searched(roads: Path, networks: Sequence[Path], number: int) -> list[Search
             found = [
                 item
                 for turn, number in enumerate(numbers)
-                for item in _both(path.stem, labelled.pictures[number], turn, models[folds[number]])
+                for item in _both(path.stem, labelled.images[number], turn, models[folds[number]])
             ]
             write_whole(path, json_text([asdict(item) for item in found]), overwrite=True)
         left -= 2 * len(numbers)
@@ -156,7 +156,7 @@ def _minutes(searches: int) -> str:
 
 
 def _both(
-    name: str, labelled: LabelledPicture, turn: int, model: DetectorModel
+    name: str, labelled: LabelledImage, turn: int, model: DetectorModel
 ) -> Iterator[Searched]:
     """Yield the picture as it is and changed, if it has vehicles."""
     image = labelled.read()

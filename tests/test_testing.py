@@ -40,7 +40,7 @@ def test_both_trackers_pass(settings: MotionTrackerSettings | RulesTrackerSettin
 @pytest.mark.parametrize(
     "output",
     [
-        *("video=out.mp4", "tracks=out.csv", "stages=stages", "picture=out.png", "json=out.json"),
+        *("video=out.mp4", "tracks=out.csv", "stages=stages", "image=out.png", "json=out.json"),
         *("vehicles=out.json", "crops=crops", "page=page", "counts=out.csv", "counts=out.json"),
     ],
 )
@@ -48,7 +48,7 @@ def test_every_sink_passes(output: str, tmp_path: Path) -> None:
     name, _, file = output.partition("=")
     lines = ["traffic.lines=[{name: a, start: [0, 0.5], end: [1, 1]}]"]
     settings = load_settings((), lines if name == "counts" else [])
-    check_sink(sink_kind(name), tmp_path / file, settings, still=name == "picture")
+    check_sink(sink_kind(name), tmp_path / file, settings, still=name == "image")
 
 
 class Wrong:
@@ -63,7 +63,7 @@ class Wrong:
     def detect(self, candidates: Any) -> Boxes:  # noqa: ARG002
         return Boxes([[1, 1, 9, 9]], [0.5])
 
-    def stage_pictures(self, image: Image, detections: Boxes) -> dict[str, Image]:  # noqa: ARG002
+    def stage_images(self, image: Image, detections: Boxes) -> dict[str, Image]:  # noqa: ARG002
         return {}
 
 
@@ -86,7 +86,7 @@ class Counts(Wrong):
 
 
 class FloatPictures(Wrong):
-    def stage_pictures(self, image: Image, detections: Boxes) -> dict[str, Any]:  # noqa: ARG002
+    def stage_images(self, image: Image, detections: Boxes) -> dict[str, Any]:  # noqa: ARG002
         return {"gray": image.astype(np.float32)}
 
 

@@ -44,8 +44,8 @@ from vdet.media import Frame, Picture
 from vdet.media.images import read_image
 from vdet.progress import no_progress, reporting
 from vdet.regions import check_masks
+from vdet.run.images import ImageJob, ImageSearch, run_images
 from vdet.run.loop import Parts
-from vdet.run.pictures import PictureJob, PictureSearch, run_pictures
 from vdet.run.result import FrameResult
 from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind, check_sinks
@@ -130,7 +130,7 @@ class Detector:
             raise TypeError(f"image: {wanted}, not a {type(image).__name__}")
         if image.dtype != "uint8" or image.ndim != 3 or image.shape[2] != 3:
             raise ValueError(f"image: {wanted}, not {image.dtype} {image.shape}")
-        return PictureSearch(self._model, self._settings).detect(source, image).detections
+        return ImageSearch(self._model, self._settings).detect(source, image).detections
 
 
 class Tracker:
@@ -275,7 +275,7 @@ def detect_video(
 @recorded_inputs()
 def detect_image(
     source: PathName,
-    picture: PathName | None = None,
+    image: PathName | None = None,
     *,
     outputs: Mapping[str, Paths] | None = None,
     settings: Settings | None = None,
@@ -284,14 +284,14 @@ def detect_image(
 ) -> Boxes:
     """Find the vehicles in an image file, and write the requested outputs.
 
-    `picture` is the output with a box around each vehicle; other parameters as for `detect_video`.
+    `image` is the output with a box around each vehicle; other parameters as for `detect_video`.
     """
     settings, loaded, _ = _resolved(settings, detector, None)
-    job = PictureJob(Path(source), _outputs({"picture": picture or (), **(outputs or {})}))
+    job = ImageJob(Path(source), _outputs({"image": image or (), **(outputs or {})}))
     check_masks(settings.regions)
     record_input(job.source)
     check_sinks(job.outputs, overwrite=overwrite)
-    (found,) = run_pictures([job], (), PictureSearch(loaded, settings), overwrite=overwrite)
+    (found,) = run_images([job], (), ImageSearch(loaded, settings), overwrite=overwrite)
     if isinstance(found, ImageError):
         raise found
     return found.detections

@@ -40,7 +40,7 @@ _BUILT_IN: dict[str, dict[str, str]] = {
     SINKS: {
         name: f"vdet.run.sinks.{module}:{name.upper()}"
         for module, names in {
-            "drawn": ("video", "picture"),
+            "drawn": ("video", "image"),
             "data": ("tracks", "json", "labels", "vehicles", "counts", "flows", "conditions"),
             "folders": ("stages", "crops", "clips", "page"),
         }.items()

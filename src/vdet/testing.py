@@ -13,7 +13,7 @@ import numpy as np
 
 from vdet.boxes import NO_BOXES, Boxes, Image, clipped
 from vdet.config.schema import Settings
-from vdet.detect.protocol import DetectorModel, VideoDetector, stage_pictures_of
+from vdet.detect.protocol import DetectorModel, VideoDetector, stage_images_of
 from vdet.files import OutputFiles
 from vdet.media import Frame, Picture, VideoInfo
 from vdet.run.result import FrameResult
@@ -51,7 +51,7 @@ def check_detector(model: DetectorModel, images: Sequence[Image]) -> None:
     for boxes in (*found, in_still):
         inside = clipped(boxes.sides, (width, height))
         assert np.array_equal(inside, boxes.sides), "a box lies outside the frame"
-    for name, picture in stage_pictures_of(still)(shown[0], in_still).items():
+    for name, picture in stage_images_of(still)(shown[0], in_still).items():
         is_image = picture.dtype == np.uint8 and picture.ndim == 3
         assert is_image, f"stage image {name} is not uint8 of shape (H, W, 3)"
     assert np.array_equal(shown, images), "the detector changed a frame"

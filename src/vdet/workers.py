@@ -55,7 +55,7 @@ def limit_library_threads() -> None:
     threadpool_limits(1)
 
 
-PICTURES = 32_000_000, 64_000_000
+IMAGES = 32_000_000, 64_000_000
 """Limits for `return_freed_memory` with which each image reuses the memory of an earlier one.
 
 Allocating new memory takes longer than decoding an image into it.

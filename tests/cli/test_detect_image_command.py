@@ -8,7 +8,7 @@ import pytest
 
 from conftest import Run
 from quick import QUICK_OPTIONS, only_windows
-from vdet.labels.reading import read_labelled_pictures
+from vdet.labels.reading import read_labelled_images
 from vdet.media.images import read_image
 from vdet.synthetic.render import Renderer
 from vdet.synthetic.scene import Scene
@@ -107,7 +107,7 @@ def test_labels_of_a_folder_and_those_below_are_read_by_eval_images(
     zipfile.ZipFile(files[-1]).extractall(tmp_path / "set")
     names = [folder / "a.png", folder / "north" / "a.png"]
     for labels in (files[0], tmp_path / "set"):
-        found = read_labelled_pictures(labels).pictures
+        found = read_labelled_images(labels).images
         assert [item.path for item in found] == names
         first, second = ([label.box for label in item.labels] for item in found)
         assert first

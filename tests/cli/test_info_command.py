@@ -59,7 +59,7 @@ def test_a_video_is_described(run: Run, tmp_path: Path) -> None:
     assert "already exists" in again.err
 
 
-def test_numbered_pictures_are_a_video_and_one_picture_is_not(run: Run, tmp_path: Path) -> None:
+def test_numbered_images_are_a_video_and_one_picture_is_not(run: Run, tmp_path: Path) -> None:
     for number in range(3):
         write_image(tmp_path / f"img_{number}.png", np.full((96, 160, 3), 90, np.uint8))
     for path, words in (

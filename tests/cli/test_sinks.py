@@ -11,7 +11,7 @@ from vdet.media.images import read_image
 from writing import write_image
 
 FRAMES = 15
-NAMES = "video picture tracks json labels vehicles counts flows conditions stages crops clips page"
+NAMES = "video image tracks json labels vehicles counts flows conditions stages crops clips page"
 KNOWN = f"known: {', '.join(NAMES.split())}"
 
 
@@ -68,15 +68,15 @@ class TestDetectVideo:
 
 
 def test_a_sink_for_one_picture(run: Run, tmp_path: Path, out: Path, red: tuple[str, ...]) -> None:
-    picture = tmp_path / "red.png"
-    write_image(picture, road(CAR))
-    sink = ("--sink", f"picture={out}/a.png", *red)
-    run("detect-image", picture, *sink, code=0)
-    assert (read_image(out / "a.png") != read_image(picture)).any()
+    image = tmp_path / "red.png"
+    write_image(image, road(CAR))
+    sink = ("--sink", f"image={out}/a.png", *red)
+    run("detect-image", image, *sink, code=0)
+    assert (read_image(out / "a.png") != read_image(image)).any()
     before = (out / "a.png").read_bytes()
-    twin = picture.with_name("twin.png")
+    twin = image.with_name("twin.png")
     write_image(twin, road())
-    several = run("detect-image", twin, picture, *sink, "--overwrite")
+    several = run("detect-image", twin, image, *sink, "--overwrite")
     assert several.code == 1
     assert "a.png: is for one image; for several, use a folder" in several.err
     assert (out / "a.png").read_bytes() == before

@@ -10,14 +10,14 @@ from vdet.boxes import Boxes
 from vdet.evaluate.comparison import compare
 from vdet.evaluate.images import Counting, MeasuredImage
 from vdet.evaluate.scores import ClassResult, class_results
+from vdet.labels.images import LabelledImage
 from vdet.labels.label import Label
-from vdet.labels.pictures import LabelledPicture
 
 
 def test_vehicles_of_a_picture_are_counted_by_their_class_and_that_of_their_detection() -> None:
     places, true = [(x, 0, x + 100, 100) for x in range(0, 800, 200)], ["car", "truck", "truck"]
     labels = [Label(0, box, name) for box, name in zip(places, [*true, "vehicle"], strict=True)]
-    picture = LabelledPicture(Path("a.png"), Path("a.txt"), tuple(labels))
+    picture = LabelledImage(Path("a.png"), Path("a.txt"), tuple(labels))
     boxes = np.array([*places[:2], places[3], (900, 0, 999, 100)])
     found = Boxes(boxes, [0.9] * 4, classes=[0, 0, 1, 1], names=["car", "truck"])
     shown = MeasuredImage.of(picture, 1000, found, Counting(0.5, 0)).shown

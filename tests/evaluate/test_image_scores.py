@@ -17,8 +17,8 @@ from vdet.evaluate.images import (
     MeasuredSet,
     score_source,
 )
+from vdet.labels.images import LabelledImage, LabelledImages
 from vdet.labels.label import Label
-from vdet.labels.pictures import LabelledPicture, LabelledPictures
 
 PLAIN = Counting(score=0.5, min_width=0)
 WIDTH = 1000
@@ -43,7 +43,7 @@ class Searched:
         labels = (
             Label(row, box, "car", ignored=row in self.ignored) for row, box in enumerate(self.true)
         )
-        picture = LabelledPicture(Path("a.png"), Path("a.txt"), tuple(labels))
+        picture = LabelledImage(Path("a.png"), Path("a.txt"), tuple(labels))
         boxes = np.array([box for _, box in self.found]).reshape(-1, 4)
         scores = np.array([score for score, _ in self.found])
         return MeasuredImage.of(picture, WIDTH, Boxes(boxes, scores), counting)
@@ -51,7 +51,7 @@ class Searched:
 
 def source(*pictures: Searched, counting: Counting = PLAIN) -> MeasuredSet:
     measured = [picture.measured(counting) for picture in pictures]
-    labelled = LabelledPictures("set", tuple(item.picture for item in measured))
+    labelled = LabelledImages("set", tuple(item.labelled for item in measured))
     return score_source(labelled, measured)
 
 

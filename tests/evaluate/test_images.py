@@ -12,8 +12,8 @@ from vdet.boxes import Box
 from vdet.detect.svm.detector import SvmModel
 from vdet.errors import ImageError
 from vdet.evaluate.images import Counting, evaluate_images
-from vdet.labels.pictures import LabelledPictures
-from vdet.labels.reading import read_labelled_pictures
+from vdet.labels.images import LabelledImages
+from vdet.labels.reading import read_labelled_images
 
 DETECTOR = PERSPECTIVE.svm
 COUNTING = Counting(DETECTOR.min_score_still, 0)
@@ -25,13 +25,13 @@ def model() -> SvmModel:
 
 
 @pytest.fixture
-def red_set(tmp_path: Path) -> LabelledPictures:
+def red_set(tmp_path: Path) -> LabelledImages:
     """Five pictures with a car in other places, and one without."""
     cars = {f"{n}": moved_to(CAR, 30 + 40 * n, CAR.y1) for n in range(5)}
     return write_set(tmp_path / "red", cars | {"9": None})
 
 
-def write_set(folder: Path, cars: dict[str, Box | None]) -> LabelledPictures:
+def write_set(folder: Path, cars: dict[str, Box | None]) -> LabelledImages:
     pictures = {
         name: Labelled(
             WIDTH,
@@ -43,23 +43,23 @@ def write_set(folder: Path, cars: dict[str, Box | None]) -> LabelledPictures:
     path = write_coco(folder, pictures)
     for name, car in cars.items():
         show(folder / f"{name}.png", road(*([car] if car else [])))
-    return read_labelled_pictures(path)
+    return read_labelled_images(path)
 
 
-def test_results_do_not_depend_on_threads(red_set: LabelledPictures, model: SvmModel) -> None:
+def test_results_do_not_depend_on_threads(red_set: LabelledImages, model: SvmModel) -> None:
     done: list[int] = []
     alone = evaluate_images([red_set], model, COUNTING, progress=lambda _: done.append)
     together = evaluate_images([red_set], model, COUNTING, threads=3)
     assert done == [1] * 6
     images = [result.sources[0].images for result in (alone, together)]
-    for one, other, image in zip(*images, red_set.pictures, strict=True):
-        assert one.picture is image is other.picture
+    for one, other, image in zip(*images, red_set.images, strict=True):
+        assert one.labelled is image is other.labelled
         for frame, same in zip(one.every.frames, other.every.frames, strict=True):
             assert np.array_equal(frame.track_boxes, same.track_boxes)
             assert np.array_equal(frame.scores, same.scores)
 
 
-def test_a_picture_that_cannot_be_read_is_named(red_set: LabelledPictures, model: SvmModel) -> None:
-    red_set.pictures[2].path.write_bytes(b"no picture")
+def test_a_picture_that_cannot_be_read_is_named(red_set: LabelledImages, model: SvmModel) -> None:
+    red_set.images[2].path.write_bytes(b"no picture")
     with pytest.raises(ImageError, match=r"2\.png: is not an image"):
         evaluate_images([red_set], model, COUNTING, threads=2)

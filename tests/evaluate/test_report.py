@@ -23,7 +23,7 @@ from vdet.evaluate.report import (
 )
 from vdet.evaluate.video import ClipResult, score_files
 from vdet.labels.label import Label, from_size
-from vdet.labels.reading import read_labelled_pictures
+from vdet.labels.reading import read_labelled_images
 
 NAME = RunName("svm", None, None, ("b=1",))
 
@@ -99,11 +99,11 @@ class TestPictures:
         """Return the result where these boxes are found in two pictures, one without a car."""
         cow = Boxed("cow", (0, 0, 5, 5))
         pictures = {"a": Labelled(100, 60, (self.CAR, cow)), "b": Labelled(100, 60)}
-        labelled = read_labelled_pictures(write_coco(folder, pictures))
+        labelled = read_labelled_images(write_coco(folder, pictures))
         boxes = np.array([from_size(*box) for box in found], np.float64).reshape(-1, 4)
         shown = Boxes(boxes, np.full(len(found), 0.9))
         images = [
-            MeasuredImage.of(picture, 100, shown, self.COUNTING) for picture in labelled.pictures
+            MeasuredImage.of(picture, 100, shown, self.COUNTING) for picture in labelled.images
         ]
         return ImagesResult(self.COUNTING, (score_source(labelled, images),))
 

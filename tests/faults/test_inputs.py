@@ -16,7 +16,7 @@ from red_cars import CAR, HEIGHT, SETTINGS, WIDTH, red_model, red_settings
 from running import frames_of, names, until, write_drive
 from vdet.batch.task import process_file
 from vdet.errors import VdetError
-from vdet.labels.reading import read_labelled_pictures
+from vdet.labels.reading import read_labelled_images
 from vdet.run.loop import Parts
 from vdet.run.sinks import Output
 from vdet.run.video import Run, run_video
@@ -80,19 +80,19 @@ def test_a_fifo_in_a_set_of_labelled_pictures_is_not_waited_for(tmp_path: Path) 
     write_yolo(tmp_path, {name: Labelled(WIDTH, HEIGHT, boxes) for name in "ab"})
     (tmp_path / "labels" / "a.txt").unlink()
     os.mkfifo(tmp_path / "labels" / "a.txt")
-    found = list(read_labelled_pictures(tmp_path).pictures)
+    found = list(read_labelled_images(tmp_path).images)
     assert [len(picture.labels) for picture in found] == [0, 1]
     (tmp_path / "images" / "a.png").unlink()
     os.mkfifo(tmp_path / "images" / "a.png")
     with pytest.raises(VdetError, match=r"a\.png"):
-        list(read_labelled_pictures(tmp_path).pictures)
+        list(read_labelled_images(tmp_path).images)
 
 
 def test_a_fifo_where_a_coco_file_may_be_is_not_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "labels.json")
     for path in (tmp_path, tmp_path / "labels.json"):
         with pytest.raises(VdetError, match="labelled images not found"):
-            read_labelled_pictures(path)
+            read_labelled_images(path)
 
 
 class Pipe:

@@ -50,7 +50,7 @@ def contents(folder: Path) -> dict[Path, bytes]:
         "detect-image frames -o frames",
         "detect-image set/a.png -c settings.yaml --json link.png",
         "detect-video in.mp4 in.mp4",
-        "detect-video frames --no-video -c settings.yaml --sink picture=mask.png",
+        "detect-video frames --no-video -c settings.yaml --sink image=mask.png",
         "detect-video in.mp4 --no-video -c out/in.json --counts out/in.json",
         "detect-video in.mp4 --no-video -c out/in.json --counts again/in.json",
         "detect-video in.mp4 --no-video -c out/in.json --counts .json -d out",

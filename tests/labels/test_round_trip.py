@@ -17,14 +17,14 @@ from labels.saving import VIDEO, car, frame, read_back, written
 from vdet.boxes import Box
 from vdet.detect.classes import OUR_NAMES, UNKNOWN
 from vdet.errors import TruthError
-from vdet.labels.coco import COCO, read_coco_pictures
-from vdet.labels.formats import Format, PictureTracks, track_formats
+from vdet.labels.coco import COCO, read_coco_images
+from vdet.labels.formats import Format, ImageTracks, track_formats
+from vdet.labels.images import LabelledImage
 from vdet.labels.kitti import KITTI
 from vdet.labels.label import SavedTracks
 from vdet.labels.mot import MOT
 from vdet.labels.native import CSV, JSON_LINES
-from vdet.labels.pictures import LabelledPicture
-from vdet.labels.yolo import YOLO, read_yolo_pictures
+from vdet.labels.yolo import YOLO, read_yolo_images
 from vdet.track.track import FrameTracks, State, Track
 from writing import write_image
 
@@ -50,9 +50,9 @@ def boxes(draw: st.DrawFn) -> Box:
     return Box.sized(x, y, right - x, bottom - y)
 
 
-READERS: dict[Format, Callable[[Path], Iterator[LabelledPicture]]] = {
-    COCO: read_coco_pictures,
-    YOLO: lambda path: read_yolo_pictures(path.parent / "images", path.parent / "labels"),
+READERS: dict[Format, Callable[[Path], Iterator[LabelledImage]]] = {
+    COCO: read_coco_images,
+    YOLO: lambda path: read_yolo_images(path.parent / "images", path.parent / "labels"),
 }
 """How the labels of pictures are read again."""
 
@@ -156,11 +156,11 @@ def test_a_box_may_reach_out_of_the_frame(tmp_path: Path, form: Format) -> None:
 
 
 @st.composite
-def labelled(draw: st.DrawFn) -> list[PictureTracks]:
+def labelled(draw: st.DrawFn) -> list[ImageTracks]:
     """Give pictures with boxes, some in folders; no two boxes of one are the same."""
     names = st.sampled_from(["a.png", "b/a.png", "b/c d/é & <e>.jpg", "b/2.jpg"])
     return [
-        PictureTracks(
+        ImageTracks(
             Path(name),
             (VIDEO.width, VIDEO.height),
             [
@@ -173,14 +173,14 @@ def labelled(draw: st.DrawFn) -> list[PictureTracks]:
 
 
 def test_every_format_that_pictures_are_written_in_is_read() -> None:
-    assert {form for form in FORMATS if form.pictures} == READERS.keys()
+    assert {form for form in FORMATS if form.images} == READERS.keys()
 
 
 @pytest.mark.parametrize("form", READERS, ids=lambda form: form.name)
 @settings(max_examples=20)
 @given(pictures=labelled())
-def test_labels_of_pictures_are_read_again(form: Format, pictures: list[PictureTracks]) -> None:
-    assert form.pictures is not None
+def test_labels_of_pictures_are_read_again(form: Format, pictures: list[ImageTracks]) -> None:
+    assert form.images is not None
     with TemporaryDirectory() as name:
         folder = Path(name)
         path, images = folder / f"set{form.suffix}", folder / "images"
@@ -188,7 +188,7 @@ def test_labels_of_pictures_are_read_again(form: Format, pictures: list[PictureT
             (images / picture.path).parent.mkdir(parents=True, exist_ok=True)
             write_image(images / picture.path, np.zeros((VIDEO.height, VIDEO.width, 3), np.uint8))
         with path.open("wb") as file:
-            form.pictures(file, pictures)
+            form.images(file, pictures)
         if form is YOLO:
             with zipfile.ZipFile(path) as archive:
                 archive.extractall(folder)

@@ -15,7 +15,7 @@ from vdet.errors import ImageError
 from vdet.media.images import decode_image, encode_image, read_header, read_image
 from vdet.media.reader import VideoReader
 
-PICTURE = np.random.default_rng(0).integers(0, 256, (24, 32, 3), dtype=np.uint8)
+IMAGE = np.random.default_rng(0).integers(0, 256, (24, 32, 3), dtype=np.uint8)
 
 
 def smooth() -> Image:
@@ -31,8 +31,8 @@ def encoded(suffix: str, image: np.ndarray) -> bytes:
 @pytest.mark.parametrize("suffix", [".png", ".bmp", ".tiff", ".PNG"])
 def test_a_written_picture_is_read_back_the_same(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"picture{suffix}"
-    path.write_bytes(encode_image(PICTURE, path))
-    np.testing.assert_array_equal(read_image(path), PICTURE)
+    path.write_bytes(encode_image(IMAGE, path))
+    np.testing.assert_array_equal(read_image(path), IMAGE)
 
 
 @pytest.mark.parametrize("suffix", [".jpg", ".jpeg", ".webp"])
@@ -58,7 +58,7 @@ def test_12_bit_values_in_16_bits_are_as_bright_as_others(
     tmp_path: Path, suffix: str, channels: slice | int, *, white: int
 ) -> None:
     path = tmp_path / f"0001{suffix}"
-    deep = np.rint(PICTURE[..., channels] / 255 * white).astype(np.uint16)
+    deep = np.rint(IMAGE[..., channels] / 255 * white).astype(np.uint16)
     deep.flat[0] = white
     path.write_bytes(encoded(suffix, deep))
     expected = np.rint(deep / white * 255).reshape(24, 32, -1) * np.ones(3)
@@ -71,10 +71,10 @@ def test_12_bit_values_in_16_bits_are_as_bright_as_others(
 @pytest.mark.parametrize("kind", [np.uint8, np.uint16])
 def test_alpha_is_dropped_and_grey_has_three_equal_channels(kind: type[np.generic]) -> None:
     scale = 257 if kind is np.uint16 else 1
-    with_alpha = np.dstack([PICTURE, np.zeros((24, 32), np.uint8)]).astype(kind) * scale
+    with_alpha = np.dstack([IMAGE, np.zeros((24, 32), np.uint8)]).astype(kind) * scale
     for source, expected in (
-        (with_alpha, PICTURE),
-        (with_alpha[..., 0], np.repeat(PICTURE[..., :1], 3, axis=2)),
+        (with_alpha, IMAGE),
+        (with_alpha[..., 0], np.repeat(IMAGE[..., :1], 3, axis=2)),
     ):
         image = decode_image(encoded(".png", source.astype(kind)))
         assert image is not None
@@ -143,8 +143,8 @@ def test_a_jpeg_that_was_cut_off_is_read_as_far_as_it_goes_with_a_warning(
     [
         b"",
         b"this is not a picture\n",
-        encoded(".png", PICTURE)[:20],
-        encoded(".jpg", PICTURE)[:100],
+        encoded(".png", IMAGE)[:20],
+        encoded(".jpg", IMAGE)[:100],
         b"\x89PNG\r\n\x1a\n",
     ],
     ids=["empty", "text", "cut png", "cut jpeg", "png signature alone"],
@@ -166,4 +166,4 @@ def test_a_pipe_is_refused_at_once(tmp_path: Path, read: Callable[[Path], object
 @pytest.mark.parametrize("name", ["picture.xyz", "picture", "picture.txt"])
 def test_the_error_for_an_unknown_suffix_lists_the_known_ones(name: str) -> None:
     with pytest.raises(ImageError, match=r"must end in .*\.jpg, .*\.png"):
-        encode_image(PICTURE, Path(name))
+        encode_image(IMAGE, Path(name))

@@ -9,7 +9,7 @@ from typing import Any
 from red_cars import CAR, HEIGHT, SETTINGS, WIDTH, red_finder, road
 from vdet.boxes import NO_BOXES, Box, Boxes, Image
 from vdet.config.schema import Settings
-from vdet.detect.protocol import StagePictures
+from vdet.detect.protocol import StageImages
 from vdet.detect.svm.detector import SvmModel
 from vdet.files import OutputFiles
 from vdet.lanes.road import Road
@@ -90,7 +90,7 @@ def stages_of_trace(image: Image, detections: Boxes) -> dict[str, Image]:
         return {}
     height, width = image.shape[:2]
     detector = model_for(SETTINGS).for_video(width, height, [image])
-    return detector.stage_pictures(image, detections)
+    return detector.stage_images(image, detections)
 
 
 def write(
@@ -100,7 +100,7 @@ def write(
     settings: Settings = SETTINGS,
     video: VideoInfo | None = VIDEO,
     at: Fraction = Fraction(0),
-    stage_pictures: StagePictures = stages_of_trace,
+    stage_images: StageImages = stages_of_trace,
 ) -> None:
     """Give results to a sink of its own run.
 
@@ -109,7 +109,7 @@ def write(
     with OutputFiles(overwrite=True) as files:
         traffic = LiveTraffic(settings, video.width, video.height) if video else None
         context = SinkContext(
-            files, settings, video, at=at, traffic=traffic, stage_pictures=stage_pictures
+            files, settings, video, at=at, traffic=traffic, stage_images=stage_images
         )
         with open_sinks([output], context) as sinks:
             for result in results:

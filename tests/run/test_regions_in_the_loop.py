@@ -15,7 +15,7 @@ from vdet.config.camera import CameraSettings
 from vdet.config.schema import Settings
 from vdet.errors import ImageError, VideoError
 from vdet.media.images import read_image
-from vdet.run.pictures import PictureJob, PictureSearch, run_pictures
+from vdet.run.images import ImageJob, ImageSearch, run_images
 from vdet.run.sinks import Output
 from vdet.run.video import Run
 from writing import write_image
@@ -45,7 +45,7 @@ def test_a_picture_shows_only_what_stands_in_the_region(settings: Settings) -> N
     image = road(moved_to(CAR, 20, 120), moved_to(CAR, 220, 120))
 
     def found(regions: Settings) -> list[Box]:
-        result = PictureSearch(model_for(regions), regions).detect(Path("a.png"), image)
+        result = ImageSearch(model_for(regions), regions).detect(Path("a.png"), image)
         assert [t.box for t in result.tracks] == rounded(result.detections)
         return [t.box for t in result.tracks]
 
@@ -60,7 +60,7 @@ def test_regions_for_another_shape_name_the_file(red_clip: Path, tmp_path: Path)
     with pytest.raises(VideoError, match=r"red\.mp4: camera\.size: points are for frames"):
         run_red(Run(red_clip, outputs(tracks=tmp_path / "t.csv")), settings)
     with pytest.raises(ImageError, match=r"a\.png: camera\.size"):
-        PictureSearch(model_for(settings), settings).detect(Path("a.png"), road(CAR))
+        ImageSearch(model_for(settings), settings).detect(Path("a.png"), road(CAR))
     assert list(tmp_path.iterdir()) == []
 
 
@@ -68,8 +68,8 @@ def test_the_stages_show_the_regions(tmp_path: Path) -> None:
     write_image(tmp_path / "road.png", road(CAR))
     for name, settings in (("without", SETTINGS), ("with", within())):
         folder = tmp_path / name
-        job = PictureJob(tmp_path / "road.png", (Output("stages", folder),))
-        list(run_pictures([job], (), PictureSearch(model_for(settings), settings)))
+        job = ImageJob(tmp_path / "road.png", (Output("stages", folder),))
+        list(run_images([job], (), ImageSearch(model_for(settings), settings)))
     assert not list((tmp_path / "without").glob("*regions*"))
     names = sorted(path.name for path in (tmp_path / "with").iterdir())
     assert names[-2:] == ["4-regions.png", "5-boxes.png"]

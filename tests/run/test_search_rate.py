@@ -24,13 +24,13 @@ from vdet.run.result import FrameResult
 from vdet.run.sinks import Output
 from vdet.track.motion.tracker import MotionTracker
 
-PICTURE = Picture(road(CAR))
+IMAGE = Picture(road(CAR))
 OF_NETWORK, OF_SVM = NetworkSettings().searches_per_second, SvmSettings().searches_per_second
 
 
 def searched(rate: SearchRate, times: Iterable[float | Fraction]) -> list[int]:
     """Return the numbers of the frames that are searched."""
-    frames = [Frame(n, Fraction(time), PICTURE) for n, time in enumerate(times)]
+    frames = [Frame(n, Fraction(time), IMAGE) for n, time in enumerate(times)]
     return [frame.index for frame, is_searched in rate.choose(frames) if is_searched]
 
 
@@ -160,7 +160,7 @@ def test_frames_are_searched_so_many_times_a_second() -> None:
 
 @pytest.mark.parametrize("time", [Fraction(1, 25), Fraction(0), float("nan"), float("inf")])
 def test_times_that_do_not_increase_are_refused(time: Fraction) -> None:
-    frames = [Frame(n, at, PICTURE) for n, at in enumerate((Fraction(0), Fraction(1, 25), time))]
+    frames = [Frame(n, at, IMAGE) for n, at in enumerate((Fraction(0), Fraction(1, 25), time))]
     with pytest.raises(ValueError, match=r"^frame 2 at .*s is not after the last one"):
         list(follow(frames))
 

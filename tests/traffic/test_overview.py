@@ -9,13 +9,13 @@ from vdet.track.track import Track
 from vdet.traffic.records import BestCrops, Crop
 
 ROAD = np.arange(HEIGHT * WIDTH * 3, dtype=np.uint64).reshape(HEIGHT, WIDTH, 3).astype(np.uint8)
-PICTURE = Picture(ROAD)
+IMAGE = Picture(ROAD)
 
 
 def crops(*shown: list[Track]) -> dict[int, Crop]:
     """Return the picture of each vehicle that was given back last."""
     best = BestCrops()
-    found = [crop for n, track in enumerate(shown) for crop in best.add(frame(n, *track), PICTURE)]
+    found = [crop for n, track in enumerate(shown) for crop in best.add(frame(n, *track), IMAGE)]
     return {crop.id: crop for crop in (*found, *best.end())}
 
 
@@ -49,10 +49,10 @@ def test_where_the_detector_did_not_see_it_there_is_no_picture() -> None:
 
 def test_a_vehicle_that_is_gone_is_given_back_and_again_if_it_comes_back_better() -> None:
     best = BestCrops()
-    assert best.add(frame(0, track(1, box(40))), PICTURE) == []
-    assert [crop.id for crop in best.add(frame(1), PICTURE)] == [1]
-    assert best.add(frame(2), PICTURE) == []
-    assert best.add(frame(3, track(1, box(30))), PICTURE) == []
-    assert best.add(frame(4), PICTURE) == [], "the first one is better"
-    best.add(frame(5, track(1, box(60))), PICTURE)
+    assert best.add(frame(0, track(1, box(40))), IMAGE) == []
+    assert [crop.id for crop in best.add(frame(1), IMAGE)] == [1]
+    assert best.add(frame(2), IMAGE) == []
+    assert best.add(frame(3, track(1, box(30))), IMAGE) == []
+    assert best.add(frame(4), IMAGE) == [], "the first one is better"
+    best.add(frame(5, track(1, box(60))), IMAGE)
     assert [crop.image.shape[0] for crop in best.end()] == [72]

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from vdet.errors import BatchError, VideoError
 from vdet.media.demux import refuse_stream
-from vdet.media.images import PICTURE_SUFFIXES, find_sequence
+from vdet.media.images import IMAGE_SUFFIXES, find_sequence
 
 _log = logging.getLogger("vdet")
 
@@ -96,11 +96,11 @@ def _below(folder: Path, base: Path) -> Iterator[InputVideo]:
         for path in videos:
             yield InputVideo(path, path.relative_to(base))
         suffixes = {Path(name).suffix.lower() for name in names if not name.startswith(".")}
-        if not videos and suffixes & PICTURE_SUFFIXES:
-            yield from _pictures_in(Path(root), base)
+        if not videos and suffixes & IMAGE_SUFFIXES:
+            yield from _images_in(Path(root), base)
 
 
-def _pictures_in(folder: Path, base: Path) -> Iterator[InputVideo]:
+def _images_in(folder: Path, base: Path) -> Iterator[InputVideo]:
     """Yield the numbered images of a folder as one video, with the name of the folder."""
     try:
         sequence = find_sequence(folder)

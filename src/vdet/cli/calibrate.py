@@ -39,7 +39,7 @@ def calibrate(
     """
     from vdet.lanes.calibration import calibrate as fit
     from vdet.lanes.camera import save_camera
-    from vdet.run.pictures import find_images
+    from vdet.run.images import find_images
 
     if not (3 <= min(pattern) <= max(pattern) <= 999):
         raise click.UsageError("--pattern: must be 3 to 999 inner corners, such as 9x6")

@@ -11,7 +11,7 @@ from vdet.cli import options
 from vdet.cli.command import command
 from vdet.cli.messages import print_lines, progress_steps
 from vdet.errors import ImageError, counted, failure_code
-from vdet.workers import PICTURES, core_count, return_freed_memory
+from vdet.workers import IMAGES, core_count, return_freed_memory
 
 if TYPE_CHECKING:
     from vdet.run.result import FrameResult
@@ -63,19 +63,19 @@ def detect_image(
         log.warning("%s", settings.lack_of_metres)
     from vdet.detect.factory import load_detector
     from vdet.regions import check_masks
-    from vdet.run.pictures import PictureSearch, find_images, plan_pictures, run_pictures
+    from vdet.run.images import ImageSearch, find_images, plan_images, run_images
     from vdet.run.sinks.protocol import check_sinks
 
-    return_freed_memory(*PICTURES)
+    return_freed_memory(*IMAGES)
     check_masks(settings.regions)
     model = load_detector(settings.detector)
     sources = find_images(images)
     shared = options.wanted_outputs()
     check_sinks(shared, overwrite=overwrite)
-    jobs = plan_pictures(sources, output, stages, overwrite=overwrite)
+    jobs = plan_images(sources, output, stages, overwrite=overwrite)
     is_printed, failed = not (output or stages or shared), 0
-    search, threads = PictureSearch(model, settings), core_count()
-    results = run_pictures(jobs, shared, search, overwrite=overwrite, threads=threads)
+    search, threads = ImageSearch(model, settings), core_count()
+    results = run_images(jobs, shared, search, overwrite=overwrite, threads=threads)
     with progress_steps(" images") as steps, closing(results):
         advance = steps("", len(jobs))
         for result in results:

@@ -220,7 +220,7 @@ def _with_endings(outputs: list[Output], *, no_video: bool) -> list[Output]:
     endings = []
     for output in outputs:
         sink, kind, suffix = output.sink, sink_kind(output.sink), str(output.path).lower()
-        if kind.takes == "pictures" or kind.one_frame:
+        if kind.takes == "images" or kind.one_frame:
             raise click.UsageError(f"{sink}: cannot be written with -d; remove one of them")
         if not _SUFFIX.fullmatch(suffix) or not kind.takes_name(f"video{suffix}"):
             known = ", ".join(kind.endings) or f"as in .{sink if kind.folder_pattern else 'txt'}"

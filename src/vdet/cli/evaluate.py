@@ -11,7 +11,7 @@ from vdet.cli import options
 from vdet.cli.command import command
 from vdet.cli.messages import progress_steps
 from vdet.cli.results import ResultFiles, facts_options, results_options
-from vdet.workers import PICTURES, core_count, return_freed_memory
+from vdet.workers import IMAGES, core_count, return_freed_memory
 
 _data = click.argument("data", nargs=-1, required=True, type=options.INPUT, metavar="DATA...")
 
@@ -40,13 +40,13 @@ def images(data: tuple[Path, ...], min_width: float, **targets: Any) -> None:
     from vdet.detect.factory import load_detector
     from vdet.evaluate.images import Counting, evaluate_images
     from vdet.evaluate.report import images_report
-    from vdet.labels.reading import read_labelled_pictures
+    from vdet.labels.reading import read_labelled_images
     from vdet.labels.roles import Roles
 
-    return_freed_memory(*PICTURES)
+    return_freed_memory(*IMAGES)
     detector, roles = settings.detector, Roles.from_settings(settings)
     model = load_detector(detector.showing_all())
-    sets = [read_labelled_pictures(path, roles) for path in data]
+    sets = [read_labelled_images(path, roles) for path in data]
     results = ResultFiles(**targets).checked()
     counting = Counting(detector.min_score_still, min_width)
     with progress_steps(" images") as steps:

@@ -48,7 +48,7 @@ def info(path: Path | None, **targets: Any) -> int:
     vdet info -c gate.yaml
     vdet info
     """
-    from vdet.media.images import is_picture_name
+    from vdet.media.images import is_image_name
 
     results = ResultFiles(**targets).checked()
     if path is None:
@@ -56,7 +56,7 @@ def info(path: Path | None, **targets: Any) -> int:
     else:
         describe = {".npz": _linear_model, ".onnx": _network}.get(path.suffix.lower())
         if describe is None:
-            describe = _picture if is_picture_name(path) and "%" not in path.name else _video
+            describe = _image if is_image_name(path) and "%" not in path.name else _video
         facts = {"file": str(path)} | describe(path)
     shown = {name.replace("_", " "): facts[name] for name in facts if name != "provenance"}
     results.print([f"{name}: {_text(value)}" for name, value in shown.items()], facts)
@@ -189,7 +189,7 @@ def _network(path: Path) -> Facts:
     }
 
 
-def _picture(path: Path) -> Facts:
+def _image(path: Path) -> Facts:
     from vdet.detect.svm.horizon import find_horizon
     from vdet.media.images import read_image
 
@@ -201,7 +201,7 @@ def _picture(path: Path) -> Facts:
 def _video(path: Path) -> Facts:
     from vdet.detect.svm.horizon import find_horizon
     from vdet.errors import VideoError
-    from vdet.media.demux import is_pipe, open_input, picture_stream
+    from vdet.media.demux import is_pipe, open_input, video_stream
     from vdet.media.reader import VideoReader
     from vdet.run.loop import FIRST_FRAMES
 
@@ -210,7 +210,7 @@ def _video(path: Path) -> Facts:
     with VideoReader(path, frames=FIRST_FRAMES) as reader:
         info, images = reader.info, [frame.image for frame in reader]
     with open_input(path) as container:
-        context = picture_stream(container, path).codec_context
+        context = video_stream(container, path).codec_context
         return {
             "kind": "video",
             "container": container.format.long_name,

@@ -147,16 +147,16 @@ def train_net(
     options.check_file(output, ".onnx", what="networks", overwrite=overwrite)
     settings = options.read_settings()
     try:
-        from vdet.learn.net.sources import clip_source, picture_source
+        from vdet.learn.net.sources import clip_source, image_source
         from vdet.learn.net.training import train_to_file
     except ImportError as error:
         raise DataError(f"{error.name} is not installed; pip install torch onnx") from error
-    from vdet.labels.reading import read_labelled_pictures
+    from vdet.labels.reading import read_labelled_images
     from vdet.labels.roles import Roles
 
     limit_library_threads()
     roles = Roles.for_training(settings)
-    sources = [picture_source(read_labelled_pictures(path, roles), settings) for path in data]
+    sources = [image_source(read_labelled_images(path, roles), settings) for path in data]
     sources += [clip_source(clip, truth, settings) for clip, truth in clips]
     check_output(output, overwrite=overwrite)  # it may be among the files that were read now
     print_lines(*(line for _, report in sources for line in report.lines()), "")

@@ -35,13 +35,13 @@ class VideoDetector(Protocol):
         """
 
 
-StagePictures = Callable[[Image, Boxes], dict[str, Image]]
+StageImages = Callable[[Image, Boxes], dict[str, Image]]
 """Takes an image and its detections; returns an image of each stage by its name."""
 
 
-def stage_pictures_of(detector: VideoDetector) -> StagePictures:
-    """Return the method `stage_pictures` of a detector, or one that returns no images."""
-    return getattr(detector, "stage_pictures", lambda *_: {})
+def stage_images_of(detector: VideoDetector) -> StageImages:
+    """Return the method `stage_images` of a detector, or one that returns no images."""
+    return getattr(detector, "stage_images", lambda *_: {})
 
 
 @runtime_checkable

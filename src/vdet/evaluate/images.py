@@ -13,10 +13,10 @@ from vdet.detect.classes import UNKNOWN
 from vdet.detect.protocol import DetectorModel
 from vdet.evaluate.comparison import Comparison, compare, pool
 from vdet.evaluate.scores import DetectionScores, RankedPredictions, rank_predictions, score_boxes
+from vdet.labels.images import LabelledImage, LabelledImages
 from vdet.labels.label import MAX_IN_FRAME, LabelledVideo
-from vdet.labels.pictures import LabelledPicture, LabelledPictures
 from vdet.progress import Progress, no_progress
-from vdet.run.pictures import PictureSearch
+from vdet.run.images import ImageSearch
 from vdet.run.threads import map_ordered
 
 
@@ -47,23 +47,23 @@ class MeasuredImage:
         The vehicles compared with the detections of every score, and with those that count.
     """
 
-    picture: LabelledPicture
+    labelled: LabelledImage
     every: Comparison
     shown: Comparison
 
     @classmethod
-    def of(cls, picture: LabelledPicture, width: int, found: Boxes, counting: Counting) -> Self:
+    def of(cls, image: LabelledImage, width: int, found: Boxes, counting: Counting) -> Self:
         """Compare the detections with the labels of an image, `width` pixels wide."""
         minimum = counting.min_width * width
-        regions = picture.ignored | (_widths(picture.boxes) < minimum)
-        truth = _one_frame(picture.boxes, np.ones(len(regions)), regions, picture.classes)
-        labelled = [name not in picture.unlabelled for name in found.class_names]
-        found = found[np.flatnonzero(labelled)]
+        regions = image.ignored | (_widths(image.boxes) < minimum)
+        truth = _one_frame(image.boxes, np.ones(len(regions)), regions, image.classes)
+        is_labelled = [name not in image.unlabelled for name in found.class_names]
+        found = found[np.flatnonzero(is_labelled)]
         found = found[np.argsort(-found.scores, kind="stable")[:MAX_IN_FRAME]]
         narrow = _widths(found.sides) < minimum
         detected = _one_frame(found.sides, found.scores, narrow, found.class_names)
         shown = detected.where(found.scores >= counting.score)
-        return cls(picture, compare(detected, truth), compare(shown, truth))
+        return cls(image, compare(detected, truth), compare(shown, truth))
 
 
 def _one_frame(
@@ -106,7 +106,7 @@ class ImageScores(DetectionScores):
 class MeasuredSet:
     """The images of one source, labelled and measured, all detections, and the scores."""
 
-    labelled: LabelledPictures
+    labelled: LabelledImages
     images: tuple[MeasuredImage, ...]
     ranked: RankedPredictions
     scores: ImageScores
@@ -139,7 +139,7 @@ class ImagesResult:
 
 
 def evaluate_images(
-    sets: Sequence[LabelledPictures],
+    sets: Sequence[LabelledImages],
     model: DetectorModel,
     counting: Counting,
     *,
@@ -160,10 +160,10 @@ def evaluate_images(
     ImageError
         An image cannot be read or searched; the message names it.
     """
-    advance = progress(sum(len(set_.pictures) for set_ in sets))
-    whole = PictureSearch(model, Settings())  # the whole image, without steps
+    advance = progress(sum(len(set_.images) for set_ in sets))
+    whole = ImageSearch(model, Settings())  # the whole image, without steps
 
-    def search(labelled: LabelledPicture) -> MeasuredImage:
+    def search(labelled: LabelledImage) -> MeasuredImage:
         image = labelled.read()
         found = whole.detect(labelled.path, image).detections
         return MeasuredImage.of(labelled, image.shape[1], found, counting)
@@ -171,7 +171,7 @@ def evaluate_images(
     sources = []
     for labelled in sets:
         measured = []
-        with map_ordered(search, labelled.pictures, threads) as results:
+        with map_ordered(search, labelled.images, threads) as results:
             for _, result in results:
                 measured.append(result)
                 advance(1)
@@ -179,7 +179,7 @@ def evaluate_images(
     return ImagesResult(counting, tuple(sources))
 
 
-def score_source(labelled: LabelledPictures, images: Sequence[MeasuredImage]) -> MeasuredSet:
+def score_source(labelled: LabelledImages, images: Sequence[MeasuredImage]) -> MeasuredSet:
     """Return the scores of one source."""
     found = score_boxes(pool([image.shown for image in images]))
     ranked = rank_predictions(pool([image.every for image in images]))

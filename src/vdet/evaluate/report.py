@@ -26,7 +26,7 @@ from vdet.version import __version__
 TRUE: Color = (90, 220, 60)
 FOUND: Color = (40, 120, 255)
 
-_MAX_PICTURES, _MAX_CROPS = 9, 24  # of each source; of each video
+_MAX_IMAGES, _MAX_CROPS = 9, 24  # of each source; of each video
 _SCALE = 3.0  # width of the part around a box, in sizes of the box
 
 _Seen = tuple[int, Float64Array, float]
@@ -119,12 +119,12 @@ def worst_tiles(source: MeasuredSet) -> Iterator[Tile]:
     """
     scored = [(score_boxes(image.shown), image) for image in source.images]
     scored.sort(key=lambda pair: -pair[0].false_positives - pair[0].misses)
-    for scores, image in scored[:_MAX_PICTURES]:
+    for scores, image in scored[:_MAX_IMAGES]:
         if scores.false_positives or scores.misses:
-            (frame,), picture = image.shown.frames, image.picture
+            (frame,), labelled = image.shown.frames, image.labelled
             alarms = counted(scores.false_positives, "false alarm")
             caption = f"{scores.misses} missed, {alarms}"
-            yield Tile(_with_boxes(picture.read(), frame), picture.path.name, caption)
+            yield Tile(_with_boxes(labelled.read(), frame), labelled.path.name, caption)
 
 
 def mistake_tiles(video: Path, comparison: Comparison) -> Iterator[Tile]:
@@ -161,7 +161,7 @@ def _with_boxes(image: Image, frame: ComparedFrame) -> Image:
 
 
 _OF_BOXES = "precision", "recall", "f1", "ap50", "mean_iou", "false_positives"
-_OF_PICTURES = "images", "vehicles", *_OF_BOXES, "best_f1", "best_score"
+_OF_IMAGES = "images", "vehicles", *_OF_BOXES, "best_f1", "best_score"
 _OF_TRACKS = "mota", "idf1", "hota", "id_switches", "false_tracks", "mean_delay"
 _OF_VIDEO = *_OF_BOXES, "misses", *_OF_TRACKS
 _OF_CLASSES = "vehicles", "found", "right", "precision", "recall", "f1", "confused"
@@ -169,7 +169,7 @@ _OF_CLASSES = "vehicles", "found", "right", "precision", "recall", "f1", "confus
 
 _HEADINGS = {
     "f1": "F1", "ap50": "AP50", "mean_iou": "IoU", "false_positives": "false alarms",
-    "images": "pictures", "best_f1": "best F1", "best_score": "at score", "misses": "missed",
+    "images": "images", "best_f1": "best F1", "best_score": "at score", "misses": "missed",
     "mota": "MOTA", "idf1": "IDF1", "hota": "HOTA", "id_switches": "switches",
     "false_tracks": "false tracks", "mean_delay": "delay", "right": "right class",
     "confused": "confused with",
@@ -229,7 +229,7 @@ def images_report(result: ImagesResult, name: RunName) -> Report:
     values = {"mean": asdict(mean), "sources": sources, "classes": list(map(asdict, classes))}
     return Report(
         [name.line, what],
-        [_score_table("source", _OF_PICTURES, rows), _class_table(classes)],
+        [_score_table("source", _OF_IMAGES, rows), _class_table(classes)],
         [_others(source) for source in result.sources if source.labelled.others],
         {**name.values, **asdict(counting), **values},
         [(source.labelled.name, worst_tiles(source)) for source in result.sources],

@@ -27,7 +27,8 @@ from vdet.boxes import Box
 from vdet.detect.classes import UNKNOWN
 from vdet.errors import TruthError
 from vdet.files import record_input
-from vdet.labels.formats import Format, PictureTracks, SourceVideo, last_classes
+from vdet.labels.formats import Format, ImageTracks, SourceVideo, last_classes
+from vdet.labels.images import LabelledImage, image_folder, inside
 from vdet.labels.json_stream import json_values
 from vdet.labels.label import MAX_LABELS, NO_ID, Label, SavedTracks, Size, from_size, line_error
 from vdet.labels.parsing import (
@@ -39,7 +40,6 @@ from vdet.labels.parsing import (
     first_mistake,
     frame_number,
 )
-from vdet.labels.pictures import LabelledPicture, inside, picture_folder
 from vdet.track.track import FrameTracks, State
 
 _VIDEO = 1
@@ -103,12 +103,12 @@ def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) ->
     writer.end(file)
 
 
-def _write_pictures(file: BinaryIO, pictures: Sequence[PictureTracks]) -> None:
+def _write_images(file: BinaryIO, images: Sequence[ImageTracks]) -> None:
     writer = _Writer("images")
-    for number, picture in enumerate(pictures, start=1):
-        (width, height), name = picture.size, picture.path.as_posix()
+    for number, image in enumerate(images, start=1):
+        (width, height), name = image.size, image.path.as_posix()
         writer.add("images", id=number, file_name=name, width=width, height=height)
-        for track in picture.tracks:
+        for track in image.tracks:
             category = writer.category(track.class_name or UNKNOWN)
             writer.add_box(number, track.box, category, track.score)
     writer.end(file)
@@ -230,13 +230,13 @@ def read_coco(path: Path, data: bytes) -> SavedTracks:
     return SavedTracks(labels, tuple(sorted(frames)), checked_times(path, times), size)
 
 
-COCO = Format("COCO", ".coco.json", read_coco, whole=_write, pictures=_write_pictures)
+COCO = Format("COCO", ".coco.json", read_coco, whole=_write, images=_write_images)
 
 
-def read_coco_pictures(path: Path) -> Iterator[LabelledPicture]:
+def read_coco_images(path: Path) -> Iterator[LabelledImage]:
     """Yield every image of a COCO file; `iscrowd: 1` marks an ignore region.
 
-    `picture_folder` finds the images, such as in `images/default` from CVAT. Only boxes and
+    `image_folder` finds the images, such as in `images/default` from CVAT. Only boxes and
     categories are used.
 
     Raises
@@ -253,6 +253,6 @@ def read_coco_pictures(path: Path) -> Iterator[LabelledPicture]:
     except OSError as error:
         raise TruthError(f"{path}: cannot be read: {error.strerror}") from error
     for image in images:
-        folder = folder or picture_folder(path, image.file_name)
-        picture, labels = folder / image.file_name, tuple(image.labels)
-        yield LabelledPicture(picture, path, labels, image.size, unlabelled)
+        folder = folder or image_folder(path, image.file_name)
+        place, labels = folder / image.file_name, tuple(image.labels)
+        yield LabelledImage(place, path, labels, image.size, unlabelled)

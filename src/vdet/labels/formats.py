@@ -30,7 +30,7 @@ class SourceVideo:
 
 
 @dataclass(frozen=True, slots=True)
-class PictureTracks:
+class ImageTracks:
     """The vehicles in a single image.
 
     `path` is its name in the file of labels, `size` its width and height in pixels.
@@ -59,7 +59,7 @@ class Format:
         the first line of the file.
     whole
         For a format that is written at the end: function that writes all frames of a video.
-    pictures
+    images
         For a format that also stores labels of images: function that writes them. Their paths are
         their names in the file.
     """
@@ -70,7 +70,7 @@ class Format:
     lines: Callable[[FrameTracks], Iterable[str]] | None = None
     heading: str = ""
     whole: Callable[[BinaryIO, SourceVideo, Sequence[FrameTracks]], None] | None = None
-    pictures: Callable[[BinaryIO, Sequence[PictureTracks]], None] | None = None
+    images: Callable[[BinaryIO, Sequence[ImageTracks]], None] | None = None
 
 
 class TrackWriter:
@@ -110,9 +110,9 @@ def track_suffixes() -> list[str]:
     return [form.suffix for form in track_formats()]
 
 
-def picture_suffixes() -> list[str]:
+def image_suffixes() -> list[str]:
     """Return the endings of files with labels of images."""
-    return [form.suffix for form in track_formats() if form.pictures]
+    return [form.suffix for form in track_formats() if form.images]
 
 
 def format_for(path: Path) -> Format | None:

@@ -8,9 +8,9 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from vdet.labels.formats import Format
+from vdet.labels.images import LabelledImage, paired_files
 from vdet.labels.label import Label, SavedTracks, limited
 from vdet.labels.parsing import label_lines, parse_number, parse_whole, read_bytes
-from vdet.labels.pictures import LabelledPicture, paired_files
 from vdet.track.track import FrameTracks
 
 _TRACK_COLUMNS = 17  # frame and id, then those of an object
@@ -55,7 +55,7 @@ def _object_label(place: int, columns: Sequence[str]) -> Label:
     return Label(place, (left, top, right, bottom), columns[0])
 
 
-def read_kitti_pictures(pictures: Path, labels: Path) -> Iterator[LabelledPicture]:
+def read_kitti_images(images: Path, labels: Path) -> Iterator[LabelledImage]:
     """Yield the images of a set that have a label file, with 15 columns per line.
 
     Raises
@@ -63,10 +63,10 @@ def read_kitti_pictures(pictures: Path, labels: Path) -> Iterator[LabelledPictur
     TruthError
         As for `read_kitti` or `paired_files`.
     """
-    for picture, file in paired_files(pictures, labels):
+    for image, file in paired_files(images, labels):
         if file:
             found = label_lines(file, read_bytes(file), _object_label, form="KITTI", counts=[15])
-            yield LabelledPicture(picture, file, tuple(found))
+            yield LabelledImage(image, file, tuple(found))
 
 
 KITTI = Format("KITTI tracking", ".kitti.txt", read_kitti, _lines)

@@ -50,7 +50,7 @@ class Label(NamedTuple):
     name
         Its name in the file; None if the file has no names.
     frame
-        Number of the frame, from 1; 1 in a picture.
+        Number of the frame, from 1; 1 in an image.
     score
         Confidence, higher is better; 1 where the file has none.
     ignored

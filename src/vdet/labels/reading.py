@@ -7,17 +7,17 @@ from pathlib import Path
 
 from vdet.archives import is_hidden
 from vdet.errors import TruthError
-from vdet.labels.coco import read_coco_pictures
+from vdet.labels.coco import read_coco_images
 from vdet.labels.formats import recognize, track_formats
-from vdet.labels.kitti import read_kitti_pictures
+from vdet.labels.images import LabelledImage, LabelledImages, checked_images
+from vdet.labels.kitti import read_kitti_images
 from vdet.labels.label import Label, LabelledVideo, SavedTracks, checked_labels, line_error
 from vdet.labels.mot import MOT
 from vdet.labels.parsing import read_bytes
-from vdet.labels.pictures import LabelledPicture, LabelledPictures, checked_pictures
 from vdet.labels.roles import DEFAULT_ROLES, Roles, is_region
-from vdet.labels.yolo import read_yolo_pictures
+from vdet.labels.yolo import read_yolo_images
 
-_FOLDERS = {("image_2", "label_2"): read_kitti_pictures, ("images", "labels"): read_yolo_pictures}
+_FOLDERS = {("image_2", "label_2"): read_kitti_images, ("images", "labels"): read_yolo_images}
 """Readers of sets with a label file for each image, by the names of both folders."""
 
 
@@ -106,7 +106,7 @@ def _with_roles(path: Path, labels: Iterable[Label], roles: Roles) -> Iterator[L
             yield label._replace(name=name, score=1.0, ignored=ignored)
 
 
-def read_labelled_pictures(path: Path, roles: Roles = DEFAULT_ROLES) -> LabelledPictures:
+def read_labelled_images(path: Path, roles: Roles = DEFAULT_ROLES) -> LabelledImages:
     """Read labelled images in any format.
 
     Parameters
@@ -121,17 +121,17 @@ def read_labelled_pictures(path: Path, roles: Roles = DEFAULT_ROLES) -> Labelled
     TruthError
         There is no labelled set, or it has a mistake; the message names its place.
     """
-    return checked_pictures(str(path), _pictures(path), roles)
+    return checked_images(str(path), _images(path), roles)
 
 
-def _pictures(path: Path) -> Iterable[LabelledPicture]:
+def _images(path: Path) -> Iterable[LabelledImage]:
     for names, read in _FOLDERS.items():
-        pictures, labels = (path / name for name in names)
-        if pictures.is_dir() and labels.is_dir():
-            return read(pictures, labels)
+        images, labels = (path / name for name in names)
+        if images.is_dir() and labels.is_dir():
+            return read(images, labels)
     files = _files(path)
     if len(files) == 1:
-        return read_coco_pictures(files[0])
+        return read_coco_images(files[0])
     if files:
         found = ", ".join(str(file.relative_to(path)) for file in files[:5])
         raise TruthError(f"{path}: contains several such files ({found}); pass the one with labels")

@@ -24,7 +24,8 @@ from vdet.config.document import MAX_BYTES as MAX_DESCRIPTION
 from vdet.config.document import parse_document
 from vdet.detect.classes import UNKNOWN
 from vdet.errors import ConfigError, ImageError, OutputError, TruthError, escaped, printable
-from vdet.labels.formats import Format, PictureTracks, SourceVideo
+from vdet.labels.formats import Format, ImageTracks, SourceVideo
+from vdet.labels.images import LabelledImage, paired_files
 from vdet.labels.label import Label, SavedTracks, Size, limited
 from vdet.labels.parsing import (
     LIMIT,
@@ -35,7 +36,6 @@ from vdet.labels.parsing import (
     parse_whole,
     read_bytes,
 )
-from vdet.labels.pictures import LabelledPicture, paired_files
 from vdet.media.images import read_header
 from vdet.track.track import FrameTracks
 
@@ -50,8 +50,8 @@ def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) ->
     """Write the archive. Boxes are clipped to the frame; boxes outside it are omitted."""
     size = video.width, video.height
     classes: dict[str, int] = {}  # name: number, in the order of their numbers
-    pictures = "".join(f"images/train/frame_{frame.index:06}.png\n" for frame in frames)
-    texts = {"train.txt": pictures}
+    images = "".join(f"images/train/frame_{frame.index:06}.png\n" for frame in frames)
+    texts = {"train.txt": images}
     for frame in frames:
         lines = (_line(t.box, t.class_name, size, classes, f" {t.id}") for t in frame.tracks)
         texts[f"labels/train/frame_{frame.index:06}.txt"] = "".join(lines)
@@ -59,16 +59,16 @@ def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) ->
     _store(file, texts | {_DATA: _description("train.txt", classes) + sides})
 
 
-def _write_pictures(file: BinaryIO, pictures: Sequence[PictureTracks]) -> None:
+def _write_images(file: BinaryIO, images: Sequence[ImageTracks]) -> None:
     """Write the archive, to be unpacked beside the folder `images`."""
     classes: dict[str, int] = {}
     texts: dict[str, str] = {}
-    for picture in pictures:
-        name = f"labels/{picture.path.with_suffix('.txt').as_posix()}"
+    for image in images:
+        name = f"labels/{image.path.with_suffix('.txt').as_posix()}"
         if name in texts:
             what = "YOLO needs images with different names; this one occurs with two endings"
-            raise OutputError(f"{picture.path.with_suffix('')}: {what}")
-        lines = (_line(t.box, t.class_name, picture.size, classes) for t in picture.tracks)
+            raise OutputError(f"{image.path.with_suffix('')}: {what}")
+        lines = (_line(t.box, t.class_name, image.size, classes) for t in image.tracks)
         texts[name] = "".join(lines)
     _store(file, texts | {_DATA: _description("images", classes)})
 
@@ -79,10 +79,10 @@ def _store(file: BinaryIO, texts: Mapping[str, str]) -> None:
             store(archive, name, text)
 
 
-def _description(pictures: str, classes: Iterable[str]) -> str:
+def _description(images: str, classes: Iterable[str]) -> str:
     """Return the start of `data.yaml`; Ultralytics needs both `train` and `val`."""
     names = json.dumps([escaped(name) for name in classes] or [UNKNOWN], ensure_ascii=False)
-    return f"path: .\ntrain: {pictures}\nval: {pictures}\nnames: {names}\n"
+    return f"path: .\ntrain: {images}\nval: {images}\nnames: {names}\n"
 
 
 def _line(box: Box, name: str | None, size: Size, classes: dict[str, int], end: str = "") -> str:
@@ -223,7 +223,7 @@ def _track_label(place: int, columns: Sequence[str], names: Sequence[str], size:
     return label._replace(id=parse_whole(columns[-1]), score=score)
 
 
-def read_yolo_pictures(pictures: Path, labels: Path) -> Iterator[LabelledPicture]:
+def read_yolo_images(images: Path, labels: Path) -> Iterator[LabelledImage]:
     """Yield the images of a set; one without a label file shows no vehicle.
 
     Raises
@@ -232,22 +232,22 @@ def read_yolo_pictures(pictures: Path, labels: Path) -> Iterator[LabelledPicture
         `data.yaml` is missing in the folder of the set and above it, an image cannot be read, or as
         for `read_yolo` or `paired_files`.
     """
-    folder = pictures.parent
+    folder = images.parent
     data = next((p for p in (folder / _DATA, folder.parent / _DATA) if p.is_file()), None)
     if data is None:
         raise TruthError(f"{folder}: needs {_DATA} with the names of the classes, here or above")
     _, names = _described(read_bytes(data), str(data))
-    for picture, file in paired_files(pictures, labels):
+    for image, file in paired_files(images, labels):
         if file is None:
-            yield LabelledPicture(picture, picture)
+            yield LabelledImage(image, image)
             continue
         try:
-            size, _ = read_header(picture)
+            size, _ = read_header(image)
         except ImageError as error:
             raise TruthError(str(error)) from error
         parse = partial(_label, names=names, size=size)
         found = label_lines(file, read_bytes(file), parse, form="YOLO", counts=None)
-        yield LabelledPicture(picture, file, tuple(found), size)
+        yield LabelledImage(image, file, tuple(found), size)
 
 
-YOLO = Format("YOLO", ".yolo.zip", read_yolo, whole=_write, pictures=_write_pictures)
+YOLO = Format("YOLO", ".yolo.zip", read_yolo, whole=_write, images=_write_images)

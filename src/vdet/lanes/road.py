@@ -283,7 +283,7 @@ def lane_text(lane: Lane) -> tuple[str, ...]:
     return f"lane {lane.width:.1f} m wide, {bend}", middle
 
 
-def stage_pictures(road: Road) -> dict[str, Image]:
+def stage_images(road: Road) -> dict[str, Image]:
     """Return pictures of the stages, BGR uint8.
 
     `road` is the undistorted frame with the outline of the top view, `above` the top view, `mask`

@@ -11,8 +11,8 @@ from av.stream import Stream
 
 from vdet.config.schema import Settings
 from vdet.errors import OutputError
-from vdet.media.demux import ClockUnwrapper, is_pipe, open_input, packets, picture_stream
-from vdet.media.images import is_picture_name
+from vdet.media.demux import ClockUnwrapper, is_pipe, open_input, packets, video_stream
+from vdet.media.images import is_image_name
 from vdet.media.reader import VideoReader
 from vdet.media.writer import VIDEO_SUFFIXES, VideoWriter
 
@@ -21,10 +21,10 @@ _SOUND_LAG = 1  # seconds of video after the end in which sound of the part may 
 
 def can_copy(source: Path) -> bool:
     """Return whether parts of a video can be copied: it is seekable, and has one clock."""
-    if is_pipe(source) or not source.is_file() or is_picture_name(source):
+    if is_pipe(source) or not source.is_file() or is_image_name(source):
         return False
     with open_input(source) as container:
-        return not ClockUnwrapper(container, picture_stream(container, source)).may_restart
+        return not ClockUnwrapper(container, video_stream(container, source)).may_restart
 
 
 def copied_suffix(source: Path) -> str:
@@ -50,7 +50,7 @@ def copy_part(source: Path, start: Fraction, end: Fraction, target: Path) -> Non
         The container of `target` cannot hold a stream of the source.
     """
     with open_input(source) as container, av.open(str(target.absolute()), "w") as written:
-        pictures = picture_stream(container, source)
+        pictures = video_stream(container, source)
         streams: list[Stream] = [pictures, *container.streams.audio]
         try:
             targets = {one.index: written.add_stream_from_template(one) for one in streams}
@@ -75,12 +75,12 @@ def _moved_to_zero(
     for packet in found:
         if packet.pts is None or packet.dts is None:
             continue
-        time, is_picture = packet.pts * packet.time_base, packet.stream_index == pictures
-        if is_picture and packet.is_keyframe:
+        time, is_image = packet.pts * packet.time_base, packet.stream_index == pictures
+        if is_image and packet.is_keyframe:
             begin, stop = min(begin, time), min(stop, time if time >= end else math.inf)
-        if is_picture and time > stop + _SOUND_LAG:
+        if is_image and time > stop + _SOUND_LAG:
             return
-        if begin <= time < stop and not (is_picture and stop < math.inf):
+        if begin <= time < stop and not (is_image and stop < math.inf):
             shift = round(begin / packet.time_base)
             packet.pts, packet.dts = packet.pts - shift, packet.dts - shift
             yield packet

@@ -117,7 +117,7 @@ class Decoder:
     def __init__(self, path: Path, frame_rate: float | None) -> None:
         self.before = 0
         self.container = demux.open_input(path, frame_rate)
-        self.stream = demux.picture_stream(self.container, path)
+        self.stream = demux.video_stream(self.container, path)
         context = self.stream.codec_context
         context.options = {"max_pixels": str(demux.MAX_PIXELS)}
         context.thread_count = 1  # with more, frames near damage differ from run to run
@@ -129,7 +129,7 @@ class Decoder:
         self.ticks: Sequence[int] = ()
         if sequence := find_sequence(path):
             _, self.ticks = sequence.timing(frame_rate)
-            self._packets = self._read_pictures(sequence.files)
+            self._packets = self._read_images(sequence.files)
 
     def skip_to(self, time: int, first: int) -> bool:
         """Begin at the last key frame at or before a time, and count the frames before it.
@@ -188,7 +188,7 @@ class Decoder:
                 self.damage.restarts = self.clock.restarts
                 yield packet
 
-    def _read_pictures(self, files: Iterable[Path]) -> "Iterator[Packet[Stream]]":
+    def _read_images(self, files: Iterable[Path]) -> "Iterator[Packet[Stream]]":
         """Yield numbered images as packets."""
         for file, tick in zip(files, self.ticks, strict=True):
             try:

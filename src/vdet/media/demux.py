@@ -112,7 +112,7 @@ HDR_TRANSFERS = (16, 18)
 _MAX_TERM = 1_000_000  # of a rate as a fraction; the encoder has 32-bit integers
 
 
-def picture_stream(container: InputContainer, path: Path) -> VideoStream:
+def video_stream(container: InputContainer, path: Path) -> VideoStream:
     """Return the first video stream that is not a cover or thumbnails.
 
     Raises

@@ -26,17 +26,17 @@ from vdet.files import read_whole, record_input
 if TYPE_CHECKING:
     import av
 
-MAX_PICTURE_PIXELS = 2**25
+MAX_IMAGE_PIXELS = 2**25
 """Maximum number of pixels: an 8K frame has fewer, a decompression bomb far more."""
-MAX_PICTURE_SIDE = 2**15
+MAX_IMAGE_SIDE = 2**15
 MAX_BYTES = 256_000_000
-"""Maximum size of an image file: enough for `MAX_PICTURE_PIXELS` of 16 bits, uncompressed."""
-PICTURE_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp"})
+"""Maximum size of an image file: enough for `MAX_IMAGE_PIXELS` of 16 bits, uncompressed."""
+IMAGE_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp"})
 
 _FORMATS = ("PNG", "JPEG", "BMP", "TIFF", "WEBP")
-_NO_PICTURE = "is not an image, or is damaged (PNG, JPEG, BMP, TIFF, WebP)"
+_NO_IMAGE = "is not an image, or is damaged (PNG, JPEG, BMP, TIFF, WebP)"
 _TOO_LARGE = (
-    f"has more than {MAX_PICTURE_PIXELS:,} pixels, or a side of more than {MAX_PICTURE_SIDE:,}; "
+    f"has more than {MAX_IMAGE_PIXELS:,} pixels, or a side of more than {MAX_IMAGE_SIDE:,}; "
     "make it smaller"
 )
 _12_BITS, _16_BITS = 4095, 65_535
@@ -52,7 +52,7 @@ _TURNS = {90: cv2.ROTATE_90_COUNTERCLOCKWISE, 180: cv2.ROTATE_180, 270: cv2.ROTA
 
 @dataclass(frozen=True, slots=True)
 class Orientation:
-    """How a coded picture becomes upright: mirrored left to right or not, then rotated.
+    """How a coded image becomes upright: mirrored left to right or not, then rotated.
 
     `rotation` is counter-clockwise: 0, 90, 180 or 270 degrees.
     """
@@ -72,9 +72,9 @@ class Orientation:
         return cls(turns[number], mirrored=number in (2, 4, 5, 7))
 
     @classmethod
-    def of_frame(cls, picture: "av.VideoFrame") -> "Orientation":
+    def of_frame(cls, image: "av.VideoFrame") -> "Orientation":
         """Return the nearest quarter turn of a decoded frame, by its display matrix."""
-        return cls(round(picture.rotation / 90) * 90 % 360)
+        return cls(round(image.rotation / 90) * 90 % 360)
 
 
 def upright(image: Image, orientation: Orientation) -> Image:
@@ -99,8 +99,8 @@ def read_image(path: Path) -> Image:
     ------
     ImageError
         The file cannot be read, is a pipe, is not a PNG, JPEG, BMP, TIFF or WebP image, or is
-        larger than `MAX_BYTES`; the image has more than `MAX_PICTURE_PIXELS`, or a side longer than
-        `MAX_PICTURE_SIDE`.
+        larger than `MAX_BYTES`; the image has more than `MAX_IMAGE_PIXELS`, or a side longer than
+        `MAX_IMAGE_SIDE`.
     """
     data = read_encoded(path)
     image = _decode(data, path)
@@ -109,9 +109,9 @@ def read_image(path: Path) -> Image:
     return image
 
 
-def is_picture_name(path: Path) -> bool:
+def is_image_name(path: Path) -> bool:
     """Return whether a file has the name of an image, and is not hidden."""
-    return path.suffix.lower() in PICTURE_SUFFIXES and not path.name.startswith(".")
+    return path.suffix.lower() in IMAGE_SUFFIXES and not path.name.startswith(".")
 
 
 def read_header(path: Path) -> tuple[tuple[int, int], Orientation]:
@@ -124,10 +124,10 @@ def read_header(path: Path) -> tuple[tuple[int, int], Orientation]:
     ImageError
         As for `read_image`.
     """
-    picture = _open(read_encoded(path), path)
-    width, height = picture.size
-    turn = _orientation(picture)
-    if turn.is_sideways and picture.format != "TIFF":
+    image = _open(read_encoded(path), path)
+    width, height = image.size
+    turn = _orientation(image)
+    if turn.is_sideways and image.format != "TIFF":
         width, height = height, width
     return (width, height), turn
 
@@ -136,7 +136,7 @@ def read_encoded(path: Path) -> bytes:
     """Return the content of an image file. Raises `ImageError`."""
     if path.is_fifo():  # it may never end, or never begin
         raise ImageError(f"{path}: can be read only once; save it to a file first")
-    return read_whole(path, limit=MAX_BYTES, what="picture", error=ImageError)
+    return read_whole(path, limit=MAX_BYTES, what="image", error=ImageError)
 
 
 def decode_image(data: bytes) -> Image | None:
@@ -153,7 +153,7 @@ def encode_image(image: Image, path: Path) -> bytes:
         written, data = cv2.imencode(path.suffix, image)
         if written:
             return data.tobytes()
-    raise ImageError(f"{path}: images must end in {', '.join(sorted(PICTURE_SUFFIXES))}")
+    raise ImageError(f"{path}: images must end in {', '.join(sorted(IMAGE_SUFFIXES))}")
 
 
 def from_16_bits(values: npt.NDArray[np.uint16]) -> Image:
@@ -180,44 +180,44 @@ def _refusing(path: Path) -> Iterator[None]:
     except (pillow.DecompressionBombError, pillow.DecompressionBombWarning) as error:
         raise ImageError(f"{path}: {_TOO_LARGE}") from error
     except Exception as error:  # a dozen kinds on damaged data
-        raise ImageError(f"{path}: {_NO_PICTURE}") from error
+        raise ImageError(f"{path}: {_NO_IMAGE}") from error
 
 
 def _open(data: bytes, path: Path) -> ImageFile:
     """Read the header of an image. Raises `ImageError`, which names `path`."""
     with _refusing(path):
-        picture = pillow.open(io.BytesIO(data), formats=_FORMATS)
-    if max(picture.size) > MAX_PICTURE_SIDE or math.prod(picture.size) > MAX_PICTURE_PIXELS:
+        image = pillow.open(io.BytesIO(data), formats=_FORMATS)
+    if max(image.size) > MAX_IMAGE_SIDE or math.prod(image.size) > MAX_IMAGE_PIXELS:
         raise ImageError(f"{path}: {_TOO_LARGE}")
-    return picture
+    return image
 
 
-def _orientation(picture: ImageFile) -> Orientation:
+def _orientation(image: ImageFile) -> Orientation:
     with suppress(Exception):  # many kinds, if the EXIF data are damaged
         # The method of a PNG image would decode it to find EXIF data at its end.
-        return Orientation.of_exif(pillow.Image.getexif(picture).get(_ORIENTATION, 1))
+        return Orientation.of_exif(pillow.Image.getexif(image).get(_ORIENTATION, 1))
     return Orientation()
 
 
 def _decode(data: bytes, path: Path) -> Image:
-    picture = _open(data + _JPEG_END if _is_cut_off(data) else data, path)
+    image = _open(data + _JPEG_END if _is_cut_off(data) else data, path)
     # Pillow itself rotates TIFF.
-    turn = Orientation() if picture.format == "TIFF" else _orientation(picture)
+    turn = Orientation() if image.format == "TIFF" else _orientation(image)
     with _refusing(path):
-        return upright(_to_bgr(picture, data), turn)
+        return upright(_to_bgr(image, data), turn)
 
 
-def _to_bgr(picture: ImageFile, data: bytes) -> Image:
+def _to_bgr(image: ImageFile, data: bytes) -> Image:
     """Decode and convert an image that was opened from `data`."""
-    has_16_bits = any(";16" in str(tile.args) for tile in picture.tile)
-    picture.load()
+    has_16_bits = any(";16" in str(tile.args) for tile in image.tile)
+    image.load()
     if has_16_bits:  # Pillow keeps only 8
         values = cv2.imdecode(np.frombuffer(data, np.uint8), _ALL_BITS)
         return from_16_bits(np.asarray(values, np.uint16))
-    if picture.mode == "F":
+    if image.mode == "F":
         raise ValueError("grey values in floating point")
-    picture.info.pop("transparency", None)  # it is dropped; Pillow would warn about some kinds
-    rgb = picture if picture.mode == "RGB" else picture.convert("RGB")
+    image.info.pop("transparency", None)  # it is dropped; Pillow would warn about some kinds
+    rgb = image if image.mode == "RGB" else image.convert("RGB")
     return np.asarray(cv2.cvtColor(np.asarray(rgb), cv2.COLOR_RGB2BGR), np.uint8)
 
 
@@ -236,7 +236,7 @@ ASSUMED_RATE = 25.0
 
 
 @dataclass(frozen=True, slots=True)
-class PictureSequence:
+class ImageSequence:
     """Images that form a video.
 
     Attributes
@@ -258,7 +258,7 @@ class PictureSequence:
         return Fraction(str(frame_rate or ASSUMED_RATE)), range(len(self.files))
 
 
-def find_sequence(path: Path) -> PictureSequence | None:
+def find_sequence(path: Path) -> ImageSequence | None:
     """Return the images of the pattern or folder `path`; None if it is neither.
 
     Numbers may begin anywhere, and increase by any constant step. In the name of a folder, a per
@@ -278,7 +278,7 @@ def find_sequence(path: Path) -> PictureSequence | None:
         matches = [(form.fullmatch(file.name), file) for file in folder.iterdir()]
     except OSError as error:
         raise VideoError(f"{path}: {folder} cannot be read: {error.strerror}") from error
-    named = [(match, file) for match, file in matches if pattern or is_picture_name(file)]
+    named = [(match, file) for match, file in matches if pattern or is_image_name(file)]
     found = sorted((int(match[1]), file) for match, file in named if match)
     if not found:
         raise VideoError(f"{path}: no numbered images found; use a video, or -d DIR for a folder")
@@ -295,10 +295,10 @@ def find_sequence(path: Path) -> PictureSequence | None:
         if gap != step:
             lack = f"image {number + step} is missing; copy image {number} in its place"
             raise VideoError(f"{path}: {lack}")
-    return PictureSequence(files)
+    return ImageSequence(files)
 
 
-def _by_the_clock(files: tuple[Path, ...]) -> PictureSequence | None:
+def _by_the_clock(files: tuple[Path, ...]) -> ImageSequence | None:
     """Return the images if all their names are different times."""
     times = {time: file for file in files if (time := ClockSettings().time_in(file.name))}
     if len(times) < len(files) or len({time.tzinfo for time in times}) > 1:
@@ -307,7 +307,7 @@ def _by_the_clock(files: tuple[Path, ...]) -> PictureSequence | None:
     seconds = [round((time - ordered[0]).total_seconds()) for time in ordered]
     tick = math.gcd(*seconds) or 1
     ticks = tuple(second // tick for second in seconds)
-    return PictureSequence(tuple(times[time] for time in ordered), ticks, tick)
+    return ImageSequence(tuple(times[time] for time in ordered), ticks, tick)
 
 
 def _form(before: str, digits: str | None, after: str) -> re.Pattern[str]:

@@ -17,7 +17,7 @@ from av.video.reformatter import ColorRange
 
 from vdet.config.schema import OutputSettings
 from vdet.errors import OutputError, VideoError
-from vdet.media.demux import SAFELY, ClockUnwrapper, open_input, packets, picture_stream
+from vdet.media.demux import SAFELY, ClockUnwrapper, open_input, packets, video_stream
 from vdet.media.frame import MATRIX_CODES, UNSPECIFIED, Coding, Frame, Picture, Planes, VideoInfo
 from vdet.version import __version__
 
@@ -45,7 +45,7 @@ class SoundCopy:
         self._can_hide = target.format.name != "matroska"
         self._left_out = 0  # packets
         self._source = open_input(source)
-        self._clock = ClockUnwrapper(self._source, picture_stream(self._source, source))
+        self._clock = ClockUnwrapper(self._source, video_stream(self._source, source))
         self._streams = self._add_streams()
         self._packets = self._moved()
         self._next = next(self._packets, None)

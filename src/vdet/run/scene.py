@@ -11,7 +11,7 @@ from vdet.detect.factory import load_detector
 from vdet.errors import TruthError, VideoError
 from vdet.labels.reading import read_tracks
 from vdet.media import Frame
-from vdet.media.images import is_picture_name, read_image
+from vdet.media.images import is_image_name, read_image
 from vdet.media.reader import VideoReader
 from vdet.progress import Steps
 from vdet.run.loop import Parts
@@ -39,7 +39,7 @@ def read_scene(run: Run, tracks: Path | None, steps: Steps) -> tuple[Image, list
     VdetError
         The source or the file of tracks cannot be used.
     """
-    if is_picture_name(run.source) and "%" not in run.source.name:
+    if is_image_name(run.source) and "%" not in run.source.name:
         return read_image(run.source), _saved(tracks, None, run) if tracks else []
     found: list[FrameTracks] = []
     images = _spread(_known(run, tracks, found, steps) if tracks else _detected(run, found, steps))

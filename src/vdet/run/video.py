@@ -13,7 +13,7 @@ from vdet.boxes import NO_BOXES
 from vdet.conditions.finding import Finding
 from vdet.config.schema import Settings
 from vdet.detect.factory import as_model
-from vdet.detect.protocol import VideoDetector, stage_pictures_of
+from vdet.detect.protocol import VideoDetector, stage_images_of
 from vdet.errors import ConfigError, FrameSizeError, VideoError
 from vdet.files import OutputFiles, record_input, recorded_inputs
 from vdet.media.reader import VideoReader
@@ -270,7 +270,7 @@ def write_outputs(
             outputs=run.outputs,
             traffic=video.traffic,
             facts=video.facts,
-            stage_pictures=stage_pictures_of(video.detector),
+            stage_images=stage_images_of(video.detector),
         )
         with open_sinks(run.outputs, context) as sinks:
             advance = progress(video.reader.expected)

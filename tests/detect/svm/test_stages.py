@@ -23,7 +23,7 @@ def pictures_of(image: Image, settings: SvmSettings = ROWS) -> dict[str, Image]:
     """Detect in a still picture and draw the stages."""
     height, width = image.shape[:2]
     detector = SvmModel(red_finder(), settings).for_video(width, height, [image])
-    return detector.stage_pictures(image, detector.detect(detector.search(Picture(image), None)))
+    return detector.stage_images(image, detector.detect(detector.search(Picture(image), None)))
 
 
 def test_hits_are_drawn_around_the_car_alone() -> None:

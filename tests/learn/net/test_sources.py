@@ -6,12 +6,12 @@ from pathlib import Path
 import pytest
 
 from labels.writers import Boxed, Labelled, write_coco
-from strange.test_numbered_pictures import write_pictures
+from strange.test_numbered_images import write_pictures
 from vdet.config.schema import InputSettings, Settings
 from vdet.errors import VideoError
-from vdet.labels.reading import read_labelled_pictures
+from vdet.labels.reading import read_labelled_images
 from vdet.labels.roles import Roles
-from vdet.learn.net.sources import UNKNOWN, clip_source, picture_source
+from vdet.learn.net.sources import UNKNOWN, clip_source, image_source
 
 
 def test_a_damaged_video_is_learnt_from_as_far_as_the_settings_tolerate(tmp_path: Path) -> None:
@@ -53,8 +53,8 @@ def test_a_class_without_labels_makes_the_picture_an_ignore_region_for_it(tmp_pa
     document["info"]["unlabelled_classes"] = ["pedestrian"]
     labels.write_text(json.dumps(document), encoding="utf-8")
     settings = Settings()
-    labelled = read_labelled_pictures(tmp_path, Roles.for_training(settings))
-    source, _ = picture_source(labelled, settings)
+    labelled = read_labelled_images(tmp_path, Roles.for_training(settings))
+    source, _ = image_source(labelled, settings)
     (sample,) = source.samples
     person = settings.train.net.classes.index("person")
     assert sample.boxes.tolist() == [[20, 30, 80, 70], [0, 0, 9, 9], [0, 0, 160, 96]]

@@ -61,7 +61,7 @@ def test_without_a_video_of_the_run_it_shows_the_source(red_clip: Path, tmp_path
     assert min(times) >= 1, "the source is there from its beginning"
 
 
-def test_numbered_pictures_are_no_video_to_show(tmp_path: Path) -> None:
+def test_numbered_images_are_no_video_to_show(tmp_path: Path) -> None:
     numbered = replace(video_info(), path=tmp_path / "img_%04d.png")
     write(Output("page", tmp_path / "page"), [result_of(CAR)], video=numbered)
     assert page_of(tmp_path / "page").all("video") == []

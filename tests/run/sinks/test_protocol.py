@@ -160,8 +160,8 @@ class TestFailure:
     ("sink", "name", "is_video", "words"),
     [
         ("video", "a.mp4", False, "is for videos"),
-        ("picture", "a.png", True, "is for pictures"),
-        ("json", "a.json", True, "is for pictures"),
+        ("image", "a.png", True, "is for images"),
+        ("json", "a.json", True, "is for images"),
     ],
 )
 def test_a_sink_refuses_results_that_it_cannot_take(

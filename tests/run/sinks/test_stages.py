@@ -61,7 +61,7 @@ def test_pictures_of_any_detector_come_first_in_its_order(tmp_path: Path) -> Non
     def pictures(image: Image, _: Boxes) -> dict[str, Image]:
         return {"z-first": image // 2, "a-second": 255 - image}
 
-    write(Output("stages", tmp_path), [result_of()], stage_pictures=pictures)
+    write(Output("stages", tmp_path), [result_of()], stage_images=pictures)
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         *("1-z-first.png", "2-a-second.png", "3-boxes.png")
     ]

@@ -125,7 +125,7 @@ class NetworkDetector:
             trace=searches,
         )
 
-    def stage_pictures(self, image: Image, detections: Boxes) -> dict[str, Image]:
+    def stage_images(self, image: Image, detections: Boxes) -> dict[str, Image]:
         """Return images of the network's input, and of the boxes before suppression."""
         boxes = image.copy()
         for raw in detections.trace:

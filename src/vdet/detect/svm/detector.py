@@ -173,7 +173,7 @@ class SvmDetector:
         )
         return self._shown_in_still(found) if is_still else found
 
-    def stage_pictures(self, image: Image, detections: Boxes) -> dict[str, Image]:
+    def stage_images(self, image: Image, detections: Boxes) -> dict[str, Image]:
         """Return three images of a frame, BGR uint8 `(H, W, 3)`: windows, hits, heat."""
         trace = detections.trace
         windows, hits = (image * 0.6).astype(np.uint8), image.copy()

@@ -1,4 +1,4 @@
-"""Training pictures for the network: places, scales, mosaics, colours and pasted objects."""
+"""Training images for the network: places, scales, mosaics, colours and pasted objects."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -16,30 +16,30 @@ from vdet.learn.net.weather import blended, with_weather
 MIN_SIDE = 8.0
 """Minimum longer side of a vehicle, pixels; smaller vehicles are ignored."""
 _SCALES = 0.5, 2.0
-"""Smallest and largest scale of a picture; at 1 its width fits."""
+"""Smallest and largest scale of an image; at 1 its width fits."""
 _MOSAIC_SCALES = 0.5, 1.5
-"""Smallest and largest scale of the four pictures of a mosaic."""
+"""Smallest and largest scale of the four images of a mosaic."""
 _MIN_VISIBLE = 0.25  # fraction of a vehicle that is left after cropping, else it is ignored
 _ASPECT = 0.1  # most change of the width relative to the height
 REPEAT_THRESHOLD = 0.4
-"""Pictures with a class that is in a smaller fraction of the pictures are drawn more often."""
-_TILTED = 0.25  # fraction of pictures that are turned
+"""Images with a class that is in a smaller fraction of the images are drawn more often."""
+_TILTED = 0.25  # fraction of images that are turned
 _TILT = 3.0  # deviation of their angles, degrees
 
-_PASTED = 0.3  # fraction of pictures that get pasted objects
-_MAX_PASTED = 3  # objects in a picture
+_PASTED = 0.3  # fraction of images that get pasted objects
+_MAX_PASTED = 3  # objects in an image
 _RARE = 0.5  # a class with fewer objects than this fraction of the mean is rare
 _MARGIN = 0.2  # surroundings of a pasted object on each side, fraction of the box
 _MIN_DONOR = 24.0  # longer side of an object to paste, pixels
-_PASTED_SIDES = 16.0, 0.4  # of the longer side: minimum in pixels, maximum of the picture's height
+_PASTED_SIDES = 16.0, 0.4  # of the longer side: minimum in pixels, maximum of the image's height
 _MAX_COVERED = 0.2  # of another object by a pasted one
 
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """How pictures are drawn at a step of the training.
+    """How images are drawn at a step of the training.
 
-    `width` and `height` are the size of the pictures, pixels; `magnified` multiplies all scales.
+    `width` and `height` are the size of the images, pixels; `magnified` multiplies all scales.
     """
 
     width: int
@@ -49,10 +49,10 @@ class Drawing:
 
 
 class SampleDrawer:
-    """Draws training pictures from sources.
+    """Draws training images from sources.
 
     The probability of a source is proportional to its weight and to the square root of its size,
-    that of a picture in it to `repeat_factors`.
+    that of an image in it to `repeat_factors`.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ class SampleDrawer:
         self._paster = Paster(self._samples)
 
     def draw(self, rng: np.random.Generator, drawing: Drawing) -> NetSample:
-        """Return one training picture with the vehicles in it."""
+        """Return one training image with the vehicles in it."""
         if rng.random() < drawing.mosaics:
             sample = self._mosaic(rng, drawing)
         else:
@@ -91,7 +91,7 @@ class SampleDrawer:
         return self._samples[int(rng.choice(len(self._samples), p=self._chances))]
 
     def _mosaic(self, rng: np.random.Generator, drawing: Drawing) -> NetSample:
-        """Return four pictures that meet in a random point."""
+        """Return four images that meet in a random point."""
         width, height = drawing.width, drawing.height
         x = round(width * rng.uniform(0.3, 0.7))
         y = round(height * rng.uniform(0.3, 0.7))
@@ -100,7 +100,7 @@ class SampleDrawer:
         places = (0, 0, x, y), (x, 0, width, y), (0, y, x, height), (x, y, width, height)
         for left, top, right, bottom in places:
             scale = drawing.magnified * _scale(rng, _MOSAIC_SCALES)
-            fit = width / (right - left)  # the scale refers to the width of the whole picture
+            fit = width / (right - left)  # the scale refers to the width of the whole image
             part = _place(rng, self._pick(rng), (right - left, bottom - top), scale * fit / 2)
             image[top:bottom, left:right] = part.image
             moved = part.boxes + np.array([left, top, left, top], np.float32)
@@ -111,15 +111,15 @@ class SampleDrawer:
 def repeat_factors(
     samples: Sequence[NetSample], shares: Float64Array, threshold: float
 ) -> Float64Array:
-    """Return how many times more often each picture is drawn for the rarest class in it.
+    """Return how many times more often each image is drawn for the rarest class in it.
 
-    A class in a fraction f of the pictures, fewer than `threshold`, gives √(threshold / f).
+    A class in a fraction f of the images, fewer than `threshold`, gives √(threshold / f).
     Source: Gupta et al., "LVIS", 2019 (repeat factor sampling).
 
     Parameters
     ----------
     shares
-        Float64 `(n,)`: the probability of each picture before; the sum is 1.
+        Float64 `(n,)`: the probability of each image before; the sum is 1.
     """
     count = 1 + max(int(sample.classes.max(initial=0)) for sample in samples)
     has = [np.isin(np.arange(count), sample.classes[~sample.ignored]) for sample in samples]
@@ -129,7 +129,7 @@ def repeat_factors(
 
 
 class Paster:
-    """Pastes objects of the rare classes in `samples` into pictures, with their surroundings.
+    """Pastes objects of the rare classes in `samples` into images, with their surroundings.
 
     Source: Ghiasi et al., "Simple Copy-Paste is a Strong Data Augmentation Method", 2021.
     """
@@ -154,11 +154,11 @@ class Paster:
 
 
 def _whole(sample: NetSample) -> list[int]:
-    """Return the rows of the objects that are large, inside the picture, and not hidden."""
+    """Return the rows of the objects that are large, inside the image, and not hidden."""
     height, width = sample.image.shape[:2]
     boxes, known = sample.boxes.astype(np.float64), sample.classes >= 0
     overlaps = iou_matrix(boxes, boxes) - np.eye(len(boxes))
-    overlaps[:, sample.ignored & known] = 0  # the whole picture
+    overlaps[:, sample.ignored & known] = 0  # the whole image
     large = (boxes[:, 2:] - boxes[:, :2]).max(1, initial=0) >= _MIN_DONOR
     inside = (boxes > 1).all(1) & (boxes[:, 2:] < np.array([width, height]) - 1).all(1)
     apart = overlaps.max(1, initial=0) < 0.1
@@ -212,7 +212,7 @@ def _scale(rng: np.random.Generator, limits: tuple[float, float]) -> float:
 def _place(
     rng: np.random.Generator, sample: NetSample, size: tuple[int, int], scale: float
 ) -> NetSample:
-    """Return a part of a picture of `size`; at scale 1 its width fits."""
+    """Return a part of an image of `size`; at scale 1 its width fits."""
     width, height = size
     whole = np.array(sample.image.shape[1::-1])
     stretch = np.exp(rng.uniform(-_ASPECT, _ASPECT) / 2)
@@ -241,7 +241,7 @@ def _moved(boxes: Float32Array, placing: Float64Array) -> Float32Array:
 
 
 def _cropped(sample: NetSample) -> NetSample:
-    """Cut boxes at the sides of the picture; vehicles of which little is left are ignored."""
+    """Cut boxes at the sides of the image; vehicles of which little is left are ignored."""
     limits = np.array(sample.image.shape[1::-1] * 2, np.float32)
     cut = np.clip(sample.boxes, 0, limits)
     areas, left = area(sample.boxes.astype(np.float64)), area(cut.astype(np.float64))
@@ -272,7 +272,7 @@ def _recolored(rng: np.random.Generator, image: Image) -> Image:
 
 
 def _with_noise(rng: np.random.Generator, image: Image) -> Image:
-    """Sometimes blur a picture, sometimes compress it, sometimes add noise."""
+    """Sometimes blur an image, sometimes compress it, sometimes add noise."""
     if rng.random() < 0.15:
         image = _image(cv2.GaussianBlur(image, (0, 0), rng.uniform(0.4, 1.5)))
     if rng.random() < 0.15:

@@ -81,11 +81,11 @@ def write_model(
 
 
 @torch.no_grad()
-def start_from(network: Network, path: Path, pictures: Tensor, classes: Sequence[str]) -> None:
+def start_from(network: Network, path: Path, images: Tensor, classes: Sequence[str]) -> None:
     """Give a network the weights of a file that `export_network` has written.
 
     Normalisation is part of the convolutions there. Each normalisation of the network gets the
-    mean and deviation of what it sees in some pictures, and undoes itself at first. Layers may be
+    mean and deviation of what it sees in some images, and undoes itself at first. Layers may be
     wider than those of the file: further channels have random weights and change no output yet.
     So have classes that the file does not know.
 
@@ -93,7 +93,7 @@ def start_from(network: Network, path: Path, pictures: Tensor, classes: Sequence
     ----------
     classes
         Those of the network, in its order.
-    pictures
+    images
         BGR, 0 to 255, float32 `(B, 3, H, W)`: at least a batch as the training shows them.
 
     Raises
@@ -132,7 +132,7 @@ def start_from(network: Network, path: Path, pictures: Tensor, classes: Sequence
         places = [*range(5), *(5 + classes.index(name) for name in shared)]
         columns = [*range(5), *(5 + theirs.index(name) for name in shared)]
         folded = _convolutions(onnx.load(str(path)).graph)
-        network(pictures)
+        network(images)
         if next(folded, None) is not None:
             raise ValueError("more convolutions than the network has")
     except Exception as error:  # onnx and torch raise many kinds for a file of another form

@@ -46,7 +46,7 @@ class Block(nn.Module):
 
 
 class Network(nn.Module):
-    """From pictures to a score, four distances and the classes of every cell.
+    """From images to a score, four distances and the classes of every cell.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ class Network(nn.Module):
             head.bias = nn.Parameter(first.clone())
         self.heads = nn.ModuleList(heads)
 
-    def forward(self, pictures: Tensor) -> list[Tensor]:
+    def forward(self, images: Tensor) -> list[Tensor]:
         """Return the raw output of each level, `(B, 5 + classes, H / stride, W / stride)`.
 
         The channels are the score before the sigmoid, the distances to the left, top, right and
@@ -89,14 +89,14 @@ class Network(nn.Module):
 
         Parameters
         ----------
-        pictures
+        images
             BGR, 0 to 255, float32 `(B, 3, H, W)`; H and W are multiples of 32.
         """
-        return self.levels(pictures / 255)
+        return self.levels(images / 255)
 
-    def levels(self, pictures: Tensor) -> list[Tensor]:
-        """Return the raw output of each level for pictures from 0 to 1, as `forward` does."""
-        values = functional.relu(self.stem_norm(self.stem(pictures)))
+    def levels(self, images: Tensor) -> list[Tensor]:
+        """Return the raw output of each level for images from 0 to 1, as `forward` does."""
+        values = functional.relu(self.stem_norm(self.stem(images)))
         levels = []
         for stage in self.stages:
             values = stage(values)
@@ -143,15 +143,15 @@ class Vehicles:
 
     Attributes
     ----------
-    picture
-        int64 `(n,)`: the number of its picture in the batch.
+    image
+        int64 `(n,)`: the number of its image in the batch.
     boxes
         float32 `(n, 4)`: x1, y1, x2, y2, pixels of the input.
     classes
         int64 `(n,)`: its class, -1 where it is not known.
     """
 
-    picture: Tensor
+    image: Tensor
     boxes: Tensor
     classes: Tensor
 
@@ -161,12 +161,12 @@ class Vehicles:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Batch:
-    """Training pictures of one step.
+    """Training images of one step.
 
-    `pictures` are the inputs of the network; `ignored` are the ignore regions, as `Vehicles`.
+    `images` are the inputs of the network; `ignored` are the ignore regions, as `Vehicles`.
     """
 
-    pictures: Tensor
+    images: Tensor
     vehicles: Vehicles
     ignored: Vehicles
 
@@ -190,12 +190,12 @@ def loss_of(network: Network, batch: Batch, weights: Tensor) -> Tensor:
     0 for others (Li et al., "Generalized Focal Loss", 2020). Boxes are compared by generalised
     overlap, classes by cross entropy.
     """
-    height, width = batch.pictures.shape[2:]
+    height, width = batch.images.shape[2:]
     centers, strides = map(torch.from_numpy, cell_centers(width, height))
-    raw = flatten(network(batch.pictures))
+    raw = flatten(network(batch.images))
     scores, boxes = raw[..., 0], decode(raw[..., 1:5], centers, strides)
     row, cell, iou = assign(scores, boxes, batch.vehicles, centers, strides)
-    cells = batch.vehicles.picture[row], cell
+    cells = batch.vehicles.image[row], cell
     targets = torch.zeros_like(scores)
     targets[cells] = iou
     classes = batch.vehicles.classes[row]
@@ -235,7 +235,7 @@ def assign(
     Returns
     -------
     row, cell, iou
-        The row of each vehicle, the cell in its picture, and the overlap of their boxes; all
+        The row of each vehicle, the cell in its image, and the overlap of their boxes; all
         `(m,)`.
     """
     middle = (vehicles.boxes[:, :2] + vehicles.boxes[:, 2:]) / 2
@@ -243,9 +243,9 @@ def assign(
     offset = (centers[None] - middle[:, None]).abs()
     reach = torch.maximum(half[:, None], _MIN_REACH * strides[None, :, None])
     row, cell = torch.nonzero((offset < reach).all(-1), as_tuple=True)
-    picture = vehicles.picture[row]
-    iou = paired_iou(boxes[picture, cell], vehicles.boxes[row])
-    logits = scores[picture, cell]
+    image = vehicles.image[row]
+    iou = paired_iou(boxes[image, cell], vehicles.boxes[row])
+    logits = scores[image, cell]
     score_cost = functional.binary_cross_entropy_with_logits(logits, iou, reduction="none")
     distance = offset[row, cell].norm(dim=-1) / strides[cell]
     costs = torch.full((len(vehicles), len(centers)), _NEVER)
@@ -261,24 +261,24 @@ def assign(
     wanted = torch.arange(CANDIDATES)[None] < count[:, None]
     chosen = torch.full_like(costs, _NEVER)
     chosen.scatter_(1, cheapest.indices, cheapest.values.where(wanted, _NEVER))
-    of_cells = vehicles.picture[:, None].expand_as(chosen)
+    of_cells = vehicles.image[:, None].expand_as(chosen)
     lowest = torch.full_like(scores, _NEVER).scatter_reduce(0, of_cells, chosen, "amin")
-    is_taken = (chosen < _NEVER) & (chosen == lowest[vehicles.picture])
+    is_taken = (chosen < _NEVER) & (chosen == lowest[vehicles.image])
     row, cell = torch.nonzero(is_taken, as_tuple=True)
     return row, cell, overlaps[row, cell]
 
 
 def uncounted(ignored: Vehicles, centers: Tensor, seen: Tensor) -> tuple[Tensor, Tensor]:
-    """Return the picture and the cell of all cells whose middle lies in an ignore region.
+    """Return the image and the cell of all cells whose middle lies in an ignore region.
 
     Of a region with a class, only the cells that see it: `seen` is the best class `(B, cells)`.
     """
     boxes = ignored.boxes[:, None]
     inside = ((centers > boxes[..., :2]) & (centers < boxes[..., 2:])).all(-1)
     classes = ignored.classes[:, None]
-    inside &= (classes == UNKNOWN) | (classes == seen[ignored.picture])
+    inside &= (classes == UNKNOWN) | (classes == seen[ignored.image])
     row, cell = torch.nonzero(inside, as_tuple=True)
-    return ignored.picture[row], cell
+    return ignored.image[row], cell
 
 
 def paired_iou(a: Tensor, b: Tensor) -> Tensor:

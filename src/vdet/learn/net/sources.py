@@ -1,4 +1,4 @@
-"""Labelled pictures and videos in memory, from which the training draws."""
+"""Labelled images and videos in memory, from which the training draws."""
 
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
@@ -11,14 +11,14 @@ import numpy as np
 from vdet.boxes import BoolArray, Float32Array, Image, Int64Array
 from vdet.config.schema import Settings
 from vdet.errors import counted, printable
+from vdet.labels.images import LabelledImage, LabelledImages
 from vdet.labels.label import Label, spread_frames
-from vdet.labels.pictures import LabelledPicture, LabelledPictures
 from vdet.labels.reading import read_true_labels
 from vdet.labels.roles import Roles
 from vdet.media.reader import VideoReader
 
 MAX_PIXELS = 640_000
-"""Pictures are held with at most this many pixels; larger ones are scaled down."""
+"""Images are held with at most this many pixels; larger ones are scaled down."""
 
 UNKNOWN = -1
 """The class of a vehicle whose kind is not known, and of an ignore region for all classes."""
@@ -29,7 +29,7 @@ EVERY = 4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NetSample:
-    """A picture with its vehicles.
+    """An image with its vehicles.
 
     Attributes
     ----------
@@ -108,7 +108,7 @@ class SourceReport:
     """
 
     name: str
-    pictures: int
+    images: int
     vehicles: Counts
     ignored: Counts
     background: Counts
@@ -117,7 +117,7 @@ class SourceReport:
     def lines(self) -> Iterator[str]:
         """Yield as lines of text what is learnt, and what not."""
         learnt = _listed(self.vehicles) or "nothing to learn"
-        yield f"{self.name}: {counted(self.pictures, 'image')}; {learnt}"
+        yield f"{self.name}: {counted(self.images, 'image')}; {learnt}"
         if self.unlabelled:
             yield f"  not labelled, so not background: {', '.join(self.unlabelled)}"
         if self.ignored:
@@ -134,13 +134,13 @@ Source = tuple[NetSource, SourceReport]
 """A source, and what a training makes of it."""
 
 
-def picture_source(labelled: LabelledPictures, settings: Settings) -> Source:
-    """Read a set of labelled pictures into memory; `settings` has the classes to learn.
+def image_source(labelled: LabelledImages, settings: Settings) -> Source:
+    """Read a set of labelled images into memory; `settings` has the classes to learn.
 
-    Raises `ImageError` where a picture cannot be read.
+    Raises `ImageError` where an image cannot be read.
     """
-    pictures = ((picture.read(), picture) for picture in labelled.pictures)
-    return _source(Path(labelled.name).resolve().name, pictures, labelled, settings)
+    images = ((image.read(), image) for image in labelled.images)
+    return _source(Path(labelled.name).resolve().name, images, labelled, settings)
 
 
 def clip_source(video: Path, truth: Path, settings: Settings) -> Source:
@@ -168,29 +168,29 @@ def clip_source(video: Path, truth: Path, settings: Settings) -> Source:
     ignored = Counter(
         label.name or "" for some in labels.values() for label in some if label.ignored
     )
-    labelled = LabelledPictures(video.name, (), ignored=tuple(ignored.most_common()))
+    labelled = LabelledImages(video.name, (), ignored=tuple(ignored.most_common()))
 
     def frames() -> _Frames:
         with VideoReader(video, frames=last, settings=settings.input) as reader:
             for number, frame in enumerate(reader, start=1):
                 if number in used:
-                    yield frame.image, LabelledPicture(video, truth, tuple(labels[number]))
+                    yield frame.image, LabelledImage(video, truth, tuple(labels[number]))
 
     return _source(video.name, frames(), labelled, settings)
 
 
-_Frames = Iterator[tuple[Image, LabelledPicture]]
-"""Pictures, each with its labels."""
+_Frames = Iterator[tuple[Image, LabelledImage]]
+"""Images, each with its labels."""
 
 
-def _source(name: str, frames: _Frames, labelled: LabelledPictures, settings: Settings) -> Source:
+def _source(name: str, frames: _Frames, labelled: LabelledImages, settings: Settings) -> Source:
     """Read the samples of a source, and count what is learnt and what is not."""
     classes = settings.train.net.classes
     samples = [_sample(image, labels, classes) for image, labels in frames]
     names, vehicles = (*classes, "vehicle"), Counter[str]()
     for sample in samples:
         vehicles.update(names[class_] for class_ in sample.classes[~sample.ignored].tolist())
-    unlabelled = {name for picture in labelled.pictures for name in picture.unlabelled}
+    unlabelled = {name for image in labelled.images for name in image.unlabelled}
     report = SourceReport(
         name,
         len(samples),
@@ -202,8 +202,8 @@ def _source(name: str, frames: _Frames, labelled: LabelledPictures, settings: Se
     return NetSource(name, samples), report
 
 
-def _sample(image: Image, labelled: LabelledPicture, classes: Sequence[str]) -> NetSample:
-    """Return a sample; the whole picture is an ignore region for each class without labels."""
+def _sample(image: Image, labelled: LabelledImage, classes: Sequence[str]) -> NetSample:
+    """Return a sample; the whole image is an ignore region for each class without labels."""
     height, width = image.shape[:2]
     number = {name: index for index, name in enumerate(classes)}
     unlabelled = [number[name] for name in labelled.unlabelled if name in number]

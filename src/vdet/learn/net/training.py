@@ -27,13 +27,13 @@ from vdet.version import __version__
 CHECKPOINT = 500
 """Steps between two checkpoints."""
 _SEED = 0
-"""Seed of the weights and the pictures."""
+"""Seed of the weights and the images."""
 _SMALL = 0.35
-"""Fraction of the steps, at the start, with pictures of half the size."""
+"""Fraction of the steps, at the start, with images of half the size."""
 _PLAIN = 0.12
 """Fraction of the steps, at the end, without mosaics."""
 _MOSAICS = 0.35
-"""Fraction of pictures put together of four."""
+"""Fraction of images put together of four."""
 _WARM_UP = 200
 """Steps in which the learning rate rises, or a tenth of all if that is less."""
 _LAST_RATE = 0.02
@@ -42,7 +42,7 @@ _WEIGHT_DECAY = 0.02
 _LONGEST_GRADIENT = 10.0
 _AVERAGE = 0.998
 """Fraction that the moving average of the weights keeps at each step."""
-_MAGNIFIED = 1.4  # scale of the small pictures, whose vehicles would be too small
+_MAGNIFIED = 1.4  # scale of the small images, whose vehicles would be too small
 _REPORTED = 100  # last steps whose mean loss is reported
 
 StepProgress = Callable[[int, float], object]
@@ -189,14 +189,14 @@ def _drawing(settings: NetworkTrainingSettings, step: int) -> Drawing:
 
 def _to_batch(samples: Sequence[NetSample]) -> Batch:
     joined = join(samples, samples[0].image)
-    picture = np.repeat(np.arange(len(samples)), [len(sample.boxes) for sample in samples])
-    columns = [torch.from_numpy(item) for item in (picture, joined.boxes, joined.classes)]
+    image = np.repeat(np.arange(len(samples)), [len(sample.boxes) for sample in samples])
+    columns = [torch.from_numpy(item) for item in (image, joined.boxes, joined.classes)]
     vehicles, ignored = (
         Vehicles(*(column[rows] for column in columns))
         for rows in map(torch.from_numpy, (~joined.ignored, joined.ignored))
     )
-    pictures = torch.from_numpy(np.stack([sample.image for sample in samples]))
-    return Batch(pictures.permute(0, 3, 1, 2).float(), vehicles, ignored)
+    images = torch.from_numpy(np.stack([sample.image for sample in samples]))
+    return Batch(images.permute(0, 3, 1, 2).float(), vehicles, ignored)
 
 
 class _Training:
@@ -230,7 +230,7 @@ class _Training:
 
     def start_from(self, path: Path, batch: Batch) -> None:
         """Take the first weights from an exported network. Raises `DataError`."""
-        start_from(self._network, path, batch.pictures, self._settings.classes)
+        start_from(self._network, path, batch.images, self._settings.classes)
         self.averaged.load_state_dict(self._network.state_dict())
 
     @property

@@ -1,4 +1,4 @@
-"""Night, fog, rain and drops on the glass, drawn into pictures of clear days."""
+"""Night, fog, rain and drops on the glass, drawn into images of clear days."""
 
 from typing import Any
 
@@ -10,19 +10,19 @@ from vdet.boxes import Float32Array, Image
 
 _Values = npt.NDArray[Any]
 
-_NIGHT = 0.14  # fraction of pictures
-_DARK = 70.0  # mean of a picture that is not darkened further
+_NIGHT = 0.14  # fraction of images
+_DARK = 70.0  # mean of an image that is not darkened further
 _FOG = 0.06
 _RAIN = 0.1
 _LAMP = (0.03, 0.09)  # radius of a lamp, fraction of the vehicle's width: smallest and largest
 _TWO_LAMPS = 0.75  # minimum width of a vehicle with two lamps, fraction of its height
 _STREET_LAMP = (0.6, 0.85, 1.0)  # BGR
-_WIPED = 0.15  # fraction of pictures in rain with a wiper
+_WIPED = 0.15  # fraction of images in rain with a wiper
 _DROPS = 40  # most drops on the glass
 
 
 def with_weather(rng: np.random.Generator, image: Image, boxes: Float32Array) -> Image:
-    """Return the picture at night, in fog or in the rain; most pictures stay as they are.
+    """Return the image at night, in fog or in the rain; most images stay as they are.
 
     Parameters
     ----------
@@ -40,9 +40,9 @@ def with_weather(rng: np.random.Generator, image: Image, boxes: Float32Array) ->
 
 
 def _at_night(rng: np.random.Generator, image: Image, boxes: Float32Array) -> Image:
-    """Darken the picture, tint it, and light the lamps of vehicles and some others.
+    """Darken the image, tint it, and light the lamps of vehicles and some others.
 
-    The lamps of some pictures glare, and a wet road reflects them.
+    The lamps of some images glare, and a wet road reflects them.
     """
     height, width = image.shape[:2]
     dark = (image / 255.0) ** rng.uniform(1.1, 2.0) * rng.uniform(0.2, 0.8)
@@ -73,14 +73,14 @@ def _at_night(rng: np.random.Generator, image: Image, boxes: Float32Array) -> Im
 
 
 def _in_fog(rng: np.random.Generator, image: Image) -> Image:
-    """Blend the picture with grey, more so at the top."""
+    """Blend the image with grey, more so at the top."""
     top = rng.uniform(0.3, 0.85)
     veil = np.linspace(top, top * rng.uniform(0.2, 0.8), len(image))[:, np.newaxis, np.newaxis]
     return _image(image * (1 - veil) + rng.uniform(120, 220) * veil)
 
 
 def _in_rain(rng: np.random.Generator, image: Image) -> Image:
-    """Dull the picture and draw streaks; often with drops on the glass, sometimes with a wiper."""
+    """Dull the image and draw streaks; often with drops on the glass, sometimes with a wiper."""
     height, width = image.shape[:2]
     rain = np.zeros((height, width), np.uint8)
     slant = rng.uniform(-0.3, 0.3)
@@ -99,7 +99,7 @@ def _in_rain(rng: np.random.Generator, image: Image) -> Image:
 
 
 def _with_drops(rng: np.random.Generator, image: Image) -> Image:
-    """Draw drops on the glass: each shows a blurred, upside-down picture of what is around it."""
+    """Draw drops on the glass: each shows a blurred, upside-down image of what is around it."""
     height, width = image.shape[:2]
     blurred = cv2.GaussianBlur(image, (0, 0), 0.004 * width * rng.uniform(0.5, 2))
     shown, mask = blurred.copy(), np.zeros((height, width), np.uint8)

@@ -23,7 +23,7 @@ from vdet.archives import ArchiveError, is_hidden, list_members, open_archive, r
 from vdet.boxes import Image
 from vdet.errors import DataError, escaped, printable
 from vdet.files import read_whole, staged
-from vdet.media.images import PICTURE_SUFFIXES, decode_image
+from vdet.media.images import IMAGE_SUFFIXES, decode_image
 
 CLASSES = {"vehicles": True, "non-vehicles": False}
 BOXED = "boxes"
@@ -102,7 +102,7 @@ def _find_in(source: Path) -> list[PatchFile]:
 def _patch_file(source: Path, name: str, boxes: Mapping[str, Sides]) -> PatchFile | None:
     """Return the patch file of a name in a source; None if it is not a patch."""
     path = PurePosixPath(name)
-    if is_hidden(path) or path.suffix.lower() not in PICTURE_SUFFIXES:
+    if is_hidden(path) or path.suffix.lower() not in IMAGE_SUFFIXES:
         return None
     sides = boxes.get(name)
     known = CLASSES | ({BOXED: True} if sides else {})

@@ -13,11 +13,11 @@ from typing import Any, BinaryIO, Self
 from vdet.errors import OutputError
 from vdet.files import json_text, print_now, write_text
 from vdet.labels.formats import (
-    PictureTracks,
+    ImageTracks,
     SourceVideo,
     TrackWriter,
     format_for,
-    picture_suffixes,
+    image_suffixes,
     track_suffixes,
 )
 from vdet.labels.native import CLOCK, JSON_LINES, track_record
@@ -84,24 +84,24 @@ class LabelSink(BaseSink):
 
     def __init__(self, path: Path, context: SinkContext) -> None:
         super().__init__(path, context)
-        self._pictures: list[PictureTracks] = []
+        self._images: list[ImageTracks] = []
 
     def finish(self) -> None:
         """Write the file."""
         form = format_for(self.path)
         assert form is not None  # the suffixes of the kind say so
-        assert form.pictures is not None
+        assert form.images is not None
         with self.context.files.stage(self.path).open("wb") as file:
-            form.pictures(file, self._pictures)
+            form.images(file, self._images)
 
     def write(self, result: FrameResult) -> None:
-        """Add a picture."""
+        """Add an image."""
         place = self.context.places.get(result.source, Path(result.source.name))
         size = result.frame.picture.width, result.frame.picture.height
-        self._pictures.append(PictureTracks(place, size, result.tracks))
+        self._images.append(ImageTracks(place, size, result.tracks))
 
 
-LABELS = SinkKind(LabelSink, picture_suffixes, "labels of images", takes="pictures")
+LABELS = SinkKind(LabelSink, image_suffixes, "labels of images", takes="images")
 
 
 class JsonSink(BaseSink):
@@ -123,7 +123,7 @@ class JsonSink(BaseSink):
             write_text(self.context.files.stage(self.path), json_text(self._items))
 
     def write(self, result: FrameResult) -> None:
-        """Add the item of a picture."""
+        """Add the item of an image."""
         picture, boxes = result.frame.picture, list(map(track_record, result.tracks))
         for box in boxes:
             del box["id"], box["state"]  # they mean nothing in a single image
@@ -131,7 +131,7 @@ class JsonSink(BaseSink):
         self._items.append({**item, "boxes": boxes, **result.frame_tracks.facts})
 
 
-JSON = SinkKind(JsonSink, what="lists of boxes", writes_standard_output=True, takes="pictures")
+JSON = SinkKind(JsonSink, what="lists of boxes", writes_standard_output=True, takes="images")
 
 
 class TableSink(BaseSink):

@@ -1,4 +1,4 @@
-"""The sinks `video` and `picture`: frames with boxes, labels, trails and counts."""
+"""The sinks `video` and `image`: frames with boxes, labels, trails and counts."""
 
 import zlib
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ from vdet.draw import boxes
 from vdet.draw.boxes import Color, Surface, draw_lines
 from vdet.errors import OutputError
 from vdet.media import Frame, Picture, Planes, VideoInfo
-from vdet.media.images import PICTURE_SUFFIXES, encode_image
+from vdet.media.images import IMAGE_SUFFIXES, encode_image
 from vdet.media.writer import VIDEO_SUFFIXES, VideoWriter, may_replace_video
 from vdet.polygons import Point
 from vdet.run.result import FrameResult
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from vdet.traffic.counter import VehicleCounter
 
 VIDEO_LABELS = ("id", "class"), ("id",)
-PICTURE_LABELS = ("class", "score"), ("score",)
+IMAGE_LABELS = ("class", "score"), ("score",)
 """Parts of the label of a vehicle if it fits the box, and otherwise."""
 
 
@@ -44,7 +44,7 @@ class Overlay:
         self._settings, self._draw = settings, settings.draw
         self._longest = self._draw.trails if video else None
         self._counter = counter if settings.traffic.draw else None
-        automatic = VIDEO_LABELS if video else PICTURE_LABELS
+        automatic = VIDEO_LABELS if video else IMAGE_LABELS
         self._labels = automatic if self._draw.label is None else (self._draw.label,)
         self._trails: dict[int, list[tuple[float, Point]]] = {}  # with the time in seconds
 
@@ -155,7 +155,7 @@ class VideoSink(BaseSink):
 VIDEO = SinkKind(VideoSink, VIDEO_SUFFIXES, "videos", takes="videos", may_replace=may_replace_video)
 
 
-class PictureSink(BaseSink):
+class ImageSink(BaseSink):
     """Writes one image."""
 
     _is_done = False
@@ -172,4 +172,4 @@ class PictureSink(BaseSink):
         self.context.files.stage(self.path).write_bytes(encode_image(drawn.image, self.path))
 
 
-PICTURE = SinkKind(PictureSink, sorted(PICTURE_SUFFIXES), "pictures", takes="pictures")
+IMAGE = SinkKind(ImageSink, sorted(IMAGE_SUFFIXES), "images", takes="images")

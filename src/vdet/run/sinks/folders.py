@@ -12,16 +12,16 @@ from vdet.detect.classes import UNKNOWN, in_file_name
 from vdet.draw.boxes import WHITE, color_of, draw_box, draw_label, draw_regions
 from vdet.errors import OutputError, clock_text
 from vdet.files import write_text
-from vdet.lanes.road import stage_pictures
+from vdet.lanes.road import stage_images
 from vdet.media import Picture
 from vdet.media.cutting import can_copy, copied_suffix, copy_part, encode_part
-from vdet.media.images import encode_image, is_picture_name
+from vdet.media.images import encode_image, is_image_name
 from vdet.pages.batch import write_index
 from vdet.pages.render import PAGE_NAME, jpeg_uri, link_to
 from vdet.pages.video import Player, VideoPage
 from vdet.regions import lay_regions
 from vdet.run.result import FrameResult, findings_in
-from vdet.run.sinks.drawn import PICTURE_LABELS, label_text
+from vdet.run.sinks.drawn import IMAGE_LABELS, label_text
 from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.traffic.records import BestCrops, Crop, VehicleRecord
 
@@ -49,13 +49,13 @@ class StagesSink(BaseSink):
         if self._is_done or not result.searched or result.frame.time < time:
             return
         self._is_done = True
-        pictures = self.context.stage_pictures(result.frame.image, result.detections)
+        pictures = self.context.stage_images(result.frame.image, result.detections)
         height, width = result.frame.image.shape[:2]
         if regions := lay_regions(self.context.settings.regions, width, height):
             pictures["regions"] = draw_regions(result.frame.image, regions)
         pictures[_BOXES] = _with_boxes(result)
         if result.road:
-            pictures |= stage_pictures(result.road)
+            pictures |= stage_images(result.road)
         folder = self.context.files.stage_folder(self.path)
         for number, (name, picture) in enumerate(pictures.items(), start=1):
             path = folder / f"{number}-{name}.png"
@@ -70,7 +70,7 @@ def _with_boxes(result: FrameResult) -> Image:
         draw_box(picture, detection.box, WHITE)
         draw_label(picture, f"{detection.score:.2f}", (detection.box.x1, detection.box.y2), WHITE)
     for track in result.tracks:
-        text = label_text(track, PICTURE_LABELS[-1])
+        text = label_text(track, IMAGE_LABELS[-1])
         draw_box(picture, track.box, color_of(track.id), text, dashed=track.state == "predicted")
     return picture
 
@@ -195,7 +195,7 @@ class PageSink(BaseSink):
         """Return the video that this run writes, else the source if it is a video file."""
         source = self.video.path
         drawn = self._paths_of("video")
-        if not drawn and (not source.is_file() or is_picture_name(source)):
+        if not drawn and (not source.is_file() or is_image_name(source)):
             return None
         path, start = (drawn[0], self._start) if drawn else (source, float(self.video.start))
         return Player(path.name, link_to(path, self.path), bool(drawn), start)

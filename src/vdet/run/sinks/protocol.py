@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol, Self
 
 from vdet.config.schema import Settings
-from vdet.detect.protocol import StagePictures
+from vdet.detect.protocol import StageImages
 from vdet.errors import OutputError
 from vdet.files import OutputFiles, check_output, output_errors
 from vdet.media import VideoInfo
@@ -58,7 +58,7 @@ class SinkContext:
         What the steps found out about the whole video; empty before sinks finish.
     places
         For single images: their paths below the input folders.
-    stage_pictures
+    stage_images
         Takes the image of a frame and its detections; returns an image of each stage of the
         detector by its name, in order.
     """
@@ -72,7 +72,7 @@ class SinkContext:
     traffic: "LiveTraffic | None" = None
     facts: dict[str, Fact] = field(default_factory=dict)
     places: Mapping[Path, Path] = field(default_factory=dict)
-    stage_pictures: StagePictures = lambda *_: {}
+    stage_images: StageImages = lambda *_: {}
 
 
 class BaseSink:
@@ -155,7 +155,7 @@ class SinkKind:
         Whether it needs only the frame at `SinkContext.at`. If all outputs of a run do, only the
         frames around it are read.
     takes
-        "videos" or "pictures" if the sink accepts only results of videos, or only of images.
+        "videos" or "images" if the sink accepts only results of videos, or only of images.
     may_replace
         Whether `--overwrite` may replace a file.
     check
@@ -170,7 +170,7 @@ class SinkKind:
     folder_pattern: str = ""
     writes_standard_output: bool = False
     one_frame: bool = False
-    takes: Literal["videos", "pictures", "both"] = "both"
+    takes: Literal["videos", "images", "both"] = "both"
     may_replace: Callable[[Path], bool] = lambda _: True
     check: Callable[[Path], object] = lambda _: None
     total: BatchTotal | None = None
@@ -273,7 +273,7 @@ def open_sinks(outputs: Iterable[Output], context: SinkContext) -> Iterator[Sink
     ConfigError
         A sink is unknown.
     """
-    source = "pictures" if context.video is None else "videos"
+    source = "images" if context.video is None else "videos"
     sinks = {}
     with ExitStack() as stack:
         for output in outputs:

@@ -19,7 +19,7 @@ def write_pictures(pattern: Path, numbers: range) -> Path:
 
 
 @pytest.mark.parametrize("suffix", ["png", "jpg", "bmp", "tiff", "webp"])
-def test_numbered_pictures_are_a_video(suffix: str, tmp_path: Path, process: Process) -> None:
+def test_numbered_images_are_a_video(suffix: str, tmp_path: Path, process: Process) -> None:
     pattern = tmp_path / "pictures 100%" / f"img_%02d.{suffix}"
     write_pictures(pattern, range(9, 12))  # not from 0, and with more digits
     shown = process(pattern, "--set", "input.frame_rate=25")

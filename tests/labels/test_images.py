@@ -23,9 +23,9 @@ from labels.writers import (
     write_yolo,
 )
 from vdet.errors import ImageError, TruthError
-from vdet.labels import pictures as module
+from vdet.labels import images as module
 from vdet.labels.label import from_size
-from vdet.labels.reading import read_labelled_pictures
+from vdet.labels.reading import read_labelled_images
 
 FORMS = list(WRITERS)
 WIDTH, HEIGHT = 64, 32
@@ -76,10 +76,10 @@ def test_what_is_written_is_read_back(
 ) -> None:
     folder = fresh(tmp_path_factory)
     WRITERS[form](folder, scene)
-    found = read_labelled_pictures(folder)
+    found = read_labelled_images(folder)
     assert found.name == str(folder)
-    assert sorted(picture.path.stem for picture in found.pictures) == sorted(scene)
-    for image in found.pictures:
+    assert sorted(picture.path.stem for picture in found.images) == sorted(scene)
+    for image in found.images:
         expected = [b for b in scene[image.path.stem].boxes if b.name != "cow"]
         written = np.array([from_size(*b.box) for b in expected]).reshape(-1, 4)
         assert np.allclose(image.boxes, written, atol=1e-6)
@@ -96,7 +96,7 @@ def test_a_missing_picture_is_named(tmp_path: Path, form: str) -> None:
     WRITERS[form](tmp_path, SCENE)
     next(tmp_path.rglob("a.png")).unlink()
     with pytest.raises(TruthError, match=r"\ba\b"):
-        read_labelled_pictures(tmp_path)
+        read_labelled_images(tmp_path)
 
 
 @pytest.mark.parametrize("form", ["COCO", "YOLO"])
@@ -104,7 +104,7 @@ def test_a_picture_of_another_size_than_its_labels_say_is_refused(
     tmp_path: Path, form: str
 ) -> None:
     WRITERS[form](tmp_path, SCENE)
-    image = read_labelled_pictures(tmp_path).pictures[0]
+    image = read_labelled_images(tmp_path).images[0]
     assert image.read().shape == (HEIGHT, WIDTH, 3)
     write_pictures(image.path.parent, {"a": Labelled(HEIGHT, WIDTH)})
     with pytest.raises(ImageError, match=r"a\.png: is 32×64, .* labels are for 64×32"):
@@ -115,14 +115,14 @@ def test_too_many_pictures_or_boxes_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     write_coco(tmp_path, SCENE)
-    for name, most in (("MAX_PICTURES", 1), ("MAX_BOXES", 3)):
+    for name, most in (("MAX_IMAGES", 1), ("MAX_BOXES", 3)):
         with monkeypatch.context() as patch:
             patch.setattr(module, name, most)
             with pytest.raises(TruthError, match="boxes; cut it into parts"):
-                read_labelled_pictures(tmp_path)
+                read_labelled_images(tmp_path)
     monkeypatch.setattr(module, "MAX_IN_FRAME", 2)
     with pytest.raises(TruthError, match=r"annotations\.2: the image has more than 2 boxes"):
-        read_labelled_pictures(tmp_path)
+        read_labelled_images(tmp_path)
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -131,7 +131,7 @@ def test_hidden_files_are_passed_over(tmp_path: Path, form: str) -> None:
     for folder in (file.parent, next(tmp_path.rglob("a.png")).parent):
         for name in (f"._{file.name}", "._a.png", ".DS_Store", "Thumbs.db"):
             (folder / name).write_bytes(b"\0\5")
-    assert [picture.path.name for picture in read_labelled_pictures(tmp_path).pictures] == [
+    assert [picture.path.name for picture in read_labelled_images(tmp_path).images] == [
         *("a.png", "b.png")
     ]
 
@@ -144,7 +144,7 @@ def test_a_label_that_occurs_twice_counts_once(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     write_coco(tmp_path, scene_of((1, 2, 20, 10), (1, 2, 20, 10), (1, 2, 20, 11)))
-    (picture,) = read_labelled_pictures(tmp_path).pictures
+    (picture,) = read_labelled_images(tmp_path).images
     assert picture.boxes.tolist() == [[1, 2, 21, 12], [1, 2, 21, 13]]
     assert caplog.messages == [f"{tmp_path}: has 1 label twice in the same image; each counts once"]
 
@@ -161,7 +161,7 @@ def test_boxes_that_cannot_be_pixels_of_their_pictures_are_refused(
 ) -> None:
     write_coco(tmp_path, scene_of(*boxes))
     with pytest.raises(TruthError, match=r"2 of \d boxes are outside their images or within a"):
-        read_labelled_pictures(tmp_path)
+        read_labelled_images(tmp_path)
 
 
 def test_where_no_set_is_found_it_says_what_was_looked_for(tmp_path: Path) -> None:
@@ -169,10 +169,10 @@ def test_where_no_set_is_found_it_says_what_was_looked_for(tmp_path: Path) -> No
         with pytest.raises(
             TruthError, match=r"not found; use a folder with one \.json file \(COCO\)"
         ):
-            read_labelled_pictures(path)
+            read_labelled_images(path)
     shutil.copy(write_coco(tmp_path, SCENE), tmp_path / "other.json")
     with pytest.raises(TruthError, match=r"\(annotations\.json, other\.json\); pass the one"):
-        read_labelled_pictures(tmp_path)
+        read_labelled_images(tmp_path)
 
 
 @pytest.mark.parametrize("place", ["labels.json", "annotations/labels.json"])
@@ -184,13 +184,13 @@ def test_a_coco_file_may_lie_above_or_beside_the_pictures(
     path = tmp_path / "set" / place
     path.parent.mkdir(exist_ok=True)
     written.rename(path)
-    found = {picture.path.parent for picture in read_labelled_pictures(path).pictures}
+    found = {picture.path.parent for picture in read_labelled_images(path).images}
     assert found == {tmp_path / "set" / folder}
-    assert len(read_labelled_pictures(tmp_path / "set").pictures) == 2
+    assert len(read_labelled_images(tmp_path / "set").images) == 2
     write_pictures(tmp_path / "set" / "train", SCENE)
     write_pictures(tmp_path / "set" / "test", SCENE)
     with pytest.raises(TruthError, match=r"first image, a\.png, is in .*; keep one"):
-        read_labelled_pictures(path)
+        read_labelled_images(path)
 
 
 def test_what_other_programs_say_of_an_image_does_not_matter(tmp_path: Path) -> None:
@@ -198,7 +198,7 @@ def test_what_other_programs_say_of_an_image_does_not_matter(tmp_path: Path) -> 
     document = json.loads(path.read_text(encoding="utf-8"))
     document["images"][0] |= {"time": "night", "weather": "rain", "camera": "north"}
     path.write_text(json.dumps(document), encoding="utf-8")
-    assert len(read_labelled_pictures(tmp_path).pictures) == 2
+    assert len(read_labelled_images(tmp_path).images) == 2
 
 
 @pytest.mark.parametrize(
@@ -222,7 +222,7 @@ def test_a_wrong_entry_of_coco_is_refused_by_its_number(
     document[key][1].update(values)
     path.write_text(json.dumps(document), encoding="utf-8")
     with pytest.raises(TruthError) as caught:
-        read_labelled_pictures(path)
+        read_labelled_images(path)
     assert words in str(caught.value)
     assert str(caught.value).isprintable()
 
@@ -241,7 +241,7 @@ def test_a_wrong_file_of_labels_is_refused_with_the_place(
 ) -> None:
     WRITERS[form](tmp_path, SCENE).write_text(text, encoding="utf-8")
     with pytest.raises(TruthError, match=words) as caught:
-        read_labelled_pictures(tmp_path)
+        read_labelled_images(tmp_path)
     assert str(caught.value).isprintable()
 
 
@@ -250,7 +250,7 @@ def test_what_each_type_of_kitti_means(tmp_path: Path) -> None:
     kinds = ("Car", "Van", "Truck", "Tram", "Misc", "DontCare", "Person_sitting", "Cyclist")
     rest = "0 0 0 1 2 11 22 1 1 4 2 1 20 -1.6\n"
     path.write_text("".join(f"{kind} {rest}" for kind in kinds), encoding="utf-8")
-    image = read_labelled_pictures(tmp_path).pictures[0]
+    image = read_labelled_images(tmp_path).images[0]
     assert image.classes == ("car", "car", "truck", *["vehicle"] * 3, "person", "bicycle")
     assert image.ignored.tolist() == [*[False] * 3, *[True] * 4, False]
     assert image.boxes[0].tolist() == [1, 2, 11, 22]
@@ -261,7 +261,7 @@ def test_a_rider_is_read_as_a_part_of_what_is_ridden(tmp_path: Path) -> None:
     boxes = {"Motorcycle": "10 20 30 40", "Rider": "12 5 28 35", "rider": "60 5 70 35"}
     rows = [f"{kind} 0 0 0 {box} 1 1 4 2 1 20 -1.6\n" for kind, box in boxes.items()]
     path.write_text("".join(rows), encoding="utf-8")
-    image = read_labelled_pictures(tmp_path).pictures[0]
+    image = read_labelled_images(tmp_path).images[0]
     assert image.boxes.tolist() == [[10, 5, 30, 40], [60, 5, 70, 35]]
     assert (image.classes[0], image.ignored.tolist()) == ("motorcycle", [False, True])
 
@@ -272,20 +272,20 @@ class TestYolo:
         (tmp_path / "train" / "data.yaml").unlink()
         names = "".join(f"  {number}: {name}\n" for number, name in enumerate(NAMES))
         (tmp_path / "data.yaml").write_text(f"names:\n{names}", encoding="utf-8")
-        image = read_labelled_pictures(tmp_path / "train").pictures[0]
+        image = read_labelled_images(tmp_path / "train").images[0]
         assert image.classes == ("car", "truck", "vehicle")
 
     def test_a_polygon_is_taken_as_its_box(self, tmp_path: Path) -> None:
         path = write_yolo(tmp_path, SCENE)
         path.write_text("0 0.5 0.5 0.1 0.1\n1 0.25 0.5 0.5 0.75 0.375 1\n", encoding="utf-8")
-        image = read_labelled_pictures(tmp_path).pictures[0]
+        image = read_labelled_images(tmp_path).images[0]
         assert image.classes == ("car", "truck")
         assert image.boxes[1].tolist() == [0.25 * WIDTH, 0.5 * HEIGHT, 0.5 * WIDTH, HEIGHT]
 
     def test_what_lies_less_than_a_pixel_outside_is_moved_to_the_side(self, tmp_path: Path) -> None:
         path = write_yolo(tmp_path, SCENE)
         path.write_text("0 1.000001 0.5 0.125 1.01\n", encoding="utf-8")
-        (box,) = read_labelled_pictures(tmp_path).pictures[0].boxes.tolist()
+        (box,) = read_labelled_images(tmp_path).images[0].boxes.tolist()
         assert box == [0.9375 * WIDTH, 0, 1.0625 * WIDTH, HEIGHT]
 
     @pytest.mark.parametrize(
@@ -303,15 +303,15 @@ class TestYolo:
         if text is not None:
             (tmp_path / "data.yaml").write_text(text, encoding="utf-8")
         with pytest.raises(TruthError, match=words):
-            read_labelled_pictures(tmp_path)
+            read_labelled_images(tmp_path)
 
     def test_labels_without_a_picture_are_refused(self, tmp_path: Path) -> None:
         path = write_yolo(tmp_path, SCENE)
         (path.parent / "classes.txt").write_text("car\n", encoding="utf-8")
-        assert len(read_labelled_pictures(tmp_path).pictures) == 2
+        assert len(read_labelled_images(tmp_path).images) == 2
         path.rename(path.with_name("c.txt"))
         with pytest.raises(TruthError, match=r"c\.txt: has no image of its name below"):
-            read_labelled_pictures(tmp_path)
+            read_labelled_images(tmp_path)
 
 
 @pytest.fixture(scope="module")
@@ -334,7 +334,7 @@ def test_damaged_labels_are_labels_or_a_truth_error(
     path.write_bytes(content[:at] + damage.encode() + content[end:])
     words = ""
     try:
-        read_labelled_pictures(path.parent if form == "COCO" else path.parents[1])
+        read_labelled_images(path.parent if form == "COCO" else path.parents[1])
     except TruthError as error:
         words = str(error)
     assert words.isprintable()

@@ -15,9 +15,9 @@ from vdet.boxes import BoolArray, Float64Array, Image
 from vdet.errors import ImageError, TruthError, counted, printable
 from vdet.labels.label import MAX_IN_FRAME, Corners, Label, Size, line_error, mistake_in_box
 from vdet.labels.roles import DEFAULT_ROLES, Roles, merge_riders
-from vdet.media.images import is_picture_name, read_image
+from vdet.media.images import is_image_name, read_image
 
-MAX_PICTURES = 200_000
+MAX_IMAGES = 200_000
 """Maximum number of images in one set."""
 
 MAX_BOXES = 2_000_000
@@ -30,7 +30,7 @@ log = logging.getLogger("vdet")
 
 
 @dataclass(frozen=True, slots=True)
-class LabelledPicture:
+class LabelledImage:
     """An image with its labels.
 
     Attributes
@@ -38,7 +38,7 @@ class LabelledPicture:
     path, file
         The image file, and the file of its labels.
     labels
-        From a reader: all labels of the file. In `LabelledPictures`: only vehicles and ignore
+        From a reader: all labels of the file. In `LabelledImages`: only vehicles and ignore
         regions, each with an area; `name` is a class of `Roles`.
     size
         Width and height of the image in pixels; None if the labels do not contain them.
@@ -84,7 +84,7 @@ class LabelledPicture:
 
 
 @dataclass(frozen=True, slots=True)
-class LabelledPictures:
+class LabelledImages:
     """Labelled images of one source.
 
     `name` is shown in tables. `others` are the labels that are neither vehicles nor ignore regions,
@@ -93,14 +93,14 @@ class LabelledPictures:
     """
 
     name: str
-    pictures: tuple[LabelledPicture, ...]
+    images: tuple[LabelledImage, ...]
     others: tuple[tuple[str, int], ...] = ()
     ignored: tuple[tuple[str, int], ...] = ()
 
 
-def checked_pictures(
-    name: str, pictures: Iterable[LabelledPicture], roles: Roles = DEFAULT_ROLES
-) -> LabelledPictures:
+def checked_images(
+    name: str, images: Iterable[LabelledImage], roles: Roles = DEFAULT_ROLES
+) -> LabelledImages:
     """Check the labels of a set, and omit the labels that are not vehicles.
 
     A duplicate label in an image counts once, with a warning.
@@ -109,26 +109,26 @@ def checked_pictures(
     ------
     TruthError
         There is no image, an image is missing or appears twice, a box has no area, most boxes
-        cannot be pixels of their images, or there are more than `MAX_PICTURES`, more than
+        cannot be pixels of their images, or there are more than `MAX_IMAGES`, more than
         `MAX_BOXES` in total, or more than `MAX_IN_FRAME` in one image.
     """
-    checked: dict[Path, LabelledPicture] = {}
+    checked: dict[Path, LabelledImage] = {}
     counts = Counter[str](), Counter[str]()
     boxes = repeated = absurd = 0
-    for picture in pictures:
-        labels = tuple({label[1:]: label for label in picture.labels}.values())
+    for image in images:
+        labels = tuple({label[1:]: label for label in image.labels}.values())
         boxes += len(labels)
-        repeated += len(picture.labels) - len(labels)
-        absurd += sum(_is_absurd(label.box, picture.size) for label in labels)
-        if len(checked) == MAX_PICTURES or boxes > MAX_BOXES:
-            most = f"{MAX_PICTURES:,} images or {MAX_BOXES:,} boxes"
+        repeated += len(image.labels) - len(labels)
+        absurd += sum(_is_absurd(label.box, image.size) for label in labels)
+        if len(checked) == MAX_IMAGES or boxes > MAX_BOXES:
+            most = f"{MAX_IMAGES:,} images or {MAX_BOXES:,} boxes"
             raise TruthError(f"{name}: has more than {most}; cut it into parts")
-        if picture.path in checked:
-            raise TruthError(f"{name}: has the image {printable(picture.path.name)} twice")
-        checked[picture.path] = replace(
-            picture,
-            labels=tuple(_with_roles(replace(picture, labels=labels), roles, *counts)),
-            unlabelled=tuple(filter(None, map(roles.class_of, picture.unlabelled))),
+        if image.path in checked:
+            raise TruthError(f"{name}: has the image {printable(image.path.name)} twice")
+        checked[image.path] = replace(
+            image,
+            labels=tuple(_with_roles(replace(image, labels=labels), roles, *counts)),
+            unlabelled=tuple(filter(None, map(roles.class_of, image.unlabelled))),
         )
     if not checked:
         raise TruthError(f"{name}: has no labelled images")
@@ -139,7 +139,7 @@ def checked_pictures(
         twice = counted(repeated, "label")
         log.warning("%s: has %s twice in the same image; each counts once", name, twice)
     others, ignored = (tuple(count.most_common()) for count in counts)
-    return LabelledPictures(name, tuple(checked.values()), others, ignored)
+    return LabelledImages(name, tuple(checked.values()), others, ignored)
 
 
 def _is_absurd(box: Corners, size: Size | None) -> bool:
@@ -150,13 +150,13 @@ def _is_absurd(box: Corners, size: Size | None) -> bool:
 
 
 def _with_roles(
-    picture: LabelledPicture, roles: Roles, others: Counter[str], ignored: Counter[str]
+    image: LabelledImage, roles: Roles, others: Counter[str], ignored: Counter[str]
 ) -> Iterator[Label]:
     """Yield the vehicles and ignore regions of an image, and count the other labels."""
-    if not is_file(picture.path):
-        raise TruthError(f"{printable(str(picture.path))}: not found, but {picture.file} labels it")
+    if not is_file(image.path):
+        raise TruthError(f"{printable(str(image.path))}: not found, but {image.file} labels it")
     count = 0
-    for label in merge_riders(picture.labels):
+    for label in merge_riders(image.labels):
         name = label.name or ""
         role = roles.role_of(name)
         if role not in ("vehicle", "ignored"):
@@ -166,7 +166,7 @@ def _with_roles(
         if count == MAX_IN_FRAME:
             mistake = f"the image has more than {MAX_IN_FRAME:,} boxes"
         if mistake:
-            raise line_error(picture.file, label.place, mistake)
+            raise line_error(image.file, label.place, mistake)
         count += 1
         ignored.update([name] if role == "ignored" and not label.ignored else [])
         is_ignored = label.ignored or role == "ignored"
@@ -185,7 +185,7 @@ def inside(name: str) -> str:
     return name
 
 
-def picture_folder(path: Path, name: str) -> Path:
+def image_folder(path: Path, name: str) -> Path:
     """Return the folder that image names are relative to: the one that has the first image.
 
     It is the folder of the label file or at most two folders below; if the file is in
@@ -203,7 +203,7 @@ def picture_folder(path: Path, name: str) -> Path:
     raise TruthError(f"{path}: its first image, {shown}, was not found beside it or below")
 
 
-def paired_files(pictures: Path, labels: Path) -> Iterator[tuple[Path, Path | None]]:
+def paired_files(images: Path, labels: Path) -> Iterator[tuple[Path, Path | None]]:
     """Yield the images below a folder, with the label file of the same name below another.
 
     Hidden files and files of the system or of label tools are skipped; an image may have no label
@@ -217,9 +217,9 @@ def paired_files(pictures: Path, labels: Path) -> Iterator[tuple[Path, Path | No
         if not is_hidden(name) and name.name != "classes.txt"
     }
     used = set()
-    for picture in sorted(filter(is_picture_name, pictures.rglob("*"))):
-        name = picture.relative_to(pictures).with_suffix("")
-        yield picture, files.get(name)
+    for image in sorted(filter(is_image_name, images.rglob("*"))):
+        name = image.relative_to(images).with_suffix("")
+        yield image, files.get(name)
         used.add(name)
     if unused := files.keys() - used:
-        raise TruthError(f"{files[min(unused)]}: has no image of its name below {pictures}")
+        raise TruthError(f"{files[min(unused)]}: has no image of its name below {images}")

@@ -9,11 +9,11 @@ from pathlib import Path
 from vdet.archives import is_hidden
 from vdet.boxes import Boxes, Image
 from vdet.config.schema import Settings
-from vdet.detect.protocol import DetectorModel, stage_pictures_of
+from vdet.detect.protocol import DetectorModel, stage_images_of
 from vdet.errors import ImageError
 from vdet.files import OutputFiles, record_input
 from vdet.media import Frame, Picture
-from vdet.media.images import PICTURE_SUFFIXES, is_picture_name, read_image
+from vdet.media.images import IMAGE_SUFFIXES, is_image_name, read_image
 from vdet.run.loop import Parts, build, named_errors
 from vdet.run.result import FrameResult
 from vdet.run.sinks import Output
@@ -22,7 +22,7 @@ from vdet.run.threads import map_ordered
 
 
 @dataclass(frozen=True, slots=True)
-class PictureJob:
+class ImageJob:
     """An image, and the outputs for it alone.
 
     `place` is its path below the input folder; None: its name.
@@ -47,11 +47,11 @@ def find_images(paths: Sequence[Path]) -> dict[Path, Path]:
     found: dict[Path, Path] = {}
     for path in paths:
         if path.is_dir():
-            pictures = sorted(p for p in filter(is_picture_name, path.rglob("*")) if p.is_file())
-            places = {picture: picture.relative_to(path) for picture in pictures}
+            images = sorted(p for p in filter(is_image_name, path.rglob("*")) if p.is_file())
+            places = {image: image.relative_to(path) for image in images}
             places = {p: place for p, place in places.items() if not is_hidden(place)}
             if not places:
-                names = ", ".join(sorted(PICTURE_SUFFIXES))
+                names = ", ".join(sorted(IMAGE_SUFFIXES))
                 raise ImageError(f"{path}: contains no images ({names})")
         elif path.exists():
             places = {path: Path(path.name)}
@@ -62,9 +62,9 @@ def find_images(paths: Sequence[Path]) -> dict[Path, Path]:
     return found
 
 
-def plan_pictures(
+def plan_images(
     sources: Mapping[Path, Path], out: Path | None, stages: Path | None, *, overwrite: bool
-) -> list[PictureJob]:
+) -> list[ImageJob]:
     """Choose the outputs of each image, and check them before any work.
 
     Parameters
@@ -83,22 +83,22 @@ def plan_pictures(
         An output already exists (without `overwrite`), is an input, or belongs to two sources.
     """
     several = len(sources) > 1
-    is_file = out is not None and not several and out.suffix.lower() in PICTURE_SUFFIXES
+    is_file = out is not None and not several and out.suffix.lower() in IMAGE_SUFFIXES
 
     def wanted(place: Path) -> Iterator[Output]:
         if out is not None:
-            yield Output("picture", out if is_file else out / place)
+            yield Output("image", out if is_file else out / place)
         if stages is not None:
             yield Output("stages", stages / place.with_suffix("") if several else stages)
 
-    jobs = [PictureJob(source, tuple(wanted(place)), place) for source, place in sources.items()]
+    jobs = [ImageJob(source, tuple(wanted(place)), place) for source, place in sources.items()]
     outputs = [output for job in jobs for output in job.outputs]
     check_sinks(outputs, overwrite=overwrite, makes_folder=not is_file)
     return jobs
 
 
 @dataclass(frozen=True, slots=True)
-class PictureSearch:
+class ImageSearch:
     """Searches single images, with one detector and settings."""
 
     model: DetectorModel
@@ -122,22 +122,20 @@ class PictureSearch:
     ) -> Iterator[Sinks]:
         """Yield the sinks of some outputs, which appear together after the block."""
 
-        def stage_pictures(image: Image, detections: Boxes) -> dict[str, Image]:
+        def stage_images(image: Image, detections: Boxes) -> dict[str, Image]:
             detector = self.model.for_video(image.shape[1], image.shape[0], [image])
-            return stage_pictures_of(detector)(image, detections)
+            return stage_images_of(detector)(image, detections)
 
         with OutputFiles(overwrite=overwrite) as files:
-            context = SinkContext(
-                files, self.settings, places=places, stage_pictures=stage_pictures
-            )
+            context = SinkContext(files, self.settings, places=places, stage_images=stage_images)
             with open_sinks(outputs, context) as sinks:
                 yield sinks
 
 
-def run_pictures(
-    jobs: Sequence[PictureJob],
+def run_images(
+    jobs: Sequence[ImageJob],
     shared: Sequence[Output],
-    search: PictureSearch,
+    search: ImageSearch,
     *,
     overwrite: bool = False,
     threads: int = 1,
@@ -154,7 +152,7 @@ def run_pictures(
         An output cannot be written.
     """
 
-    def find(job: PictureJob) -> FrameResult | ImageError:
+    def find(job: ImageJob) -> FrameResult | ImageError:
         try:
             return search.detect(job.source, read_image(job.source))
         except ImageError as error:

@@ -11,7 +11,7 @@ from red_cars import CAR, SETTINGS, road
 from run.conftest import Register
 from run.red_runs import model_for
 from vdet.errors import ImageError, OutputError
-from vdet.run.pictures import PictureJob, PictureSearch, find_images, plan_pictures, run_pictures
+from vdet.run.images import ImageJob, ImageSearch, find_images, plan_images, run_images
 from vdet.run.result import FrameResult
 from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import SinkContext, SinkKind
@@ -55,19 +55,19 @@ def placed(folder: Path, *names: str) -> dict[Path, Path]:
 class TestPlan:
     def test_one_picture_goes_to_the_file_named(self, tmp_path: Path) -> None:
         source, out = tmp_path / "a.png", tmp_path / "found.jpg"
-        expected = PictureJob(source, (Output("picture", out),), Path("a.png"))
-        assert plan_pictures(placed(tmp_path, "a.png"), out, None, overwrite=False) == [expected]
+        expected = ImageJob(source, (Output("image", out),), Path("a.png"))
+        assert plan_images(placed(tmp_path, "a.png"), out, None, overwrite=False) == [expected]
 
     def test_several_keep_their_names_in_the_folder(self, tmp_path: Path) -> None:
         sources = placed(tmp_path, "a.png", "north/a.png")
-        jobs = plan_pictures(sources, tmp_path / "out", None, overwrite=False)
+        jobs = plan_images(sources, tmp_path / "out", None, overwrite=False)
         assert [job.outputs for job in jobs] == [
-            (Output("picture", tmp_path / "out" / place),) for place in sources.values()
+            (Output("image", tmp_path / "out" / place),) for place in sources.values()
         ]
 
     def test_stages_of_several_go_into_a_folder_each(self, tmp_path: Path) -> None:
         sources = placed(tmp_path, "a.png", "b.png")
-        jobs = plan_pictures(sources, None, tmp_path / "stages", overwrite=False)
+        jobs = plan_images(sources, None, tmp_path / "stages", overwrite=False)
         assert [job.outputs for job in jobs] == [
             (Output("stages", tmp_path / "stages" / name),) for name in "ab"
         ]
@@ -76,21 +76,21 @@ class TestPlan:
         sources = placed(tmp_path, "a.png", "b.png")
         touch(tmp_path / "out" / "b.png")
         with pytest.raises(OutputError, match=r"b\.png: already exists"):
-            plan_pictures(sources, tmp_path / "out", None, overwrite=False)
-        assert len(plan_pictures(sources, tmp_path / "out", None, overwrite=True)) == 2
+            plan_images(sources, tmp_path / "out", None, overwrite=False)
+        assert len(plan_images(sources, tmp_path / "out", None, overwrite=True)) == 2
 
     def test_a_file_where_the_folder_should_be_is_refused(self, tmp_path: Path) -> None:
         touch(tmp_path / "out")
         sources = placed(tmp_path, "a.png", "b.png")
         with pytest.raises(OutputError, match=r"the folder .*out is not a folder"):
-            plan_pictures(sources, tmp_path / "out", None, overwrite=True)
+            plan_images(sources, tmp_path / "out", None, overwrite=True)
 
 
 def test_a_picture_that_is_too_small_is_named(tmp_path: Path) -> None:
     source, out = tmp_path / "tiny.png", tmp_path / "out.png"
     write_image(source, road(CAR)[:, :20])
-    job = PictureJob(source, (Output("picture", out),))
-    (found,) = run_pictures([job], (), PictureSearch(model_for(SETTINGS), SETTINGS))
+    job = ImageJob(source, (Output("image", out),))
+    (found,) = run_images([job], (), ImageSearch(model_for(SETTINGS), SETTINGS))
     assert isinstance(found, ImageError)
     assert "tiny.png: no search window fits" in str(found)
     assert not out.exists()
@@ -115,13 +115,13 @@ class Fails:
 
 class TestSeveral:
     @pytest.fixture
-    def jobs(self, tmp_path: Path) -> list[PictureJob]:
+    def jobs(self, tmp_path: Path) -> list[ImageJob]:
         """Two pictures of a car, and between them a file that is not a picture."""
         jobs = []
         for name in ("a.png", "b.png", "c.png"):
             source = tmp_path / name
             write_image(source, road(CAR))
-            jobs.append(PictureJob(source, (Output("picture", tmp_path / f"out-{name}"),)))
+            jobs.append(ImageJob(source, (Output("image", tmp_path / f"out-{name}"),)))
         (tmp_path / "b.png").write_text("no picture")
         return jobs
 
@@ -130,11 +130,11 @@ class TestSeveral:
 
     @pytest.mark.parametrize("threads", [1, 3])
     def test_a_picture_that_cannot_be_read_does_not_stop_the_others(
-        self, jobs: list[PictureJob], tmp_path: Path, threads: int
+        self, jobs: list[ImageJob], tmp_path: Path, threads: int
     ) -> None:
         shared = [Output("json", tmp_path / "boxes.json")]
-        search = PictureSearch(model_for(SETTINGS), SETTINGS)
-        first, failure, last = run_pictures(jobs, shared, search, threads=threads)
+        search = ImageSearch(model_for(SETTINGS), SETTINGS)
+        first, failure, last = run_images(jobs, shared, search, threads=threads)
         assert isinstance(first, FrameResult)
         assert isinstance(last, FrameResult)
         assert "b.png: is not an image" in str(failure)
@@ -144,16 +144,16 @@ class TestSeveral:
         assert [len(item["boxes"]) for item in items] == [1, 1]
 
     def test_a_shared_output_that_fails_at_the_end_leaves_those_of_the_pictures(
-        self, jobs: list[PictureJob], tmp_path: Path, register: Register
+        self, jobs: list[ImageJob], tmp_path: Path, register: Register
     ) -> None:
         register("fails", SinkKind(Fails))
         shared = [Output("json", tmp_path / "boxes.json"), Output("fails", tmp_path / "fails.txt")]
         with pytest.raises(OutputError, match=r"fails\.txt: cannot be written: No space"):
-            list(run_pictures(jobs, shared, PictureSearch(model_for(SETTINGS), SETTINGS)))
+            list(run_images(jobs, shared, ImageSearch(model_for(SETTINGS), SETTINGS)))
         assert self.names(tmp_path) == ["out-a.png", "out-c.png"]
 
     def test_the_outputs_of_one_picture_appear_together_or_not_at_all(
-        self, jobs: list[PictureJob], tmp_path: Path, register: Register
+        self, jobs: list[ImageJob], tmp_path: Path, register: Register
     ) -> None:
         register("fails", SinkKind(Fails))
         (first, *_) = jobs
@@ -161,5 +161,5 @@ class TestSeveral:
         for outputs in ((*first.outputs, fails), (fails, *first.outputs)):
             job = replace(first, outputs=outputs)
             with pytest.raises(OutputError, match=r"fails\.txt: cannot be written: No space"):
-                list(run_pictures([job], (), PictureSearch(model_for(SETTINGS), SETTINGS)))
+                list(run_images([job], (), ImageSearch(model_for(SETTINGS), SETTINGS)))
             assert self.names(tmp_path) == []

@@ -14,7 +14,7 @@ from quick import only_windows
 from vdet.errors import ImageError
 from vdet.media.images import read_image
 
-PICTURE = cv2.resize(np.random.default_rng(0).integers(0, 256, (6, 8, 3), dtype=np.uint8), (64, 48))
+IMAGE = cv2.resize(np.random.default_rng(0).integers(0, 256, (6, 8, 3), dtype=np.uint8), (64, 48))
 FORMATS: dict[str, tuple[str, list[int]]] = {
     "8-bit.png": (".png", []),
     "16-bit.png": (".png", []),
@@ -43,14 +43,14 @@ def black(width: int, height: int) -> bytes:
 
 def png_of(width: int, height: int) -> bytes:
     """Return a small PNG whose header, with the right checksum, claims another size."""
-    png = encoded(".png", PICTURE)
+    png = encoded(".png", IMAGE)
     header = b"IHDR" + struct.pack(">II", width, height) + png[24:29]
     return png[:12] + header + struct.pack(">I", zlib.crc32(header)) + png[33:]
 
 
 def with_size(suffix: str, old: bytes, new: bytes) -> bytes:
     """Return a small picture whose header claims another size."""
-    data = encoded(suffix, PICTURE)
+    data = encoded(suffix, IMAGE)
     assert data.count(old) == 1
     return data.replace(old, new)
 
@@ -68,7 +68,7 @@ BOMBS = {
 def test_damaged_pictures_are_read_or_refused(tmp_path: Path) -> None:
     contents = dict(BOMBS)
     for seed, (name, (suffix, options)) in enumerate(FORMATS.items()):
-        picture = PICTURE.astype(np.uint16) * 257 if name == "16-bit.png" else PICTURE
+        picture = IMAGE.astype(np.uint16) * 257 if name == "16-bit.png" else IMAGE
         whole = encoded(suffix, picture, options)
         damaged = mutated(whole, seed=seed, count=MUTATIONS)
         contents |= {f"{number}-{name}": data for number, data in enumerate(damaged)}
