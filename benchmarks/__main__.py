@@ -114,7 +114,7 @@ def _start_rows(times: Times) -> list[Measurement]:
     row, busy_row = _row_of(times), _row_of({name: (busy, 0) for name, (_, busy) in times.items()})
     return [
         row(f"vdet --help / python -c '{IMPORTS}'", "help", "imports", "≤ 0.8", "0.5"),
-        row("detect-image, one picture / the same", "picture", "imports", "≤ 2.5", "2.0"),
+        row("detect-image, one image / the same", "picture", "imports", "≤ 2.5", "2.0"),
         busy_row(
             "one second of video / PyAV alone, processor time",
             "second", "plain second", "≤ 2.0", "1.5",

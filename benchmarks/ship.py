@@ -30,7 +30,7 @@ def from_checkpoint(path: Path, output: Path) -> None:
     settings = dict(state["settings"])
     network = Network(len(settings["classes"]))
     network.load_state_dict(state["averaged"])
-    sources = [{"name": name, "pictures": count} for name, count in settings.pop("sources")]
+    sources = [{"name": name, "images": count} for name, count in settings.pop("sources")]
     base = settings.pop("base", "None")
     provenance: dict[str, Any] = {
         "training": settings,

@@ -284,7 +284,7 @@ def detect_image(
 ) -> Boxes:
     """Find the vehicles in an image file, and write the requested outputs.
 
-    `image` is the output with a box around each vehicle; other parameters as for `detect_video`.
+    `image` is the output, with a box around each vehicle; other parameters as for `detect_video`.
     """
     settings, loaded, _ = _resolved(settings, detector, None)
     job = ImageJob(Path(source), _outputs({"image": image or (), **(outputs or {})}))

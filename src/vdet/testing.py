@@ -125,7 +125,7 @@ def check_sink(
 
 
 def _write(kind: SinkKind, path: Path, settings: Settings, *, still: bool, fails: bool) -> None:
-    """Write a picture or three frames through the sink; the run may end with an error."""
+    """Write an image or three frames through the sink; the run may end with an error."""
     rate, traffic = Fraction(RATE), LiveTraffic(settings, WIDTH, HEIGHT)
     info = None if still else VideoInfo(Path("check.mp4"), WIDTH, HEIGHT, rate, 1 / rate, frames=3)
     with OutputFiles() as files:

@@ -41,7 +41,7 @@ def demo(folder: Path, seed: int, overwrite: bool) -> None:
         "counted.mp4": "the road from the pole, with lines and counts",
         "page/page.html": f"its page; {folder / 'flows.csv'} has the flows",
         "stages": "every stage of the linear model in one frame",
-        MODEL: "the linear model; vdet info --json prints its metrics",
+        MODEL: "the linear model; vdet info FILE --json - prints its metrics",
     }
     paths = {str(folder / name): text for name, text in files.items()}
     width = max(map(len, paths))

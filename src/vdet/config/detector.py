@@ -42,7 +42,7 @@ class DetectorSettings(Section):
         return 0.0
 
     def showing_all(self) -> Self:
-        """Return settings with which a still picture shows detections of every score."""
+        """Return settings with which a single image shows detections of every score."""
         return self.model_copy(update={"min_score_still": 0.0})
 
 

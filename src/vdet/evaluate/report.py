@@ -169,7 +169,7 @@ _OF_CLASSES = "vehicles", "found", "right", "precision", "recall", "f1", "confus
 
 _HEADINGS = {
     "f1": "F1", "ap50": "AP50", "mean_iou": "IoU", "false_positives": "false alarms",
-    "images": "images", "best_f1": "best F1", "best_score": "at score", "misses": "missed",
+    "best_f1": "best F1", "best_score": "at score", "misses": "missed",
     "mota": "MOTA", "idf1": "IDF1", "hota": "HOTA", "id_switches": "switches",
     "false_tracks": "false tracks", "mean_delay": "delay", "right": "right class",
     "confused": "confused with",

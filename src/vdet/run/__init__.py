@@ -1,1 +1,1 @@
-"""From frames to outputs: the loop over the frames of a video, and still pictures."""
+"""From frames to outputs: the loop over the frames of a video, and single images."""

@@ -12,7 +12,7 @@ from vdet.detect.classes import UNKNOWN
 
 _USUAL, _USUAL_NEEDS = "car", 0.6
 """The class that detectors take for small or unclear vehicles of every kind, and the fraction of
-all votes that it needs. On pictures that it has not seen, the shipped network is sure of cars to
+all votes that it needs. On images that it has not seen, the shipped network is sure of cars to
 0.93, but takes trucks and buses for cars to a third or a half.
 """
 
