@@ -99,9 +99,11 @@ def _csv_lines(frame: FrameTracks) -> Iterator[str]:
     rows, clock = io.StringIO(), frame.facts.get(CLOCK)
     writer = csv.writer(rows, lineterminator="\n")
     for track in frame.tracks:
-        *place, _, state, name, foot, distance, lane = track_record(track).values()
-        known = f"{track.score:.4f}", state, name, *foot, distance, lane, clock
-        writer.writerow((frame.index, f"{frame.time:.6f}", *place, *known))
+        known = track_record(track)
+        place, score = track.box.xywh, f"{track.score:.4f}"
+        cells = (frame.index, f"{frame.time:.6f}", track.id, *place, score, track.state)
+        others = (track.class_name, *known["foot"], known["distance"], known["lane"])
+        writer.writerow((*cells, *others, clock))
     yield rows.getvalue()
 
 

@@ -256,8 +256,10 @@ class ClipSink(BaseSink):
 
     def _chosen(self) -> Sequence[VehicleRecord]:
         counts, records = self.traffic.counts(), self.traffic.vehicles
-        counted = {event.id for event in counts.events} if counts else ()
-        return [record for record in records if counts is None or record.id in counted]
+        if counts is None:
+            return records
+        counted = {event.id for event in counts.events}
+        return [record for record in records if record.id in counted]
 
     def _name(self, scene: Scene) -> str:
         (first, *others), when = scene.vehicles, self.traffic.clock
