@@ -100,6 +100,8 @@ class NetworkTrainingSettings(Section):
     """Width and height of the images, multiples of 64 and 32."""
     learning_rate: float = Field(1e-3, gt=0, le=1)
     """Highest learning rate of AdamW."""
+    channels: float = Field(1.0, ge=0.25, le=4)
+    """Factor of the channels of all layers; 2 has about four times the parameters."""
     classes: tuple[str, ...] = Field(
         ("car", "truck", "bus", "motorcycle", "bicycle", "person"), min_length=1, max_length=100
     )

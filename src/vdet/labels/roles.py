@@ -56,7 +56,7 @@ class Roles:
             is_found = words.get(_key(word)) == "vehicle"
             words[_key(word)] = "ignored" if is_found and role == "other" else role
         words.update(dict.fromkeys(_REGION_LETTERS, "ignored"))
-        return cls(words, {_key(name): name for name in classes})
+        return cls(words, {letters(name): name for name in classes})
 
     @classmethod
     def from_settings(cls, settings: Settings) -> Self:
@@ -84,7 +84,7 @@ class Roles:
 
     def class_of(self, label: str) -> str | None:
         """Return the class of a label; None if it has none."""
-        return our_name(label) or self.classes.get(letters(label))
+        return self.classes.get(letters(label)) or our_name(label)
 
     @property
     def known(self) -> str:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from vdet.boxes import Float32Array, Float64Array, Image, area, coverage, iou_matrix
 from vdet.config.schema import NetworkTrainingSettings
 from vdet.detect.onnx.preparation import GREY
+from vdet.learn.net.signs import draw_sign
 from vdet.learn.net.sources import NetSample, NetSource, join
 from vdet.learn.net.weather import blended, with_weather
 
@@ -32,7 +33,9 @@ _RARE = 0.5  # a class with fewer objects than this fraction of the mean is rare
 _MARGIN = 0.2  # surroundings of a pasted object on each side, fraction of the box
 _MIN_DONOR = 24.0  # longer side of an object to paste, pixels
 _PASTED_SIDES = 16.0, 0.4  # of the longer side: minimum in pixels, maximum of the image's height
-_MAX_COVERED = 0.2  # of another object by a pasted one
+_MAX_COVERED = 0.2  # of another object by a pasted one or a sign
+_SIGNS = 0.3  # fraction of images that get signs
+_MAX_SIGNS = 3  # signs in an image
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +82,7 @@ class SampleDrawer:
             sample = _place(rng, self._pick(rng), (drawing.width, drawing.height), scale)
         if rng.random() < 0.5:
             sample = _mirrored(sample)
-        sample = self._paster.paste(rng, sample)
+        sample = _with_signs(rng, self._paster.paste(rng, sample))
         sides = sample.boxes[:, 2:] - sample.boxes[:, :2]
         may_have_lamps = ~sample.ignored & (sides[:, 0] > 0.45 * sides[:, 1])  # people have none
         image = _recolored(rng, sample.image)
@@ -113,7 +116,8 @@ def repeat_factors(
 ) -> Float64Array:
     """Return how many times more often each image is drawn for the rarest class in it.
 
-    A class in a fraction f of the images, fewer than `threshold`, gives √(threshold / f).
+    A class in a fraction f of the images, fewer than `threshold`, gives √(threshold / f); images
+    without any object count as a class.
     Source: Gupta et al., "LVIS", 2019 (repeat factor sampling).
 
     Parameters
@@ -122,7 +126,8 @@ def repeat_factors(
         Float64 `(n,)`: the probability of each image before; the sum is 1.
     """
     count = 1 + max(int(sample.classes.max(initial=0)) for sample in samples)
-    has = [np.isin(np.arange(count), sample.classes[~sample.ignored]) for sample in samples]
+    learnt = [sample.classes[~sample.ignored] for sample in samples]
+    has = [np.append(np.isin(np.arange(count), classes), len(classes) == 0) for classes in learnt]
     fractions = np.maximum(shares @ np.array(has), 1e-9)
     factors = np.where(has, np.sqrt(threshold / fractions), 1.0)
     return np.asarray(factors.max(axis=1).clip(1.0), np.float64)
@@ -197,6 +202,18 @@ def _paste(rng: np.random.Generator, sample: NetSample, donor: NetSample, row: i
         classes=np.append(sample.classes, donor.classes[row]),
         ignored=np.append(sample.ignored, False),
     )
+
+
+def _with_signs(rng: np.random.Generator, sample: NetSample) -> NetSample:
+    """Sometimes draw signs into the image of a sample; they cover no object."""
+    if rng.random() >= _SIGNS:
+        return sample
+    objects = sample.boxes[~sample.ignored].astype(np.float64)
+    for _ in range(int(rng.integers(1, _MAX_SIGNS + 1))):
+        image, box = draw_sign(rng, sample.image)
+        if coverage(objects, box).max(initial=0) <= _MAX_COVERED:
+            sample = replace(sample, image=image)
+    return sample
 
 
 def _feather(count: int, near: float, far: float) -> Float64Array:

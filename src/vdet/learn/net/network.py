@@ -5,6 +5,7 @@ and bottom-up after PANet (Liu et al., 2018), boxes as distances from the middle
 FCOS (Tian et al., 2019). All widths are multiples of 16, which onnxruntime computes fastest.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -18,10 +19,10 @@ from vdet.learn.net.sources import UNKNOWN, NetSource
 
 STEM = 16
 TRUNK = ((32, 0), (64, 2), (160, 3), (256, 2))
-"""Width of each stage, and the number of blocks behind its first one, which halves the size."""
+"""Channels of each stage, and the number of blocks behind its first one, which halves the size."""
 
 NECK = 80
-"""Width of the joined levels and of the heads."""
+"""Channels of the joined levels and of the heads."""
 
 _FIRST_SCORE = 0.01
 """Score of every cell before training, so that the many empty cells do not dominate the loss."""
@@ -45,6 +46,11 @@ class Block(nn.Module):
         return functional.relu(out + values if self.is_residual else out)
 
 
+def multiplied(channels: int, factor: float) -> int:
+    """Return the number of channels times a factor, as a multiple of 16."""
+    return max(16, 16 * math.floor(channels * factor / 16 + 0.5))
+
+
 class Network(nn.Module):
     """From images to a score, four distances and the classes of every cell.
 
@@ -52,28 +58,31 @@ class Network(nn.Module):
     ----------
     classes
         Number of classes of vehicles.
+    channels
+        Factor of the channels of all layers, which are rounded to multiples of 16.
     """
 
-    def __init__(self, classes: int) -> None:
+    def __init__(self, classes: int, channels: float = 1.0) -> None:
         super().__init__()
         self.columns = 5 + classes
-        self.stem = nn.Conv2d(3, STEM, 3, 2, 1, bias=False)
-        self.stem_norm = nn.BatchNorm2d(STEM)
-        widths = [STEM, *(width for width, _ in TRUNK)]
+        stem, neck = multiplied(STEM, channels), multiplied(NECK, channels)
+        self.stem = nn.Conv2d(3, stem, 3, 2, 1, bias=False)
+        self.stem_norm = nn.BatchNorm2d(stem)
+        widths = [stem, *(multiplied(width, channels) for width, _ in TRUNK)]
         self.stages = nn.ModuleList(
             nn.Sequential(Block(before, width, 2), *(Block(width, width) for _ in range(more)))
-            for before, (width, more) in zip(widths, TRUNK, strict=False)
+            for before, width, (_, more) in zip(widths, widths[1:], TRUNK, strict=False)
         )
         self.lateral = nn.ModuleList(
-            nn.Sequential(nn.Conv2d(width, NECK, 1, bias=False), nn.BatchNorm2d(NECK), nn.ReLU())
+            nn.Sequential(nn.Conv2d(width, neck, 1, bias=False), nn.BatchNorm2d(neck), nn.ReLU())
             for width in widths[-3:]
         )
-        self.down = nn.ModuleList(Block(NECK, NECK) for _ in STRIDES[:-1])
-        self.up = nn.ModuleList(Block(NECK, NECK, 2) for _ in STRIDES[:-1])
+        self.down = nn.ModuleList(Block(neck, neck) for _ in STRIDES[:-1])
+        self.up = nn.ModuleList(Block(neck, neck, 2) for _ in STRIDES[:-1])
         self.towers = nn.ModuleList(
-            nn.Sequential(Block(NECK, NECK), Block(NECK, NECK)) for _ in STRIDES
+            nn.Sequential(Block(neck, neck), Block(neck, neck)) for _ in STRIDES
         )
-        heads = [nn.Conv2d(NECK, self.columns, 1) for _ in STRIDES]
+        heads = [nn.Conv2d(neck, self.columns, 1) for _ in STRIDES]
         first = torch.zeros(self.columns)
         first[0] = torch.logit(torch.tensor(_FIRST_SCORE))
         for head in heads:

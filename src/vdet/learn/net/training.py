@@ -212,7 +212,8 @@ class _Training:
         self._settings = settings
         self._learnt_with = learnt_with
         self._class_weights = class_weights(sources, len(settings.classes))
-        self._network = Network(len(settings.classes)).to(memory_format=torch.channels_last).train()
+        network = Network(len(settings.classes), settings.channels)
+        self._network = network.to(memory_format=torch.channels_last).train()
         self.averaged = copy.deepcopy(self._network)
         weights = [parameter for parameter in self._network.parameters() if parameter.ndim > 1]
         others = [parameter for parameter in self._network.parameters() if parameter.ndim <= 1]
