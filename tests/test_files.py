@@ -2,7 +2,6 @@
 
 import itertools
 import os
-import re
 import resource
 import subprocess
 import sys
@@ -152,7 +151,7 @@ class TestOutputFiles:
             for name in before:
                 (folder / name).write_text("old")
             files = OutputFiles(overwrite=True)
-            into = files.stage_folder(folder, TEXTS)
+            into = files.stage_folder(folder, is_text)
             for name in after:
                 (into / name).write_text("new")
             with monkeypatch.context() as patch, suppress(KeyboardInterrupt), files:
@@ -207,7 +206,7 @@ def test_what_was_read_in_a_run_is_kept(tmp_path: Path) -> None:
             with pytest.raises(OutputError, match=rf"{name}: is the input itself"), files:
                 pass
         with OutputFiles(overwrite=True) as files:
-            files.stage_folder(tmp_path, TEXTS)
+            files.stage_folder(tmp_path, is_text)
         assert names(tmp_path) == ["a.txt", "b.txt", "of-an-earlier-run.txt"]
         assert {path.read_text() for path in tmp_path.iterdir()} == {"precious"}
     with staged(tmp_path / "a.txt", overwrite=True) as temporary:
@@ -288,7 +287,8 @@ def test_a_name_is_shown_on_one_line_without_control_characters(name: str) -> No
     assert shown == name or not name.isprintable() or name.startswith(shown[:-1])
 
 
-TEXTS = re.compile(r"[a-z0-9-]+\.txt")
+def is_text(path: Path) -> bool:
+    return path.suffix == ".txt"
 
 
 class TestFolder:
@@ -299,7 +299,7 @@ class TestFolder:
         resource.setrlimit(resource.RLIMIT_NOFILE, (200, hard))
         try:
             with OutputFiles() as files:
-                folder = files.stage_folder(tmp_path, TEXTS)
+                folder = files.stage_folder(tmp_path, is_text)
                 for number in range(300):
                     (folder / f"{number}.txt").touch()
         finally:
@@ -309,17 +309,20 @@ class TestFolder:
     def test_what_is_there_is_kept_unless_it_is_overwritten(self, tmp_path: Path) -> None:
         for name in ("a.txt", "of-an-earlier-run.txt", "mine.png"):
             (tmp_path / name).write_text("old")
+        (tmp_path / "folder.txt").mkdir()
+        (tmp_path / "link.txt").symlink_to("mine.png")
 
         def write(overwrite: bool) -> None:
             with OutputFiles(overwrite=overwrite) as files:
-                (files.stage_folder(tmp_path, TEXTS) / "a.txt").write_text("new")
+                (files.stage_folder(tmp_path, is_text) / "a.txt").write_text("new")
 
         with pytest.raises(OutputError, match=r"a\.txt: appeared during the run"):
             write(overwrite=False)
-        assert names(tmp_path) == ["a.txt", "mine.png", "of-an-earlier-run.txt"]
+        kept = ["a.txt", "folder.txt", "link.txt", "mine.png"]
+        assert names(tmp_path) == [*kept, "of-an-earlier-run.txt"]
         assert (tmp_path / "a.txt").read_text() == "old"
         write(overwrite=True)
-        assert names(tmp_path) == ["a.txt", "mine.png"]
+        assert names(tmp_path) == kept
         assert (tmp_path / "a.txt").read_text() == "new"
 
     @pytest.mark.parametrize("is_old", [True, False])

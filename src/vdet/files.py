@@ -14,7 +14,7 @@ import re
 import shutil
 import stat
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextvars import ContextVar
 from pathlib import Path
 from typing import Any, Self
@@ -141,7 +141,7 @@ class OutputFiles:
     def __init__(self, *, overwrite: bool = False) -> None:
         self._overwrite = overwrite
         self._folders: dict[Path, Path] = {}  # temporary folders by destination
-        self._names: dict[Path, re.Pattern[str]] = {}
+        self._is_earlier: dict[Path, Callable[[Path], bool]] = {}
         self._new_folders: list[Path] = []  # outermost first
         self._cleanup = contextlib.ExitStack()
 
@@ -156,17 +156,18 @@ class OutputFiles:
             temporary.touch()
         return temporary
 
-    def stage_folder(self, path: Path, names: re.Pattern[str] | None = None) -> Path:
+    def stage_folder(self, path: Path, is_earlier: Callable[[Path], bool] | None = None) -> Path:
         """Return a temporary folder whose files will be moved to the folder `path`.
 
         Parameters
         ----------
-        names
-            With `overwrite`, files of an earlier run are removed at the end: files in `path` with
-            such names that this run did not write. None: keep all.
+        is_earlier
+            Whether an earlier run wrote a file. With `overwrite`, the regular files in `path` for
+            which it is true, and which this run did not write, are removed at the end. None: keep
+            all.
         """
-        if names:
-            self._names[path] = names
+        if is_earlier:
+            self._is_earlier[path] = is_earlier
         with output_errors(path):
             return self._temporary_folder(path)
 
@@ -219,9 +220,10 @@ class OutputFiles:
                             file.chmod(stat.S_IMODE(path.stat().st_mode))
                         self._set_aside(path, undo)
                     _add_name(path, file, undo)
-            for folder, names in self._names.items() if self._overwrite else ():
+            for folder, is_earlier in self._is_earlier.items() if self._overwrite else ():
                 for old in list(folder.iterdir()):
-                    if names.fullmatch(old.name) and old not in files and not is_input(old):
+                    is_removable = old not in files and old.is_file() and not old.is_symlink()
+                    if is_removable and not is_input(old) and is_earlier(old):
                         with contextlib.suppress(OSError):
                             self._set_aside(old, undo)
             undo.pop_all()

@@ -14,7 +14,7 @@ from vdet.errors import OutputError
 from vdet.media.demux import ClockUnwrapper, is_pipe, open_input, packets, video_stream
 from vdet.media.images import is_image_name
 from vdet.media.reader import VideoReader
-from vdet.media.writer import VIDEO_SUFFIXES, VideoWriter
+from vdet.media.writer import MARK, VIDEO_SUFFIXES, VideoWriter
 
 _SOUND_LAG = 1  # seconds of video after the end in which sound of the part may still follow
 
@@ -50,6 +50,7 @@ def copy_part(source: Path, start: Fraction, end: Fraction, target: Path) -> Non
         The container of `target` cannot hold a stream of the source.
     """
     with open_input(source) as container, av.open(str(target.absolute()), "w") as written:
+        written.metadata["comment"] = MARK
         pictures = video_stream(container, source)
         streams: list[Stream] = [pictures, *container.streams.audio]
         try:

@@ -112,27 +112,41 @@ _X264 = "b-adapt=0:scenecut=0:b-pyramid=none"
 tenth of a run and save 1 % of the file size; and no B-frames as references, for fewer frames in
 memory: files are 2 % larger.
 """
-_MARK = "made by vdet"
+MARK = f"made by vdet {__version__}"
+"""Comment in the metadata of every video that vdet writes."""
+_MARKED = "made by vdet"
 _MP4 = (b"ftyp", b"styp", b"moov", b"moof", b"mdat", b"free", b"skip", b"wide")  # first boxes
 _FINEST = 10_000_000  # ticks a second; more is not safe in mp4 players
+
+
+def is_marked(path: Path) -> bool:
+    """Return whether a file is a video that vdet wrote: see `MARK`."""
+    try:
+        return _comment(path).startswith(_MARKED)
+    except av.FFmpegError:
+        return False
 
 
 def may_replace_video(path: Path) -> bool:
     """Return whether a video may replace this file: vdet wrote it, or it is not a video.
 
-    `VideoWriter` marks its files in the metadata comment. An unreadable file that begins like an
-    MP4 file is kept: it may be a truncated recording that can be repaired.
+    An unreadable file that begins like an MP4 file is kept: it may be a truncated recording that
+    can be repaired.
     """
     if not path.is_file():
         return path.is_symlink()  # its target does not exist
     try:
-        with av.open(str(path.absolute()), options=SAFELY, metadata_errors="replace") as container:
-            tags = {key.lower(): value for key, value in container.metadata.items()}
+        return _comment(path).startswith(_MARKED)
     except av.FFmpegError:
         with contextlib.suppress(OSError), path.open("rb") as file:
             return file.read(8)[4:] not in _MP4
         return False
-    return tags.get("comment", "").startswith(_MARK)
+
+
+def _comment(path: Path) -> str:
+    """Return the comment in the metadata of a video. Raises `av.FFmpegError` if it is none."""
+    with av.open(str(path.absolute()), options=SAFELY, metadata_errors="replace") as container:
+        return {key.lower(): text for key, text in container.metadata.items()}.get("comment", "")
 
 
 class VideoWriter:
@@ -197,7 +211,7 @@ class VideoWriter:
         with self._naming_the_file():
             self._container = av.open(str(path.absolute()), mode="w", container_options=flags)
         tags = {name: value for name, value in asdict(info.tags).items() if value}
-        self._container.metadata.update(tags, comment=f"{_MARK} {__version__}")
+        self._container.metadata.update(tags, comment=MARK)
         self._stream = self._add_picture(settings, threads)
 
     def write(self, frame: Frame) -> None:

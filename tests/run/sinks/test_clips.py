@@ -1,8 +1,11 @@
 """The sink `clips`: which parts of a video it cuts out, and how."""
 
+import os
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
+from shutil import copy
 
 import av
 import pytest
@@ -12,6 +15,7 @@ from red_cars import CAR, SETTINGS
 from run.red_runs import read, result_of, write
 from running import names
 from vdet.config.schema import ClipSettings
+from vdet.errors import OutputError
 from vdet.media.reader import VideoReader
 from vdet.run.result import FrameResult
 from vdet.run.sinks import Output
@@ -42,15 +46,21 @@ def results() -> list[FrameResult]:
     return found
 
 
-def cut(source: Path, folder: Path, *, exact: bool = False) -> dict[str, list[int]]:
+def cut(
+    source: Path,
+    folder: Path,
+    *,
+    exact: bool = False,
+    shown: Iterable[FrameResult] | None = None,
+) -> dict[str, list[int]]:
     """Return the numbers of the frames of each clip, by its name."""
     settings = SETTINGS.model_copy(update={"clips": ClipSettings(margin=0.2, exact=exact)})
     with VideoReader(source) as reader:
         video = replace(reader.info)
-    write(Output("clips", folder), results(), settings=settings, video=video)
-    return {
-        name: [read_number(frame.image) for frame in read(folder / name)] for name in names(folder)
-    }
+    frames = results() if shown is None else shown
+    write(Output("clips", folder), frames, settings=settings, video=video)
+    clips = [path for path in sorted(folder.iterdir()) if path.is_file()]
+    return {path.name: [read_number(frame.image) for frame in read(path)] for path in clips}
 
 
 def test_a_clip_is_copied_from_key_frame_to_key_frame_for_each_time_with_vehicles(
@@ -79,3 +89,41 @@ def test_where_the_clock_may_restart_clips_are_exact(tmp_path: Path) -> None:
     stream = joined(tmp_path / "in.ts", part, part)
     (tmp_path / "clips").mkdir()
     assert [len(found) for found in cut(stream, tmp_path / "clips").values()] == [16, 11]
+
+
+@pytest.mark.parametrize("exact", [False, True])
+def test_overwriting_removes_earlier_clips_of_vdet_and_nothing_else(
+    source: Path, tmp_path: Path, exact: bool
+) -> None:
+    theirs = ["clip-2024-birthday-3.mp4", "clip-00-00-07-car-9.mp4"]
+    for name in theirs:
+        write_clip(tmp_path / name, count=2)
+    (tmp_path / "clip-5-folder-9.mkv").mkdir()
+    (tmp_path / "clip-00-00-08-car-9.mkv").mkdir()
+    before = names(tmp_path)
+    cut(source, tmp_path, exact=exact)
+    assert len(names(tmp_path)) == len(before) + 2
+    cut(source, tmp_path, shown=[])
+    assert names(tmp_path) == before
+
+
+def test_no_clip_is_cut_out_of_another_file_of_the_same_name(
+    source: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    video, folder = tmp_path / "in.mp4", tmp_path / "clips"
+    copy(source, video)
+
+    def shown() -> Iterator[FrameResult]:
+        yield from results()
+        write_clip(tmp_path / "new.mp4", count=COUNT).replace(video)  # as a ring buffer does
+
+    assert cut(video, folder, shown=shown()) == {}
+    assert "in.mp4: changed during the run, so no clips were cut out of it" in caplog.text
+
+
+def test_no_clip_can_be_cut_out_of_a_pipe(source: Path, tmp_path: Path) -> None:
+    with VideoReader(source) as reader:
+        video = replace(reader.info, path=tmp_path / "pipe")
+    os.mkfifo(video.path)
+    with pytest.raises(OutputError, match=r"pipe: can be read only once, so no clips can be cut"):
+        write(Output("clips", tmp_path / "clips"), results(), settings=SETTINGS, video=video)

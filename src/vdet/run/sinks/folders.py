@@ -1,5 +1,6 @@
 """The sinks that write a folder: `stages`, `crops`, `clips` and `page`."""
 
+import logging
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -15,7 +16,9 @@ from vdet.files import write_text
 from vdet.lanes.road import stage_images
 from vdet.media import Picture
 from vdet.media.cutting import can_copy, copied_suffix, copy_part, encode_part
+from vdet.media.demux import is_pipe
 from vdet.media.images import encode_image, is_image_name
+from vdet.media.writer import is_marked
 from vdet.pages.batch import write_index
 from vdet.pages.render import PAGE_NAME, jpeg_uri, link_to
 from vdet.pages.video import Player, VideoPage
@@ -25,8 +28,10 @@ from vdet.run.sinks.drawn import IMAGE_LABELS, label_text
 from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.traffic.records import BestCrops, Crop, VehicleRecord
 
+log = logging.getLogger("vdet")
+
 _BOXES = "boxes"
-_CROP_NAME = re.compile(r"vehicle-\d{4,}(-[\w-]+)?-at--?\d+\.\d{3}s\.(jpg|png)")
+_CROP_NAME = re.compile(r"vehicle-\d{4,}(-[\w-]+)?-at--?\d+\.\d{3}s\.jpg")
 _GAP = 1.0  # minimum seconds between two frames that the page calls a gap
 _THUMBNAIL = 200  # longer side of the picture of a vehicle, pixels
 
@@ -83,7 +88,7 @@ class CropSink(BaseSink):
 
     def __init__(self, path: Path, context: SinkContext) -> None:
         super().__init__(path, context)
-        self._folder = context.files.stage_folder(path, _CROP_NAME)
+        self._folder = context.files.stage_folder(path, _is_crop)
         self._best = BestCrops()
         self._written: dict[int, tuple[float, Path]] = {}
 
@@ -106,6 +111,10 @@ class CropSink(BaseSink):
             path = self._folder / f"{crop.id}.jpg"
             path.write_bytes(encode_image(crop.image, path))
             self._written[crop.id] = crop.time, path
+
+
+def _is_crop(path: Path) -> bool:
+    return _CROP_NAME.fullmatch(path.name) is not None
 
 
 def _crop_name(vehicle: VehicleRecord, time: float) -> str:
@@ -209,7 +218,9 @@ _INDEX = BatchTotal("index", write_index, suffix=".html")
 PAGE = SinkKind(PageSink, what="pages", folder_pattern=PAGE_NAME, takes="videos", total=_INDEX)
 
 
-_NAME = re.compile(r"clip-[\dT-]+-\S+-\d+(\+\d+)?\.(mp4|mov|mkv)")
+_CLIP_NAME = re.compile(
+    r"clip-(\d{2,}|\d{4}-\d\d-\d\dT\d\d)-\d\d-\d\d-[\w-]+-\d+(\+\d+)?\.(mp4|mov|mkv)"
+)
 _PRECISION = 1_000_000  # largest denominator of a time, seconds
 
 
@@ -236,12 +247,25 @@ def scenes(records: Iterable[VehicleRecord], margin: float) -> list[Scene]:
 
 
 class ClipSink(BaseSink):
-    """Cuts the clips at the end of the run; with lines or zones, only of counted vehicles."""
+    """Cuts the clips at the end of the run; with lines or zones, only of counted vehicles.
+
+    The video is read a second time: if it is no longer the same file then, there are no clips.
+    """
+
+    def __init__(self, path: Path, context: SinkContext) -> None:
+        super().__init__(path, context)
+        if is_pipe(self.video.path):
+            what = "can be read only once, so no clips can be cut out of it"
+            raise OutputError(f"{self.video.path}: {what}; save it to a file first")
+        self._state = _state(self.video.path)
 
     def finish(self) -> None:
         """Write the clips."""
-        folder = self.context.files.stage_folder(self.path, _NAME)
+        folder = self.context.files.stage_folder(self.path, _is_clip)
         settings, source = self.context.settings, self.video.path
+        if _state(source) != self._state:
+            log.warning("%s: changed during the run, so no clips were cut out of it", source)
+            return
         copies = not settings.clips.exact and can_copy(source)
         suffix = copied_suffix(source) if copies else ".mp4"
         for scene in scenes(self._chosen(), settings.clips.margin):
@@ -268,6 +292,19 @@ class ClipSink(BaseSink):
             moment = when.at(first.first).strftime("%Y-%m-%dT%H-%M-%S")
         more = f"+{len(others)}" if others else ""
         return f"clip-{moment}-{in_file_name(first.class_name)}-{first.id}{more}"
+
+
+def _is_clip(path: Path) -> bool:
+    return _CLIP_NAME.fullmatch(path.name) is not None and is_marked(path)
+
+
+def _state(path: Path) -> tuple[int, int, int, int] | None:
+    """Return what changes when a file is replaced or written; None if it does not exist."""
+    try:
+        status = path.stat()
+    except OSError:
+        return None
+    return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns
 
 
 CLIPS = SinkKind(ClipSink, what="clips", folder_pattern="clip-*.*", takes="videos")
