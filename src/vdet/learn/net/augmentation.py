@@ -195,7 +195,7 @@ def _paste(rng: np.random.Generator, sample: NetSample, donor: NetSample, row: i
         return sample
     part = sample.image[y : y + rows, x : x + columns]
     opacity = _feather(columns, inner[0], inner[2]) * _feather(rows, inner[1], inner[3])[:, None]
-    part[:] = blended(part, patch, opacity)
+    part[:] = blended(part, _image(patch), opacity)
     return replace(
         sample,
         boxes=np.concatenate([sample.boxes, place[np.newaxis]]),
@@ -297,8 +297,9 @@ def _with_noise(rng: np.random.Generator, image: Image) -> Image:
         coded = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
         image = _image(np.asarray(cv2.imdecode(coded, cv2.IMREAD_COLOR)))
     if rng.random() < 0.15:
-        noise = rng.normal(0, rng.uniform(2, 12), image.shape[:2])
-        image = _image(np.clip(image + noise[..., np.newaxis], 0, 255))
+        noise = rng.standard_normal(image.shape[:2], np.float32) * rng.uniform(2, 12)
+        noise = cv2.merge([noise.astype(np.int16)] * 3)
+        image = _image(cv2.add(image, noise, dtype=cv2.CV_8U))
     return image
 
 

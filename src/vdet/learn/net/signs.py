@@ -5,7 +5,7 @@ import string
 import cv2
 import numpy as np
 
-from vdet.boxes import Float64Array, Image
+from vdet.boxes import Box, Float64Array, Image
 from vdet.learn.net.weather import blended
 
 _SIDES = 0.015, 0.4  # height of a sign, fraction of the image's height: smallest and largest
@@ -40,22 +40,31 @@ def draw_sign(rng: np.random.Generator, image: Image) -> tuple[Image, Float64Arr
     wide = min(tall * aspect, 0.8 * width)
     x, y = rng.uniform(0, width - wide), rng.uniform(0, 0.8 * height)
     sign, opacity = _board(rng, wide / tall) if is_board else _plate(rng)
-    shape = max(2, round(wide)), max(2, round(tall))
-    slant = rng.normal(0, 0.05, 2)
-    scale = np.array([shape[0] / sign.shape[1], shape[1] / sign.shape[0]])
-    placing = np.array([[scale[0], slant[0] * scale[1], x], [slant[1] * scale[0], scale[1], y]])
     shown = image.copy()
-    if rng.random() < 0.7:  # a post
-        foot = round(x + wide / 2), round(y + tall / 2)
-        end = foot[0], min(height, round(y + tall * rng.uniform(1.5, 6)))
-        thickness = max(1, round(min(wide, tall) * rng.uniform(0.04, 0.12)))
-        cv2.line(shown, foot, end, (int(rng.integers(60, 190)),) * 3, thickness, cv2.LINE_AA)
-    light = rng.uniform(0.45, 1.1)
+    if rng.random() < 0.7:
+        _draw_post(rng, shown, Box.sized(x, y, wide, tall))
+    scale = np.array([max(2, wide) / sign.shape[1], max(2, tall) / sign.shape[0]])
+    slant = rng.normal(0, 0.05, 2)
+    placing = np.array([[scale[0], slant[0] * scale[1], x], [slant[1] * scale[0], scale[1], y]])
+    margin = 0.2 * max(wide, tall) + 2  # for the slant
+    left, top = max(0, int(x - margin)), max(0, int(y - margin))
+    around = shown[top : int(y + tall + margin), left : int(x + wide + margin)]
+    placing[:, 2] -= left, top
     blur = 0.35 / float(scale.min())  # so that the sign is as sharp as the image
-    layers = [cv2.GaussianBlur(layer, (0, 0), blur) for layer in (sign, opacity)]
-    warped, mask = (cv2.warpAffine(layer, placing, (width, height)) for layer in layers)
-    result = blended(shown, warped * light, mask / 255.0)
-    return result, np.array([[x, y, x + wide, y + tall]])
+    layers = (cv2.GaussianBlur(layer, (0, 0), blur) for layer in (sign, opacity))
+    size = around.shape[1], around.shape[0]
+    warped, mask = (cv2.warpAffine(layer, placing, size) for layer in layers)
+    lit = cv2.convertScaleAbs(warped, alpha=rng.uniform(0.45, 1.1))
+    around[:] = blended(around, lit, mask / 255.0)
+    return shown, np.array([[x, y, x + wide, y + tall]])
+
+
+def _draw_post(rng: np.random.Generator, image: Image, sign: Box) -> None:
+    """Draw a post from the middle of a sign down."""
+    top = round((sign.x1 + sign.x2) / 2), round((sign.y1 + sign.y2) / 2)
+    bottom = top[0], min(len(image), top[1] + round(sign.height * rng.uniform(1, 6)))
+    thickness = max(1, round(min(sign.width, sign.height) * rng.uniform(0.04, 0.12)))
+    cv2.line(image, top, bottom, (int(rng.integers(60, 190)),) * 3, thickness)
 
 
 def _plate(rng: np.random.Generator) -> tuple[Image, Image]:
