@@ -113,6 +113,7 @@ def mine(
 @options.output_file_option
 @options.option("--video CLIP TRUTH", options.INPUT, name="clips", nargs=2, multiple=True)
 @options.option("--base FILE")
+@options.option("--device NAME", click.Choice(["auto", "cpu", "cuda"]), default="auto")
 @options.settings_options("train.net.steps=4000")
 @options.overwrite_option
 def train_net(
@@ -120,6 +121,7 @@ def train_net(
     output: Path,
     clips: tuple[tuple[Path, Path], ...],
     base: Path | None,
+    device: str,
     overwrite: bool,
 ) -> None:
     """Train a network on labelled images.
@@ -136,6 +138,9 @@ def train_net(
         Also train on every fourth frame of a labelled video. Can be repeated.
     base
         Start from the weights of this network of vdet train-net.
+    device
+        Compute here. auto uses a GPU if torch finds one. A stopped training can resume on another
+        device.
 
     Examples
     --------
@@ -167,6 +172,12 @@ def train_net(
             bar.update(step - bar.n)
 
         done = train_to_file(
-            sources, settings.train.net, output, base=base, overwrite=overwrite, progress=advance
+            sources,
+            settings.train.net,
+            output,
+            base=base,
+            device=device,
+            overwrite=overwrite,
+            progress=advance,
         )
     print_lines(done, f"{output}: written")

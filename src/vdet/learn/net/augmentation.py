@@ -298,8 +298,8 @@ def _with_noise(rng: np.random.Generator, image: Image) -> Image:
         image = _image(np.asarray(cv2.imdecode(coded, cv2.IMREAD_COLOR)))
     if rng.random() < 0.15:
         noise = rng.standard_normal(image.shape[:2], np.float32) * rng.uniform(2, 12)
-        noise = cv2.merge([noise.astype(np.int16)] * 3)
-        image = _image(cv2.add(image, noise, dtype=cv2.CV_8U))
+        of_channels = cv2.merge([noise.astype(np.int16)] * 3)
+        image = _image(cv2.add(image, of_channels, dtype=cv2.CV_8U))
     return image
 
 

@@ -167,17 +167,27 @@ class Vehicles:
     def __len__(self) -> int:
         return len(self.boxes)
 
+    def to(self, device: torch.device) -> "Vehicles":
+        """Return them on a device."""
+        return Vehicles(self.image.to(device), self.boxes.to(device), self.classes.to(device))
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Batch:
     """Training images of one step.
 
-    `images` are the inputs of the network; `ignored` are the ignore regions, as `Vehicles`.
+    `images` are BGR, uint8 or float32 `(B, 3, H, W)` from 0 to 255; `ignored` are the ignore
+    regions, as `Vehicles`.
     """
 
     images: Tensor
     vehicles: Vehicles
     ignored: Vehicles
+
+    def to(self, device: torch.device) -> "Batch":
+        """Return it on a device, with images as float32."""
+        images = self.images.to(device).float()
+        return Batch(images, self.vehicles.to(device), self.ignored.to(device))
 
 
 def class_weights(sources: Sequence[NetSource], count: int) -> Tensor:
@@ -199,9 +209,12 @@ def loss_of(network: Network, batch: Batch, weights: Tensor) -> Tensor:
     0 for others (Li et al., "Generalized Focal Loss", 2020). Boxes are compared by generalised
     overlap, classes by cross entropy.
     """
+    device = batch.images.device
     height, width = batch.images.shape[2:]
-    centers, strides = map(torch.from_numpy, cell_centers(width, height))
-    raw = flatten(network(batch.images))
+    centers, strides = (torch.from_numpy(v).to(device) for v in cell_centers(width, height))
+    with torch.autocast(device.type, torch.bfloat16, enabled=device.type == "cuda"):
+        levels = network(batch.images)
+    raw = flatten(levels).float()
     scores, boxes = raw[..., 0], decode(raw[..., 1:5], centers, strides)
     row, cell, iou = assign(scores, boxes, batch.vehicles, centers, strides)
     cells = batch.vehicles.image[row], cell
@@ -257,7 +270,7 @@ def assign(
     logits = scores[image, cell]
     score_cost = functional.binary_cross_entropy_with_logits(logits, iou, reduction="none")
     distance = offset[row, cell].norm(dim=-1) / strides[cell]
-    costs = torch.full((len(vehicles), len(centers)), _NEVER)
+    costs = torch.full((len(vehicles), len(centers)), _NEVER, device=scores.device)
     overlaps = torch.zeros_like(costs)
     overlaps[row, cell] = iou
     costs[row, cell] = (
@@ -267,7 +280,7 @@ def assign(
     )
     count = overlaps.topk(CANDIDATES, dim=1).values.sum(1).int().clamp(min=1)
     cheapest = costs.topk(CANDIDATES, dim=1, largest=False)
-    wanted = torch.arange(CANDIDATES)[None] < count[:, None]
+    wanted = torch.arange(CANDIDATES, device=count.device)[None] < count[:, None]
     chosen = torch.full_like(costs, _NEVER)
     chosen.scatter_(1, cheapest.indices, cheapest.values.where(wanted, _NEVER))
     of_cells = vehicles.image[:, None].expand_as(chosen)

@@ -4,7 +4,7 @@ import copy
 import math
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -21,8 +21,9 @@ from vdet.learn.net.augmentation import Drawing, SampleDrawer
 from vdet.learn.net.export import export_network, start_from
 from vdet.learn.net.network import Batch, Network, Vehicles, class_weights, loss_of
 from vdet.learn.net.sources import NetSample, NetSource, Source, join
-from vdet.run.threads import prefetch
+from vdet.run.threads import map_ordered
 from vdet.version import __version__
+from vdet.workers import core_count
 
 CHECKPOINT = 500
 """Steps between two checkpoints."""
@@ -55,6 +56,7 @@ def train_to_file(
     output: Path,
     *,
     base: Path | None = None,
+    device: str = "auto",
     overwrite: bool = False,
     progress: StepProgress = lambda *_: None,
 ) -> str:
@@ -62,7 +64,7 @@ def train_to_file(
 
     Parameters
     ----------
-    sources, settings, base, progress
+    sources, settings, base, device, progress
         See `train_network`.
     overwrite
         Replace an earlier network.
@@ -89,7 +91,12 @@ def train_to_file(
         progress(step, loss)
 
     network = train_network(
-        [source for source, _ in sources], settings, checkpoint, base=base, progress=advance
+        [source for source, _ in sources],
+        settings,
+        checkpoint,
+        base=base,
+        device=device,
+        progress=advance,
     )
     provenance = {
         "program": f"vdet {__version__}",
@@ -113,12 +120,14 @@ def train_network(
     checkpoint: Path,
     *,
     base: Path | None = None,
+    device: str = "auto",
     progress: StepProgress = lambda *_: None,
 ) -> Network:
     """Train a network and return it with the moving average of its weights.
 
-    The same sources and settings give the same network on the same machine. A training that was
-    stopped resumes from its last checkpoint. Until it ends, torch uses one thread.
+    On a CPU the same sources and settings give the same network on the same machine. A training
+    that was stopped resumes from its last checkpoint, also on another device. Threads draw the
+    images: one for a CPU, one per core for a GPU.
 
     Parameters
     ----------
@@ -128,12 +137,14 @@ def train_network(
         File of the last checkpoint; it is made and replaced, and read where it exists.
     base
         An exported network from whose weights the training starts.
+    device
+        Where to compute: "cpu", "cuda", or "auto" for a GPU where torch finds one.
 
     Raises
     ------
     DataError
-        No source has a vehicle, a weight is given to a source that is not there, the base is not
-        such a network, or the checkpoint belongs to another training.
+        There is no such device, no source has a vehicle, a weight is given to a source that is not
+        there, the base is not such a network, or the checkpoint belongs to another training.
     """
     if not any((~sample.ignored).any() for source in sources for sample in source.samples):
         raise DataError("no image has a vehicle; pass labelled images")
@@ -147,17 +158,21 @@ def train_network(
         "base": str(base),
         **settings.model_dump(),
     }
+    target = _device(device)
     threads = torch.get_num_threads()
     torch.set_num_threads(1)  # two threads that wait for each other are slower than one
     torch.set_flush_denormal(True)
+    batches = _Batches(sources, settings)
     try:
-        training = _Training(sources, settings, learnt_with)
+        training = _Training(sources, settings, learnt_with, target)
         if checkpoint.exists():
             training.restore(checkpoint)
         elif base is not None:
-            training.start_from(base, next(_batches(sources, settings, 0)))
-        with prefetch(_batches(sources, settings, training.step)) as batches:
-            for batch in batches:
+            training.start_from(base, batches.draw(0))
+        workers = 1 if target.type == "cpu" else core_count()
+        remaining_steps = range(training.step, settings.steps)
+        with map_ordered(batches.draw, remaining_steps, workers) as drawn:
+            for _, batch in drawn:
                 loss = training.learn(batch)
                 progress(training.step, loss)
                 if training.step % CHECKPOINT == 0 or training.step == settings.steps:
@@ -165,18 +180,29 @@ def train_network(
     finally:
         torch.set_flush_denormal(False)
         torch.set_num_threads(threads)
-    return training.averaged.eval()
+    return training.averaged.cpu().eval()
 
 
-def _batches(
-    sources: Sequence[NetSource], settings: NetworkTrainingSettings, first: int
-) -> Iterator[Batch]:
-    """Yield the batches from step `first` on; each depends on the step and the seed alone."""
-    drawer = SampleDrawer(sources, settings)
-    for step in range(first, settings.steps):
+def _device(name: str) -> torch.device:
+    """Return a device by the name of an option. Raises `DataError` if torch does not find it."""
+    has_gpu = torch.cuda.is_available()
+    if name == "cuda" and not has_gpu:
+        raise DataError("--device cuda: torch finds no GPU; use --device cpu")
+    return torch.device("cuda" if has_gpu and name != "cpu" else "cpu")
+
+
+class _Batches:
+    """The batches of a training; each depends on the step and the seed alone."""
+
+    def __init__(self, sources: Sequence[NetSource], settings: NetworkTrainingSettings) -> None:
+        self._drawer = SampleDrawer(sources, settings)
+        self._settings = settings
+
+    def draw(self, step: int) -> Batch:
+        """Draw the images of a step; several threads may call this at once."""
         rng = np.random.default_rng((_SEED, step))
-        drawing = _drawing(settings, step)
-        yield _to_batch([drawer.draw(rng, drawing) for _ in range(settings.batch)])
+        drawing = _drawing(self._settings, step)
+        return _to_batch([self._drawer.draw(rng, drawing) for _ in range(self._settings.batch)])
 
 
 def _drawing(settings: NetworkTrainingSettings, step: int) -> Drawing:
@@ -196,7 +222,7 @@ def _to_batch(samples: Sequence[NetSample]) -> Batch:
         for rows in map(torch.from_numpy, (~joined.ignored, joined.ignored))
     )
     images = torch.from_numpy(np.stack([sample.image for sample in samples]))
-    return Batch(images.permute(0, 3, 1, 2).float(), vehicles, ignored)
+    return Batch(images.permute(0, 3, 1, 2), vehicles, ignored)
 
 
 class _Training:
@@ -207,13 +233,15 @@ class _Training:
         sources: Sequence[NetSource],
         settings: NetworkTrainingSettings,
         learnt_with: dict[str, Any],
+        device: torch.device,
     ) -> None:
         torch.manual_seed(_SEED)
         self._settings = settings
         self._learnt_with = learnt_with
-        self._class_weights = class_weights(sources, len(settings.classes))
+        self._device = device
+        self._class_weights = class_weights(sources, len(settings.classes)).to(device)
         network = Network(len(settings.classes), settings.channels)
-        self._network = network.to(memory_format=torch.channels_last).train()
+        self._network = network.to(device, memory_format=torch.channels_last).train()
         self.averaged = copy.deepcopy(self._network)
         weights = [parameter for parameter in self._network.parameters() if parameter.ndim > 1]
         others = [parameter for parameter in self._network.parameters() if parameter.ndim <= 1]
@@ -231,7 +259,8 @@ class _Training:
 
     def start_from(self, path: Path, batch: Batch) -> None:
         """Take the first weights from an exported network. Raises `DataError`."""
-        start_from(self._network, path, batch.images, self._settings.classes)
+        images = batch.to(self._device).images
+        start_from(self._network, path, images, self._settings.classes)
         self.averaged.load_state_dict(self._network.state_dict())
 
     @property
@@ -249,7 +278,7 @@ class _Training:
         """Do one step and return its loss."""
         for group in self._optimizer.param_groups:
             group["lr"] = self.rate
-        loss = loss_of(self._network, batch, self._class_weights)
+        loss = loss_of(self._network, batch.to(self._device), self._class_weights)
         self._optimizer.zero_grad()
         loss.backward()  # type: ignore[no-untyped-call]
         torch.nn.utils.clip_grad_norm_(self._network.parameters(), _LONGEST_GRADIENT)
@@ -275,7 +304,7 @@ class _Training:
     def restore(self, path: Path) -> None:
         """Resume from a file that `save` has written. Raises `DataError`."""
         try:
-            state: dict[str, Any] = torch.load(path, weights_only=True)
+            state: dict[str, Any] = torch.load(path, self._device, weights_only=True)
             same = state["settings"] == self._learnt_with
             for name, part in self._parts.items():
                 part.load_state_dict(state[name])

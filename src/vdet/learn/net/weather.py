@@ -66,7 +66,7 @@ def _at_night(rng: np.random.Generator, image: Image, boxes: Float32Array) -> Im
     # A wide blur is computed at a quarter of the size.
     small = cv2.resize(light, None, fx=0.25, fy=0.25, interpolation=cv2.INTER_AREA)
     bloom = cv2.GaussianBlur(small, (0, 0), width / 4 * rng.uniform(0.004, 0.02))
-    lit = cv2.LUT(image, levels[np.newaxis].astype(np.float32))
+    lit = np.asarray(cv2.LUT(image, levels[np.newaxis].astype(np.float32)), np.float32)
     lit += light
     lit += cv2.resize(bloom, (width, height)) * np.float32(rng.uniform(0.5, 2.5))
     if rng.random() < 0.3:  # a wet road
@@ -134,7 +134,7 @@ def _with_wiper(rng: np.random.Generator, image: Image) -> Image:
     return blended(smeared, dark, cv2.GaussianBlur(mask, (0, 0), 0.006 * width) / 255.0)
 
 
-def blended(image: Image, other: Image, opacity: _Values) -> Image:
+def blended(image: _Values, other: _Values, opacity: _Values) -> Image:
     """Return the image with another one over it, of an opacity `(H, W)` from 0 to 1."""
     over = np.asarray(opacity, np.float32)
     return np.asarray(cv2.blendLinear(image, other, 1 - over, over), np.uint8)
