@@ -230,12 +230,19 @@ def test_what_a_file_has_already_is_carried_through(window: Browser, tmp_path: P
     given = tmp_path / "given.yaml"
     given.write_text(
         f"""
-camera: {{size: [640, 360], clock: {{pattern: "%Y%m%d_%H%M%S"}}}}
+camera:
+  size: [640, 360]
+  clock: {{pattern: "%Y%m%d_%H%M%S"}}
+  lens:
+    size: [320, 180]
+    matrix: [[300.0, 0.0, 160.0], [0.0, 300.0, 90.0], [0.0, 0.0, 1.0]]
+    distortion: [0.0, 0.0, 0.0, 0.0, 0.0]
 detector: {{model: mine.onnx}}
 regions: [{{name: ramp, mask: ramp.png}}]
 traffic:
   interval: 15min
-  lines: [{{name: "{NAME}", start: [100, 200], end: [500, 200], left: "{NAME}"}}]
+  lines: [{{name: "{NAME}", start: [100, 200], end: [500, 200], left: "\\x7f\\x85\\u2028"}}]
+  zones: [{{name: closed, points: [[50, 50], [150, 50], [100, 150], [50, 50]]}}]
 """
     )
     values = given_values([given])
@@ -244,18 +251,27 @@ traffic:
     for _ in range(2):
         text = window.text("#text")
         found = parse_document(text, "text").values
-        assert found["camera"] == {"size": [1280, 720], "clock": {"pattern": "%Y%m%d_%H%M%S"}}
+        assert found["camera"] == {
+            "size": [1280, 720],
+            "clock": {"pattern": "%Y%m%d_%H%M%S"},
+            "lens": values["camera"]["lens"],
+        }
         assert found["detector"] == {"model": "mine.onnx"}
         assert found["regions"] == [{"name": "ramp", "mask": "ramp.png"}]
-        [line] = found["traffic"].pop("lines")
+        [line], [zone] = found["traffic"].pop("lines"), found["traffic"].pop("zones")
         assert found["traffic"] == {"interval": "15min"}
-        assert (line["name"], line["start"], line["left"]) == (NAME, [200, 400], NAME)
+        assert (line["name"], line["start"], line["left"]) == (NAME, [200, 400], "\x7f\x85\u2028")
+        assert zone["points"] == [[100, 100], [300, 100], [200, 300]]
+        assert window.run("return get('save').disabled") is False
         (saved := tmp_path / "saved.yaml").write_text(text)
         window.choose_file("#open", saved)
         window.wait("return get('hint').textContent === 'Opened saved.yaml.'")
     assert window.run("return [document.title, document.images.length]") == ["Draw gate.yaml", 0]
     window.choose_file("#open", given)
     window.wait("return get('hint').textContent.includes('not written by this page')")
+    (page := tmp_path / "page.html").write_bytes(made.output(page, "gate\nsteps: [x].yaml"))
+    window.open(page)
+    assert "steps" not in parse_document(window.text("#text"), "text").values
 
 
 def test_warnings_are_those_of_a_run(window: Browser, tmp_path: Path) -> None:

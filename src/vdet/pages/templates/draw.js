@@ -339,10 +339,22 @@ const FORMS = { // the lists of the file, and what their items have
   lines: ["name", "start", "end", "left", "right"], zones: ["name", "points"],
 };
 
+/** Escape the characters that YAML takes for line breaks, or does not allow, although JSON has them. */
+function escaped(text) {
+  return text.replace(/[\0-\x1f\x7f-\x9f\u2028\u2029\ufeff]/g,
+    character => `\\u${character.charCodeAt(0).toString(16).padStart(4, "0")}`);
+}
+
+/** Remove the last corner of a polygon where it repeats the first one. */
+function withoutRepeated(item) {
+  const { points } = item, isClosed = points?.length > 3 && String(points[0]) === String(points.at(-1));
+  return isClosed ? { ...item, points: points.slice(0, -1) } : item;
+}
+
 /** Write the settings of the camera as YAML; `rest` has the lines of everything else. */
 function writeYaml(places, size, rest, name) {
   const write = value => Array.isArray(value) ? `[${value.map(write).join(", ")}]` :
-    typeof value === "number" ? String(Math.round(1000 * value) / 1000) : JSON.stringify(value);
+    typeof value === "number" ? String(Math.round(1000 * value) / 1000) : escaped(JSON.stringify(value));
   const line = (kind, item) => FORMS[kind].filter(key => item[key] != null)
     .map(key => `${key}: ${key === "kind" ? item.kind : write(item[key])}`).join(", ");
   const list = (kind, indent, note) => places[kind].length ? [`${indent}${kind}:  # ${note}`,
@@ -352,7 +364,7 @@ function writeYaml(places, size, rest, name) {
     ...list("zones", "  ", "polygons in which vehicles are counted"), ...rest.traffic];
   return [
     `${MARK}: this file says where the vehicles of a camera are counted.`,
-    `# vdet detect-video CLIP --no-video -c ${name} --flows flows.csv --interval 15min`,
+    escaped(`# vdet detect-video CLIP --no-video -c ${name} --flows flows.csv --interval 15min`),
     "camera:", `  size: ${write(size)}  # points below are pixels of such frames`,
     ...list("ground", "  ", "points of the road in pixels and metres"), ...rest.camera,
     ...list("regions", "", "parts of the frame in which vehicles are shown"),
@@ -371,11 +383,11 @@ function readYaml(text) {
     const [, indent, key] = /^( *)(\w+):/.exec(line) ?? [], item = /^ *- (\{.*\})$/.exec(line);
     if (indent === "") section = key in rest ? key : "other";
     if (FORMS[key] && indent === (key === "regions" ? "" : "  ")) list = key;
-    else if (list && item) places[list].push(readItem(item[1]));
+    else if (list && item) places[list].push(withoutRepeated(readItem(item[1])));
     else if (list && /^ *-/.test(line)) throw Error(`not as this page writes it: ${line.trim()}`);
     else {
       list = null;
-      if (section === "camera" && key === "size") size = JSON.parse(/\[.*?\]/.exec(line)[0]);
+      if (section === "camera" && key === "size" && indent === "  ") size = JSON.parse(/\[.*?\]/.exec(line)[0]);
       else if (indent !== "" || section === "other") rest[section].push(line);
     }
   }
@@ -452,6 +464,7 @@ async function openPage(data) {
   const image = Object.assign(new Image(), { src: data.picture });
   await image.decode();
   data.places.lines = data.places.lines.map(line => ({ left: "left", right: "right", ...line }));
+  for (const kind of ["zones", "regions"]) data.places[kind] = data.places[kind].map(withoutRepeated);
 
   let { places, rest } = data, past = [], future = [], saved = JSON.stringify(places);
   let tool = "select", selected = null; // what is selected: kind, index, and the number of a point
