@@ -48,10 +48,10 @@ def test_another_network_says_what_it_was_taken_for(run: Run, tmp_path: Path) ->
 def test_a_video_is_described(run: Run, tmp_path: Path) -> None:
     path = write_clip(tmp_path / "v_20260501_065959.mov", size=(160, 96), rotation=90)
     result = run("info", path, "--json", tmp_path / "facts.json", code=0)
-    for line in ("width: 96", "rate: 25", "frames: 12", "begins: 2026-05-01 06:59:59"):
+    for line in ("width: 160", "rate: 25", "frames: 12", "begins: 2026-05-01 06:59:59"):
         assert line in result.out
     values = json.loads((tmp_path / "facts.json").read_text())
-    assert (values["width"], values["height"], values["declared_frames"]) == (96, 160, 12)
+    assert (values["width"], values["height"], values["declared_frames"]) == (160, 96, 12)
     assert (values["rate"], values["seconds"]) == (25, 0.48)
     again = run("info", path, "--json", tmp_path / "facts.json")
     assert (again.code, again.err.count("\n")) == (1, 1)

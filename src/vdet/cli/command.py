@@ -29,7 +29,8 @@ class Command(click.Command):
         heading, sections = "Options", dict[str, list[tuple[str, str]]]()
         for parameter in self.get_params(context):
             heading = self.headings.get(parameter.name or "", heading)
-            if row := parameter.get_help_record(context):
+            row = parameter.get_help_record(context)
+            if row and isinstance(parameter, click.Option):
                 sections.setdefault(heading, []).append(row)
         for heading, rows in sections.items():
             with formatter.section(heading):

@@ -46,16 +46,10 @@ _HEADINGS = {
     "vehicles have clips.",
 )
 @click.option(
-    "--margin",
-    type=float,
-    metavar="SECONDS",
-    help="Time added to a clip before and after (`clips.margin`).",
+    "--margin", type=float, metavar="SECONDS", help="Time added around each clip (`clips.margin`)."
 )
 @click.option(
-    "--exact",
-    is_flag=True,
-    help="Cut clips at exact frames by encoding them again. By default, whole key-frame intervals "
-    "are copied (`clips.exact`).",
+    "--exact", is_flag=True, help="Cut clips at exact frames, by encoding again (`clips.exact`)."
 )
 @options.counts_option
 @options.flows_option
@@ -74,11 +68,7 @@ _HEADINGS = {
     "--stride", type=click.IntRange(1, 100), help="Search every N-th frame (`detector.stride`)."
 )
 @options.begin_option
-@click.option(
-    "--strict",
-    is_flag=True,
-    help="Exit with code 4 if a result is doubtful. Outputs are still written.",
-)
+@click.option("--strict", is_flag=True, help="Exit with code 4 if a result is doubtful.")
 @options.output_folder(
     "-d", "--directory", "folder", help="Process every CLIP, and write the outputs into DIR."
 )
@@ -96,8 +86,7 @@ _HEADINGS = {
 @click.option(
     "--scheduler",
     metavar="ADDRESS",
-    help="With -d: address of a Dask scheduler, such as tcp://host:8786. Workers must see the "
-    "files at the same paths.",
+    help="With -d: use this Dask scheduler, such as tcp://host:8786.",
 )
 @options.lanes_option
 @options.model_option
