@@ -53,8 +53,8 @@ def draw(
 ) -> None:
     """Write a page for drawing lines over the paths of vehicles.
 
-    CLIP is a video, or an image of one frame, which has paths only with --tracks-from. The page
-    also draws zones, shows live counts for each line, and saves settings for -c. It needs no
+    CLIP is a video, or an image of one frame, which has paths only with --tracks-from. Zones can be
+    drawn too. The page shows live counts for each line, and saves settings for -c. It needs no
     network.
 
     \b

@@ -217,7 +217,7 @@ class SettingsSource:
 def settings_options(**keys: str) -> Callable[[Function], Function]:
     """Add `-c FILE` and `--set KEY=VALUE`; the command receives all settings as `source`.
 
-    `keys` are the settings that other options of the command change, by the argument of each.
+    `keys` has the setting that each other option changes, by the name of its argument.
     """
 
     def decorate(command: Function) -> Function:
