@@ -23,14 +23,13 @@ def commands_page() -> str:
 
 
 def _helps(command: click.Command, context: click.Context) -> Iterator[tuple[str, str]]:
-    """Yield the name and the help of a command and of the commands below it."""
+    """Yield the name and the help of a command, and of each of its commands."""
     yield context.command_path, command.get_help(context)
     if isinstance(command, click.Group):
         for name in command.list_commands(context):
-            found = command.get_command(context, name)
-            assert found is not None
-            below = click.Context(found, info_name=name, parent=context)
-            yield from _helps(found, below)
+            subcommand = command.get_command(context, name)
+            assert subcommand is not None
+            yield from _helps(subcommand, click.Context(subcommand, info_name=name, parent=context))
 
 
 if __name__ == "__main__":

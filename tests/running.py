@@ -179,7 +179,7 @@ def start(
         before()
 
     process = subprocess.Popen(
-        [sys.executable, "-m", "vdet", *map(str, arguments)],
+        [sys.executable, "-P", "-m", "vdet", *map(str, arguments)],  # as the installed program
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

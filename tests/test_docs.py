@@ -12,7 +12,7 @@ import pytest
 from docs.commands import PAGE
 
 from vdet.cli.main import cli
-from vdet.cli.options import config_names, read_settings
+from vdet.cli.options import SettingsSource
 
 ROOT = Path(__file__).parents[1]
 PAGES = [
@@ -61,9 +61,9 @@ def check(words: list[str]) -> None:
         command, context = found, click.Context(found, info_name=name, parent=context)
     if not words:
         return
-    with command.make_context(command.name, words):
-        if set(config_names()) <= {"default", "svm", "seed"}:  # others are the reader's own
-            read_settings()
+    values = command.make_context(command.name, words).params
+    if set(values.get("configs", ())) <= {"default", "svm", "seed"}:  # others are the reader's own
+        SettingsSource(values.get("configs", ()), values.get("assignments", ())).load()
 
 
 def test_the_readme_is_short() -> None:

@@ -12,7 +12,6 @@ import pytest
 
 from red_cars import car_at, road
 from running import Running, names, start, write_drive
-from vdet.__main__ import leave_out_current_folder
 
 MODULES = ("queue", "typing", "selectors", "socket", "numpy", "joblib", "multiprocessing")
 KB = 1024
@@ -38,32 +37,17 @@ def running() -> Iterator[list[Running]]:
 
 
 def test_nothing_in_the_current_folder_is_imported(
-    batch: tuple[str, ...], running: list[Running], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    batch: tuple[str, ...], running: list[Running], tmp_path: Path
 ) -> None:
     folder = tmp_path / "current"
     folder.mkdir()
     for name in MODULES:
         (folder / f"{name}.py").write_text("open('imported', 'a').write(__name__ + ' ')")
-    # An empty entry means the current folder.
-    monkeypatch.setenv("PYTHONPATH", os.pathsep + os.environ.get("PYTHONPATH", ""))
     running.append(start(batch, before=lambda: os.chdir(folder)))
     result = running[0].finish()
     assert not (folder / "imported").exists(), (folder / "imported").read_text()
     assert result.code == 0, result.err
     assert names(tmp_path / "out") == ["a.csv", "b.csv", "c.csv", "manifest.jsonl"]
-
-
-def test_what_the_user_names_stays_on_the_path(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("PYTHONSAFEPATH", "")  # and put back what it was
-    for named, expected in (("", ["/other"]), (".", [str(tmp_path), "", "/other"])):
-        monkeypatch.setenv("PYTHONPATH", os.pathsep.join(["", named, "/other"]))
-        monkeypatch.setattr(sys, "path", [str(tmp_path), "", "/other"])
-        leave_out_current_folder()
-        assert sys.path == expected
-        assert os.environ["PYTHONPATH"].split(os.pathsep) == [*([named] if named else []), "/other"]
 
 
 def test_a_batch_goes_on_without_standard_error(

@@ -4,16 +4,13 @@ import gc
 import os
 import signal
 import sys
-import threading
-import time
 from typing import NoReturn
 
 from vdet.errors import INTERRUPTED, VdetError, in_one_line
-from vdet.system import CAN_WAKE, ENDING_SIGNALS
+from vdet.system import ENDING_SIGNALS
 from vdet.workers import SINGLE_THREADED
 
-CLEANUP_TIMEOUT = 10.0  # seconds between a signal and a forced exit
-_SENT_AGAIN = 20
+CLEANUP_TIMEOUT = 10  # seconds between a signal and a forced exit
 _NEW_OBJECTS = 20_000  # between two collections: what loading the libraries makes is no garbage
 _STDOUT, _STDERR = 1, 2
 
@@ -24,12 +21,12 @@ def run() -> NoReturn:
     gc.set_threshold(_NEW_OBJECTS)
     for name, value in SINGLE_THREADED.items():
         os.environ.setdefault(name, value)
+    os.environ["PYTHONSAFEPATH"] = "1"  # workers import nothing from the current folder
     # A killed worker leaves semaphores, which loky removes with a warning that users do not need.
     sys.warnoptions.append("ignore::UserWarning:loky.backend.resource_tracker")
-    for number in _signals():
-        signal.signal(number, _interrupt)
-    if CAN_WAKE:
-        _watch_for_signals()
+    for number in ENDING_SIGNALS:
+        if signal.getsignal(number) is not signal.SIG_IGN:  # as with `nohup`
+            signal.signal(number, _interrupt)
     try:
         from vdet.cli import main
 
@@ -57,41 +54,16 @@ def open_streams() -> None:
     sys.stderr = sys.stderr or open(_STDERR, "w", encoding="utf-8", closefd=False)  # noqa: SIM115
 
 
-def _signals() -> list[signal.Signals]:
-    """Return the signals that end the program and are not ignored, as by `nohup`."""
-    return [number for number in ENDING_SIGNALS if signal.getsignal(number) is not signal.SIG_IGN]
-
-
-def _ignore_signals() -> None:
-    for number in _signals():
-        signal.signal(number, signal.SIG_IGN)
-
-
 def _interrupt(*_: object) -> NoReturn:
     _ignore_signals()  # a second signal must not interrupt the clean-up
+    if hasattr(signal, "alarm"):
+        signal.alarm(CLEANUP_TIMEOUT)  # ends the process even if a thread hangs in a library
     raise KeyboardInterrupt
 
 
-def _watch_for_signals() -> None:
-    """Exit `CLEANUP_TIMEOUT` after a signal, even if the main thread hangs in a library.
-
-    A signal just before the main thread begins to wait does not end that wait, so it is sent again;
-    once handled, it is ignored.
-    """
-    reader, writer = os.pipe()
-    os.set_blocking(writer, False)
-    signal.set_wakeup_fd(writer)  # gets the number of a signal at once
-    numbers, thread = _signals(), threading.get_ident()
-
-    def exit_late() -> None:
-        while (number := os.read(reader, 1)[0]) not in numbers:
-            pass
-        for _ in range(_SENT_AGAIN):
-            time.sleep(CLEANUP_TIMEOUT / _SENT_AGAIN)
-            signal.pthread_kill(thread, number)
-        os._exit(INTERRUPTED)
-
-    threading.Thread(target=exit_late, daemon=True).start()
+def _ignore_signals() -> None:
+    for number in ENDING_SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
 
 
 def _exit(code: object) -> NoReturn:

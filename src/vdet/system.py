@@ -15,9 +15,6 @@ _ENDING = ("SIGINT", "SIGTERM", "SIGHUP")
 ENDING_SIGNALS = [signal.Signals[name] for name in _ENDING if hasattr(signal, name)]
 """The signals that end the program: of Ctrl-C, of `kill`, and of a terminal that closes."""
 
-CAN_WAKE = hasattr(signal, "pthread_kill")
-"""Whether a thread can send the main thread a signal, which ends a wait."""
-
 
 def lock(descriptor: int) -> bool:
     """Lock a file for this process until it is closed.

@@ -1,17 +1,16 @@
 """Lines, log records and progress bars on standard error."""
 
 import io
+import logging
 from pathlib import Path
 from typing import Any
 
-import click
 import pytest
 from tqdm import tqdm
 
 from conftest import Run
 from running import until, write_drive
-from vdet.cli.main import cli
-from vdet.cli.messages import is_quiet, progress_steps
+from vdet.cli.messages import LOG, is_quiet, progress_steps
 
 
 class Terminal(io.StringIO):
@@ -90,6 +89,7 @@ class TestNamesThatControlATerminal:
 
 
 def test_there_is_no_bar_with_quiet(terminal: Terminal) -> None:
-    with click.Context(cli, obj=True).scope(), progress_steps("") as steps:
+    LOG.setLevel(logging.ERROR)
+    with progress_steps("") as steps:
         steps("fitting", None)
     assert terminal.getvalue() == ""

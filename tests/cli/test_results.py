@@ -14,27 +14,27 @@ def test_a_page_and_numbers_that_cannot_be_written_are_refused_before_any_work(
 ) -> None:
     folder, target = tmp_path / "a" / "b", tmp_path / "a.json"
     results = ResultFiles(str(target), page=folder, overwrite=False)
-    results.checked()
+    results.check()
     assert not list(tmp_path.iterdir()), "a run that fails leaves no folder"
     results.print(["F1"], {"f1": 0.5}, lambda: "precious")
     one, other = ResultFiles(str(target), overwrite=False), ResultFiles(None, False, folder)
     for kept in (results, one, other):
         with pytest.raises(OutputError, match="already exists; use --overwrite"):
-            kept.checked()
-    ResultFiles(str(target), page=folder, overwrite=True).checked()
+            kept.check()
+    ResultFiles(str(target), page=folder, overwrite=True).check()
     with recorded_inputs():
         record_input(target)
         with pytest.raises(OutputError, match="is the input itself"):
-            ResultFiles(str(target), overwrite=True).checked()
+            ResultFiles(str(target), overwrite=True).check()
     with pytest.raises(OutputError, match=r"the folder .*page\.html is not a folder"):
-        ResultFiles(None, page=folder / "page.html", overwrite=True).checked()
+        ResultFiles(None, page=folder / "page.html", overwrite=True).check()
     with pytest.raises(OutputError, match="is used for two outputs"):
-        ResultFiles(str(folder / "page.html"), page=folder, overwrite=True).checked()
+        ResultFiles(str(folder / "page.html"), page=folder, overwrite=True).check()
 
 
 def test_numbers_may_lie_in_the_new_folder_of_the_page(tmp_path: Path) -> None:
     results = ResultFiles(str(tmp_path / "a" / "a.json"), page=tmp_path / "a", overwrite=False)
-    results.checked()
+    results.check()
     results.print([], {"f1": 0.5}, lambda: "html")
     assert {file.name for file in (tmp_path / "a").iterdir()} == {"a.json", "page.html"}
 

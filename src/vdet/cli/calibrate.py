@@ -1,22 +1,25 @@
 """`vdet calibrate`: from photographs of a chessboard to a camera file."""
 
-import logging
 from pathlib import Path
 
 import click
 
 from vdet.cli import options
 from vdet.cli.command import command
-from vdet.cli.messages import print_lines, progress_steps
+from vdet.cli.messages import LOG, print_lines, progress_steps
 from vdet.errors import counted
-
-log = logging.getLogger("vdet")
 
 
 @command()
 @click.argument("photos", nargs=-1, required=True, type=options.PATH, metavar="PHOTO...")
-@options.output_file_option
-@options.option("--pattern NxM", options.parse_pair, default="9x6")
+@options.output_file("-o", "--output", required=True, help="Camera file to write, .yaml.")
+@click.option(
+    "--pattern",
+    type=options.parse_pair,
+    metavar="NxM",
+    default="9x6",
+    help="Inner corners of the board per row and column, 3 to 999.",
+)
 @options.overwrite_option
 def calibrate(
     photos: tuple[Path, ...], output: Path, pattern: tuple[int, int], overwrite: bool
@@ -26,16 +29,9 @@ def calibrate(
     Computes its focal length and lens distortion. Each PHOTO is a file, or a folder of files. Take
     ten or more photographs of the whole flat board from different angles.
 
-    Parameters
-    ----------
-    output
-        Camera file to write, .yaml.
-    pattern
-        Inner corners of the board per row and column, 3 to 999.
-
-    Examples
-    --------
-    vdet calibrate chessboards/ -o camera.yaml --pattern 9x6
+    \b
+    Examples:
+      vdet calibrate chessboards/ -o camera.yaml --pattern 9x6
     """
     from vdet.lanes.calibration import calibrate as fit
     from vdet.lanes.camera import save_camera
@@ -43,15 +39,15 @@ def calibrate(
 
     if not (3 <= min(pattern) <= max(pattern) <= 999):
         raise click.UsageError("--pattern: must be 3 to 999 inner corners, such as 9x6")
-    options.check_file(output, ".yaml", ".yml", what="cameras", overwrite=overwrite)
-    found = list(find_images(photos))
+    options.check_file(output, ".yaml", ".yml", noun="cameras", overwrite=overwrite)
+    paths = list(find_images(photos))
     with progress_steps("") as steps:
-        steps(f"searching {counted(len(found), 'photograph')}", None)
-        result = fit(found, pattern)
+        steps(f"searching {counted(len(paths), 'photograph')}", None)
+        result = fit(paths, pattern)
     for path, reason in result.skipped.items():
-        log.warning("%s: not used: %s", path, reason)
+        LOG.warning("%s: not used: %s", path, reason)
     save_camera(result.camera, output, overwrite=overwrite)
     camera, (width, height) = result.camera, result.camera.size
     lens = f"focal length {camera.matrix[0][0]:.0f} px, RMS error {result.rms:.2f} px"
-    used = f"{len(result.photos)} of {len(found)} photographs used"
+    used = f"{len(result.photos)} of {len(paths)} photographs used"
     print_lines(f"{output}: {width}×{height}, {lens}, {used}")

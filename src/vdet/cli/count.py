@@ -1,6 +1,5 @@
 """`vdet count`: count the vehicles of track files at lines and in zones."""
 
-import logging
 import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -10,29 +9,44 @@ import click
 
 from vdet.cli import options
 from vdet.cli.command import command
-from vdet.cli.messages import announce, print_lines, progress_steps
-from vdet.cli.results import check_counting, counting_options
+from vdet.cli.messages import LOG, announce, print_lines, progress_steps
 from vdet.errors import counted
 from vdet.files import OutputFiles, output_errors
 
 if TYPE_CHECKING:
     from vdet.traffic.counts import Counts
 
-log = logging.getLogger("vdet")
-
 
 @command()
 @click.argument("tracks", nargs=-1, required=True, type=options.INPUT, metavar="TRACKS...")
-@counting_options
-@options.option(
-    "--size WIDTHxHEIGHT", options.parse_pair, show_default="from TRACKS, else camera.size"
+@options.counts_option
+@options.flows_option
+@options.interval_option
+@options.begin_option
+@click.option(
+    "--size",
+    type=options.parse_pair,
+    metavar="WIDTHxHEIGHT",
+    show_default="from TRACKS, else camera.size",
+    help="Frame size of the video in pixels.",
 )
-@options.option("--rate FPS", click.FloatRange(min=0, min_open=True), show_default="from TRACKS")
-@options.class_option
-@options.settings_options("traffic.min_seen_seconds=0.5")
+@click.option(
+    "--rate",
+    type=click.FloatRange(min=0, min_open=True),
+    metavar="FPS",
+    show_default="from TRACKS",
+    help="Frame rate of the video, for TRACKS without times.",
+)
+@options.classes_option
+@options.settings_options(interval="traffic.interval", begin="input.begin", classes="classes")
 @options.overwrite_option
 def count(
-    tracks: tuple[Path, ...], size: tuple[int, int] | None, rate: float | None, overwrite: bool
+    tracks: options.Paths,
+    size: tuple[int, int] | None,
+    rate: float | None,
+    source: options.SettingsSource,
+    overwrite: bool,
+    **paths: options.Paths,
 ) -> None:
     """Count the vehicles of track files at lines and in zones.
 
@@ -40,51 +54,49 @@ def count(
     are the same as those of detect-video --counts. If the clock times of TRACKS follow one another,
     a vehicle in two of them counts once.
 
-    Parameters
-    ----------
-    size
-        Frame size of the video in pixels.
-    rate
-        Frame rate of the video, for TRACKS without times.
-
-    Examples
-    --------
-    vdet count tracks.jsonl -c gate.yaml
-    vdet count tracks.jsonl -c gate.yaml --flows flows.csv --interval 15min
-    vdet count found/*.tracks.csv -c gate.yaml --counts counts.json
+    \b
+    Examples:
+      vdet count tracks.jsonl -c gate.yaml
+      vdet count tracks.jsonl -c gate.yaml --flows flows.csv --interval 15min
+      vdet count found/*.tracks.csv -c gate.yaml --counts counts.json
     """
-    from vdet.batch.inputs import VIDEO_INPUT_SUFFIXES
-
-    for path in tracks:
-        if path.suffix.lower() in VIDEO_INPUT_SUFFIXES:
-            saved = shlex.join(map(str, (path, "--no-video", "--tracks", f"{path.stem}.jsonl")))
-            raise click.UsageError(f"{path}: is a video; run first: vdet detect-video {saved}")
-    settings = options.read_settings()
+    _reject_videos(tracks)
+    settings = source.load()
     if not settings.traffic:
         raise click.UsageError("no lines or zones to count at; add a settings file with -c FILE")
-    check_counting(settings, several=len(tracks) > 1)
+    outputs = options.requested_outputs((), paths)
+    options.check_counting(settings, outputs, several=len(tracks) > 1)
     from vdet.run.sinks.protocol import check_sinks
     from vdet.traffic.counting import count_files
     from vdet.traffic.output import counts_content, flows_content
     from vdet.traffic.tables import write_content
 
-    outputs = options.wanted_outputs()
     check_sinks(outputs, overwrite=overwrite)
     with progress_steps(" files") as steps:
         advance = steps("", len(tracks) if len(tracks) > 1 else None)
         videos = count_files(tracks, settings, size, rate, advance=advance)
-    for name, counts in videos.items():
-        if counts.clock:
-            announce(f"{name}: begins {counts.clock}")
-        for warning in counts.warnings:
-            log.warning("%s: %s", name, warning)
+    for name, result in videos.items():
+        if result.clock:
+            announce(f"{name}: begins {result.clock}")
+        for warning in result.warnings:
+            LOG.warning("%s: %s", name, warning)
     with OutputFiles(overwrite=overwrite) as files:
         for output in outputs:
-            make = {"counts": counts_content, "flows": flows_content}[output.sink]
-            content = make(output.path, videos, settings.traffic.seconds)
+            content_of = {"counts": counts_content, "flows": flows_content}[output.sink]
+            content = content_of(output.path, videos, settings.traffic.seconds)
             with output_errors(output.path):
                 write_content(files.stage(output.path), content)
     print_lines(*_totals(videos), *_matrix(list(videos.values())))
+
+
+def _reject_videos(tracks: Sequence[Path]) -> None:
+    """Raise `click.UsageError` for a video, with the command that makes its tracks."""
+    from vdet.batch.inputs import VIDEO_INPUT_SUFFIXES
+
+    for path in tracks:
+        if path.suffix.lower() in VIDEO_INPUT_SUFFIXES:
+            arguments = shlex.join([str(path), "--no-video", "--tracks", f"{path.stem}.jsonl"])
+            raise click.UsageError(f"{path}: is a video; run first: vdet detect-video {arguments}")
 
 
 def _totals(videos: "Mapping[str, Counts]") -> list[str]:
@@ -92,15 +104,16 @@ def _totals(videos: "Mapping[str, Counts]") -> list[str]:
     from vdet.evaluate.output import table
     from vdet.traffic.counts import direction_totals
 
-    alone = len(videos) == 1 or not all(counts.clock for counts in videos.values())
-    totals = {name: counts.totals for name, counts in videos.items() if alone}
+    totals = {}
+    if len(videos) == 1 or not all(counts.clock for counts in videos.values()):
+        totals = {name: counts.totals for name, counts in videos.items()}
     if len(videos) > 1:
         totals["all files"] = direction_totals(list(videos.values()))
     rows = []
-    for name, item in totals.items():
-        for total in item:
+    for file, directions in totals.items():
+        for total in directions:
             classes = ", ".join(counted(number, kind) for kind, number in total.classes.items())
-            rows.append((name, total.name, total.direction, str(total.count), classes))
+            rows.append((file, total.name, total.direction, str(total.count), classes))
     return table(("file", "name", "direction", "count", "classes"), rows)
 
 

@@ -6,12 +6,12 @@ import click
 
 from vdet.cli.command import command
 from vdet.cli.messages import announce, print_lines, progress_steps
-from vdet.cli.options import PATH, option, overwrite_option
+from vdet.cli.options import PATH, number_option, overwrite_option
 
 
 @command()
 @click.argument("folder", default=Path("demo"), type=PATH, metavar="[DIR]")
-@option("--seed N", click.IntRange(min=0), default=5)
+@number_option("--seed", type=click.IntRange(min=0), default=5, help="Seed of the random scenes.")
 @overwrite_option
 def demo(folder: Path, seed: int, overwrite: bool) -> None:
     """Try the whole program on synthetic roads.
@@ -21,20 +21,15 @@ def demo(folder: Path, seed: int, overwrite: bool) -> None:
     other synthetic roads and finds the vehicles too. All results are compared with the ground
     truth. All files are written into DIR, by default demo.
 
-    Parameters
-    ----------
-    seed
-        Seed of the random scenes.
-
-    Examples
-    --------
-    vdet demo
-    vdet demo folder --seed 2 --overwrite
+    \b
+    Examples:
+      vdet demo
+      vdet demo folder --seed 2 --overwrite
     """
     from vdet.demo import MODEL, TRUTH, run_demo
 
     with progress_steps("") as steps:
-        result = run_demo(folder, seed=seed, overwrite=overwrite, announce=announce, steps=steps)
+        lines = run_demo(folder, seed=seed, overwrite=overwrite, announce=announce, steps=steps)
     files = {
         "found.mp4": "the road with the vehicles that the network found",
         "found.csv": f"their tracks; {folder / TRUTH} has the ground truth",
@@ -46,7 +41,7 @@ def demo(folder: Path, seed: int, overwrite: bool) -> None:
     paths = {str(folder / name): text for name, text in files.items()}
     width = max(map(len, paths))
     print_lines(
-        *result,
+        *lines,
         "",
         "Results:",
         *(f"  {path:{width}}  {text}" for path, text in paths.items()),

@@ -1,6 +1,5 @@
 """`vdet detect-image`: find vehicles in images."""
 
-import logging
 from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,58 +8,61 @@ import click
 
 from vdet.cli import options
 from vdet.cli.command import command
-from vdet.cli.messages import print_lines, progress_steps
+from vdet.cli.messages import LOG, print_lines, progress_steps
 from vdet.errors import ImageError, counted, failure_code
+from vdet.run.sinks import Output
 from vdet.workers import IMAGES, core_count, return_freed_memory
 
 if TYPE_CHECKING:
     from vdet.run.result import FrameResult
 
-log = logging.getLogger("vdet")
-
 
 @command()
 @click.argument("images", nargs=-1, required=True, type=options.PATH, metavar="IMAGE...")
-@options.option("-o, --output PATH", options.PATH)
-@options.option("--stages DIR")
-@options.output_option("--json FILE")
-@options.output_option("--labels FILE")
-@options.sink_option
-@options.class_option
+@options.output_file(
+    "-o",
+    "--output",
+    metavar="PATH",
+    help="Write the image with its boxes. For several images, a folder, in which they keep their "
+    "names and folders.",
+)
+@options.output_folder("--stages", help="Write an image of every stage into DIR.")
+@options.output_files("--json", help="Write the boxes to FILE. With -, to standard output.")
+@options.output_files(
+    "--labels",
+    help="Write the boxes for labelling tools: .coco.json or .yolo.zip. Can be repeated.",
+)
+@options.sinks_option
+@options.classes_option
 @options.lanes_option
-@options.settings_options("detector.min_score_still=0.5", options.model_option)
+@options.model_option
+@options.settings_options(classes="classes", lanes="lanes.enabled", model="detector.model")
 @options.overwrite_option
 def detect_image(
-    images: tuple[Path, ...], output: Path | None, stages: Path | None, overwrite: bool
+    images: options.Paths,
+    output: Path | None,
+    stages: Path | None,
+    sinks: tuple[Output, ...],
+    source: options.SettingsSource,
+    overwrite: bool,
+    **paths: options.Paths,
 ) -> int:
     """Find vehicles in images.
 
     Each IMAGE is a file, or a folder (searched recursively). Without an output option, prints the
     vehicles: class, score, and box in pixels as x, y, width and height.
 
-    Parameters
-    ----------
-    output
-        Write the image with its boxes. For several images, a folder, in which they keep their names
-        and folders.
-    stages
-        Write an image of every stage into DIR.
-    json
-        Write the boxes to FILE. With -, to standard output.
-    labels
-        Write the boxes for labelling tools: .coco.json or .yolo.zip. Can be repeated.
-
-    Examples
-    --------
-    vdet detect-image road.jpg
-    vdet detect-image road.jpg -o found.jpg --json -
-    vdet detect-image images/ -o found/ --json boxes.json
-    vdet detect-image images/ --labels images.coco.json
-    vdet detect-image road.jpg --stages stages
+    \b
+    Examples:
+      vdet detect-image road.jpg
+      vdet detect-image road.jpg -o found.jpg --json -
+      vdet detect-image images/ -o found/ --json boxes.json
+      vdet detect-image images/ --labels images.coco.json
+      vdet detect-image road.jpg --stages stages
     """
-    settings = options.read_settings()
+    settings = source.load()
     if settings.lack_of_metres:
-        log.warning("%s", settings.lack_of_metres)
+        LOG.warning("%s", settings.lack_of_metres)
     from vdet.detect.factory import load_detector
     from vdet.regions import check_masks
     from vdet.run.images import ImageSearch, find_images, plan_images, run_images
@@ -68,19 +70,19 @@ def detect_image(
 
     return_freed_memory(*IMAGES)
     check_masks(settings.regions)
-    model = load_detector(settings.detector)
-    sources = find_images(images)
-    shared = options.wanted_outputs()
-    check_sinks(shared, overwrite=overwrite)
-    jobs = plan_images(sources, output, stages, overwrite=overwrite)
-    is_printed, failed = not (output or stages or shared), 0
-    search, threads = ImageSearch(model, settings), core_count()
-    results = run_images(jobs, shared, search, overwrite=overwrite, threads=threads)
+    search = ImageSearch(load_detector(settings.detector), settings)
+    files = find_images(images)
+    outputs = options.requested_outputs(sinks, paths)
+    check_sinks(outputs, overwrite=overwrite)
+    jobs = plan_images(files, output, stages, overwrite=overwrite)
+    is_printed = not (output or stages or outputs)
+    failed = 0
+    results = run_images(jobs, outputs, search, overwrite=overwrite, threads=core_count())
     with progress_steps(" images") as steps, closing(results):
         advance = steps("", len(jobs))
         for result in results:
             if isinstance(result, ImageError):
-                log.error("%s", result)
+                LOG.error("%s", result)
                 failed += 1
             elif is_printed:
                 _print_vehicles(result)

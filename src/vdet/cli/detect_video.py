@@ -1,9 +1,7 @@
-"""`vdet detect-video`: find and follow vehicles in one video or many."""
+"""`vdet detect-video`: find and follow vehicles in one video, or in many (`vdet.cli.batch`)."""
 
-import logging
-import re
 import shlex
-from contextlib import closing
+from collections.abc import Sequence
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
@@ -11,69 +9,115 @@ from typing import TYPE_CHECKING
 
 import click
 
-from vdet.cli import options
+from vdet.cli import batch, options
 from vdet.cli.command import command
-from vdet.cli.messages import announce, print_lines, progress_steps
-from vdet.cli.results import check_counting, counting_options
-from vdet.errors import DOUBTFUL, counted, failure_code
+from vdet.cli.messages import announce, progress_steps
+from vdet.errors import DOUBTFUL, counted
 from vdet.run.sinks import Output
-from vdet.workers import DaskCluster, LocalProcesses, Workers, core_count
 
 if TYPE_CHECKING:
-    from vdet.batch.manifest import Record
-    from vdet.batch.run import Plan
     from vdet.run.video import Run
 
-log = logging.getLogger("vdet")
 
-_SUFFIX = re.compile(r"(\.[a-z0-9_-]+)+", re.ASCII)
-"""The ending of an output's name, such as `.csv` or `.cars.csv`."""
+_HEADINGS = {
+    "no_video": "Outputs",
+    "start": "Input",
+    "folder": "Batch",
+    "threads": "Parallel work",
+    "lanes": "Model and settings",
+    "quiet": "General",
+}
 
 
-@command()
+@command(headings=_HEADINGS)
 @click.argument("videos", nargs=-1, required=True, type=options.PATH, metavar="IN [OUT] | CLIP...")
-@options.option("--no-video")
-@options.output_option("--tracks FILE")
-@options.output_option("--vehicles FILE")
-@options.output_option("--crops DIR")
-@options.output_option("--page DIR")
-@options.output_option("--clips DIR")
-@options.short_form("--margin SECONDS", "clips.margin", float)
-@options.short_form("--exact", "clips.exact")
-@counting_options
-@options.sink_option
+@click.option("--no-video", is_flag=True, help="Do not write a video, only other outputs.")
+@options.output_files(
+    "--tracks",
+    help="Write the boxes of every frame: .txt (MOTChallenge), .csv, .jsonl, .coco.json, "
+    ".kitti.txt or .yolo.zip. With -, write .jsonl to standard output. Can be repeated.",
+)
+@options.output_files("--vehicles", help="Write a record of each vehicle: .csv, .json or .parquet.")
+@options.output_folders("--crops", help="Write the best image of each vehicle into DIR.")
+@options.output_folders("--page", help="Write a report about the vehicles, page.html, into DIR.")
+@options.output_folders(
+    "--clips",
+    help="Write a clip of each time span with vehicles into DIR. With lines or zones, only counted "
+    "vehicles have clips.",
+)
+@click.option(
+    "--margin", type=float, metavar="SECONDS", help="Time added around each clip (`clips.margin`)."
+)
+@click.option(
+    "--exact", is_flag=True, help="Cut clips at exact frames, by encoding again (`clips.exact`)."
+)
+@options.counts_option
+@options.flows_option
+@options.interval_option
+@options.sinks_option
+@options.output_folders(
+    "--stages", help="Write an image of every stage of one frame into DIR. Requires --at."
+)
+@options.time_option("--at", help="Time of the frame for --stages.")
+@options.classes_option
+@options.overwrite_option
 @options.start_option
 @options.end_option
-@options.option("--frames N", options.POSITIVE)
-@options.short_form("--stride N", "detector.stride", click.IntRange(1, 100))
-@options.option("--threads N", options.PROCESSES, show_default="one per core, shared by --jobs")
-@options.output_option("--stages DIR")
-@options.class_option
-@options.option(f"--at {options.TIME_FORM}", options.parse_time)
-@options.option("--strict")
-@options.option("-d, --directory DIR", name="folder")
-@options.jobs_option
-@options.option("--skip-existing")
-@options.option("--dry-run")
-@options.scheduler_option
+@options.number_option("--frames", help="Process at most N frames.")
+@options.number_option(
+    "--stride", type=click.IntRange(1, 100), help="Search every N-th frame (`detector.stride`)."
+)
+@options.begin_option
+@click.option("--strict", is_flag=True, help="Exit with code 4 if a result is doubtful.")
+@options.output_folder(
+    "-d", "--directory", "folder", help="Process every CLIP, and write the outputs into DIR."
+)
+@click.option(
+    "--skip-existing", is_flag=True, help="With -d: skip videos whose outputs are all up to date."
+)
+@click.option("--dry-run", is_flag=True, help="With -d: list what would be written, and stop.")
+@options.number_option(
+    "--threads",
+    type=options.PROCESSES,
+    show_default="one per core, shared by --jobs",
+    help="Search one video in N threads.",
+)
+@options.jobs_option(help="With -d: process N videos at once.")
+@click.option(
+    "--scheduler",
+    metavar="ADDRESS",
+    help="With -d: use this Dask scheduler, such as tcp://host:8786.",
+)
 @options.lanes_option
-@options.settings_options("output.crf=18", options.model_option)
-@options.overwrite_option
+@options.model_option
+@options.settings_options(
+    margin="clips.margin",
+    exact="clips.exact",
+    interval="traffic.interval",
+    classes="classes",
+    stride="detector.stride",
+    begin="input.begin",
+    lanes="lanes.enabled",
+    model="detector.model",
+)
 def detect_video(
-    videos: tuple[Path, ...],
+    videos: options.Paths,
     no_video: bool,
+    sinks: tuple[Output, ...],
+    at: Fraction | None,
+    overwrite: bool,
     start: Fraction | None,
     end: Fraction | None,
     frames: int | None,
-    threads: int | None,
-    at: Fraction | None,
     strict: bool,
     folder: Path | None,
-    jobs: int | None,
     skip_existing: bool,
     dry_run: bool,
+    threads: int | None,
+    jobs: int | None,
     scheduler: str | None,
-    overwrite: bool,
+    source: options.SettingsSource,
+    **paths: options.Paths,
 ) -> int:
     """Find and follow vehicles in one video or many.
 
@@ -82,155 +126,96 @@ def detect_video(
 
     With -d DIR, every CLIP is processed. A CLIP is a video, a folder (searched recursively), or a
     quoted pattern such as 'day*/*.mp4'. The outputs go into DIR, with a record of each video in
-    manifest.jsonl.
+    manifest.jsonl. Options such as --tracks then take only the ending of the names, such as .csv,
+    or .crops for a folder.
 
-    Parameters
-    ----------
-    no_video
-        Do not write a video, only other outputs.
-    tracks
-        Write the boxes of every frame: .txt (MOTChallenge), .csv, .jsonl, .coco.json, .kitti.txt or
-        .yolo.zip. With -, write .jsonl to standard output. With -d, only the ending of the names.
-        Can be repeated.
-    vehicles
-        Write a record of each vehicle: .csv, .json or .parquet. With -d, only the ending of the
-        names.
-    crops
-        Write the best image of each vehicle into DIR. With -d, an ending such as .crops.
-    page
-        Write a report about the vehicles, page.html, into DIR. With -d, an ending such as .page.
-    clips
-        Write a clip of each time span with vehicles into DIR. With lines or zones, only counted
-        vehicles have clips. With -d, an ending such as .clips.
-    margin
-        Time added to a clip before and after (`clips.margin`).
-    exact
-        Cut clips at exact frames by encoding them again. By default, whole key-frame intervals are
-        copied (`clips.exact`).
-    counts
-        Write counts at lines and zones: .csv has the events, .totals.csv, .wide.csv and .zones.csv
-        have tables by interval, .json has everything. Can be repeated. With -d, only the ending of
-        the names.
-    flows
-        Write flows from one line or zone to another: .csv has a row for each interval, flow and
-        class, .wide.csv has a row for each interval, with sums, .matrix.csv has a matrix, .json has
-        the flows and the matrix. Can be repeated. With -d, only the ending of the names.
-    frames
-        Process at most N frames.
-    stride
-        Search every N-th frame (`detector.stride`).
-    threads
-        Search one video in N threads.
-    stages
-        Write an image of every stage of one frame into DIR. Requires --at.
-    at
-        Time of the frame for --stages.
-    strict
-        Exit with code 4 if a result is doubtful. Outputs are still written.
-    folder
-        Process every CLIP, and write the outputs into DIR.
-    jobs
-        With -d: process N videos at once.
-    skip_existing
-        With -d: skip videos whose outputs are all up to date.
-    dry_run
-        With -d: list what would be written, and stop.
-
-    Examples
-    --------
-    vdet detect-video in.mp4
-    vdet detect-video in.mp4 out.mp4 --tracks out.csv
-    vdet detect-video in.mp4 --no-video --tracks - --start 1:30 --end 2:00
-    vdet detect-video in.mp4 --no-video --stages stages --at 12.5
-    vdet detect-video in.mp4 --no-video -c gate.yaml --flows flows.csv --interval 15min
-    vdet detect-video clips/ -d found --tracks .jsonl --skip-existing
+    \b
+    Examples:
+      vdet detect-video in.mp4
+      vdet detect-video in.mp4 out.mp4 --tracks out.csv
+      vdet detect-video in.mp4 --no-video --tracks - --start 1:30 --end 2:00
+      vdet detect-video in.mp4 --no-video --stages stages --at 12.5
+      vdet detect-video in.mp4 --no-video -c gate.yaml --flows flows.csv --interval 15min
+      vdet detect-video clips/ -d found --tracks .jsonl --skip-existing
     """
-    outputs = options.wanted_outputs()
-    for_batch = jobs or skip_existing or dry_run or scheduler
-    is_reversed = start is not None and end is not None and end <= start
+    outputs = options.requested_outputs(sinks, paths)
     has_stages = any(output.sink == "stages" for output in outputs)
-    has_nothing = no_video and not outputs and (folder or len(videos) < 2)
-    for is_wrong, words in (
-        (for_batch and not folder, "--jobs, --skip-existing, --dry-run and --scheduler require -d"),
-        (overwrite and skip_existing, "--overwrite and --skip-existing cannot be used together"),
-        (jobs and scheduler, "--jobs and --scheduler cannot be used together"),
-        (is_reversed, "--end must be later than --start"),
-        ((at is None) == has_stages, "--stages and --at must be used together"),
-        (has_nothing, "no output; add one, such as --tracks"),
-    ):
-        if is_wrong:
-            raise click.UsageError(words)
-    source = Path()
+    if has_stages != (at is not None):
+        raise click.UsageError("--stages and --at must be used together")
+    if start is not None and end is not None and end <= start:
+        raise click.UsageError("--end must be later than --start")
     if folder is None:
-        source, outputs = _in_and_out(videos, outputs, no_video=no_video)
-    settings = options.read_settings()
-    check_counting(settings, several=folder is not None)
+        if jobs or skip_existing or dry_run or scheduler:
+            raise click.UsageError("--jobs, --skip-existing, --dry-run and --scheduler require -d")
+        outputs = _with_video(videos, outputs, no_video=no_video)
+    settings = source.load()
+    options.check_counting(settings, outputs, several=folder is not None)
     from vdet.regions import check_masks
     from vdet.run.video import Run
 
     check_masks(settings.regions)
-    if folder is not None:
-        outputs = _with_endings(outputs, no_video=no_video)
-    part = start, end, frames, at or Fraction(0)
-    run = Run(source, tuple(outputs), settings, *part, overwrite, threads)
+    run = Run(
+        source=videos[0],
+        outputs=tuple(outputs),
+        settings=settings,
+        start=start,
+        end=end,
+        frames=frames,
+        at=at or Fraction(0),
+        overwrite=overwrite,
+        threads=threads,
+    )
     if folder is None:
-        code, is_doubtful = 0, _process_one(run)
+        code, is_doubtful = 0, _process_video(run)
     else:
-        from vdet.batch.run import make_plan
-
-        if scheduler:  # the workers were started in other folders
-            videos, folder = tuple(clip.absolute() for clip in videos), folder.absolute()
-        plan = make_plan(videos, folder, run, skip_existing=skip_existing)
-        if dry_run:
-            return _print_plan(plan)
-        code, is_doubtful = _process_batch(plan, jobs, scheduler)
+        code, is_doubtful = batch.process_videos(
+            videos,
+            folder,
+            run,
+            no_video=no_video,
+            skip_existing=skip_existing,
+            dry_run=dry_run,
+            jobs=jobs,
+            scheduler=scheduler,
+        )
     return code or (DOUBTFUL if strict and is_doubtful else 0)
 
 
-def _in_and_out(
-    clips: tuple[Path, ...], wanted: list[Output], *, no_video: bool
-) -> tuple[Path, list[Output]]:
-    """Return the source, and all outputs including the video."""
-    source, *videos = clips
-    is_beside = not (no_video or wanted or videos or source.is_dir() or "%" in source.name)
-    if no_video == bool(videos) and not is_beside:
+def _with_video(paths: Sequence[Path], outputs: list[Output], *, no_video: bool) -> list[Output]:
+    """Return all outputs for `paths`, which are IN and OUT, or only IN.
+
+    Without any output, the video is written beside its source. Raises `click.UsageError`.
+    """
+    source, *videos = paths
+    if no_video and not videos:
+        if not outputs:
+            raise click.UsageError("no output; add one, such as --tracks")
+        return outputs
+    has_default = not (no_video or outputs or videos or source.is_dir() or "%" in source.name)
+    if no_video or not (videos or has_default):
         raise click.UsageError("pass either OUT or --no-video; for several videos, add -d DIR")
     from vdet.media.writer import may_replace_video
-    from vdet.run.sinks.protocol import sink_kind
 
-    if is_beside:
-        from vdet.batch.inputs import DRAWN
-
-        suffix = sink_kind("video").suffix_for(source)
-        videos = [source.with_name(f"{source.stem}{DRAWN}{suffix}")]
-    is_kept = any(path.is_file() and not may_replace_video(path) for path in videos[:1])
-    if len(videos) > 1 or is_kept:
-        shown = shlex.join(map(str, clips[:2])) + (" …" if len(clips) > 2 else "")
+    if has_default:
+        videos = [_beside(source)]
+    if len(videos) > 1 or (videos[0].is_file() and not may_replace_video(videos[0])):
+        shown = shlex.join(map(str, paths[:2])) + (" …" if len(paths) > 2 else "")
         raise click.UsageError(
             f"{videos[0]} would be replaced, but vdet did not write it; remove it, or for several "
             f"videos use a folder: vdet detect-video {shown} -d found"
         )
-    return source, [*(Output("video", path) for path in videos), *wanted]
+    return [Output("video", videos[0]), *outputs]
 
 
-def _with_endings(outputs: list[Output], *, no_video: bool) -> list[Output]:
-    """Return the outputs of a batch, whose paths are endings of names."""
+def _beside(source: Path) -> Path:
+    """Return the name of the video that is written without any output option."""
+    from vdet.batch.inputs import DRAWN
     from vdet.run.sinks.protocol import sink_kind
 
-    endings = []
-    for output in outputs:
-        sink, kind, suffix = output.sink, sink_kind(output.sink), str(output.path).lower()
-        if kind.takes == "images" or kind.one_frame:
-            raise click.UsageError(f"{sink}: cannot be written with -d; remove one of them")
-        if not _SUFFIX.fullmatch(suffix) or not kind.takes_name(f"video{suffix}"):
-            known = ", ".join(kind.endings) or f"as in .{sink if kind.folder_pattern else 'txt'}"
-            raise click.UsageError(f"{sink}: with -d, pass only the ending of the names: {known}")
-        endings.append(Output(sink, Path(suffix)))
-    has_video = no_video or any(output.sink == "video" for output in outputs)
-    return endings if has_video else [Output("video", Path()), *endings]
+    return source.with_name(f"{source.stem}{DRAWN}{sink_kind('video').suffix_for(source)}")
 
 
-def _process_one(run: "Run") -> bool:
+def _process_video(run: "Run") -> bool:
     """Process a video, and return whether the result is doubtful."""
     from vdet.detect.factory import load_detector
     from vdet.run.loop import Parts
@@ -242,56 +227,11 @@ def _process_one(run: "Run") -> bool:
     with progress_steps(" frames") as steps:
         steps("opening", None)
         totals = run_video(run, parts, progress=partial(steps, ""))
+    numbers = f"{counted(totals.frames, 'frame')}, {counted(totals.tracks, 'track')}"
     rate = totals.frames / totals.seconds
-    found = f"{counted(totals.frames, 'frame')}, {counted(totals.tracks, 'track')}"
-    announce(f"{run.source}: {found}, {totals.seconds:.1f} s, {rate:.1f} frames/s")
+    announce(f"{run.source}: {numbers}, {totals.seconds:.1f} s, {rate:.1f} frames/s")
     paths = [output.path for output in run.outputs if output.path != STANDARD_OUTPUT]
     announce(*(f"{path}: written" for path in paths))
     if totals.clock and run.settings.traffic:
         announce(f"{run.source}: begins {totals.clock}")
     return findings_in(totals.facts).is_doubtful
-
-
-def _print_plan(plan: "Plan") -> int:
-    for runs, form in ((plan.skipped, "{}: {} up to date"), (plan.runs, "{} → {}")):
-        for run in runs:
-            print_lines(form.format(run.source, ", ".join(str(item.path) for item in run.outputs)))
-    return 0
-
-
-def _process_batch(plan: "Plan", jobs: int | None, scheduler: str | None) -> tuple[int, bool]:
-    """Process a batch; return the exit code, and whether a result is doubtful."""
-    from vdet.batch.run import run_batch
-
-    cores = core_count()
-    jobs = max(1, min(jobs or cores, len(plan.runs)))
-    workers: Workers = LocalProcesses(jobs)
-    if scheduler:
-        workers, jobs = DaskCluster(scheduler), cores  # a thread for each file
-    records = []
-    with (
-        progress_steps(" files") as steps,
-        closing(run_batch(plan, workers=workers, threads=max(1, cores // jobs))) as results,
-    ):
-        advance = steps("", len(plan.runs))
-        for run, record in results:
-            _print_result(run, record)
-            records.append(record)
-            advance(1)
-    failed = sum(record.error is not None for record in records)
-    skipped = f"{len(plan.skipped)} skipped, " if plan.skipped else ""
-    done = counted(len(records) - failed, "file")
-    announce(f"{plan.folder}: {done} done, {skipped}{failed} failed")
-    code = failure_code(failed, len(plan.runs) + len(plan.skipped))
-    return code, any(record.is_doubtful for record in records)
-
-
-def _print_result(run: "Run", record: "Record") -> None:
-    for warning in record.warnings:
-        log.warning("%s", warning)
-    if record.error:
-        log.error("%s", record.error)
-    else:
-        found = f"{counted(record.frames or 0, 'frame')}, {counted(record.tracks or 0, 'track')}"
-        begin = f", begins {record.begin}" if record.begin and run.settings.traffic else ""
-        announce(f"{run.source}: {found}, {record.seconds:.1f} s{begin}")

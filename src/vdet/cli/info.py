@@ -3,20 +3,22 @@
 import math
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import asdict
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from vdet.cli.command import command
 from vdet.cli.messages import print_lines
-from vdet.cli.options import INPUT, config_names, read_settings, settings_options
+from vdet.cli.options import INPUT, SettingsSource, settings_options
 from vdet.cli.results import ResultFiles, facts_options
 from vdet.errors import counted, in_one_line, opencv_fault, printable
 from vdet.version import __version__
 from vdet.workers import core_count
+
+if TYPE_CHECKING:
+    from vdet.config.schema import Settings
 
 Facts = dict[str, Any]
 """Values for JSON by name; each is also a line of text."""
@@ -31,9 +33,9 @@ _ANY_SIZE = 1000, 1000
 @command()
 @click.argument("path", type=INPUT, metavar="[FILE]", required=False)
 @facts_options
-@settings_options("camera.size=[960,540]")
-def info(path: Path | None, **targets: Any) -> int:
-    """Describe a video, an image, a model file, the settings of a camera, or this machine.
+@settings_options()
+def info(path: Path | None, source: SettingsSource, results: ResultFiles) -> int:
+    """Describe a video, image, model or camera, or check this machine.
 
     FILE is a video, numbered images, an image, a linear model (.npz), or a network (.onnx) of vdet
     or of another tool. For a model, --json also writes how it was trained. Without FILE, checks the
@@ -41,38 +43,52 @@ def info(path: Path | None, **targets: Any) -> int:
     pixel on speeds. With neither, checks packages, codecs and the shipped models; the exit code is
     1 if something that vdet needs does not work.
 
-    Examples
-    --------
-    vdet info in.mp4
-    vdet info model.npz --json -
-    vdet info -c gate.yaml
-    vdet info
+    \b
+    Examples:
+      vdet info in.mp4
+      vdet info model.npz --json -
+      vdet info -c gate.yaml
+      vdet info
     """
+    results.check()
+    settings = source.load()
+    if path:
+        facts = {"file": str(path), **_file(path, settings)}
+    elif source.configs:
+        facts = {"file": " ".join(source.configs), **_camera(settings)}
+    else:
+        facts = _machine()
+    lines = [
+        f"{name.replace('_', ' ')}: {_text(value)}"
+        for name, value in facts.items()
+        if name != "provenance"
+    ]
+    results.print(lines, facts)
+    return int(facts.get("works") is False)
+
+
+def _file(path: Path, settings: "Settings") -> Facts:
     from vdet.media.images import is_image_name
 
-    results = ResultFiles(**targets).checked()
-    if path is None:
-        facts = _settings() if config_names() else _machine()
-    else:
-        describe = {".npz": _linear_model, ".onnx": _network}.get(path.suffix.lower())
-        if describe is None:
-            describe = _image if is_image_name(path) and "%" not in path.name else _video
-        facts = {"file": str(path)} | describe(path)
-    shown = {name.replace("_", " "): facts[name] for name in facts if name != "provenance"}
-    results.print([f"{name}: {_text(value)}" for name, value in shown.items()], facts)
-    return int(facts.get("works") is False)
+    if path.suffix.lower() == ".npz":
+        return _linear_model(path)
+    if path.suffix.lower() == ".onnx":
+        return _network(path)
+    if is_image_name(path) and "%" not in path.name:
+        return _image(path)
+    return _video(path, settings)
 
 
 def _machine() -> Facts:
     """Return the state of everything that vdet needs, and whether all of it works."""
     from vdet.config.loading import shipped_configs
 
-    found = {"vdet": f"{__version__}, on {core_count()} cores", **dict(_packages())}
-    found["cv2"] = f"{_BROKEN}; {fault}" if (fault := opencv_fault()) else "ok"
-    found["codec h264"] = _checked(_codec)
+    states = {"vdet": f"{__version__}, on {core_count()} cores", **dict(_packages())}
+    states["cv2"] = f"{_BROKEN}; {fault}" if (fault := opencv_fault()) else "ok"
+    states["codec h264"] = _checked(_codec)
     for name, path in shipped_configs().items():
-        found[f"settings {name}"] = _checked(partial(_shipped, path))
-    return found | {"works": not any(text.startswith(_BROKEN) for text in found.values())}
+        states[f"settings {name}"] = _checked(partial(_shipped, path))
+    return states | {"works": not any(text.startswith(_BROKEN) for text in states.values())}
 
 
 def _packages() -> Iterator[tuple[str, str]]:
@@ -114,17 +130,15 @@ def _shipped(path: Path) -> str:
     return f"{path}, its model loads"
 
 
-def _settings() -> Facts:
+def _camera(settings: "Settings") -> Facts:
     """Return lines, zones and the fit of the ground points in the settings of a camera."""
     from vdet.lanes.ground import ground_of
     from vdet.traffic.crossings import place
     from vdet.traffic.speeds import KMH, precision_at
 
-    settings = read_settings()
     size = settings.camera.size or _ANY_SIZE
     lines, zones = place(settings.traffic, *size)
     facts: Facts = {
-        "file": " ".join(config_names()),
         "kind": "settings of a camera",
         "lines": [line.name for line in lines],
         "zones": [zone.name for zone in zones],
@@ -177,74 +191,55 @@ def _network(path: Path) -> Facts:
     from vdet.detect.onnx.recognition import recognize
     from vdet.detect.onnx.session import Session
 
-    found = recognize(Session(path)).for_frames(1280, 720)
+    network = recognize(Session(path)).for_frames(1280, 720)
     return {
         "kind": "network",
-        "form": found.name,
-        "input_for_1280x720": f"{found.form.width}x{found.form.height}",
-        "classes": [name for name in found.names if our_name(name)],
-        "other_classes": [name for name in found.names if not our_name(name)],
+        "form": network.name,
+        "input_for_1280x720": f"{network.form.width}x{network.form.height}",
+        "classes": [name for name in network.names if our_name(name)],
+        "other_classes": [name for name in network.names if not our_name(name)],
         "trained_on": list(trained_on(path)),
-        "provenance": found.header.provenance if found.header else {},
+        "provenance": network.header.provenance if network.header else {},
     }
 
 
 def _image(path: Path) -> Facts:
-    from vdet.detect.svm.horizon import find_horizon
     from vdet.media.images import read_image
 
-    image = read_image(path)
-    height, width = image.shape[:2]
-    return {"kind": "image", "width": width, "height": height, "horizon": find_horizon([image])}
+    height, width = read_image(path).shape[:2]
+    return {"kind": "image", "width": width, "height": height}
 
 
-def _video(path: Path) -> Facts:
-    from vdet.detect.svm.horizon import find_horizon
-    from vdet.errors import VideoError
-    from vdet.media.demux import is_pipe, open_input, video_stream
+def _video(path: Path, settings: "Settings") -> Facts:
     from vdet.media.reader import VideoReader
-    from vdet.run.loop import FIRST_FRAMES
+    from vdet.traffic.clock import find_clock
 
-    if is_pipe(path):
-        raise VideoError(f"{path}: can be read only once; save it to a file first")
-    with VideoReader(path, frames=FIRST_FRAMES) as reader:
-        info, images = reader.info, [frame.image for frame in reader]
-    with open_input(path) as container:
-        context = video_stream(container, path).codec_context
-        return {
-            "kind": "video",
-            "container": container.format.long_name,
-            "bytes": max(0, container.size or 0),
-            "codec": context.name,
-            "pixel_format": context.pix_fmt,
-            "width": info.width,
-            "height": info.height,
-            **asdict(info.orientation),
-            "declared_frames": info.frames,
-            "rate": float(info.rate),
-            "start": float(info.start),
-            "seconds": None if info.duration is None else float(info.duration),
-            "audio": [
-                sound.codec_context.name if sound.codec_context else "unknown"
-                for sound in container.streams.audio
-            ],
-            **asdict(info.tags),
-            "horizon": find_horizon(images),
-        }
+    with VideoReader(path, settings=settings.input) as reader:
+        video = reader.info
+    clock = find_clock(path, settings, video.tags.creation_time, float(video.start))
+    return {
+        "kind": "video",
+        "width": video.width,
+        "height": video.height,
+        "rate": float(video.rate),
+        "declared_frames": video.frames,
+        "seconds": None if video.duration is None else float(video.duration),
+        "begins": clock and str(clock),
+    }
 
 
 @command()
-@settings_options("tracker.kind=rules")
-def config() -> None:
+@settings_options()
+def config(source: SettingsSource) -> None:
     """Print the effective settings as commented YAML.
 
     Save them, change what you like, and pass the file to a command with -c.
 
-    Examples
-    --------
-    vdet config > my.yaml
-    vdet config -c seed --set output.crf=18
+    \b
+    Examples:
+      vdet config > my.yaml
+      vdet config -c seed --set output.crf=18
     """
     from vdet.config.rendering import render_settings
 
-    print_lines(*render_settings(read_settings()).splitlines())
+    print_lines(*render_settings(source.load()).splitlines())

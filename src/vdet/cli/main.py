@@ -18,7 +18,7 @@ cli = Program(
     "vdet",
     help="Find and follow vehicles in road video on an ordinary CPU.",
     params=verbosity_options(),
-    context_settings={"help_option_names": ["-h", "--help"]},
+    context_settings={"help_option_names": ["-h", "--help"], "show_default": True},
 )
 click.version_option(__version__, prog_name="vdet")(cli)
 
@@ -29,7 +29,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     Exit codes are in `vdet.errors`. An error is one line on standard error; with `VDET_DEBUG=1` in
     the environment a traceback follows.
     """
-    set_up_logs(verbose=False, quiet=False)
+    set_up_logs()
     try:
         with recorded_inputs():
             code = cli.main(arguments, prog_name="vdet", standalone_mode=False)

@@ -18,6 +18,7 @@ from vdet.progress import Advance, Steps, no_steps
 if TYPE_CHECKING:
     from tqdm import tqdm
 
+LOG = logging.getLogger("vdet")
 REFRESH_INTERVAL = 1.0  # seconds
 
 
@@ -40,9 +41,8 @@ def print_lines(*lines: str, err: bool = False) -> None:
 
 
 def is_quiet() -> bool:
-    """Return whether the running command has `--quiet`."""
-    context = click.get_current_context(silent=True)
-    return bool(context and context.obj)
+    """Return whether `--quiet` is set: only errors are logged."""
+    return LOG.level >= logging.ERROR
 
 
 def announce(*lines: str) -> None:
@@ -59,12 +59,11 @@ class _LogHandler(logging.Handler):
         print_lines(f"vdet: {mark}{record.getMessage()}", err=True)
 
 
-def set_up_logs(*, verbose: bool, quiet: bool) -> None:
-    """Print the log records of vdet: warnings and errors; all, or only errors, as set."""
-    log = logging.getLogger("vdet")
-    log.handlers = [_LogHandler()]
-    log.propagate = False
-    log.setLevel(logging.ERROR if quiet else logging.DEBUG if verbose else logging.WARNING)
+def set_up_logs() -> None:
+    """Print the warnings and errors that vdet logs; `--quiet` and `--verbose` change the level."""
+    LOG.handlers = [_LogHandler()]
+    LOG.propagate = False
+    LOG.setLevel(logging.WARNING)
     # Messages of Pillow about damaged images are for developers.
     logging.getLogger("PIL").addHandler(logging.NullHandler())
     warnings.filterwarnings("ignore", module="PIL")
@@ -86,11 +85,11 @@ def progress_steps(unit: str) -> Iterator[Steps]:
         return
     with ExitStack() as stack:
 
-        def start(what: str, total: int | None) -> Advance:
+        def start(step: str, total: int | None) -> Advance:
             stack.close()
-            timed = total is None and bool(what)
-            form = "{desc} [{elapsed}]" if timed else None
-            bar = live_bar(total=total, desc=what, unit=unit, leave=not timed, bar_format=form)
+            is_timed = total is None and bool(step)
+            form = "{desc} [{elapsed}]" if is_timed else None
+            bar = live_bar(total=total, desc=step, unit=unit, leave=not is_timed, bar_format=form)
             return stack.enter_context(bar).update
 
         yield start

@@ -1,33 +1,32 @@
-"""Where a command writes its results: text, JSON and a page; options for counting."""
+"""Where a command writes its results: text, JSON and a page."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from vdet.cli import options
 from vdet.cli.messages import print_lines, progress_steps
-from vdet.cli.options import F, option, overwrite_option, short_form
+from vdet.cli.options import Function, output_folder, overwrite_option
 from vdet.errors import OutputError
 from vdet.files import OutputFiles, check_output, json_text, output_errors, print_now, write_text
 
 if TYPE_CHECKING:
-    from vdet.config.schema import Settings
     from vdet.evaluate.report import Report
 
 
 @dataclass(frozen=True, slots=True)
 class ResultFiles:
-    """Where a command writes its results, from the values of `results_options`."""
+    """Where a command writes its results: see `results_options`."""
 
     json_target: str | None
     overwrite: bool
     page: Path | None = None
 
-    def checked(self) -> Self:
-        """Return self, after checking that the outputs can be written, before any work.
+    def check(self) -> None:
+        """Check that the outputs can be written, before any work.
 
         Raises
         ------
@@ -41,16 +40,18 @@ class ResultFiles:
         for path in paths:
             makes_folder = self.page is not None and self.page.is_relative_to(path.parent)
             check_output(path, overwrite=self.overwrite, makes_folder=makes_folder)
-        return self
 
     @property
     def _files(self) -> dict[str, Path]:
         """The files to write, by kind."""
         from vdet.pages.render import PAGE_NAME
 
-        page = self.page and self.page / PAGE_NAME
-        targets = {"numbers": self.json_target, "page": page}
-        return {what: Path(to) for what, to in targets.items() if to not in (None, "-")}
+        files = {}
+        if self.json_target is not None and self.json_target != "-":
+            files["numbers"] = Path(self.json_target)
+        if self.page:
+            files["page"] = self.page / PAGE_NAME
+        return files
 
     def print(
         self,
@@ -62,10 +63,10 @@ class ResultFiles:
         to_stderr = self.json_target == "-"
         print_lines(*lines, err=to_stderr)
         with OutputFiles(overwrite=self.overwrite) as files:
-            for what, path in self._files.items():
+            for kind, path in self._files.items():
                 with progress_steps("") as steps, output_errors(path):
-                    steps(f"writing the {what}", None)
-                    text = make_page() if what == "page" else json_text(values)
+                    steps(f"writing the {kind}", None)
+                    text = make_page() if kind == "page" else json_text(values)
                     write_text(files.stage_folder(path.parent) / path.name, text)
             if to_stderr:
                 print_now(json_text(values))
@@ -77,36 +78,27 @@ class ResultFiles:
         self.print(report.lines(), report.values, report.page)
 
 
-_json_option = option("--json FILE", str, name="json_target")
-_page_option = option("--page DIR")
+def facts_options(command: Function) -> Function:
+    """Add `--json FILE` and `--overwrite`; the command receives them as `results`."""
+
+    @click.option(
+        "--json",
+        "json_target",
+        metavar="FILE",
+        help="Write the results to FILE. With -, to standard output, and the text to standard "
+        "error.",
+    )
+    @overwrite_option
+    @wraps(command)
+    def with_results(
+        json_target: str | None, overwrite: bool, page: Path | None = None, **values: Any
+    ) -> Any:
+        return command(results=ResultFiles(json_target, overwrite, page), **values)
+
+    return with_results
 
 
-def facts_options(command: F) -> F:
-    """Add `--json FILE` and `--overwrite`: arguments of `ResultFiles`."""
-    return _json_option(overwrite_option(command))
-
-
-def results_options(command: F) -> F:
-    """Add `--json FILE`, `--page DIR` and `--overwrite`: arguments of `ResultFiles`."""
-    return _json_option(_page_option(overwrite_option(command)))
-
-
-def check_counting(settings: "Settings", *, several: bool) -> None:
-    """Raise `click.UsageError` if the settings do not fit the outputs or the videos."""
-    tables = {output.sink for output in options.wanted_outputs()} & {"counts", "flows"}
-    if tables and not settings.traffic:
-        raise click.UsageError(
-            f"--{min(tables)} needs lines or zones; add a settings file with -c FILE"
-        )
-    if settings.input.begin and several:
-        raise click.UsageError(
-            "input.begin is for one video; for several set a pattern of their names, "
-            "camera.clock.pattern"
-        )
-
-
-def counting_options(command: F) -> F:
-    """Add `--counts`, `--flows`, and the short forms `--interval` and `--begin`."""
-    counts, flows = map(options.output_option, ("--counts FILE", "--flows FILE"))
-    interval = short_form("--interval TIME", "traffic.interval")
-    return counts(flows(interval(short_form("--begin TIME", "input.begin")(command))))
+def results_options(command: Function) -> Function:
+    """Add `--page DIR` to `facts_options`."""
+    page_option = output_folder("--page", help="Write a report with charts, page.html, into DIR.")
+    return page_option(facts_options(command))

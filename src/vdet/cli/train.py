@@ -7,6 +7,7 @@ import click
 from vdet.cli import options
 from vdet.cli.command import command
 from vdet.cli.messages import live_bar, print_lines, progress_steps
+from vdet.cli.options import Paths, SettingsSource
 from vdet.errors import DataError, counted
 from vdet.files import check_output
 from vdet.workers import limit_library_threads
@@ -14,11 +15,13 @@ from vdet.workers import limit_library_threads
 
 @command()
 @click.argument("data", nargs=-1, required=True, type=options.INPUT, metavar="DATA...")
-@options.output_file_option
-@options.settings_options("train.svm.C=1e-4")
-@options.jobs_option
+@options.output_file("-o", "--output", required=True, help="Model file to write, .npz.")
+@options.settings_options()
+@options.jobs_option(help="Compute features in N threads.")
 @options.overwrite_option
-def train(data: tuple[Path, ...], output: Path, jobs: int | None, overwrite: bool) -> None:
+def train(
+    data: Paths, output: Path, source: SettingsSource, jobs: int | None, overwrite: bool
+) -> None:
     """Train a linear model on labelled patches.
 
     Each DATA is a folder or a zip file with images in vehicles/<group>/ and non-vehicles/<group>/.
@@ -26,20 +29,13 @@ def train(data: tuple[Path, ...], output: Path, jobs: int | None, overwrite: boo
     each patch; with it the model also learns to find the sides of vehicles. The metrics are
     printed and stored in the model; vdet info --json reads them.
 
-    Parameters
-    ----------
-    output
-        Model file to write, .npz.
-    jobs
-        Compute features in N threads.
-
-    Examples
-    --------
-    vdet train vehicles.zip non-vehicles.zip mined.zip -o model.npz
-    vdet train patches/ -o model.npz --set train.svm.C=1e-3
+    \b
+    Examples:
+      vdet train vehicles.zip non-vehicles.zip mined.zip -o model.npz
+      vdet train patches/ -o model.npz --set train.svm.C=1e-3
     """
-    settings = options.read_settings(detector="svm")
-    options.check_file(output, ".npz", what="models", overwrite=overwrite)
+    settings = source.load(detector="svm")
+    options.check_file(output, ".npz", noun="models", overwrite=overwrite)
     from vdet.detect.svm.model import save_model
     from vdet.learn.svm.dataset import find_patches
     from vdet.learn.svm.training import train as fit_model
@@ -53,20 +49,24 @@ def train(data: tuple[Path, ...], output: Path, jobs: int | None, overwrite: boo
 
 @command()
 @click.argument("videos", nargs=-1, required=True, type=options.INPUT, metavar="IN...")
-@options.truth_option
-@options.output_file_option
-@options.option("--every N", options.POSITIVE, default=4)
-@options.option("--from FRAME", options.POSITIVE, name="first", default=1)
+@options.truths_option
+@options.output_file("-o", "--output", required=True, help="Zip file to write.")
+@options.number_option("--every", default=4, help="Use every N-th frame of a video.")
+@options.number_option(
+    "--from", "first", metavar="FRAME", default=1, help="Start at this frame, counted from 1."
+)
 @options.until_option
-@options.settings_options("labels.roles.tram=vehicle", options.model_option)
+@options.model_option
+@options.settings_options(model="detector.model")
 @options.overwrite_option
 def mine(
-    videos: tuple[Path, ...],
-    truths: tuple[Path, ...],
+    videos: Paths,
+    truths: Paths,
     output: Path,
     every: int,
     first: int,
     until: int | None,
+    source: SettingsSource,
     overwrite: bool,
 ) -> None:
     """Cut patches for vdet train out of labelled videos.
@@ -75,53 +75,61 @@ def mine(
     classifies as vehicles although they contain none, or only a part of one. Ignore regions are
     skipped.
 
-    Parameters
-    ----------
-    output
-        Zip file to write.
-    every
-        Use every N-th frame of a video.
-    first
-        Start at this frame, counted from 1.
-
-    Examples
-    --------
-    vdet mine in.mp4 --truth gt.txt -o mined.zip
-    vdet mine a.mp4 b.mp4 --truth a.txt --truth b.txt -o mined.zip
+    \b
+    Examples:
+      vdet mine in.mp4 --truth gt.txt -o mined.zip
+      vdet mine a.mp4 b.mp4 --truth a.txt --truth b.txt -o mined.zip
     """
     if until is not None and until < first:
         raise click.UsageError("--until must not be before --from")
-    options.check_file(output, ".zip", what="patches", overwrite=overwrite)
-    settings = options.read_for_whole_frames(detector="svm")
+    options.check_file(output, ".zip", noun="patches", overwrite=overwrite)
+    settings = source.load(detector="svm")
+    options.reject_regions(settings)
     from vdet.detect.svm.detector import load_svm
     from vdet.learn.svm import mining
 
-    pairs = options.paired(videos, truths)
-    labelled = [mining.VideoSource(*pair, every, first, until) for pair in pairs]
-    model = load_svm(settings.svm, Path(settings.svm.model) if settings.svm.model else None)
+    sources = [
+        mining.VideoSource(video, truth, every, first, until)
+        for video, truth in options.with_truths(videos, truths)
+    ]
+    svm = load_svm(settings.svm, Path(settings.svm.model) if settings.svm.model else None)
     with progress_steps(" frames") as steps:
         frames, counts = mining.mine(
-            labelled, output, settings, model, overwrite=overwrite, steps=steps
+            sources, output, settings, svm, overwrite=overwrite, steps=steps
         )
-    found = f"{counts['vehicle']} patches of vehicles, {counts['box']} more for their boxes"
+    vehicles = f"{counts['vehicle']} patches of vehicles, {counts['box']} more for their boxes"
     alarms = f"{counts['false alarm']} false alarms, {counts['part']} more on parts of vehicles"
-    print_lines(f"{output}: {found}, {alarms}; from {counted(frames, 'frame')}")
+    print_lines(f"{output}: {vehicles}, {alarms}; from {counted(frames, 'frame')}")
 
 
 @command()
 @click.argument("data", nargs=-1, type=options.INPUT, metavar="[DATA]...")
-@options.output_file_option
-@options.option("--video CLIP TRUTH", options.INPUT, name="clips", nargs=2, multiple=True)
-@options.option("--base FILE")
-@options.option("--device NAME", click.Choice(["auto", "cpu", "cuda"]), default="auto")
-@options.settings_options("train.net.steps=4000")
+@options.output_file("-o", "--output", required=True, help="Network to write, .onnx.")
+@options.input_file(
+    "--video",
+    "clips",
+    metavar="CLIP TRUTH",
+    nargs=2,
+    multiple=True,
+    help="Also train on every fourth frame of a labelled video. Can be repeated.",
+)
+@options.input_file("--base", help="Start from the weights of this network of vdet train-net.")
+@click.option(
+    "--device",
+    type=click.Choice(["auto", "cpu", "cuda"]),
+    default="auto",
+    show_default=True,
+    help="Where to compute; auto uses a GPU if torch finds one. A checkpoint resumes on any.",
+)
+@options.settings_options()
 @options.overwrite_option
 def train_net(
-    data: tuple[Path, ...],
+    data: Paths,
     output: Path,
     clips: tuple[tuple[Path, Path], ...],
     base: Path | None,
     device: str,
+    source: SettingsSource,
     overwrite: bool,
 ) -> None:
     """Train a network on labelled images.
@@ -130,27 +138,15 @@ def train_net(
     the network, as .ckpt; if training stops, run the same command to resume.
     Requires torch and onnx: pip install torch onnx
 
-    Parameters
-    ----------
-    output
-        Network to write, .onnx.
-    clips
-        Also train on every fourth frame of a labelled video. Can be repeated.
-    base
-        Start from the weights of this network of vdet train-net.
-    device
-        Compute here. auto uses a GPU if torch finds one. A stopped training can resume on another
-        device.
-
-    Examples
-    --------
-    vdet train-net images/city images/motorway -o mine.onnx
-    vdet train-net images/ -o mine.onnx --video drive.mp4 drive-truth.txt
+    \b
+    Examples:
+      vdet train-net images/city images/motorway -o mine.onnx
+      vdet train-net images/ -o mine.onnx --video drive.mp4 drive-truth.txt
     """
     if not data and not clips:
         raise click.UsageError("nothing to learn from; pass DATA or --video")
-    options.check_file(output, ".onnx", what="networks", overwrite=overwrite)
-    settings = options.read_settings()
+    options.check_file(output, ".onnx", noun="networks", overwrite=overwrite)
+    settings = source.load()
     try:
         from vdet.learn.net.sources import clip_source, image_source
         from vdet.learn.net.training import train_to_file
@@ -171,7 +167,7 @@ def train_net(
             bar.set_postfix_str(f"loss {loss:.3f}", refresh=False)
             bar.update(step - bar.n)
 
-        done = train_to_file(
+        summary = train_to_file(
             sources,
             settings.train.net,
             output,
@@ -180,4 +176,4 @@ def train_net(
             overwrite=overwrite,
             progress=advance,
         )
-    print_lines(done, f"{output}: written")
+    print_lines(summary, f"{output}: written")
