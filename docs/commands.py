@@ -1,5 +1,6 @@
 """Write docs/commands.md: the help of every command."""
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,8 +12,13 @@ PAGE = Path(__file__).with_name("commands.md")
 
 _INTRODUCTION = """# Commands
 
-The help of every command, as `vdet COMMAND --help` prints it. `make commands` writes this page.
+The help of every command, written by `make commands`. Every command also has `-q`, `-v` and `-h`,
+and every command with `--set` also has `-c`: see `vdet config`.
 """
+
+_WITH_ALL_OPTIONS = ("vdet", "vdet config")
+_COMMON_OPTION = re.compile(r"^  -[qvhc], --\w+.*\n(?: {4,}.*\n)*", re.MULTILINE)
+_EMPTY_SECTION = re.compile(r"^\w+:\n(?:\n|\Z)", re.MULTILINE)
 
 
 def commands_page() -> str:
@@ -22,9 +28,15 @@ def commands_page() -> str:
     return _INTRODUCTION + "".join(texts)
 
 
+def _without_common_options(text: str) -> str:
+    """Return the help of a command without the options that all commands share."""
+    return _EMPTY_SECTION.sub("", _COMMON_OPTION.sub("", f"{text}\n")).rstrip("\n")
+
+
 def _helps(command: click.Command, context: click.Context) -> Iterator[tuple[str, str]]:
     """Yield the name and the help of a command and of the commands below it."""
-    yield context.command_path, command.get_help(context)
+    name, text = context.command_path, command.get_help(context)
+    yield name, text if name in _WITH_ALL_OPTIONS else _without_common_options(text)
     if isinstance(command, click.Group):
         for name in command.list_commands(context):
             found = command.get_command(context, name)
