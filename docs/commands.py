@@ -1,5 +1,6 @@
 """Write docs/commands.md: the help of every command."""
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,15 +12,27 @@ PAGE = Path(__file__).with_name("commands.md")
 
 _INTRODUCTION = """# Commands
 
-The help of every command, as `vdet COMMAND --help` prints it. `make commands` writes this page.
+The help of every command, written by `make commands`. All commands also have `-q`, `-v` and `-h`,
+and all but `calibrate` and `demo` have `-c` and `--set`: see `vdet config`.
 """
+
+_WITH_ALL_OPTIONS = ("vdet", "vdet config")
+_COMMON_OPTION = re.compile(r"^  (?:-[qvhc], --\w+|--set ).*\n(?: {4,}.*\n)*", re.MULTILINE)
+_EMPTY_SECTION = re.compile(r"^\w[\w ]*:\n(?:\n|\Z)", re.MULTILINE)
 
 
 def commands_page() -> str:
     """Return the page as Markdown."""
     context = click.Context(cli, info_name="vdet", terminal_width=80, **cli.context_settings)
-    texts = [f"\n## {name}\n\n```text\n{text}\n```\n" for name, text in _helps(cli, context)]
-    return _INTRODUCTION + "".join(texts)
+    texts = [(name, _without_common_options(name, text)) for name, text in _helps(cli, context)]
+    return _INTRODUCTION + "".join(f"\n## {name}\n\n```text\n{text}\n```\n" for name, text in texts)
+
+
+def _without_common_options(name: str, text: str) -> str:
+    """Return the help of a command without the options that nearly all commands share."""
+    if name in _WITH_ALL_OPTIONS:
+        return text
+    return _EMPTY_SECTION.sub("", _COMMON_OPTION.sub("", f"{text}\n")).rstrip("\n")
 
 
 def _helps(command: click.Command, context: click.Context) -> Iterator[tuple[str, str]]:
