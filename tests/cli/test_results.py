@@ -6,7 +6,7 @@ import pytest
 
 from vdet.cli.results import ResultFiles
 from vdet.errors import OutputError, VideoError
-from vdet.files import record_input, recorded_inputs
+from vdet.files import file_ids
 
 
 def test_a_page_and_numbers_that_cannot_be_written_are_refused_before_any_work(
@@ -22,10 +22,8 @@ def test_a_page_and_numbers_that_cannot_be_written_are_refused_before_any_work(
         with pytest.raises(OutputError, match="already exists; use --overwrite"):
             kept.checked()
     ResultFiles(str(target), page=folder, overwrite=True).checked()
-    with recorded_inputs():
-        record_input(target)
-        with pytest.raises(OutputError, match="is the input itself"):
-            ResultFiles(str(target), overwrite=True).checked()
+    with pytest.raises(OutputError, match="is the input itself"):
+        ResultFiles(str(target), overwrite=True, inputs=file_ids([target])).checked()
     with pytest.raises(OutputError, match=r"the folder .*page\.html is not a folder"):
         ResultFiles(None, page=folder / "page.html", overwrite=True).checked()
     with pytest.raises(OutputError, match="is used for two outputs"):

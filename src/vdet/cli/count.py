@@ -63,13 +63,15 @@ def count(
     if not settings.traffic:
         raise click.UsageError("no lines or zones to count at; add a settings file with -c FILE")
     check_counting(settings, several=len(tracks) > 1)
+    from vdet.run.inputs import input_files
     from vdet.run.sinks.protocol import check_sinks
     from vdet.traffic.counting import count_files
     from vdet.traffic.output import counts_content, flows_content
     from vdet.traffic.tables import write_content
 
     outputs = options.wanted_outputs()
-    check_sinks(outputs, overwrite=overwrite)
+    inputs = input_files(*tracks, *options.config_files())
+    check_sinks(outputs, overwrite=overwrite, inputs=inputs)
     with progress_steps(" files") as steps:
         advance = steps("", len(tracks) if len(tracks) > 1 else None)
         videos = count_files(tracks, settings, size, rate, advance=advance)
@@ -78,7 +80,7 @@ def count(
             announce(f"{name}: begins {counts.clock}")
         for warning in counts.warnings:
             log.warning("%s: %s", name, warning)
-    with OutputFiles(overwrite=overwrite) as files:
+    with OutputFiles(overwrite=overwrite, inputs=inputs) as files:
         for output in outputs:
             make = {"counts": counts_content, "flows": flows_content}[output.sink]
             content = make(output.path, videos, settings.traffic.seconds)

@@ -64,6 +64,7 @@ def detect_image(
     from vdet.detect.factory import load_detector
     from vdet.regions import check_masks
     from vdet.run.images import ImageSearch, find_images, plan_images, run_images
+    from vdet.run.inputs import input_files
     from vdet.run.sinks.protocol import check_sinks
 
     return_freed_memory(*IMAGES)
@@ -71,11 +72,12 @@ def detect_image(
     model = load_detector(settings.detector)
     sources = find_images(images)
     shared = options.wanted_outputs()
-    check_sinks(shared, overwrite=overwrite)
-    jobs = plan_images(sources, output, stages, overwrite=overwrite)
+    inputs = input_files(*sources, *options.config_files(), settings=settings)
+    check_sinks(shared, overwrite=overwrite, inputs=inputs)
+    jobs = plan_images(sources, output, stages, overwrite=overwrite, inputs=inputs)
     is_printed, failed = not (output or stages or shared), 0
     search, threads = ImageSearch(model, settings), core_count()
-    results = run_images(jobs, shared, search, overwrite=overwrite, threads=threads)
+    results = run_images(jobs, shared, search, overwrite=overwrite, inputs=inputs, threads=threads)
     with progress_steps(" images") as steps, closing(results):
         advance = steps("", len(jobs))
         for result in results:

@@ -172,7 +172,9 @@ def detect_video(
     if folder is not None:
         outputs = _with_endings(outputs, no_video=no_video)
     part = start, end, frames, at or Fraction(0)
-    run = Run(source, tuple(outputs), settings, *part, overwrite, threads)
+    run = Run(
+        source, tuple(outputs), settings, *part, overwrite, threads, tuple(options.config_files())
+    )
     if folder is None:
         code, is_doubtful = 0, _process_one(run)
     else:

@@ -61,6 +61,7 @@ def draw(
     vdet draw in.mp4 -c gate.yaml -o place.jpg
     """
     from vdet.pages.drawing import Drawing
+    from vdet.run.inputs import input_files
     from vdet.run.scene import read_scene
     from vdet.run.video import Run
 
@@ -68,9 +69,12 @@ def draw(
     settings = options.read_settings()
     if not outputs:
         raise click.UsageError("no output; use -o FILE or --propose FILE")
+    inputs = input_files(
+        clip, *([tracks] if tracks else ()), *options.config_files(), settings=settings
+    )
     for path, suffixes, what in ((output, _OUTPUTS, "pages"), (propose, _SETTINGS, "settings")):
         if path:
-            options.check_file(path, *suffixes, what=what, overwrite=overwrite)
+            options.check_file(path, *suffixes, what=what, overwrite=overwrite, inputs=inputs)
     if output and output.suffix.lower() != ".html" and not settings.traffic:
         raise ConfigError(f"{output}: nothing to draw; add lines or zones with -c FILE")
     with progress_steps(" frames") as steps:
@@ -81,7 +85,7 @@ def draw(
     drawing = Drawing(image, frames, settings, options.own_values(), facing)
     if propose and not drawing.proposals:
         raise ConfigError(f"{clip}: no stream has enough vehicles; draw lines with -o gate.html")
-    with OutputFiles(overwrite=overwrite) as files:
+    with OutputFiles(overwrite=overwrite, inputs=inputs) as files:
         for path in outputs:
             with output_errors(path):
                 name = Path([path.name, *options.config_names()][-1]).with_suffix(".yaml").name

@@ -12,7 +12,7 @@ import click
 
 from vdet.cli.command import command
 from vdet.cli.messages import print_lines
-from vdet.cli.options import INPUT, config_names, read_settings, settings_options
+from vdet.cli.options import INPUT, config_files, config_names, read_settings, settings_options
 from vdet.cli.results import ResultFiles, facts_options
 from vdet.errors import counted, in_one_line, opencv_fault, printable
 from vdet.version import __version__
@@ -48,9 +48,11 @@ def info(path: Path | None, **targets: Any) -> int:
     vdet info -c gate.yaml
     vdet info
     """
-    from vdet.media.images import is_image_name
+    from vdet.media.images import is_image_name, video_files
+    from vdet.run.inputs import input_files
 
-    results = ResultFiles(**targets).checked()
+    inputs = input_files(*(video_files(path) if path else ()), *config_files())
+    results = ResultFiles(**targets, inputs=inputs).checked()
     if path is None:
         facts = _settings() if config_names() else _machine()
     else:

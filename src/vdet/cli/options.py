@@ -58,7 +58,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from vdet.errors import ConfigError, OutputError
-from vdet.files import check_output, record_input
+from vdet.files import NO_FILES, FileIds, check_output
 from vdet.run.sinks import Output
 
 if TYPE_CHECKING:
@@ -66,17 +66,10 @@ if TYPE_CHECKING:
     from vdet.evaluate.output import RunName
 
 
-class _Input(click.Path):
-    def convert(self, value: Any, option: Any, context: Any) -> Any:
-        path = Path(super().convert(value, option, context))  # type: ignore[arg-type]
-        record_input(path)
-        return path
-
-
 PATH = click.Path(path_type=Path)
 """A path; whether it exists is checked later."""
-INPUT = _Input(path_type=Path)
-"""The path of an input file, which no output may replace."""
+INPUT = PATH
+"""The path of an input file."""
 POSITIVE = click.IntRange(1, 1_000_000_000)
 PROCESSES = click.IntRange(1, 256)
 """Number of threads or processes."""
@@ -156,11 +149,13 @@ def paired(videos: Sequence[Path], truths: Sequence[Path]) -> list[tuple[Path, P
     return list(zip(videos, truths, strict=True))
 
 
-def check_file(output: Path, *suffixes: str, what: str, overwrite: bool) -> None:
+def check_file(
+    output: Path, *suffixes: str, what: str, overwrite: bool, inputs: FileIds = NO_FILES
+) -> None:
     """Refuse an output with another suffix, or that cannot be written. Raises `OutputError`."""
     if output.suffix.lower() not in suffixes:
         raise OutputError(f"{output}: {what} must end in {suffixes[0]}")
-    check_output(output, overwrite=overwrite)
+    check_output(output, overwrite=overwrite, inputs=inputs)
 
 
 def _keeping(what: str, make: Callable[[Any], Iterable[Any]] = list) -> dict[str, Any]:
@@ -235,7 +230,7 @@ def read_settings(*, detector: str | None = None) -> "Settings":
         return Settings()  # without YAML
     from vdet.config.loading import load_settings
 
-    return load_settings(_config_files(), assignments, detector=detector)
+    return load_settings(config_files(), assignments, detector=detector)
 
 
 def read_for_whole_frames(*, detector: str | None = None) -> "Settings":
@@ -246,7 +241,8 @@ def read_for_whole_frames(*, detector: str | None = None) -> "Settings":
     return settings
 
 
-def _config_files() -> list[Path]:
+def config_files() -> list[Path]:
+    """Return the settings files."""
     from vdet.config.loading import find_config
 
     return [find_config(name) for name in _kept("configs")]
@@ -257,7 +253,7 @@ def own_values() -> dict[str, Any]:
     from vdet.config.loading import given_values, shipped_configs
 
     shipped = set(shipped_configs().values())
-    return given_values([path for path in _config_files() if path not in shipped])
+    return given_values([path for path in config_files() if path not in shipped])
 
 
 def config_names() -> list[str]:

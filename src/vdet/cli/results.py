@@ -11,7 +11,16 @@ from vdet.cli import options
 from vdet.cli.messages import print_lines, progress_steps
 from vdet.cli.options import F, option, overwrite_option, short_form
 from vdet.errors import OutputError
-from vdet.files import OutputFiles, check_output, json_text, output_errors, print_now, write_text
+from vdet.files import (
+    NO_FILES,
+    FileIds,
+    OutputFiles,
+    check_output,
+    json_text,
+    output_errors,
+    print_now,
+    write_text,
+)
 
 if TYPE_CHECKING:
     from vdet.config.schema import Settings
@@ -25,6 +34,7 @@ class ResultFiles:
     json_target: str | None
     overwrite: bool
     page: Path | None = None
+    inputs: FileIds = NO_FILES
 
     def checked(self) -> Self:
         """Return self, after checking that the outputs can be written, before any work.
@@ -40,7 +50,9 @@ class ResultFiles:
             raise OutputError(f"{paths[0]}: is used for two outputs; rename one")
         for path in paths:
             makes_folder = self.page is not None and self.page.is_relative_to(path.parent)
-            check_output(path, overwrite=self.overwrite, makes_folder=makes_folder)
+            check_output(
+                path, overwrite=self.overwrite, makes_folder=makes_folder, inputs=self.inputs
+            )
         return self
 
     @property
@@ -61,7 +73,7 @@ class ResultFiles:
         """Print lines of text, and write the files, which appear together. Raises `OutputError`."""
         to_stderr = self.json_target == "-"
         print_lines(*lines, err=to_stderr)
-        with OutputFiles(overwrite=self.overwrite) as files:
+        with OutputFiles(overwrite=self.overwrite, inputs=self.inputs) as files:
             for what, path in self._files.items():
                 with progress_steps("") as steps, output_errors(path):
                     steps(f"writing the {what}", None)

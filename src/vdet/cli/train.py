@@ -8,7 +8,6 @@ from vdet.cli import options
 from vdet.cli.command import command
 from vdet.cli.messages import live_bar, print_lines, progress_steps
 from vdet.errors import DataError, counted
-from vdet.files import check_output
 from vdet.workers import limit_library_threads
 
 
@@ -39,7 +38,10 @@ def train(data: tuple[Path, ...], output: Path, jobs: int | None, overwrite: boo
     vdet train patches/ -o model.npz --set train.svm.C=1e-3
     """
     settings = options.read_settings(detector="svm")
-    options.check_file(output, ".npz", what="models", overwrite=overwrite)
+    from vdet.run.inputs import input_files
+
+    inputs = input_files(*data, *options.config_files())
+    options.check_file(output, ".npz", what="models", overwrite=overwrite, inputs=inputs)
     from vdet.detect.svm.model import save_model
     from vdet.learn.svm.dataset import find_patches
     from vdet.learn.svm.training import train as fit_model
@@ -91,8 +93,11 @@ def mine(
     """
     if until is not None and until < first:
         raise click.UsageError("--until must not be before --from")
-    options.check_file(output, ".zip", what="patches", overwrite=overwrite)
     settings = options.read_for_whole_frames(detector="svm")
+    from vdet.run.inputs import input_files
+
+    inputs = input_files(*videos, *truths, *options.config_files(), settings=settings)
+    options.check_file(output, ".zip", what="patches", overwrite=overwrite, inputs=inputs)
     from vdet.detect.svm.detector import load_svm
     from vdet.learn.svm import mining
 
@@ -144,8 +149,12 @@ def train_net(
     """
     if not data and not clips:
         raise click.UsageError("nothing to learn from; pass DATA or --video")
-    options.check_file(output, ".onnx", what="networks", overwrite=overwrite)
     settings = options.read_settings()
+    from vdet.run.inputs import input_files
+
+    paths = *data, *(path for clip in clips for path in clip), *([base] if base else ())
+    inputs = input_files(*paths, *options.config_files())
+    options.check_file(output, ".onnx", what="networks", overwrite=overwrite, inputs=inputs)
     try:
         from vdet.learn.net.sources import clip_source, image_source
         from vdet.learn.net.training import train_to_file
@@ -158,7 +167,6 @@ def train_net(
     roles = Roles.for_training(settings)
     sources = [image_source(read_labelled_images(path, roles), settings) for path in data]
     sources += [clip_source(clip, truth, settings) for clip, truth in clips]
-    check_output(output, overwrite=overwrite)  # it may be among the files that were read now
     print_lines(*(line for _, report in sources for line in report.lines()), "")
     with live_bar(total=settings.train.net.steps, unit=" steps") as bar:
 

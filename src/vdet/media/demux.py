@@ -15,7 +15,6 @@ from av.stream import Discard, Disposition, Stream
 from av.video.stream import VideoStream
 
 from vdet.errors import VideoError
-from vdet.files import record_input
 from vdet.media.frame import Coding, ColorTags, Tags, VideoInfo
 from vdet.media.images import Orientation, find_sequence, read_header
 
@@ -62,7 +61,6 @@ def open_input(path: Path, frame_rate: float | None = None) -> InputContainer:
         options = {"framerate": f"{rate.numerator}/{rate.denominator}", "pattern_type": "none"}
     elif not os.path.exists(path):  # noqa: PTH110  # also False if it is not accessible
         raise VideoError(f"{path}: not found; check the name")
-    record_input(path)
     try:
         return av.open(name, "r", kind, options, metadata_errors="replace")  # tags: any encoding
     except av.FFmpegError as error:
