@@ -40,12 +40,11 @@ def calibrate(
     from vdet.lanes.calibration import calibrate as fit
     from vdet.lanes.camera import save_camera
     from vdet.run.images import find_images
-    from vdet.run.inputs import input_files
 
     if not (3 <= min(pattern) <= max(pattern) <= 999):
         raise click.UsageError("--pattern: must be 3 to 999 inner corners, such as 9x6")
     found = list(find_images(photos))
-    inputs = input_files(*found)
+    inputs = options.input_files(*found)
     options.check_file(output, ".yaml", ".yml", what="cameras", overwrite=overwrite, inputs=inputs)
     with progress_steps("") as steps:
         steps(f"searching {counted(len(found), 'photograph')}", None)

@@ -63,14 +63,13 @@ def count(
     if not settings.traffic:
         raise click.UsageError("no lines or zones to count at; add a settings file with -c FILE")
     check_counting(settings, several=len(tracks) > 1)
-    from vdet.run.inputs import input_files
     from vdet.run.sinks.protocol import check_sinks
     from vdet.traffic.counting import count_files
     from vdet.traffic.output import counts_content, flows_content
     from vdet.traffic.tables import write_content
 
     outputs = options.wanted_outputs()
-    inputs = input_files(*tracks, *options.config_files())
+    inputs = options.input_files(*tracks)
     check_sinks(outputs, overwrite=overwrite, inputs=inputs)
     with progress_steps(" files") as steps:
         advance = steps("", len(tracks) if len(tracks) > 1 else None)

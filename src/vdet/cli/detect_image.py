@@ -64,7 +64,6 @@ def detect_image(
     from vdet.detect.factory import load_detector
     from vdet.regions import check_masks
     from vdet.run.images import ImageSearch, find_images, plan_images, run_images
-    from vdet.run.inputs import input_files
     from vdet.run.sinks.protocol import check_sinks
 
     return_freed_memory(*IMAGES)
@@ -72,7 +71,7 @@ def detect_image(
     model = load_detector(settings.detector)
     sources = find_images(images)
     shared = options.wanted_outputs()
-    inputs = input_files(*sources, *options.config_files(), settings=settings)
+    inputs = options.input_files(*sources, settings=settings)
     check_sinks(shared, overwrite=overwrite, inputs=inputs)
     jobs = plan_images(sources, output, stages, overwrite=overwrite, inputs=inputs)
     is_printed, failed = not (output or stages or shared), 0

@@ -61,7 +61,6 @@ def draw(
     vdet draw in.mp4 -c gate.yaml -o place.jpg
     """
     from vdet.pages.drawing import Drawing
-    from vdet.run.inputs import input_files
     from vdet.run.scene import read_scene
     from vdet.run.video import Run
 
@@ -69,9 +68,7 @@ def draw(
     settings = options.read_settings()
     if not outputs:
         raise click.UsageError("no output; use -o FILE or --propose FILE")
-    inputs = input_files(
-        clip, *([tracks] if tracks else ()), *options.config_files(), settings=settings
-    )
+    inputs = options.input_files(clip, *([tracks] if tracks else ()), settings=settings)
     for path, suffixes, what in ((output, _OUTPUTS, "pages"), (propose, _SETTINGS, "settings")):
         if path:
             options.check_file(path, *suffixes, what=what, overwrite=overwrite, inputs=inputs)

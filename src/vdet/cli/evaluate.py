@@ -42,13 +42,12 @@ def images(data: tuple[Path, ...], min_width: float, **targets: Any) -> None:
     from vdet.evaluate.report import images_report
     from vdet.labels.reading import read_labelled_images
     from vdet.labels.roles import Roles
-    from vdet.run.inputs import input_files
 
     return_freed_memory(*IMAGES)
     detector, roles = settings.detector, Roles.from_settings(settings)
     model = load_detector(detector.showing_all())
     sets = [read_labelled_images(path, roles) for path in data]
-    inputs = input_files(*data, *options.config_files(), settings=settings)
+    inputs = options.input_files(*data, settings=settings)
     results = ResultFiles(**targets, inputs=inputs).checked()
     counting = Counting(detector.min_score_still, min_width)
     with progress_steps(" images") as steps:
@@ -80,11 +79,10 @@ def patches(data: tuple[Path, ...], **targets: Any) -> None:
     from vdet.detect.svm.model import load_model
     from vdet.learn.svm.dataset import find_patches
     from vdet.learn.svm.training import evaluate_patches
-    from vdet.run.inputs import input_files
 
     path = Path(settings.svm.model) if settings.svm.model else None
     model = load_model(path, requested_features(settings.svm)) if path else None
-    inputs = input_files(*data, *options.config_files(), settings=settings)
+    inputs = options.input_files(*data, settings=settings)
     results = ResultFiles(**targets, inputs=inputs).checked()
     files = find_patches(data)
     with progress_steps("") as steps:
@@ -113,9 +111,8 @@ def tracks(prediction: Path, truth: Path, until: int | None, **targets: Any) -> 
     """
     from vdet.evaluate.report import tracks_report
     from vdet.evaluate.video import score_files
-    from vdet.run.inputs import input_files
 
-    inputs = input_files(prediction, truth, *options.config_files())
+    inputs = options.input_files(prediction, truth)
     results = ResultFiles(**targets, inputs=inputs).checked()
     with progress_steps("") as steps:
         steps("comparing", None)
@@ -147,11 +144,10 @@ def video(
     from vdet.evaluate.report import video_report
     from vdet.evaluate.video import evaluate_clip, open_clip
     from vdet.regions import check_masks
-    from vdet.run.inputs import input_files
 
     check_masks(settings.regions)
     model = load_detector(settings.detector)
-    inputs = input_files(*videos, *truths, *options.config_files(), settings=settings)
+    inputs = options.input_files(*videos, *truths, settings=settings)
     results = ResultFiles(**targets, inputs=inputs).checked()
     clips = [open_clip(*pair, until, settings) for pair in pairs]
     with progress_steps(" frames") as steps:

@@ -12,7 +12,7 @@ import click
 
 from vdet.cli.command import command
 from vdet.cli.messages import print_lines
-from vdet.cli.options import INPUT, config_files, config_names, read_settings, settings_options
+from vdet.cli.options import INPUT, config_names, input_files, read_settings, settings_options
 from vdet.cli.results import ResultFiles, facts_options
 from vdet.errors import counted, in_one_line, opencv_fault, printable
 from vdet.version import __version__
@@ -49,9 +49,8 @@ def info(path: Path | None, **targets: Any) -> int:
     vdet info
     """
     from vdet.media.images import is_image_name, video_files
-    from vdet.run.inputs import input_files
 
-    inputs = input_files(*(video_files(path) if path else ()), *config_files())
+    inputs = input_files(*(video_files(path) if path else ()))
     results = ResultFiles(**targets, inputs=inputs).checked()
     if path is None:
         facts = _settings() if config_names() else _machine()
@@ -227,8 +226,8 @@ def _video(path: Path) -> Facts:
             "start": float(info.start),
             "seconds": None if info.duration is None else float(info.duration),
             "audio": [
-                sound.codec_context.name if sound.codec_context else "unknown"
-                for sound in container.streams.audio
+                stream.codec_context.name if stream.codec_context else "unknown"
+                for stream in container.streams.audio
             ],
             **asdict(info.tags),
             "horizon": find_horizon(images),

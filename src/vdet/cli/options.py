@@ -241,6 +241,16 @@ def read_for_whole_frames(*, detector: str | None = None) -> "Settings":
     return settings
 
 
+def input_files(*paths: Path, settings: "Settings | None" = None) -> FileIds:
+    """Identify the files that the running command reads; arguments as for the same of `vdet.run`.
+
+    The settings files are among them.
+    """
+    from vdet.run import inputs
+
+    return inputs.input_files(*paths, *config_files(), settings=settings)
+
+
 def config_files() -> list[Path]:
     """Return the settings files."""
     from vdet.config.loading import find_config

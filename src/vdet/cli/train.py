@@ -1,5 +1,6 @@
 """`vdet mine`, `vdet train` and `vdet train-net`: from labelled data to models."""
 
+from itertools import chain
 from pathlib import Path
 
 import click
@@ -38,9 +39,7 @@ def train(data: tuple[Path, ...], output: Path, jobs: int | None, overwrite: boo
     vdet train patches/ -o model.npz --set train.svm.C=1e-3
     """
     settings = options.read_settings(detector="svm")
-    from vdet.run.inputs import input_files
-
-    inputs = input_files(*data, *options.config_files())
+    inputs = options.input_files(*data)
     options.check_file(output, ".npz", what="models", overwrite=overwrite, inputs=inputs)
     from vdet.detect.svm.model import save_model
     from vdet.learn.svm.dataset import find_patches
@@ -94,9 +93,7 @@ def mine(
     if until is not None and until < first:
         raise click.UsageError("--until must not be before --from")
     settings = options.read_for_whole_frames(detector="svm")
-    from vdet.run.inputs import input_files
-
-    inputs = input_files(*videos, *truths, *options.config_files(), settings=settings)
+    inputs = options.input_files(*videos, *truths, settings=settings)
     options.check_file(output, ".zip", what="patches", overwrite=overwrite, inputs=inputs)
     from vdet.detect.svm.detector import load_svm
     from vdet.learn.svm import mining
@@ -150,10 +147,8 @@ def train_net(
     if not data and not clips:
         raise click.UsageError("nothing to learn from; pass DATA or --video")
     settings = options.read_settings()
-    from vdet.run.inputs import input_files
-
-    paths = *data, *(path for clip in clips for path in clip), *([base] if base else ())
-    inputs = input_files(*paths, *options.config_files())
+    paths = *data, *chain(*clips), *([base] if base else ())
+    inputs = options.input_files(*paths)
     options.check_file(output, ".onnx", what="networks", overwrite=overwrite, inputs=inputs)
     try:
         from vdet.learn.net.sources import clip_source, image_source

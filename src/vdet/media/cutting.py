@@ -16,7 +16,7 @@ from vdet.media.images import is_image_name
 from vdet.media.reader import VideoReader
 from vdet.media.writer import MARK, VIDEO_SUFFIXES, VideoWriter
 
-_SOUND_LAG = 1  # seconds of video after the end in which sound of the part may still follow
+_AUDIO_LAG = 1  # seconds of video after the end in which audio of the part may still follow
 
 
 def can_copy(source: Path) -> bool:
@@ -34,7 +34,7 @@ def copied_suffix(source: Path) -> str:
 
 
 def copy_part(source: Path, start: Fraction, end: Fraction, target: Path) -> None:
-    """Copy the key-frame intervals that contain a part of a video, with its sound.
+    """Copy the key-frame intervals that contain a part of a video, with its audio.
 
     Parameters
     ----------
@@ -54,10 +54,10 @@ def copy_part(source: Path, start: Fraction, end: Fraction, target: Path) -> Non
         pictures = video_stream(container, source)
         streams: list[Stream] = [pictures, *container.streams.audio]
         try:
-            targets = {one.index: written.add_stream_from_template(one) for one in streams}
+            targets = {item.index: written.add_stream_from_template(item) for item in streams}
             container.seek(int(start * av.time_base))
-            found = packets(container, streams, on_error=lambda: None)
-            for packet in _moved_to_zero(found, pictures.index, end):
+            following = packets(container, streams, on_error=lambda: None)
+            for packet in _moved_to_zero(following, pictures.index, end):
                 packet.stream = targets[packet.stream_index]
                 written.mux(packet)
         except (ValueError, av.FFmpegError) as error:
@@ -65,7 +65,7 @@ def copy_part(source: Path, start: Fraction, end: Fraction, target: Path) -> Non
 
 
 def _moved_to_zero(
-    found: "Iterable[Packet[Stream]]", pictures: int, end: Fraction
+    following: "Iterable[Packet[Stream]]", pictures: int, end: Fraction
 ) -> "Iterator[Packet[Stream]]":
     """Yield the packets from the first key frame to the first one at or after `end`.
 
@@ -73,13 +73,13 @@ def _moved_to_zero(
     """
     begin: Fraction | float = math.inf
     stop: Fraction | float = math.inf
-    for packet in found:
+    for packet in following:
         if packet.pts is None or packet.dts is None:
             continue
         time, is_image = packet.pts * packet.time_base, packet.stream_index == pictures
         if is_image and packet.is_keyframe:
             begin, stop = min(begin, time), min(stop, time if time >= end else math.inf)
-        if is_image and time > stop + _SOUND_LAG:
+        if is_image and time > stop + _AUDIO_LAG:
             return
         if begin <= time < stop and not (is_image and stop < math.inf):
             shift = round(begin / packet.time_base)
@@ -90,7 +90,7 @@ def _moved_to_zero(
 def encode_part(
     source: Path, start: Fraction, end: Fraction, target: Path, settings: Settings
 ) -> None:
-    """Encode a part of a video, exact to the frame, with its sound.
+    """Encode a part of a video, exact to the frame, with its audio.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def encode_part(
     """
     with (
         VideoReader(source, start=start, end=end, settings=settings.input) as reader,
-        VideoWriter(target, reader.info, settings.output, whole_sound=False) as writer,
+        VideoWriter(target, reader.info, settings.output, whole_audio=False) as writer,
     ):
         for frame in reader:
             writer.write(frame)

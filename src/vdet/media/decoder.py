@@ -35,7 +35,7 @@ class Damage:
     period
         Time from one picture to the next, in units of the stream's time base.
     errors
-        Unreadable places in the file, and packets that cannot be decoded.
+        Unreadable parts of the file, and packets that cannot be decoded.
     restarts
         How often the clock restarts: the last packets before are flagged, but not corrupt.
     without_picture
@@ -50,7 +50,7 @@ class Damage:
     corrupt_packets: int = 0
     without_picture: int = 0
     _corrupt_pictures: int = 0
-    _last: int | None = None  # time of a picture
+    _last: int | None = None  # time of the last picture
 
     @property
     def is_evident(self) -> bool:
@@ -76,8 +76,8 @@ class Damage:
 
         A late picture in a damaged stream is not usable, and counts as lost.
         """
-        if self.is_evident and None not in (picture.pts, self._last):
-            late = (self._last or 0) - (picture.pts or 0)
+        if self.is_evident and picture.pts is not None and self._last is not None:
+            late = self._last - picture.pts
             if 0 <= late <= _MAX_LATE * self.period:
                 return False
         self._last = picture.pts
@@ -179,8 +179,8 @@ class Decoder:
 
     def _read(self) -> "Iterator[Packet[Stream]]":
         """Yield the packets of the pictures."""
-        found = demux.packets(self.container, self.clock.streams, self._fail)
-        for packet in self.clock.unwrap(found):
+        packets = demux.packets(self.container, self.clock.streams, self._fail)
+        for packet in self.clock.unwrap(packets):
             if packet.stream_index == self.stream.index:
                 if self._is_avi and self.stream.codec_context.has_b_frames:
                     packet.pts = packet.dts = None  # AVI has no presentation times

@@ -51,18 +51,18 @@ def open_input(path: Path, frame_rate: float | None = None) -> InputContainer:
         missing.
     """
     refuse_stream(path)
-    # "a:b.mp4" would be treated as a protocol; an absolute name is not.
-    name, options = str(path.absolute()), SAFELY
+    file, options = path, SAFELY
     # FFmpeg may treat raw Motion JPEG as a pipe of images, which is not allowed.
-    kind = "mjpeg" if path.suffix.lower() in (".mjpeg", ".mjpg") else None
+    container_format = "mjpeg" if path.suffix.lower() in (".mjpeg", ".mjpg") else None
     if sequence := find_sequence(path):
-        name, kind = str(sequence.files[0].absolute()), "image2"
+        file, container_format = sequence.files[0], "image2"
         rate, _ = sequence.timing(frame_rate)
-        options = {"framerate": f"{rate.numerator}/{rate.denominator}", "pattern_type": "none"}
+        options = {"framerate": str(rate), "pattern_type": "none"}
     elif not os.path.exists(path):  # noqa: PTH110  # also False if it is not accessible
         raise VideoError(f"{path}: not found; check the name")
-    try:
-        return av.open(name, "r", kind, options, metadata_errors="replace")  # tags: any encoding
+    name = str(file.absolute())  # "a:b.mp4" would be treated as a protocol
+    try:  # tags may have any encoding
+        return av.open(name, "r", container_format, options, metadata_errors="replace")
     except av.FFmpegError as error:
         fault = f"cannot be opened, is not a video, or was cut off ({error.strerror})"
         raise VideoError(f"{path}: {fault}; use a file that plays") from error
@@ -82,17 +82,17 @@ def is_pipe(path: Path) -> bool:
 def packets(
     container: InputContainer, streams: Iterable[Stream], on_error: Callable[[], None]
 ) -> "Iterator[Packet[Stream]]":
-    """Yield the packets of `streams` in file order; skip unreadable places, and other streams.
+    """Yield the packets of `streams` in file order, and skip what cannot be read.
 
-    `on_error` is called for each place that is skipped.
+    `on_error` is called for each part of the file that is skipped.
     """
-    wanted = {stream.index: stream for stream in streams}
-    for other in set(container.streams) - set(wanted.values()):
-        other.discard = Discard.all
+    selected = {stream.index: stream for stream in streams}
+    for stream in container.streams:
+        stream.discard = Discard.default if stream.index in selected else Discard.all
     failures = 0
     while failures < _MAX_FAILURES:
         try:
-            for packet in container.demux(*wanted.values()):
+            for packet in container.demux(*selected.values()):
                 failures = 0
                 if packet.size:  # an empty packet would end the decoder
                     yield packet
@@ -135,37 +135,36 @@ def joined_videos(path: Path) -> int:
     """Return how many MP4 or MOV videos, each with an index, were joined byte by byte."""
     if not path.is_file() or path.suffix.lower() not in {".mp4", ".mov", ".m4v"}:
         return 1
-    position = found = 0
+    position = indexes = 0
     with path.open("rb") as file:
         for _ in range(_MAX_BOXES):
             file.seek(position)
-            head = file.read(16)
-            found += head[4:8] == b"moov"
-            length = int.from_bytes(head[:4])
+            header = file.read(16)
+            indexes += header[4:8] == b"moov"
+            length = int.from_bytes(header[:4])
             if length == 1:  # it follows, in 64 bits
-                length = int.from_bytes(head[8:])
+                length = int.from_bytes(header[8:])
             if length < 8:  # also at the end of the file
                 break
             position += length
-    return found
+    return indexes
 
 
 def describe(path: Path, stream: VideoStream, first: av.VideoFrame) -> VideoInfo:
     """Describe a video, of which the `first` picture has been decoded."""
     container = cast("InputContainer", stream.container)
-    time_base = time_base_of(stream)
-    rate = rate_of(stream)
+    rate, time_base = rate_of(stream), time_base_of(stream)
     start = (first.pts or 0) * time_base
-    # The longest stream may be longer than the video stream.
-    longest = Fraction(container.duration, av.time_base) if container.duration else None
-    duration = stated_duration(stream, start) or longest
-    turn = Orientation.of_frame(first)
+    duration = stated_duration(stream, start)
+    if duration is None and container.duration:  # of the longest stream
+        duration = Fraction(container.duration, av.time_base)
+    orientation = Orientation.of_frame(first)
     if sequence := find_sequence(path):
-        _, turn = read_header(sequence.files[0])
+        _, orientation = read_header(sequence.files[0])
     is_hdr = first.color_trc in HDR_TRANSFERS
     colors = ColorTags(first.color_primaries, first.color_trc, first.colorspace)
     width, height, aspect = first.width, first.height, stream.sample_aspect_ratio or Fraction(1)
-    if turn.is_sideways:
+    if orientation.is_sideways:
         width, height, aspect = height, width, 1 / aspect
     return VideoInfo(
         path=path,
@@ -176,21 +175,21 @@ def describe(path: Path, stream: VideoStream, first: av.VideoFrame) -> VideoInfo
         start=start,
         frames=stream.frames or (round(duration * rate) if duration else None),
         duration=duration,
-        orientation=turn,
+        orientation=orientation,
         pixel_aspect=aspect,
         color=ColorTags(1, 1, 1) if is_hdr else colors,
-        coding=(not is_hdr and turn == Orientation() and Coding.of(first)) or Coding(),
-        has_sound=bool(container.streams.audio) and not is_pipe(path),
+        coding=(not is_hdr and orientation == Orientation() and Coding.of(first)) or Coding(),
+        has_audio=bool(container.streams.audio) and not is_pipe(path),
         tags=_tags(stream),
     )
 
 
 def _tags(stream: VideoStream) -> Tags:
     """Return metadata of the recording; the names differ between containers."""
-    metadata = stream.metadata | stream.container.metadata
-    found = {name.lower(): value for name, value in metadata.items()}
-    location = found.get("location") or found.get("com.apple.quicktime.location.iso6709")
-    return Tags(found.get("creation_time"), location, found.get("title"))
+    metadata = (stream.metadata | stream.container.metadata).items()
+    tags = {name.lower(): value for name, value in metadata}
+    location = tags.get("location") or tags.get("com.apple.quicktime.location.iso6709")
+    return Tags(tags.get("creation_time"), location, tags.get("title"))
 
 
 def stated_duration(stream: VideoStream, start: Fraction) -> Fraction | None:
@@ -210,8 +209,8 @@ def stated_duration(stream: VideoStream, start: Fraction) -> Fraction | None:
 def rate_of(stream: VideoStream) -> Fraction:
     """Return the average frame rate; 25 if the file does not declare one."""
     for rate in (stream.average_rate, stream.guessed_rate):
-        if rate and (near := rate.limit_denominator(_MAX_TERM)) > 0:
-            return near
+        if rate and (limited := rate.limit_denominator(_MAX_TERM)) > 0:
+            return limited
     return Fraction(25)
 
 
@@ -221,8 +220,8 @@ def time_base_of(stream: VideoStream) -> Fraction:
 
 
 _TS_DISCONT = 0x0200  # FFmpeg's flag of such formats: AVFMT_TS_DISCONT
-_BACK = Fraction(1, 10)  # seconds; a larger step back begins a new part
-_FORTH = 10  # seconds; a larger jump forward begins a new part, as in the ffmpeg program
+_MAX_BACK = Fraction(1, 10)  # seconds; a larger step back begins a new part
+_MAX_FORWARD = 10  # seconds; a larger jump forward begins a new part, as in the ffmpeg program
 
 
 class ClockUnwrapper:
@@ -241,7 +240,7 @@ class ClockUnwrapper:
     Attributes
     ----------
     streams
-        Streams whose packets are needed: video, and all sound if the clock may restart.
+        Streams whose packets are needed: video, and all audio if the clock may restart.
     may_restart
         Whether the clock may restart in files of this format.
     restarts
@@ -251,8 +250,8 @@ class ClockUnwrapper:
     def __init__(self, container: InputContainer, pictures: VideoStream) -> None:
         self.restarts = 0
         self.may_restart = bool(container.format.flags & _TS_DISCONT)
-        sounds = container.streams.audio if self.may_restart else ()
-        self.streams: list[Stream] = [pictures, *sounds]
+        audio = container.streams.audio if self.may_restart else ()
+        self.streams: list[Stream] = [pictures, *audio]
         self._pictures = pictures.index
         self._period = 1 / rate_of(pictures)
         self._offsets = [Fraction(0)]  # of each part, seconds; the first part keeps its clock
@@ -270,22 +269,22 @@ class ClockUnwrapper:
     def _move(self, packet: "Packet[Stream]", begin: Fraction) -> None:
         """Add the offset of its part to the times of a packet, and note where it ends."""
         stream = packet.stream_index
-        number = self._part_at(stream, begin)
-        self.restarts += stream == self._pictures and number > self._part_of[stream]
-        self._part_of[stream] = number
+        part = self._part_at(stream, begin)
+        self.restarts += stream == self._pictures and part > self._part_of[stream]
+        self._part_of[stream] = part
         duration = (packet.duration or 0) * packet.time_base or self._period
-        end = begin + self._offsets[number] + duration
+        end = begin + self._offsets[part] + duration
         self._ends[stream] = max(self._ends.get(stream, end), end)
-        shift = round(self._offsets[number] / packet.time_base)
+        shift = round(self._offsets[part] / packet.time_base)
         packet.pts = None if packet.pts is None else packet.pts + shift
         packet.dts = None if packet.dts is None else packet.dts + shift
 
     def _part_at(self, stream: int, begin: Fraction) -> int:
         """Return the part, maybe a new one, in which a stream continues at a time of its clock."""
         newest, end = self._part_of.get(self._pictures, 0), self._ends.get(stream)
-        for number in range(self._part_of.setdefault(stream, newest), len(self._offsets)):
-            time = begin + self._offsets[number]
-            if end is None or end - _BACK <= time <= max(self._ends.values()) + _FORTH:
-                return number
+        for part in range(self._part_of.setdefault(stream, newest), len(self._offsets)):
+            time = begin + self._offsets[part]
+            if end is None or end - _MAX_BACK <= time <= max(self._ends.values()) + _MAX_FORWARD:
+                return part
         self._offsets.append(max(self._ends.values()) - begin)
         return len(self._offsets) - 1

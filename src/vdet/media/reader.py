@@ -98,7 +98,7 @@ class VideoReader:
             self.info = replace(self.info, frames=len(ticks), duration=self.length)
         elif not self._decoder.clock.may_restart:
             self.length = demux.stated_duration(stream, self.info.start)
-        self._to_standard = _standard_range(first.color_trc, stream)
+        self._to_standard_range = _standard_range_filter(first.color_trc, stream)
         self._faults += self._assumptions()
         self._frames = self._deliver(self._begin(first))
 
@@ -131,7 +131,7 @@ class VideoReader:
         """Yield assumptions that the user should know."""
         if isinstance(self._decoder.ticks, range) and self._settings.frame_rate is None:
             yield f"{ASSUMED_RATE:.0f} images per second are assumed; set input.frame_rate"
-        if self._decoder.container.streams.audio and not self.info.has_sound:
+        if self._decoder.container.streams.audio and not self.info.has_audio:
             yield "its audio is dropped: a pipe can be read only once"
         streams = len(demux.moving_streams(self._decoder.container))
         if streams > 1:
@@ -161,28 +161,36 @@ class VideoReader:
             self._decoder.container.close()
 
     def _selected(self, first: av.VideoFrame) -> Iterator[Frame]:
-        for index, time, picture in self._timed(first):
-            since = time - self.info.start
+        info, period, time = self.info, 1 / self.info.rate, None
+        pictures = itertools.chain([first], self._pictures)
+        for index, picture in enumerate(pictures, self._decoder.before):
+            stated = None if picture.pts is None else picture.pts * info.time_base
+            time = next_time(time, stated, period)
+            since = time - info.start
             if self._end is not None and since >= self._end:
                 return
             if since >= self._start:
                 yield Frame(index, time, self._upright(picture))
+        shown = max(period, picture.duration * info.time_base)
+        declared, self.length = self.length, since + shown
+        if declared and declared - self.length > max(2 * period, declared * _TOLERANCE):
+            self._faults.append(f"ends early: {index + 1} of {info.frames} frames could be read")
 
     def _upright(self, picture: av.VideoFrame) -> Picture:
         """Return a picture as planes if they need no conversion, else as BGR."""
         info = self.info
-        form = Coding.of(picture), picture.width, picture.height
-        has_same_form = form == (info.coding, info.width, info.height)
-        if has_same_form and info.orientation == Orientation() and not self._to_standard:
+        has_same_size = (picture.width, picture.height) == (info.width, info.height)
+        is_ready = info.orientation == Orientation() and not self._to_standard_range
+        if has_same_size and is_ready and Coding.of(picture) == info.coding:
             return Picture(Planes(picture, info.coding))
         return Picture(self._image(picture))
 
     def _image(self, picture: av.VideoFrame) -> Image:
         info = self.info
         try:
-            if self._to_standard:
-                self._to_standard.vpush(picture)
-                picture = self._to_standard.vpull()
+            if self._to_standard_range:
+                self._to_standard_range.vpush(picture)
+                picture = self._to_standard_range.vpull()
             image = bgr_of(picture)
         except (av.FFmpegError, ValueError) as error:
             fault = f"its pixels ({picture.format.name}) cannot be converted"
@@ -193,19 +201,6 @@ class VideoReader:
             return image
         self._is_scaled = True
         return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
-
-    def _timed(self, first: av.VideoFrame) -> Iterator[tuple[int, Fraction, av.VideoFrame]]:
-        info, period, time = self.info, 1 / self.info.rate, None
-        pictures = itertools.chain([first], self._pictures)
-        for index, picture in enumerate(pictures, self._decoder.before):
-            stated = None if picture.pts is None else picture.pts * info.time_base
-            time = next_time(time, stated, period)
-            yield index, time, picture
-        assert time is not None
-        shown = max(period, picture.duration * info.time_base)
-        declared, self.length = self.length, time + shown - info.start
-        if declared and declared - self.length > max(2 * period, declared * _TOLERANCE):
-            self._faults.append(f"ends early: {index + 1} of {info.frames} frames could be read")
 
     def _report(self) -> None:
         """Refuse a video that is too damaged; warn about other faults."""
@@ -225,7 +220,7 @@ class VideoReader:
             _log.warning("%s: %s", self.info.path, "; ".join(self._faults))
 
 
-def _standard_range(transfer: int, stream: VideoStream) -> Graph | None:
+def _standard_range_filter(transfer: int, stream: VideoStream) -> Graph | None:
     """Return the filter that converts HDR video to BT.709; None for other video."""
     if transfer not in demux.HDR_TRANSFERS:
         return None

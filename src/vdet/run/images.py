@@ -122,12 +122,7 @@ class ImageSearch:
 
     @contextmanager
     def open_sinks(
-        self,
-        outputs: Sequence[Output],
-        places: Mapping[Path, Path],
-        *,
-        overwrite: bool,
-        inputs: FileIds,
+        self, outputs: Sequence[Output], places: Mapping[Path, Path], files: OutputFiles
     ) -> Iterator[Sinks]:
         """Yield the sinks of some outputs, which appear together after the block."""
 
@@ -135,10 +130,9 @@ class ImageSearch:
             detector = self.model.for_video(image.shape[1], image.shape[0], [image])
             return stage_images_of(detector)(image, detections)
 
-        with OutputFiles(overwrite=overwrite, inputs=inputs) as files:
-            context = SinkContext(files, self.settings, places=places, stage_images=stage_images)
-            with open_sinks(outputs, context) as sinks:
-                yield sinks
+        context = SinkContext(files, self.settings, places=places, stage_images=stage_images)
+        with files, open_sinks(outputs, context) as sinks:
+            yield sinks
 
 
 def run_images(
@@ -169,14 +163,14 @@ def run_images(
             return error
 
     places = {job.source: job.place for job in jobs if job.place}
-    opened = partial(search.open_sinks, places=places, overwrite=overwrite, inputs=inputs)
+    files = partial(OutputFiles, overwrite=overwrite, inputs=inputs)
     with (
-        opened(shared) as sinks,
+        search.open_sinks(shared, places, files()) as sinks,
         map_ordered(find, jobs, threads) as results,
     ):
         for job, found in results:
             if isinstance(found, FrameResult):
-                with opened(job.outputs) as own:
+                with search.open_sinks(job.outputs, places, files()) as own:
                     own.write(found)
                     sinks.write(found)
             yield found
