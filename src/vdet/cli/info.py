@@ -203,6 +203,7 @@ def _video(path: Path) -> Facts:
     from vdet.detect.svm.horizon import find_horizon
     from vdet.errors import VideoError
     from vdet.media.demux import is_pipe, open_input, video_stream
+    from vdet.media.images import find_sequence
     from vdet.media.reader import VideoReader
     from vdet.run.loop import FIRST_FRAMES
 
@@ -210,7 +211,7 @@ def _video(path: Path) -> Facts:
         raise VideoError(f"{path}: can be read only once; save it to a file first")
     with VideoReader(path, frames=FIRST_FRAMES) as reader:
         info, images = reader.info, [frame.image for frame in reader]
-    with open_input(path) as container:
+    with open_input(path, find_sequence(path)) as container:
         context = video_stream(container, path).codec_context
         return {
             "kind": "video",

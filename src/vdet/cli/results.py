@@ -11,20 +11,12 @@ from vdet.cli import options
 from vdet.cli.messages import print_lines, progress_steps
 from vdet.cli.options import F, option, overwrite_option, short_form
 from vdet.errors import OutputError
-from vdet.files import (
-    NO_FILES,
-    FileIds,
-    OutputFiles,
-    check_output,
-    json_text,
-    output_errors,
-    print_now,
-    write_text,
-)
+from vdet.files import OutputFiles, check_output, json_text, output_errors, print_now, write_text
 
 if TYPE_CHECKING:
     from vdet.config.schema import Settings
     from vdet.evaluate.report import Report
+    from vdet.files import FileIds
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +26,7 @@ class ResultFiles:
     json_target: str | None
     overwrite: bool
     page: Path | None = None
-    inputs: FileIds = NO_FILES
+    inputs: "FileIds" = frozenset()
 
     def checked(self) -> Self:
         """Return self, after checking that the outputs can be written, before any work.

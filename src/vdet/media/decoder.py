@@ -1,6 +1,6 @@
 """Decode a video stream from its first picture, or from a key frame, despite damage."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import chain
@@ -13,7 +13,7 @@ from av.stream import Stream
 from vdet.errors import ImageError
 from vdet.media import demux
 from vdet.media.demux import ClockUnwrapper
-from vdet.media.images import find_sequence, read_encoded
+from vdet.media.images import ImageSequence, find_sequence, read_encoded
 
 _LONGEST_GROUP = 600  # maximum packets between key frames, which are kept in memory
 _COUNTABLE = ("av1", "h264", "hevc", "libdav1d", "mjpeg", "mpeg2video", "mpeg4", "png", "vp9")
@@ -92,7 +92,7 @@ class Decoder:
     Parameters
     ----------
     frame_rate
-        Rate of numbered images, per second; None: by their names, else `ASSUMED_RATE`.
+        Rate of numbered images, per second; None: as their names say, else `ASSUMED_RATE`.
 
     Attributes
     ----------
@@ -102,9 +102,8 @@ class Decoder:
         The damage so far.
     clock
         Knows whether, and how often, the clock restarts.
-    ticks
-        Presentation times of numbered images, in units of the time base; a range if their names are
-        not times.
+    sequence
+        The numbered images; None for a file.
     is_countable
         Whether frames can be counted without decoding them.
 
@@ -116,7 +115,8 @@ class Decoder:
 
     def __init__(self, path: Path, frame_rate: float | None) -> None:
         self.before = 0
-        self.container = demux.open_input(path, frame_rate)
+        self.sequence = find_sequence(path, frame_rate)
+        self.container = demux.open_input(path, self.sequence)
         self.stream = demux.video_stream(self.container, path)
         context = self.stream.codec_context
         context.options = {"max_pixels": str(demux.MAX_PIXELS)}
@@ -125,11 +125,7 @@ class Decoder:
         self.damage = Damage(1 / demux.rate_of(self.stream) / demux.time_base_of(self.stream))
         self._is_avi = self.container.format.name == "avi"
         self.is_countable = context.name in _COUNTABLE and not (self._is_avi or demux.is_pipe(path))
-        self._packets = self._read()
-        self.ticks: Sequence[int] = ()
-        if sequence := find_sequence(path):
-            _, self.ticks = sequence.timing(frame_rate)
-            self._packets = self._read_images(sequence.files)
+        self._packets = self._read_images(self.sequence) if self.sequence else self._read()
 
     def skip_to(self, time: int, first: int) -> bool:
         """Begin at the last key frame at or before a time, and count the frames before it.
@@ -188,9 +184,9 @@ class Decoder:
                 self.damage.restarts = self.clock.restarts
                 yield packet
 
-    def _read_images(self, files: Iterable[Path]) -> "Iterator[Packet[Stream]]":
+    def _read_images(self, sequence: ImageSequence) -> "Iterator[Packet[Stream]]":
         """Yield numbered images as packets."""
-        for file, tick in zip(files, self.ticks, strict=True):
+        for file, tick in zip(sequence.files, sequence.ticks, strict=True):
             try:
                 packet: Packet[Stream] = Packet(read_encoded(file))
             except ImageError:

@@ -16,7 +16,7 @@ from av.video.stream import VideoStream
 
 from vdet.errors import VideoError
 from vdet.media.frame import Coding, ColorTags, Tags, VideoInfo
-from vdet.media.images import Orientation, find_sequence, read_header
+from vdet.media.images import ASSUMED_RATE, ImageSequence, Orientation, read_header
 
 MAX_PIXELS = 8192 * 4608
 """Maximum for a frame. 8K video, in both widths, has fewer; a damaged header may claim more."""
@@ -36,28 +36,21 @@ SAFELY = {"format_whitelist": _FORMATS, "max_pixels": str(MAX_PIXELS)}
 """Options for opening any file: only these formats, and no larger frames when probing."""
 
 
-def open_input(path: Path, frame_rate: float | None = None) -> InputContainer:
-    """Open a video file for reading, or the first of numbered images (`img_%04d.png`, a folder).
-
-    Parameters
-    ----------
-    frame_rate
-        Of numbered pictures, per second; None: as their names say, else `ASSUMED_RATE`.
+def open_input(path: Path, sequence: ImageSequence | None = None) -> InputContainer:
+    """Open a video file for reading, or the first image of a sequence with the name `path`.
 
     Raises
     ------
     VideoError
-        The file does not exist, cannot be read, is not a video, or is an address; an image is
-        missing.
+        The file does not exist, cannot be read, is not a video, or is an address.
     """
     refuse_stream(path)
     file, options = path, SAFELY
     # FFmpeg may treat raw Motion JPEG as a pipe of images, which is not allowed.
     container_format = "mjpeg" if path.suffix.lower() in (".mjpeg", ".mjpg") else None
-    if sequence := find_sequence(path):
+    if sequence:
         file, container_format = sequence.files[0], "image2"
-        rate, _ = sequence.timing(frame_rate)
-        options = {"framerate": str(rate), "pattern_type": "none"}
+        options = {"framerate": str(sequence.rate or ASSUMED_RATE), "pattern_type": "none"}
     elif not os.path.exists(path):  # noqa: PTH110  # also False if it is not accessible
         raise VideoError(f"{path}: not found; check the name")
     name = str(file.absolute())  # "a:b.mp4" would be treated as a protocol
@@ -150,7 +143,9 @@ def joined_videos(path: Path) -> int:
     return indexes
 
 
-def describe(path: Path, stream: VideoStream, first: av.VideoFrame) -> VideoInfo:
+def describe(
+    path: Path, stream: VideoStream, first: av.VideoFrame, sequence: ImageSequence | None
+) -> VideoInfo:
     """Describe a video, of which the `first` picture has been decoded."""
     container = cast("InputContainer", stream.container)
     rate, time_base = rate_of(stream), time_base_of(stream)
@@ -159,7 +154,7 @@ def describe(path: Path, stream: VideoStream, first: av.VideoFrame) -> VideoInfo
     if duration is None and container.duration:  # of the longest stream
         duration = Fraction(container.duration, av.time_base)
     orientation = Orientation.of_frame(first)
-    if sequence := find_sequence(path):
+    if sequence:
         _, orientation = read_header(sequence.files[0])
     is_hdr = first.color_trc in HDR_TRANSFERS
     colors = ColorTags(first.color_primaries, first.color_trc, first.colorspace)

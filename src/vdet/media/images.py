@@ -231,7 +231,7 @@ def to_ycrcb(image: Image) -> tuple[Image, Image, Image]:
 
 _PATTERN = re.compile(r"((?:[^%]|%%)*)%(?:0([1-9]\d*))?d((?:[^%]|%%)*)", re.ASCII)
 _LAST_NUMBER = re.compile(r".*?(\d+)\D*\.\w+", re.ASCII | re.DOTALL)
-ASSUMED_RATE = 25.0
+ASSUMED_RATE = Fraction(25)
 """Images per second, if neither the settings nor the names determine it."""
 
 
@@ -243,27 +243,28 @@ class ImageSequence:
     ----------
     files
         The images, in order.
-    ticks, tick
-        Time of each image after the first one, if names are times; the unit in seconds.
+    ticks
+        Time of each image after the first one, in periods of the rate.
+    rate
+        Images per second; None if it is unknown: `ASSUMED_RATE`.
     """
 
     files: tuple[Path, ...]
-    ticks: tuple[int, ...] = ()
-    tick: int = 1
-
-    def timing(self, frame_rate: float | None) -> tuple[Fraction, Sequence[int]]:
-        """Return the rate of the images, per second, and the time of each, in periods of it."""
-        if self.ticks and frame_rate is None:
-            return Fraction(1, self.tick), self.ticks
-        return Fraction(str(frame_rate or ASSUMED_RATE)), range(len(self.files))
+    ticks: Sequence[int]
+    rate: Fraction | None = None
 
 
-def find_sequence(path: Path) -> ImageSequence | None:
+def find_sequence(path: Path, frame_rate: float | None = None) -> ImageSequence | None:
     """Return the images of the pattern or folder `path`; None if it is neither.
 
     Images whose names are different times are in the order of these. Otherwise they are in the
     order of their numbers, which may begin anywhere, and increase by any constant step. In the name
     of a folder, a per cent sign is literal.
+
+    Parameters
+    ----------
+    frame_rate
+        Images per second; None: as their names say.
 
     Raises
     ------
@@ -272,7 +273,12 @@ def find_sequence(path: Path) -> ImageSequence | None:
         are not one sequence.
     """
     files = _numbered_files(path)
-    return _ordered_by_time(files) or _ordered_by_number(files, path) if files else None
+    if not files:
+        return None
+    sequence = _ordered_by_time(files) or _ordered_by_number(files, path)
+    if frame_rate is None:
+        return sequence
+    return ImageSequence(sequence.files, range(len(files)), Fraction(str(frame_rate)))
 
 
 def video_files(path: Path) -> tuple[Path, ...]:
@@ -322,7 +328,7 @@ def _ordered_by_time(files: Iterable[Path]) -> ImageSequence | None:
     seconds = [round((time - ordered[0]).total_seconds()) for time in ordered]
     tick = math.gcd(*seconds) or 1
     ticks = tuple(second // tick for second in seconds)
-    return ImageSequence(tuple(dated[time] for time in ordered), ticks, tick)
+    return ImageSequence(tuple(dated[time] for time in ordered), ticks, Fraction(1, tick))
 
 
 def _ordered_by_number(files: Mapping[Path, int], path: Path) -> ImageSequence:
@@ -338,4 +344,4 @@ def _ordered_by_number(files: Mapping[Path, int], path: Path) -> ImageSequence:
         if gap != step:
             fault = f"image {number + step} is missing; copy image {number} in its place"
             raise VideoError(f"{path}: {fault}")
-    return ImageSequence(tuple(ordered))
+    return ImageSequence(tuple(ordered), range(len(ordered)))

@@ -91,11 +91,12 @@ class VideoReader:
             advice = f"use a file that plays, with frames of at most {limits}"
             raise VideoError(f"{path}: no frame can be decoded; {advice}")
         stream = self._decoder.stream
-        self.info: VideoInfo = demux.describe(path, stream, first)
+        sequence = self._decoder.sequence
+        self.info: VideoInfo = demux.describe(path, stream, first, sequence)
         self.length: Fraction | None = None
-        if ticks := self._decoder.ticks:
-            self.length = (ticks[-1] + 1) * self.info.time_base
-            self.info = replace(self.info, frames=len(ticks), duration=self.length)
+        if sequence:
+            self.length = (sequence.ticks[-1] + 1) * self.info.time_base
+            self.info = replace(self.info, frames=len(sequence.files), duration=self.length)
         elif not self._decoder.clock.may_restart:
             self.length = demux.stated_duration(stream, self.info.start)
         self._to_standard_range = _standard_range_filter(first.color_trc, stream)
@@ -129,8 +130,8 @@ class VideoReader:
 
     def _assumptions(self) -> Iterator[str]:
         """Yield assumptions that the user should know."""
-        if isinstance(self._decoder.ticks, range) and self._settings.frame_rate is None:
-            yield f"{ASSUMED_RATE:.0f} images per second are assumed; set input.frame_rate"
+        if self._decoder.sequence and not self._decoder.sequence.rate:
+            yield f"{ASSUMED_RATE} images per second are assumed; set input.frame_rate"
         if self._decoder.container.streams.audio and not self.info.has_audio:
             yield "its audio is dropped: a pipe can be read only once"
         streams = len(demux.moving_streams(self._decoder.container))

@@ -120,10 +120,7 @@ _FINEST = 10_000_000  # ticks a second; more is not safe in mp4 players
 
 def is_marked(path: Path) -> bool:
     """Return whether a file is a video that vdet wrote: see `MARK`."""
-    try:
-        return _comment(path).startswith(_MARKED)
-    except av.FFmpegError:
-        return False
+    return (_comment(path) or "").startswith(_MARKED)
 
 
 def may_replace_video(path: Path) -> bool:
@@ -134,18 +131,22 @@ def may_replace_video(path: Path) -> bool:
     """
     if not path.is_file():
         return path.is_symlink()  # its target does not exist
-    try:
-        return _comment(path).startswith(_MARKED)
-    except av.FFmpegError:
+    comment = _comment(path)
+    if comment is None:
         with contextlib.suppress(OSError), path.open("rb") as file:
             return file.read(8)[4:] not in _MP4
         return False
+    return comment.startswith(_MARKED)
 
 
-def _comment(path: Path) -> str:
-    """Return the comment in the metadata of a video. Raises `av.FFmpegError` if it is none."""
-    with av.open(str(path.absolute()), options=SAFELY, metadata_errors="replace") as container:
-        return {key.lower(): text for key, text in container.metadata.items()}.get("comment", "")
+def _comment(path: Path) -> str | None:
+    """Return the comment in the metadata of a video, maybe an empty one; None if it is none."""
+    try:
+        with av.open(str(path.absolute()), options=SAFELY, metadata_errors="replace") as container:
+            tags = {key.lower(): text for key, text in container.metadata.items()}
+    except av.FFmpegError:
+        return None
+    return tags.get("comment", "")
 
 
 class VideoWriter:
