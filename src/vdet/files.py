@@ -47,7 +47,7 @@ def _id(path: Path) -> tuple[int, int] | None:
 def check_output(
     path: Path, *, overwrite: bool, makes_folder: bool = False, inputs: FileIds = NO_FILES
 ) -> None:
-    """Refuse an output that cannot be written, before any work is done.
+    """Check that an output can be written, before any work is done.
 
     Parameters
     ----------

@@ -98,6 +98,8 @@ class Decoder:
     ----------
     before
         Number of frames before the first picture.
+    pictures
+        The pictures that can be decoded.
     damage
         The damage so far.
     clock
@@ -126,6 +128,7 @@ class Decoder:
         self._is_avi = self.container.format.name == "avi"
         self.is_countable = context.name in _COUNTABLE and not (self._is_avi or demux.is_pipe(path))
         self._packets = self._read_images(self.sequence) if self.sequence else self._read()
+        self.pictures = self._decode()
 
     def skip_to(self, time: int, first: int) -> bool:
         """Begin at the last key frame at or before a time, and count the frames before it.
@@ -159,8 +162,7 @@ class Decoder:
         self._packets = (packet for packet in following if packet.pts is None or packet.pts >= key)
         return True
 
-    def pictures(self) -> Iterator[av.VideoFrame]:
-        """Yield the pictures that can be decoded."""
+    def _decode(self) -> Iterator[av.VideoFrame]:
         for packet in chain(self._packets, (None,)):
             if packet and not packet.is_discard:  # otherwise the file marks it as hidden
                 self.damage.packets += 1

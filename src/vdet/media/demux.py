@@ -44,7 +44,7 @@ def open_input(path: Path, sequence: ImageSequence | None = None) -> InputContai
     VideoError
         The file does not exist, cannot be read, is not a video, or is an address.
     """
-    refuse_stream(path)
+    reject_address(path)
     file, options = path, SAFELY
     # FFmpeg may treat raw Motion JPEG as a pipe of images, which is not allowed.
     container_format = "mjpeg" if path.suffix.lower() in (".mjpeg", ".mjpg") else None
@@ -61,8 +61,8 @@ def open_input(path: Path, sequence: ImageSequence | None = None) -> InputContai
         raise VideoError(f"{path}: {fault}; use a file that plays") from error
 
 
-def refuse_stream(path: Path) -> None:
-    """Refuse an address, or ``-``. Raises `VideoError`."""
+def reject_address(path: Path) -> None:
+    """Raise `VideoError` if `path` is an address, or ``-``."""
     if not path.exists() and _STREAM.match(str(path)):
         raise VideoError(f"{path}: streams are not supported; save it to a file first")
 

@@ -171,7 +171,7 @@ def _is_cut_off(data: bytes) -> bool:
 
 
 @contextmanager
-def _refusing(path: Path) -> Iterator[None]:
+def _naming_errors(path: Path) -> Iterator[None]:
     """Convert errors of Pillow to an `ImageError` that names `path`."""
     try:
         yield
@@ -185,7 +185,7 @@ def _refusing(path: Path) -> Iterator[None]:
 
 def _open(data: bytes, path: Path) -> ImageFile:
     """Read the header of an image. Raises `ImageError`, which names `path`."""
-    with _refusing(path):
+    with _naming_errors(path):
         image = pillow.open(io.BytesIO(data), formats=_FORMATS)
     if max(image.size) > MAX_IMAGE_SIDE or math.prod(image.size) > MAX_IMAGE_PIXELS:
         raise ImageError(f"{path}: {_TOO_LARGE}")
@@ -203,7 +203,7 @@ def _decode(data: bytes, path: Path) -> Image:
     image = _open(data + _JPEG_END if _is_cut_off(data) else data, path)
     # Pillow itself rotates TIFF.
     turn = Orientation() if image.format == "TIFF" else _orientation(image)
-    with _refusing(path):
+    with _naming_errors(path):
         return upright(_to_bgr(image, data), turn)
 
 

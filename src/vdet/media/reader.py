@@ -84,8 +84,7 @@ class VideoReader:
         self._faults: list[str] = []
         self._is_scaled = False
         self._decoder = Decoder(path, settings.frame_rate)
-        self._pictures = self._decoder.pictures()
-        first = next(self._pictures, None)
+        first = next(self._decoder.pictures, None)
         if first is None or max(first.width, first.height) > _MAX_SIDE:
             limits = f"{demux.MAX_PIXELS // 10**6} million pixels and sides of {_MAX_SIDE}"
             advice = f"use a file that plays, with frames of at most {limits}"
@@ -145,13 +144,12 @@ class VideoReader:
         if not is_countable or first.pts is None or time <= first.pts:
             return first
         decoder = Decoder(self.info.path, self._settings.frame_rate)
-        pictures = decoder.pictures()
-        picture = next(pictures, None) if decoder.skip_to(time, first.pts) else None
+        picture = next(decoder.pictures, None) if decoder.skip_to(time, first.pts) else None
         if picture is None or decoder.damage.is_evident:
             decoder.container.close()
             return first
         self._decoder.container.close()
-        self._decoder, self._pictures = decoder, pictures
+        self._decoder = decoder
         return picture
 
     def _deliver(self, first: av.VideoFrame) -> Generator[Frame, None, None]:
@@ -163,7 +161,7 @@ class VideoReader:
 
     def _selected(self, first: av.VideoFrame) -> Iterator[Frame]:
         info, period, time = self.info, 1 / self.info.rate, None
-        pictures = itertools.chain([first], self._pictures)
+        pictures = itertools.chain([first], self._decoder.pictures)
         for index, picture in enumerate(pictures, self._decoder.before):
             stated = None if picture.pts is None else picture.pts * info.time_base
             time = next_time(time, stated, period)
@@ -204,7 +202,7 @@ class VideoReader:
         return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
 
     def _report(self) -> None:
-        """Refuse a video that is too damaged; warn about other faults."""
+        """Raise `VideoError` if too much is damaged; warn about other faults."""
         damaged, total = self.damaged, self._decoder.damage.pictures + self._decoder.damage.lost
         if damaged:
             self._faults.insert(0, f"{damaged} of {total} frames damaged or lost")
