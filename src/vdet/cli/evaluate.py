@@ -47,7 +47,8 @@ def images(data: tuple[Path, ...], min_width: float, **targets: Any) -> None:
     detector, roles = settings.detector, Roles.from_settings(settings)
     model = load_detector(detector.showing_all())
     sets = [read_labelled_images(path, roles) for path in data]
-    inputs = options.input_files(*data, settings=settings)
+    images_read = (image.path for labelled in sets for image in labelled.images)
+    inputs = options.input_files(*data, *images_read, settings=settings)
     results = ResultFiles(**targets, inputs=inputs).checked()
     counting = Counting(detector.min_score_still, min_width)
     with progress_steps(" images") as steps:

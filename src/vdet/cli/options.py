@@ -242,9 +242,9 @@ def read_for_whole_frames(*, detector: str | None = None) -> "Settings":
 
 
 def input_files(*paths: Path, settings: "Settings | None" = None) -> FileIds:
-    """Identify the files that the running command reads; arguments as for the same of `vdet.run`.
+    """Identify the files that the running command reads: see `vdet.run.inputs`.
 
-    The settings files are among them.
+    These are `paths`, the settings files, and the model file and masks of `settings`.
     """
     from vdet.run import inputs
 

@@ -203,10 +203,8 @@ def stated_duration(stream: VideoStream, start: Fraction) -> Fraction | None:
 
 def rate_of(stream: VideoStream) -> Fraction:
     """Return the average frame rate; 25 if the file does not declare one."""
-    for rate in (stream.average_rate, stream.guessed_rate):
-        if rate and (limited := rate.limit_denominator(_MAX_TERM)) > 0:
-            return limited
-    return Fraction(25)
+    rate = stream.average_rate or stream.guessed_rate or Fraction(25)
+    return rate.limit_denominator(_MAX_TERM) or Fraction(25)
 
 
 def time_base_of(stream: VideoStream) -> Fraction:
