@@ -11,7 +11,7 @@ from av.stream import Stream
 
 from vdet.config.schema import Settings
 from vdet.errors import OutputError
-from vdet.media.demux import ClockUnwrapper, is_pipe, open_input, packets, video_stream
+from vdet.media.demux import ClockUnwrapper, open_input, packets, video_stream
 from vdet.media.images import is_image_name
 from vdet.media.reader import VideoReader
 from vdet.media.writer import MARK, VIDEO_SUFFIXES, VideoWriter
@@ -21,7 +21,7 @@ _AUDIO_LAG = 1  # seconds of video after the end in which audio of the part may 
 
 def can_copy(source: Path) -> bool:
     """Return whether parts of a video can be copied: it is seekable, and has one clock."""
-    if is_pipe(source) or not source.is_file() or is_image_name(source):
+    if not source.is_file() or is_image_name(source):
         return False
     with open_input(source) as container:
         return not ClockUnwrapper(container, video_stream(container, source)).may_restart

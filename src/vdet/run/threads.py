@@ -10,6 +10,7 @@ from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import AbstractContextManager, contextmanager
+from contextvars import copy_context
 from typing import Any, TypeVar
 
 T = TypeVar("T")
@@ -21,7 +22,7 @@ _END = object()  # follows the last item
 
 
 class _Thread(ThreadPoolExecutor):
-    """A thread that makes calls in turn.
+    """A thread that makes calls in turn, each in the context (`contextvars`) of its caller.
 
     At the end of the block, pending calls are still made, but waited for only `JOIN_TIMEOUT`.
     """
@@ -30,7 +31,7 @@ class _Thread(ThreadPoolExecutor):
         super().__init__(1, thread_name_prefix=name)
 
     def call(self, function: Callable[..., R], *arguments: Any) -> Future[R]:
-        return self.submit(function, *arguments)
+        return self.submit(copy_context().run, function, *arguments)
 
     def __exit__(self, *_: object) -> None:
         hangs = wait([self.submit(int)], JOIN_TIMEOUT).not_done
@@ -102,7 +103,7 @@ def map_ordered(
 
         def pairs() -> Iterator[tuple[T, R]]:
             for item in items:
-                running.append((item, pool.submit(function, item)))
+                running.append((item, pool.submit(copy_context().run, function, item)))
                 if len(running) > threads:
                     first, future = running.popleft()
                     yield first, future.result()
