@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable, Iterator
+from contextlib import closing
 from fractions import Fraction
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from av.stream import Stream
 
 from vdet.config.schema import Settings
 from vdet.errors import OutputError
-from vdet.media.demux import ClockUnwrapper, open_input, packets, video_stream
+from vdet.media.demux import Demuxer
 from vdet.media.images import is_image_name
 from vdet.media.reader import VideoReader
 from vdet.media.writer import MARK, VIDEO_SUFFIXES, VideoWriter
@@ -23,8 +24,8 @@ def can_copy(source: Path) -> bool:
     """Return whether parts of a video can be copied: it is seekable, and has one clock."""
     if not source.is_file() or is_image_name(source):
         return False
-    with open_input(source) as container:
-        return not ClockUnwrapper(container, video_stream(container, source)).may_restart
+    with closing(Demuxer(source)) as demuxer:
+        return not demuxer.may_restart
 
 
 def copied_suffix(source: Path) -> str:
@@ -49,15 +50,14 @@ def copy_part(source: Path, start: Fraction, end: Fraction, target: Path) -> Non
     OutputError
         The container of `target` cannot hold a stream of the source.
     """
-    with open_input(source) as container, av.open(str(target.absolute()), "w") as written:
+    with closing(Demuxer(source)) as demuxer, av.open(str(target.absolute()), "w") as written:
         written.metadata["comment"] = MARK
-        pictures = video_stream(container, source)
-        streams: list[Stream] = [pictures, *container.streams.audio]
+        streams: list[Stream] = [demuxer.video, *demuxer.container.streams.audio]
         try:
             targets = {item.index: written.add_stream_from_template(item) for item in streams}
-            container.seek(int(start * av.time_base))
-            following = packets(container, streams, on_error=lambda: None)
-            for packet in _moved_to_zero(following, pictures.index, end):
+            demuxer.container.seek(int(start * av.time_base))
+            following = demuxer.packets(streams)
+            for packet in _moved_to_zero(following, demuxer.video.index, end):
                 packet.stream = targets[packet.stream_index]
                 written.mux(packet)
         except (ValueError, av.FFmpegError) as error:

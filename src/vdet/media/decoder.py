@@ -12,7 +12,7 @@ from av.stream import Stream
 
 from vdet.errors import ImageError
 from vdet.media import demux
-from vdet.media.demux import ClockUnwrapper
+from vdet.media.demux import Demuxer
 from vdet.media.images import ImageSequence, find_sequence, read_encoded
 
 _LONGEST_GROUP = 600  # maximum packets between key frames, which are kept in memory
@@ -102,8 +102,8 @@ class Decoder:
         The pictures that can be decoded.
     damage
         The damage so far.
-    clock
-        Knows whether, and how often, the clock restarts.
+    demuxer
+        The file.
     sequence
         The numbered images; None for a file.
     is_countable
@@ -118,14 +118,13 @@ class Decoder:
     def __init__(self, path: Path, frame_rate: float | None) -> None:
         self.before = 0
         self.sequence = find_sequence(path, frame_rate)
-        self.container = demux.open_input(path, self.sequence)
-        self.stream = demux.video_stream(self.container, path)
+        self.demuxer = Demuxer(path, self.sequence)
+        self.stream = self.demuxer.video
         context = self.stream.codec_context
         context.options = {"max_pixels": str(demux.MAX_PIXELS)}
         context.thread_count = 1  # with more, frames near damage differ from run to run
-        self.clock = ClockUnwrapper(self.container, self.stream)
         self.damage = Damage(1 / demux.rate_of(self.stream) / demux.time_base_of(self.stream))
-        self._is_avi = self.container.format.name == "avi"
+        self._is_avi = self.demuxer.container.format.name == "avi"
         self.is_countable = context.name in _COUNTABLE and not (self._is_avi or demux.is_pipe(path))
         self._packets = self._read_images(self.sequence) if self.sequence else self._read()
         self.pictures = self._decode()
@@ -177,14 +176,12 @@ class Decoder:
 
     def _read(self) -> "Iterator[Packet[Stream]]":
         """Yield the packets of the pictures."""
-        packets = demux.packets(self.container, self.clock.streams, self._fail)
-        for packet in self.clock.unwrap(packets):
-            if packet.stream_index == self.stream.index:
-                if self._is_avi and self.stream.codec_context.has_b_frames:
-                    packet.pts = packet.dts = None  # AVI has no presentation times
-                self.damage.corrupt_packets += packet.is_corrupt
-                self.damage.restarts = self.clock.restarts
-                yield packet
+        for packet in self.demuxer.packets([self.stream], self._fail):
+            if self._is_avi and self.stream.codec_context.has_b_frames:
+                packet.pts = packet.dts = None  # AVI has no presentation times
+            self.damage.corrupt_packets += packet.is_corrupt
+            self.damage.restarts = self.demuxer.restarts
+            yield packet
 
     def _read_images(self, sequence: ImageSequence) -> "Iterator[Packet[Stream]]":
         """Yield numbered images as packets."""

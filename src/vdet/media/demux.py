@@ -2,7 +2,7 @@
 
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
@@ -24,7 +24,6 @@ MAX_PIXELS = 8192 * 4608
 _MAX_BOXES = 200_000  # maximum number of boxes of an MP4 file to read
 
 _STREAM = re.compile(r"[a-z][a-z0-9+.-]+:/|-$", re.IGNORECASE)  # "rtsp://…" as a path, or "-"
-_MAX_FAILURES = 100  # in a row; a file with only errors must end too
 
 # Formats that contain their pictures: not formats that refer to other files or addresses (such as
 # playlists), nor text that would be rendered as a picture.
@@ -70,32 +69,6 @@ def reject_address(path: Path) -> None:
 def is_pipe(path: Path) -> bool:
     """Return whether `path` can be read only once, like a FIFO."""
     return path.exists() and not path.is_file() and not path.is_dir()
-
-
-def packets(
-    container: InputContainer, streams: Iterable[Stream], on_error: Callable[[], None]
-) -> "Iterator[Packet[Stream]]":
-    """Yield the packets of `streams` in file order, and skip what cannot be read.
-
-    `on_error` is called for each part of the file that is skipped.
-    """
-    selected = {stream.index: stream for stream in streams}
-    for stream in container.streams:
-        stream.discard = Discard.default if stream.index in selected else Discard.all
-    failures = 0
-    while failures < _MAX_FAILURES:
-        try:
-            for packet in container.demux(*selected.values()):
-                failures = 0
-                if packet.size:  # an empty packet would end the decoder
-                    yield packet
-            return
-        except IndexError:  # from PyAV, at the end, if a stream appeared while reading
-            return
-        except av.FFmpegError:
-            failures += 1
-            if failures == 1:
-                on_error()
 
 
 HDR_TRANSFERS = (16, 18)
@@ -215,55 +188,83 @@ def time_base_of(stream: VideoStream) -> Fraction:
 _TS_DISCONT = 0x0200  # FFmpeg's flag of such formats: AVFMT_TS_DISCONT
 _MAX_BACK = Fraction(1, 10)  # seconds; a larger step back begins a new part
 _MAX_FORWARD = 10  # seconds; a larger jump forward begins a new part, as in the ffmpeg program
+_MAX_FAILURES = 100  # in a row; a file with only errors must end too
 
 
-class ClockUnwrapper:
-    """Moves packets to one continuous time line, in file order.
+class Demuxer:
+    """An open video file, whose packets are read in file order, on one continuous time line.
 
-    Each stream enters the next part where its own clock jumps, because packets of both parts
-    alternate near the joint. The first stream in a part determines its offset.
-
-    Parameters
-    ----------
-    container
-        If its clock cannot restart, packets are not changed.
-    pictures
-        The video stream, whose restarts count.
+    If its clock restarts, each stream enters the next part where its own clock jumps, because
+    packets of both parts alternate near the joint. The first stream in a part determines its
+    offset. Parameters and errors are those of `open_input` and `video_stream`.
 
     Attributes
     ----------
-    streams
-        Streams whose packets are needed: video, and all audio if the clock may restart.
+    container
+        The file.
+    video
+        The video stream, whose restarts count.
     may_restart
         Whether the clock may restart in files of this format.
     restarts
         How often it has restarted.
     """
 
-    def __init__(self, container: InputContainer, pictures: VideoStream) -> None:
+    def __init__(self, path: Path, sequence: ImageSequence | None = None) -> None:
+        self.container = open_input(path, sequence)
+        self.video = video_stream(self.container, path)
         self.restarts = 0
-        self.may_restart = bool(container.format.flags & _TS_DISCONT)
-        audio = container.streams.audio if self.may_restart else ()
-        self.streams: list[Stream] = [pictures, *audio]
-        self._pictures = pictures.index
-        self._period = 1 / rate_of(pictures)
+        self.may_restart = bool(self.container.format.flags & _TS_DISCONT)
+        self._period = 1 / rate_of(self.video)
         self._offsets = [Fraction(0)]  # of each part, seconds; the first part keeps its clock
         self._part_of: dict[int, int] = {}  # the current part of each stream
         self._ends: dict[int, Fraction] = {}  # of each stream, seconds on the time line
 
-    def unwrap(self, packets: "Iterable[Packet[Stream]]") -> "Iterator[Packet[Stream]]":
-        """Yield `packets`, of `streams` and possibly others, with continuous times."""
-        for packet in packets:
+    def close(self) -> None:
+        """Close the file."""
+        self.container.close()
+
+    def packets(
+        self, streams: Sequence[Stream], on_error: Callable[[], None] = lambda: None
+    ) -> "Iterator[Packet[Stream]]":
+        """Yield the packets of `streams`, and skip what cannot be read.
+
+        `on_error` is called for each part of the file that is skipped.
+        """
+        selected = {stream.index for stream in streams}
+        needed = [self.video, *self.container.streams.audio] if self.may_restart else streams
+        for packet in self._readable({stream.index: stream for stream in needed}, on_error):
             ticks = packet.pts if packet.dts is None else packet.dts
             if self.may_restart and ticks is not None:
                 self._move(packet, ticks * packet.time_base)
-            yield packet
+            if packet.stream_index in selected:
+                yield packet
+
+    def _readable(
+        self, needed: Mapping[int, Stream], on_error: Callable[[], None]
+    ) -> "Iterator[Packet[Stream]]":
+        for stream in self.container.streams:
+            stream.discard = Discard.default if stream.index in needed else Discard.all
+        failures = 0
+        while failures < _MAX_FAILURES:
+            try:
+                for packet in self.container.demux(*needed.values()):
+                    failures = 0
+                    if packet.size:  # an empty packet would end the decoder
+                        yield packet
+                return
+            except IndexError:  # from PyAV, at the end, if a stream appeared while reading
+                return
+            except av.FFmpegError:
+                failures += 1
+                if failures == 1:
+                    on_error()
 
     def _move(self, packet: "Packet[Stream]", begin: Fraction) -> None:
         """Add the offset of its part to the times of a packet, and note where it ends."""
         stream = packet.stream_index
         part = self._part_at(stream, begin)
-        self.restarts += stream == self._pictures and part > self._part_of[stream]
+        self.restarts += stream == self.video.index and part > self._part_of[stream]
         self._part_of[stream] = part
         duration = (packet.duration or 0) * packet.time_base or self._period
         end = begin + self._offsets[part] + duration
@@ -274,7 +275,7 @@ class ClockUnwrapper:
 
     def _part_at(self, stream: int, begin: Fraction) -> int:
         """Return the part, maybe a new one, in which a stream continues at a time of its clock."""
-        newest, end = self._part_of.get(self._pictures, 0), self._ends.get(stream)
+        newest, end = self._part_of.get(self.video.index, 0), self._ends.get(stream)
         for part in range(self._part_of.setdefault(stream, newest), len(self._offsets)):
             time = begin + self._offsets[part]
             if end is None or end - _MAX_BACK <= time <= max(self._ends.values()) + _MAX_FORWARD:

@@ -96,7 +96,7 @@ class VideoReader:
         if sequence:
             self.length = (sequence.ticks[-1] + 1) * self.info.time_base
             self.info = replace(self.info, frames=len(sequence.files), duration=self.length)
-        elif not self._decoder.clock.may_restart:
+        elif not self._decoder.demuxer.may_restart:
             self.length = demux.stated_duration(stream, self.info.start)
         self._to_standard_range = _standard_range_filter(first.color_trc, stream)
         self._faults += self._assumptions()
@@ -125,15 +125,15 @@ class VideoReader:
 
     def __exit__(self, *_: object) -> None:
         self._frames.close()
-        self._decoder.container.close()
+        self._decoder.demuxer.close()
 
     def _assumptions(self) -> Iterator[str]:
         """Yield assumptions that the user should know."""
         if self._decoder.sequence and not self._decoder.sequence.rate:
             yield f"{ASSUMED_RATE} images per second are assumed; set input.frame_rate"
-        if self._decoder.container.streams.audio and not self.info.has_audio:
+        if self._decoder.demuxer.container.streams.audio and not self.info.has_audio:
             yield "its audio is dropped: a pipe can be read only once"
-        streams = len(demux.moving_streams(self._decoder.container))
+        streams = len(demux.moving_streams(self._decoder.demuxer.container))
         if streams > 1:
             yield f"has {streams} video streams; only the first is used"
 
@@ -146,9 +146,9 @@ class VideoReader:
         decoder = Decoder(self.info.path, self._settings.frame_rate)
         picture = next(decoder.pictures, None) if decoder.skip_to(time, first.pts) else None
         if picture is None or decoder.damage.is_evident:
-            decoder.container.close()
+            decoder.demuxer.close()
             return first
-        self._decoder.container.close()
+        self._decoder.demuxer.close()
         self._decoder = decoder
         return picture
 
@@ -157,7 +157,7 @@ class VideoReader:
             yield from itertools.islice(self._selected(first), self._limit)
             self._report()
         finally:
-            self._decoder.container.close()
+            self._decoder.demuxer.close()
 
     def _selected(self, first: av.VideoFrame) -> Iterator[Frame]:
         info, period, time = self.info, 1 / self.info.rate, None
@@ -209,7 +209,7 @@ class VideoReader:
         if damaged > math.ceil(self._settings.max_damaged * total):
             limit = "more than input.max_damaged allows; raise it"
             raise VideoError(f"{self.info.path}: {self._faults[0]}, {limit}")
-        if restarts := self._decoder.clock.restarts:
+        if restarts := self._decoder.demuxer.restarts:
             self._faults.append(f"its clock restarts {restarts}×; the parts follow one another")
         if (videos := demux.joined_videos(self.info.path)) > 1:
             self._faults.append(f"{videos} videos are joined in one file; only the first is read")

@@ -17,7 +17,7 @@ from av.video.reformatter import ColorRange
 
 from vdet.config.schema import OutputSettings
 from vdet.errors import OutputError, VideoError
-from vdet.media.demux import SAFELY, ClockUnwrapper, open_input, packets, video_stream
+from vdet.media.demux import SAFELY, Demuxer
 from vdet.media.frame import MATRIX_CODES, UNSPECIFIED, Coding, Frame, Picture, Planes, VideoInfo
 from vdet.version import __version__
 
@@ -44,8 +44,7 @@ class AudioCopy:
         self._origin = origin
         self._can_hide = target.format.name != "matroska"
         self._dropped = 0  # packets
-        self._source = open_input(source)
-        self._clock = ClockUnwrapper(self._source, video_stream(self._source, source))
+        self._source = Demuxer(source)
         self._streams = self._add_streams()
         self._packets = self._shifted_packets()
         self._next = next(self._packets, None)
@@ -72,7 +71,7 @@ class AudioCopy:
     def _add_streams(self) -> dict[int, AudioStream]:
         """Add the supported streams to the target, by their index in the source."""
         streams, target = {}, self._target
-        for stream in self._source.streams.audio:
+        for stream in self._source.container.streams.audio:
             codec = stream.codec_context
             if codec and codec.sample_rate and codec.name in target.supported_codecs:
                 streams[stream.index] = target.add_stream_from_template(stream)
@@ -84,15 +83,12 @@ class AudioCopy:
 
     def _shifted_packets(self) -> "Generator[Packet[Stream], None, None]":
         """Yield the packets to copy, with their times and stream in the target."""
-        copied = [self._source.streams[index] for index in self._streams]
-        if not copied:
+        if not self._streams:
             return
-        needed = self._clock.streams if self._clock.may_restart else copied
         last: dict[int, int] = {}
-        for packet in self._clock.unwrap(packets(self._source, needed, on_error=lambda: None)):
+        copied = [self._source.container.streams[index] for index in self._streams]
+        for packet in self._source.packets(copied):
             index, pts, dts = packet.stream_index, packet.pts, packet.dts
-            if index not in self._streams:
-                continue
             if pts is None or dts is None or dts <= last.get(index, dts - 1):
                 self._dropped += 1  # muxers reject times that do not increase
                 continue
