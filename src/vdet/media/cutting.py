@@ -56,8 +56,7 @@ def copy_part(source: Path, start: Fraction, end: Fraction, target: Path) -> Non
         try:
             targets = {item.index: written.add_stream_from_template(item) for item in streams}
             demuxer.container.seek(int(start * av.time_base))
-            following = demuxer.packets(streams)
-            for packet in _moved_to_zero(following, demuxer.video.index, end):
+            for packet in _moved_to_zero(demuxer.packets(streams), demuxer.video, end):
                 packet.stream = targets[packet.stream_index]
                 written.mux(packet)
         except (ValueError, av.FFmpegError) as error:
@@ -65,23 +64,23 @@ def copy_part(source: Path, start: Fraction, end: Fraction, target: Path) -> Non
 
 
 def _moved_to_zero(
-    following: "Iterable[Packet[Stream]]", pictures: int, end: Fraction
+    packets: "Iterable[Packet[Stream]]", video: Stream, end: Fraction
 ) -> "Iterator[Packet[Stream]]":
-    """Yield the packets from the first key frame to the first one at or after `end`.
+    """Yield the packets from the first key frame of `video` to the first one at or after `end`.
 
-    `pictures` is the index of the video stream. The first key frame is moved to second 0.
+    The first key frame is moved to second 0.
     """
     begin: Fraction | float = math.inf
     stop: Fraction | float = math.inf
-    for packet in following:
+    for packet in packets:
         if packet.pts is None or packet.dts is None:
             continue
-        time, is_image = packet.pts * packet.time_base, packet.stream_index == pictures
-        if is_image and packet.is_keyframe:
+        time, is_video = packet.pts * packet.time_base, packet.stream_index == video.index
+        if is_video and packet.is_keyframe:
             begin, stop = min(begin, time), min(stop, time if time >= end else math.inf)
-        if is_image and time > stop + _AUDIO_LAG:
+        if is_video and time > stop + _AUDIO_LAG:
             return
-        if begin <= time < stop and not (is_image and stop < math.inf):
+        if begin <= time < stop and not (is_video and stop < math.inf):
             shift = round(begin / packet.time_base)
             packet.pts, packet.dts = packet.pts - shift, packet.dts - shift
             yield packet
