@@ -21,12 +21,10 @@ from vdet.files import (
     _HOST,
     OutputFiles,
     check_output,
+    file_ids,
     read_whole,
-    record_input,
-    recorded_inputs,
     staged,
 )
-from vdet.run.threads import map_ordered, prefetch
 
 DIGITS = "1a2b3c4d" * 2
 
@@ -178,50 +176,32 @@ def interrupt_after(steps: int, folder: Path, patch: pytest.MonkeyPatch) -> None
 
 
 @pytest.mark.parametrize("overwrite", [True, False])
-def test_what_will_be_read_is_refused_before_any_work_under_each_of_its_names(
+def test_an_input_is_rejected_as_an_output_under_each_of_its_names(
     tmp_path: Path, overwrite: bool
 ) -> None:
     (tmp_path / "in.json").touch()
-    (tmp_path / "out.json").hardlink_to(tmp_path / "in.json")
-    with recorded_inputs():
-        record_input(tmp_path / "in.json", tmp_path / "missing")
+    (tmp_path / "hard.json").hardlink_to(tmp_path / "in.json")
+    (tmp_path / "link.json").symlink_to("hard.json")
+    inputs = file_ids([tmp_path / "in.json", tmp_path / "missing"])
+    for name in ("in.json", "hard.json", "link.json"):
         with pytest.raises(OutputError, match="is the input itself"):
-            check_output(tmp_path / "out.json", overwrite=overwrite)
-    check_output(tmp_path / "out.json", overwrite=True)  # another run does not read it
+            check_output(tmp_path / name, overwrite=overwrite, inputs=inputs)
+    check_output(tmp_path / "in.json", overwrite=True)
 
 
-def test_what_was_read_in_a_run_is_kept(tmp_path: Path) -> None:
-    """Threads of a run and runs inside it add to its record; another run has its own."""
-    for name in ("a.txt", "b.txt", "of-an-earlier-run.txt"):
+def test_no_output_replaces_an_input(tmp_path: Path) -> None:
+    for name in ("0.txt", "a.txt", "of-an-earlier-run.txt"):
         (tmp_path / name).write_text("precious")
-    with recorded_inputs(), map_ordered(read_all, [tmp_path / "a.txt"], 1) as first:
-        list(first)
-        with recorded_inputs(), prefetch(map(read_all, [tmp_path / "b.txt"])) as second:
-            list(second)
-            read_all(tmp_path / "of-an-earlier-run.txt")
-        for name in ("a.txt", "b.txt"):
-            files = OutputFiles(overwrite=True)
-            for path in (tmp_path / "0.txt", tmp_path / name):
-                files.stage(path).write_text("new")
-            with pytest.raises(OutputError, match=rf"{name}: is the input itself"), files:
-                pass
-        with OutputFiles(overwrite=True) as files:
-            files.stage_folder(tmp_path, is_text)
-        assert names(tmp_path) == ["a.txt", "b.txt", "of-an-earlier-run.txt"]
-        assert {path.read_text() for path in tmp_path.iterdir()} == {"precious"}
-    with staged(tmp_path / "a.txt", overwrite=True) as temporary:
-        temporary.write_text("new")
-    assert (tmp_path / "a.txt").read_text() == "new"
-
-
-def test_what_a_run_writes_itself_is_no_input_of_it(tmp_path: Path) -> None:
-    """It may have the number of an input that was deleted, as the state of a long training."""
-    with recorded_inputs():
-        for text in ("first", "second"):
-            with staged(tmp_path / "a.txt", overwrite=True) as temporary:
-                temporary.write_text(text)
-                record_input(temporary)
-    assert (tmp_path / "a.txt").read_text() == "second"
+    inputs = file_ids([tmp_path / "a.txt", tmp_path / "of-an-earlier-run.txt"])
+    files = OutputFiles(overwrite=True, inputs=inputs)
+    for path in (tmp_path / "0.txt", tmp_path / "a.txt"):
+        files.stage(path).write_text("new")
+    with pytest.raises(OutputError, match=r"a\.txt: is the input itself"), files:
+        pass
+    with OutputFiles(overwrite=True, inputs=inputs) as files:
+        (files.stage_folder(tmp_path, is_text) / "0.txt").write_text("new")
+    texts = {path.name: path.read_text() for path in tmp_path.iterdir()}
+    assert texts == {"0.txt": "new", "a.txt": "precious", "of-an-earlier-run.txt": "precious"}
 
 
 @pytest.mark.parametrize("stem", ["x" * 250, "ü" * 125, "\udcff" * 250])
@@ -255,10 +235,6 @@ def test_a_folder_that_the_work_makes_may_be_missing(tmp_path: Path) -> None:
 
 def read(path: Path, limit: int) -> bytes:
     return read_whole(path, limit=limit, what="letter", error=ConfigError)
-
-
-def read_all(path: Path) -> bytes:
-    return read(path, 1000)
 
 
 def test_a_larger_file_is_refused_with_the_error_of_the_caller(tmp_path: Path) -> None:

@@ -37,7 +37,6 @@ from vdet.detect.protocol import DetectorModel, VideoDetector
 from vdet.errors import ImageError, VdetError
 from vdet.evaluate.scores import Scores
 from vdet.evaluate.video import score_files
-from vdet.files import record_input, recorded_inputs
 from vdet.labels.formats import Format
 from vdet.labels.label import Label, SavedTracks
 from vdet.media import Frame, Picture
@@ -45,6 +44,7 @@ from vdet.media.images import read_image
 from vdet.progress import no_progress, reporting
 from vdet.regions import check_masks
 from vdet.run.images import ImageJob, ImageSearch, run_images
+from vdet.run.inputs import input_files
 from vdet.run.loop import Parts
 from vdet.run.result import FrameResult
 from vdet.run.sinks import Output
@@ -228,7 +228,6 @@ def vehicles(source: PathName | Run, **options: Any) -> tuple[VehicleRecord, ...
     return results.vehicles
 
 
-@recorded_inputs()
 def detect_video(
     source: PathName | Run,
     video: PathName | None = None,
@@ -272,7 +271,6 @@ def detect_video(
     return run_video(run, parts, progress=reported)
 
 
-@recorded_inputs()
 def detect_image(
     source: PathName,
     image: PathName | None = None,
@@ -289,9 +287,10 @@ def detect_image(
     settings, loaded, _ = _resolved(settings, detector, None)
     job = ImageJob(Path(source), _outputs({"image": image or (), **(outputs or {})}))
     check_masks(settings.regions)
-    record_input(job.source)
-    check_sinks(job.outputs, overwrite=overwrite)
-    (found,) = run_images([job], (), ImageSearch(loaded, settings), overwrite=overwrite)
+    inputs = input_files(job.source, settings=settings)
+    check_sinks(job.outputs, overwrite=overwrite, inputs=inputs)
+    search = ImageSearch(loaded, settings)
+    (found,) = run_images([job], (), search, overwrite=overwrite, inputs=inputs)
     if isinstance(found, ImageError):
         raise found
     return found.detections

@@ -7,7 +7,6 @@ from pathlib import Path, PurePath, PurePosixPath, PureWindowsPath
 from typing import IO
 
 from vdet.errors import printable
-from vdet.files import record_input
 
 _COMPRESSIONS = frozenset({zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED})
 """Methods that can be unpacked up to a limit; zipfile unpacks the others as a whole."""
@@ -15,13 +14,11 @@ _ENCRYPTED = 1  # bit of a member's flags
 
 
 class ArchiveError(ValueError):
-    """A zip file, or a member of it, is refused; the message says why."""
+    """A zip file, or a member of it, is rejected; the message says why."""
 
 
 def open_archive(file: Path | IO[bytes]) -> zipfile.ZipFile:
-    """Open a zip file to read it, and record it as an input. Raises `ArchiveError`."""
-    if isinstance(file, Path):
-        record_input(file)
+    """Open a zip file to read it. Raises `ArchiveError`."""
     try:
         return zipfile.ZipFile(file)
     except Exception as error:  # zipfile raises a dozen kinds on damaged data

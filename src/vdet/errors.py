@@ -94,18 +94,14 @@ def opencv_fault() -> str | None:
     both.
     """
     try:
-        import cv2
+        from cv2 import HOGDescriptor  # noqa: F401  # OpenCV 5 has none
     except ImportError:
-        version = "missing"
-    else:
-        if hasattr(cv2, "HOGDescriptor"):
-            return None
-        version = getattr(cv2, "__version__", "damaged")
-    return (
-        f"OpenCV is {version}: opencv-python has replaced opencv-python-headless; run "
-        '"pip uninstall -y opencv-python opencv-python-headless" and then '
-        "\"pip install 'opencv-python-headless<5'\""
-    )
+        return (
+            "opencv-python has replaced opencv-python-headless; run "
+            '"pip uninstall -y opencv-python opencv-python-headless" and then '
+            "\"pip install 'opencv-python-headless<5'\""
+        )
+    return None
 
 
 def escaped(text: str) -> str:
@@ -132,7 +128,7 @@ def named(count: int, noun: str) -> str:
 def clock_text(seconds: float | Fraction, digits: int = 0, *, hours: bool = False) -> str:
     """Return a time as `1:05`, or `2:01:05` for hours; `digits` is the number of decimals."""
     whole, part = divmod(round(abs(seconds) * 10**digits), 10**digits)
-    minutes, rest = divmod(whole, 60)
+    minutes, whole_seconds = divmod(whole, 60)
     text = f"{minutes // 60}:{minutes % 60:02}" if hours or minutes >= 60 else f"{minutes}"
-    text += f":{rest:02}" + (f".{part:0{digits}}" if digits else "")
+    text += f":{whole_seconds:02}" + (f".{part:0{digits}}" if digits else "")
     return f"−{text}" if seconds < 0 and (whole or part) else text

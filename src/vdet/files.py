@@ -14,8 +14,7 @@ import re
 import shutil
 import stat
 import sys
-from collections.abc import Callable, Iterator
-from contextvars import ContextVar
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Self
 
@@ -27,56 +26,35 @@ _HOST = re.sub(r"[^a-z0-9]", "", platform.node().lower())[:16]
 _TEMPORARY = re.compile(rf"\.vdet-{_HOST}-[0-9a-f]{{16}}")
 _ASIDE = ".older"  # folder in a temporary one, for files that are replaced
 
-_FileId = tuple[int, int]  # device and inode: the same for all names of a file
-_inputs: ContextVar[set[_FileId] | None] = ContextVar("inputs", default=None)
+FileIds = frozenset[tuple[int, int]]
+"""Files by their device and inode, which are the same for all names of a file."""
+NO_FILES: FileIds = frozenset()
 
 
-@contextlib.contextmanager
-def recorded_inputs() -> Iterator[None]:
-    """Record each file that is read in the block, so that no output of the block replaces one.
+def file_ids(paths: Iterable[Path]) -> FileIds:
+    """Identify the files that exist; links are followed."""
+    return frozenset(filter(None, map(_id, paths)))
 
-    A nested block shares the record of the outer one. Threads use the record of their context
-    (`contextvars`), as those of `vdet.run.threads` do. Worker processes have none.
-    """
-    record = _inputs.get()
-    token = _inputs.set(set() if record is None else record)
+
+def _id(path: Path) -> tuple[int, int] | None:
     try:
-        yield
-    finally:
-        _inputs.reset(token)
-
-
-def record_input(*files: Path | int) -> None:
-    """Record files as inputs, by name or as descriptors; links are followed.
-
-    All code that opens a file for reading calls this. A name can be recorded earlier, so that an
-    output of this name is refused before any work.
-    """
-    record = _inputs.get()
-    if record is not None:
-        record.update(found for file in files if (found := _id(file)))
-
-
-def is_input(path: Path) -> bool:
-    """Return whether `path` is a file that this run reads: see `recorded_inputs`."""
-    return _id(path) in (_inputs.get() or ())
-
-
-def _id(file: Path | int) -> _FileId | None:
-    try:
-        status = os.stat(file)  # noqa: PTH116  # it may be a descriptor
+        status = path.stat()
     except OSError:  # it does not exist
         return None
     return status.st_dev, status.st_ino
 
 
-def check_output(path: Path, *, overwrite: bool, makes_folder: bool = False) -> None:
-    """Refuse an output that cannot be written, before any work is done.
+def check_output(
+    path: Path, *, overwrite: bool, makes_folder: bool = False, inputs: FileIds = NO_FILES
+) -> None:
+    """Check that an output can be written, before any work is done.
 
     Parameters
     ----------
     makes_folder
         The folder of the output is created later if it is missing.
+    inputs
+        The files that are read: see `vdet.run.inputs`.
 
     Raises
     ------
@@ -90,7 +68,7 @@ def check_output(path: Path, *, overwrite: bool, makes_folder: bool = False) -> 
     if makes_folder:
         folder = next((parent for parent in path.parents if os.path.exists(parent)), folder)  # noqa: PTH110
     if os.path.lexists(path):
-        _check_replaceable(path)
+        _check_replaceable(path, inputs)
         if not overwrite:
             raise OutputError(f"{path}: already exists; use --overwrite to replace it")
     if not folder.is_dir():
@@ -100,8 +78,8 @@ def check_output(path: Path, *, overwrite: bool, makes_folder: bool = False) -> 
         raise OutputError(f"{path}: the folder {folder} cannot be written to")
 
 
-def _check_replaceable(path: Path) -> None:
-    if is_input(path):
+def _check_replaceable(path: Path, inputs: FileIds) -> None:
+    if _id(path) in inputs:
         raise OutputError(f"{path}: is the input itself; use another output")
     if not (path.is_file() or path.is_symlink()):
         raise OutputError(
@@ -128,9 +106,10 @@ class OutputFiles:
     Parameters
     ----------
     overwrite
-        Replace existing files, except inputs, and keep their permissions. A link itself is
-        replaced, not its target. Otherwise every existing file is kept, also one that appears
-        during the run.
+        Replace existing files, and keep their permissions. A link itself is replaced, not its
+        target. Otherwise every existing file is kept, also one that appears during the run.
+    inputs
+        The files that the run reads, which are never replaced: see `vdet.run.inputs`.
 
     Raises
     ------
@@ -138,8 +117,9 @@ class OutputFiles:
         A file cannot be created, synced or renamed, or an existing one must be kept.
     """
 
-    def __init__(self, *, overwrite: bool = False) -> None:
+    def __init__(self, *, overwrite: bool = False, inputs: FileIds = NO_FILES) -> None:
         self._overwrite = overwrite
+        self._inputs = inputs
         self._folders: dict[Path, Path] = {}  # temporary folders by destination
         self._is_earlier: dict[Path, Callable[[Path], bool]] = {}
         self._new_folders: list[Path] = []  # outermost first
@@ -171,7 +151,7 @@ class OutputFiles:
         with output_errors(path):
             return self._temporary_folder(path)
 
-    def place_of(self, path: Path) -> Path:
+    def staged_path(self, path: Path) -> Path:
         """Return the temporary path of a staged file or folder."""
         folder = self._folders.get(path.parent, path.parent)
         return self._folders.get(path, folder / path.name)
@@ -192,41 +172,60 @@ class OutputFiles:
         try:
             with self._cleanup:
                 if kind is None:
-                    self._publish()
+                    files = self._synced_files()
+                    if self._overwrite:
+                        self._check_older(files)
+                    self._swap(files)
                     self._new_folders.clear()
         finally:
             for folder in reversed(self._new_folders):
                 with contextlib.suppress(OSError):  # another run may have written into it
                     folder.rmdir()
 
-    def _publish(self) -> None:
+    def _synced_files(self) -> dict[Path, Path]:
+        """Sync the staged files to disk, and return them by their final paths."""
         files = {
-            path / file.name: file
-            for path, folder in self._folders.items()
-            for file in sorted(folder.iterdir())
+            folder / file.name: file
+            for folder, temporary in self._folders.items()
+            for file in sorted(temporary.iterdir())
         }
         for path, file in files.items():
             with output_errors(path), file.open("rb+") as written:
                 os.fsync(written.fileno())
-        # New files are not inputs, although one may reuse the inode of a deleted input.
-        (_inputs.get() or set()).difference_update(map(_id, files.values()))
+        return files
+
+    def _check_older(self, files: Mapping[Path, Path]) -> None:
+        """Check the files to be replaced, and give their permissions to the new ones."""
+        for path, file in files.items():
+            if os.path.lexists(path):
+                _check_replaceable(path, self._inputs)
+                if not path.is_symlink():
+                    with output_errors(path):
+                        file.chmod(stat.S_IMODE(path.stat().st_mode))
+
+    def _swap(self, files: Mapping[Path, Path]) -> None:
+        """Give new files their final names instead of older ones; undo all if one fails."""
         # An interrupt may come at any time, so the undo is registered before each step.
         with contextlib.ExitStack() as undo:
             for path, file in files.items():
                 with output_errors(path):
                     if self._overwrite and os.path.lexists(path):
-                        _check_replaceable(path)
-                        if not path.is_symlink():
-                            file.chmod(stat.S_IMODE(path.stat().st_mode))
                         self._set_aside(path, undo)
                     _add_name(path, file, undo)
-            for folder, is_earlier in self._is_earlier.items() if self._overwrite else ():
-                for old in list(folder.iterdir()):
-                    is_removable = old not in files and old.is_file() and not old.is_symlink()
-                    if is_removable and not is_input(old) and is_earlier(old):
-                        with contextlib.suppress(OSError):
-                            self._set_aside(old, undo)
+            for path in self._left_over(files) if self._overwrite else ():
+                with contextlib.suppress(OSError):
+                    self._set_aside(path, undo)
             undo.pop_all()
+
+    def _left_over(self, files: Mapping[Path, Path]) -> list[Path]:
+        """Return the files of earlier runs that this run did not write again."""
+        return [
+            file
+            for folder, is_earlier in self._is_earlier.items()
+            for file in folder.iterdir()
+            if file not in files and file.is_file() and not file.is_symlink()
+            if _id(file) not in self._inputs and is_earlier(file)
+        ]
 
     def _set_aside(self, path: Path, undo: contextlib.ExitStack) -> None:
         """Move the existing file into the temporary folder, which is removed at the end."""
@@ -338,12 +337,12 @@ def json_text(values: Any, *, ensure_ascii: bool = True) -> str:
 
 
 def read_whole(path: Path, *, limit: int, what: str, error: type[VdetError]) -> bytes:
-    """Return the content of a file, and record it as an input.
+    """Return the content of a file.
 
     Parameters
     ----------
     limit
-        Bytes. A larger file is refused after `limit` + 1 bytes, whatever size it claims.
+        Bytes. A larger file is rejected after `limit` + 1 bytes, whatever size it claims.
     what
         What the file should be, for messages.
     error
@@ -352,7 +351,6 @@ def read_whole(path: Path, *, limit: int, what: str, error: type[VdetError]) -> 
     data = bytearray()
     try:
         with path.open("rb") as file:
-            record_input(file.fileno())
             # A single read would set memory aside for all of `limit`.
             while len(data) <= limit and (chunk := file.read(min(_CHUNK, limit + 1 - len(data)))):
                 data += chunk

@@ -10,7 +10,6 @@ import pytest
 from vdet.batch.manifest import Record, Written, open_manifest
 from vdet.batch.run import Plan, make_plan
 from vdet.errors import BatchError, OutputError
-from vdet.files import recorded_inputs
 from vdet.run.sinks import Output, data
 from vdet.run.sinks.protocol import BatchTotal, output_state
 from vdet.run.video import Run
@@ -195,10 +194,7 @@ class TestRefused:
     def test_an_output_that_is_an_input(self) -> None:
         Path("out").mkdir()
         Path("out/a.mp4").symlink_to(Path("clips/a.mp4").absolute())
-        with (
-            recorded_inputs(),
-            pytest.raises(OutputError, match=r"out/a\.mp4: is the input itself"),
-        ):
+        with pytest.raises(OutputError, match=r"out/a\.mp4: is the input itself"):
             plan("clips", overwrite=True)
 
     @pytest.mark.parametrize("make", [os.mkfifo, lambda path: path.symlink_to("elsewhere")])

@@ -125,7 +125,7 @@ def test_another_opencv_over_ours_is_named_with_the_cure(
     monkeypatch.delattr("cv2.HOGDescriptor")
     monkeypatch.setattr("cv2.__version__", "5.0.0")
     cure = (
-        "OpenCV is 5.0.0: opencv-python has replaced opencv-python-headless; run "
+        "opencv-python has replaced opencv-python-headless; run "
         '"pip uninstall -y opencv-python opencv-python-headless" and then '
         "\"pip install 'opencv-python-headless<5'\"\n"
     )

@@ -6,7 +6,7 @@ import pytest
 
 from vdet.cli.results import ResultFiles
 from vdet.errors import OutputError, VideoError
-from vdet.files import record_input, recorded_inputs
+from vdet.files import NO_FILES, file_ids
 
 
 def test_a_page_and_numbers_that_cannot_be_written_are_refused_before_any_work(
@@ -14,27 +14,25 @@ def test_a_page_and_numbers_that_cannot_be_written_are_refused_before_any_work(
 ) -> None:
     folder, target = tmp_path / "a" / "b", tmp_path / "a.json"
     results = ResultFiles(str(target), page=folder, overwrite=False)
-    results.check()
+    results.check(NO_FILES)
     assert not list(tmp_path.iterdir()), "a run that fails leaves no folder"
     results.print(["F1"], {"f1": 0.5}, lambda: "precious")
     one, other = ResultFiles(str(target), overwrite=False), ResultFiles(None, False, folder)
     for kept in (results, one, other):
         with pytest.raises(OutputError, match="already exists; use --overwrite"):
-            kept.check()
-    ResultFiles(str(target), page=folder, overwrite=True).check()
-    with recorded_inputs():
-        record_input(target)
-        with pytest.raises(OutputError, match="is the input itself"):
-            ResultFiles(str(target), overwrite=True).check()
+            kept.check(NO_FILES)
+    ResultFiles(str(target), page=folder, overwrite=True).check(NO_FILES)
+    with pytest.raises(OutputError, match="is the input itself"):
+        ResultFiles(str(target), overwrite=True).check(file_ids([target]))
     with pytest.raises(OutputError, match=r"the folder .*page\.html is not a folder"):
-        ResultFiles(None, page=folder / "page.html", overwrite=True).check()
+        ResultFiles(None, page=folder / "page.html", overwrite=True).check(NO_FILES)
     with pytest.raises(OutputError, match="is used for two outputs"):
-        ResultFiles(str(folder / "page.html"), page=folder, overwrite=True).check()
+        ResultFiles(str(folder / "page.html"), page=folder, overwrite=True).check(NO_FILES)
 
 
 def test_numbers_may_lie_in_the_new_folder_of_the_page(tmp_path: Path) -> None:
     results = ResultFiles(str(tmp_path / "a" / "a.json"), page=tmp_path / "a", overwrite=False)
-    results.check()
+    results.check(NO_FILES)
     results.print([], {"f1": 0.5}, lambda: "html")
     assert {file.name for file in (tmp_path / "a").iterdir()} == {"a.json", "page.html"}
 

@@ -34,7 +34,7 @@ RED: Color = (40, 30, 230)
 
 def ground(coding: Coding) -> Planes:
     """Return planes of soft colours."""
-    planes = Planes(av.VideoFrame(WIDTH, HEIGHT, "yuv420p"), coding, is_own=True)
+    planes = Planes(av.VideoFrame(WIDTH, HEIGHT, "yuv420p"), coding, is_writable=True)
     for layer, base in zip(planes.layers, (90, 120, 130), strict=True):
         y, x = np.mgrid[: layer.shape[0], : layer.shape[1]]
         layer[:] = base + 20 * x // WIDTH + 20 * y // HEIGHT

@@ -42,6 +42,7 @@ def contents(folder: Path) -> dict[Path, bytes]:
     [
         "eval images set --json set/annotations.json",
         "eval images set --json set/a.png",
+        "eval images set/annotations.json --json set/b.png",
         "eval images yset --json yset/data.yaml",
         "eval images yset --json yset/labels/a.txt",
         "info frames/img_%04d.png --json frames/img_0001.png",

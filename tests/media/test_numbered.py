@@ -113,4 +113,4 @@ def test_numbers_beside_one_time_are_numbers(tmp_path: Path) -> None:
     assert names_of(tmp_path) == names
     found = find_sequence(tmp_path)
     assert found is not None
-    assert found.ticks == ()
+    assert found.rate is None

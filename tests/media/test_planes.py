@@ -59,7 +59,7 @@ class TestCoding:
 def test_a_copy_has_the_same_values_and_coding_in_memory_of_its_own(coding: Coding) -> None:
     original = Planes.of_image(slopes(64, 48), coding)
     copied = original.copy()
-    assert copied.is_own
+    assert copied.is_writable
     assert (copied.shape, copied.coding) == (original.shape, coding)
     for ours, theirs in zip(copied.layers, original.layers, strict=True):
         np.testing.assert_array_equal(ours, theirs)
@@ -77,7 +77,7 @@ class TestOfImage:
         assert planes.shape == (height + height % 2, width + width % 2)
         assert planes.picture.format.name == "yuv420p"
         assert planes.coding == coding
-        assert planes.is_own
+        assert planes.is_writable
 
     @in_any_coding
     def test_an_odd_side_grows_by_its_last_row_or_column(self, coding: Coding) -> None:
@@ -114,7 +114,7 @@ def exact_image(planes: Planes) -> npt.NDArray[np.float64]:
 
 def blocks_of_any_colour(width: int, height: int, coding: Coding) -> Planes:
     """Return planes of one random colour for each value of chroma, coded as the standard says."""
-    planes = Planes(av.VideoFrame(width, height, "yuv420p"), coding, is_own=True)
+    planes = Planes(av.VideoFrame(width, height, "yuv420p"), coding, is_writable=True)
     of_red, of_blue = (0.2126, 0.0722) if coding.matrix == "bt709" else (0.299, 0.114)
     base, luma_steps, chroma_steps = (0, 255, 255) if coding.full_range else (16, 219, 224)
     blue, green, red = np.random.default_rng(width).random((3, *planes.blue.shape))

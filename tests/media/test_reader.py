@@ -211,7 +211,7 @@ def test_planes_are_those_of_the_decoder(
         planes = frame.picture.planes
         assert planes is not None
         assert planes.coding == coding
-        assert not planes.is_own, "the decoder may need it for the next frames"
+        assert not planes.is_writable, "the decoder may need it for the next frames"
         height, width = planes.shape
         assert (reader.info.width, reader.info.height) == (width, height)
         decoded = pictures[frame.index]
@@ -232,7 +232,7 @@ def test_info_is_what_the_file_declares(tmp_path: Path) -> None:
     assert info.frames == 12
     assert info.duration == pytest.approx(12 / rate, abs=0.001)
     assert (info.color.matrix, info.color.primaries, info.color.transfer) == (1, 2, 2)
-    assert info.has_sound
+    assert info.has_audio
 
 
 class TestFaults:

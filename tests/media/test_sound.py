@@ -23,7 +23,7 @@ FAST = OutputSettings(preset="ultrafast")
 def copy(source: Path, target: Path) -> Path:
     with (
         VideoReader(source) as reader,
-        VideoWriter(target, reader.info, FAST, whole_sound=True) as writer,
+        VideoWriter(target, reader.info, FAST, whole_audio=True) as writer,
     ):
         for frame in reader:
             writer.write(frame)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from vdet.errors import BatchError, VideoError
-from vdet.media.demux import refuse_stream
+from vdet.media.demux import reject_address
 from vdet.media.images import IMAGE_SUFFIXES, find_sequence
 
 _log = logging.getLogger("vdet")
@@ -72,7 +72,7 @@ def _videos_of(clip: Path) -> Iterable[InputVideo]:
         return [InputVideo(clip, Path(clip.name))]
     if glob.has_magic(str(clip)):
         return _matching(clip)
-    refuse_stream(clip)
+    reject_address(clip)
     if find_sequence(clip):
         return [InputVideo(clip, Path(f"{clip.absolute().parent.name}{clip.suffix}"))]
     return []

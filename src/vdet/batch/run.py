@@ -17,9 +17,9 @@ from vdet.files import (
     check_output,
     make_folder,
     output_errors,
-    record_input,
     remove_stale,
 )
+from vdet.run.inputs import input_files
 from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import BatchTotal, check_sinks, sink_kind
 from vdet.run.video import Run
@@ -76,10 +76,12 @@ def make_plan(
     load_detector(settings.detector)
     sources = find_sources(clips)
     _refuse_nested(clips, sources, folder)
+    files = tuple(path.absolute() for path in common.settings_files)
     runs = [
         replace(
             common,
             settings=settings,
+            settings_files=files,
             source=source.path,
             outputs=tuple(_named(output, folder / source.place) for output in common.outputs),
         )
@@ -92,8 +94,9 @@ def make_plan(
         if (total := sink_kind(output.sink).total)
     }
     _refuse_shared(runs, [path for path, *_ in totals.values()], folder)
+    inputs = input_files(*(source.path for source in sources), *files, settings=settings)
     manifest, skipped = folder / MANIFEST, []
-    check_output(manifest, overwrite=True, makes_folder=True)
+    check_output(manifest, overwrite=True, makes_folder=True, inputs=inputs)
     if skip_existing:
         known, every, runs = known_outputs(read_batch(folder)), runs, []
         for run in every:
@@ -102,10 +105,10 @@ def make_plan(
             else:
                 runs.append(replacing_ours(run, known))
     for run in runs:
-        check_sinks(run.outputs, overwrite=run.overwrite, makes_folder=True)
+        check_sinks(run.outputs, overwrite=run.overwrite, makes_folder=True, inputs=inputs)
     for path, *_ in totals.values():
         replaces = common.overwrite or (skip_existing and manifest.exists())
-        check_output(path, overwrite=replaces, makes_folder=True)
+        check_output(path, overwrite=replaces, makes_folder=True, inputs=inputs)
     return Plan(folder, tuple(runs), tuple(skipped), totals)
 
 
@@ -127,7 +130,6 @@ def _refuse_nested(clips: Iterable[Path], sources: Iterable[InputVideo], folder:
 
 def _refuse_shared(runs: Iterable[Run], totals: Iterable[Path], folder: Path) -> None:
     """Refuse an output with the name of another output, a total or the manifest."""
-    record_input(*(run.source for run in runs))
     owners = {folder / MANIFEST: "the manifest"}
     makers = [(path, "the outputs of all videos") for path in totals]
     makers += [(output.path, str(run.source)) for run in runs for output in run.outputs]

@@ -16,7 +16,7 @@ from vdet.batch.manifest import Record, Written, note_path, read_records
 from vdet.detect.factory import load_detector, model_file
 from vdet.detect.protocol import DetectorModel
 from vdet.errors import BatchError, in_one_line
-from vdet.files import OutputFiles, recorded_inputs, write_whole
+from vdet.files import OutputFiles, write_whole
 from vdet.run.loop import Parts
 from vdet.run.sinks.protocol import output_state
 from vdet.run.video import Run, write_outputs
@@ -103,7 +103,6 @@ def replacing_ours(run: Run, known: Known) -> Run:
     return replace(run, overwrite=any(os.path.lexists(output.path) for output in run.outputs))
 
 
-@recorded_inputs()
 def process_file(run: Run, *, folder: Path) -> Record:
     """Process a video, and return its record, which is also written as a note into the folder.
 
@@ -120,7 +119,7 @@ def process_file(run: Run, *, folder: Path) -> Record:
                 if is_done(run, known):
                     return earlier
                 run = run if run.overwrite else replacing_ours(run, known)
-            with OutputFiles(overwrite=run.overwrite) as files:
+            with OutputFiles(overwrite=run.overwrite, inputs=run.inputs) as files:
                 record = replace(_written(run, record, files), warnings=tuple(warnings))
                 write_whole(note, record.line, overwrite=True)
         except Exception as failure:
@@ -138,7 +137,7 @@ def _written(run: Run, record: Record, files: OutputFiles) -> Record:
     totals = write_outputs(run, parts, files)
     written = []
     for output in run.outputs:
-        state = output_state(output, files.place_of(output.path)) or (0, 0)
+        state = output_state(output, files.staged_path(output.path)) or (0, 0)
         path, summary = str(output.path.absolute()), totals.summaries[output.path]
         written.append(Written(output.sink, path, *state, digest, summary))
     return replace(

@@ -8,6 +8,7 @@ from vdet.cli import options
 from vdet.cli.command import command
 from vdet.cli.messages import LOG, print_lines, progress_steps
 from vdet.errors import counted
+from vdet.files import file_ids
 
 
 @command()
@@ -39,8 +40,9 @@ def calibrate(
 
     if not (3 <= min(pattern) <= max(pattern) <= 999):
         raise click.UsageError("--pattern: must be 3 to 999 inner corners, such as 9x6")
-    options.check_file(output, ".yaml", ".yml", noun="cameras", overwrite=overwrite)
     paths = list(find_images(photos))
+    inputs = file_ids(paths)
+    options.check_file(output, ".yaml", ".yml", noun="cameras", overwrite=overwrite, inputs=inputs)
     with progress_steps("") as steps:
         steps(f"searching {counted(len(paths), 'photograph')}", None)
         result = fit(paths, pattern)

@@ -71,7 +71,7 @@ def count(
     from vdet.traffic.output import counts_content, flows_content
     from vdet.traffic.tables import write_content
 
-    check_sinks(outputs, overwrite=overwrite)
+    check_sinks(outputs, overwrite=overwrite, inputs=source.inputs(*tracks))
     with progress_steps(" files") as steps:
         advance = steps("", len(tracks) if len(tracks) > 1 else None)
         videos = count_files(tracks, settings, size, rate, advance=advance)

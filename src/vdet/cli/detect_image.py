@@ -73,11 +73,14 @@ def detect_image(
     search = ImageSearch(load_detector(settings.detector), settings)
     files = find_images(images)
     outputs = options.requested_outputs(sinks, paths)
-    check_sinks(outputs, overwrite=overwrite)
-    jobs = plan_images(files, output, stages, overwrite=overwrite)
+    inputs = source.inputs(*files, settings=settings)
+    check_sinks(outputs, overwrite=overwrite, inputs=inputs)
+    jobs = plan_images(files, output, stages, overwrite=overwrite, inputs=inputs)
     is_printed = not (output or stages or outputs)
     failed = 0
-    results = run_images(jobs, outputs, search, overwrite=overwrite, threads=core_count())
+    results = run_images(
+        jobs, outputs, search, overwrite=overwrite, inputs=inputs, threads=core_count()
+    )
     with progress_steps(" images") as steps, closing(results):
         advance = steps("", len(jobs))
         for result in results:

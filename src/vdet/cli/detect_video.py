@@ -164,6 +164,7 @@ def detect_video(
         at=at or Fraction(0),
         overwrite=overwrite,
         threads=threads,
+        settings_files=source.files,
     )
     if folder is None:
         code, is_doubtful = 0, _process_video(run)

@@ -72,13 +72,16 @@ def draw(
     settings = source.load()
     if not outputs:
         raise click.UsageError("no output; use -o FILE or --propose FILE")
+    inputs = source.inputs(clip, *([tracks] if tracks else ()), settings=settings)
     if output:
         suffixes = (".html", ".jpg", ".png", ".svg")
-        options.check_file(output, *suffixes, noun="pages", overwrite=overwrite)
+        options.check_file(output, *suffixes, noun="pages", overwrite=overwrite, inputs=inputs)
         if output.suffix.lower() != ".html" and not settings.traffic:
             raise ConfigError(f"{output}: nothing to draw; add lines or zones with -c FILE")
     if propose:
-        options.check_file(propose, ".yaml", ".yml", noun="settings", overwrite=overwrite)
+        options.check_file(
+            propose, ".yaml", ".yml", noun="settings", overwrite=overwrite, inputs=inputs
+        )
     with progress_steps(" frames") as steps:
         # Without regions, because the page shows their effect.
         whole_frames = settings.model_copy(update={"regions": ()})

@@ -57,7 +57,8 @@ def images(
     detector = load_detector(settings.detector.showing_all())
     roles = Roles.from_settings(settings)
     sets = [read_labelled_images(path, roles) for path in data]
-    results.check()
+    images_read = (image.path for labelled in sets for image in labelled.images)
+    results.check(source.inputs(*data, *images_read, settings=settings))
     counting = Counting(settings.detector.min_score_still, min_width)
     with progress_steps(" images") as steps:
         progress = partial(steps, "")
@@ -92,7 +93,7 @@ def patches(data: options.Paths, source: SettingsSource, results: ResultFiles) -
 
     path = Path(settings.svm.model) if settings.svm.model else None
     svm = load_model(path, requested_features(settings.svm)) if path else None
-    results.check()
+    results.check(source.inputs(*data, settings=settings))
     files = find_patches(data)
     with progress_steps("") as steps:
         scores = evaluate_patches(files, settings, svm, steps=steps)
@@ -123,7 +124,7 @@ def tracks(
     from vdet.evaluate.report import tracks_report
     from vdet.evaluate.video import score_files
 
-    results.check()
+    results.check(source.inputs(prediction, truth))
     settings = source.load()
     with progress_steps("") as steps:
         steps("comparing", None)
@@ -163,7 +164,7 @@ def video(
 
     check_masks(settings.regions)
     detector = load_detector(settings.detector)
-    results.check()
+    results.check(source.inputs(*videos, *truths, settings=settings))
     clips = [open_clip(path, truth, until, settings) for path, truth in labelled]
     with progress_steps(" frames") as steps:
         scores = [evaluate_clip(clip, settings, detector, partial(steps, "")) for clip in clips]

@@ -50,7 +50,9 @@ def info(path: Path | None, source: SettingsSource, results: ResultFiles) -> int
       vdet info -c gate.yaml
       vdet info
     """
-    results.check()
+    from vdet.media.images import video_files
+
+    results.check(source.inputs(*(video_files(path) if path else ())))
     settings = source.load()
     if path:
         facts = {"file": str(path), **_file(path, settings)}

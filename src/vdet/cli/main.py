@@ -11,7 +11,6 @@ import click
 from vdet.cli.command import Program, verbosity_options
 from vdet.cli.messages import print_lines, set_up_logs
 from vdet.errors import INTERRUPTED, ConfigError, VdetError, escaped, in_one_line
-from vdet.files import recorded_inputs
 from vdet.version import __version__
 
 cli = Program(
@@ -31,8 +30,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """
     set_up_logs()
     try:
-        with recorded_inputs():
-            code = cli.main(arguments, prog_name="vdet", standalone_mode=False)
+        code = cli.main(arguments, prog_name="vdet", standalone_mode=False)
     except click.ClickException as error:
         if not isinstance(error, getattr(click.exceptions, "NoArgsIsHelpError", ())):
             error.message = escaped(error.message)  # type: ignore[misc]  # it may name a file

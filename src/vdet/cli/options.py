@@ -13,7 +13,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from vdet.errors import ConfigError, OutputError
-from vdet.files import check_output, record_input
+from vdet.files import NO_FILES, FileIds, check_output
 from vdet.run.sinks import Output
 
 if TYPE_CHECKING:
@@ -24,17 +24,10 @@ Function = Callable[..., Any]
 Paths = tuple[Path, ...]
 
 
-class _Input(click.Path):
-    def convert(self, value: Any, option: Any, context: Any) -> Any:
-        path = Path(super().convert(value, option, context))  # type: ignore[arg-type]
-        record_input(path)
-        return path
-
-
 PATH = click.Path(path_type=Path)
 """A path; whether it exists is checked later."""
-INPUT = _Input(path_type=Path)
-"""The path of an input file, which no output may replace."""
+INPUT = PATH
+"""The path of an input file."""
 POSITIVE = click.IntRange(1, 1_000_000_000)
 PROCESSES = click.IntRange(1, 256)
 """Number of threads or processes."""
@@ -197,6 +190,22 @@ class SettingsSource:
     assignments: Sequence[str] = ()
     shortcuts: Mapping[str, Any] = field(default_factory=dict)
 
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The settings files. Raises `ConfigError`."""
+        from vdet.config.loading import find_config
+
+        return tuple(find_config(name) for name in self.configs)
+
+    def inputs(self, *paths: Path, settings: "Settings | None" = None) -> FileIds:
+        """Identify the files that a command reads: see `vdet.run.inputs`.
+
+        These are `paths`, the settings files, and the model file and masks of `settings`.
+        """
+        from vdet.run.inputs import input_files
+
+        return input_files(*paths, *self.files, settings=settings)
+
     def load(self, *, detector: str | None = None) -> "Settings":
         """Read the settings; arguments and errors as for `load_settings`."""
         used = [
@@ -208,10 +217,9 @@ class SettingsSource:
             from vdet.config.schema import Settings
 
             return Settings()  # without YAML
-        from vdet.config.loading import find_config, load_settings
+        from vdet.config.loading import load_settings
 
-        paths = [find_config(name) for name in self.configs]
-        return load_settings(paths, [*self.assignments, *used], detector=detector)
+        return load_settings(self.files, [*self.assignments, *used], detector=detector)
 
 
 def settings_options(**keys: str) -> Callable[[Function], Function]:
@@ -260,11 +268,13 @@ def check_counting(settings: "Settings", outputs: Sequence[Output], *, several: 
         )
 
 
-def check_file(output: Path, *suffixes: str, noun: str, overwrite: bool) -> None:
+def check_file(
+    output: Path, *suffixes: str, noun: str, overwrite: bool, inputs: FileIds = NO_FILES
+) -> None:
     """Raise `OutputError` if an output has another suffix, or cannot be written."""
     if output.suffix.lower() not in suffixes:
         raise OutputError(f"{output}: {noun} must end in {suffixes[0]}")
-    check_output(output, overwrite=overwrite)
+    check_output(output, overwrite=overwrite, inputs=inputs)
 
 
 def with_truths(videos: Sequence[Path], truths: Sequence[Path]) -> list[tuple[Path, Path]]:

@@ -15,6 +15,7 @@ from vdet.files import OutputFiles, check_output, json_text, output_errors, prin
 
 if TYPE_CHECKING:
     from vdet.evaluate.report import Report
+    from vdet.files import FileIds
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,8 +26,8 @@ class ResultFiles:
     overwrite: bool
     page: Path | None = None
 
-    def check(self) -> None:
-        """Check that the outputs can be written, before any work.
+    def check(self, inputs: "FileIds") -> None:
+        """Check that the outputs can be written, and are none of the inputs, before any work.
 
         Raises
         ------
@@ -39,7 +40,7 @@ class ResultFiles:
             raise OutputError(f"{paths[0]}: is used for two outputs; rename one")
         for path in paths:
             makes_folder = self.page is not None and self.page.is_relative_to(path.parent)
-            check_output(path, overwrite=self.overwrite, makes_folder=makes_folder)
+            check_output(path, overwrite=self.overwrite, makes_folder=makes_folder, inputs=inputs)
 
     @property
     def _files(self) -> dict[str, Path]:

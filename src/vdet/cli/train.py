@@ -1,5 +1,6 @@
 """`vdet mine`, `vdet train` and `vdet train-net`: from labelled data to models."""
 
+from itertools import chain
 from pathlib import Path
 
 import click
@@ -9,7 +10,6 @@ from vdet.cli.command import command
 from vdet.cli.messages import live_bar, print_lines, progress_steps
 from vdet.cli.options import Paths, SettingsSource
 from vdet.errors import DataError, counted
-from vdet.files import check_output
 from vdet.workers import limit_library_threads
 
 
@@ -35,7 +35,8 @@ def train(
       vdet train patches/ -o model.npz --set train.svm.C=1e-3
     """
     settings = source.load(detector="svm")
-    options.check_file(output, ".npz", noun="models", overwrite=overwrite)
+    inputs = source.inputs(*data)
+    options.check_file(output, ".npz", noun="models", overwrite=overwrite, inputs=inputs)
     from vdet.detect.svm.model import save_model
     from vdet.learn.svm.dataset import find_patches
     from vdet.learn.svm.training import train as fit_model
@@ -82,7 +83,8 @@ def mine(
     """
     if until is not None and until < first:
         raise click.UsageError("--until must not be before --from")
-    options.check_file(output, ".zip", noun="patches", overwrite=overwrite)
+    inputs = source.inputs(*videos, *truths)
+    options.check_file(output, ".zip", noun="patches", overwrite=overwrite, inputs=inputs)
     settings = source.load(detector="svm")
     options.reject_regions(settings)
     from vdet.detect.svm.detector import load_svm
@@ -145,7 +147,8 @@ def train_net(
     """
     if not data and not clips:
         raise click.UsageError("nothing to learn from; pass DATA or --video")
-    options.check_file(output, ".onnx", noun="networks", overwrite=overwrite)
+    inputs = source.inputs(*data, *chain(*clips), *([base] if base else ()))
+    options.check_file(output, ".onnx", noun="networks", overwrite=overwrite, inputs=inputs)
     settings = source.load()
     try:
         from vdet.learn.net.sources import clip_source, image_source
@@ -159,7 +162,6 @@ def train_net(
     roles = Roles.for_training(settings)
     sources = [image_source(read_labelled_images(path, roles), settings) for path in data]
     sources += [clip_source(clip, truth, settings) for clip, truth in clips]
-    check_output(output, overwrite=overwrite)  # it may be among the files that were read now
     print_lines(*(line for _, report in sources for line in report.lines()), "")
     with live_bar(total=settings.train.net.steps, unit=" steps") as bar:
 

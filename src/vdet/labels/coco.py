@@ -26,7 +26,6 @@ from pydantic.dataclasses import dataclass
 from vdet.boxes import Box
 from vdet.detect.classes import UNKNOWN
 from vdet.errors import TruthError
-from vdet.files import record_input
 from vdet.labels.formats import Format, ImageTracks, SourceVideo, last_classes
 from vdet.labels.images import LabelledImage, image_folder, inside
 from vdet.labels.json_stream import json_values
@@ -248,7 +247,6 @@ def read_coco_images(path: Path) -> Iterator[LabelledImage]:
     folder = None
     try:
         with path.open("rb") as file:
-            record_input(file.fileno())
             images, unlabelled = _read(path, file)
     except OSError as error:
         raise TruthError(f"{path}: cannot be read: {error.strerror}") from error

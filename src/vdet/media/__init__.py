@@ -1,4 +1,4 @@
-"""Video and images: frames with exact times, copied sound, limited sizes."""
+"""Video and images: frames with exact times, copied audio, limited sizes."""
 
 from vdet.media.frame import ColorTags, Frame, Picture, Planes, VideoInfo
 

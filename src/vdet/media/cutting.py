@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable, Iterator
+from contextlib import closing
 from fractions import Fraction
 from pathlib import Path
 
@@ -11,20 +12,20 @@ from av.stream import Stream
 
 from vdet.config.schema import Settings
 from vdet.errors import OutputError
-from vdet.media.demux import ClockUnwrapper, is_pipe, open_input, packets, video_stream
+from vdet.media.demux import Demuxer
 from vdet.media.images import is_image_name
 from vdet.media.reader import VideoReader
 from vdet.media.writer import MARK, VIDEO_SUFFIXES, VideoWriter
 
-_SOUND_LAG = 1  # seconds of video after the end in which sound of the part may still follow
+_AUDIO_LAG = 1  # seconds of video after the end in which audio of the part may still follow
 
 
 def can_copy(source: Path) -> bool:
     """Return whether parts of a video can be copied: it is seekable, and has one clock."""
-    if is_pipe(source) or not source.is_file() or is_image_name(source):
+    if not source.is_file() or is_image_name(source):
         return False
-    with open_input(source) as container:
-        return not ClockUnwrapper(container, video_stream(container, source)).may_restart
+    with closing(Demuxer(source)) as demuxer:
+        return not demuxer.may_restart
 
 
 def copied_suffix(source: Path) -> str:
@@ -34,7 +35,7 @@ def copied_suffix(source: Path) -> str:
 
 
 def copy_part(source: Path, start: Fraction, end: Fraction, target: Path) -> None:
-    """Copy the key-frame intervals that contain a part of a video, with its sound.
+    """Copy the key-frame intervals that contain a part of a video, with its audio.
 
     Parameters
     ----------
@@ -49,15 +50,13 @@ def copy_part(source: Path, start: Fraction, end: Fraction, target: Path) -> Non
     OutputError
         The container of `target` cannot hold a stream of the source.
     """
-    with open_input(source) as container, av.open(str(target.absolute()), "w") as written:
+    with closing(Demuxer(source)) as demuxer, av.open(str(target.absolute()), "w") as written:
         written.metadata["comment"] = MARK
-        pictures = video_stream(container, source)
-        streams: list[Stream] = [pictures, *container.streams.audio]
+        streams: list[Stream] = [demuxer.video, *demuxer.container.streams.audio]
         try:
-            targets = {one.index: written.add_stream_from_template(one) for one in streams}
-            container.seek(int(start * av.time_base))
-            found = packets(container, streams, on_error=lambda: None)
-            for packet in _moved_to_zero(found, pictures.index, end):
+            targets = {item.index: written.add_stream_from_template(item) for item in streams}
+            demuxer.container.seek(int(start * av.time_base))
+            for packet in _moved_to_zero(demuxer.packets(streams), demuxer.video, end):
                 packet.stream = targets[packet.stream_index]
                 written.mux(packet)
         except (ValueError, av.FFmpegError) as error:
@@ -65,23 +64,23 @@ def copy_part(source: Path, start: Fraction, end: Fraction, target: Path) -> Non
 
 
 def _moved_to_zero(
-    found: "Iterable[Packet[Stream]]", pictures: int, end: Fraction
+    packets: "Iterable[Packet[Stream]]", video: Stream, end: Fraction
 ) -> "Iterator[Packet[Stream]]":
-    """Yield the packets from the first key frame to the first one at or after `end`.
+    """Yield the packets from the first key frame of `video` to the first one at or after `end`.
 
-    `pictures` is the index of the video stream. The first key frame is moved to second 0.
+    The first key frame is moved to second 0.
     """
     begin: Fraction | float = math.inf
     stop: Fraction | float = math.inf
-    for packet in found:
+    for packet in packets:
         if packet.pts is None or packet.dts is None:
             continue
-        time, is_image = packet.pts * packet.time_base, packet.stream_index == pictures
-        if is_image and packet.is_keyframe:
+        time, is_video = packet.pts * packet.time_base, packet.stream_index == video.index
+        if is_video and packet.is_keyframe:
             begin, stop = min(begin, time), min(stop, time if time >= end else math.inf)
-        if is_image and time > stop + _SOUND_LAG:
+        if is_video and time > stop + _AUDIO_LAG:
             return
-        if begin <= time < stop and not (is_image and stop < math.inf):
+        if begin <= time < stop and not (is_video and stop < math.inf):
             shift = round(begin / packet.time_base)
             packet.pts, packet.dts = packet.pts - shift, packet.dts - shift
             yield packet
@@ -90,7 +89,7 @@ def _moved_to_zero(
 def encode_part(
     source: Path, start: Fraction, end: Fraction, target: Path, settings: Settings
 ) -> None:
-    """Encode a part of a video, exact to the frame, with its sound.
+    """Encode a part of a video, exact to the frame, with its audio.
 
     Parameters
     ----------
@@ -101,7 +100,7 @@ def encode_part(
     """
     with (
         VideoReader(source, start=start, end=end, settings=settings.input) as reader,
-        VideoWriter(target, reader.info, settings.output, whole_sound=False) as writer,
+        VideoWriter(target, reader.info, settings.output, whole_audio=False) as writer,
     ):
         for frame in reader:
             writer.write(frame)

@@ -1,6 +1,6 @@
 """Decode a video stream from its first picture, or from a key frame, despite damage."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import chain
@@ -12,8 +12,8 @@ from av.stream import Stream
 
 from vdet.errors import ImageError
 from vdet.media import demux
-from vdet.media.demux import ClockUnwrapper
-from vdet.media.images import find_sequence, read_encoded
+from vdet.media.demux import Demuxer
+from vdet.media.images import ImageSequence, find_sequence, read_encoded
 
 _LONGEST_GROUP = 600  # maximum packets between key frames, which are kept in memory
 _COUNTABLE = ("av1", "h264", "hevc", "libdav1d", "mjpeg", "mpeg2video", "mpeg4", "png", "vp9")
@@ -35,7 +35,7 @@ class Damage:
     period
         Time from one picture to the next, in units of the stream's time base.
     errors
-        Unreadable places in the file, and packets that cannot be decoded.
+        Unreadable parts of the file, and packets that cannot be decoded.
     restarts
         How often the clock restarts: the last packets before are flagged, but not corrupt.
     without_picture
@@ -50,7 +50,7 @@ class Damage:
     corrupt_packets: int = 0
     without_picture: int = 0
     _corrupt_pictures: int = 0
-    _last: int | None = None  # time of a picture
+    _last: int | None = None  # time of the last picture
 
     @property
     def is_evident(self) -> bool:
@@ -76,8 +76,8 @@ class Damage:
 
         A late picture in a damaged stream is not usable, and counts as lost.
         """
-        if self.is_evident and None not in (picture.pts, self._last):
-            late = (self._last or 0) - (picture.pts or 0)
+        if self.is_evident and picture.pts is not None and self._last is not None:
+            late = self._last - picture.pts
             if 0 <= late <= _MAX_LATE * self.period:
                 return False
         self._last = picture.pts
@@ -92,19 +92,20 @@ class Decoder:
     Parameters
     ----------
     frame_rate
-        Rate of numbered images, per second; None: by their names, else `ASSUMED_RATE`.
+        Rate of numbered images, per second; None: as their names say, else `ASSUMED_RATE`.
 
     Attributes
     ----------
     before
         Number of frames before the first picture.
+    pictures
+        The pictures that can be decoded.
     damage
         The damage so far.
-    clock
-        Knows whether, and how often, the clock restarts.
-    ticks
-        Presentation times of numbered images, in units of the time base; a range if their names are
-        not times.
+    demuxer
+        The file.
+    sequence
+        The numbered images; None for a file.
     is_countable
         Whether frames can be counted without decoding them.
 
@@ -116,20 +117,17 @@ class Decoder:
 
     def __init__(self, path: Path, frame_rate: float | None) -> None:
         self.before = 0
-        self.container = demux.open_input(path, frame_rate)
-        self.stream = demux.video_stream(self.container, path)
+        self.sequence = find_sequence(path, frame_rate)
+        self.demuxer = Demuxer(path, self.sequence)
+        self.stream = self.demuxer.video
         context = self.stream.codec_context
         context.options = {"max_pixels": str(demux.MAX_PIXELS)}
         context.thread_count = 1  # with more, frames near damage differ from run to run
-        self.clock = ClockUnwrapper(self.container, self.stream)
         self.damage = Damage(1 / demux.rate_of(self.stream) / demux.time_base_of(self.stream))
-        self._is_avi = self.container.format.name == "avi"
+        self._is_avi = self.demuxer.container.format.name == "avi"
         self.is_countable = context.name in _COUNTABLE and not (self._is_avi or demux.is_pipe(path))
-        self._packets = self._read()
-        self.ticks: Sequence[int] = ()
-        if sequence := find_sequence(path):
-            _, self.ticks = sequence.timing(frame_rate)
-            self._packets = self._read_images(sequence.files)
+        self._packets = self._read_images(self.sequence) if self.sequence else self._read()
+        self.pictures = self._decode()
 
     def skip_to(self, time: int, first: int) -> bool:
         """Begin at the last key frame at or before a time, and count the frames before it.
@@ -163,8 +161,7 @@ class Decoder:
         self._packets = (packet for packet in following if packet.pts is None or packet.pts >= key)
         return True
 
-    def pictures(self) -> Iterator[av.VideoFrame]:
-        """Yield the pictures that can be decoded."""
+    def _decode(self) -> Iterator[av.VideoFrame]:
         for packet in chain(self._packets, (None,)):
             if packet and not packet.is_discard:  # otherwise the file marks it as hidden
                 self.damage.packets += 1
@@ -179,18 +176,16 @@ class Decoder:
 
     def _read(self) -> "Iterator[Packet[Stream]]":
         """Yield the packets of the pictures."""
-        found = demux.packets(self.container, self.clock.streams, self._fail)
-        for packet in self.clock.unwrap(found):
-            if packet.stream_index == self.stream.index:
-                if self._is_avi and self.stream.codec_context.has_b_frames:
-                    packet.pts = packet.dts = None  # AVI has no presentation times
-                self.damage.corrupt_packets += packet.is_corrupt
-                self.damage.restarts = self.clock.restarts
-                yield packet
+        for packet in self.demuxer.packets([self.stream], self._fail):
+            if self._is_avi and self.stream.codec_context.has_b_frames:
+                packet.pts = packet.dts = None  # AVI has no presentation times
+            self.damage.corrupt_packets += packet.is_corrupt
+            self.damage.restarts = self.demuxer.restarts
+            yield packet
 
-    def _read_images(self, files: Iterable[Path]) -> "Iterator[Packet[Stream]]":
+    def _read_images(self, sequence: ImageSequence) -> "Iterator[Packet[Stream]]":
         """Yield numbered images as packets."""
-        for file, tick in zip(files, self.ticks, strict=True):
+        for file, tick in zip(sequence.files, sequence.ticks, strict=True):
             try:
                 packet: Packet[Stream] = Packet(read_encoded(file))
             except ImageError:

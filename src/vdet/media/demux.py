@@ -2,7 +2,7 @@
 
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
@@ -15,9 +15,8 @@ from av.stream import Discard, Disposition, Stream
 from av.video.stream import VideoStream
 
 from vdet.errors import VideoError
-from vdet.files import record_input
 from vdet.media.frame import Coding, ColorTags, Tags, VideoInfo
-from vdet.media.images import Orientation, find_sequence, read_header
+from vdet.media.images import ASSUMED_RATE, ImageSequence, Orientation, read_header
 
 MAX_PIXELS = 8192 * 4608
 """Maximum for a frame. 8K video, in both widths, has fewer; a damaged header may claim more."""
@@ -25,7 +24,6 @@ MAX_PIXELS = 8192 * 4608
 _MAX_BOXES = 200_000  # maximum number of boxes of an MP4 file to read
 
 _STREAM = re.compile(r"[a-z][a-z0-9+.-]+:/|-$", re.IGNORECASE)  # "rtsp://…" as a path, or "-"
-_MAX_FAILURES = 100  # in a row; a file with only errors must end too
 
 # Formats that contain their pictures: not formats that refer to other files or addresses (such as
 # playlists), nor text that would be rendered as a picture.
@@ -37,41 +35,33 @@ SAFELY = {"format_whitelist": _FORMATS, "max_pixels": str(MAX_PIXELS)}
 """Options for opening any file: only these formats, and no larger frames when probing."""
 
 
-def open_input(path: Path, frame_rate: float | None = None) -> InputContainer:
-    """Open a video file for reading, or the first of numbered images (`img_%04d.png`, a folder).
-
-    Parameters
-    ----------
-    frame_rate
-        Of numbered pictures, per second; None: as their names say, else `ASSUMED_RATE`.
+def open_input(path: Path, sequence: ImageSequence | None = None) -> InputContainer:
+    """Open a video file for reading, or the first image of a sequence with the name `path`.
 
     Raises
     ------
     VideoError
-        The file does not exist, cannot be read, is not a video, or is an address; an image is
-        missing.
+        The file does not exist, cannot be read, is not a video, or is an address.
     """
-    refuse_stream(path)
-    # "a:b.mp4" would be treated as a protocol; an absolute name is not.
-    name, options = str(path.absolute()), SAFELY
+    reject_address(path)
+    file, options = path, SAFELY
     # FFmpeg may treat raw Motion JPEG as a pipe of images, which is not allowed.
-    kind = "mjpeg" if path.suffix.lower() in (".mjpeg", ".mjpg") else None
-    if sequence := find_sequence(path):
-        name, kind = str(sequence.files[0].absolute()), "image2"
-        rate, _ = sequence.timing(frame_rate)
-        options = {"framerate": f"{rate.numerator}/{rate.denominator}", "pattern_type": "none"}
+    container_format = "mjpeg" if path.suffix.lower() in (".mjpeg", ".mjpg") else None
+    if sequence:
+        file, container_format = sequence.files[0], "image2"
+        options = {"framerate": str(sequence.rate or ASSUMED_RATE), "pattern_type": "none"}
     elif not os.path.exists(path):  # noqa: PTH110  # also False if it is not accessible
         raise VideoError(f"{path}: not found; check the name")
-    record_input(path)
-    try:
-        return av.open(name, "r", kind, options, metadata_errors="replace")  # tags: any encoding
+    name = str(file.absolute())  # "a:b.mp4" would be treated as a protocol
+    try:  # tags may have any encoding
+        return av.open(name, "r", container_format, options, metadata_errors="replace")
     except av.FFmpegError as error:
         fault = f"cannot be opened, is not a video, or was cut off ({error.strerror})"
         raise VideoError(f"{path}: {fault}; use a file that plays") from error
 
 
-def refuse_stream(path: Path) -> None:
-    """Refuse an address, or ``-``. Raises `VideoError`."""
+def reject_address(path: Path) -> None:
+    """Raise `VideoError` if `path` is an address, or ``-``."""
     if not path.exists() and _STREAM.match(str(path)):
         raise VideoError(f"{path}: streams are not supported; save it to a file first")
 
@@ -79,32 +69,6 @@ def refuse_stream(path: Path) -> None:
 def is_pipe(path: Path) -> bool:
     """Return whether `path` can be read only once, like a FIFO."""
     return path.exists() and not path.is_file() and not path.is_dir()
-
-
-def packets(
-    container: InputContainer, streams: Iterable[Stream], on_error: Callable[[], None]
-) -> "Iterator[Packet[Stream]]":
-    """Yield the packets of `streams` in file order; skip unreadable places, and other streams.
-
-    `on_error` is called for each place that is skipped.
-    """
-    wanted = {stream.index: stream for stream in streams}
-    for other in set(container.streams) - set(wanted.values()):
-        other.discard = Discard.all
-    failures = 0
-    while failures < _MAX_FAILURES:
-        try:
-            for packet in container.demux(*wanted.values()):
-                failures = 0
-                if packet.size:  # an empty packet would end the decoder
-                    yield packet
-            return
-        except IndexError:  # from PyAV, at the end, if a stream appeared while reading
-            return
-        except av.FFmpegError:
-            failures += 1
-            if failures == 1:
-                on_error()
 
 
 HDR_TRANSFERS = (16, 18)
@@ -137,37 +101,38 @@ def joined_videos(path: Path) -> int:
     """Return how many MP4 or MOV videos, each with an index, were joined byte by byte."""
     if not path.is_file() or path.suffix.lower() not in {".mp4", ".mov", ".m4v"}:
         return 1
-    position = found = 0
+    position = indexes = 0
     with path.open("rb") as file:
         for _ in range(_MAX_BOXES):
             file.seek(position)
-            head = file.read(16)
-            found += head[4:8] == b"moov"
-            length = int.from_bytes(head[:4])
+            header = file.read(16)
+            indexes += header[4:8] == b"moov"
+            length = int.from_bytes(header[:4])
             if length == 1:  # it follows, in 64 bits
-                length = int.from_bytes(head[8:])
+                length = int.from_bytes(header[8:])
             if length < 8:  # also at the end of the file
                 break
             position += length
-    return found
+    return indexes
 
 
-def describe(path: Path, stream: VideoStream, first: av.VideoFrame) -> VideoInfo:
+def describe(
+    path: Path, stream: VideoStream, first: av.VideoFrame, sequence: ImageSequence | None
+) -> VideoInfo:
     """Describe a video, of which the `first` picture has been decoded."""
     container = cast("InputContainer", stream.container)
-    time_base = time_base_of(stream)
-    rate = rate_of(stream)
+    rate, time_base = rate_of(stream), time_base_of(stream)
     start = (first.pts or 0) * time_base
-    # The longest stream may be longer than the video stream.
-    longest = Fraction(container.duration, av.time_base) if container.duration else None
-    duration = stated_duration(stream, start) or longest
-    turn = Orientation.of_frame(first)
-    if sequence := find_sequence(path):
-        _, turn = read_header(sequence.files[0])
+    duration = stated_duration(stream, start)
+    if duration is None and container.duration:  # of the longest stream
+        duration = Fraction(container.duration, av.time_base)
+    orientation = Orientation.of_frame(first)
+    if sequence:
+        _, orientation = read_header(sequence.files[0])
     is_hdr = first.color_trc in HDR_TRANSFERS
     colors = ColorTags(first.color_primaries, first.color_trc, first.colorspace)
     width, height, aspect = first.width, first.height, stream.sample_aspect_ratio or Fraction(1)
-    if turn.is_sideways:
+    if orientation.is_sideways:
         width, height, aspect = height, width, 1 / aspect
     return VideoInfo(
         path=path,
@@ -178,21 +143,21 @@ def describe(path: Path, stream: VideoStream, first: av.VideoFrame) -> VideoInfo
         start=start,
         frames=stream.frames or (round(duration * rate) if duration else None),
         duration=duration,
-        orientation=turn,
+        orientation=orientation,
         pixel_aspect=aspect,
         color=ColorTags(1, 1, 1) if is_hdr else colors,
-        coding=(not is_hdr and turn == Orientation() and Coding.of(first)) or Coding(),
-        has_sound=bool(container.streams.audio) and not is_pipe(path),
+        coding=(not is_hdr and orientation == Orientation() and Coding.of(first)) or Coding(),
+        has_audio=bool(container.streams.audio) and not is_pipe(path),
         tags=_tags(stream),
     )
 
 
 def _tags(stream: VideoStream) -> Tags:
     """Return metadata of the recording; the names differ between containers."""
-    metadata = stream.metadata | stream.container.metadata
-    found = {name.lower(): value for name, value in metadata.items()}
-    location = found.get("location") or found.get("com.apple.quicktime.location.iso6709")
-    return Tags(found.get("creation_time"), location, found.get("title"))
+    metadata = (stream.metadata | stream.container.metadata).items()
+    tags = {name.lower(): value for name, value in metadata}
+    location = tags.get("location") or tags.get("com.apple.quicktime.location.iso6709")
+    return Tags(tags.get("creation_time"), location, tags.get("title"))
 
 
 def stated_duration(stream: VideoStream, start: Fraction) -> Fraction | None:
@@ -211,10 +176,8 @@ def stated_duration(stream: VideoStream, start: Fraction) -> Fraction | None:
 
 def rate_of(stream: VideoStream) -> Fraction:
     """Return the average frame rate; 25 if the file does not declare one."""
-    for rate in (stream.average_rate, stream.guessed_rate):
-        if rate and (near := rate.limit_denominator(_MAX_TERM)) > 0:
-            return near
-    return Fraction(25)
+    rate = stream.average_rate or stream.guessed_rate or Fraction(25)
+    return rate.limit_denominator(_MAX_TERM) or Fraction(25)
 
 
 def time_base_of(stream: VideoStream) -> Fraction:
@@ -223,71 +186,99 @@ def time_base_of(stream: VideoStream) -> Fraction:
 
 
 _TS_DISCONT = 0x0200  # FFmpeg's flag of such formats: AVFMT_TS_DISCONT
-_BACK = Fraction(1, 10)  # seconds; a larger step back begins a new part
-_FORTH = 10  # seconds; a larger jump forward begins a new part, as in the ffmpeg program
+_MAX_BACK = Fraction(1, 10)  # seconds; a larger step back begins a new part
+_MAX_FORWARD = 10  # seconds; a larger jump forward begins a new part, as in the ffmpeg program
+_MAX_FAILURES = 100  # in a row; a file with only errors must end too
 
 
-class ClockUnwrapper:
-    """Moves packets to one continuous time line, in file order.
+class Demuxer:
+    """An open video file, whose packets are read in file order, on one continuous time line.
 
-    Each stream enters the next part where its own clock jumps, because packets of both parts
-    alternate near the joint. The first stream in a part determines its offset.
-
-    Parameters
-    ----------
-    container
-        If its clock cannot restart, packets are not changed.
-    pictures
-        The video stream, whose restarts count.
+    If its clock restarts, each stream enters the next part where its own clock jumps, because
+    packets of both parts alternate near the joint. The first stream in a part determines its
+    offset. Parameters and errors are those of `open_input` and `video_stream`.
 
     Attributes
     ----------
-    streams
-        Streams whose packets are needed: video, and all sound if the clock may restart.
+    container
+        The file.
+    video
+        The video stream, whose restarts count.
     may_restart
         Whether the clock may restart in files of this format.
     restarts
         How often it has restarted.
     """
 
-    def __init__(self, container: InputContainer, pictures: VideoStream) -> None:
+    def __init__(self, path: Path, sequence: ImageSequence | None = None) -> None:
+        self.container = open_input(path, sequence)
+        self.video = video_stream(self.container, path)
         self.restarts = 0
-        self.may_restart = bool(container.format.flags & _TS_DISCONT)
-        sounds = container.streams.audio if self.may_restart else ()
-        self.streams: list[Stream] = [pictures, *sounds]
-        self._pictures = pictures.index
-        self._period = 1 / rate_of(pictures)
+        self.may_restart = bool(self.container.format.flags & _TS_DISCONT)
+        self._period = 1 / rate_of(self.video)
         self._offsets = [Fraction(0)]  # of each part, seconds; the first part keeps its clock
         self._part_of: dict[int, int] = {}  # the current part of each stream
         self._ends: dict[int, Fraction] = {}  # of each stream, seconds on the time line
 
-    def unwrap(self, packets: "Iterable[Packet[Stream]]") -> "Iterator[Packet[Stream]]":
-        """Yield `packets`, of `streams` and possibly others, with continuous times."""
-        for packet in packets:
+    def close(self) -> None:
+        """Close the file."""
+        self.container.close()
+
+    def packets(
+        self, streams: Sequence[Stream], on_error: Callable[[], None] = lambda: None
+    ) -> "Iterator[Packet[Stream]]":
+        """Yield the packets of `streams`, and skip what cannot be read.
+
+        `on_error` is called for each part of the file that is skipped.
+        """
+        selected = {stream.index for stream in streams}
+        needed = [self.video, *self.container.streams.audio] if self.may_restart else streams
+        for packet in self._readable({stream.index: stream for stream in needed}, on_error):
             ticks = packet.pts if packet.dts is None else packet.dts
             if self.may_restart and ticks is not None:
                 self._move(packet, ticks * packet.time_base)
-            yield packet
+            if packet.stream_index in selected:
+                yield packet
+
+    def _readable(
+        self, needed: Mapping[int, Stream], on_error: Callable[[], None]
+    ) -> "Iterator[Packet[Stream]]":
+        for stream in self.container.streams:
+            stream.discard = Discard.default if stream.index in needed else Discard.all
+        failures = 0
+        while failures < _MAX_FAILURES:
+            try:
+                for packet in self.container.demux(*needed.values()):
+                    failures = 0
+                    if packet.size:  # an empty packet would end the decoder
+                        yield packet
+                return
+            except IndexError:  # from PyAV, at the end, if a stream appeared while reading
+                return
+            except av.FFmpegError:
+                failures += 1
+                if failures == 1:
+                    on_error()
 
     def _move(self, packet: "Packet[Stream]", begin: Fraction) -> None:
         """Add the offset of its part to the times of a packet, and note where it ends."""
         stream = packet.stream_index
-        number = self._part_at(stream, begin)
-        self.restarts += stream == self._pictures and number > self._part_of[stream]
-        self._part_of[stream] = number
+        part = self._part_at(stream, begin)
+        self.restarts += stream == self.video.index and part > self._part_of[stream]
+        self._part_of[stream] = part
         duration = (packet.duration or 0) * packet.time_base or self._period
-        end = begin + self._offsets[number] + duration
+        end = begin + self._offsets[part] + duration
         self._ends[stream] = max(self._ends.get(stream, end), end)
-        shift = round(self._offsets[number] / packet.time_base)
+        shift = round(self._offsets[part] / packet.time_base)
         packet.pts = None if packet.pts is None else packet.pts + shift
         packet.dts = None if packet.dts is None else packet.dts + shift
 
     def _part_at(self, stream: int, begin: Fraction) -> int:
         """Return the part, maybe a new one, in which a stream continues at a time of its clock."""
-        newest, end = self._part_of.get(self._pictures, 0), self._ends.get(stream)
-        for number in range(self._part_of.setdefault(stream, newest), len(self._offsets)):
-            time = begin + self._offsets[number]
-            if end is None or end - _BACK <= time <= max(self._ends.values()) + _FORTH:
-                return number
+        newest, end = self._part_of.get(self.video.index, 0), self._ends.get(stream)
+        for part in range(self._part_of.setdefault(stream, newest), len(self._offsets)):
+            time = begin + self._offsets[part]
+            if end is None or end - _MAX_BACK <= time <= max(self._ends.values()) + _MAX_FORWARD:
+                return part
         self._offsets.append(max(self._ends.values()) - begin)
         return len(self._offsets) - 1

@@ -16,30 +16,29 @@ from vdet.media.images import Orientation, from_16_bits, to_ycrcb
 
 if TYPE_CHECKING:  # an image needs no PyAV
     import av
+    from av.video.plane import VideoPlane
 
 Layers = tuple[Image, Image, Image]
 """Luma, blue and red chroma, uint8 each; chroma may have half the size of luma."""
 
-LUMA_WEIGHTS = {"bt601": (0.299, 0.114), "bt709": (0.2126, 0.0722)}
+_LUMA_WEIGHTS = {"bt601": (0.299, 0.114), "bt709": (0.2126, 0.0722)}
 """Weights of red and blue in luma, ITU-R BT.601 and BT.709."""
-
 _PLANAR = ("yuv420p", "yuvj420p")
 _MATRICES: dict[int, Literal["bt601", "bt709"]] = {1: "bt709", 2: "bt601", 5: "bt601", 6: "bt601"}
 """By code of ITU-T H.273; untagged video is treated as BT.601."""
 MATRIX_CODES = {"bt601": 6, "bt709": 1}
 """The codes to write."""
 
-_LUMA_STEPS, _CHROMA_STEPS = 219 / 255, 224 / 255  # limited-range steps per full-range step
 
-
-def _table(new_base: float, base: float, steps: float) -> Image:
-    """Return a lookup table that maps `base` to `new_base` and a step of 1 to `steps`."""
-    values = new_base + (np.arange(256) - base) * steps
+def _table(old_zero: float, new_zero: float, step: float) -> Image:
+    """Return a lookup table that maps `old_zero` to `new_zero` and a step of 1 to `step`."""
+    values = new_zero + (np.arange(256) - old_zero) * step
     return np.asarray(np.rint(values.clip(0, 255)), np.uint8)
 
 
-_FULL_LUMA, _FULL_CHROMA = _table(0, 16, 1 / _LUMA_STEPS), _table(128, 128, 1 / _CHROMA_STEPS)
-_LIMITED_LUMA, _LIMITED_CHROMA = _table(16, 0, _LUMA_STEPS), _table(128, 128, _CHROMA_STEPS)
+_TO_FULL_RANGE = _table(16, 0, 255 / 219), _table(128, 128, 255 / 224)
+_TO_LIMITED_RANGE = _table(0, 16, 219 / 255), _table(128, 128, 224 / 255)
+"""Tables for luma and for chroma."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,30 +65,30 @@ class Coding:
 
     def to_common(self, layers: Layers) -> Layers:
         """Convert values of this coding to the common coding."""
-        stretched = layers if self.full_range else _looked_up(layers, _FULL_LUMA, _FULL_CHROMA)
-        return stretched if self.matrix == "bt601" else _recoded(stretched, _FROM_BT709)
+        full = layers if self.full_range else _looked_up(layers, *_TO_FULL_RANGE)
+        return full if self.matrix == "bt601" else _recoded(full, _FROM_BT709)
 
     def to_bgr(self, layers: Layers) -> Image:
         """Convert values of this coding to BGR, uint8 `(H, W, 3)`, in the size of luma."""
-        luma, *chroma = self.to_common(layers)
-        blue, red = (_as_large(item, luma) for item in chroma)
+        luma, blue, red = self.to_common(layers)
+        blue, red = _enlarged(blue, luma), _enlarged(red, luma)
         return np.asarray(cv2.cvtColor(cv2.merge([luma, red, blue]), cv2.COLOR_YCrCb2BGR), np.uint8)
 
     def from_common(self, layers: Layers) -> Layers:
         """Convert values of the common coding to this coding."""
-        recoded = layers if self.matrix == "bt601" else _recoded(layers, _TO_BT709)
-        return recoded if self.full_range else _looked_up(recoded, _LIMITED_LUMA, _LIMITED_CHROMA)
+        full = layers if self.matrix == "bt601" else _recoded(layers, _TO_BT709)
+        return full if self.full_range else _looked_up(full, *_TO_LIMITED_RANGE)
 
 
-def _looked_up(layers: Layers, for_luma: Image, for_chroma: Image) -> Layers:
-    pairs = zip(layers, (for_luma, for_chroma, for_chroma), strict=True)
-    luma, blue, red = (np.asarray(cv2.LUT(*pair), np.uint8) for pair in pairs)
+def _looked_up(layers: Layers, luma_table: Image, chroma_table: Image) -> Layers:
+    tables = luma_table, chroma_table, chroma_table
+    luma, blue, red = (np.asarray(item, np.uint8) for item in map(cv2.LUT, layers, tables))
     return luma, blue, red
 
 
 def _from_rgb(matrix: str) -> Float64Array:
     """Return the matrix from red, green, blue to luma, blue chroma, red chroma; 3 × 3."""
-    red, blue = LUMA_WEIGHTS[matrix]
+    red, blue = _LUMA_WEIGHTS[matrix]
     luma = np.array([red, 1 - red - blue, blue])
     blue_chroma = (np.array([0, 0, 1]) - luma) / (2 - 2 * blue)
     red_chroma = (np.array([1, 0, 0]) - luma) / (2 - 2 * red)
@@ -98,21 +97,23 @@ def _from_rgb(matrix: str) -> Float64Array:
 
 _FROM_BT709 = _from_rgb("bt601") @ np.linalg.inv(_from_rgb("bt709"))
 _TO_BT709 = np.linalg.inv(_FROM_BT709)
-_KINDS = cv2.CV_16S, cv2.CV_8U, cv2.CV_8U  # of a change of luma, of blue and red chroma
 
 
 def _recoded(layers: Layers, matrix: Float64Array) -> Layers:
     """Convert full-range values to another matrix; luma changes only by a fraction of chroma."""
-    luma, first, second = layers
-    mixed: list[Any] = []
-    for (_, a, b), zero, kind in zip(matrix.tolist(), (0, 128, 128), _KINDS, strict=True):
-        offset = zero - 128 * (a + b)
-        mixed.append(np.asarray(cv2.addWeighted(first, a, second, b, offset, dtype=kind)))
-    change, blue, red = mixed
-    return np.asarray(cv2.add(luma, _as_large(change, luma), dtype=cv2.CV_8U), np.uint8), blue, red
+    luma, blue, red = layers
+
+    def mixed(row: int, zero: int, depth: int) -> npt.NDArray[Any]:
+        _, of_blue, of_red = matrix[row].tolist()
+        offset = zero - 128 * (of_blue + of_red)
+        return np.asarray(cv2.addWeighted(blue, of_blue, red, of_red, offset, dtype=depth))
+
+    change = _enlarged(mixed(0, 0, cv2.CV_16S), luma)
+    new_luma = np.asarray(cv2.add(luma, change, dtype=cv2.CV_8U), np.uint8)
+    return new_luma, mixed(1, 128, cv2.CV_8U), mixed(2, 128, cv2.CV_8U)
 
 
-def _as_large(values: npt.NDArray[Any], luma: Image) -> npt.NDArray[Any]:
+def _enlarged(values: npt.NDArray[Any], luma: Image) -> npt.NDArray[Any]:
     """Scale chroma to the size of luma; at half size, a value stands for 2 × 2 pixels."""
     if values.shape == luma.shape:
         return values
@@ -129,15 +130,23 @@ class Planes:
         uint8 `(H, W)`.
     blue, red
         Chroma, uint8 `(⌈H / 2⌉, ⌈W / 2⌉)`; a value stands for 2 × 2 pixels.
-    is_own
+    layers
+        Luma, blue and red.
+    shape
+        H and W.
+    is_writable
         Whether nothing else uses the picture, so it may be changed and encoded.
     """
 
-    def __init__(self, picture: "av.VideoFrame", coding: Coding, *, is_own: bool = False) -> None:
+    def __init__(
+        self, picture: "av.VideoFrame", coding: Coding, *, is_writable: bool = False
+    ) -> None:
         self.picture = picture
         self.coding = coding
-        self.is_own = is_own
-        self.luma, self.blue, self.red = (_plane(picture, number) for number in range(3))
+        self.is_writable = is_writable
+        self.shape = picture.height, picture.width
+        self.luma, self.blue, self.red = map(_values, picture.planes)
+        self.layers: Layers = self.luma, self.blue, self.red
 
     @classmethod
     def of_image(cls, image: Image, coding: Coding) -> "Planes":
@@ -152,9 +161,9 @@ class Planes:
             height, width = image.shape[:2]
         luma, red, blue = to_ycrcb(image)
         luma, *chroma = coding.from_common((luma, blue, red))
-        half, area = (width // 2, height // 2), cv2.INTER_AREA
-        halves = (cv2.resize(item, half, interpolation=area) for item in chroma)
-        return cls.blank(width, height, coding)._filled((luma, *halves))
+        half = width // 2, height // 2
+        halves = [cv2.resize(values, half, interpolation=cv2.INTER_AREA) for values in chroma]
+        return cls.blank(width, height, coding)._filled([luma, *halves])
 
     @classmethod
     def blank(cls, width: int, height: int, coding: Coding) -> "Planes":
@@ -165,7 +174,7 @@ class Planes:
         picture = av.VideoFrame(width, height, "yuv420p")
         picture.colorspace = MATRIX_CODES[coding.matrix]
         picture.color_range = ColorRange.JPEG if coding.full_range else ColorRange.MPEG
-        return cls(picture, coding, is_own=True)
+        return cls(picture, coding, is_writable=True)
 
     def _filled(self, layers: Iterable[cv2.typing.MatLike]) -> "Planes":
         for target, source in zip(self.layers, layers, strict=True):
@@ -188,19 +197,9 @@ class Planes:
             return np.asarray(cv2.cvtColor(stacked, cv2.COLOR_YUV2BGR_I420), np.uint8)
         return self.coding.to_bgr(self.layers)
 
-    @property
-    def shape(self) -> tuple[int, int]:
-        """Height and width, pixels."""
-        return self.picture.height, self.picture.width
 
-    @property
-    def layers(self) -> Layers:
-        """Luma, blue and red."""
-        return self.luma, self.blue, self.red
-
-
-def _plane(picture: "av.VideoFrame", number: int) -> Image:
-    plane = picture.planes[number]
+def _values(plane: "VideoPlane") -> Image:
+    """Return the values of a plane, which share its memory; uint8 `(H, W)`."""
     values = np.frombuffer(cast(bytes, plane), np.uint8)  # it is not typed as such
     rows = values[: plane.line_size * plane.height].reshape(plane.height, plane.line_size)
     return rows[:, : plane.width]
@@ -213,29 +212,24 @@ class Picture:
     ----------
     pixels
         An image, BGR uint8 `(H, W, 3)`, or planes.
+
+    Attributes
+    ----------
+    height, width
+        Pixels.
+    planes
+        The planes, if the picture was made from planes.
     """
 
     def __init__(self, pixels: Image | Planes) -> None:
         self.pixels = pixels
-
-    @property
-    def height(self) -> int:
-        """Pixels."""
-        return int(self.pixels.shape[0])
-
-    @property
-    def width(self) -> int:
-        """Pixels."""
-        return int(self.pixels.shape[1])
-
-    @property
-    def planes(self) -> Planes | None:
-        """The planes, if the picture was made from planes."""
-        return self.pixels if isinstance(self.pixels, Planes) else None
+        self.planes = pixels if isinstance(pixels, Planes) else None
+        self.height: int = pixels.shape[0]
+        self.width: int = pixels.shape[1]
 
     def copy(self, used: Planes | None = None) -> Image | Planes:
         """Return a copy of the pixels that may be changed: see `Planes.copy`."""
-        return self.pixels.copy(used) if isinstance(self.pixels, Planes) else self.pixels.copy()
+        return self.planes.copy(used) if self.planes else self.image.copy()
 
     @cached_property
     def image(self) -> Image:
@@ -325,5 +319,5 @@ class VideoInfo:
     pixel_aspect: Fraction = Fraction(1)
     color: ColorTags = ColorTags()
     coding: Coding = field(default_factory=Coding)
-    has_sound: bool = False
+    has_audio: bool = False
     tags: Tags = Tags()

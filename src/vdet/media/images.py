@@ -4,7 +4,7 @@ import io
 import logging
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from fractions import Fraction
@@ -21,7 +21,7 @@ from PIL.ImageFile import ImageFile
 from vdet.boxes import Image
 from vdet.config.camera import ClockSettings
 from vdet.errors import ImageError, VideoError
-from vdet.files import read_whole, record_input
+from vdet.files import read_whole
 
 if TYPE_CHECKING:
     import av
@@ -171,7 +171,7 @@ def _is_cut_off(data: bytes) -> bool:
 
 
 @contextmanager
-def _refusing(path: Path) -> Iterator[None]:
+def _naming_errors(path: Path) -> Iterator[None]:
     """Convert errors of Pillow to an `ImageError` that names `path`."""
     try:
         yield
@@ -185,7 +185,7 @@ def _refusing(path: Path) -> Iterator[None]:
 
 def _open(data: bytes, path: Path) -> ImageFile:
     """Read the header of an image. Raises `ImageError`, which names `path`."""
-    with _refusing(path):
+    with _naming_errors(path):
         image = pillow.open(io.BytesIO(data), formats=_FORMATS)
     if max(image.size) > MAX_IMAGE_SIDE or math.prod(image.size) > MAX_IMAGE_PIXELS:
         raise ImageError(f"{path}: {_TOO_LARGE}")
@@ -203,7 +203,7 @@ def _decode(data: bytes, path: Path) -> Image:
     image = _open(data + _JPEG_END if _is_cut_off(data) else data, path)
     # Pillow itself rotates TIFF.
     turn = Orientation() if image.format == "TIFF" else _orientation(image)
-    with _refusing(path):
+    with _naming_errors(path):
         return upright(_to_bgr(image, data), turn)
 
 
@@ -231,7 +231,7 @@ def to_ycrcb(image: Image) -> tuple[Image, Image, Image]:
 
 _PATTERN = re.compile(r"((?:[^%]|%%)*)%(?:0([1-9]\d*))?d((?:[^%]|%%)*)", re.ASCII)
 _LAST_NUMBER = re.compile(r".*?(\d+)\D*\.\w+", re.ASCII | re.DOTALL)
-ASSUMED_RATE = 25.0
+ASSUMED_RATE = Fraction(25)
 """Images per second, if neither the settings nor the names determine it."""
 
 
@@ -243,26 +243,28 @@ class ImageSequence:
     ----------
     files
         The images, in order.
-    ticks, tick
-        Time of each image after the first one, if names are times; the unit in seconds.
+    ticks
+        Time of each image after the first one, in periods of the rate.
+    rate
+        Images per second; None if it is unknown: `ASSUMED_RATE`.
     """
 
     files: tuple[Path, ...]
-    ticks: tuple[int, ...] = ()
-    tick: int = 1
-
-    def timing(self, frame_rate: float | None) -> tuple[Fraction, Sequence[int]]:
-        """Return the rate of the images, per second, and the time of each, in periods of it."""
-        if self.ticks and frame_rate is None:
-            return Fraction(1, self.tick), self.ticks
-        return Fraction(str(frame_rate or ASSUMED_RATE)), range(len(self.files))
+    ticks: Sequence[int]
+    rate: Fraction | None = None
 
 
-def find_sequence(path: Path) -> ImageSequence | None:
+def find_sequence(path: Path, frame_rate: float | None = None) -> ImageSequence | None:
     """Return the images of the pattern or folder `path`; None if it is neither.
 
-    Numbers may begin anywhere, and increase by any constant step. In the name of a folder, a per
-    cent sign is literal.
+    Images whose names are different times are in the order of these. Otherwise they are in the
+    order of their numbers, which may begin anywhere, and increase by any constant step. In the name
+    of a folder, a per cent sign is literal.
+
+    Parameters
+    ----------
+    frame_rate
+        Images per second; None: as their names say.
 
     Raises
     ------
@@ -270,22 +272,69 @@ def find_sequence(path: Path) -> ImageSequence | None:
         The folder cannot be read, contains no such image, one is missing, or the images of a folder
         are not one sequence.
     """
-    pattern = None if path.exists() else _PATTERN.fullmatch(path.name)
-    if not (pattern or path.is_dir()):
+    files = _numbered_files(path)
+    if not files:
         return None
-    folder, form = (path.parent, _form(*pattern.groups())) if pattern else (path, _LAST_NUMBER)
+    sequence = _ordered_by_time(files) or _ordered_by_number(files, path)
+    if frame_rate is None:
+        return sequence
+    return ImageSequence(sequence.files, range(len(files)), Fraction(str(frame_rate)))
+
+
+def video_files(path: Path) -> tuple[Path, ...]:
+    """Return the files of a video: numbered images, or `path` itself. Raises `VideoError`."""
+    sequence = find_sequence(path)
+    return sequence.files if sequence else (path,)
+
+
+def _numbered_files(path: Path) -> dict[Path, int]:
+    """Return the images of a pattern or folder with their numbers; empty if it is neither."""
+    if path.is_dir():
+        folder, name_pattern = path, _LAST_NUMBER
+    elif (pattern := _PATTERN.fullmatch(path.name)) and not path.exists():
+        folder, name_pattern = path.parent, _name_pattern(pattern)
+    else:
+        return {}
     try:
-        matches = [(form.fullmatch(file.name), file) for file in folder.iterdir()]
+        matches = {file: name_pattern.fullmatch(file.name) for file in folder.iterdir()}
     except OSError as error:
         raise VideoError(f"{path}: {folder} cannot be read: {error.strerror}") from error
-    named = [(match, file) for match, file in matches if pattern or is_image_name(file)]
-    found = sorted((int(match[1]), file) for match, file in named if match)
-    if not found:
+    takes_all = name_pattern is not _LAST_NUMBER
+    files = {
+        file: int(match[1])
+        for file, match in matches.items()
+        if match and (takes_all or is_image_name(file))
+    }
+    if not files:
         raise VideoError(f"{path}: no numbered images found; use a video, or -d DIR for a folder")
-    numbers, files = zip(*found, strict=True)
-    record_input(*files)
-    if by_the_clock := _by_the_clock(files):
-        return by_the_clock
+    return files
+
+
+def _name_pattern(pattern: re.Match[str]) -> re.Pattern[str]:
+    """Return a regular expression for the names that a pattern such as `img_%04d.png` means."""
+    before, digits, after = pattern.groups()
+    number = r"0|[1-9]\d*" if digits is None else rf"\d{{{digits}}}|[1-9]\d{{{digits},}}"
+    before, after = (re.escape(part.replace("%%", "%")) for part in (before, after))
+    return re.compile(f"{before}({number}){after}", re.ASCII | re.DOTALL)
+
+
+def _ordered_by_time(files: Iterable[Path]) -> ImageSequence | None:
+    """Return the images if all their names are different times."""
+    times = [(ClockSettings().time_in(file.name), file) for file in files]
+    dated = {time: file for time, file in times if time}
+    if len(dated) < len(times) or len({time.tzinfo for time in dated}) > 1:
+        return None
+    ordered = sorted(dated)
+    seconds = [round((time - ordered[0]).total_seconds()) for time in ordered]
+    tick = math.gcd(*seconds) or 1
+    ticks = tuple(second // tick for second in seconds)
+    return ImageSequence(tuple(dated[time] for time in ordered), ticks, Fraction(1, tick))
+
+
+def _ordered_by_number(files: Mapping[Path, int], path: Path) -> ImageSequence:
+    """Return the images if they are one sequence without a gap. Raises `VideoError`."""
+    ordered = sorted(files, key=lambda file: (files[file], file))
+    numbers = [files[file] for file in ordered]
     steps = [following - number for number, following in pairwise(numbers)]
     kinds = {re.sub(r"\d", "", file.name, flags=re.ASCII) for file in files}
     if len(kinds) > 1 or 0 in steps:
@@ -293,25 +342,6 @@ def find_sequence(path: Path) -> ImageSequence | None:
     step = min(steps, default=1)
     for number, gap in zip(numbers, steps, strict=False):
         if gap != step:
-            lack = f"image {number + step} is missing; copy image {number} in its place"
-            raise VideoError(f"{path}: {lack}")
-    return ImageSequence(files)
-
-
-def _by_the_clock(files: tuple[Path, ...]) -> ImageSequence | None:
-    """Return the images if all their names are different times."""
-    times = {time: file for file in files if (time := ClockSettings().time_in(file.name))}
-    if len(times) < len(files) or len({time.tzinfo for time in times}) > 1:
-        return None
-    ordered = sorted(times)
-    seconds = [round((time - ordered[0]).total_seconds()) for time in ordered]
-    tick = math.gcd(*seconds) or 1
-    ticks = tuple(second // tick for second in seconds)
-    return ImageSequence(tuple(times[time] for time in ordered), ticks, tick)
-
-
-def _form(before: str, digits: str | None, after: str) -> re.Pattern[str]:
-    """Return a regular expression for the names of a pattern."""
-    before, after = (re.escape(part.replace("%%", "%")) for part in (before, after))
-    number = r"0|[1-9]\d*" if digits is None else rf"\d{{{digits}}}|[1-9]\d{{{digits},}}"
-    return re.compile(f"{before}({number}){after}", re.ASCII | re.DOTALL)
+            fault = f"image {number + step} is missing; copy image {number} in its place"
+            raise VideoError(f"{path}: {fault}")
+    return ImageSequence(tuple(ordered), range(len(ordered)))

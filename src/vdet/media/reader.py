@@ -84,21 +84,21 @@ class VideoReader:
         self._faults: list[str] = []
         self._is_scaled = False
         self._decoder = Decoder(path, settings.frame_rate)
-        self._pictures = self._decoder.pictures()
-        first = next(self._pictures, None)
+        first = next(self._decoder.pictures, None)
         if first is None or max(first.width, first.height) > _MAX_SIDE:
             limits = f"{demux.MAX_PIXELS // 10**6} million pixels and sides of {_MAX_SIDE}"
             advice = f"use a file that plays, with frames of at most {limits}"
             raise VideoError(f"{path}: no frame can be decoded; {advice}")
         stream = self._decoder.stream
-        self.info: VideoInfo = demux.describe(path, stream, first)
+        sequence = self._decoder.sequence
+        self.info: VideoInfo = demux.describe(path, stream, first, sequence)
         self.length: Fraction | None = None
-        if ticks := self._decoder.ticks:
-            self.length = (ticks[-1] + 1) * self.info.time_base
-            self.info = replace(self.info, frames=len(ticks), duration=self.length)
-        elif not self._decoder.clock.may_restart:
+        if sequence:
+            self.length = (sequence.ticks[-1] + 1) * self.info.time_base
+            self.info = replace(self.info, frames=len(sequence.files), duration=self.length)
+        elif not self._decoder.demuxer.may_restart:
             self.length = demux.stated_duration(stream, self.info.start)
-        self._to_standard = _standard_range(first.color_trc, stream)
+        self._to_standard_range = _standard_range_filter(first.color_trc, stream)
         self._faults += self._assumptions()
         self._frames = self._deliver(self._begin(first))
 
@@ -125,15 +125,15 @@ class VideoReader:
 
     def __exit__(self, *_: object) -> None:
         self._frames.close()
-        self._decoder.container.close()
+        self._decoder.demuxer.close()
 
     def _assumptions(self) -> Iterator[str]:
         """Yield assumptions that the user should know."""
-        if isinstance(self._decoder.ticks, range) and self._settings.frame_rate is None:
-            yield f"{ASSUMED_RATE:.0f} images per second are assumed; set input.frame_rate"
-        if self._decoder.container.streams.audio and not self.info.has_sound:
+        if self._decoder.sequence and not self._decoder.sequence.rate:
+            yield f"{ASSUMED_RATE} images per second are assumed; set input.frame_rate"
+        if self._decoder.demuxer.container.streams.audio and not self.info.has_audio:
             yield "its audio is dropped: a pipe can be read only once"
-        streams = len(demux.moving_streams(self._decoder.container))
+        streams = len(demux.moving_streams(self._decoder.demuxer.container))
         if streams > 1:
             yield f"has {streams} video streams; only the first is used"
 
@@ -144,13 +144,12 @@ class VideoReader:
         if not is_countable or first.pts is None or time <= first.pts:
             return first
         decoder = Decoder(self.info.path, self._settings.frame_rate)
-        pictures = decoder.pictures()
-        picture = next(pictures, None) if decoder.skip_to(time, first.pts) else None
+        picture = next(decoder.pictures, None) if decoder.skip_to(time, first.pts) else None
         if picture is None or decoder.damage.is_evident:
-            decoder.container.close()
+            decoder.demuxer.close()
             return first
-        self._decoder.container.close()
-        self._decoder, self._pictures = decoder, pictures
+        self._decoder.demuxer.close()
+        self._decoder = decoder
         return picture
 
     def _deliver(self, first: av.VideoFrame) -> Generator[Frame, None, None]:
@@ -158,31 +157,39 @@ class VideoReader:
             yield from itertools.islice(self._selected(first), self._limit)
             self._report()
         finally:
-            self._decoder.container.close()
+            self._decoder.demuxer.close()
 
     def _selected(self, first: av.VideoFrame) -> Iterator[Frame]:
-        for index, time, picture in self._timed(first):
-            since = time - self.info.start
+        info, period, time = self.info, 1 / self.info.rate, None
+        pictures = itertools.chain([first], self._decoder.pictures)
+        for index, picture in enumerate(pictures, self._decoder.before):
+            stated = None if picture.pts is None else picture.pts * info.time_base
+            time = next_time(time, stated, period)
+            since = time - info.start
             if self._end is not None and since >= self._end:
                 return
             if since >= self._start:
                 yield Frame(index, time, self._upright(picture))
+        shown = max(period, picture.duration * info.time_base)
+        declared, self.length = self.length, since + shown
+        if declared and declared - self.length > max(2 * period, declared * _TOLERANCE):
+            self._faults.append(f"ends early: {index + 1} of {info.frames} frames could be read")
 
     def _upright(self, picture: av.VideoFrame) -> Picture:
         """Return a picture as planes if they need no conversion, else as BGR."""
         info = self.info
-        form = Coding.of(picture), picture.width, picture.height
-        has_same_form = form == (info.coding, info.width, info.height)
-        if has_same_form and info.orientation == Orientation() and not self._to_standard:
+        has_same_size = (picture.width, picture.height) == (info.width, info.height)
+        is_ready = info.orientation == Orientation() and not self._to_standard_range
+        if has_same_size and is_ready and Coding.of(picture) == info.coding:
             return Picture(Planes(picture, info.coding))
         return Picture(self._image(picture))
 
     def _image(self, picture: av.VideoFrame) -> Image:
         info = self.info
         try:
-            if self._to_standard:
-                self._to_standard.vpush(picture)
-                picture = self._to_standard.vpull()
+            if self._to_standard_range:
+                self._to_standard_range.vpush(picture)
+                picture = self._to_standard_range.vpull()
             image = bgr_of(picture)
         except (av.FFmpegError, ValueError) as error:
             fault = f"its pixels ({picture.format.name}) cannot be converted"
@@ -194,28 +201,15 @@ class VideoReader:
         self._is_scaled = True
         return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
 
-    def _timed(self, first: av.VideoFrame) -> Iterator[tuple[int, Fraction, av.VideoFrame]]:
-        info, period, time = self.info, 1 / self.info.rate, None
-        pictures = itertools.chain([first], self._pictures)
-        for index, picture in enumerate(pictures, self._decoder.before):
-            stated = None if picture.pts is None else picture.pts * info.time_base
-            time = next_time(time, stated, period)
-            yield index, time, picture
-        assert time is not None
-        shown = max(period, picture.duration * info.time_base)
-        declared, self.length = self.length, time + shown - info.start
-        if declared and declared - self.length > max(2 * period, declared * _TOLERANCE):
-            self._faults.append(f"ends early: {index + 1} of {info.frames} frames could be read")
-
     def _report(self) -> None:
-        """Refuse a video that is too damaged; warn about other faults."""
+        """Raise `VideoError` if too much is damaged; warn about other faults."""
         damaged, total = self.damaged, self._decoder.damage.pictures + self._decoder.damage.lost
         if damaged:
             self._faults.insert(0, f"{damaged} of {total} frames damaged or lost")
         if damaged > math.ceil(self._settings.max_damaged * total):
             limit = "more than input.max_damaged allows; raise it"
             raise VideoError(f"{self.info.path}: {self._faults[0]}, {limit}")
-        if restarts := self._decoder.clock.restarts:
+        if restarts := self._decoder.demuxer.restarts:
             self._faults.append(f"its clock restarts {restarts}×; the parts follow one another")
         if (videos := demux.joined_videos(self.info.path)) > 1:
             self._faults.append(f"{videos} videos are joined in one file; only the first is read")
@@ -225,7 +219,7 @@ class VideoReader:
             _log.warning("%s: %s", self.info.path, "; ".join(self._faults))
 
 
-def _standard_range(transfer: int, stream: VideoStream) -> Graph | None:
+def _standard_range_filter(transfer: int, stream: VideoStream) -> Graph | None:
     """Return the filter that converts HDR video to BT.709; None for other video."""
     if transfer not in demux.HDR_TRANSFERS:
         return None

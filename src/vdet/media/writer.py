@@ -1,4 +1,4 @@
-"""Write frames as H.264 into one container, and copy the sound of their source into it."""
+"""Write frames as H.264 into one container, and copy the audio of their source into it."""
 
 import contextlib
 import logging
@@ -17,15 +17,15 @@ from av.video.reformatter import ColorRange
 
 from vdet.config.schema import OutputSettings
 from vdet.errors import OutputError, VideoError
-from vdet.media.demux import SAFELY, ClockUnwrapper, open_input, packets, video_stream
+from vdet.media.demux import SAFELY, Demuxer
 from vdet.media.frame import MATRIX_CODES, UNSPECIFIED, Coding, Frame, Picture, Planes, VideoInfo
 from vdet.version import __version__
 
 _log = logging.getLogger("vdet")
 
 
-class SoundCopy:
-    """Copies the packets of every sound stream of `source` to `target`, bit for bit.
+class AudioCopy:
+    """Copies the packets of every audio stream of `source` to `target`, bit for bit.
 
     Times stay relative to the video: second `origin` of the source becomes second 0 of the target.
     Earlier packets are dropped, except one if the target can hide it (mp4 and mov), because a
@@ -43,11 +43,10 @@ class SoundCopy:
         self._target = target
         self._origin = origin
         self._can_hide = target.format.name != "matroska"
-        self._left_out = 0  # packets
-        self._source = open_input(source)
-        self._clock = ClockUnwrapper(self._source, video_stream(self._source, source))
+        self._dropped = 0  # packets
+        self._source = Demuxer(source)
         self._streams = self._add_streams()
-        self._packets = self._moved()
+        self._packets = self._shifted_packets()
         self._next = next(self._packets, None)
 
     def copy(self, until: Fraction | None) -> None:
@@ -58,21 +57,21 @@ class SoundCopy:
             try:
                 self._target.mux(packet)
             except av.InvalidDataError:  # found when repacking for another container
-                self._left_out += 1
+                self._dropped += 1
             self._next = next(self._packets, None)
 
     def close(self) -> None:
         """Close the source; warn about packets that could not be copied."""
-        if self._left_out:
+        if self._dropped:
             fault = "damaged, or without a time of their own"
-            _log.warning("%s: %d audio packets dropped: %s", self._path, self._left_out, fault)
+            _log.warning("%s: %d audio packets dropped: %s", self._path, self._dropped, fault)
         self._packets.close()
         self._source.close()
 
     def _add_streams(self) -> dict[int, AudioStream]:
         """Add the supported streams to the target, by their index in the source."""
         streams, target = {}, self._target
-        for stream in self._source.streams.audio:
+        for stream in self._source.container.streams.audio:
             codec = stream.codec_context
             if codec and codec.sample_rate and codec.name in target.supported_codecs:
                 streams[stream.index] = target.add_stream_from_template(stream)
@@ -82,20 +81,16 @@ class SoundCopy:
                 _log.warning("%s: %s; left out", self._path, fault)
         return streams
 
-    def _moved(self) -> "Generator[Packet[Stream], None, None]":
+    def _shifted_packets(self) -> "Generator[Packet[Stream], None, None]":
         """Yield the packets to copy, with their times and stream in the target."""
         if not self._streams:
             return
-        needed = self._clock.streams if self._clock.may_restart else ()
-        sounds = [self._source.streams[index] for index in self._streams]
-        found = packets(self._source, (*needed, *sounds), on_error=lambda: None)
         last: dict[int, int] = {}
-        for packet in self._clock.unwrap(found):
+        copied = [self._source.container.streams[index] for index in self._streams]
+        for packet in self._source.packets(copied):
             index, pts, dts = packet.stream_index, packet.pts, packet.dts
-            if index not in self._streams:
-                continue
             if pts is None or dts is None or dts <= last.get(index, dts - 1):
-                self._left_out += 1  # muxers refuse times that do not increase
+                self._dropped += 1  # muxers reject times that do not increase
                 continue
             last[index] = dts
             shift = round(self._origin / packet.time_base)
@@ -121,10 +116,7 @@ _FINEST = 10_000_000  # ticks a second; more is not safe in mp4 players
 
 def is_marked(path: Path) -> bool:
     """Return whether a file is a video that vdet wrote: see `MARK`."""
-    try:
-        return _comment(path).startswith(_MARKED)
-    except av.FFmpegError:
-        return False
+    return (_comment(path) or "").startswith(_MARKED)
 
 
 def may_replace_video(path: Path) -> bool:
@@ -135,22 +127,26 @@ def may_replace_video(path: Path) -> bool:
     """
     if not path.is_file():
         return path.is_symlink()  # its target does not exist
-    try:
-        return _comment(path).startswith(_MARKED)
-    except av.FFmpegError:
+    comment = _comment(path)
+    if comment is None:
         with contextlib.suppress(OSError), path.open("rb") as file:
             return file.read(8)[4:] not in _MP4
         return False
+    return comment.startswith(_MARKED)
 
 
-def _comment(path: Path) -> str:
-    """Return the comment in the metadata of a video. Raises `av.FFmpegError` if it is none."""
-    with av.open(str(path.absolute()), options=SAFELY, metadata_errors="replace") as container:
-        return {key.lower(): text for key, text in container.metadata.items()}.get("comment", "")
+def _comment(path: Path) -> str | None:
+    """Return the comment in the metadata of a video, maybe an empty one; None if it is none."""
+    try:
+        with av.open(str(path.absolute()), options=SAFELY, metadata_errors="replace") as container:
+            tags = {key.lower(): text for key, text in container.metadata.items()}
+    except av.FFmpegError:
+        return None
+    return tags.get("comment", "")
 
 
 class VideoWriter:
-    """Writes frames as H.264, yuv420p, with the sound of their source; a context manager.
+    """Writes frames as H.264, yuv420p, with the audio of their source; a context manager.
 
     The file is complete only when the ``with`` block has ended without an exception. For an output
     that appears complete or not at all, write to a file from `vdet.files.OutputFiles`.
@@ -159,7 +155,7 @@ class VideoWriter:
     millisecond), and the last one lasts one period of the average rate. Odd sides grow by one
     pixel, which repeats the last row or column, because 4:2:0 needs even sides. Colours are coded
     like the planes of the source (`VideoInfo.coding`), and tagged if the source is tagged.
-    Unchanged planes are encoded as decoded. Sound packets are copied, not encoded again. Creation
+    Unchanged planes are encoded as decoded. Audio packets are copied, not encoded again. Creation
     time, location and title are kept.
 
     Parameters
@@ -172,8 +168,8 @@ class VideoWriter:
         Preset and quality.
     name
         The name of the file in messages, if it is not `path`.
-    whole_sound
-        True: copy the sound to its end. False: end it with the last frame, for a part of the
+    whole_audio
+        True: copy the audio to its end. False: end it with the last frame, for a part of the
         source.
     threads
         Number of threads of the encoder; None: it chooses.
@@ -183,7 +179,7 @@ class VideoWriter:
     OutputError
         The suffix is not supported, or the file cannot be written (from every method).
     VideoError
-        No frame was written (at the end), or the source of the sound cannot be opened.
+        No frame was written (at the end), or the source of the audio cannot be opened.
     """
 
     def __init__(
@@ -193,19 +189,19 @@ class VideoWriter:
         settings: OutputSettings,
         *,
         name: Path | None = None,
-        whole_sound: bool = True,
+        whole_audio: bool = True,
         threads: int | None = None,
     ) -> None:
         self._name = name or path
         if path.suffix.lower() not in VIDEO_SUFFIXES:
             raise OutputError(f"{self._name}: videos must end in {', '.join(VIDEO_SUFFIXES)}")
         self._info = info
-        self._whole_sound = whole_sound
+        self._whole_audio = whole_audio
         self._period = 1 / info.rate
         self._time_base = max(info.time_base, Fraction(1, _FINEST))
         self._origin: Fraction | None = None  # time of the first frame
         self._last = -1
-        self._sound: SoundCopy | None = None
+        self._audio: AudioCopy | None = None
         self._failure: OutputError | None = None
         flags = {"movflags": "+faststart"}
         with self._naming_the_file():
@@ -215,15 +211,15 @@ class VideoWriter:
         self._stream = self._add_picture(settings, threads)
 
     def write(self, frame: Frame) -> None:
-        """Encode the next frame, and copy the sound up to it; times must increase.
+        """Encode the next frame, and copy the audio up to it; times must increase.
 
         After an error, every call raises it again.
         """
         with self._naming_the_file():
             if self._origin is None:
                 self._origin = frame.time
-                if self._info.has_sound:
-                    self._sound = SoundCopy(self._info.path, self._container, frame.time)
+                if self._info.has_audio:
+                    self._audio = AudioCopy(self._info.path, self._container, frame.time)
             since = frame.time - self._origin
             last, self._last = self._last, max(self._last + 1, round(since / self._time_base))
             self._check_pause((self._last - last) * self._time_base)
@@ -231,8 +227,8 @@ class VideoWriter:
             picture.pts, picture.time_base = self._last, self._time_base
             picture.duration = round(self._period / self._time_base)
             self._container.mux(self._stream.encode(picture))
-            if self._sound:
-                self._sound.copy(since)
+            if self._audio:
+                self._audio.copy(since)
 
     def _check_pause(self, seconds: Fraction) -> None:
         """Raise `OutputError` for a pause between two frames that is too long for mp4."""
@@ -251,17 +247,17 @@ class VideoWriter:
         finally:
             with contextlib.suppress(av.FFmpegError):
                 self._container.close()
-            if self._sound:
-                self._sound.close()
+            if self._audio:
+                self._audio.close()
 
     def _finish(self) -> None:
-        """Write the rest: frames in the encoder, sound, and the index of the file."""
+        """Write the frames still in the encoder, the remaining audio, and the index of the file."""
         if self._origin is None:
             raise VideoError(f"{self._name}: no frames to write; check the times")
         self._container.mux(self._stream.encode(None))
-        if self._sound:
+        if self._audio:
             end = self._last * self._time_base + self._period
-            self._sound.copy(None if self._whole_sound else end)
+            self._audio.copy(None if self._whole_audio else end)
         self._container.close()
 
     @contextlib.contextmanager
@@ -296,4 +292,4 @@ def _to_encode(picture: Picture, coding: Coding) -> av.VideoFrame:
     planes = picture.planes
     if planes is None or planes.coding != coding or picture.width % 2 or picture.height % 2:
         planes = Planes.of_image(picture.image, coding)
-    return (planes if planes.is_own else planes.copy()).picture
+    return (planes if planes.is_writable else planes.copy()).picture

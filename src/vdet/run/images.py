@@ -4,6 +4,7 @@ from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 
 from vdet.archives import is_hidden
@@ -11,7 +12,7 @@ from vdet.boxes import Boxes, Image
 from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel, stage_images_of
 from vdet.errors import ImageError
-from vdet.files import OutputFiles, record_input
+from vdet.files import NO_FILES, FileIds, OutputFiles
 from vdet.media import Frame, Picture
 from vdet.media.images import IMAGE_SUFFIXES, is_image_name, read_image
 from vdet.run.loop import Parts, build, named_errors
@@ -36,8 +37,7 @@ class ImageJob:
 def find_images(paths: Sequence[Path]) -> dict[Path, Path]:
     """Return the images that `paths` name: files, and all images in folders, recursively.
 
-    Each has its path below the folder; hidden files and folders are skipped. The images are
-    recorded as inputs.
+    Each has its path below the folder; hidden files and folders are skipped.
 
     Raises
     ------
@@ -58,12 +58,16 @@ def find_images(paths: Sequence[Path]) -> dict[Path, Path]:
         else:
             raise ImageError(f"{path}: not found")
         found |= {source: place for source, place in places.items() if source not in found}
-    record_input(*found)
     return found
 
 
 def plan_images(
-    sources: Mapping[Path, Path], out: Path | None, stages: Path | None, *, overwrite: bool
+    sources: Mapping[Path, Path],
+    out: Path | None,
+    stages: Path | None,
+    *,
+    overwrite: bool,
+    inputs: FileIds = NO_FILES,
 ) -> list[ImageJob]:
     """Choose the outputs of each image, and check them before any work.
 
@@ -93,7 +97,7 @@ def plan_images(
 
     jobs = [ImageJob(source, tuple(wanted(place)), place) for source, place in sources.items()]
     outputs = [output for job in jobs for output in job.outputs]
-    check_sinks(outputs, overwrite=overwrite, makes_folder=not is_file)
+    check_sinks(outputs, overwrite=overwrite, makes_folder=not is_file, inputs=inputs)
     return jobs
 
 
@@ -118,7 +122,7 @@ class ImageSearch:
 
     @contextmanager
     def open_sinks(
-        self, outputs: Sequence[Output], places: Mapping[Path, Path], *, overwrite: bool
+        self, outputs: Sequence[Output], places: Mapping[Path, Path], files: OutputFiles
     ) -> Iterator[Sinks]:
         """Yield the sinks of some outputs, which appear together after the block."""
 
@@ -126,10 +130,9 @@ class ImageSearch:
             detector = self.model.for_video(image.shape[1], image.shape[0], [image])
             return stage_images_of(detector)(image, detections)
 
-        with OutputFiles(overwrite=overwrite) as files:
-            context = SinkContext(files, self.settings, places=places, stage_images=stage_images)
-            with open_sinks(outputs, context) as sinks:
-                yield sinks
+        context = SinkContext(files, self.settings, places=places, stage_images=stage_images)
+        with files, open_sinks(outputs, context) as sinks:
+            yield sinks
 
 
 def run_images(
@@ -138,6 +141,7 @@ def run_images(
     search: ImageSearch,
     *,
     overwrite: bool = False,
+    inputs: FileIds = NO_FILES,
     threads: int = 1,
 ) -> Generator[FrameResult | ImageError]:
     """Search images; yield the result of each, or the error that prevented it.
@@ -159,13 +163,14 @@ def run_images(
             return error
 
     places = {job.source: job.place for job in jobs if job.place}
+    files = partial(OutputFiles, overwrite=overwrite, inputs=inputs)
     with (
-        search.open_sinks(shared, places, overwrite=overwrite) as sinks,
+        search.open_sinks(shared, places, files()) as sinks,
         map_ordered(find, jobs, threads) as results,
     ):
         for job, found in results:
             if isinstance(found, FrameResult):
-                with search.open_sinks(job.outputs, places, overwrite=overwrite) as own:
+                with search.open_sinks(job.outputs, places, files()) as own:
                     own.write(found)
                     sinks.write(found)
             yield found

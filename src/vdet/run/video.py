@@ -15,9 +15,11 @@ from vdet.config.schema import Settings
 from vdet.detect.factory import as_model
 from vdet.detect.protocol import VideoDetector, stage_images_of
 from vdet.errors import ConfigError, FrameSizeError, VideoError
-from vdet.files import OutputFiles, record_input, recorded_inputs
+from vdet.files import FileIds, OutputFiles
+from vdet.media.images import video_files
 from vdet.media.reader import VideoReader
 from vdet.progress import Progress, no_progress
+from vdet.run.inputs import input_files
 from vdet.run.loop import Parts, build, named_errors, peek
 from vdet.run.result import Fact, Facts, FrameResult, findings_in
 from vdet.run.sinks import Output
@@ -54,6 +56,8 @@ class Run:
         Replace existing outputs.
     threads
         Number of threads for the search; None for one per core.
+    settings_files
+        The files that the settings were read from; no output replaces them.
     """
 
     source: Path
@@ -65,6 +69,7 @@ class Run:
     at: Fraction = Fraction(0)
     overwrite: bool = False
     threads: int | None = None
+    settings_files: tuple[Path, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "source", Path(self.source))  # notebooks pass text
@@ -76,6 +81,11 @@ class Run:
     def is_part(self) -> bool:
         """Whether only a part of the video is processed."""
         return (self.start, self.end, self.frames) != (None, None, None)
+
+    @property
+    def inputs(self) -> FileIds:
+        """The files that the run reads, which no output replaces. Raises `VideoError`."""
+        return input_files(*video_files(self.source), *self.settings_files, settings=self.settings)
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,7 +229,6 @@ def _video_and_results(opening: AbstractContextManager[OpenVideo]) -> Generator[
         yield from video.results
 
 
-@recorded_inputs()
 def run_video(run: Run, parts: Parts, *, progress: Progress = no_progress) -> RunTotals:
     """Process a run. Its outputs appear together, at the end of the run.
 
@@ -241,9 +250,9 @@ def run_video(run: Run, parts: Parts, *, progress: Progress = no_progress) -> Ru
 
     No output is left after an error.
     """
-    record_input(run.source)
-    check_sinks(run.outputs, overwrite=run.overwrite)
-    with OutputFiles(overwrite=run.overwrite) as files:
+    inputs = run.inputs
+    check_sinks(run.outputs, overwrite=run.overwrite, inputs=inputs)
+    with OutputFiles(overwrite=run.overwrite, inputs=inputs) as files:
         return write_outputs(run, parts, files, progress=progress)
 
 

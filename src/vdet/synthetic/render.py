@@ -104,7 +104,7 @@ def frames(scene: Scene) -> Iterator[Frame]:
 
 
 def write_clip(path: Path, scene: Scene, *, overwrite: bool = False) -> None:
-    """Write a scene as an H.264 video without sound.
+    """Write a scene as an H.264 video without audio.
 
     Raises
     ------

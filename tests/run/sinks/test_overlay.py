@@ -88,7 +88,7 @@ def test_a_frame_that_came_as_planes_stays_planes_and_looks_the_same(
     before = planes.copy()
     drawn = overlay_with(**settings).draw(as_planes)
     assert isinstance(drawn, Planes)
-    assert drawn.is_own, "it may be encoded"
+    assert drawn.is_writable, "it may be encoded"
     for layer, old, new in zip(planes.layers, before.layers, drawn.layers, strict=True):
         np.testing.assert_array_equal(layer, old)
         assert (new != old).any()

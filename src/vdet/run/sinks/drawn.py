@@ -129,7 +129,7 @@ class VideoSink(BaseSink):
             self.video,
             context.settings.output,
             name=self.path,
-            whole_sound=not context.is_part,
+            whole_audio=not context.is_part,
             threads=core_count(),  # more or fewer would write other bytes
         )
         self._used: list[Planes] = []  # allocating memory would take longer than copying into it

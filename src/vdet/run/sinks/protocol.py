@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol, Self
 from vdet.config.schema import Settings
 from vdet.detect.protocol import StageImages
 from vdet.errors import OutputError
-from vdet.files import OutputFiles, check_output, output_errors
+from vdet.files import NO_FILES, FileIds, OutputFiles, check_output, output_errors
 from vdet.media import VideoInfo
 from vdet.plugins import SINKS, load_plugin
 from vdet.run.result import Fact, FrameResult
@@ -199,7 +199,13 @@ def sink_kind(name: str) -> SinkKind:
     return kind
 
 
-def check_sinks(outputs: Sequence[Output], *, overwrite: bool, makes_folder: bool = False) -> None:
+def check_sinks(
+    outputs: Sequence[Output],
+    *,
+    overwrite: bool,
+    makes_folder: bool = False,
+    inputs: FileIds = NO_FILES,
+) -> None:
     """Refuse outputs that cannot be written, before any work; arguments as in `check_output`.
 
     Raises
@@ -225,7 +231,7 @@ def check_sinks(outputs: Sequence[Output], *, overwrite: bool, makes_folder: boo
             written = path.glob(kind.folder_pattern) if os.path.isdir(path) else ()  # noqa: PTH112
             path = min(written, default=path / kind.folder_pattern)
         makes = makes_folder or bool(kind.folder_pattern)
-        check_output(path, overwrite=overwrite, makes_folder=makes)
+        check_output(path, overwrite=overwrite, makes_folder=makes, inputs=inputs)
         if os.path.lexists(path) and not kind.may_replace(path):
             what = "was not written by vdet and will not be replaced; choose another name"
             raise OutputError(f"{path}: {what}")

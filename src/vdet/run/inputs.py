@@ -1,0 +1,27 @@
+"""The files that a command reads, which none of its outputs may replace."""
+
+from pathlib import Path
+
+from vdet.config.schema import Settings
+from vdet.files import FileIds, file_ids
+from vdet.media.images import IMAGE_SUFFIXES, video_files
+
+_DATA_SUFFIXES = IMAGE_SUFFIXES | {".csv", ".json", ".txt", ".yaml", ".yml"}
+
+
+def input_files(*paths: Path, settings: Settings | None = None) -> FileIds:
+    """Identify the files at `paths`, and the model file and masks of the settings.
+
+    A folder stands for the images and labels in it, recursively, and a pattern such as
+    `img_%04d.png` for its images. Raises `VideoError` if there is none of these.
+    """
+    files: list[Path] = []
+    for path in paths:
+        if path.is_dir():
+            files += (file for file in path.rglob("*") if file.suffix.lower() in _DATA_SUFFIXES)
+        else:
+            files += video_files(path)
+    if settings:
+        named = [settings.detector.model, *(region.mask for region in settings.regions)]
+        files += map(Path, filter(None, named))
+    return file_ids(files)
