@@ -119,9 +119,11 @@ def mine(
 @click.option(
     "--device",
     type=click.Choice(["auto", "cpu", "cuda"]),
+    metavar="NAME",
     default="auto",
     show_default=True,
-    help="Where to compute; auto uses a GPU if torch finds one. A checkpoint resumes on any.",
+    help="Compute on auto, cpu or cuda. auto uses a GPU if torch finds one. A stopped training run "
+    "resumes on any of them.",
 )
 @options.settings_options()
 @options.overwrite_option
