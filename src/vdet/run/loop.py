@@ -2,23 +2,26 @@
 
 `build` makes the `Pipeline` of a video, and `Pipeline.follow` passes its frames through:
 
-1. `search`, in threads: everything that needs no earlier frame, or only the last searched one;
+1. search, in threads: everything that needs no earlier frame;
 2. `observe`, in the order of the frames: the detections go to the tracker;
 3. a delay of `look_ahead` seconds of video, so that the tracker knows later detections;
 4. `complete`: the tracks at the time of the frame, and then every step.
+
+Where nothing moves, fewer frames are searched. The search then has two phases: first the key frame
+at the end of each segment, then the frames between key frames, if the two differ. This needs a
+stateless detector.
 """
 
 import itertools
 import math
 from collections import deque
 from collections.abc import Generator, Iterable, Iterator, Sequence
-from concurrent.futures import Future
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 from statistics import fmean
-from typing import Any
+from typing import Any, overload
 
 from vdet.boxes import NO_BOXES, Boxes, Image, iou_matrix
 from vdet.config.schema import Settings
@@ -27,18 +30,19 @@ from vdet.errors import ConfigError, ImageError, VdetError
 from vdet.media import Frame, VideoInfo
 from vdet.run.result import Facts, FrameResult
 from vdet.run.steps import FindingStep, ParallelStep, Step, StepContext, make_steps
-from vdet.run.threads import map_ordered
+from vdet.run.threads import SearchThreads
 from vdet.track.factory import make_tracker, timed
 from vdet.track.track import TimedTracker, Track, VideoTracker
 
-_STEPS = 25
+_INTERVALS = 25
 """Number of the latest frame intervals whose trimmed mean is the usual interval."""
 
-_SLACK = 0.1
+_TOLERANCE = 0.1
 """Tolerance of the distance between searches, 1 / `searches`, in frames.
 
 With 12 searches per second, every second frame is searched at 23.976 frames/s, as at 24. In the
-same way, `LONGEST_REST` may be exceeded by this fraction of the usual distance between searches.
+same way, `MAX_KEY_INTERVAL` may be exceeded by this fraction of the usual distance between
+searches.
 """
 
 
@@ -67,92 +71,113 @@ class SearchRate:
         ValueError
             A time is not a finite number, or is not later than that of the previous frame.
         """
-        steps: deque[float] = deque(maxlen=_STEPS)
-        before, since = None, 0.0  # time of the previous frame; seconds since the latest search
+        intervals: deque[float] = deque(maxlen=_INTERVALS)
+        previous_time, since_search = None, 0.0  # seconds
         for position, frame in enumerate(frames):
-            if before is not None:
-                steps.append(float(frame.time - before))
-                if not 0 < steps[-1] < math.inf:
+            if previous_time is not None:
+                intervals.append(float(frame.time - previous_time))
+                if not 0 < intervals[-1] < math.inf:
                     raise ValueError(
                         f"frame {frame.index} at {float(frame.time):g} s is not after the last one"
                     )
-                since += steps[-1]
-            before, is_searched = frame.time, self._is_due(position, since, steps)
-            since = 0.0 if is_searched else since
+                since_search += intervals[-1]
+            previous_time = frame.time
+            is_searched = self._is_due(position, since_search, intervals)
+            since_search = 0.0 if is_searched else since_search
             yield frame, is_searched
 
-    def _is_due(self, position: int, since: float, steps: Sequence[float]) -> bool:
+    def _is_due(self, position: int, since_search: float, intervals: Sequence[float]) -> bool:
         if self.stride is not None:
             return position % self.stride == 0
         if self.searches is None or not position:
             return True
-        ordered, quarter = sorted(steps), len(steps) // 4
-        usual = fmean(ordered[quarter : len(steps) - quarter])  # a few odd steps do not change it
+        ordered, quarter = sorted(intervals), len(intervals) // 4
+        usual = fmean(ordered[quarter : len(ordered) - quarter])  # a few odd ones do not change it
         longest = 1 / self.searches
-        apart = max(1, int(longest / usual + _SLACK))  # frames
-        return since >= min((apart - 0.5) * usual, longest)
+        distance = max(1, int(longest / usual + _TOLERANCE))  # frames
+        return since_search >= min((distance - 0.5) * usual, longest)
 
 
-LONGEST_REST = 0.25
-"""Maximum time between two searches where nothing moves, seconds."""
+MAX_KEY_INTERVAL = 0.25
+"""Maximum time between the searches of two key frames, seconds."""
 
-_MOST_TOGETHER = 16
-"""Maximum number of frames that are searched one after the other, and in memory together."""
+_MAX_SEGMENT = 16
+"""Maximum number of frames of a segment: they are in memory together."""
 
-_NOTED = 0.15
-"""Minimum score of a box that must stay in its place, so that frames between are not searched."""
+_MIN_SCORE = 0.15
+"""Minimum score of the boxes by which two key frames are compared."""
 
-_IN_PLACE = 0.9
+_SAME_IOU = 0.9
 """Minimum intersection over union of two boxes in the same place."""
-
-_Chosen = tuple[Frame, bool]
-"""A frame, and whether the rate of searches chooses it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Stretch:
-    """Consecutive frames, of which the last one is searched first.
-
-    If it shows the same as the last one of the stretch before, the others are not searched.
+class Segment:
+    """Consecutive frames.
 
     Attributes
     ----------
-    before
-        The candidates of the last frame of the stretch before; None: search all that are chosen.
-    found
-        The candidates of the last frame.
+    frames
+        Each with whether the search rate chooses it.
+    has_key
+        Whether the last frame is a key frame. If it shows the same as the key frame of the segment
+        before, the frames between the two are not searched.
     """
 
-    frames: Sequence[_Chosen]
-    before: Future[Any] | None
-    found: Future[Any] = field(default_factory=Future)
+    frames: Sequence[tuple[Frame, bool]]
+    has_key: bool = False
 
 
-def stretches(chosen: Iterable[_Chosen], longest: float) -> Iterator[Stretch]:
-    """Yield frames in stretches of at most `longest` seconds, but with one search if possible.
+def segments(chosen: Iterable[tuple[Frame, bool]], key_interval: float) -> Iterator[Segment]:
+    """Yield frames in segments that end with a chosen frame.
 
-    With 0, all that are chosen are searched.
+    A segment is as long as possible with at most `key_interval` seconds between key frames. With 0,
+    it has one chosen frame. Very long segments, and the last one, may end with any frame.
     """
-    frames: list[_Chosen] = []
-    before: Future[Any] | None = None
-    latest = end = -math.inf  # times of the latest search, and of the end of the stretch before
+    frames: list[tuple[Frame, bool]] = []
+    last_search = end = -math.inf  # times of the last search, and of the end of the last segment
     for frame, is_chosen in chosen:
         frames.append((frame, is_chosen))
-        step, latest = (float(frame.time) - latest, float(frame.time)) if is_chosen else (0, latest)
-        following = latest + (1 - _SLACK) * step  # the next search
-        is_full = is_chosen and following - end > longest
-        if is_full or len(frames) >= _MOST_TOGETHER:
-            yield (stretch := Stretch(frames, before if is_chosen else None))
-            frames, before, end = [], stretch.found if is_chosen and longest else None, latest
+        is_full = len(frames) >= _MAX_SEGMENT
+        if is_chosen:
+            time = float(frame.time)
+            next_search = time + (1 - _TOLERANCE) * (time - last_search)
+            is_full |= next_search - end > key_interval
+            last_search = time
+        if is_full:
+            yield Segment(frames, has_key=is_chosen)
+            frames, end = [], last_search
     if frames:
-        yield Stretch(frames, None)
+        yield Segment(frames)
 
 
-def is_same(before: Boxes, after: Boxes) -> bool:
+@dataclass(frozen=True, slots=True, eq=False)
+class SearchedFrame:
+    """A frame after its search, or a frame that is not searched.
+
+    `detections` are known if the detector is stateless; otherwise it makes them from `candidates`,
+    in the order of the frames.
+    """
+
+    frame: Frame
+    is_searched: bool = False
+    candidates: Any = None
+    detections: Boxes | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _SegmentAfterKey:
+    """A segment whose last frame is searched, and the frames before it, with what to search."""
+
+    frames: Sequence[tuple[Frame, bool]]
+    last: SearchedFrame
+
+
+def shows_same(before: Boxes, after: Boxes) -> bool:
     """Return whether two frames show the same vehicles in the same places."""
-    some, others = (boxes.sides[boxes.scores >= _NOTED] for boxes in (before, after))
-    in_place = iou_matrix(some, others) >= _IN_PLACE
-    return len(some) == len(others) and bool(in_place.any(axis=0).all())
+    a, b = (boxes.sides[boxes.scores >= _MIN_SCORE] for boxes in (before, after))
+    in_place = iou_matrix(a, b) >= _SAME_IOU
+    return len(a) == len(b) and bool(in_place.any(axis=0).all())
 
 
 FIRST_FRAMES = 2
@@ -202,48 +227,63 @@ class Pipeline:
         ValueError
             The times of the frames do not increase.
         """
-        may_rest = self.rate.searches is not None and self.rate.stride is None
-        longest = LONGEST_REST if may_rest and getattr(self.detector, "is_stateless", False) else 0
-        parts = stretches(self.rate.choose(frames), longest)
-        with map_ordered(self.search, parts, threads) as done:
+        with SearchThreads(threads) as pool:
             observed = (
-                self.observe(frame, candidates, source, searched=searched)
-                for _, found in done
-                for frame, searched, candidates in found
+                self.observe(searched, source) for searched in self._searched(frames, pool, threads)
             )
             for result in _delayed(observed, self.look_ahead):
                 yield self.complete(result)
 
-    def search(self, stretch: Stretch) -> list[tuple[Frame, bool, Any]]:
-        """Search a stretch; return each frame, whether it was searched, and its candidates.
+    def _searched(
+        self, frames: Iterable[Frame], pool: SearchThreads, threads: int
+    ) -> Iterator[SearchedFrame]:
+        """Yield the frames in their order, after their search."""
+        chosen = self.rate.choose(frames)
+        if not (self._is_stateless and self.rate.searches is not None and self.rate.stride is None):
+            single = segments(chosen, 0)
+            for _, searched in pool.map_ordered(self._search_all, single, ahead=threads):
+                yield from searched
+            return
+        # Where vehicles move, a third of the searches are of key frames.
+        keys_ahead = math.ceil(threads / 3)
+        keys = pool.map_ordered(
+            self._search_last, segments(chosen, MAX_KEY_INTERVAL), ahead=keys_ahead
+        )
+        between = pool.map_ordered(
+            self._search_all, _without_still(keys), ahead=threads - keys_ahead
+        )
+        for segment, searched in between:
+            yield from (*searched, segment.last)
 
-        Several threads may call this at once, if they begin with the stretches in their order.
-        """
-        *others, last = stretch.frames
-        try:
-            found = self._search(*last)
-            stretch.found.set_result(found[-1])
-        except BaseException as error:
-            stretch.found.set_exception(error)  # another thread may wait for it
-            raise
-        before, detect = stretch.before, self.detector.detect
-        rests = before is not None and is_same(detect(before.result()), detect(found[-1]))
-        return [*(self._search(frame, chosen and not rests) for frame, chosen in others), found]
+    def _search_last(self, segment: Segment) -> SearchedFrame:
+        return self._search(*segment.frames[-1])
 
-    def _search(self, frame: Frame, is_due: bool) -> tuple[Frame, bool, Any]:
+    def _search_all(self, segment: Segment | _SegmentAfterKey) -> list[SearchedFrame]:
+        return [self._search(frame, is_due) for frame, is_due in segment.frames]
+
+    def _search(self, frame: Frame, is_due: bool) -> SearchedFrame:
+        """Do everything that needs no earlier frame; several threads call this at once."""
         for step in self.steps:
             if isinstance(step, ParallelStep):
                 step.prepare(frame)
-        index = None if self.is_still else frame.index
-        return frame, is_due, self.detector.search(frame.picture, index) if is_due else None
+        if not is_due:
+            return SearchedFrame(frame)
+        candidates = self.detector.search(frame.picture, None if self.is_still else frame.index)
+        if self._is_stateless:
+            return SearchedFrame(frame, True, detections=self.detector.detect(candidates))
+        return SearchedFrame(frame, True, candidates)
 
-    def observe(
-        self, frame: Frame, candidates: Any, source: Path, *, searched: bool = True
-    ) -> FrameResult:
+    @property
+    def _is_stateless(self) -> bool:
+        return getattr(self.detector, "is_stateless", False)
+
+    def observe(self, searched: SearchedFrame, source: Path) -> FrameResult:
         """Pass the next frame to the tracker; return its result, still without tracks."""
-        if not searched:
+        frame, detections = searched.frame, searched.detections
+        if not searched.is_searched:
             return FrameResult(source, frame, NO_BOXES, (), searched=False)
-        detections = self.detector.detect(candidates)
+        if detections is None:
+            detections = self.detector.detect(searched.candidates)
         self.tracker.observe(detections, float(frame.time), frame.picture)
         return FrameResult(source, frame, detections, ())
 
@@ -258,6 +298,20 @@ class Pipeline:
         """Return what the steps found out about the whole video, after its last frame."""
         finding = (step for step in self.steps if isinstance(step, FindingStep))
         return {name: fact for step in finding for name, fact in step.finish().items()}
+
+
+def _without_still(
+    segments: Iterable[tuple[Segment, SearchedFrame]],
+) -> Iterator[_SegmentAfterKey]:
+    """Yield what is left to search, from segments and their last frames."""
+    before: Boxes | None = None
+    for segment, last in segments:
+        key = last.detections if segment.has_key else None
+        frames = segment.frames[:-1]
+        if before is not None and key is not None and shows_same(before, key):
+            frames = [(frame, False) for frame, _ in frames]
+        before = key
+        yield _SegmentAfterKey(frames, last)
 
 
 def _delayed(results: Iterable[FrameResult], seconds: Fraction) -> Iterator[FrameResult]:
@@ -303,7 +357,7 @@ def build(
     video
         None for a single image.
     images
-        The first frames, from `peek`, or the single image.
+        The first images, from `peek`, or the single image.
 
     Raises
     ------
@@ -315,22 +369,46 @@ def build(
     height, width = (video.height, video.width) if video else images[0].shape[:2]
     settings.camera.check_frames(width, height)
     detector = parts.model.for_video(width, height, images)
-    unknown = getattr(detector, "unknown_classes", ())
-    made = make_steps(StepContext(settings, width, height, video, unknown), parts.steps)
+    context = StepContext(
+        settings, width, height, video, unknown=getattr(detector, "unknown_classes", ())
+    )
+    steps = [*make_steps(context), *parts.steps]
     if video is None:
-        return Pipeline(detector, timed(StillTracker()), made, is_still=True)
-    own = parts.tracker
-    tracker = timed(own) if own else make_tracker(settings, width, height)
-    rate = SearchRate(settings.detector.searches_per_second, settings.detector.stride)
-    return Pipeline(detector, tracker, made, rate, Fraction(settings.tracker.look_ahead))
+        return Pipeline(detector, timed(ImageTracker()), steps, is_still=True)
+    return Pipeline(
+        detector,
+        timed(parts.tracker) if parts.tracker else make_tracker(settings, width, height),
+        steps,
+        rate=SearchRate(settings.detector.searches_per_second, settings.detector.stride),
+        look_ahead=Fraction(settings.tracker.look_ahead),
+    )
 
 
-def peek(frames: Iterable[Frame]) -> tuple[list[Image], Iterable[Frame]]:
+class FirstImages(Sequence[Image]):
+    """The images of the first frames; each is converted to BGR when it is first used."""
+
+    def __init__(self, frames: Sequence[Frame]) -> None:
+        self._frames = frames
+
+    def __len__(self) -> int:
+        return len(self._frames)
+
+    @overload
+    def __getitem__(self, index: int) -> Image: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[Image]: ...
+    def __getitem__(self, index: int | slice) -> Image | Sequence[Image]:
+        if isinstance(index, slice):
+            return FirstImages(self._frames[index])
+        return self._frames[index].image
+
+
+def peek(frames: Iterable[Frame]) -> tuple[Sequence[Image], Iterable[Frame]]:
     """Return the images for `DetectorModel.for_video`, and an iterable of all frames."""
-    rest = iter(frames)
-    first = list(itertools.islice(rest, FIRST_FRAMES))
-    # A list iterator releases its list at the end; the list itself would stay for the whole run.
-    return [frame.image for frame in first], itertools.chain(iter(first), rest)
+    remaining = iter(frames)
+    first = list(itertools.islice(remaining, FIRST_FRAMES))
+    # The iterator has a list of its own, which it releases; the images can be released before.
+    return FirstImages(first), itertools.chain(iter([*first]), remaining)
 
 
 @contextmanager
@@ -342,12 +420,12 @@ def named_errors(source: Path, kind: type[VdetError]) -> Iterator[None]:
         raise kind(f"{source}: {error}") from error
 
 
-class StillTracker:
-    """Makes a track from each detection in a single image."""
+class ImageTracker:
+    """Makes a track of each detection in a single image."""
 
     def update(self, detections: Boxes, *_: object) -> list[Track]:
         """Return a track for each detection, with ids from 1."""
         return [
-            Track(number, found.box, found.score, "detected", found.class_name)
-            for number, found in enumerate(detections, start=1)
+            Track(number, detection.box, detection.score, "detected", detection.class_name)
+            for number, detection in enumerate(detections, start=1)
         ]

@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
@@ -40,7 +41,7 @@ def findings_in(facts: Facts) -> Findings:
     return cast("Findings", facts.get(CONDITIONS, Findings()))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class FrameResult:
     """A frame, its detections, the vehicles shown, and facts about it.
 
@@ -71,7 +72,7 @@ class FrameResult:
         """The lane; None if lane finding is disabled."""
         return cast("Road | None", self.facts.get("lane"))
 
-    @property
+    @cached_property
     def frame_tracks(self) -> FrameTracks:
         """The tracks with the number, time and facts of the frame."""
         facts = {name: fact.record() for name, fact in self.facts.items()}

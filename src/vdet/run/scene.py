@@ -60,7 +60,8 @@ def _known(run: Run, tracks: Path, found: list[FrameTracks], steps: Steps) -> It
 
 def _detected(run: Run, found: list[FrameTracks], steps: Steps) -> Iterator[Frame]:
     """Yield all frames, and add their tracks to `found`."""
-    with open_video(run, Parts(load_detector(run.settings.detector))) as video:
+    parts = Parts(load_detector(run.settings.detector))
+    with open_video(run, parts, with_traffic=False) as video:
         advance = steps("", video.reader.expected)
         for result in video.results:
             found.append(result.frame_tracks)

@@ -9,12 +9,13 @@ import sys
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from contextvars import copy_context
 from typing import Any, TypeVar
 
 T = TypeVar("T")
 R = TypeVar("R")
+S = TypeVar("S")
 
 JOIN_TIMEOUT = 2.0  # seconds for a thread to end
 DEPTH = 2  # items queued between two threads
@@ -39,28 +40,37 @@ class _Thread(ThreadPoolExecutor):
 
 
 @contextmanager
-def prefetch(items: Iterable[T]) -> Iterator[Iterator[T]]:
-    """Iterate over `items` in a thread, at most `DEPTH` ahead of the consumer.
+def read_async(source: AbstractContextManager[S]) -> Iterator[tuple[S, Iterator[Any]]]:
+    """Yield the value of a context manager, and an iterator over that value.
 
-    A generator is also closed in that thread.
+    A thread enters the context manager, iterates at most `DEPTH` items ahead of the consumer, and
+    exits. A generator is closed in that thread too.
     """
-    iterator = iter(items)
-
-    with _Thread("vdet-prefetch") as thread:
+    with _Thread("vdet-read") as thread:
+        value = thread.call(source.__enter__).result()
+        iterator: Iterator[Any] = iter(value)  # type: ignore[call-overload]
         ahead = deque(thread.call(next, iterator, _END) for _ in range(DEPTH))
 
-        def taken() -> Iterator[T]:
+        def items() -> Iterator[Any]:
             while (item := ahead.popleft().result()) is not _END:
                 ahead.append(thread.call(next, iterator, _END))
                 yield item
 
         try:
-            yield taken()
+            yield value, items()
         finally:
             for future in ahead:
                 future.cancel()
             if isinstance(iterator, Generator):
                 thread.call(iterator.close)
+            thread.call(source.__exit__, None, None, None)
+
+
+@contextmanager
+def prefetch(items: Iterable[T]) -> Iterator[Iterator[T]]:
+    """Iterate over `items` in a thread, at most `DEPTH` ahead of the consumer."""
+    with read_async(nullcontext(items)) as (_, ahead):
+        yield ahead
 
 
 @contextmanager
@@ -90,27 +100,39 @@ def write_async(
         thread.call(within.__exit__, None, None, None).result()
 
 
+class SearchThreads(ThreadPoolExecutor):
+    """Threads for the search; at the end of the block, calls that have not begun are cancelled."""
+
+    def __init__(self, count: int) -> None:
+        super().__init__(count, thread_name_prefix="vdet-search")
+
+    def __exit__(self, *_: object) -> None:
+        self.shutdown(cancel_futures=True)
+
+    def map_ordered(
+        self, function: Callable[[T], R], items: Iterable[T], *, ahead: int
+    ) -> Iterator[tuple[T, R]]:
+        """Yield items with the results of `function`, in order.
+
+        At most `ahead` further items are taken and started before a result is yielded.
+        """
+        running: deque[tuple[T, Future[R]]] = deque()
+        for item in items:
+            running.append((item, self.submit(copy_context().run, function, item)))
+            if len(running) > ahead:
+                first, future = running.popleft()
+                yield first, future.result()
+        for item, future in running:
+            yield item, future.result()
+
+
 @contextmanager
 def map_ordered(
     function: Callable[[T], R], items: Iterable[T], threads: int
 ) -> Iterator[Iterator[tuple[T, R]]]:
-    """Yield an iterator of items with the results of `function`, computed in parallel, in order.
+    """Yield an iterator of items with the results of `function`, computed in threads, in order.
 
-    They are started in order too. Items are taken ahead until every thread has one, and one more.
+    Items are taken ahead until every thread has one, and one more.
     """
-    running: deque[tuple[T, Future[R]]] = deque()
-    with ThreadPoolExecutor(threads, thread_name_prefix="vdet-search") as pool:
-
-        def pairs() -> Iterator[tuple[T, R]]:
-            for item in items:
-                running.append((item, pool.submit(copy_context().run, function, item)))
-                if len(running) > threads:
-                    first, future = running.popleft()
-                    yield first, future.result()
-            for item, future in running:
-                yield item, future.result()
-
-        try:
-            yield pairs()
-        finally:
-            pool.shutdown(cancel_futures=True)
+    with SearchThreads(threads) as pool:
+        yield pool.map_ordered(function, items, ahead=threads)

@@ -73,7 +73,14 @@ class TrackSink(BaseSink):
             sys.stdout.flush()
 
 
-TRACKS = SinkKind(TrackSink, track_suffixes, "tracks", writes_standard_output=True, takes="videos")
+TRACKS = SinkKind(
+    TrackSink,
+    track_suffixes,
+    "tracks",
+    writes_standard_output=True,
+    takes="videos",
+    uses_traffic=False,
+)
 
 
 class LabelSink(BaseSink):
@@ -159,7 +166,9 @@ def _findings(sink: TableSink) -> Any:
     return findings_in(sink.context.facts).record()
 
 
-CONDITIONS = SinkKind(partial(TableSink, _findings), (".json",), "findings", takes="videos")
+CONDITIONS = SinkKind(
+    partial(TableSink, _findings), (".json",), "findings", takes="videos", uses_traffic=False
+)
 VEHICLES = SinkKind(
     partial(TableSink, _records),
     SUFFIXES,

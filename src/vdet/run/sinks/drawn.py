@@ -152,7 +152,14 @@ class VideoSink(BaseSink):
         self._encode(Frame(result.frame.index, result.frame.time, Picture(surface)))
 
 
-VIDEO = SinkKind(VideoSink, VIDEO_SUFFIXES, "videos", takes="videos", may_replace=may_replace_video)
+VIDEO = SinkKind(
+    VideoSink,
+    VIDEO_SUFFIXES,
+    "videos",
+    takes="videos",
+    may_replace=may_replace_video,
+    uses_traffic=False,  # it draws counts only if the settings have lines or zones
+)
 
 
 class ImageSink(BaseSink):

@@ -75,7 +75,9 @@ def _with_boxes(result: FrameResult) -> Image:
     return picture
 
 
-STAGES = SinkKind(StagesSink, what="stages", folder_pattern=f"*-{_BOXES}.png", one_frame=True)
+STAGES = SinkKind(
+    StagesSink, what="stages", folder_pattern=f"*-{_BOXES}.png", one_frame=True, uses_traffic=False
+)
 
 
 class CropSink(BaseSink):

@@ -162,6 +162,9 @@ class SinkKind:
         Raises `OutputError` if an output cannot be written for another reason.
     total
         The file that a batch writes over all its videos.
+    uses_traffic
+        Whether it uses `SinkContext.traffic`, apart from the clock. Without such a sink, a run
+        counts and records vehicles only if the settings have lines or zones.
     """
 
     open: Callable[[Path, SinkContext], Sink]
@@ -174,6 +177,7 @@ class SinkKind:
     may_replace: Callable[[Path], bool] = lambda _: True
     check: Callable[[Path], object] = lambda _: None
     total: BatchTotal | None = None
+    uses_traffic: bool = True
 
     @property
     def endings(self) -> Sequence[str]:
