@@ -91,7 +91,7 @@ class RedNetwork:
         y, x = np.nonzero(picture.image[..., 2] > 2 * picture.image[..., 0].astype(int))
         boxes = [(x.min(), y.min(), x.max() + 1, y.max() + 1)] if x.size else []
         sides = np.array(boxes, np.float32).reshape(-1, 4)
-        return RawBoxes(sides, np.full(len(boxes), 0.9), np.zeros(len(boxes), np.int32))
+        return RawBoxes(sides, np.full(len(boxes), 0.9, np.float32), np.zeros(len(boxes), np.int32))
 
 
 def searched_by_network(
@@ -138,7 +138,7 @@ class TestWhereNothingMoves:
 
         def fail_on_cars(network: RedNetwork, picture: Picture, minimum: float) -> RawBoxes:
             found = find(network, picture, minimum)
-            if len(found.boxes):
+            if len(found.sides):
                 raise ModelError("shows a car")
             return found
 
