@@ -25,12 +25,12 @@ from vdet.run.threads import map_ordered
 class ImageJob:
     """An image, and the outputs for it alone.
 
-    `place` is its path below the input folder; None: its name.
+    `name` is its path below the input folder; None: its file name.
     """
 
     source: Path
     outputs: tuple[Output, ...]
-    place: Path | None = None
+    name: Path | None = None
 
 
 def find_images(paths: Sequence[Path]) -> dict[Path, Path]:
@@ -44,22 +44,24 @@ def find_images(paths: Sequence[Path]) -> dict[Path, Path]:
     ImageError
         A path does not exist, or a folder contains no image.
     """
-    found: dict[Path, Path] = {}
+    images: dict[Path, Path] = {}
     for path in paths:
         if path.is_dir():
-            images = sorted(p for p in filter(is_image_name, path.rglob("*")) if p.is_file())
-            places = {image: image.relative_to(path) for image in images}
-            places = {p: place for p, place in places.items() if not is_hidden(place)}
-            if not places:
-                names = ", ".join(sorted(IMAGE_SUFFIXES))
-                raise ImageError(f"{path}: contains no images ({names})")
+            files = sorted(
+                file for file in filter(is_image_name, path.rglob("*")) if file.is_file()
+            )
+            names = {file: file.relative_to(path) for file in files}
+            names = {file: name for file, name in names.items() if not is_hidden(name)}
+            if not names:
+                suffixes = ", ".join(sorted(IMAGE_SUFFIXES))
+                raise ImageError(f"{path}: contains no images ({suffixes})")
         elif path.exists():
-            places = {path: Path(path.name)}
+            names = {path: Path(path.name)}
         else:
             raise ImageError(f"{path}: not found")
-        found |= {source: place for source, place in places.items() if source not in found}
-    record_input(*found)
-    return found
+        images |= {file: name for file, name in names.items() if file not in images}
+    record_input(*images)
+    return images
 
 
 def plan_images(
@@ -85,13 +87,13 @@ def plan_images(
     several = len(sources) > 1
     is_file = out is not None and not several and out.suffix.lower() in IMAGE_SUFFIXES
 
-    def wanted(place: Path) -> Iterator[Output]:
+    def outputs_for(name: Path) -> Iterator[Output]:
         if out is not None:
-            yield Output("image", out if is_file else out / place)
+            yield Output("image", out if is_file else out / name)
         if stages is not None:
-            yield Output("stages", stages / place.with_suffix("") if several else stages)
+            yield Output("stages", stages / name.with_suffix("") if several else stages)
 
-    jobs = [ImageJob(source, tuple(wanted(place)), place) for source, place in sources.items()]
+    jobs = [ImageJob(source, tuple(outputs_for(name)), name) for source, name in sources.items()]
     outputs = [output for job in jobs for output in job.outputs]
     check_sinks(outputs, overwrite=overwrite, makes_folder=not is_file)
     return jobs
@@ -118,7 +120,7 @@ class ImageSearch:
 
     @contextmanager
     def open_sinks(
-        self, outputs: Sequence[Output], places: Mapping[Path, Path], *, overwrite: bool
+        self, outputs: Sequence[Output], names: Mapping[Path, Path], *, overwrite: bool
     ) -> Iterator[Sinks]:
         """Yield the sinks of some outputs, which appear together after the block."""
 
@@ -127,7 +129,7 @@ class ImageSearch:
             return stage_images_of(detector)(image, detections)
 
         with OutputFiles(overwrite=overwrite) as files:
-            context = SinkContext(files, self.settings, places=places, stage_images=stage_images)
+            context = SinkContext(files, self.settings, places=names, stage_images=stage_images)
             with open_sinks(outputs, context) as sinks:
                 yield sinks
 
@@ -152,20 +154,20 @@ def run_images(
         An output cannot be written.
     """
 
-    def find(job: ImageJob) -> FrameResult | ImageError:
+    def detect(job: ImageJob) -> FrameResult | ImageError:
         try:
             return search.detect(job.source, read_image(job.source))
         except ImageError as error:
             return error
 
-    places = {job.source: job.place for job in jobs if job.place}
+    names = {job.source: job.name for job in jobs if job.name}
     with (
-        search.open_sinks(shared, places, overwrite=overwrite) as sinks,
-        map_ordered(find, jobs, threads) as results,
+        search.open_sinks(shared, names, overwrite=overwrite) as shared_sinks,
+        map_ordered(detect, jobs, threads) as results,
     ):
-        for job, found in results:
-            if isinstance(found, FrameResult):
-                with search.open_sinks(job.outputs, places, overwrite=overwrite) as own:
-                    own.write(found)
-                    sinks.write(found)
-            yield found
+        for job, result in results:
+            if isinstance(result, FrameResult):
+                with search.open_sinks(job.outputs, names, overwrite=overwrite) as sinks:
+                    sinks.write(result)
+                    shared_sinks.write(result)
+            yield result

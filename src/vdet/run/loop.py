@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 from statistics import fmean
-from typing import Any, overload
+from typing import Any
 
 from vdet.boxes import NO_BOXES, Boxes, Image, iou_matrix
 from vdet.config.schema import Settings
@@ -165,14 +165,6 @@ class SearchedFrame:
     detections: Boxes | None = None
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _SegmentAfterKey:
-    """A segment whose last frame is searched, and the frames before it, with what to search."""
-
-    frames: Sequence[tuple[Frame, bool]]
-    last: SearchedFrame
-
-
 def shows_same(before: Boxes, after: Boxes) -> bool:
     """Return whether two frames show the same vehicles in the same places."""
     a, b = (boxes.sides[boxes.scores >= _MIN_SCORE] for boxes in (before, after))
@@ -240,25 +232,28 @@ class Pipeline:
         """Yield the frames in their order, after their search."""
         chosen = self.rate.choose(frames)
         if not (self._is_stateless and self.rate.searches is not None and self.rate.stride is None):
-            single = segments(chosen, 0)
-            for _, searched in pool.map_ordered(self._search_all, single, ahead=threads):
+            for _, searched in pool.map_ordered(
+                self._search_all, segments(chosen, 0), ahead=threads
+            ):
                 yield from searched
             return
-        # Where vehicles move, a third of the searches are of key frames.
+        # Phase 1: the key frames, about a third of all searches where vehicles move.
         keys_ahead = math.ceil(threads / 3)
-        keys = pool.map_ordered(
-            self._search_last, segments(chosen, MAX_KEY_INTERVAL), ahead=keys_ahead
+        key_frames = pool.map_ordered(
+            lambda segment: self._search(*segment.frames[-1]),
+            segments(chosen, MAX_KEY_INTERVAL),
+            ahead=keys_ahead,
         )
+        # Phase 2: the frames between two key frames, if these differ.
         between = pool.map_ordered(
-            self._search_all, _without_still(keys), ahead=threads - keys_ahead
+            lambda item: self._search_all(item[0]),
+            _between_keys(key_frames),
+            ahead=threads - keys_ahead,
         )
-        for segment, searched in between:
-            yield from (*searched, segment.last)
+        for (_, key), searched in between:
+            yield from (*searched, key)
 
-    def _search_last(self, segment: Segment) -> SearchedFrame:
-        return self._search(*segment.frames[-1])
-
-    def _search_all(self, segment: Segment | _SegmentAfterKey) -> list[SearchedFrame]:
+    def _search_all(self, segment: Segment) -> list[SearchedFrame]:
         return [self._search(frame, is_due) for frame, is_due in segment.frames]
 
     def _search(self, frame: Frame, is_due: bool) -> SearchedFrame:
@@ -300,18 +295,17 @@ class Pipeline:
         return {name: fact for step in finding for name, fact in step.finish().items()}
 
 
-def _without_still(
-    segments: Iterable[tuple[Segment, SearchedFrame]],
-) -> Iterator[_SegmentAfterKey]:
-    """Yield what is left to search, from segments and their last frames."""
+def _between_keys(
+    searched: Iterable[tuple[Segment, SearchedFrame]],
+) -> Iterator[tuple[Segment, SearchedFrame]]:
+    """Yield what is left to search of each segment, with its last frame, which is searched."""
     before: Boxes | None = None
-    for segment, last in segments:
+    for segment, last in searched:
         key = last.detections if segment.has_key else None
-        frames = segment.frames[:-1]
-        if before is not None and key is not None and shows_same(before, key):
-            frames = [(frame, False) for frame, _ in frames]
+        is_still = before is not None and key is not None and shows_same(before, key)
+        frames = [(frame, is_due and not is_still) for frame, is_due in segment.frames[:-1]]
+        yield Segment(frames), last
         before = key
-        yield _SegmentAfterKey(frames, last)
 
 
 def _delayed(results: Iterable[FrameResult], seconds: Fraction) -> Iterator[FrameResult]:
@@ -393,14 +387,9 @@ class FirstImages(Sequence[Image]):
     def __len__(self) -> int:
         return len(self._frames)
 
-    @overload
-    def __getitem__(self, index: int) -> Image: ...
-    @overload
-    def __getitem__(self, index: slice) -> Sequence[Image]: ...
-    def __getitem__(self, index: int | slice) -> Image | Sequence[Image]:
-        if isinstance(index, slice):
-            return FirstImages(self._frames[index])
-        return self._frames[index].image
+    def __getitem__(self, index: Any) -> Any:
+        frames = self._frames[index]
+        return frames.image if isinstance(frames, Frame) else FirstImages(frames)
 
 
 def peek(frames: Iterable[Frame]) -> tuple[Sequence[Image], Iterable[Frame]]:

@@ -75,9 +75,7 @@ def _with_boxes(result: FrameResult) -> Image:
     return picture
 
 
-STAGES = SinkKind(
-    StagesSink, what="stages", folder_pattern=f"*-{_BOXES}.png", one_frame=True, uses_traffic=False
-)
+STAGES = SinkKind(StagesSink, what="stages", folder_pattern=f"*-{_BOXES}.png", one_frame=True)
 
 
 class CropSink(BaseSink):
@@ -86,12 +84,12 @@ class CropSink(BaseSink):
     def __init__(self, path: Path, context: SinkContext) -> None:
         super().__init__(path, context)
         self._folder = context.files.stage_folder(path, _CROP_NAME)
-        self._best = BestCrops()
+        self._crops = BestCrops()
         self._written: dict[int, tuple[float, Path]] = {}
 
     def finish(self) -> None:
         """Write the images of vehicles still shown, and name those of all recorded vehicles."""
-        self._write_all(self._best.end())
+        self._write_all(self._crops.end())
         for vehicle in self.traffic.vehicles:
             if vehicle.id in self._written:
                 time, path = self._written.pop(vehicle.id)
@@ -101,7 +99,7 @@ class CropSink(BaseSink):
 
     def write(self, result: FrameResult) -> None:
         """Look for better images in a frame."""
-        self._write_all(self._best.add(result.frame_tracks, result.frame.picture))
+        self._write_all(self._crops.add(result.frame_tracks, result.frame.picture))
 
     def _write_all(self, crops: list[Crop]) -> None:
         for crop in crops:
