@@ -14,11 +14,13 @@ from vdet.errors import ImageError
 from vdet.files import OutputFiles, record_input
 from vdet.media import Frame, Picture
 from vdet.media.images import IMAGE_SUFFIXES, is_image_name, read_image
-from vdet.run.loop import Parts, build, named_errors
+from vdet.run.loop import named_errors
 from vdet.run.result import FrameResult
 from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import SinkContext, Sinks, check_sinks, open_sinks
+from vdet.run.steps import ParallelStep, StepContext, make_steps
 from vdet.run.threads import map_ordered
+from vdet.track.track import Track
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,9 +115,21 @@ class ImageSearch:
         messages. Raises `ImageError` if it cannot be searched.
         """
         frame = Frame(0, Fraction(0), Picture(image))
+        height, width = image.shape[:2]
         with named_errors(source, ImageError):
-            pipeline = build(Parts(self.model), self.settings, None, [image])
-            (result,) = pipeline.follow([frame], source)
+            self.settings.camera.check_frames(width, height)
+            detector = self.model.for_video(width, height, [image])
+            steps = make_steps(StepContext(self.settings, width, height))
+            detections = detector.detect(detector.search(frame.picture, None))
+            tracks = tuple(
+                Track(number, detection.box, detection.score, "detected", detection.class_name)
+                for number, detection in enumerate(detections, start=1)
+            )
+            result = FrameResult(source, frame, detections, tracks)
+            for step in steps:
+                if isinstance(step, ParallelStep):
+                    step.prepare(frame)
+                result = step.apply(result)
         return result.of_classes(self.settings.classes)
 
     @contextmanager

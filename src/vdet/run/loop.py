@@ -32,7 +32,7 @@ from vdet.run.result import Facts, FrameResult
 from vdet.run.steps import FindingStep, ParallelStep, Step, StepContext, make_steps
 from vdet.run.threads import SearchThreads
 from vdet.track.factory import make_tracker, timed
-from vdet.track.track import TimedTracker, Track, VideoTracker
+from vdet.track.track import TimedTracker, VideoTracker
 
 _INTERVALS = 25
 """Number of the latest frame intervals whose trimmed mean is the usual interval."""
@@ -181,7 +181,7 @@ _MAX_WAITING = 60
 
 @dataclass(frozen=True, slots=True)
 class Pipeline:
-    """Detector, tracker and steps for the frames of one video, or for one single image.
+    """Detector, tracker and steps for the frames of one video.
 
     Attributes
     ----------
@@ -191,8 +191,6 @@ class Pipeline:
         Which frames are searched.
     look_ahead
         Seconds of video to search after a frame before its tracks are shown.
-    is_still
-        Whether the only frame is a single image.
     """
 
     detector: VideoDetector
@@ -200,7 +198,6 @@ class Pipeline:
     steps: Sequence[Step] = ()
     rate: SearchRate = SearchRate()
     look_ahead: Fraction = Fraction(0)
-    is_still: bool = False
 
     def follow(
         self, frames: Iterable[Frame], source: Path = Path(), *, threads: int = 1
@@ -263,7 +260,7 @@ class Pipeline:
                 step.prepare(frame)
         if not is_due:
             return SearchedFrame(frame)
-        candidates = self.detector.search(frame.picture, None if self.is_still else frame.index)
+        candidates = self.detector.search(frame.picture, frame.index)
         if self._is_stateless:
             return SearchedFrame(frame, True, detections=self.detector.detect(candidates))
         return SearchedFrame(frame, True, candidates)
@@ -339,19 +336,8 @@ class Parts:
     steps: Sequence[Step] = ()
 
 
-def build(
-    parts: Parts, settings: Settings, video: VideoInfo | None, images: Sequence[Image]
-) -> Pipeline:
-    """Make the pipeline of a video, or of one single image.
-
-    In a single image each detection becomes a track, with ids from 1.
-
-    Parameters
-    ----------
-    video
-        None for a single image.
-    images
-        The first images, from `peek`, or the single image.
+def build(parts: Parts, settings: Settings, video: VideoInfo, images: Sequence[Image]) -> Pipeline:
+    """Make the pipeline of a video; `images` are its first ones, from `peek`.
 
     Raises
     ------
@@ -360,19 +346,15 @@ def build(
     ConfigError, ImageError
         The points or the lens in the settings do not fit the frames.
     """
-    height, width = (video.height, video.width) if video else images[0].shape[:2]
+    width, height = video.width, video.height
     settings.camera.check_frames(width, height)
     detector = parts.model.for_video(width, height, images)
-    context = StepContext(
-        settings, width, height, video, unknown=getattr(detector, "unknown_classes", ())
-    )
-    steps = [*make_steps(context), *parts.steps]
-    if video is None:
-        return Pipeline(detector, timed(ImageTracker()), steps, is_still=True)
+    missing_classes = getattr(detector, "unknown_classes", ())
+    context = StepContext(settings, width, height, video, missing_classes)
     return Pipeline(
         detector,
         timed(parts.tracker) if parts.tracker else make_tracker(settings, width, height),
-        steps,
+        steps=[*make_steps(context), *parts.steps],
         rate=SearchRate(settings.detector.searches_per_second, settings.detector.stride),
         look_ahead=Fraction(settings.tracker.look_ahead),
     )
@@ -407,14 +389,3 @@ def named_errors(source: Path, kind: type[VdetError]) -> Iterator[None]:
         yield
     except (ConfigError, ImageError) as error:
         raise kind(f"{source}: {error}") from error
-
-
-class ImageTracker:
-    """Makes a track of each detection in a single image."""
-
-    def update(self, detections: Boxes, *_: object) -> list[Track]:
-        """Return a track for each detection, with ids from 1."""
-        return [
-            Track(number, detection.box, detection.score, "detected", detection.class_name)
-            for number, detection in enumerate(detections, start=1)
-        ]

@@ -10,7 +10,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from vdet.boxes import Box, Boxes, Image, are_nested
+from vdet.boxes import Box, Boxes, Image, are_nested, from_xywh
 from vdet.config.detector import FeatureSettings
 from vdet.config.schema import SvmSettings
 from vdet.detect.factory import DetectorKind
@@ -178,13 +178,13 @@ class SvmDetector:
         trace = detections.trace
         windows, hits = (image * 0.6).astype(np.uint8), image.copy()
         for number, grid in enumerate(trace.grids):
-            boxes, color = [Box.sized(*box) for box in grid.boxes.tolist()], color_of(number)
+            boxes, color = list(map(Box.of, from_xywh(grid.boxes).tolist())), color_of(number)
             draw_box(windows, boxes[0].union(boxes[-1]), color)
             example = boxes[number * grid.columns // len(trace.grids)]
             draw_box(windows, example, color, f"{grid.size} px: {len(grid)} windows")
+        hit_boxes = list(map(Box.of, from_xywh(trace.hits.boxes).tolist()))
         for row in np.argsort(trace.hits.probabilities).tolist():  # the most likely is on top
-            box = Box.sized(*trace.hits.boxes[row].tolist())
-            draw_box(hits, box, GREEN, f"{trace.hits.probabilities[row]:.2f}")
+            draw_box(hits, hit_boxes[row], GREEN, f"{trace.hits.probabilities[row]:.2f}")
         heat = blend_heat(image, trace.heat)
         draw_label(heat, f"peak {trace.heat.peak:.1f}", (0, 0), WHITE)
         return {"windows": windows, "hits": hits, "heat": heat}
@@ -225,7 +225,7 @@ def shipped_model(settings: SvmSettings) -> Path:
 def load_svm(settings: SvmSettings, path: Path | None) -> SvmModel:
     """Load a linear model; `path` is its file, None for the shipped one.
 
-    Features in the settings must equal those of the model. Without any, the model's own are used.
+    Features in the settings must equal those of the model.
 
     Raises
     ------
