@@ -101,13 +101,13 @@ def shade(surface: Surface, corners: Sequence[Point], color: Color, opacity: flo
     """Mix a colour into a polygon; corners are in pixels."""
     points = np.rint(np.array(corners)).astype(np.int32)
     x, y, width, height = cv2.boundingRect(points)
-    x1, y1, x2, y2 = corners = _visible(surface, Box.sized(x, y, width, height))
+    x1, y1, x2, y2 = visible = _visible(surface, Box.sized(x, y, width, height))
     mask = np.zeros((y2 - y1, x2 - x1), np.uint8)
     if not mask.size:
         return
     cv2.fillPoly(mask, [points], 255, offset=(-x1, -y1))
     for layer, value, halved in _layers(surface, color):
-        part = _part(layer, corners, halved)
+        part = _part(layer, visible, halved)
         covered = _halved(mask, x1, y1) if halved else mask
         table = np.arange(256)[:, None] * (1 - opacity) + np.array(value) * opacity
         mixed = cv2.LUT(part, np.rint(table).astype(np.uint8)[None])

@@ -15,10 +15,12 @@ stateless detector.
 import itertools
 import math
 from collections import deque
-from collections.abc import Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from concurrent.futures import Future
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 from statistics import fmean
 from typing import Any
@@ -217,49 +219,64 @@ class Pipeline:
             The times of the frames do not increase.
         """
         with SearchThreads(threads) as pool:
-            observed = (
-                self.observe(searched, source) for searched in self._searched(frames, pool, threads)
-            )
+            searched_frames = self._searched(frames, pool, threads)
+            observed = (self.observe(searched, source) for searched in searched_frames)
             for result in _delayed(observed, self.look_ahead):
                 yield self.complete(result)
 
     def _searched(
         self, frames: Iterable[Frame], pool: SearchThreads, threads: int
     ) -> Iterator[SearchedFrame]:
-        """Yield the frames in their order, after their search."""
-        chosen = self.rate.choose(frames)
-        if not (self._is_stateless and self.rate.searches is not None and self.rate.stride is None):
-            for _, searched in pool.map_ordered(
-                self._search_all, segments(chosen, 0), ahead=threads
-            ):
-                yield from searched
-            return
-        # Phase 1: the key frames, about a third of all searches where vehicles move.
-        keys_ahead = math.ceil(threads / 3)
-        key_frames = pool.map_ordered(
-            lambda segment: self._search(*segment.frames[-1]),
-            segments(chosen, MAX_KEY_INTERVAL),
-            ahead=keys_ahead,
-        )
-        # Phase 2: the frames between two key frames, if these differ.
-        between = pool.map_ordered(
-            lambda item: self._search_all(item[0]),
-            _between_keys(key_frames),
-            ahead=threads - keys_ahead,
-        )
-        for (_, key), searched in between:
-            yield from (*searched, key)
+        """Yield the frames in their order, after their search.
 
-    def _search_all(self, segment: Segment) -> list[SearchedFrame]:
-        return [self._search(frame, is_due) for frame, is_due in segment.frames]
+        At most `threads` segments, and one more, are in memory.
+        """
+        is_free = self.rate.searches is not None and self.rate.stride is None
+        key_interval = MAX_KEY_INTERVAL if is_free and self._is_stateless else 0
+        first_phase: deque[tuple[Segment, Future[SearchedFrame]]] = deque()
+        second_phase: deque[list[Callable[[], SearchedFrame]]] = deque()
+        before: Boxes | None = None
 
-    def _search(self, frame: Frame, is_due: bool) -> SearchedFrame:
-        """Do everything that needs no earlier frame; several threads call this at once."""
+        def begin_second_phase() -> None:
+            """Search the frames between key frames that are known; wait for the first of these."""
+            nonlocal before
+            while first_phase and (first_phase[0][1].done() or not second_phase):
+                segment, last = first_phase.popleft()
+                key = last.result().detections if segment.has_key else None
+                is_still = before is not None and key is not None and shows_same(before, key)
+                before = key
+                between = [
+                    pool.call(self._search, frame).result
+                    if is_chosen and not is_still
+                    else partial(SearchedFrame, frame)
+                    for frame, is_chosen in segment.frames[:-1]
+                ]
+                second_phase.append([*between, last.result])
+
+        def finish_segment() -> list[SearchedFrame]:
+            begin_second_phase()
+            finished = [result() for result in second_phase[0]]
+            begin_second_phase()  # threads stay busy while the caller uses the frames
+            second_phase.popleft()
+            return finished
+
+        for segment in segments(self.rate.choose(frames), key_interval):
+            first_phase.append((segment, pool.call(self._search_last, segment)))
+            if len(first_phase) + len(second_phase) > threads:
+                yield from finish_segment()
+        while first_phase or second_phase:
+            yield from finish_segment()
+
+    def _search_last(self, segment: Segment) -> SearchedFrame:
+        """Search the last frame of a segment, if it is chosen, and prepare all frames."""
         for step in self.steps:
             if isinstance(step, ParallelStep):
-                step.prepare(frame)
-        if not is_due:
-            return SearchedFrame(frame)
+                for frame, _ in segment.frames:
+                    step.prepare(frame)
+        frame, is_chosen = segment.frames[-1]
+        return self._search(frame) if is_chosen else SearchedFrame(frame)
+
+    def _search(self, frame: Frame) -> SearchedFrame:
         candidates = self.detector.search(frame.picture, frame.index)
         if self._is_stateless:
             return SearchedFrame(frame, True, detections=self.detector.detect(candidates))
@@ -290,19 +307,6 @@ class Pipeline:
         """Return what the steps found out about the whole video, after its last frame."""
         finding = (step for step in self.steps if isinstance(step, FindingStep))
         return {name: fact for step in finding for name, fact in step.finish().items()}
-
-
-def _between_keys(
-    searched: Iterable[tuple[Segment, SearchedFrame]],
-) -> Iterator[tuple[Segment, SearchedFrame]]:
-    """Yield what is left to search of each segment, with its last frame, which is searched."""
-    before: Boxes | None = None
-    for segment, last in searched:
-        key = last.detections if segment.has_key else None
-        is_still = before is not None and key is not None and shows_same(before, key)
-        frames = [(frame, is_due and not is_still) for frame, is_due in segment.frames[:-1]]
-        yield Segment(frames), last
-        before = key
 
 
 def _delayed(results: Iterable[FrameResult], seconds: Fraction) -> Iterator[FrameResult]:

@@ -22,17 +22,28 @@ DEPTH = 2  # items queued between two threads
 _END = object()  # follows the last item
 
 
-class _Thread(ThreadPoolExecutor):
-    """A thread that makes calls in turn, each in the context (`contextvars`) of its caller.
+class SearchThreads(ThreadPoolExecutor):
+    """Threads for the search; at the end of the block, calls that have not begun are cancelled."""
+
+    def __init__(self, count: int, name: str = "vdet-search") -> None:
+        super().__init__(count, thread_name_prefix=name)
+
+    def call(self, function: Callable[..., R], *arguments: Any) -> Future[R]:
+        """Call a function in the context (`contextvars`) of the caller."""
+        return self.submit(copy_context().run, function, *arguments)
+
+    def __exit__(self, *_: object) -> None:
+        self.shutdown(cancel_futures=True)
+
+
+class _Thread(SearchThreads):
+    """A thread that makes calls in turn.
 
     At the end of the block, pending calls are still made, but waited for only `JOIN_TIMEOUT`.
     """
 
     def __init__(self, name: str) -> None:
-        super().__init__(1, thread_name_prefix=name)
-
-    def call(self, function: Callable[..., R], *arguments: Any) -> Future[R]:
-        return self.submit(copy_context().run, function, *arguments)
+        super().__init__(1, name)
 
     def __exit__(self, *_: object) -> None:
         hangs = wait([self.submit(int)], JOIN_TIMEOUT).not_done
@@ -100,32 +111,6 @@ def write_async(
         thread.call(within.__exit__, None, None, None).result()
 
 
-class SearchThreads(ThreadPoolExecutor):
-    """Threads for the search; at the end of the block, calls that have not begun are cancelled."""
-
-    def __init__(self, count: int) -> None:
-        super().__init__(count, thread_name_prefix="vdet-search")
-
-    def __exit__(self, *_: object) -> None:
-        self.shutdown(cancel_futures=True)
-
-    def map_ordered(
-        self, function: Callable[[T], R], items: Iterable[T], *, ahead: int
-    ) -> Iterator[tuple[T, R]]:
-        """Yield items with the results of `function`, in order.
-
-        At most `ahead` further items are taken and started before a result is yielded.
-        """
-        running: deque[tuple[T, Future[R]]] = deque()
-        for item in items:
-            running.append((item, self.submit(copy_context().run, function, item)))
-            if len(running) > ahead:
-                first, future = running.popleft()
-                yield first, future.result()
-        for item, future in running:
-            yield item, future.result()
-
-
 @contextmanager
 def map_ordered(
     function: Callable[[T], R], items: Iterable[T], threads: int
@@ -134,5 +119,16 @@ def map_ordered(
 
     Items are taken ahead until every thread has one, and one more.
     """
+    running: deque[tuple[T, Future[R]]] = deque()
     with SearchThreads(threads) as pool:
-        yield pool.map_ordered(function, items, ahead=threads)
+
+        def pairs() -> Iterator[tuple[T, R]]:
+            for item in items:
+                running.append((item, pool.call(function, item)))
+                if len(running) > threads:
+                    first, future = running.popleft()
+                    yield first, future.result()
+            for item, future in running:
+                yield item, future.result()
+
+        yield pairs()
