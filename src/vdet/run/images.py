@@ -25,7 +25,7 @@ from vdet.track.track import Track
 
 @dataclass(frozen=True, slots=True)
 class ImageJob:
-    """An image, and the outputs for it alone.
+    """An image and its outputs.
 
     `name` is its path below the input folder; None: its file name.
     """

@@ -238,7 +238,7 @@ class Pipeline:
         before: Boxes | None = None
 
         def begin_second_phase() -> None:
-            """Search the frames between key frames that are known; wait for the first of these."""
+            """Search the frames before each searched key frame; wait for at least one segment."""
             nonlocal before
             while first_phase and (first_phase[0][1].done() or not second_phase):
                 segment, last = first_phase.popleft()
@@ -304,7 +304,7 @@ class Pipeline:
         return complete
 
     def facts(self) -> Facts:
-        """Return what the steps found out about the whole video, after its last frame."""
+        """Return the results of steps about the whole video, after its last frame."""
         finding = (step for step in self.steps if isinstance(step, FindingStep))
         return {name: fact for step in finding for name, fact in step.finish().items()}
 

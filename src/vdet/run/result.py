@@ -20,7 +20,7 @@ if TYPE_CHECKING:  # loaded with `--lanes`
 
 
 class Fact(Protocol):
-    """What a step found out about a frame or a whole video: a frozen value of its own type.
+    """A result of a step about a frame or a whole video: a frozen value of any type.
 
     Each line of the `str` of a fact about a whole video is printed as a warning.
     """
@@ -54,7 +54,7 @@ class FrameResult:
     detections, tracks
         In pixels of that frame.
     facts
-        What steps found out about it; the lane is "lane".
+        Results of steps about it, by name; the lane is "lane".
     searched
         Whether the detector searched the frame: see `detector.searches_per_second`. Without a
         search there are no detections.

@@ -1,8 +1,7 @@
-"""Steps: they run between the tracker and the sinks. vdet's own are here.
+"""Steps, which run between the tracker and the sinks, and those that vdet provides.
 
-A step is made for one video or one image. What is registered as an entry point of the group
-`vdet.steps` is a function that takes a `StepContext` and returns a step, or None if the settings do
-not enable it.
+A step is made for one video or one image. An entry point of the group `vdet.steps` is a function
+that takes a `StepContext` and returns a step, or None if the settings do not enable it.
 """
 
 from collections.abc import Sequence

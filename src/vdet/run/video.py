@@ -93,7 +93,7 @@ class RunTotals:
     clock
         When the video was recorded; None if unknown.
     facts
-        What the steps found out about the whole video.
+        Results of steps about the whole video, by name.
     summaries
         The `BaseSink.summary` of each output, by its path.
     """
@@ -119,7 +119,7 @@ class OpenVideo:
     traffic
         Counts, speeds and records of the results so far, if `open_video` was called with them.
     facts
-        What the steps found out about the whole video; empty before the last result.
+        Results of steps about the whole video, by name; empty before the last frame.
     """
 
     reader: VideoReader

@@ -55,7 +55,7 @@ class SinkContext:
         Counts and speeds up to the latest result, and the records of vehicles, which are known when
         sinks finish; None for single images.
     facts
-        What the steps found out about the whole video; empty before sinks finish.
+        Results of steps about the whole video, by name; empty before sinks finish.
     places
         For single images: their paths below the input folders.
     stage_images
