@@ -339,9 +339,7 @@ def iou_matrix(a: Float64Array, b: Float64Array) -> Float64Array:
     a, b
         x1, y1, x2, y2 of shapes `(n, 4)` and `(m, 4)`, each box with an area.
 
-    Returns
-    -------
-    float64 of shape `(n, m)`; 0 for boxes that only touch.
+    The result is float64 `(n, m)`; 0 for boxes that only touch.
     """
     return iou(a[:, np.newaxis], b)
 
@@ -361,7 +359,7 @@ def coverage(boxes: Float64Array, others: Float64Array) -> Float64Array:
 
 
 def are_nested(boxes: Float64Array, scores: npt.ArrayLike) -> BoolArray:
-    """Return for each box whether it contains, or is inside, a box with a higher score.
+    """Return for each box, `(n,)`, whether it contains, or is inside, a box with a higher score.
 
     Nearly all of the smaller one is then inside the larger: at most one of them shows a vehicle.
 
@@ -371,10 +369,6 @@ def are_nested(boxes: Float64Array, scores: npt.ArrayLike) -> BoolArray:
         x1, y1, x2, y2 of shape `(n, 4)`, each with an area.
     scores
         Shape `(n,)`. Of two equal scores, the one of the larger box counts as higher.
-
-    Returns
-    -------
-    bool `(n,)`.
     """
     inside = coverage(boxes, boxes) > _NESTED
     rank = np.empty(len(boxes), np.int64)

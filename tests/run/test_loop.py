@@ -115,7 +115,7 @@ class TestRun:
             return SearchThreads(count)
 
         monkeypatch.setattr("vdet.run.video.core_count", lambda: 3)
-        monkeypatch.setattr("vdet.run.loop.SearchThreads", note)
+        monkeypatch.setattr("vdet.run.search.SearchThreads", note)
         job = video.Run(write_drive(tmp_path / "a.mp4", 2))
         run_video(replace(job, settings=SETTINGS), Parts(red_model()))
         run_video(replace(job, threads=2, settings=SETTINGS), Parts(red_model()))

@@ -19,8 +19,9 @@ from vdet.detect.onnx.preparation import InputForm
 from vdet.detect.onnx.recognition import Recognized
 from vdet.errors import ModelError, OutputError
 from vdet.media import Frame, Picture
-from vdet.run.loop import Pipeline, SearchRate
+from vdet.run.loop import Pipeline
 from vdet.run.result import FrameResult
+from vdet.run.search import SearchRate
 from vdet.run.sinks import Output
 from vdet.track.motion.tracker import MotionTracker
 

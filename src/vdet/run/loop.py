@@ -2,177 +2,31 @@
 
 `build` makes the `Pipeline` of a video, and `Pipeline.follow` passes its frames through:
 
-1. search, in threads: everything that needs no earlier frame;
+1. `FrameSearch.search`, in threads: everything that needs no earlier frame;
 2. `observe`, in the order of the frames: the detections go to the tracker;
 3. a delay of `look_ahead` seconds of video, so that the tracker knows later detections;
 4. `complete`: the tracks at the time of the frame, and then every step.
-
-Where nothing moves, fewer frames are searched. The search then has two phases: first the key frame
-at the end of each segment, then the frames between key frames, if the two differ. This needs a
-stateless detector.
 """
 
 import itertools
-import math
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from concurrent.futures import Future
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from collections.abc import Generator, Iterable, Iterator, Sequence
+from contextlib import closing, contextmanager
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from functools import partial
 from pathlib import Path
-from statistics import fmean
 from typing import Any
 
-from vdet.boxes import NO_BOXES, Boxes, Image, iou_matrix
+from vdet.boxes import NO_BOXES, Image
 from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel, VideoDetector
 from vdet.errors import ConfigError, ImageError, VdetError
 from vdet.media import Frame, VideoInfo
 from vdet.run.result import Facts, FrameResult
-from vdet.run.steps import FindingStep, ParallelStep, Step, StepContext, make_steps
-from vdet.run.threads import SearchThreads
+from vdet.run.search import FrameSearch, SearchedFrame, SearchRate
+from vdet.run.steps import FindingStep, Step, StepContext, make_steps
 from vdet.track.factory import make_tracker, timed
 from vdet.track.track import TimedTracker, VideoTracker
-
-_INTERVALS = 25
-"""Number of the latest frame intervals whose trimmed mean is the usual interval."""
-
-_TOLERANCE = 0.1
-"""Tolerance of the distance between searches, 1 / `searches`, in frames.
-
-With 12 searches per second, every second frame is searched at 23.976 frames/s, as at 24. In the
-same way, `MAX_KEY_INTERVAL` may be exceeded by this fraction of the usual distance between
-searches.
-"""
-
-
-@dataclass(frozen=True, slots=True)
-class SearchRate:
-    """How often the frames of a video are searched; the first frame always is.
-
-    Frames are chosen by their times, because the declared frame rate of a file may be wrong.
-
-    Attributes
-    ----------
-    searches
-        Minimum number of searches per second; None for every frame.
-    stride
-        Search every `stride`-th frame; overrides `searches`. None to use `searches`.
-    """
-
-    searches: float | None = None
-    stride: int | None = None
-
-    def choose(self, frames: Iterable[Frame]) -> Iterator[tuple[Frame, bool]]:
-        """Yield each frame, and whether it is searched.
-
-        Raises
-        ------
-        ValueError
-            A time is not a finite number, or is not later than that of the previous frame.
-        """
-        intervals: deque[float] = deque(maxlen=_INTERVALS)
-        previous_time, since_search = None, 0.0  # seconds
-        for position, frame in enumerate(frames):
-            if previous_time is not None:
-                intervals.append(float(frame.time - previous_time))
-                if not 0 < intervals[-1] < math.inf:
-                    raise ValueError(
-                        f"frame {frame.index} at {float(frame.time):g} s is not after the last one"
-                    )
-                since_search += intervals[-1]
-            previous_time = frame.time
-            is_searched = self._is_due(position, since_search, intervals)
-            since_search = 0.0 if is_searched else since_search
-            yield frame, is_searched
-
-    def _is_due(self, position: int, since_search: float, intervals: Sequence[float]) -> bool:
-        if self.stride is not None:
-            return position % self.stride == 0
-        if self.searches is None or not position:
-            return True
-        ordered, quarter = sorted(intervals), len(intervals) // 4
-        usual = fmean(ordered[quarter : len(ordered) - quarter])  # a few odd ones do not change it
-        longest = 1 / self.searches
-        distance = max(1, int(longest / usual + _TOLERANCE))  # frames
-        return since_search >= min((distance - 0.5) * usual, longest)
-
-
-MAX_KEY_INTERVAL = 0.25
-"""Maximum time between the searches of two key frames, seconds."""
-
-_MAX_SEGMENT = 16
-"""Maximum number of frames of a segment: they are in memory together."""
-
-_MIN_SCORE = 0.15
-"""Minimum score of the boxes by which two key frames are compared."""
-
-_SAME_IOU = 0.9
-"""Minimum intersection over union of two boxes in the same place."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Segment:
-    """Consecutive frames.
-
-    Attributes
-    ----------
-    frames
-        Each with whether the search rate chooses it.
-    has_key
-        Whether the last frame is a key frame. If it shows the same as the key frame of the segment
-        before, the frames between the two are not searched.
-    """
-
-    frames: Sequence[tuple[Frame, bool]]
-    has_key: bool = False
-
-
-def segments(chosen: Iterable[tuple[Frame, bool]], key_interval: float) -> Iterator[Segment]:
-    """Yield frames in segments that end with a chosen frame.
-
-    A segment is as long as possible with at most `key_interval` seconds between key frames. With 0,
-    it has one chosen frame. Very long segments, and the last one, may end with any frame.
-    """
-    frames: list[tuple[Frame, bool]] = []
-    last_search = end = -math.inf  # times of the last search, and of the end of the last segment
-    for frame, is_chosen in chosen:
-        frames.append((frame, is_chosen))
-        is_full = len(frames) >= _MAX_SEGMENT
-        if is_chosen:
-            time = float(frame.time)
-            next_search = time + (1 - _TOLERANCE) * (time - last_search)
-            is_full |= next_search - end > key_interval
-            last_search = time
-        if is_full:
-            yield Segment(frames, has_key=is_chosen)
-            frames, end = [], last_search
-    if frames:
-        yield Segment(frames)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class SearchedFrame:
-    """A frame after its search, or a frame that is not searched.
-
-    `detections` are known if the detector is stateless; otherwise it makes them from `candidates`,
-    in the order of the frames.
-    """
-
-    frame: Frame
-    is_searched: bool = False
-    candidates: Any = None
-    detections: Boxes | None = None
-
-
-def shows_same(before: Boxes, after: Boxes) -> bool:
-    """Return whether two frames show the same vehicles in the same places."""
-    a, b = (boxes.sides[boxes.scores >= _MIN_SCORE] for boxes in (before, after))
-    in_place = iou_matrix(a, b) >= _SAME_IOU
-    return len(a) == len(b) and bool(in_place.any(axis=0).all())
-
 
 FIRST_FRAMES = 2
 """Number of frames passed to `DetectorModel.for_video`."""
@@ -198,7 +52,7 @@ class Pipeline:
     detector: VideoDetector
     tracker: TimedTracker
     steps: Sequence[Step] = ()
-    rate: SearchRate = SearchRate()
+    rate: SearchRate = field(default_factory=SearchRate)
     look_ahead: Fraction = Fraction(0)
 
     def follow(
@@ -218,73 +72,11 @@ class Pipeline:
         ValueError
             The times of the frames do not increase.
         """
-        with SearchThreads(threads) as pool:
-            searched_frames = self._searched(frames, pool, threads)
+        search = FrameSearch(self.detector, self.steps, self.rate, threads)
+        with closing(search.search(frames)) as searched_frames:
             observed = (self.observe(searched, source) for searched in searched_frames)
             for result in _delayed(observed, self.look_ahead):
                 yield self.complete(result)
-
-    def _searched(
-        self, frames: Iterable[Frame], pool: SearchThreads, threads: int
-    ) -> Iterator[SearchedFrame]:
-        """Yield the frames in their order, after their search.
-
-        At most `threads` segments, and one more, are in memory.
-        """
-        is_free = self.rate.searches is not None and self.rate.stride is None
-        key_interval = MAX_KEY_INTERVAL if is_free and self._is_stateless else 0
-        first_phase: deque[tuple[Segment, Future[SearchedFrame]]] = deque()
-        second_phase: deque[list[Callable[[], SearchedFrame]]] = deque()
-        before: Boxes | None = None
-
-        def begin_second_phase() -> None:
-            """Search the frames before each searched key frame; wait for at least one segment."""
-            nonlocal before
-            while first_phase and (first_phase[0][1].done() or not second_phase):
-                segment, last = first_phase.popleft()
-                key = last.result().detections if segment.has_key else None
-                is_still = before is not None and key is not None and shows_same(before, key)
-                before = key
-                between = [
-                    pool.call(self._search, frame).result
-                    if is_chosen and not is_still
-                    else partial(SearchedFrame, frame)
-                    for frame, is_chosen in segment.frames[:-1]
-                ]
-                second_phase.append([*between, last.result])
-
-        def finish_segment() -> list[SearchedFrame]:
-            begin_second_phase()
-            finished = [result() for result in second_phase[0]]
-            begin_second_phase()  # threads stay busy while the caller uses the frames
-            second_phase.popleft()
-            return finished
-
-        for segment in segments(self.rate.choose(frames), key_interval):
-            first_phase.append((segment, pool.call(self._search_last, segment)))
-            if len(first_phase) + len(second_phase) > threads:
-                yield from finish_segment()
-        while first_phase or second_phase:
-            yield from finish_segment()
-
-    def _search_last(self, segment: Segment) -> SearchedFrame:
-        """Search the last frame of a segment, if it is chosen, and prepare all frames."""
-        for step in self.steps:
-            if isinstance(step, ParallelStep):
-                for frame, _ in segment.frames:
-                    step.prepare(frame)
-        frame, is_chosen = segment.frames[-1]
-        return self._search(frame) if is_chosen else SearchedFrame(frame)
-
-    def _search(self, frame: Frame) -> SearchedFrame:
-        candidates = self.detector.search(frame.picture, frame.index)
-        if self._is_stateless:
-            return SearchedFrame(frame, True, detections=self.detector.detect(candidates))
-        return SearchedFrame(frame, True, candidates)
-
-    @property
-    def _is_stateless(self) -> bool:
-        return getattr(self.detector, "is_stateless", False)
 
     def observe(self, searched: SearchedFrame, source: Path) -> FrameResult:
         """Pass the next frame to the tracker; return its result, still without tracks."""

@@ -9,7 +9,7 @@ import sys
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import AbstractContextManager, closing, contextmanager, nullcontext
 from contextvars import copy_context
 from typing import Any, TypeVar
 
@@ -55,32 +55,32 @@ def read_async(source: AbstractContextManager[S]) -> Iterator[tuple[S, Iterator[
     """Yield the value of a context manager, and an iterator over that value.
 
     A thread enters the context manager, iterates at most `DEPTH` items ahead of the consumer, and
-    exits. A generator is closed in that thread too.
+    exits.
     """
+    ahead: deque[Future[Any]] = deque()
     with _Thread("vdet-read") as thread:
-        value = thread.call(source.__enter__).result()
-        iterator: Iterator[Any] = iter(value)  # type: ignore[call-overload]
-        ahead = deque(thread.call(next, iterator, _END) for _ in range(DEPTH))
-
-        def items() -> Iterator[Any]:
-            while (item := ahead.popleft().result()) is not _END:
-                ahead.append(thread.call(next, iterator, _END))
-                yield item
-
         try:
+            value = thread.call(source.__enter__).result()
+            iterator: Iterator[Any] = iter(value)  # type: ignore[call-overload]
+            ahead.extend(thread.call(next, iterator, _END) for _ in range(DEPTH))
+
+            def items() -> Iterator[Any]:
+                while (item := ahead.popleft().result()) is not _END:
+                    ahead.append(thread.call(next, iterator, _END))
+                    yield item
+
             yield value, items()
         finally:
             for future in ahead:
                 future.cancel()
-            if isinstance(iterator, Generator):
-                thread.call(iterator.close)
             thread.call(source.__exit__, None, None, None)
 
 
 @contextmanager
 def prefetch(items: Iterable[T]) -> Iterator[Iterator[T]]:
-    """Iterate over `items` in a thread, at most `DEPTH` ahead of the consumer."""
-    with read_async(nullcontext(items)) as (_, ahead):
+    """Iterate over `items` in a thread, at most `DEPTH` ahead; generators are closed in it too."""
+    source = closing(items) if isinstance(items, Generator) else nullcontext(items)
+    with read_async(source) as (_, ahead):
         yield ahead
 
 
