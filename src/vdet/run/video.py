@@ -255,7 +255,9 @@ def write_outputs(
     if kinds and all(kind.one_frame for kind in kinds):
         start = max(run.at - STAGE_MARGIN, run.start or Fraction(0))
         run = replace(run, start=start, end=run.end or run.at + STAGE_MARGIN)
-    with_traffic = bool(run.settings.traffic) or any(kind.uses_traffic for kind in kinds)
+    with_traffic = bool(run.settings.traffic) or any(
+        getattr(kind.open, "uses_traffic", True) for kind in kinds
+    )
     with open_video(run, parts, with_traffic=with_traffic) as video:
         info, frames, ids = video.reader.info, 0, set[int]()
         context = SinkContext(

@@ -41,6 +41,7 @@ class TrackSink(BaseSink):
     `[[x, y], …]`, pixels of the frame, the nearest point first.
     """
 
+    uses_traffic = False
     _file: BinaryIO | None = None
     _writer: TrackWriter
 
@@ -73,14 +74,7 @@ class TrackSink(BaseSink):
             sys.stdout.flush()
 
 
-TRACKS = SinkKind(
-    TrackSink,
-    track_suffixes,
-    "tracks",
-    writes_standard_output=True,
-    takes="videos",
-    uses_traffic=False,
-)
+TRACKS = SinkKind(TrackSink, track_suffixes, "tracks", writes_standard_output=True, takes="videos")
 
 
 class LabelSink(BaseSink):

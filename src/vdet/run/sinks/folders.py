@@ -34,6 +34,7 @@ _THUMBNAIL = 200  # longer side of the picture of a vehicle, pixels
 class StagesSink(BaseSink):
     """Writes stage images of the first searched frame at or after the time `SinkContext.at`."""
 
+    uses_traffic = False
     _is_done = False
 
     def finish(self) -> None:

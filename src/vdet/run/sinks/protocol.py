@@ -79,9 +79,12 @@ class BaseSink:
     """Base of most sinks: `finish` is called when the run ends without an error.
 
     `summary` is what a file over all videos of a batch needs from the output, as values for JSON.
+    `uses_traffic` is whether it uses `SinkContext.traffic`, apart from the clock. If no sink does,
+    a run counts and records vehicles only if the settings have lines or zones.
     """
 
     summary: Any = None
+    uses_traffic = True
 
     def __init__(self, path: Path, context: SinkContext) -> None:
         self.path = path
@@ -162,9 +165,6 @@ class SinkKind:
         Raises `OutputError` if an output cannot be written for another reason.
     total
         The file that a batch writes over all its videos.
-    uses_traffic
-        Whether it uses `SinkContext.traffic`, apart from the clock. Without such a sink, a run
-        counts and records vehicles only if the settings have lines or zones.
     """
 
     open: Callable[[Path, SinkContext], Sink]
@@ -177,7 +177,6 @@ class SinkKind:
     may_replace: Callable[[Path], bool] = lambda _: True
     check: Callable[[Path], object] = lambda _: None
     total: BatchTotal | None = None
-    uses_traffic: bool = True
 
     @property
     def endings(self) -> Sequence[str]:
