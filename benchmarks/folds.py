@@ -31,7 +31,8 @@ from vdet.learn.svm.extraction import extract
 from vdet.learn.svm.fitting import fit, fit_boxes
 from vdet.media import Frame, Picture
 from vdet.media.reader import VideoReader
-from vdet.run.loop import Pipeline, SearchRate, peek
+from vdet.run.loop import Pipeline, peek
+from vdet.run.search import SearchRate
 from vdet.track.factory import make_tracker
 from vdet.workers import limit_library_threads
 

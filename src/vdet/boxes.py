@@ -5,7 +5,7 @@ here too.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from types import MappingProxyType
@@ -47,6 +47,12 @@ class Box:
         """Return the box with this top-left corner and size."""
         return cls(x, y, x + width, y + height)
 
+    @classmethod
+    def of(cls, sides: Iterable[float]) -> "Box":
+        """Return the box with these sides: x1, y1, x2, y2."""
+        x1, y1, x2, y2 = sides
+        return cls(x1, y1, x2, y2)
+
     @property
     def width(self) -> float:
         """Pixels across."""
@@ -75,7 +81,7 @@ class Box:
     @property
     def rounded(self) -> "Box":
         """The box with its sides at the nearest whole pixels, halves up."""
-        return Box(*self.pixels)
+        return Box.of(self.pixels)
 
     @property
     def pixels(self) -> tuple[int, int, int, int]:
@@ -211,8 +217,8 @@ class Boxes:
     def __iter__(self) -> Iterator[Detection]:
         ids = [None] * len(self) if self.ids is None else self.ids.tolist()
         scores, names = self.scores.tolist(), self.class_names
-        for sides, *others in zip(self.sides.tolist(), scores, names, ids, strict=True):
-            yield Detection(Box(*sides), *others)
+        for sides, score, name, number in zip(self.sides.tolist(), scores, names, ids, strict=True):
+            yield Detection(Box.of(sides), score, name, number)
 
     @overload
     def __getitem__(self, rows: int) -> Detection: ...
@@ -318,11 +324,11 @@ def _column(
 NO_BOXES = Boxes(np.empty((0, 4)), np.empty(0))
 
 
-def from_xywh(places: npt.NDArray[Any]) -> Float64Array:
+def from_xywh(xywh: npt.NDArray[Any]) -> Float64Array:
     """Convert boxes `(n, 4)` from x, y, width, height to x1, y1, x2, y2."""
-    boxes = places.astype(np.float64)
-    boxes[:, 2:] += boxes[:, :2]
-    return boxes
+    sides = xywh.astype(np.float64)
+    sides[:, 2:] += sides[:, :2]
+    return sides
 
 
 def iou_matrix(a: Float64Array, b: Float64Array) -> Float64Array:
@@ -333,9 +339,7 @@ def iou_matrix(a: Float64Array, b: Float64Array) -> Float64Array:
     a, b
         x1, y1, x2, y2 of shapes `(n, 4)` and `(m, 4)`, each box with an area.
 
-    Returns
-    -------
-    float64 of shape `(n, m)`; 0 for boxes that only touch.
+    The result is float64 `(n, m)`; 0 for boxes that only touch.
     """
     return iou(a[:, np.newaxis], b)
 
@@ -355,7 +359,7 @@ def coverage(boxes: Float64Array, others: Float64Array) -> Float64Array:
 
 
 def are_nested(boxes: Float64Array, scores: npt.ArrayLike) -> BoolArray:
-    """Return for each box whether it contains, or is inside, a box with a higher score.
+    """Return for each box, `(n,)`, whether it contains, or is inside, a box with a higher score.
 
     Nearly all of the smaller one is then inside the larger: at most one of them shows a vehicle.
 
@@ -365,10 +369,6 @@ def are_nested(boxes: Float64Array, scores: npt.ArrayLike) -> BoolArray:
         x1, y1, x2, y2 of shape `(n, 4)`, each with an area.
     scores
         Shape `(n,)`. Of two equal scores, the one of the larger box counts as higher.
-
-    Returns
-    -------
-    bool `(n,)`.
     """
     inside = coverage(boxes, boxes) > _NESTED
     rank = np.empty(len(boxes), np.int64)

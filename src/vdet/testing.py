@@ -38,23 +38,23 @@ def check_detector(model: DetectorModel, images: Sequence[Image]) -> None:
     * Stage images are BGR uint8.
     """
     height, width = images[0].shape[:2]
-    shown = [image.copy() for image in images]
-    first, second = (model.for_video(width, height, shown) for _ in range(2))
-    found = [_detect(first, image, index) for index, image in enumerate(shown)]
+    frames = [image.copy() for image in images]
+    first, second = (model.for_video(width, height, frames) for _ in range(2))
+    detections = [_detect(first, image, index) for index, image in enumerate(frames)]
     with ThreadPoolExecutor(2) as pool:
-        again = map(second.detect, pool.map(second.search, map(Picture, shown), range(len(shown))))
-        for one, other in zip(found, again, strict=True):
-            is_same = len(one) == len(other) and np.allclose(one.sides, other.sides, atol=1e-4)
+        candidates = pool.map(second.search, map(Picture, frames), range(len(frames)))
+        for a, b in zip(detections, map(second.detect, candidates), strict=True):
+            is_same = len(a) == len(b) and np.allclose(a.sides, b.sides, atol=1e-4)
             assert is_same, "boxes differ between two detectors: they share something"
-    still = model.for_video(width, height, shown[:1])
-    in_still = _detect(still, shown[0], None)
-    for boxes in (*found, in_still):
+    still = model.for_video(width, height, frames[:1])
+    in_still = _detect(still, frames[0], None)
+    for boxes in (*detections, in_still):
         inside = clipped(boxes.sides, (width, height))
         assert np.array_equal(inside, boxes.sides), "a box lies outside the frame"
-    for name, picture in stage_images_of(still)(shown[0], in_still).items():
+    for name, picture in stage_images_of(still)(frames[0], in_still).items():
         is_image = picture.dtype == np.uint8 and picture.ndim == 3
         assert is_image, f"stage image {name} is not uint8 of shape (H, W, 3)"
-    assert np.array_equal(shown, images), "the detector changed a frame"
+    assert np.array_equal(frames, images), "the detector changed a frame"
 
 
 def _detect(detector: VideoDetector, image: Image, index: int | None) -> Boxes:
@@ -75,10 +75,11 @@ def check_tracker(make: Callable[[int, int], VideoTracker]) -> None:
     ids: set[int] = set()
     for index in range(3 * RATE):
         picture = Picture(_scene(index))
-        frame = _detections(index), index / RATE, picture
-        tracks, again = first.update(*frame), second.update(*frame)
+        detections, time = _detections(index), index / RATE
+        tracks = first.update(detections, time, picture)
         _check_tracks(tracks)
-        assert again == tracks, "two trackers differ: they share something"
+        is_same = second.update(detections, time, picture) == tracks
+        assert is_same, "two trackers differ: they share something"
         assert (picture.image == _scene(index)).all(), "the tracker changed the frame"
         ids |= {track.id for track in tracks}
     assert len(tracks) == 2, f"{len(tracks)} of 2 vehicles are shown"
@@ -119,8 +120,8 @@ def check_sink(
     for fails in (True, False):
         with suppress(KeyboardInterrupt):
             _write(kind, path, settings or Settings(), still=still, fails=fails)
-        wrong = "a failed run left its output" if fails else "a run that ended well left no output"
-        assert _is_there(path) is not fails, wrong
+        fault = "a failed run left its output" if fails else "a successful run left no output"
+        assert _is_there(path) is not fails, fault
     assert not list(path.parent.rglob("*.vdet-*")), "temporary files are left"
 
 
@@ -150,17 +151,17 @@ def _is_there(path: Path) -> bool:
 
 
 def _detections(index: int) -> Boxes:
-    """Return two vehicles that drive in lanes of their own."""
-    x, other = 60 + 2 * index, 500 - 3 * index
-    sides = [(x, 180, x + 90, 250), (other, 40, other + 80, 100)]
+    """Return two vehicles that drive in different lanes."""
+    near, far = 60 + 2 * index, 500 - 3 * index
+    sides = [(near, 180, near + 90, 250), (far, 40, far + 80, 100)]
     return Boxes(sides, [0.9, 0.95], data={"strength": [9.0, 9.5]})
 
 
 def _scene(index: int) -> Image:
-    """Draw the vehicles with a texture of their own on a grey road."""
+    """Draw the vehicles, each with its texture, on a grey road."""
     image = np.full((HEIGHT, WIDTH, 3), 90, np.uint8)
-    for number, found in enumerate(_detections(index)):
-        part = found.box.cut(image)
+    for number, detection in enumerate(_detections(index)):
+        part = detection.box.cut(image)
         part[:] = np.random.default_rng(number).integers(0, 256, part.shape)
     return image
 
@@ -168,6 +169,6 @@ def _scene(index: int) -> Image:
 def _result(index: int) -> FrameResult:
     frame = Frame(index, Fraction(index, RATE), Picture(_scene(index)))
     detections = _detections(index)
-    left, right = (found.box for found in detections)
-    tracks = (Track(1, left, 0.9, "detected"), Track(2, right, 0.9, "predicted"))
+    near, far = (detection.box for detection in detections)
+    tracks = (Track(1, near, 0.9, "detected"), Track(2, far, 0.9, "predicted"))
     return FrameResult(Path("check.mp4"), frame, detections, tracks)

@@ -7,7 +7,6 @@ from dataclasses import replace
 from fractions import Fraction
 from itertools import count
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -33,7 +32,7 @@ from vdet.media.frame import Planes
 from vdet.media.images import read_image
 from vdet.run import video
 from vdet.run.loop import FIRST_FRAMES, Parts
-from vdet.run.threads import map_ordered
+from vdet.run.threads import SearchThreads
 from vdet.run.video import run_video
 
 QUEUED = 24
@@ -111,12 +110,12 @@ class TestRun:
     ) -> None:
         pools: list[int] = []
 
-        def note(function: Any, items: Any, threads: int, **options: Any) -> Any:
-            pools.append(threads)
-            return map_ordered(function, items, threads, **options)
+        def note(count: int) -> SearchThreads:
+            pools.append(count)
+            return SearchThreads(count)
 
         monkeypatch.setattr("vdet.run.video.core_count", lambda: 3)
-        monkeypatch.setattr("vdet.run.loop.map_ordered", note)
+        monkeypatch.setattr("vdet.run.search.SearchThreads", note)
         job = video.Run(write_drive(tmp_path / "a.mp4", 2))
         run_video(replace(job, settings=SETTINGS), Parts(red_model()))
         run_video(replace(job, threads=2, settings=SETTINGS), Parts(red_model()))
@@ -132,7 +131,7 @@ class TestRun:
     def test_stages_alone_need_only_the_frames_around_their_moment(
         self, red_clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr("vdet.run.video.LEAD", Fraction(5, 25))
+        monkeypatch.setattr("vdet.run.video.STAGE_MARGIN", Fraction(5, 25))
         at = Fraction(30, 25)
         whole = outputs(stages=tmp_path / "whole", tracks=tmp_path / "t.csv")
         for name, wanted in {"alone": outputs(stages=tmp_path / "alone"), "whole": whole}.items():

@@ -19,8 +19,9 @@ from vdet.detect.onnx.preparation import InputForm
 from vdet.detect.onnx.recognition import Recognized
 from vdet.errors import ModelError, OutputError
 from vdet.media import Frame, Picture
-from vdet.run.loop import Pipeline, SearchRate
+from vdet.run.loop import Pipeline
 from vdet.run.result import FrameResult
+from vdet.run.search import SearchRate
 from vdet.run.sinks import Output
 from vdet.track.motion.tracker import MotionTracker
 
@@ -91,7 +92,7 @@ class RedNetwork:
         y, x = np.nonzero(picture.image[..., 2] > 2 * picture.image[..., 0].astype(int))
         boxes = [(x.min(), y.min(), x.max() + 1, y.max() + 1)] if x.size else []
         sides = np.array(boxes, np.float32).reshape(-1, 4)
-        return RawBoxes(sides, np.full(len(boxes), 0.9), np.zeros(len(boxes), np.int32))
+        return RawBoxes(sides, np.full(len(boxes), 0.9, np.float32), np.zeros(len(boxes), np.int32))
 
 
 def searched_by_network(
@@ -138,7 +139,7 @@ class TestWhereNothingMoves:
 
         def fail_on_cars(network: RedNetwork, picture: Picture, minimum: float) -> RawBoxes:
             found = find(network, picture, minimum)
-            if len(found.boxes):
+            if len(found.sides):
                 raise ModelError("shows a car")
             return found
 

@@ -91,5 +91,5 @@ def test_frames_too_small_for_any_window_pass_with_a_warning(
     assert len(tracks.read_text().splitlines()) == 1, "the heading"
     assert [path.name for path in stages.iterdir()] == ["1-boxes.png"]
     (warning,) = [warning for warning in shown.warnings if "horizon" not in warning]
-    assert "tiny.mkv: gets no boxes: no search window fits into" in warning
+    assert "tiny.mkv: no vehicles can be detected: no search window fits into" in warning
     assert f"{width}×{height}" in warning

@@ -13,7 +13,7 @@ class VideoDetector(Protocol):
 
     Each frame takes two steps: `search`, in parallel with other frames, then `detect`, in the order
     of the frames. The attribute `is_stateless`, if present and true, means that `detect` keeps
-    nothing: frames may stay unsearched where nothing moves.
+    nothing: threads call it after `search`, and fewer frames are searched where nothing moves.
     """
 
     def search(self, picture: Picture, index: int | None) -> Any:
@@ -31,7 +31,8 @@ class VideoDetector(Protocol):
     def detect(self, candidates: Any) -> Boxes:
         """Return the detections of the next frame, from what `search` returned for it.
 
-        It is called in the order of the frames, and may remember earlier ones.
+        Unless the detector is stateless, it is called in the order of the frames, and may remember
+        earlier ones.
         """
 
 
@@ -56,7 +57,8 @@ class DetectorModel(Protocol):
         width, height
             Size of the frames, pixels.
         images
-            The first few frames, or the single image, BGR uint8 `(H, W, 3)`.
+            The first few frames, or the single image, BGR uint8 `(H, W, 3)`; frames of a video are
+            converted when they are first used.
 
         Raises
         ------

@@ -18,7 +18,7 @@ Color = tuple[int, int, int]
 """Blue, green, red, 0 to 255."""
 
 Surface = Image | Planes
-"""An image, BGR uint8 `(H, W, 3)`, or planes of their own; drawing changes it."""
+"""An image, BGR uint8 `(H, W, 3)`, or planes that nothing else uses; drawing changes it."""
 
 _FONT = cv2.FONT_HERSHEY_DUPLEX
 _SHIFT = 4
@@ -68,8 +68,8 @@ def write_text(
     x1, y1, x2, y2 = corners = _visible(surface, within)
     if x1 >= x2 or y1 >= y2:
         return
-    place = round(origin[0]) - x1, round(origin[1]) - y1
-    mask = _text_mask(text, place, scale, (y2 - y1, x2 - x1))
+    start = round(origin[0]) - x1, round(origin[1]) - y1
+    mask = _text_mask(text, start, scale, (y2 - y1, x2 - x1))
     masks = [mask, _halved(mask, x1, y1) if isinstance(surface, Planes) else mask]
     for layer, value, halved in _layers(surface, color):
         part = _part(layer, corners, halved)
@@ -79,10 +79,10 @@ def write_text(
 
 
 @lru_cache(maxsize=256)
-def _text_mask(text: str, place: tuple[int, int], scale: float, shape: tuple[int, int]) -> Image:
+def _text_mask(text: str, origin: tuple[int, int], scale: float, shape: tuple[int, int]) -> Image:
     """Return how much of each pixel a text covers; cached, as labels often stay for many frames."""
     mask = np.zeros(shape, np.uint8)
-    cv2.putText(mask, text, place, _FONT, scale, 255, _stroke(scale), cv2.LINE_AA)
+    cv2.putText(mask, text, origin, _FONT, scale, 255, _stroke(scale), cv2.LINE_AA)
     return mask
 
 
@@ -100,13 +100,14 @@ def _stroke(scale: float) -> int:
 def shade(surface: Surface, corners: Sequence[Point], color: Color, opacity: float) -> None:
     """Mix a colour into a polygon; corners are in pixels."""
     points = np.rint(np.array(corners)).astype(np.int32)
-    x1, y1, x2, y2 = _visible(surface, Box.sized(*cv2.boundingRect(points)))
+    x, y, width, height = cv2.boundingRect(points)
+    x1, y1, x2, y2 = visible = _visible(surface, Box.sized(x, y, width, height))
     mask = np.zeros((y2 - y1, x2 - x1), np.uint8)
     if not mask.size:
         return
     cv2.fillPoly(mask, [points], 255, offset=(-x1, -y1))
     for layer, value, halved in _layers(surface, color):
-        part = _part(layer, (x1, y1, x2, y2), halved)
+        part = _part(layer, visible, halved)
         covered = _halved(mask, x1, y1) if halved else mask
         table = np.arange(256)[:, None] * (1 - opacity) + np.array(value) * opacity
         mixed = cv2.LUT(part, np.rint(table).astype(np.uint8)[None])
@@ -213,7 +214,7 @@ def draw_label(surface: Surface, text: str, corner: Point, color: Color) -> Box:
     The corner is `(x, y)` in pixels. The tag is moved so that it lies in the surface. A text that
     is wider than the surface becomes smaller; if it still does not fit, its end is cut off.
     """
-    tag, origin, scale = _lay_out(surface, text, corner)
+    tag, origin, scale = _label_layout(surface, text, corner)
     fill(surface, tag, color)
     write_text(surface, text, origin, scale, text_color(color), within=tag)
     return tag
@@ -230,18 +231,18 @@ def draw_labels(
     taken = np.array([(box.x1, box.y1, box.x2, box.y2) for box in boxes]).reshape(-1, 4)
     for box, options, tint in zip(boxes, texts, color, strict=True):
         for text in options:
-            tag, *_ = _lay_out(surface, text, (0, 0))
+            tag, *_ = _label_layout(surface, text, (0, 0))
             if tag.width <= box.width:
                 break
         if text:
-            places = _places(surface, box, tag)
-            hidden = (coverage(places, taken).sum(axis=1) / _BETTER).astype(int)
-            x1, _, _, y2 = place = places[hidden.argmin()]
-            taken = np.vstack([taken, place])
+            tags = _tag_positions(surface, box, tag)
+            hidden = (coverage(tags, taken).sum(axis=1) / _BETTER).astype(int)
+            x1, _, _, y2 = best = tags[hidden.argmin()]
+            taken = np.vstack([taken, best])
             draw_label(surface, text, (x1, y2), tint)
 
 
-def _places(surface: Surface, box: Box, tag: Box) -> Float64Array:
+def _tag_positions(surface: Surface, box: Box, tag: Box) -> Float64Array:
     """Return a tag above and below a box, at its left and its right side, in the surface."""
     rows, columns = surface.shape[:2]
     x = np.array([box.x1, box.x1, box.x2 - tag.width, box.x2 - tag.width])
@@ -250,7 +251,7 @@ def _places(surface: Surface, box: Box, tag: Box) -> Float64Array:
     return np.stack([x, y, x + tag.width, y + tag.height], axis=1)
 
 
-def _lay_out(surface: Surface, text: str, corner: Point) -> tuple[Box, Point, float]:
+def _label_layout(surface: Surface, text: str, corner: Point) -> tuple[Box, Point, float]:
     """Return the tag of a label, the lower left corner of its text, and the scale of its font."""
     rows, columns = surface.shape[:2]
     scale = max(_SMALLEST_TEXT, min(rows / 1200, columns / (text_size(text, 1)[0] + 20)))
@@ -305,6 +306,6 @@ def draw_regions(image: Image, regions: Regions) -> Image:
         for name, corners in polygons.items():
             draw_lines(picture, corners, color, line_width(picture), closed=True)
             left, top = min(corners, key=lambda corner: (corner[1], corner[0]))
-            tag, *_ = _lay_out(picture, name, (0, 0))
+            tag, *_ = _label_layout(picture, name, (0, 0))
             draw_label(picture, name, (round(left), round(top) + tag.height), color)
     return picture

@@ -120,7 +120,7 @@ def evaluate_clip(
     all_classes = settings.model_copy(update={"classes": ()})
     run = Run(clip.video, settings=all_classes, frames=clip.truth.last_frame or None)
     labels, frames = list[Label](), 0
-    with open_video(run, Parts(model)) as video:
+    with open_video(run, Parts(model), with_traffic=False) as video:
         advance, info = progress(video.reader.expected), video.reader.info
         for result in video.results:
             number = result.frame.index + 1

@@ -15,23 +15,25 @@ from vdet.errors import ImageError
 from vdet.files import NO_FILES, FileIds, OutputFiles
 from vdet.media import Frame, Picture
 from vdet.media.images import IMAGE_SUFFIXES, is_image_name, read_image
-from vdet.run.loop import Parts, build, named_errors
+from vdet.run.loop import named_errors
 from vdet.run.result import FrameResult
 from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import SinkContext, Sinks, check_sinks, open_sinks
+from vdet.run.steps import ParallelStep, StepContext, make_steps
 from vdet.run.threads import map_ordered
+from vdet.track.track import Track
 
 
 @dataclass(frozen=True, slots=True)
 class ImageJob:
-    """An image, and the outputs for it alone.
+    """An image and its outputs.
 
-    `place` is its path below the input folder; None: its name.
+    `name` is its path below the input folder; None: its file name.
     """
 
     source: Path
     outputs: tuple[Output, ...]
-    place: Path | None = None
+    name: Path | None = None
 
 
 def find_images(paths: Sequence[Path]) -> dict[Path, Path]:
@@ -44,21 +46,23 @@ def find_images(paths: Sequence[Path]) -> dict[Path, Path]:
     ImageError
         A path does not exist, or a folder contains no image.
     """
-    found: dict[Path, Path] = {}
+    images: dict[Path, Path] = {}
     for path in paths:
         if path.is_dir():
-            images = sorted(p for p in filter(is_image_name, path.rglob("*")) if p.is_file())
-            places = {image: image.relative_to(path) for image in images}
-            places = {p: place for p, place in places.items() if not is_hidden(place)}
-            if not places:
-                names = ", ".join(sorted(IMAGE_SUFFIXES))
-                raise ImageError(f"{path}: contains no images ({names})")
+            files = sorted(
+                file for file in filter(is_image_name, path.rglob("*")) if file.is_file()
+            )
+            names = {file: file.relative_to(path) for file in files}
+            names = {file: name for file, name in names.items() if not is_hidden(name)}
+            if not names:
+                suffixes = ", ".join(sorted(IMAGE_SUFFIXES))
+                raise ImageError(f"{path}: contains no images ({suffixes})")
         elif path.exists():
-            places = {path: Path(path.name)}
+            names = {path: Path(path.name)}
         else:
             raise ImageError(f"{path}: not found")
-        found |= {source: place for source, place in places.items() if source not in found}
-    return found
+        images |= {file: name for file, name in names.items() if file not in images}
+    return images
 
 
 def plan_images(
@@ -89,13 +93,13 @@ def plan_images(
     several = len(sources) > 1
     is_file = out is not None and not several and out.suffix.lower() in IMAGE_SUFFIXES
 
-    def wanted(place: Path) -> Iterator[Output]:
+    def outputs_for(name: Path) -> Iterator[Output]:
         if out is not None:
-            yield Output("image", out if is_file else out / place)
+            yield Output("image", out if is_file else out / name)
         if stages is not None:
-            yield Output("stages", stages / place.with_suffix("") if several else stages)
+            yield Output("stages", stages / name.with_suffix("") if several else stages)
 
-    jobs = [ImageJob(source, tuple(wanted(place)), place) for source, place in sources.items()]
+    jobs = [ImageJob(source, tuple(outputs_for(name)), name) for source, name in sources.items()]
     outputs = [output for job in jobs for output in job.outputs]
     check_sinks(outputs, overwrite=overwrite, makes_folder=not is_file, inputs=inputs)
     return jobs
@@ -115,14 +119,26 @@ class ImageSearch:
         messages. Raises `ImageError` if it cannot be searched.
         """
         frame = Frame(0, Fraction(0), Picture(image))
+        height, width = image.shape[:2]
         with named_errors(source, ImageError):
-            pipeline = build(Parts(self.model), self.settings, None, [image])
-            (result,) = pipeline.follow([frame], source)
+            self.settings.camera.check_frames(width, height)
+            detector = self.model.for_video(width, height, [image])
+            steps = make_steps(StepContext(self.settings, width, height))
+            detections = detector.detect(detector.search(frame.picture, None))
+            tracks = tuple(
+                Track(number, detection.box, detection.score, "detected", detection.class_name)
+                for number, detection in enumerate(detections, start=1)
+            )
+            result = FrameResult(source, frame, detections, tracks)
+            for step in steps:
+                if isinstance(step, ParallelStep):
+                    step.prepare(frame)
+                result = step.apply(result)
         return result.of_classes(self.settings.classes)
 
     @contextmanager
     def open_sinks(
-        self, outputs: Sequence[Output], places: Mapping[Path, Path], files: OutputFiles
+        self, outputs: Sequence[Output], names: Mapping[Path, Path], files: OutputFiles
     ) -> Iterator[Sinks]:
         """Yield the sinks of some outputs, which appear together after the block."""
 
@@ -130,7 +146,7 @@ class ImageSearch:
             detector = self.model.for_video(image.shape[1], image.shape[0], [image])
             return stage_images_of(detector)(image, detections)
 
-        context = SinkContext(files, self.settings, places=places, stage_images=stage_images)
+        context = SinkContext(files, self.settings, places=names, stage_images=stage_images)
         with files, open_sinks(outputs, context) as sinks:
             yield sinks
 
@@ -156,21 +172,21 @@ def run_images(
         An output cannot be written.
     """
 
-    def find(job: ImageJob) -> FrameResult | ImageError:
+    def detect(job: ImageJob) -> FrameResult | ImageError:
         try:
             return search.detect(job.source, read_image(job.source))
         except ImageError as error:
             return error
 
-    places = {job.source: job.place for job in jobs if job.place}
+    names = {job.source: job.name for job in jobs if job.name}
     files = partial(OutputFiles, overwrite=overwrite, inputs=inputs)
     with (
-        search.open_sinks(shared, places, files()) as sinks,
-        map_ordered(find, jobs, threads) as results,
+        search.open_sinks(shared, names, files()) as shared_sinks,
+        map_ordered(detect, jobs, threads) as results,
     ):
-        for job, found in results:
-            if isinstance(found, FrameResult):
-                with search.open_sinks(job.outputs, places, files()) as own:
-                    own.write(found)
-                    sinks.write(found)
-            yield found
+        for job, result in results:
+            if isinstance(result, FrameResult):
+                with search.open_sinks(job.outputs, names, files()) as sinks:
+                    sinks.write(result)
+                    shared_sinks.write(result)
+            yield result

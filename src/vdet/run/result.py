@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
@@ -19,7 +20,7 @@ if TYPE_CHECKING:  # loaded with `--lanes`
 
 
 class Fact(Protocol):
-    """What a step found out about a frame or a whole video: a frozen value of its own type.
+    """A result of a step about a frame or a whole video: a frozen value of any type.
 
     Each line of the `str` of a fact about a whole video is printed as a warning.
     """
@@ -40,7 +41,7 @@ def findings_in(facts: Facts) -> Findings:
     return cast("Findings", facts.get(CONDITIONS, Findings()))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class FrameResult:
     """A frame, its detections, the vehicles shown, and facts about it.
 
@@ -53,7 +54,7 @@ class FrameResult:
     detections, tracks
         In pixels of that frame.
     facts
-        What steps found out about it; the lane is "lane".
+        Results of steps about it, by name; the lane is "lane".
     searched
         Whether the detector searched the frame: see `detector.searches_per_second`. Without a
         search there are no detections.
@@ -71,7 +72,7 @@ class FrameResult:
         """The lane; None if lane finding is disabled."""
         return cast("Road | None", self.facts.get("lane"))
 
-    @property
+    @cached_property
     def frame_tracks(self) -> FrameTracks:
         """The tracks with the number, time and facts of the frame."""
         facts = {name: fact.record() for name, fact in self.facts.items()}

@@ -21,7 +21,7 @@ from vdet.track.track import FrameTracks
 _MAX_SAMPLES = 20
 """Maximum number of frames for the image of the scene; at least half of them are used."""
 _STILL_FRAMES = 5000
-"""Number of frames to read for it if the tracks are known."""
+"""Number of frames to read for it if the tracks are saved."""
 
 
 def read_scene(run: Run, tracks: Path | None, steps: Steps) -> tuple[Image, list[FrameTracks]]:
@@ -41,31 +41,40 @@ def read_scene(run: Run, tracks: Path | None, steps: Steps) -> tuple[Image, list
     """
     if is_image_name(run.source) and "%" not in run.source.name:
         return read_image(run.source), _saved(tracks, None, run) if tracks else []
-    found: list[FrameTracks] = []
-    images = _spread(_known(run, tracks, found, steps) if tracks else _detected(run, found, steps))
+    images, shown = (
+        _with_saved_tracks(run, tracks, steps) if tracks else _with_detection(run, steps)
+    )
     if not images:
         raise VideoError(f"{run.source}: no frames in this part; check --start and --end")
-    return np.median(images, axis=0).astype(np.uint8), found
+    return np.median(images, axis=0).astype(np.uint8), shown
 
 
-def _known(run: Run, tracks: Path, found: list[FrameTracks], steps: Steps) -> Iterator[Frame]:
-    """Yield the first frames, and add all saved tracks to `found`."""
+def _with_saved_tracks(
+    run: Run, tracks: Path, steps: Steps
+) -> tuple[list[Image], list[FrameTracks]]:
+    """Return some of the first images, and all saved tracks."""
     with VideoReader(
         run.source, start=run.start, end=run.end, frames=_STILL_FRAMES, settings=run.settings.input
     ) as reader:
-        found += _saved(tracks, float(reader.info.rate), run)
+        saved = _saved(tracks, float(reader.info.rate), run)
         steps("reading the scene", None)
-        yield from reader
+        return _spread(reader), saved
 
 
-def _detected(run: Run, found: list[FrameTracks], steps: Steps) -> Iterator[Frame]:
-    """Yield all frames, and add their tracks to `found`."""
-    with open_video(run, Parts(load_detector(run.settings.detector))) as video:
+def _with_detection(run: Run, steps: Steps) -> tuple[list[Image], list[FrameTracks]]:
+    """Return some of the images, and the tracks of all frames."""
+    shown: list[FrameTracks] = []
+    parts = Parts(load_detector(run.settings.detector))
+    with open_video(run, parts, with_traffic=False) as video:
         advance = steps("", video.reader.expected)
-        for result in video.results:
-            found.append(result.frame_tracks)
-            yield result.frame
-            advance(1)
+
+        def frames() -> Iterator[Frame]:
+            for result in video.results:
+                shown.append(result.frame_tracks)
+                yield result.frame
+                advance(1)
+
+        return _spread(frames()), shown
 
 
 def _spread(frames: Iterable[Frame]) -> list[Image]:

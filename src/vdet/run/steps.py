@@ -1,8 +1,7 @@
-"""Steps: they run between the tracker and the sinks. vdet's own are here.
+"""Steps, which run between the tracker and the sinks, and those that vdet provides.
 
-A step is made for one video or one image. What is registered as an entry point of the group
-`vdet.steps` is a function that takes a `StepContext` and returns a step, or None if the settings do
-not enable it.
+A step is made for one video or one image. An entry point of the group `vdet.steps` is a function
+that takes a `StepContext` and returns a step, or None if the settings do not enable it.
 """
 
 from collections.abc import Sequence
@@ -49,7 +48,7 @@ class FindingStep(Step, Protocol):
 
 @dataclass(frozen=True, slots=True)
 class StepContext:
-    """What a step is made from.
+    """What a step is made of.
 
     Attributes
     ----------
@@ -58,7 +57,7 @@ class StepContext:
     video
         None for a single image.
     unknown
-        Classes in the settings that the detector does not know.
+        Classes in the settings that the detector cannot find.
     """
 
     settings: Settings
@@ -68,8 +67,8 @@ class StepContext:
     unknown: Sequence[str] = ()
 
 
-def make_steps(context: StepContext, others: Sequence[Step] = ()) -> list[Step]:
-    """Make the steps enabled by the settings, followed by `others`.
+def make_steps(context: StepContext) -> list[Step]:
+    """Make the steps enabled by the settings.
 
     Raises
     ------
@@ -93,7 +92,7 @@ def make_steps(context: StepContext, others: Sequence[Step] = ()) -> list[Step]:
     if settings.regions:
         steps.append(RegionStep(Regions(settings.regions, width, height)))
     steps += [load_plugin(STEPS, name)(context) for name in settings.steps]
-    return [step for step in (*steps, *others) if step is not None]
+    return [step for step in steps if step is not None]
 
 
 class LaneStep:
@@ -122,18 +121,18 @@ def with_positions(tracks: Sequence[Track], road: "Road", foot: float) -> tuple[
     """Return the tracks of a frame with the `distance` and the `lane` of their feet.
 
     Both are None without a lane, for a vehicle whose lower edge is cut off by the frame, and where
-    `Road.position` does not know them. `foot` is how far boxes extend below the tyres, as a
+    `Road.position` has none. `foot` is how far boxes extend below the tyres, as a
     fraction of their height.
     """
 
-    def placed(track: Track) -> Track:
+    def with_position(track: Track) -> Track:
         x, y = track.foot
         tyres = x, y - foot * track.box.height
         position = None if road.cuts(track.box) else road.position(tyres)
         distance, lane = (position.distance, position.lane) if position else (None, None)
         return replace(track, distance=distance, lane=lane)
 
-    return tuple(map(placed, tracks))
+    return tuple(map(with_position, tracks))
 
 
 class RegionStep:
@@ -144,10 +143,10 @@ class RegionStep:
 
     def apply(self, result: FrameResult) -> FrameResult:
         """Keep the detections and vehicles whose foot is inside the regions."""
-        contains, found = self._regions.contains, result.detections
-        detections = found[[n for n, item in enumerate(found) if contains(item.box.foot)]]
+        contains, detections = self._regions.contains, result.detections
+        rows = [row for row, item in enumerate(detections) if contains(item.box.foot)]
         tracks = tuple(track for track in result.tracks if contains(track.foot))
-        return replace(result, detections=detections, tracks=tracks)
+        return replace(result, detections=detections[rows], tracks=tracks)
 
 
 class ConditionStep:

@@ -9,29 +9,36 @@ import sys
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
-from contextlib import AbstractContextManager, contextmanager
-from contextvars import copy_context
+from contextlib import AbstractContextManager, closing, contextmanager, nullcontext
 from typing import Any, TypeVar
 
 T = TypeVar("T")
 R = TypeVar("R")
+S = TypeVar("S")
 
 JOIN_TIMEOUT = 2.0  # seconds for a thread to end
 DEPTH = 2  # items queued between two threads
 _END = object()  # follows the last item
 
 
-class _Thread(ThreadPoolExecutor):
-    """A thread that makes calls in turn, each in the context (`contextvars`) of its caller.
+class SearchThreads(ThreadPoolExecutor):
+    """Threads for the search; at the end of the block, calls that have not begun are cancelled."""
+
+    def __init__(self, count: int, name: str = "vdet-search") -> None:
+        super().__init__(count, thread_name_prefix=name)
+
+    def __exit__(self, *_: object) -> None:
+        self.shutdown(cancel_futures=True)
+
+
+class _Thread(SearchThreads):
+    """A thread that makes calls in turn.
 
     At the end of the block, pending calls are still made, but waited for only `JOIN_TIMEOUT`.
     """
 
     def __init__(self, name: str) -> None:
-        super().__init__(1, thread_name_prefix=name)
-
-    def call(self, function: Callable[..., R], *arguments: Any) -> Future[R]:
-        return self.submit(copy_context().run, function, *arguments)
+        super().__init__(1, name)
 
     def __exit__(self, *_: object) -> None:
         hangs = wait([self.submit(int)], JOIN_TIMEOUT).not_done
@@ -39,28 +46,37 @@ class _Thread(ThreadPoolExecutor):
 
 
 @contextmanager
-def prefetch(items: Iterable[T]) -> Iterator[Iterator[T]]:
-    """Iterate over `items` in a thread, at most `DEPTH` ahead of the consumer.
+def read_async(source: AbstractContextManager[S]) -> Iterator[tuple[S, Iterator[Any]]]:
+    """Yield the value of a context manager, and an iterator over that value.
 
-    A generator is also closed in that thread.
+    A thread enters the context manager, iterates at most `DEPTH` items ahead of the consumer, and
+    exits.
     """
-    iterator = iter(items)
-
-    with _Thread("vdet-prefetch") as thread:
-        ahead = deque(thread.call(next, iterator, _END) for _ in range(DEPTH))
-
-        def taken() -> Iterator[T]:
-            while (item := ahead.popleft().result()) is not _END:
-                ahead.append(thread.call(next, iterator, _END))
-                yield item
-
+    ahead: deque[Future[Any]] = deque()
+    with _Thread("vdet-read") as thread:
         try:
-            yield taken()
+            value = thread.submit(source.__enter__).result()
+            iterator: Iterator[Any] = iter(value)  # type: ignore[call-overload]
+            ahead.extend(thread.submit(next, iterator, _END) for _ in range(DEPTH))
+
+            def items() -> Iterator[Any]:
+                while (item := ahead.popleft().result()) is not _END:
+                    ahead.append(thread.submit(next, iterator, _END))
+                    yield item
+
+            yield value, items()
         finally:
             for future in ahead:
                 future.cancel()
-            if isinstance(iterator, Generator):
-                thread.call(iterator.close)
+            thread.submit(source.__exit__, None, None, None)
+
+
+@contextmanager
+def prefetch(items: Iterable[T]) -> Iterator[Iterator[T]]:
+    """Iterate over `items` in a thread, at most `DEPTH` ahead; generators are closed in it too."""
+    source = closing(items) if isinstance(items, Generator) else nullcontext(items)
+    with read_async(source) as (_, ahead):
+        yield ahead
 
 
 @contextmanager
@@ -73,44 +89,41 @@ def write_async(
     is one. An error in the thread is raised by a later call, or when the block ends.
     """
     with _Thread("vdet-write") as thread:
-        waiting: deque[Future[Any]] = deque([thread.call(within.__enter__)])
+        waiting: deque[Future[Any]] = deque([thread.submit(within.__enter__)])
 
         def put(item: T) -> None:
             while waiting and (len(waiting) >= DEPTH or waiting[0].done()):
                 waiting.popleft().result()
-            waiting.append(thread.call(take, item))
+            waiting.append(thread.submit(take, item))
 
         try:
             yield put
             for future in waiting:
                 future.result()
         except BaseException:
-            thread.call(within.__exit__, *sys.exc_info())
+            thread.submit(within.__exit__, *sys.exc_info())
             raise
-        thread.call(within.__exit__, None, None, None).result()
+        thread.submit(within.__exit__, None, None, None).result()
 
 
 @contextmanager
 def map_ordered(
     function: Callable[[T], R], items: Iterable[T], threads: int
 ) -> Iterator[Iterator[tuple[T, R]]]:
-    """Yield an iterator of items with the results of `function`, computed in parallel, in order.
+    """Yield an iterator of items with the results of `function`, computed in threads, in order.
 
-    They are started in order too. Items are taken ahead until every thread has one, and one more.
+    Items are taken ahead until every thread has one, and one more.
     """
     running: deque[tuple[T, Future[R]]] = deque()
-    with ThreadPoolExecutor(threads, thread_name_prefix="vdet-search") as pool:
+    with SearchThreads(threads) as pool:
 
         def pairs() -> Iterator[tuple[T, R]]:
             for item in items:
-                running.append((item, pool.submit(copy_context().run, function, item)))
+                running.append((item, pool.call(function, item)))
                 if len(running) > threads:
                     first, future = running.popleft()
                     yield first, future.result()
             for item, future in running:
                 yield item, future.result()
 
-        try:
-            yield pairs()
-        finally:
-            pool.shutdown(cancel_futures=True)
+        yield pairs()

@@ -24,7 +24,7 @@ from vdet.run.loop import Parts, build, named_errors, peek
 from vdet.run.result import Fact, Facts, FrameResult, findings_in
 from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import SinkContext, check_sinks, open_sinks, sink_kind
-from vdet.run.threads import prefetch
+from vdet.run.threads import read_async
 from vdet.traffic.clock import Clock, find_clock
 from vdet.traffic.counts import Counts
 from vdet.traffic.live import LiveTraffic
@@ -33,7 +33,7 @@ from vdet.workers import core_count, return_freed_memory
 
 log = logging.getLogger("vdet")
 
-LEAD = Fraction(2)
+STAGE_MARGIN = Fraction(2)
 """Seconds to process before and after the time `Run.at`, for detector and tracker."""
 
 
@@ -103,7 +103,7 @@ class RunTotals:
     clock
         When the video was recorded; None if unknown.
     facts
-        What the steps found out about the whole video.
+        Results of steps about the whole video, by name.
     summaries
         The `BaseSink.summary` of each output, by its path.
     """
@@ -127,9 +127,9 @@ class OpenVideo:
     results
         The results of its frames, in order.
     traffic
-        Counts, speeds and records of the results so far.
+        Counts, speeds and records of the results so far, if `open_video` was called with them.
     facts
-        What the steps found out about the whole video; empty before the last result.
+        Results of steps about the whole video, by name; empty before the last frame.
     """
 
     reader: VideoReader
@@ -140,48 +140,49 @@ class OpenVideo:
 
 
 @contextmanager
-def open_video(run: Run, parts: Parts) -> Iterator[OpenVideo]:
+def open_video(run: Run, parts: Parts, *, with_traffic: bool = True) -> Iterator[OpenVideo]:
     """Open a video, and track the vehicles in it; parameters and errors as for `run_video`.
 
-    Reading and searching run in threads.
+    Reading and searching run in threads. Without `with_traffic`, nothing is counted or recorded.
     """
-    with named_errors(run.source, VideoError), prefetch(_reader_and_frames(run)) as read:
-        reader: VideoReader = next(read)
-        latest = max(run.start or Fraction(0), run.at)
-        if reader.length is not None and latest >= reader.length:
-            raise _no_frame(run, f"{float(latest):.2f} s is beyond its end", reader)
+    with named_errors(run.source, VideoError), read_async(_opened(run)) as (reader, read):
+        first_time = max(run.start or Fraction(0), run.at)
+        if reader.length is not None and first_time >= reader.length:
+            raise _no_frame(run, f"{float(first_time):.2f} s is beyond its end", reader)
         images, frames = peek(read)
         settings, info = run.settings, reader.info
         try:
             pipeline = build(parts, settings, info, images)
         except FrameSizeError as error:
-            log.warning("%s: gets no boxes: %s", run.source, error)
+            log.warning("%s: no vehicles can be detected: %s", run.source, error)
             pipeline = build(Parts(as_model(lambda _: NO_BOXES)), settings, info, images)
         del images  # otherwise they stay in memory for the whole run
-        threads = run.threads or core_count()
         clock = find_clock(run.source, settings, info.tags.creation_time, float(info.start))
         traffic = LiveTraffic(settings, info.width, info.height, clock)
         facts: dict[str, Fact] = {}
 
         def results() -> Generator[FrameResult]:
-            with closing(pipeline.follow(frames, run.source, threads=threads)) as found:
-                for result in found:
-                    traffic.add(replace(result, facts={}).frame_tracks)  # it does not use facts
+            threads = run.threads or core_count()
+            with closing(pipeline.follow(frames, run.source, threads=threads)) as completed:
+                for result in completed:
+                    if with_traffic:
+                        traffic.add(result.frame_tracks)
                     yield result.of_classes(settings.classes)
             facts.update(pipeline.facts())
-            traffic.end(is_still=findings_in(facts).is_still)
+            if with_traffic:
+                traffic.end(is_still=findings_in(facts).is_still)
 
-        with closing(results()) as found:
-            yield OpenVideo(reader, pipeline.detector, found, traffic, facts)
+        with closing(results()) as every_result:
+            yield OpenVideo(reader, pipeline.detector, every_result, traffic, facts)
 
 
-def _reader_and_frames(run: Run) -> Generator[Any]:
-    """Yield the reader, and then its frames; the reading thread opens and closes it."""
+@contextmanager
+def _opened(run: Run) -> Iterator[VideoReader]:
+    """Open the video when the block begins: in the thread that reads it."""
     with VideoReader(
         run.source, start=run.start, end=run.end, frames=run.frames, settings=run.settings.input
     ) as reader:
         yield reader
-        yield from reader
 
 
 class Results(Iterator[FrameResult]):
@@ -194,17 +195,18 @@ class Results(Iterator[FrameResult]):
     _video: OpenVideo | None = None
 
     def __init__(self, video: AbstractContextManager[OpenVideo]) -> None:
-        self._frames = _video_and_results(video)
+        self._results = self._read(video)
+
+    def _read(self, video: AbstractContextManager[OpenVideo]) -> Generator[FrameResult]:
+        with video as self._video:
+            yield from self._video.results
 
     def __next__(self) -> FrameResult:
-        if self._video is None:
-            self._video = next(self._frames)
-        result: FrameResult = next(self._frames)
-        return result
+        return next(self._results)
 
     def close(self) -> None:
         """Close the video before its last frame."""
-        self._frames.close()
+        self._results.close()
 
     @property
     def counts(self) -> Counts | None:
@@ -220,13 +222,6 @@ class Results(Iterator[FrameResult]):
     def findings(self) -> tuple[Finding, ...]:
         """Reasons to doubt the results; empty before the last frame."""
         return findings_in(self._video.facts).found if self._video else ()
-
-
-def _video_and_results(opening: AbstractContextManager[OpenVideo]) -> Generator[Any]:
-    """Yield the open video, and then its results."""
-    with opening as video:
-        yield video
-        yield from video.results
 
 
 def run_video(run: Run, parts: Parts, *, progress: Progress = no_progress) -> RunTotals:
@@ -263,12 +258,16 @@ def write_outputs(
 
     Other parameters and errors as for `run_video`.
     """
-    began = time.perf_counter()
+    start_time = time.perf_counter()
     return_freed_memory()
-    if run.outputs and all(sink_kind(output.sink).one_frame for output in run.outputs):
-        start = max(run.at - LEAD, run.start or Fraction(0))
-        run = replace(run, start=start, end=run.end or run.at + LEAD)
-    with open_video(run, parts) as video:
+    kinds = [sink_kind(output.sink) for output in run.outputs]
+    if kinds and all(kind.one_frame for kind in kinds):
+        start = max(run.at - STAGE_MARGIN, run.start or Fraction(0))
+        run = replace(run, start=start, end=run.end or run.at + STAGE_MARGIN)
+    with_traffic = bool(run.settings.traffic) or any(
+        getattr(kind.open, "uses_traffic", True) for kind in kinds
+    )
+    with open_video(run, parts, with_traffic=with_traffic) as video:
         info, frames, ids = video.reader.info, 0, set[int]()
         context = SinkContext(
             files,
@@ -291,12 +290,19 @@ def write_outputs(
             if not frames:
                 raise _no_frame(run, "no frames at these times", video.reader)
         counts = video.traffic.counts()
-        found = [line for fact in video.facts.values() for line in str(fact).splitlines()]
-        for warning in (*(counts.warnings if counts else ()), *found):
+        fact_lines = [line for fact in video.facts.values() for line in str(fact).splitlines()]
+        for warning in (*(counts.warnings if counts else ()), *fact_lines):
             log.warning("%s: %s", run.source, warning)
-    seconds = time.perf_counter() - began
-    totals = info.width, info.height, frames, len(ids), seconds
-    return RunTotals(*totals, video.traffic.clock, video.facts, sinks.summaries)
+    return RunTotals(
+        width=info.width,
+        height=info.height,
+        frames=frames,
+        tracks=len(ids),
+        seconds=time.perf_counter() - start_time,
+        clock=video.traffic.clock,
+        facts=video.facts,
+        summaries=sinks.summaries,
+    )
 
 
 def _no_frame(run: Run, words: str, reader: VideoReader) -> VideoError:

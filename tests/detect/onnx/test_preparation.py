@@ -75,7 +75,7 @@ def test_only_the_letterbox_of_other_networks_is_grey_beyond_the_frame(
 ) -> None:
     values, place = seen(InputForm(96, 96, dtype), picture)
     top, height = (0, 96) if dtype is np.uint8 else (21, 54)
-    assert place == (0, top, (96 / 1280, height / 720))
+    assert place == Placement(0, top, (96 / 1280, height / 720))
     is_frame = np.isin(np.arange(96), np.arange(top, top + height))
     assert values[:, ~is_frame] == pytest.approx(114)
     assert (values[:, is_frame].round() != 114).any(axis=(0, 2)).all()

@@ -144,7 +144,7 @@ def test_a_network_without_a_wanted_class_is_refused(tmp_path: Path) -> None:
     form = ultralytics(SIZE, RedBox(64, 32, 16, 8), 1)
     metadata = {**ULTRALYTICS, "names": "{0: 'face'}"}
     path = write_network(tmp_path / "net.onnx", form, SIZE, (64, 32), metadata=metadata)
-    with pytest.raises(ModelError, match=r"knows none of detector\.classes, only face"):
+    with pytest.raises(ModelError, match=r"has none of detector\.classes, only face"):
         detect(path, frame_with_red(128, 128))
 
 

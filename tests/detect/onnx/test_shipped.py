@@ -46,10 +46,11 @@ def test_a_still_picture_is_also_searched_mirrored_with_a_larger_input() -> None
     assert isinstance(detector, NetworkDetector)
     assert (detector.network.form.width, detector.larger.form.width) == (640, 896)
     boxes = [astuple(item.box) for item in true_boxes(scene, FRAME) if must_be_found(item, height)]
-    searches, minimum = detector.search(Picture(Renderer(scene).image(FRAME)), None)
-    assert [len(searches), minimum] == [2, NetworkSettings().min_score_still]
-    for found in searches:
-        overlap = iou_matrix(np.array(boxes), found.boxes.astype(float))
+    candidates = detector.search(Picture(Renderer(scene).image(FRAME)), None)
+    assert len(candidates.searches) == 2
+    assert candidates.min_score == NetworkSettings().min_score_still
+    for found in candidates.searches:
+        overlap = iou_matrix(np.array(boxes), found.sides)
         assert (overlap.max(axis=1) > 0.7).all()
 
 

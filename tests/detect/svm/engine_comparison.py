@@ -15,7 +15,7 @@ from vdet.detect.svm.features import FeatureExtractor, to_patch
 from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.pyramid import FramePyramid
 from vdet.detect.svm.search import DenseSearch
-from vdet.detect.svm.windows import WindowGrid, lay_grid
+from vdet.detect.svm.windows import WindowGrid, band_grid
 from vdet.media import Picture, Planes
 from vdet.synthetic.render import Renderer
 from vdet.synthetic.scene import demo_scene
@@ -109,4 +109,4 @@ def cars() -> Image:
 def grid_of(size: int, *, overlap: float) -> WindowGrid:
     """Lay windows of 48 to 128 pixels over `cars`; an eighth of a window is a cell."""
     settings = WindowSettings(size=size, overlap=overlap, top=8, bottom=size + 52)
-    return lay_grid(settings, 440, 200)
+    return band_grid(settings, 440, 200)

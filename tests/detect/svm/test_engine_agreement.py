@@ -13,7 +13,7 @@ from detect.svm.engine_comparison import (
 )
 from seed import SEED
 from vdet.config.schema import SvmSettings
-from vdet.detect.svm.windows import lay_grids
+from vdet.detect.svm.windows import window_grids
 
 SHIPPED = {"seed": SEED.svm, "default": SvmSettings()}
 GRIDS = {
@@ -42,7 +42,7 @@ def assert_agree(results: EngineResults, same: float = 0.97) -> None:
 @pytest.mark.parametrize(("name", "members"), [("seed", 3), ("default", 1), ("default", 3)])
 def test_the_engines_agree_on_a_drawn_road(name: str, members: int) -> None:
     model = fitted(SHIPPED[name].features, members)
-    grids = lay_grids(SHIPPED[name], model.features, 1280, 720, horizon=HORIZON)
+    grids = window_grids(SHIPPED[name], model.features, 1280, 720, horizon=HORIZON)
     assert_agree(compare(model, grids, road()))
 
 

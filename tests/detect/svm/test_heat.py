@@ -7,7 +7,7 @@ import pytest
 from vdet.boxes import Box
 from vdet.config.detector import HeatSettings, WindowSettings
 from vdet.detect.svm.heat import Heat, find_regions, sum_heat
-from vdet.detect.svm.windows import Windows, lay_grid
+from vdet.detect.svm.windows import Windows, band_grid
 
 
 def found(*windows: tuple[int, int, int, int, float], weight: float = 1) -> Windows:
@@ -77,7 +77,7 @@ def test_with_votes_a_hit_adds_its_probability_times_its_weight() -> None:
 @pytest.mark.parametrize("overlap", [0, 0.5, 0.75])
 def test_with_votes_heat_does_not_depend_on_overlap(overlap: float) -> None:
     settings = WindowSettings(size=20, overlap=overlap, top=0, bottom=60)
-    grid = lay_grid(settings, 100, 60)
+    grid = band_grid(settings, 100, 60)
     weights = np.full(len(grid), grid.weight, np.float32)
     ones, boxes = np.ones(len(grid), np.float32), grid.boxes
     windows = Windows(boxes, ones, weights, boxes.astype(np.float32))

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vdet.config.detector import FeatureSettings, PerspectiveSettings
-from vdet.detect.svm.windows import WindowGrid, lay_perspective
+from vdet.detect.svm.windows import WindowGrid, perspective_grids
 
 FEATURES = FeatureSettings()
 SIZES = PerspectiveSettings().sizes
@@ -20,7 +20,7 @@ def laid(
     **changes: object,
 ) -> list[WindowGrid]:
     settings = PerspectiveSettings.model_validate(changes)
-    return lay_perspective(settings, features, width, height, horizon=horizon)
+    return perspective_grids(settings, features, width, height, horizon=horizon)
 
 
 def rows_of(grid: WindowGrid) -> tuple[int, int]:

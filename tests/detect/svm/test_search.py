@@ -16,7 +16,7 @@ from vdet.config.schema import SvmSettings
 from vdet.config.section import scale_lengths
 from vdet.detect.svm.detector import SvmDetector
 from vdet.detect.svm.model import BoxRegression, LinearModel
-from vdet.detect.svm.windows import Windows, lay_grids
+from vdet.detect.svm.windows import Windows, window_grids
 from vdet.errors import FrameSizeError, ImageError
 from vdet.media import Picture
 
@@ -74,7 +74,7 @@ MEDIAN = float(np.median(search_all(search_of(SMALL)).probabilities))
 
 
 def test_the_seed_has_831_windows_on_a_720p_frame_the_large_ones_first() -> None:
-    grids = lay_grids(SEED.svm, SEED.svm.features, 1280, 720, horizon=0.5)
+    grids = window_grids(SEED.svm, SEED.svm.features, 1280, 720, horizon=0.5)
     sides = [width for grid in grids for width in grid.boxes[:, 2].tolist()]
     assert sides == [128] * 423 + [64] * 408
 

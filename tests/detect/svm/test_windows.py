@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from vdet.boxes import Int32Array
 from vdet.config.detector import WindowSettings
-from vdet.detect.svm.windows import WindowGrid, Windows, lay_grid
+from vdet.detect.svm.windows import WindowGrid, Windows, band_grid
 
 ROWS = 2000  # of a frame that is higher than all bands here
 
@@ -17,7 +17,7 @@ def band(size: int, overlap: float, top: int, bottom: int) -> WindowSettings:
 
 
 def boxes_of(settings: WindowSettings, width: int, height: int = ROWS) -> Int32Array:
-    return lay_grid(settings, width, height).boxes
+    return band_grid(settings, width, height).boxes
 
 
 def test_step_and_buffer_are_truncated() -> None:
@@ -51,7 +51,7 @@ def test_all_windows_lie_inside_band_and_frame(
 
 
 def test_the_weight_is_one_over_the_number_of_windows_that_cover_a_pixel() -> None:
-    grid = lay_grid(band(64, 0.75, 0, 320), 320, 320)
+    grid = band_grid(band(64, 0.75, 0, 320), 320, 320)
     covered = np.zeros((320, 320))
     for x, y, w, h in grid.boxes.tolist():
         covered[y : y + h, x : x + w] += 1

@@ -8,11 +8,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from vdet.boxes import Box, Boxes, Image, Int32Array, clipped
+from vdet.boxes import Boxes, Image, Int32Array, clipped
 from vdet.config.schema import NetworkSettings
 from vdet.detect.classes import our_name
 from vdet.detect.factory import DetectorKind
-from vdet.detect.onnx.layouts import RawBoxes
 from vdet.detect.onnx.merging import combine, suppress
 from vdet.detect.onnx.recognition import Recognized, read_header, recognize
 from vdet.detect.onnx.session import Session
@@ -23,8 +22,14 @@ from vdet.media import Picture
 _LARGER = 2.0
 """Pixels of the larger input for a single image, as a multiple of those for a frame of a video."""
 
-Candidates = tuple[list[RawBoxes], float]
-"""The boxes of each search before suppression, and the minimum score."""
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Candidates:
+    """The boxes of each search before suppression, and the minimum score of a detection."""
+
+    searches: Sequence[Boxes]
+    min_score: float
+
 
 _USUAL = NetworkSettings().classes
 
@@ -37,7 +42,7 @@ class NetworkModel:
     Raises
     ------
     ModelError
-        The file cannot be used, or knows none of the classes in the settings.
+        The file cannot be used, or has none of the classes in the settings.
     """
 
     def __init__(self, path: Path, settings: NetworkSettings) -> None:
@@ -46,7 +51,7 @@ class NetworkModel:
         names = self._recognized.names
         self._numbers = np.array([*our_classes(names, combined_classes(settings)), -1], np.int32)
         if not np.isin(np.arange(len(settings.classes)), self._numbers).any():
-            raise ModelError(f"{path}: knows none of detector.classes, only {', '.join(names)}")
+            raise ModelError(f"{path}: has none of detector.classes, only {', '.join(names)}")
 
     def for_video(self, width: int, height: int, images: Sequence[Image]) -> "NetworkDetector":  # noqa: ARG002
         """Return a detector for frames of one size."""
@@ -73,7 +78,7 @@ class NetworkDetector:
 
     @property
     def unknown_classes(self) -> tuple[str, ...]:
-        """Classes in the settings that the network does not know, except the default ones."""
+        """Classes in the settings that the network does not have, except the default ones."""
         return tuple(
             name
             for number, name in enumerate(self.settings.classes)
@@ -87,51 +92,59 @@ class NetworkDetector:
         removed when both are combined.
         """
         settings, is_still = self.settings, index is None
-        minimum = max(settings.min_score, settings.min_score_still if is_still else 0)
+        min_score = max(settings.min_score, settings.min_score_still if is_still else 0)
         if not is_still or self.larger is self.network:
-            return [self._find(self.network, picture, settings.classes)], minimum
-        classes = combined_classes(settings)
-        mirrored = Picture(np.ascontiguousarray(picture.image[:, ::-1]))
-        second = self._find(self.larger, mirrored, classes).mirrored(picture.width)
-        return [self._find(self.network, picture, classes), second], minimum
+            return Candidates([self._find(self.network, picture, settings.classes)], min_score)
+        names = combined_classes(settings)
+        image = Picture(np.ascontiguousarray(picture.image[:, ::-1]))
+        searches = self._find(self.network, picture, names), self._find(self.larger, image, names)
+        return Candidates([searches[0], _mirrored(searches[1], picture.width)], min_score)
 
-    def _find(self, network: Recognized, picture: Picture, names: Sequence[str]) -> RawBoxes:
+    def _find(self, network: Recognized, picture: Picture, names: Sequence[str]) -> Boxes:
         """Return the boxes of the named classes, the first of `combined_classes`, unsuppressed."""
         raw = network.find(picture, self.settings.min_score)
-        boxes = clipped(raw.boxes.astype(np.float64), (picture.width, picture.height))
+        sides = clipped(raw.sides.astype(np.float64), (picture.width, picture.height))
         numbers = self.numbers[raw.classes.clip(-1, len(self.numbers) - 1)]
-        keep = (numbers >= 0) & (numbers < len(names))
-        keep &= (boxes[:, 2:] - boxes[:, :2] >= 1).all(axis=1)  # not with a NaN
-        wanted = self.numbers[:-1, np.newaxis] == np.arange(len(names))
-        likely = None if raw.class_scores is None else raw.class_scores[keep] @ wanted
-        return RawBoxes(boxes[keep].astype(np.float32), raw.scores[keep], numbers[keep], likely)
+        rows = (numbers >= 0) & (numbers < len(names))
+        rows &= (sides[:, 2:] - sides[:, :2] >= 1).all(axis=1)  # not with a NaN
+        data = {}
+        if raw.class_scores is not None:
+            means_name = self.numbers[:-1, np.newaxis] == np.arange(len(names))
+            data["class_scores"] = raw.class_scores[rows] @ means_name
+        return Boxes(sides[rows], raw.scores[rows], classes=numbers[rows], names=names, data=data)
 
     def detect(self, candidates: Candidates) -> Boxes:
         """Return one box for each vehicle."""
-        searches, minimum = candidates
-        overlap = self.settings.nms_iou
-        found, *others = (suppress(raw, overlap) for raw in searches)
-        for other in others:
-            found = combine(found, other, overlap)
-        names = self.settings.classes
-        found = found.rows((found.scores >= minimum) & (found.classes < len(names)))
-        likely = found.class_scores
+        overlap, names = self.settings.nms_iou, self.settings.classes
+        boxes, *second = (suppress(boxes, overlap) for boxes in candidates.searches)
+        if second:
+            boxes = combine(boxes, second[0], overlap)
+        assert boxes.classes is not None
+        rows = (boxes.scores >= candidates.min_score) & (boxes.classes < len(names))
         return Boxes(
-            found.boxes,
-            found.scores,
-            classes=found.classes,
+            boxes.sides[rows],
+            boxes.scores[rows],
+            classes=boxes.classes[rows],
             names=names,
-            data={} if likely is None else {"class_scores": likely[:, : len(names)]},
-            trace=searches,
+            data={name: column[rows, : len(names)] for name, column in boxes.data.items()},
+            trace=candidates.searches,
         )
 
     def stage_images(self, image: Image, detections: Boxes) -> dict[str, Image]:
         """Return images of the network's input, and of the boxes before suppression."""
-        boxes = image.copy()
-        for raw in detections.trace:
-            for box, score in zip(raw.boxes.round().astype(int).tolist(), raw.scores, strict=True):
-                draw_box(boxes, Box(*box), GREEN, f"{score:.2f}")
-        return {"input": self.network.form.scaled(Picture(image))[0], "candidates": boxes}
+        candidates = image.copy()
+        for boxes in detections.trace:
+            for candidate in boxes:
+                draw_box(candidates, candidate.box, GREEN, f"{candidate.score:.2f}")
+        scaled, _ = self.network.form.scaled(Picture(image))
+        return {"input": scaled, "candidates": candidates}
+
+
+def _mirrored(boxes: Boxes, width: int) -> Boxes:
+    """Return the boxes in the mirror image of a picture of this width."""
+    sides = boxes.sides.copy()
+    sides[:, [2, 0]] = width - boxes.sides[:, [0, 2]]
+    return Boxes(sides, boxes.scores, classes=boxes.classes, names=boxes.names, data=boxes.data)
 
 
 def combined_classes(settings: NetworkSettings) -> tuple[str, ...]:
@@ -139,9 +152,9 @@ def combined_classes(settings: NetworkSettings) -> tuple[str, ...]:
     return tuple(dict.fromkeys((*settings.classes, *_USUAL)))
 
 
-def our_classes(names: Sequence[str], wanted: Sequence[str]) -> list[int]:
-    """Return the index in `wanted` of each class of a network, -1 if it is missing."""
-    numbers = {name: number for number, name in enumerate(wanted)}
+def our_classes(names: Sequence[str], chosen: Sequence[str]) -> list[int]:
+    """Return the index in `chosen` of each class of a network, -1 if it is missing."""
+    numbers = {name: number for number, name in enumerate(chosen)}
     return [numbers.get(our_name(name) or name.strip().lower(), -1) for name in names]
 
 

@@ -2,11 +2,11 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from vdet.boxes import BoolArray, Float32Array, Int32Array, Int64Array
+from vdet.boxes import Float32Array, Int32Array
 from vdet.detect.onnx.session import Array
 
 STRIDES = (8, 16, 32)
@@ -18,29 +18,18 @@ Cells = tuple[Float32Array, Float32Array]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RawBoxes:
-    """Boxes before suppression.
+    """Boxes as the network gives them, before any check; only decoding uses them.
 
-    `boxes` float32 `(n, 4)`: x1, y1, x2, y2, pixels of the input or of the frame; `scores` float32
-    `(n,)`, 0 to 1; `classes` int32 `(n,)`: indices in the names of the network or of the settings;
-    `class_scores` float32 `(n, len(names))`: probability of each class, None if the network outputs
-    only the best class.
+    `sides` float32 `(n, 4)`: x1, y1, x2, y2, pixels of the input or of the frame; `scores` float32
+    `(n,)`, 0 to 1; `classes` int32 `(n,)`: indices in the names of the network; `class_scores`
+    float32 `(n, len(names))`: probability of each class, None if the network outputs only the best
+    class.
     """
 
-    boxes: Float32Array
+    sides: Float32Array
     scores: Float32Array
     classes: Int32Array
     class_scores: Float32Array | None = None
-
-    def rows(self, rows: Int64Array | BoolArray) -> "RawBoxes":
-        """Return some of the boxes."""
-        likely = None if self.class_scores is None else self.class_scores[rows]
-        return RawBoxes(self.boxes[rows], self.scores[rows], self.classes[rows], likely)
-
-    def mirrored(self, width: int) -> "RawBoxes":
-        """Return the boxes in the mirror image of a picture of this width."""
-        mirrored = self.boxes.copy()
-        mirrored[:, [2, 0]] = width - self.boxes[:, [0, 2]]
-        return replace(self, boxes=mirrored)
 
 
 OutputLayout = Callable[[Array, float], RawBoxes]
@@ -64,9 +53,9 @@ def our_cells(
     rows = np.flatnonzero(logits >= math.log(minimum / (1 - minimum)))
     lengths = np.logaddexp(0, table[rows, 1:5] + 1) * strides[rows, np.newaxis]
     middle = centers[rows]
-    boxes = np.concatenate([middle - lengths[:, :2], middle + lengths[:, 2:]], axis=1)
-    classes = np.exp(table[rows, 5:] - table[rows, 5:].max(axis=1, keepdims=True))
-    return _raw(boxes, 1 / (1 + np.exp(-logits[rows])), best[rows], classes)
+    sides = np.concatenate([middle - lengths[:, :2], middle + lengths[:, 2:]], axis=1)
+    class_scores = np.exp(table[rows, 5:] - table[rows, 5:].max(axis=1, keepdims=True))
+    return _raw(sides, 1 / (1 + np.exp(-logits[rows])), best[rows], class_scores)
 
 
 def center_columns(output: Array, minimum: float) -> RawBoxes:
@@ -76,8 +65,8 @@ def center_columns(output: Array, minimum: float) -> RawBoxes:
     best, classes = scores.max(axis=1), scores.argmax(axis=1)
     rows = np.flatnonzero(best >= minimum)
     middle, half = table[rows, :2], table[rows, 2:4] / 2
-    boxes = np.concatenate([middle - half, middle + half], axis=1)
-    return _raw(boxes, best[rows], classes[rows], scores[rows])
+    sides = np.concatenate([middle - half, middle + half], axis=1)
+    return _raw(sides, best[rows], classes[rows], scores[rows])
 
 
 def final_rows(output: Array, minimum: float) -> RawBoxes:
@@ -98,11 +87,11 @@ def cell_centers(width: int, height: int) -> Cells:
 
 
 def _raw(
-    boxes: Array, scores: Array, classes: Array, class_scores: Array | None = None
+    sides: Array, scores: Array, classes: Array, class_scores: Array | None = None
 ) -> RawBoxes:
     """Return the boxes; each row of `class_scores`, at least 0, is normalized to a sum of 1."""
     if class_scores is not None:
         class_scores = np.nan_to_num(class_scores.astype(np.float32).clip(1e-9, 1))
         class_scores /= class_scores.sum(axis=1, keepdims=True)
-    clipped = np.clip(scores.astype(np.float32), 0, 1)
-    return RawBoxes(boxes.astype(np.float32), clipped, classes.astype(np.int32), class_scores)
+    scores = scores.astype(np.float32).clip(0, 1)
+    return RawBoxes(sides.astype(np.float32), scores, classes.astype(np.int32), class_scores)

@@ -1,7 +1,7 @@
 """Convert frames to the input of a network, and boxes in the input back to the frame."""
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import cv2
 import numpy as np
@@ -35,10 +35,10 @@ class InputForm:
 
     def prepare(self, picture: Picture) -> tuple[npt.NDArray[Any], "Placement"]:
         """Return the input for a frame, and the placement of the frame in it."""
-        image, place = self.scaled(picture)
+        image, placement = self.scaled(picture)
         if self.dtype is np.uint8:
-            return image[np.newaxis], place
-        return cv2.dnn.blobFromImage(image, 1 / 255, swapRB=True).astype(self.dtype), place
+            return image[np.newaxis], placement
+        return cv2.dnn.blobFromImage(image, 1 / 255, swapRB=True).astype(self.dtype), placement
 
     def scaled(self, picture: Picture) -> tuple[Image, "Placement"]:
         """Return the input as an image, BGR uint8, and the placement of the frame in it."""
@@ -48,26 +48,27 @@ class InputForm:
             width = max(1, round(picture.width * factor))
             height = max(1, round(picture.height * factor))
         left, top = (self.width - width) // 2, (self.height - height) // 2
-        place = Placement(left, top, (width / picture.width, height / picture.height))
+        placement = Placement(left, top, (width / picture.width, height / picture.height))
         scaled = _scaled_picture(picture, width, height)
         if scaled.shape[:2] == (self.height, self.width):
-            return scaled, place
+            return scaled, placement
         canvas = np.full((self.height, self.width, 3), GREY, np.uint8)
         canvas[top : top + height, left : left + width] = scaled
-        return canvas, place
+        return canvas, placement
 
 
-class Placement(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Placement:
     """Placement of a frame in the input: its top-left pixel, and its scales in x and y."""
 
     left: int
     top: int
     scales: tuple[float, float]
 
-    def to_frame(self, boxes: Float32Array) -> Float32Array:
+    def to_frame(self, sides: Float32Array) -> Float32Array:
         """Convert boxes in the input, `(n, 4)` x1, y1, x2, y2, to pixels of the frame."""
         offset = np.array([self.left, self.top] * 2, np.float32)
-        return np.asarray((boxes - offset) / np.array(self.scales * 2, np.float32))
+        return np.asarray((sides - offset) / np.array(self.scales * 2, np.float32))
 
 
 def size_of_area(width: int, height: int, pixels: float) -> tuple[int, int]:

@@ -112,17 +112,17 @@ class Recognized:
         ModelError
             The network does not run, or its output is not what its form says.
         """
-        values, place = self.form.prepare(picture)
+        values, placement = self.form.prepare(picture)
         outputs = self.session.run(values)
         try:
             with np.errstate(all="ignore"):  # numbers of any size
                 raw = self.layout(outputs[0], minimum)
-                found = replace(raw, boxes=place.to_frame(raw.boxes))
+                boxes = replace(raw, sides=placement.to_frame(raw.sides))
         except (ValueError, TypeError, IndexError) as error:
             raise _unknown(self.session, f"its output is {_shapes(outputs)}") from error
-        if raw.boxes.max(initial=-math.inf) < _NORMALISED and len(raw.boxes):
+        if raw.sides.max(initial=-math.inf) < _NORMALISED and len(raw.sides):
             raise _unknown(self.session, "its boxes are fractions of the input, not pixels")
-        return found
+        return boxes
 
 
 def recognize(session: Session, names: Sequence[str] = ()) -> Recognized:
@@ -163,14 +163,16 @@ def _ours(session: Session, header: Header, size: tuple[int, int]) -> Recognized
     """Return our network with an input of one size, width and height in pixels."""
     scores = [header.by_class.get(name, header.calibration) for name in header.classes]
     lines = np.array([(score.slope, score.offset) for score in scores], np.float32)
-    layout = partial(our_cells, cells=cell_centers(*size), calibration=lines)
-    return Recognized(session, "vdet", header.classes, InputForm(*size), layout, header)
+    width, height = size
+    layout = partial(our_cells, cells=cell_centers(width, height), calibration=lines)
+    form = InputForm(width, height)
+    return Recognized(session, "vdet", header.classes, form, layout, header)
 
 
 def _foreign(session: Session, names: tuple[str, ...]) -> Recognized:
     """Return a network of another tool, by the shape of its output for a black image."""
-    own_names, size = _ultralytics_metadata(session)
-    names = names or own_names
+    names_in_file, size = _ultralytics_metadata(session)
+    names = names or names_in_file
     form = _letterbox(session, size)
     outputs = session.run(np.zeros((1, 3, form.height, form.width), form.dtype))
     cells = len(cell_centers(form.width, form.height)[1])
@@ -195,13 +197,13 @@ def _ultralytics_metadata(session: Session) -> tuple[tuple[str, ...], tuple[int,
         names, side = (ast.literal_eval(metadata.get(key, "None")) for key in ("names", "imgsz"))
         listed = names.values() if isinstance(names, dict) else names or ()
         size = (int(side[1]), int(side[0])) if side else _USUAL_SIZE
-        known = tuple(map(str, listed))
+        class_names = tuple(map(str, listed))
     except Exception as error:  # many kinds: the text may be anything
         raise _unknown(session, "its metadata cannot be read") from error
     task = metadata.get("task", "detect")
     if task != "detect":
         raise _unknown(session, f"its task is {task:.40}, not detect")
-    return known, size
+    return class_names, size
 
 
 def _letterbox(session: Session, usual: tuple[int, int]) -> InputForm:

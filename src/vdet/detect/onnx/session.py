@@ -8,7 +8,6 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import numpy.typing as npt
 
 from vdet.errors import ModelError
@@ -77,20 +76,20 @@ class Session:
         """
         options, outputs = self._new_options(), Future[list[Array]]()
         options.log_severity_level = _SILENT
-        call = values, options, outputs  # one long operation cannot be stopped: it is abandoned
-        threading.Thread(target=self._run, args=call, name="vdet-network", daemon=True).start()
+
+        def search() -> None:
+            try:
+                outputs.set_result(self._session.run(None, {self.inputs[0].name: values}, options))
+            except Exception as error:  # onnxruntime raises its own kinds
+                outputs.set_exception(self._failed(_in_words(error)))
+
+        # One long operation cannot be stopped: it is abandoned.
+        threading.Thread(target=search, name="vdet-network", daemon=True).start()
         for _ in range(MAX_SECONDS):  # time in which this process was stopped does not count
             with suppress(TimeoutError):
                 return outputs.result(1)
         options.terminate = True
         raise self._failed(f"it took more than {MAX_SECONDS} s")
-
-    def _run(self, values: Array, options: Any, outputs: Future[list[Array]]) -> None:
-        try:
-            found = self._session.run(None, {self.inputs[0].name: values}, options)
-            outputs.set_result([np.asarray(item) for item in found])
-        except Exception as error:  # onnxruntime raises its own kinds
-            outputs.set_exception(self._failed(_in_words(error)))
 
     def _failed(self, reason: str) -> ModelError:
         return ModelError(f"{self.path}: fails on an image: {reason}")

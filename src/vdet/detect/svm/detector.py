@@ -10,7 +10,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from vdet.boxes import Box, Boxes, Image, are_nested
+from vdet.boxes import Box, Boxes, Image, are_nested, from_xywh
 from vdet.config.detector import FeatureSettings
 from vdet.config.schema import SvmSettings
 from vdet.detect.factory import DetectorKind
@@ -20,7 +20,7 @@ from vdet.detect.svm.model import LinearModel, load_model
 from vdet.detect.svm.pyramid import FramePyramid
 from vdet.detect.svm.search import DenseSearch, vehicle_boxes
 from vdet.detect.svm.votes import Votes, split_regions
-from vdet.detect.svm.windows import WindowGrid, Windows, lay_grids
+from vdet.detect.svm.windows import WindowGrid, Windows, window_grids
 from vdet.draw.boxes import GREEN, WHITE, color_of, draw_box, draw_label
 from vdet.errors import FrameSizeError, ImageError, ModelError
 from vdet.media import Picture
@@ -74,8 +74,8 @@ class SvmModel:
         if horizon is None and (horizon := find_horizon(images)) is None:
             # A folder may have many images without a horizon: only videos warn.
             level = logging.WARNING if len(images) > 1 else logging.INFO
-            found = f"no horizon found: {DEFAULT_HORIZON} of the height is assumed"
-            log.log(level, "%s; set detector.search.perspective.horizon", found)
+            assumed = f"no horizon found: {DEFAULT_HORIZON} of the height is assumed"
+            log.log(level, "%s; set detector.search.perspective.horizon", assumed)
             return DEFAULT_HORIZON
         log.info("the horizon is at %.2f of the height", horizon)
         return horizon
@@ -105,7 +105,7 @@ class SvmDetector:
     Attributes
     ----------
     grids
-        The window sets, laid over the frame.
+        The window sets in the frame.
 
     Raises
     ------
@@ -127,7 +127,7 @@ class SvmDetector:
     ) -> None:
         self._settings, self._features, self._size = settings, model.features, (width, height)
         self._recent: deque[Windows] = deque(maxlen=settings.heat.frames)
-        self.grids = tuple(lay_grids(settings, model.features, width, height, horizon=horizon))
+        self.grids = tuple(window_grids(settings, model.features, width, height, horizon=horizon))
         if not self.grids:
             raise FrameSizeError(f"no search window fits into {width}×{height} pixels")
         if (count := sum(map(len, self.grids))) > MAX_WINDOWS:
@@ -162,7 +162,7 @@ class SvmDetector:
         self._recent.extend([hits] * (self._settings.heat.frames if is_still else 1))
         heat = sum_heat(self._recent, self._size, self._settings.heat)
         regions = self._regions(heat)
-        found = Boxes(
+        boxes = Boxes(
             np.reshape([astuple(region.box) for region in regions], (-1, 4)),
             [self._settings.score.of(region.strength) for region in regions],
             data={
@@ -171,20 +171,20 @@ class SvmDetector:
             },
             trace=Trace(hits, heat, self.grids),
         )
-        return self._shown_in_still(found) if is_still else found
+        return self._shown_in_still(boxes) if is_still else boxes
 
     def stage_images(self, image: Image, detections: Boxes) -> dict[str, Image]:
         """Return three images of a frame, BGR uint8 `(H, W, 3)`: windows, hits, heat."""
         trace = detections.trace
         windows, hits = (image * 0.6).astype(np.uint8), image.copy()
         for number, grid in enumerate(trace.grids):
-            boxes, color = [Box.sized(*box) for box in grid.boxes.tolist()], color_of(number)
+            boxes, color = list(map(Box.of, from_xywh(grid.boxes).tolist())), color_of(number)
             draw_box(windows, boxes[0].union(boxes[-1]), color)
             example = boxes[number * grid.columns // len(trace.grids)]
             draw_box(windows, example, color, f"{grid.size} px: {len(grid)} windows")
+        hit_boxes = list(map(Box.of, from_xywh(trace.hits.boxes).tolist()))
         for row in np.argsort(trace.hits.probabilities).tolist():  # the most likely is on top
-            box = Box.sized(*trace.hits.boxes[row].tolist())
-            draw_box(hits, box, GREEN, f"{trace.hits.probabilities[row]:.2f}")
+            draw_box(hits, hit_boxes[row], GREEN, f"{trace.hits.probabilities[row]:.2f}")
         heat = blend_heat(image, trace.heat)
         draw_label(heat, f"peak {trace.heat.peak:.1f}", (0, 0), WHITE)
         return {"windows": windows, "hits": hits, "heat": heat}
@@ -196,12 +196,12 @@ class SvmDetector:
         inside = (replace(region, box=region.box.clipped(*self._size)) for region in regions)
         return [region for region in inside if region.box.area]
 
-    def _shown_in_still(self, found: Boxes) -> Boxes:
+    def _shown_in_still(self, boxes: Boxes) -> Boxes:
         """Return strong and large detections, without those nested in another."""
         settings = self._settings
         smallest = np.array(settings.min_size_still) * self._size
-        large = (found.sides[:, 2:] - found.sides[:, :2] >= smallest).all(axis=1)
-        shown = found[large & (found.scores >= settings.min_score_still)]
+        large = (boxes.sides[:, 2:] - boxes.sides[:, :2] >= smallest).all(axis=1)
+        shown = boxes[large & (boxes.scores >= settings.min_score_still)]
         return shown[~are_nested(shown.sides, shown.data["strength"])]
 
 
@@ -225,7 +225,7 @@ def shipped_model(settings: SvmSettings) -> Path:
 def load_svm(settings: SvmSettings, path: Path | None) -> SvmModel:
     """Load a linear model; `path` is its file, None for the shipped one.
 
-    Features in the settings must equal those of the model. Without any, the model's own are used.
+    Features in the settings must equal those of the model.
 
     Raises
     ------

@@ -148,7 +148,7 @@ def _read(archive: zipfile.ZipFile) -> LinearModel:
         FeatureSettings.model_validate(header["features"]),
         **{name: arrays[name] for name in _NAMES},
         provenance=header["provenance"],
-        box_regression=BoxRegression(*boxes) if boxes else None,
+        box_regression=BoxRegression(boxes[0], boxes[1]) if boxes else None,
     )
     _check_arrays(model)
     return model

@@ -6,6 +6,7 @@ import numpy as np
 from vdet.boxes import Image
 from vdet.config.detector import FeatureSettings
 from vdet.detect.svm.features import Channels, halve, resize, split
+from vdet.detect.svm.windows import Strip
 from vdet.media import Picture
 
 
@@ -41,20 +42,22 @@ class FramePyramid:
         rows = slice(top, picture.height if bottom is None else bottom)
         self._levels = _levels(picture, rows, margin)
 
-    def cut(self, rows: slice, columns: slice, width: int, height: int) -> Channels:
-        """Return a part of the frame, resized to `width` × `height`.
+    def cut(self, strip: Strip) -> Channels:
+        """Return a strip of the frame, resized.
 
-        `rows` and `columns` are pixels of the frame, columns may be negative. Each channel, or BGR,
-        equals `resize(channel[rows, columns], width, height)`. Halvings are shared by all cuts.
+        Each channel, or BGR, equals `resize(channel[rows, columns], width, height)`. Halvings are
+        shared by all cuts.
         """
         across, down = self._origin
+        rows, columns = strip.rows, strip.columns
         sides = rows.start + down, rows.stop + down, columns.start + across, columns.stop + across
         if len(self._levels) == 1:
-            return split(self._levels[0].cut(sides, width, height), self._features)
-        shrinks = map(self._features.shrink, range(3))
+            return split(self._levels[0].cut(sides, strip.width, strip.height), self._features)
         luma, red, blue = (
-            levels.cut(sides, width // shrink, height // shrink)
-            for levels, shrink in zip(self._levels, shrinks, strict=True)
+            levels.cut(sides, strip.width // shrink, strip.height // shrink)
+            for levels, shrink in zip(
+                self._levels, map(self._features.shrink, range(3)), strict=True
+            )
         )
         return luma, red, blue
 

@@ -8,6 +8,8 @@ searched as four such grids. Windows of other grids share only the gradients of 
 (`table_sums`).
 """
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 
@@ -16,7 +18,7 @@ from vdet.config.detector import FeatureSettings
 from vdet.detect.svm.features import Channels, hog_descriptors
 from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.pyramid import FramePyramid
-from vdet.detect.svm.windows import WINDOW_SIDES, IndexArray, WindowGrid
+from vdet.detect.svm.windows import WINDOW_SIDES, IndexArray, Strip, WindowGrid
 
 _MIN_SIDE = 0.2  # minimum side of a vehicle in a window, sides of the window
 
@@ -30,10 +32,18 @@ BATCH = 8192
 """Maximum number of windows whose vectors are in memory at once."""
 
 
-_Part = tuple[IndexArray, tuple[slice, slice, int, int], IndexArray, IndexArray]
-"""`n` windows of a grid that lie at whole pixels of one strip, in each channel of a patch: their
-numbers in the grid `(n,)`, the strip (see `WindowGrid.strip`), and x and y of their top-left pixels
-in it, `(n,)` each."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _Part:
+    """`n` windows of a grid that lie at whole pixels of one strip.
+
+    `numbers` `(n,)` are those in the grid; `x` and `y`, `(n,)` each, are the top-left pixels of the
+    windows in the strip.
+    """
+
+    numbers: IndexArray
+    strip: Strip
+    x: IndexArray
+    y: IndexArray
 
 
 class DenseSearch:
@@ -48,9 +58,9 @@ class DenseSearch:
             self._hog = Gradients
             n = (pixels / max(map(features.shrink, range(3)))).denominator
         self._model, self._count = model, len(grid)
-        self._weights, of_colours = np.split(model.weights, [features.hog_length], axis=1)
+        self._weights, color_weights = np.split(model.weights, [features.hog_length], axis=1)
         bins = features.histogram.bins
-        self._tables = np.repeat(of_colours.reshape(-1, 3, bins), 256 // bins, axis=2)
+        self._tables = np.repeat(color_weights.reshape(-1, 3, bins), 256 // bins, axis=2)
         self._parts = [
             _part(grid, features.patch, n, column, row)
             for row in range(min(n, grid.rows))
@@ -69,17 +79,16 @@ class DenseSearch:
         model, features = self._model, self._model.features
         probabilities = np.zeros(self._count, np.float32)
         sides = np.tile(WINDOW_SIDES, (self._count, 1))
-        for numbers, place, x, y in self._parts:
-            strip = frame.cut(*place)
+        for part in self._parts:
+            strip, x, y = frame.cut(part.strip), part.x, part.y
             hog = self._hog(strip, features)
             values = table_sums(strip, self._tables, features, x, y)
             values += hog.values(self._weights, x, y)
-            found = model.to_probabilities(values + model.biases)
-            probabilities[numbers] = found
-            hits = found >= probability
+            probabilities[part.numbers] = model.to_probabilities(values + model.biases)
+            hits = probabilities[part.numbers] >= probability
             if model.box_regression is not None and hits.any():
                 vectors = hog.vectors(x[hits], y[hits])
-                sides[numbers[hits]] = model.box_regression.sides(vectors)
+                sides[part.numbers[hits]] = model.box_regression.sides(vectors)
         return probabilities, sides
 
 
@@ -88,7 +97,7 @@ def _part(grid: WindowGrid, patch: int, n: int, column: int, row: int) -> _Part:
     numbers = np.arange(len(grid)).reshape(grid.rows, grid.columns)[row::n, column::n]
     pixels = int(n * grid.step * patch / grid.size)
     y, x = np.indices(numbers.shape).reshape(2, -1) * pixels
-    return numbers.ravel(), grid.every_nth(n, column, row).strip(patch), x, y
+    return _Part(numbers.ravel(), grid.every_nth(n, column, row).strip(patch), x, y)
 
 
 class Blocks:
@@ -117,11 +126,11 @@ class Blocks:
 
     def values(self, weights: Float32Array, x: IndexArray, y: IndexArray) -> Float32Array:
         """Return the HOG of windows times weights, `(m, h)` → float32 `(n, m)`."""
-        # A matrix product weights every block as if it lay in each place (i, j) of a window.
+        # A matrix product weights every block as if it lay at each position (i, j) of a window.
         columns, rows, length = self._blocks.shape
         side, count = self._features.blocks, len(weights)
-        by_place = weights.reshape(count, 3, side**2, -1).swapaxes(1, 2).reshape(-1, length)
-        planes = by_place @ self._blocks.reshape(-1, length).T
+        by_position = weights.reshape(count, 3, side**2, -1).swapaxes(1, 2).reshape(-1, length)
+        planes = by_position @ self._blocks.reshape(-1, length).T
         planes = planes.reshape(count, side, side, columns * rows)
         # Block (i, j) of the window that begins at block k is block k + i·rows + j.
         last = columns * rows - side + 1
@@ -149,8 +158,8 @@ class Gradients:
         """Return the HOG of windows as `FeatureExtractor` orders it, float32 `(n, h)`."""
         parts = []
         for number, (hog, channel) in enumerate(zip(self._descriptors, self._strip, strict=True)):
-            places = np.stack([x, y], axis=1) // self._features.shrink(number)
-            vectors = hog.compute(channel, locations=list(map(tuple, places.tolist())))
+            corners = np.stack([x, y], axis=1) // self._features.shrink(number)
+            vectors = hog.compute(channel, locations=list(map(tuple, corners.tolist())))
             parts.append(np.reshape(vectors, (len(x), -1)))
         return np.concatenate(parts, axis=1, dtype=np.float32)
 

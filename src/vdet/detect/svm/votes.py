@@ -2,10 +2,10 @@
 
 Each hit votes for the box of the vehicle in its window. A vote has two weights. `presence`, for the
 existence of a vehicle, is the probability of the hit, which soon approaches 1. `position`, for the
-place of the box, is unbounded, and is highest for the window that fits the vehicle best.
+position of the box, is unbounded, and is highest for the window that fits the vehicle best.
 
-The box with the most agreement is a vehicle. Its votes are averaged and removed, and the rest vote
-again. This is greedy non-maximum suppression that averages boxes instead of picking one, as
+The box with the most agreement is a vehicle. Its votes are averaged and removed, and the others
+vote again. This is greedy non-maximum suppression that averages boxes instead of picking one, as
 Viola & Jones merge detections ("Robust Real-Time Face Detection", 2004, section 5.6).
 """
 
@@ -48,7 +48,7 @@ class Votes:
     presence
         float64 `(n,)`: weight for the existence of a vehicle.
     position
-        float64 `(n,)`, above 0: weight for the place of the box.
+        float64 `(n,)`, above 0: weight for the sides of the box.
     """
 
     boxes: Float64Array
@@ -62,7 +62,7 @@ class Votes:
         Boxes are clipped to the frame of `size` (width and height, pixels), because windows can
         only guess how far a vehicle extends beyond it.
         """
-        boxes = from_xywh(np.concatenate([some.vehicles for some in hits]))
+        boxes = from_xywh(np.concatenate([hit.vehicles for hit in hits]))
         weights = np.concatenate([hit.weights for hit in hits], dtype=np.float64)
         probabilities = np.concatenate([hit.probabilities for hit in hits], dtype=np.float64)
         bounded = np.clip(probabilities, 1 - _MAX_PROBABILITY, _MAX_PROBABILITY)
@@ -93,15 +93,27 @@ def split_regions(regions: Sequence[HotRegion], votes: Votes, minimum: float) ->
     shows one of the two. `minimum` is the minimum weight of agreeing votes.
     """
     groups = _overlapping([region.box for region in regions])
-    found = [vehicle for group in groups for vehicle in _vehicles(votes.within(group), minimum)]
-    boxes = np.reshape([box for box, _, _ in found], (-1, 4))
-    position = np.array([weight for _, weight, _ in found])
-    parts: BoolArray = coverage(boxes, boxes) > _INSIDE
-    parts &= area(boxes) > area(boxes)[:, np.newaxis]
-    parts &= _FAR_STRONGER * position > position[:, np.newaxis]
-    kept = [found[row] for row in np.flatnonzero(~parts.any(axis=1))]
-    pairs = [(Box(*sides.tolist()), presence) for sides, _, presence in kept]
-    return [HotRegion(box.rounded, box.center, presence) for box, presence in pairs]
+    vehicles = [vehicle for group in groups for vehicle in _vehicles(votes.within(group), minimum)]
+    sides = np.reshape([vehicle.sides for vehicle in vehicles], (-1, 4))
+    position = np.array([vehicle.position for vehicle in vehicles])
+    is_part: BoolArray = coverage(sides, sides) > _INSIDE
+    is_part &= area(sides) > area(sides)[:, np.newaxis]
+    is_part &= _FAR_STRONGER * position > position[:, np.newaxis]
+    return [vehicles[row].region for row in np.flatnonzero(~is_part.any(axis=1))]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Vehicle:
+    """A box `(4,)` that votes agree on, and their weights of position and presence."""
+
+    sides: Float64Array
+    position: float
+    presence: float
+
+    @property
+    def region(self) -> HotRegion:
+        box = Box.of(self.sides.tolist())
+        return HotRegion(box.rounded, box.center, self.presence)
 
 
 def _overlapping(boxes: Iterable[Box]) -> list[list[Box]]:
@@ -110,7 +122,7 @@ def _overlapping(boxes: Iterable[Box]) -> list[list[Box]]:
     for box in boxes:
         joined, apart = [box], []
         for group in groups:
-            if any(box.intersection(other).area for other in group):
+            if any(box.intersection(member).area for member in group):
                 joined = group + joined
             else:
                 apart.append(group)
@@ -118,8 +130,8 @@ def _overlapping(boxes: Iterable[Box]) -> list[list[Box]]:
     return groups
 
 
-def _vehicles(votes: Votes, minimum: float) -> Iterator[tuple[Float64Array, float, float]]:
-    """Yield boxes `(4,)` that votes agree on, and their weights of position and presence."""
+def _vehicles(votes: Votes, minimum: float) -> Iterator[_Vehicle]:
+    """Yield the vehicles that votes agree on, the one with most agreement first."""
     overlaps = iou_matrix(votes.boxes, votes.boxes)
     presence, position = votes.presence.copy(), votes.position.copy()
     # Presence only falls: when no box has enough, no more will be found.
@@ -133,7 +145,7 @@ def _vehicles(votes: Votes, minimum: float) -> Iterator[tuple[Float64Array, floa
         used = np.maximum(around, overlaps[mode]) > _AGREEMENT
         used[mode] = True
         if weight >= minimum:
-            yield box, float(agreed[mode]), weight
+            yield _Vehicle(box, float(agreed[mode]), weight)
             used |= coverage(votes.boxes, box[np.newaxis])[:, 0] > _INSIDE
         presence[used] = position[used] = 0
 

@@ -10,7 +10,6 @@ of all sizes.
 import math
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -66,9 +65,23 @@ class Windows:
 
     def hits(self, probability: float) -> "Windows":
         """Return the windows with at least this probability, in the same order."""
-        keep = self.probabilities >= probability
-        columns: tuple[Any, ...] = self.boxes, self.probabilities, self.weights, self.vehicles
-        return Windows(*(column[keep] for column in columns))
+        rows = self.probabilities >= probability
+        return Windows(
+            self.boxes[rows], self.probabilities[rows], self.weights[rows], self.vehicles[rows]
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Strip:
+    """A part of a frame, `rows` and `columns`, and its size after resizing, pixels.
+
+    Columns may be outside the frame.
+    """
+
+    rows: slice
+    columns: slice
+    width: int
+    height: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,12 +116,8 @@ class WindowGrid:
         along = max(1.0, float(self.size / self.step))
         return 1 / (min(self.columns, along) * min(self.rows, along))
 
-    def strip(self, patch: int) -> tuple[slice, slice, int, int]:
-        """Return the strip of the grid: its rows and columns in the frame, its width and height.
-
-        It begins at the first window and ends with the last. Width and height are pixels at the
-        scale where a window has `patch` pixels.
-        """
+    def strip(self, patch: int) -> Strip:
+        """Return the strip from the first window to the last, with windows of `patch` pixels."""
 
         def extent(first: Fraction, count: int) -> tuple[slice, int]:
             start, span = round(first), (count - 1) * self.step + self.size
@@ -116,7 +125,7 @@ class WindowGrid:
 
         rows, height = extent(self.top, self.rows)
         columns, width = extent(self.left, self.columns)
-        return rows, columns, width, height
+        return Strip(rows, columns, width, height)
 
     def every_nth(self, n: int, column: int, row: int) -> "WindowGrid":
         """Return the grid of every n-th window, from this column and row on."""
@@ -125,22 +134,22 @@ class WindowGrid:
         return WindowGrid(self.size, self.step * n, left, top, columns, rows)
 
 
-def lay_grids(
+def window_grids(
     settings: SvmSettings, features: FeatureSettings, width: int, height: int, *, horizon: float
 ) -> list[WindowGrid]:
-    """Lay the window sets over a frame of `width` × `height` pixels.
+    """Return the grids of all window sets in a frame of `width` × `height` pixels.
 
     `horizon` is its row, as a fraction of the frame's height. Sets without a fitting window are
     omitted.
     """
     search = scale_lengths(settings.search, height / REFERENCE_HEIGHT)
-    grids = [lay_grid(window, width, height) for window in search.windows]
-    grids += lay_perspective(search.perspective, features, width, height, horizon=horizon)
+    grids = [band_grid(window, width, height) for window in search.windows]
+    grids += perspective_grids(search.perspective, features, width, height, horizon=horizon)
     return [grid for grid in grids if len(grid)]
 
 
-def lay_grid(settings: WindowSettings, width: int, height: int) -> WindowGrid:
-    """Lay the windows of a set over its band of rows and the width of the frame.
+def band_grid(settings: WindowSettings, width: int, height: int) -> WindowGrid:
+    """Return the windows of a set in its band of rows, over the width of the frame.
 
     Each product is truncated to a whole number: step = int(size·(1 - overlap)), buffer =
     int(size·overlap), count = int((span - buffer) / step) across and down, or fewer where fewer
@@ -168,10 +177,10 @@ def lay_grid(settings: WindowSettings, width: int, height: int) -> WindowGrid:
     return WindowGrid(size, Fraction(step), Fraction(0), Fraction(top), columns, rows)
 
 
-def lay_perspective(
+def perspective_grids(
     sets: PerspectiveSettings, features: FeatureSettings, width: int, height: int, *, horizon: float
 ) -> list[WindowGrid]:
-    """Lay the sets over a frame of `width` × `height` pixels.
+    """Return the grids of the perspective sets in a frame of `width` × `height` pixels.
 
     Windows lie inside the frame's rows, and may reach beyond its left and right. Sizes and first
     rows are rounded so that a set's strip can be halved exactly until a window is about as large as
@@ -199,9 +208,8 @@ def lay_perspective(
         step = Fraction(size, cells)
         beyond = int(_BEYOND * cells)
         columns = (width + 2 * beyond * step - size) // step + 1
-        wanted = round((_LOWEST - _HIGHEST) * cells) + 1
-        rows = min(wanted, (height - top - size) // step + 1)
+        rows = min(round((_LOWEST - _HIGHEST) * cells) + 1, (height - top - size) // step + 1)
         if size <= width and min(columns, rows) >= 1 and size not in {grid.size for grid in grids}:
-            place = -beyond * step, Fraction(top)
-            grids.append(WindowGrid(size, step, *place, int(columns), int(rows)))
+            left = -beyond * step
+            grids.append(WindowGrid(size, step, left, Fraction(top), int(columns), int(rows)))
     return grids

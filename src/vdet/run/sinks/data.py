@@ -41,6 +41,7 @@ class TrackSink(BaseSink):
     `[[x, y], …]`, pixels of the frame, the nearest point first.
     """
 
+    uses_traffic = False
     _file: BinaryIO | None = None
     _writer: TrackWriter
 
@@ -66,8 +67,8 @@ class TrackSink(BaseSink):
         """Add the tracks of a frame."""
         frame, clock = result.frame_tracks, self.traffic.clock
         if clock:
-            moment = clock.at(frame.time).isoformat(" ", "microseconds")
-            frame = replace(frame, facts={CLOCK: moment, **frame.facts})
+            clock_time = clock.at(frame.time).isoformat(" ", "microseconds")
+            frame = replace(frame, facts={CLOCK: clock_time, **frame.facts})
         self._writer.write(frame)
         if self._file is None:
             sys.stdout.flush()
@@ -96,9 +97,9 @@ class LabelSink(BaseSink):
 
     def write(self, result: FrameResult) -> None:
         """Add an image."""
-        place = self.context.places.get(result.source, Path(result.source.name))
+        name = self.context.places.get(result.source, Path(result.source.name))
         size = result.frame.picture.width, result.frame.picture.height
-        self._images.append(ImageTracks(place, size, result.tracks))
+        self._images.append(ImageTracks(name, size, result.tracks))
 
 
 LABELS = SinkKind(LabelSink, image_suffixes, "labels of images", takes="images")

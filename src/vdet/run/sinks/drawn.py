@@ -109,16 +109,18 @@ def draw_running_counts(surface: Surface, counter: "VehicleCounter") -> None:
     """Draw the lines and zones with their current counts; vehicles are drawn over them."""
     from vdet.pages.place import border_marks, draw_marks
 
-    found = counter.so_far()
-    marks = [mark for line in counter.lines for mark in border_marks(line, found)]
+    counts = counter.so_far()
+    marks = [mark for line in counter.lines for mark in border_marks(line, counts)]
     for zone in counter.zones:
-        enter, leave, appear, vanish = (found[zone.name, way] for way in zone.directions)
-        marks += border_marks(zone, found, f": {enter + appear - leave - vanish}")
+        enter, leave, appear, vanish = (counts[zone.name, way] for way in zone.directions)
+        marks += border_marks(zone, counts, f": {enter + appear - leave - vanish}")
     draw_marks(surface, marks)
 
 
 class VideoSink(BaseSink):
     """Draws on copies of the frames, and encodes them in a thread."""
+
+    uses_traffic = False  # it draws counts only if the settings have lines or zones
 
     def __enter__(self) -> Self:
         context = self.context

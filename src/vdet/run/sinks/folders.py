@@ -39,6 +39,7 @@ _THUMBNAIL = 200  # longer side of the picture of a vehicle, pixels
 class StagesSink(BaseSink):
     """Writes stage images of the first searched frame at or after the time `SinkContext.at`."""
 
+    uses_traffic = False
     _is_done = False
 
     def finish(self) -> None:
@@ -89,12 +90,12 @@ class CropSink(BaseSink):
     def __init__(self, path: Path, context: SinkContext) -> None:
         super().__init__(path, context)
         self._folder = context.files.stage_folder(path, _is_crop)
-        self._best = BestCrops()
+        self._crops = BestCrops()
         self._written: dict[int, tuple[float, Path]] = {}
 
     def finish(self) -> None:
         """Write the images of vehicles still shown, and name those of all recorded vehicles."""
-        self._write_all(self._best.end())
+        self._write_all(self._crops.end())
         for vehicle in self.traffic.vehicles:
             if vehicle.id in self._written:
                 time, path = self._written.pop(vehicle.id)
@@ -104,7 +105,7 @@ class CropSink(BaseSink):
 
     def write(self, result: FrameResult) -> None:
         """Look for better images in a frame."""
-        self._write_all(self._best.add(result.frame_tracks, result.frame.picture))
+        self._write_all(self._crops.add(result.frame_tracks, result.frame.picture))
 
     def _write_all(self, crops: list[Crop]) -> None:
         for crop in crops:

@@ -55,7 +55,7 @@ class SinkContext:
         Counts and speeds up to the latest result, and the records of vehicles, which are known when
         sinks finish; None for single images.
     facts
-        What the steps found out about the whole video; empty before sinks finish.
+        Results of steps about the whole video, by name; empty before sinks finish.
     places
         For single images: their paths below the input folders.
     stage_images
@@ -79,9 +79,12 @@ class BaseSink:
     """Base of most sinks: `finish` is called when the run ends without an error.
 
     `summary` is what a file over all videos of a batch needs from the output, as values for JSON.
+    `uses_traffic` is whether it uses `SinkContext.traffic`, apart from the clock. If no sink does,
+    a run counts and records vehicles only if the settings have lines or zones.
     """
 
     summary: Any = None
+    uses_traffic = True
 
     def __init__(self, path: Path, context: SinkContext) -> None:
         self.path = path
@@ -182,15 +185,15 @@ class SinkKind:
 
     def suffix_for(self, video: Path) -> str:
         """Return the ending of the output for a video: its own, if the sink can write it."""
-        is_known = not self.endings or video.suffix.lower() in self.endings
-        return video.suffix if is_known else self.endings[0]
+        is_allowed = not self.endings or video.suffix.lower() in self.endings
+        return video.suffix if is_allowed else self.endings[0]
 
     def takes_name(self, name: str) -> bool:
         """Return whether an output may have this name, without its folder."""
         if self.writes_standard_output and name == STANDARD_OUTPUT.name:
             return True
-        ends = [len(ending) for ending in self.endings if name.lower().endswith(ending)]
-        return not self.endings or 0 < max(ends, default=0) < len(name)
+        lengths = [len(ending) for ending in self.endings if name.lower().endswith(ending)]
+        return not self.endings or 0 < max(lengths, default=0) < len(name)
 
 
 def sink_kind(name: str) -> SinkKind:
@@ -206,7 +209,7 @@ def check_sinks(
     makes_folder: bool = False,
     inputs: FileIds = NO_FILES,
 ) -> None:
-    """Refuse outputs that cannot be written, before any work; arguments as in `check_output`.
+    """Reject outputs that cannot be written, before any work; arguments as in `check_output`.
 
     Raises
     ------
@@ -233,17 +236,17 @@ def check_sinks(
         makes = makes_folder or bool(kind.folder_pattern)
         check_output(path, overwrite=overwrite, makes_folder=makes, inputs=inputs)
         if os.path.lexists(path) and not kind.may_replace(path):
-            what = "was not written by vdet and will not be replaced; choose another name"
-            raise OutputError(f"{path}: {what}")
+            advice = "was not written by vdet and will not be replaced; choose another name"
+            raise OutputError(f"{path}: {advice}")
 
 
-def output_state(output: Output, place: Path | None = None) -> tuple[int, int] | None:
+def output_state(output: Output, staged: Path | None = None) -> tuple[int, int] | None:
     """Return the size in bytes and modification time of an output; None if it does not exist.
 
     The time is in nanoseconds since 1970. For a folder, they are the sum and the latest of the
-    files written by the sink. Staged outputs are at `place`.
+    files written by the sink. A staged output is at `staged`.
     """
-    pattern, path = sink_kind(output.sink).folder_pattern, place or output.path
+    pattern, path = sink_kind(output.sink).folder_pattern, staged or output.path
     if not (os.path.isdir if pattern else os.path.isfile)(path):  # its name may be too long
         return None
     states = [file.stat() for file in (path.glob(pattern) if pattern else [path])]

@@ -1,0 +1,232 @@
+"""The search of a video: which frames are searched, and when, in threads.
+
+Where nothing moves, fewer frames are searched, if the detector is stateless. The search of a
+segment has two phases: first its last frame, the key frame, then the frames between two key frames,
+if these differ.
+"""
+
+import math
+from collections import deque
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from concurrent.futures import Future
+from dataclasses import dataclass
+from functools import partial
+from statistics import fmean
+from typing import Any
+
+from vdet.boxes import Boxes, iou_matrix
+from vdet.detect.protocol import VideoDetector
+from vdet.media import Frame
+from vdet.run.steps import ParallelStep, Step
+from vdet.run.threads import SearchThreads
+
+_INTERVALS = 25
+"""Number of the latest frame intervals whose trimmed mean is the usual interval."""
+
+_TOLERANCE = 0.1
+"""Tolerance of the distance between searches, 1 / `searches`, in frames.
+
+With 12 searches per second, every second frame is searched at 23.976 frames/s, as at 24. In the
+same way, `MAX_KEY_INTERVAL` may be exceeded by this fraction of the usual distance between
+searches.
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class SearchRate:
+    """How often the frames of a video are searched; the first frame always is.
+
+    Frames are chosen by their times, because the declared frame rate of a file may be wrong.
+
+    Attributes
+    ----------
+    searches
+        Minimum number of searches per second; None for every frame.
+    stride
+        Search every `stride`-th frame; overrides `searches`. None to use `searches`.
+    """
+
+    searches: float | None = None
+    stride: int | None = None
+
+    def choose(self, frames: Iterable[Frame]) -> Iterator[tuple[Frame, bool]]:
+        """Yield each frame, and whether it is searched.
+
+        Raises
+        ------
+        ValueError
+            A time is not a finite number, or is not later than that of the previous frame.
+        """
+        intervals: deque[float] = deque(maxlen=_INTERVALS)
+        previous_time, since_search = None, 0.0  # seconds
+        for position, frame in enumerate(frames):
+            if previous_time is not None:
+                intervals.append(float(frame.time - previous_time))
+                if not 0 < intervals[-1] < math.inf:
+                    raise ValueError(
+                        f"frame {frame.index} at {float(frame.time):g} s is not after the last one"
+                    )
+                since_search += intervals[-1]
+            previous_time = frame.time
+            is_searched = self._is_due(position, since_search, intervals)
+            since_search = 0.0 if is_searched else since_search
+            yield frame, is_searched
+
+    def _is_due(self, position: int, since_search: float, intervals: Sequence[float]) -> bool:
+        if self.stride is not None:
+            return position % self.stride == 0
+        if self.searches is None or not position:
+            return True
+        ordered, quarter = sorted(intervals), len(intervals) // 4
+        usual = fmean(ordered[quarter : len(ordered) - quarter])  # a few odd ones do not change it
+        longest = 1 / self.searches
+        distance = max(1, int(longest / usual + _TOLERANCE))  # frames
+        return since_search >= min((distance - 0.5) * usual, longest)
+
+
+MAX_KEY_INTERVAL = 0.25
+"""Maximum time between the searches of two key frames, seconds."""
+
+_MAX_SEGMENT = 16
+"""Maximum number of frames of a segment: they are in memory together."""
+
+_MIN_SCORE = 0.15
+"""Minimum score of the boxes by which two key frames are compared."""
+
+_SAME_IOU = 0.9
+"""Minimum intersection over union of two boxes in the same place."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Segment:
+    """Consecutive frames.
+
+    Attributes
+    ----------
+    frames
+        Each with whether the search rate chooses it.
+    has_key
+        Whether the last frame is a key frame. If it shows the same as the key frame of the segment
+        before, the frames between the two are not searched.
+    """
+
+    frames: Sequence[tuple[Frame, bool]]
+    has_key: bool = False
+
+
+def segments(chosen: Iterable[tuple[Frame, bool]], key_interval: float) -> Iterator[Segment]:
+    """Yield frames in segments that end with a chosen frame.
+
+    A segment is as long as possible with at most `key_interval` seconds between key frames. With 0,
+    it has one chosen frame. Very long segments, and the last one, may end with any frame.
+    """
+    frames: list[tuple[Frame, bool]] = []
+    last_search = end = -math.inf  # times of the last search, and of the end of the last segment
+    for frame, is_chosen in chosen:
+        frames.append((frame, is_chosen))
+        is_full = len(frames) >= _MAX_SEGMENT
+        if is_chosen:
+            time = float(frame.time)
+            next_search = time + (1 - _TOLERANCE) * (time - last_search)
+            is_full |= next_search - end > key_interval
+            last_search = time
+        if is_full:
+            yield Segment(frames, has_key=is_chosen)
+            frames, end = [], last_search
+    if frames:
+        yield Segment(frames)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SearchedFrame:
+    """A frame after its search, or a frame that is not searched.
+
+    `detections` are known if the detector is stateless; otherwise it makes them from `candidates`,
+    in the order of the frames.
+    """
+
+    frame: Frame
+    is_searched: bool = False
+    candidates: Any = None
+    detections: Boxes | None = None
+
+
+def shows_same(before: Boxes, after: Boxes) -> bool:
+    """Return whether two frames show the same vehicles in the same places."""
+    a, b = (boxes.sides[boxes.scores >= _MIN_SCORE] for boxes in (before, after))
+    in_place = iou_matrix(a, b) >= _SAME_IOU
+    return len(a) == len(b) and bool(in_place.any(axis=0).all())
+
+
+class FrameSearch:
+    """Searches the frames of one video in threads.
+
+    Parameters
+    ----------
+    steps
+        Those of the video: the parallel ones prepare all frames.
+    threads
+        Number of frames searched at once. The results do not depend on it. At most this number of
+        segments, and one more, are in memory.
+    """
+
+    def __init__(
+        self, detector: VideoDetector, steps: Sequence[Step], rate: SearchRate, threads: int
+    ) -> None:
+        self._detector, self._rate, self._threads = detector, rate, threads
+        self._steps = [step for step in steps if isinstance(step, ParallelStep)]
+        self._is_stateless = getattr(detector, "is_stateless", False)
+        self._first_phase: deque[tuple[Segment, Future[SearchedFrame]]] = deque()
+        self._second_phase: deque[list[Callable[[], SearchedFrame]]] = deque()
+        self._key_before: Boxes | None = None
+
+    def search(self, frames: Iterable[Frame]) -> Generator[SearchedFrame]:
+        """Yield the frames in their order, after their search.
+
+        Raises `ValueError` if their times do not increase.
+        """
+        may_skip = self._is_stateless and self._rate.searches and self._rate.stride is None
+        parts = segments(self._rate.choose(frames), MAX_KEY_INTERVAL if may_skip else 0)
+        with SearchThreads(self._threads) as pool:
+            for segment in parts:
+                self._first_phase.append((segment, pool.call(self._search_last, segment)))
+                if len(self._first_phase) + len(self._second_phase) > self._threads:
+                    yield from self._finish_segment(pool)
+            while self._first_phase or self._second_phase:
+                yield from self._finish_segment(pool)
+
+    def _finish_segment(self, pool: SearchThreads) -> list[SearchedFrame]:
+        self._begin_second_phases(pool)
+        finished = [result() for result in self._second_phase[0]]
+        self._begin_second_phases(pool)  # threads stay busy while the caller uses the frames
+        self._second_phase.popleft()
+        return finished
+
+    def _begin_second_phases(self, pool: SearchThreads) -> None:
+        """Begin the second phase of segments after their first one; wait for at least one."""
+        while self._first_phase and (self._first_phase[0][1].done() or not self._second_phase):
+            segment, last = self._first_phase.popleft()
+            key, before = last.result().detections if segment.has_key else None, self._key_before
+            is_still = before is not None and key is not None and shows_same(before, key)
+            self._key_before = key
+            between = [
+                pool.call(self._search, frame).result
+                if is_chosen and not is_still
+                else partial(SearchedFrame, frame)
+                for frame, is_chosen in segment.frames[:-1]
+            ]
+            self._second_phase.append([*between, last.result])
+
+    def _search_last(self, segment: Segment) -> SearchedFrame:
+        """Do the first phase: prepare all frames, and search the last one if it is chosen."""
+        for step in self._steps:
+            for frame, _ in segment.frames:
+                step.prepare(frame)
+        frame, is_chosen = segment.frames[-1]
+        return self._search(frame) if is_chosen else SearchedFrame(frame)
+
+    def _search(self, frame: Frame) -> SearchedFrame:
+        candidates = self._detector.search(frame.picture, frame.index)
+        if self._is_stateless:
+            return SearchedFrame(frame, True, detections=self._detector.detect(candidates))
+        return SearchedFrame(frame, True, candidates)
