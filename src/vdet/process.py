@@ -25,7 +25,7 @@ def run() -> NoReturn:
     for name, value in SINGLE_THREADED.items():
         os.environ.setdefault(name, value)
     # A killed worker leaves semaphores, which loky removes with a warning that users do not need.
-    sys.warnoptions.append("ignore::UserWarning:loky.backend.resource_tracker")
+    sys.warnoptions.append("ignore::UserWarning:joblib.externals.loky.backend.resource_tracker")
     for number in _signals():
         signal.signal(number, _interrupt)
     if CAN_WAKE:
