@@ -225,7 +225,7 @@ def _dask_backend(client: Any) -> Any:
     from distributed import KilledWorker
     from joblib.parallel import ParallelBackendBase
 
-    class DaskBackend(ParallelBackendBase):
+    class DaskBackend(ParallelBackendBase):  # type: ignore[misc]
         supports_retrieve_callback = True
 
         def effective_n_jobs(self, n_jobs: int) -> int:
