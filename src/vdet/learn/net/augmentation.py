@@ -82,7 +82,7 @@ class SampleDrawer:
             sample = _place(rng, self._pick(rng), (drawing.width, drawing.height), scale)
         if rng.random() < 0.5:
             sample = _mirrored(sample)
-        sample = _with_signs(rng, self._paster.paste(rng, sample))
+        sample = with_signs(rng, self._paster.paste(rng, sample))
         sides = sample.boxes[:, 2:] - sample.boxes[:, :2]
         may_have_lamps = ~sample.ignored & (sides[:, 0] > 0.45 * sides[:, 1])  # people have none
         image = _recolored(rng, sample.image)
@@ -204,7 +204,7 @@ def _paste(rng: np.random.Generator, sample: NetSample, donor: NetSample, row: i
     )
 
 
-def _with_signs(rng: np.random.Generator, sample: NetSample) -> NetSample:
+def with_signs(rng: np.random.Generator, sample: NetSample) -> NetSample:
     """Sometimes draw signs into the image of a sample; they cover no object."""
     if rng.random() >= _SIGNS:
         return sample
