@@ -244,14 +244,16 @@ def test_a_checkpoint_of_another_training_is_refused(tmp_path: Path) -> None:
     source, path = [block_source(4)], tmp_path / "net.ckpt"
     train_network(source, settings, path)
     other = settings.model_copy(update={"learning_rate": 1e-4})
-    with pytest.raises(DataError, match=r"net\.ckpt: belongs to a training with other settings"):
+    with pytest.raises(
+        DataError, match=r"net\.ckpt: belongs to a training run with other settings"
+    ):
         train_network(source, other, path)
-    with pytest.raises(DataError, match=r"net\.ckpt: belongs to a training with .* base"):
+    with pytest.raises(DataError, match=r"net\.ckpt: belongs to a training run with .* base"):
         train_network(source, settings, path, base=tmp_path / "base.onnx")
-    with pytest.raises(DataError, match=r"net\.ckpt: belongs to a training with .* images"):
+    with pytest.raises(DataError, match=r"net\.ckpt: belongs to a training run with .* images"):
         train_network([block_source(5)], settings, path)
     path.write_bytes(b"junk")
-    with pytest.raises(DataError, match=r"net\.ckpt: is not a checkpoint of this training"):
+    with pytest.raises(DataError, match=r"net\.ckpt: is not a checkpoint of this training run"):
         train_network(source, settings, path)
 
 

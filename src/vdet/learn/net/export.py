@@ -76,7 +76,7 @@ def export_network(
 def write_model(
     model: onnx.ModelProto, header: Header, path: Path, *, overwrite: bool = False
 ) -> None:
-    """Write the graph of a network of ours with a header. Raises `OutputError`."""
+    """Write the graph of a network of vdet train-net with a header. Raises `OutputError`."""
     text = json.dumps(header.model_dump(mode="json"))
     onnx.helper.set_model_props(model, {HEADER_KEY: text})
     onnx.checker.check_model(model)

@@ -46,10 +46,10 @@ def draw_sign(rng: np.random.Generator, image: Image) -> tuple[Image, Float64Arr
     placing = np.array([[scale[0], slant[0] * scale[1], x], [slant[1] * scale[0], scale[1], y]])
     shown = image.copy()
     if rng.random() < 0.7:  # a post
-        foot = round(x + wide / 2), round(y + tall / 2)
-        end = foot[0], min(height, round(y + tall * rng.uniform(1.5, 6)))
+        start = round(x + wide / 2), round(y + tall / 2)
+        end = start[0], min(height, round(y + tall * rng.uniform(1.5, 6)))
         thickness = max(1, round(min(wide, tall) * rng.uniform(0.04, 0.12)))
-        cv2.line(shown, foot, end, (int(rng.integers(60, 190)),) * 3, thickness, cv2.LINE_AA)
+        cv2.line(shown, start, end, (int(rng.integers(60, 190)),) * 3, thickness, cv2.LINE_AA)
     light = rng.uniform(0.45, 1.1)
     blur = 0.35 / float(scale.min())  # so that the sign is as sharp as the image
     layers = [cv2.GaussianBlur(layer, (0, 0), blur) for layer in (sign, opacity)]
