@@ -18,8 +18,6 @@ from vdet.errors import INTERRUPTED, ClusterError
 
 T = TypeVar("T")
 R = TypeVar("R")
-StartCalls = Callable[..., Generator[Any]]
-"""Starts delayed calls with options of `joblib.Parallel`; returns the generator of results."""
 
 PARENT_CHECK_INTERVAL = 0.5  # seconds
 SINGLE_THREADED = {"OPENBLAS_NUM_THREADS": "1", "OPENCV_FOR_THREADS_NUM": "1"}
@@ -78,8 +76,8 @@ class Workers(Protocol):
     def at_once(self) -> int | None:
         """Maximum number of items in work at a time; None: all."""
 
-    def open(self) -> contextlib.AbstractContextManager[StartCalls]:
-        """Connect to them; yield a function that starts calls in them."""
+    def open(self) -> contextlib.AbstractContextManager[Any]:
+        """Connect to them; yield a backend of joblib."""
 
 
 def call_all(
@@ -88,43 +86,46 @@ def call_all(
     """Yield every item with its result, in order of completion.
 
     The result is None for an item that kills its process. When a process is killed, any of the
-    items in work may be the cause. They are called again, one by one, to find the cause, so an item
-    may be called twice. An error raised by `function` is raised here.
+    items in work may be the cause. They are called again, one by one, to find it, so an item may be
+    called twice. An error raised by `function` is raised here.
     """
     remaining = dict(enumerate(items))
-    with workers.open() as start:
+    with workers.open() as backend:
         while remaining:
-            for number, result in _call(start, function, remaining, workers.at_once):
+            for number, result in _call(function, remaining, backend, workers.at_once):
                 yield remaining.pop(number), result
             for number in list(remaining)[: workers.at_once]:  # a process was killed
                 item = remaining.pop(number)
-                results = dict(_call(start, function, {number: item}, at_once=1))
-                yield item, results.get(number)
+                yield item, dict(_call(function, {number: item}, backend, 1)).get(number)
 
 
 def _call(
-    start: StartCalls, function: Callable[[T], R], items: Mapping[int, T], at_once: int | None
+    function: Callable[[T], R], items: Mapping[int, T], backend: Any, at_once: int | None
 ) -> Generator[tuple[int, R]]:
-    """Yield the results of numbered items; those that a killed process leaves out are missing."""
-    from joblib import delayed
+    """Yield the results of numbered items; those lost with a killed process are missing."""
+    from joblib import Parallel, delayed
 
+    parallel = Parallel(
+        n_jobs=max(2, at_once or 0),  # one job would run in this process
+        backend=backend,
+        pre_dispatch=at_once or "all",
+        batch_size=1,
+        return_as="generator_unordered",
+    )
     calls = [delayed(_numbered)(number, function, item) for number, item in items.items()]
-    results = None
-    try:
-        results = start(
-            calls,
-            n_jobs=max(2, at_once or 0),  # one job would run in this process
-            pre_dispatch=at_once or "all",
-            batch_size=1,
-            return_as="generator_unordered",
-        )
+    handler = signal.signal(signal.SIGINT, signal.SIG_IGN)  # for the processes that start
+    with contextlib.suppress(BrokenExecutor), contextlib.ExitStack() as stack:
+        try:
+            results = parallel(calls)
+        finally:
+            signal.signal(signal.SIGINT, handler)
+        stack.callback(_close, results)
         yield from filter(None, results)
-    except BrokenExecutor:
-        return
-    finally:
-        with warnings.catch_warnings(action="ignore"):  # about calls that it cancels
-            if results:
-                results.close()
+
+
+def _close(results: Generator[Any]) -> None:
+    with warnings.catch_warnings(action="ignore"):  # about calls that it cancels
+        results.close()
 
 
 def _numbered(number: int, function: Callable[[T], R], item: T) -> tuple[int, R]:
@@ -135,29 +136,21 @@ def _numbered(number: int, function: Callable[[T], R], item: T) -> tuple[int, R]
 class LocalProcesses:
     """`at_once` processes of this machine; only the main thread can start them.
 
-    They ignore Ctrl-C in a terminal, because their parent ends them, and end soon after it.
+    They ignore Ctrl-C in a terminal, because their parent ends them, and end when it does.
     """
 
     at_once: int
 
     @contextlib.contextmanager
-    def open(self) -> Iterator[StartCalls]:
-        """Yield a function that starts the processes; at the end of the block they are killed."""
-        from joblib import Parallel, parallel_config
+    def open(self) -> Iterator[Any]:
+        """Yield a backend that starts the processes; at the end of the block they are killed."""
         from joblib.externals.loky import get_reusable_executor
-
-        def start(calls: Iterable[Any], **options: Any) -> Generator[Any]:
-            with parallel_config("loky", inner_max_num_threads=1):
-                parallel = Parallel(**options, initializer=_initialize, initargs=(os.getpid(),))
-            handler = signal.signal(signal.SIGINT, signal.SIG_IGN)  # for the processes that start
-            try:
-                results: Generator[Any] = parallel(calls)
-            finally:
-                signal.signal(signal.SIGINT, handler)
-            return results
+        from joblib.parallel import LokyBackend
 
         try:
-            yield start
+            yield LokyBackend(
+                inner_max_num_threads=1, initializer=_initialize, initargs=(os.getpid(),)
+            )
         finally:
             get_reusable_executor().shutdown(kill_workers=True)
 
@@ -186,7 +179,7 @@ class DaskCluster:
     at_once: int | None = None
 
     @contextlib.contextmanager
-    def open(self) -> Iterator[StartCalls]:
+    def open(self) -> Iterator[Any]:
         """Connect to the scheduler; at the end of the block it drops items that have not begun.
 
         Raises
@@ -198,8 +191,6 @@ class DaskCluster:
             from distributed import Client
         except ImportError as error:
             raise ClusterError("--scheduler needs Dask; pip install dask distributed") from error
-        from joblib import Parallel
-
         for name in ("distributed", "distributed.client"):
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # errors are raised
         with contextlib.ExitStack() as stack:
@@ -210,9 +201,8 @@ class DaskCluster:
                 advice = "start them with `dask scheduler` and `dask worker`"
                 lack = f"no Dask scheduler with a worker responds; {advice}"
                 raise ClusterError(f"{self.address}: {lack}") from error
-            backend = _dask_backend(client)
             try:
-                yield lambda calls, **options: Parallel(**options, backend=backend)(calls)
+                yield _dask_backend(client)
             except CancelledError as error:
                 raise ClusterError(f"{self.address}: the scheduler has ended; run again") from error
 

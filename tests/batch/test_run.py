@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from joblib.parallel import SequentialBackend
 
 from red_cars import red_settings
 from running import names, write_drive
@@ -18,7 +19,6 @@ from vdet.errors import BatchError, OutputError
 from vdet.run.sinks import Output, data
 from vdet.run.sinks.protocol import BatchTotal
 from vdet.run.video import Run
-from vdet.workers import StartCalls
 
 OUTPUTS = Output("tracks", Path(".csv")), Output("vehicles", Path(".cars.json"))
 
@@ -32,8 +32,8 @@ class InTurn:
     at_once = 1
 
     @contextmanager
-    def open(self) -> Iterator[StartCalls]:
-        yield lambda calls, **_: (call(*arguments) for call, arguments, _ in calls)
+    def open(self) -> Iterator[SequentialBackend]:
+        yield SequentialBackend()
 
 
 @pytest.fixture

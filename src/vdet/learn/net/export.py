@@ -10,7 +10,6 @@ import json
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
@@ -111,31 +110,21 @@ def start_from(network: Network, path: Path, images: Tensor, classes: Sequence[s
         biases = {}
         folded_convolutions = _folded_convolutions(onnx.load(str(path)).graph)
         layers = _layers_in_order(network, images)
-        for layer, folded in zip(layers, folded_convolutions, strict=True):
-            if layer.norm is None:
-                _load_head(layer.convolution, folded, columns)
-                continue
-            factor = 255 if layer.convolution is network.stem else 1
-            _load_weight(layer.convolution.weight, factor * folded.weight)
-            biases[layer.norm] = folded.bias
+        for (layer, norm), (weight, bias) in zip(layers, folded_convolutions, strict=True):
+            if norm is None:  # a head
+                for column, base_column in columns:
+                    _load(layer.weight[column : column + 1], weight[[base_column]])
+                    layer.bias[column] = bias[base_column]
+            else:
+                _load(layer.weight, 255 * weight if layer is network.stem else weight)
+                biases[norm] = bias
         _calibrate(network, biases, images)
     except Exception as error:  # onnx and torch raise many kinds for a file of another form
         raise DataError(f"{path}: is not a network of vdet train-net") from error
 
 
-@dataclass(frozen=True, slots=True)
-class _FoldedConvolution:
-    """A convolution that includes its normalisation.
-
-    `weight` is float32 `(outputs, inputs, height, width)`, `bias` is float32 `(outputs,)`.
-    """
-
-    weight: Tensor
-    bias: Tensor
-
-
-def _folded_convolutions(graph: onnx.GraphProto) -> list[_FoldedConvolution]:
-    """Return the convolutions in the order of the graph."""
+def _folded_convolutions(graph: onnx.GraphProto) -> list[tuple[Tensor, Tensor]]:
+    """Return the weight and bias of all convolutions, in the order of the graph."""
     constants = {item.name: numpy_helper.to_array(item) for item in graph.initializer}
     convolutions = []
     for node in graph.node:
@@ -143,27 +132,24 @@ def _folded_convolutions(graph: onnx.GraphProto) -> list[_FoldedConvolution]:
             constants[node.output[0]] = constants[node.input[0]]
         elif node.op_type == "Conv":
             weight, bias = (torch.tensor(constants[name]) for name in node.input[1:3])
-            convolutions.append(_FoldedConvolution(weight, bias))
+            convolutions.append((weight, bias))
     return convolutions
 
 
-@dataclass(frozen=True, slots=True)
-class _Layer:
-    """A convolution, and the normalisation after it; a head has none."""
+def _layers_in_order(
+    network: Network, images: Tensor
+) -> list[tuple[nn.Conv2d, nn.BatchNorm2d | None]]:
+    """Return all convolutions, each with its normalisation, in the order in which they compute.
 
-    convolution: nn.Conv2d
-    norm: nn.BatchNorm2d | None
-
-
-def _layers_in_order(network: Network, images: Tensor) -> list[_Layer]:
-    """Return the layers in the order in which they compute, which is that of the graph."""
+    That is the order of the graph. Heads have no normalisation.
+    """
     computed: list[nn.Module] = []
     kinds = nn.Conv2d | nn.BatchNorm2d
     modules = [module for module in network.modules() if isinstance(module, kinds)]
     with _before_each(modules, lambda module, _: computed.append(module)):
         network(images)
     return [
-        _Layer(module, following if isinstance(following, nn.BatchNorm2d) else None)
+        (module, following if isinstance(following, nn.BatchNorm2d) else None)
         for module, following in zip_longest(computed, computed[1:])
         if isinstance(module, nn.Conv2d)
     ]
@@ -182,7 +168,7 @@ def _before_each(
             hook.remove()
 
 
-def _load_weight(weight: Tensor, values: Tensor) -> None:
+def _load(weight: Tensor, values: Tensor) -> None:
     """Set the first channels of a weight; they do not depend on further inputs."""
     outputs, inputs = values.shape[:2]
     weight[:outputs] = 0
@@ -195,15 +181,6 @@ def _matching_columns(classes: Sequence[str], base_classes: Sequence[str]) -> li
     return [(column, column) for column in range(5)] + [
         (5 + classes.index(name), 5 + base_classes.index(name)) for name in shared
     ]
-
-
-def _load_head(
-    head: nn.Conv2d, folded: _FoldedConvolution, columns: Sequence[tuple[int, int]]
-) -> None:
-    """Set the columns of a head that its base has too."""
-    for column, base_column in columns:
-        _load_weight(head.weight[column : column + 1], folded.weight[[base_column]])
-        head.bias[column] = folded.bias[base_column]
 
 
 def _calibrate(network: Network, biases: Mapping[nn.Module, Tensor], images: Tensor) -> None:
