@@ -1,4 +1,4 @@
-"""Signals and file locks that only some systems have; elsewhere, vdet does without."""
+"""Signals and file locks that only some systems have; elsewhere, vdet runs without them."""
 
 import contextlib
 import os
@@ -17,6 +17,22 @@ ENDING_SIGNALS = [signal.Signals[name] for name in _ENDING if hasattr(signal, na
 
 CAN_WAKE = hasattr(signal, "pthread_kill")
 """Whether a thread can send the main thread a signal, which ends a wait."""
+
+
+@contextlib.contextmanager
+def blocked_interrupts() -> Iterator[None]:
+    """Delay Ctrl-C to the end of the block; processes that start in the block never get it."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    from multiprocessing.resource_tracker import ensure_running
+
+    ensure_running()  # if it started in the block, it would unblock signals
+    earlier = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, earlier)
 
 
 def lock(descriptor: int) -> bool:

@@ -4,7 +4,6 @@ import contextlib
 import logging
 import math
 import os
-import signal
 import threading
 import time
 import warnings
@@ -15,6 +14,7 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 from vdet.errors import INTERRUPTED, ClusterError
+from vdet.system import blocked_interrupts
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -87,7 +87,7 @@ def call_all(
 
     The result is None for an item that kills its process. When a process is killed, any of the
     items in work may be the cause. They are called again, one by one, to find it, so an item may be
-    called twice. An error raised by `function` is raised here.
+    called twice. An error raised by `function` is raised here. Only the main thread can call this.
     """
     remaining = dict(enumerate(items))
     with workers.open() as backend:
@@ -113,13 +113,10 @@ def _call(
         return_as="generator_unordered",
     )
     calls = [delayed(_numbered)(number, function, item) for number, item in items.items()]
-    handler = signal.signal(signal.SIGINT, signal.SIG_IGN)  # for the processes that start
     with contextlib.suppress(BrokenExecutor), contextlib.ExitStack() as stack:
-        try:
+        with blocked_interrupts():  # also in the processes that start
             results = parallel(calls)
-        finally:
-            signal.signal(signal.SIGINT, handler)
-        stack.callback(_close, results)
+            stack.callback(_close, results)
         yield from filter(None, results)
 
 
@@ -134,7 +131,7 @@ def _numbered(number: int, function: Callable[[T], R], item: T) -> tuple[int, R]
 
 @dataclass(frozen=True, slots=True)
 class LocalProcesses:
-    """`at_once` processes of this machine; only the main thread can start them.
+    """`at_once` processes of this machine.
 
     They ignore Ctrl-C in a terminal, because their parent ends them, and end when it does.
     """

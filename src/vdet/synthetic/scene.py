@@ -6,7 +6,7 @@ surface and the plants beside it repeat every `PERIOD` metres, so a clip may hav
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from fractions import Fraction
 
 import numpy as np
@@ -116,19 +116,12 @@ class SceneVehicle:
 
     def position(self, time: float) -> Waypoint | None:
         """Return where it is at `time`, or None while it does not exist."""
-        times = [point.time for point in self.path]
+        points = np.array([astuple(point) for point in self.path])
+        times = points[:, 0]
         if not times[0] <= time <= times[-1]:
             return None
-
-        def at_time(values: list[float]) -> float:
-            return float(np.interp(time, times, values))
-
-        return Waypoint(
-            time,
-            ahead=at_time([point.ahead for point in self.path]),
-            lateral=at_time([point.lateral for point in self.path]),
-            heading=at_time([point.heading for point in self.path]),
-        )
+        ahead, lateral, heading = (np.interp(time, times, column) for column in points[:, 1:].T)
+        return Waypoint(time, float(ahead), float(lateral), float(heading))
 
 
 @dataclass(frozen=True, slots=True)
