@@ -79,10 +79,10 @@ def note(source: str, *outputs: Output, made_by: str = "") -> None:
         "now",
         outputs=tuple(
             Written(
-                sink=output.sink,
-                path=str(output.path.absolute()),
-                bytes=size,
-                changed=changed,
+                output.sink,
+                str(output.path.absolute()),
+                size,
+                changed,
                 digest=made_by or digest(Run(Path(source))),
             )
             for output in outputs

@@ -82,10 +82,9 @@ def is_up_to_date(run: Run, written: WrittenByPath) -> bool:
     """Return whether the outputs of a run have their recorded sizes and the current digest."""
     digest = result_digest(run)
     for output in run.outputs:
-        state, versions = output_state(output), written.get(os.path.realpath(output.path))
-        if not (state and versions):
-            return False
-        if (versions[-1].digest, versions[-1].bytes) != (digest, state[0]):
+        size, _ = output_state(output) or (None, None)
+        latest = written.get(os.path.realpath(output.path), [None])[-1]
+        if size is None or latest is None or (latest.digest, latest.bytes) != (digest, size):
             return False
     return True
 
@@ -142,16 +141,8 @@ def _written(run: Run, record: Record, files: OutputFiles) -> Record:
     written = []
     for output in run.outputs:
         size, changed = output_state(output, files.place_of(output.path)) or (0, 0)
-        written.append(
-            Written(
-                sink=output.sink,
-                path=str(output.path.absolute()),
-                bytes=size,
-                changed=changed,
-                digest=digest,
-                summary=totals.summaries[output.path],
-            )
-        )
+        path, summary = str(output.path.absolute()), totals.summaries[output.path]
+        written.append(Written(output.sink, path, size, changed, digest, summary))
     return replace(
         record,
         seconds=round(totals.seconds, 3),
