@@ -90,7 +90,7 @@ def _matching(pattern: Path) -> Iterator[InputVideo]:
 
 
 def _below(folder: Path, base: Path) -> Iterator[InputVideo]:
-    for root, folders, names in os.walk(folder, onerror=_refuse_unreadable):
+    for root, folders, names in os.walk(folder, onerror=_reject_unreadable):
         folders[:] = [name for name in folders if not name.startswith(".")]
         videos = [path for name in names if _is_video(path := Path(root, name))]
         for path in videos:
@@ -118,5 +118,5 @@ def _is_video(path: Path) -> bool:
     return path.suffix.lower() in VIDEO_INPUT_SUFFIXES and not is_skipped
 
 
-def _refuse_unreadable(error: OSError) -> None:
+def _reject_unreadable(error: OSError) -> None:
     raise BatchError(f"{error.filename}: cannot be read: {error.strerror}; remove it") from error

@@ -89,7 +89,7 @@ def make_plan(
     settings = common.settings.with_paths(lambda path: str(Path(path).absolute()))
     load_detector(settings.detector)
     sources = find_sources(clips)
-    _refuse_nested(clips, sources, folder)
+    _reject_nested(clips, sources, folder)
     runs = [
         replace(
             common,
@@ -107,7 +107,7 @@ def make_plan(
         for ending in [output.path.name]
         if (kind := sink_kind(output.sink).total)
     )
-    _refuse_shared(runs, totals, folder)
+    _reject_shared(runs, totals, folder)
     manifest, skipped = folder / MANIFEST, []
     check_output(manifest, overwrite=True, makes_folder=True)
     if skip_existing:
@@ -132,7 +132,7 @@ def _named(output: Output, video: Path) -> Output:
     return replace(output, path=video.with_suffix(ending))
 
 
-def _refuse_nested(clips: Iterable[Path], sources: Iterable[InputVideo], folder: Path) -> None:
+def _reject_nested(clips: Iterable[Path], sources: Iterable[InputVideo], folder: Path) -> None:
     inner = folder.resolve()
     for clip in clips:
         if clip.is_dir() and inner.is_relative_to(clip.resolve()):
@@ -142,8 +142,8 @@ def _refuse_nested(clips: Iterable[Path], sources: Iterable[InputVideo], folder:
             raise BatchError(f"{source.path}: is inside the output folder {folder}; use another")
 
 
-def _refuse_shared(runs: Iterable[Run], totals: Iterable[TotalFile], folder: Path) -> None:
-    """Refuse an output with the name of another output, a total or the manifest."""
+def _reject_shared(runs: Iterable[Run], totals: Iterable[TotalFile], folder: Path) -> None:
+    """Reject an output with the name of another output, a total or the manifest."""
     record_input(*(run.source for run in runs))
     owners = {folder / MANIFEST: "the manifest"}
     makers = [(total.path, "the outputs of all videos") for total in totals]

@@ -8,11 +8,9 @@ import copy
 import io
 import json
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from itertools import zip_longest
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import onnx
@@ -108,9 +106,8 @@ def start_from(network: Network, path: Path, images: Tensor, classes: Sequence[s
         header = read_header(Session(path))
         columns = _matching_columns(classes, header.classes if header else ())
         biases = {}
-        folded_convolutions = _folded_convolutions(onnx.load(str(path)).graph)
-        layers = _layers_in_order(network, images)
-        for (layer, norm), (weight, bias) in zip(layers, folded_convolutions, strict=True):
+        folded = _folded_convolutions(onnx.load(str(path)).graph)
+        for (layer, norm), (weight, bias) in zip(_layers(network), folded, strict=True):
             if norm is None:  # a head
                 for column, base_column in columns:
                     _load(layer.weight[column : column + 1], weight[[base_column]])
@@ -136,36 +133,21 @@ def _folded_convolutions(graph: onnx.GraphProto) -> list[tuple[Tensor, Tensor]]:
     return convolutions
 
 
-def _layers_in_order(
-    network: Network, images: Tensor
-) -> list[tuple[nn.Conv2d, nn.BatchNorm2d | None]]:
+def _layers(network: Network) -> list[tuple[nn.Conv2d, nn.BatchNorm2d | None]]:
     """Return all convolutions, each with its normalisation, in the order in which they compute.
 
     That is the order of the graph. Heads have no normalisation.
     """
-    computed: list[nn.Module] = []
-    kinds = nn.Conv2d | nn.BatchNorm2d
-    modules = [module for module in network.modules() if isinstance(module, kinds)]
-    with _before_each(modules, lambda module, _: computed.append(module)):
-        network(images)
+    branches = [part for pair in zip(network.towers, network.heads, strict=True) for part in pair]
+    joined = network.lateral, network.down, network.up
+    parts = network.stem, network.stem_norm, network.stages, *joined, *branches
+    modules = [module for part in parts for module in part.modules()]
+    layers = [module for module in modules if isinstance(module, nn.Conv2d | nn.BatchNorm2d)]
     return [
-        (module, following if isinstance(following, nn.BatchNorm2d) else None)
-        for module, following in zip_longest(computed, computed[1:])
-        if isinstance(module, nn.Conv2d)
+        (layer, following if isinstance(following, nn.BatchNorm2d) else None)
+        for layer, following in zip_longest(layers, layers[1:])
+        if isinstance(layer, nn.Conv2d)
     ]
-
-
-@contextmanager
-def _before_each(
-    modules: Iterable[nn.Module], call: Callable[[Any, tuple[Tensor]], None]
-) -> Iterator[None]:
-    """Call a function with each module and its inputs, before the module computes."""
-    hooks = [module.register_forward_pre_hook(call) for module in modules]
-    try:
-        yield
-    finally:
-        for hook in hooks:
-            hook.remove()
 
 
 def _load(weight: Tensor, values: Tensor) -> None:
@@ -196,5 +178,7 @@ def _calibrate(network: Network, biases: Mapping[nn.Module, Tensor], images: Ten
         norm.bias[: len(bias)] = bias + mean[: len(bias)]
         norm.load_state_dict({"running_mean": mean, "running_var": variance}, strict=False)
 
-    with _before_each(biases, calibrate):
-        network(images)
+    hooks = [norm.register_forward_pre_hook(calibrate) for norm in biases]
+    network(images)
+    for hook in hooks:
+        hook.remove()
