@@ -1,10 +1,14 @@
 """Systems that lack what others have: Windows, macOS."""
 
+import signal
 import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from running import names, with_modules
+from vdet.system import blocked_interrupts
 
 LACKING = """
 import os, signal, sys
@@ -72,3 +76,22 @@ def test_without_locks_limits_and_forks_vehicles_are_found_followed_and_counted(
         assert (done.returncode, done.stderr) == (0, ""), done.stderr
     made = {"out.mp4", "t.csv", "t.jsonl", "moving.csv", "counts.csv"}
     assert set(names(tmp_path)) == made | {"in.mp4", "lines.yaml", "sitecustomize.py"}
+
+
+def test_ctrl_c_comes_after_the_block_and_never_in_processes_that_start_in_it() -> None:
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    shows_blocked = "import signal; print(signal.pthread_sigmask(signal.SIG_BLOCK, []))"
+    blocked = ""
+
+    def start() -> None:
+        nonlocal blocked
+        with blocked_interrupts():
+            signal.raise_signal(signal.SIGINT)
+            blocked = subprocess.check_output([sys.executable, "-c", shows_blocked], text=True)
+
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            start()
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert "SIGINT" in blocked

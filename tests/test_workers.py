@@ -4,16 +4,14 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
-from concurrent.futures import BrokenExecutor, ThreadPoolExecutor
-from contextlib import closing, contextmanager
+from contextlib import closing
 from functools import partial
 from pathlib import Path
 
 import pytest
 
 from running import until
-from vdet.workers import LocalProcesses, Submit, call_all, core_count
+from vdet.workers import LocalProcesses, call_all, core_count
 
 
 def process_of(_: int) -> int:
@@ -51,36 +49,6 @@ def test_only_items_that_always_kill_their_process_have_no_result(tmp_path: Path
     assert results == {number: None if number == 3 else number for number in range(6)}
 
 
-class BrokenOnce:
-    """Threads for processes; `calls` has the items of each time that they are started."""
-
-    at_once = 2
-
-    def __init__(self) -> None:
-        self.calls: list[list[int]] = []
-
-    @contextmanager
-    def open(self) -> Iterator[Submit]:
-        self.calls.append([])
-
-        def call(item: int) -> int:
-            self.calls[-1].append(item)
-            if item == 3 and len(self.calls) == 1:
-                raise BrokenExecutor
-            return item
-
-        with ThreadPoolExecutor(1) as pool:
-            yield lambda _, item: pool.submit(call, item)
-
-
-def test_what_may_have_killed_a_process_is_repeated_alone_at_the_end() -> None:
-    workers = BrokenOnce()
-    results = dict(call_all(int, range(6), workers))
-    assert results == {number: number for number in range(6)}
-    assert workers.calls[-1] == [3]
-    assert sorted(item for some in workers.calls for item in some) == [0, 1, 2, 3, 3, 4, 5]
-
-
 def test_an_error_of_the_function_is_raised() -> None:
     with pytest.raises(ZeroDivisionError):
         list(call_all(partial(divmod, 1), [1, 0], LocalProcesses(1)))
@@ -103,7 +71,7 @@ def test_what_ended_processes_left_is_removed_without_a_word(tmp_path: Path) -> 
     code = f"""if True:
         import sys
         import vdet.cli
-        from loky.backend import resource_tracker
+        from joblib.externals.loky.backend import resource_tracker
         from vdet.process import run
         from vdet.workers import LocalProcesses, call_all
         def work_in_processes():

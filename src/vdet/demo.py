@@ -118,9 +118,9 @@ def run_demo(
     find(ROAD, _BY_MODEL, linear.model_copy(update={"detector": chosen}))
     truth, scores = read_truth(folder / TRUTH), []
     for name, outputs in (("network", _BY_NETWORK), (f"linear model {MODEL}", _BY_MODEL)):
-        found = score(read_predictions(folder / outputs["tracks"]), truth)
-        ratios = (found.precision, found.recall, found.f1, found.idf1)
-        scores.append([name, *(f"{ratio:.2f}" for ratio in ratios), str(found.id_switches)])
+        metrics = score(read_predictions(folder / outputs["tracks"]), truth)
+        ratios = (metrics.precision, metrics.recall, metrics.f1, metrics.idf1)
+        scores.append([name, *(f"{ratio:.2f}" for ratio in ratios), str(metrics.id_switches)])
     compared = table(("", "precision", "recall", "F1", "IDF1", "id switches"), scores)
     flows = _flows(folder, pole, counting)
     return [*compared, "", *table(("from", "to", "vehicles", "true"), flows)]

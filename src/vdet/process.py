@@ -23,7 +23,7 @@ def run() -> NoReturn:
         os.environ.setdefault(name, value)
     os.environ["PYTHONSAFEPATH"] = "1"  # workers import nothing from the current folder
     # A killed worker leaves semaphores, which loky removes with a warning that users do not need.
-    sys.warnoptions.append("ignore::UserWarning:loky.backend.resource_tracker")
+    sys.warnoptions.append("ignore::UserWarning:joblib.externals.loky.backend.resource_tracker")
     for number in ENDING_SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN:  # as with `nohup`
             signal.signal(number, _interrupt)

@@ -1,4 +1,4 @@
-"""Signals and file locks that only some systems have; elsewhere, vdet does without."""
+"""Signals and file locks that only some systems have; elsewhere, vdet runs without them."""
 
 import contextlib
 import os
@@ -14,6 +14,22 @@ except ImportError:  # Windows
 _ENDING = ("SIGINT", "SIGTERM", "SIGHUP")
 ENDING_SIGNALS = [signal.Signals[name] for name in _ENDING if hasattr(signal, name)]
 """The signals that end the program: of Ctrl-C, of `kill`, and of a terminal that closes."""
+
+
+@contextlib.contextmanager
+def blocked_interrupts() -> Iterator[None]:
+    """Delay Ctrl-C to the end of the block; processes that start in the block never get it."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    from multiprocessing.resource_tracker import ensure_running
+
+    ensure_running()  # if it started in the block, it would unblock signals
+    earlier = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, earlier)
 
 
 def lock(descriptor: int) -> bool:

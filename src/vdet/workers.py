@@ -4,32 +4,24 @@ import contextlib
 import logging
 import math
 import os
-import signal
 import threading
 import time
-from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, wait
+import warnings
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
+from concurrent.futures import BrokenExecutor, CancelledError, Future
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 from vdet.errors import INTERRUPTED, ClusterError
+from vdet.system import blocked_interrupts
 
 T = TypeVar("T")
 R = TypeVar("R")
-Submit = Callable[..., Future[Any]]
 
 PARENT_CHECK_INTERVAL = 0.5  # seconds
 SINGLE_THREADED = {"OPENBLAS_NUM_THREADS": "1", "OPENCV_FOR_THREADS_NUM": "1"}
 """Variables that limit libraries to one thread, because frames and files run in parallel."""
-ENVIRONMENT = {
-    **SINGLE_THREADED,
-    "OMP_NUM_THREADS": "1",
-    "MKL_NUM_THREADS": "1",
-    "PYTHONSAFEPATH": "1",  # no module is imported from the current folder
-}
-
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3  # of malloc.h
 
 QUOTA = Path("/sys/fs/cgroup/cpu.max")
@@ -81,11 +73,11 @@ class Workers(Protocol):
     """Processes that work in parallel."""
 
     @property
-    def at_once(self) -> float:
-        """Maximum number of items in work at a time."""
+    def at_once(self) -> int | None:
+        """Maximum number of items in work at a time; None: all."""
 
-    def open(self) -> contextlib.AbstractContextManager[Submit]:
-        """Start them or connect to them; yield the `submit` method of an executor."""
+    def open(self) -> contextlib.AbstractContextManager[Any]:
+        """Connect to them; yield a backend of joblib."""
 
 
 def call_all(
@@ -94,79 +86,70 @@ def call_all(
     """Yield every item with its result, in order of completion.
 
     The result is None for an item that kills its process. When a process is killed, any of the
-    items in work may be the cause. They are repeated at the end, one by one, to find the cause. An
-    error raised by `function` is raised here.
+    items in work may be the cause. They are called again, one by one, to find it, so an item may be
+    called twice. An error raised by `function` is raised here. Only the main thread can call this.
     """
-    suspects: list[T] = []
-    for item, result in _call(function, items, workers):
-        if result is not None:
-            yield item, result
-        else:
-            suspects.append(item)
-    for item in suspects:
-        yield from _call(function, [item], workers)
+    remaining = dict(enumerate(items))
+    with workers.open() as backend:
+        while remaining:
+            for number, result in _call(function, remaining, backend, workers.at_once):
+                yield remaining.pop(number), result
+            for number in list(remaining)[: workers.at_once]:  # a process was killed
+                item = remaining.pop(number)
+                yield item, dict(_call(function, {number: item}, backend, 1)).get(number)
 
 
 def _call(
-    function: Callable[[T], R], items: Iterable[T], workers: Workers
-) -> Generator[tuple[T, R | None]]:
-    """Yield every item with its result; None for those in work when a process was killed."""
-    waiting = deque(items)
-    while waiting:
-        in_work: dict[Future[R], T] = {}
-        is_broken = False
-        with workers.open() as submit:
-            while in_work or (waiting and not is_broken):
-                while waiting and not is_broken and len(in_work) < workers.at_once:
-                    try:
-                        in_work[submit(function, waiting[0])] = waiting[0]
-                        waiting.popleft()
-                    except BrokenExecutor:
-                        is_broken = True
-                for future in wait(in_work, return_when=FIRST_COMPLETED).done:
-                    item = in_work.pop(future)
-                    is_lost = _is_killed(future.exception())
-                    is_broken = is_broken or is_lost
-                    yield item, None if is_lost else future.result()
+    function: Callable[[T], R], items: Mapping[int, T], backend: Any, at_once: int | None
+) -> Generator[tuple[int, R]]:
+    """Yield the results of numbered items; those lost with a killed process are missing."""
+    from joblib import Parallel, delayed
+
+    parallel = Parallel(
+        n_jobs=max(2, at_once or 0),  # one job would run in this process
+        backend=backend,
+        pre_dispatch=at_once or "all",
+        batch_size=1,
+        return_as="generator_unordered",
+    )
+    calls = [delayed(_numbered)(number, function, item) for number, item in items.items()]
+    with contextlib.suppress(BrokenExecutor), contextlib.ExitStack() as stack:
+        with blocked_interrupts():  # also in the processes that start
+            results = parallel(calls)
+            stack.callback(_close, results)
+        yield from filter(None, results)
 
 
-def _is_killed(error: BaseException | None) -> bool:
-    """Return whether an error means that a process was killed or crashed."""
-    return isinstance(error, BrokenExecutor) or type(error).__name__ == "KilledWorker"  # of Dask
+def _close(results: Generator[Any]) -> None:
+    with warnings.catch_warnings(action="ignore"):  # about calls that it cancels
+        results.close()
+
+
+def _numbered(number: int, function: Callable[[T], R], item: T) -> tuple[int, R]:
+    return number, function(item)
 
 
 @dataclass(frozen=True, slots=True)
 class LocalProcesses:
-    """`at_once` processes of this machine; only the main thread can start them.
+    """`at_once` processes of this machine.
 
-    They ignore Ctrl-C in a terminal, because their parent ends them, and end soon after it.
+    They ignore Ctrl-C in a terminal, because their parent ends them, and end when it does.
     """
 
     at_once: int
 
     @contextlib.contextmanager
-    def open(self) -> Iterator[Submit]:
-        """Start the processes; at the end of the block they are killed."""
-        from loky import ProcessPoolExecutor
+    def open(self) -> Iterator[Any]:
+        """Yield a backend that starts the processes; at the end of the block they are killed."""
+        from joblib.externals.loky import get_reusable_executor
+        from joblib.parallel import LokyBackend
 
-        begin = {"initializer": _initialize, "initargs": (os.getpid(),), "env": ENVIRONMENT}
-        executor = ProcessPoolExecutor(self.at_once, **begin)
-
-        def submit(*call: Any) -> Future[Any]:
-            future: Future[Any] = executor.submit(*call)
-            while not (future.running() or future.done()):
-                time.sleep(0.001)  # loky cannot end while an item is on its way to a process
-            return future
-
-        handler = signal.signal(signal.SIGINT, signal.SIG_IGN)  # for the processes that start
         try:
-            submit(int)
+            yield LokyBackend(
+                inner_max_num_threads=1, initializer=_initialize, initargs=(os.getpid(),)
+            )
         finally:
-            signal.signal(signal.SIGINT, handler)
-        try:
-            yield submit
-        finally:
-            executor.shutdown(kill_workers=True)
+            get_reusable_executor().shutdown(kill_workers=True)
 
 
 def _initialize(parent: int) -> None:
@@ -184,22 +167,22 @@ def _initialize(parent: int) -> None:
 class DaskCluster:
     """All workers of the Dask scheduler at `address`; they must see files at the same paths.
 
-    The scheduler must answer within `timeout` seconds, and have a worker within as many more. It
+    The scheduler must respond within `timeout` seconds, and have a worker within as many more. It
     repeats an item whose worker was lost (`distributed.scheduler.allowed-failures`).
     """
 
     address: str
     timeout: float = 10.0
-    at_once: float = math.inf
+    at_once: int | None = None
 
     @contextlib.contextmanager
-    def open(self) -> Iterator[Submit]:
+    def open(self) -> Iterator[Any]:
         """Connect to the scheduler; at the end of the block it drops items that have not begun.
 
         Raises
         ------
         ClusterError
-            Dask is not installed, or the scheduler does not answer, has no worker, or ends.
+            Dask is not installed, or the scheduler does not respond, has no worker, or ends.
         """
         try:
             from distributed import Client
@@ -213,9 +196,38 @@ class DaskCluster:
                 stack.enter_context(client).wait_for_workers(1, timeout=self.timeout)
             except (OSError, ValueError) as error:  # ValueError: not the form of an address
                 advice = "start them with `dask scheduler` and `dask worker`"
-                lack = f"no Dask scheduler with a worker answers; {advice}"
+                lack = f"no Dask scheduler with a worker responds; {advice}"
                 raise ClusterError(f"{self.address}: {lack}") from error
             try:
-                yield client.get_executor(pure=False).submit
+                yield _dask_backend(client)
             except CancelledError as error:
                 raise ClusterError(f"{self.address}: the scheduler has ended; run again") from error
+
+
+def _dask_backend(client: Any) -> Any:
+    """Return a backend of joblib for a Dask client.
+
+    With joblib's own one, a call whose worker was killed never ends.
+    """
+    from distributed import KilledWorker
+    from joblib.parallel import ParallelBackendBase
+
+    class DaskBackend(ParallelBackendBase):  # type: ignore[misc]
+        supports_retrieve_callback = True
+
+        def effective_n_jobs(self, n_jobs: int) -> int:
+            return n_jobs
+
+        def submit(self, call: Callable[[], R], callback: Callable[..., object]) -> Future[R]:
+            future: Future[R] = executor.submit(call)
+            future.add_done_callback(callback)
+            return future
+
+        def retrieve_result_callback(self, future: Future[R]) -> R | list[None]:
+            try:
+                return future.result()
+            except KilledWorker:
+                return [None]
+
+    executor = client.get_executor(pure=False)
+    return DaskBackend()

@@ -27,7 +27,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def found(*clips: str) -> list[tuple[str, str]]:
     sources = find_sources([Path(clip) for clip in clips])
-    return [(str(source.path), str(source.place)) for source in sources]
+    return [(str(source.path), str(source.relative_path)) for source in sources]
 
 
 @pytest.mark.usefixtures("folder")

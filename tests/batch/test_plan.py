@@ -78,10 +78,14 @@ def note(source: str, *outputs: Output, made_by: str = "") -> None:
         "now",
         outputs=tuple(
             Written(
-                *(output.sink, str(output.path.absolute()), *(output_state(output) or (0, 0))),
+                output.sink,
+                str(output.path.absolute()),
+                size,
+                changed,
                 digest=made_by or digest(Run(Path(source))),
             )
             for output in outputs
+            for size, changed in [output_state(output) or (0, 0)]
         ),
     )
     with open_manifest(Path("out")) as add:
@@ -197,14 +201,11 @@ class TestRefused:
         with pytest.raises(OutputError, match=r"out/a\.mp4: is the input itself"):
             plan("clips", overwrite=True)
 
-    @pytest.mark.parametrize("make", [os.mkfifo, lambda path: path.symlink_to("elsewhere")])
-    def test_a_manifest_that_is_no_ordinary_file(self, make: Callable[[Path], object]) -> None:
+    def test_a_manifest_that_is_no_ordinary_file(self) -> None:
         Path("out").mkdir()
-        make(Path("out/manifest.jsonl"))
-        words = r"manifest\.jsonl: (is not a regular file|.*symbolic links)"
-        with pytest.raises(OutputError, match=words):
+        os.mkfifo("out/manifest.jsonl")
+        with pytest.raises(OutputError, match=r"manifest\.jsonl: is not a regular file"):
             plan("clips", skip_existing=True)
-        assert not Path("out/elsewhere").exists()
 
 
 @pytest.mark.usefixtures("clips")

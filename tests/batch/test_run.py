@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
@@ -10,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from joblib.parallel import SequentialBackend
 
 from red_cars import red_settings
 from running import names, write_drive
@@ -19,7 +19,6 @@ from vdet.errors import BatchError, OutputError
 from vdet.run.sinks import Output, data
 from vdet.run.sinks.protocol import BatchTotal
 from vdet.run.video import Run
-from vdet.workers import Submit
 
 OUTPUTS = Output("tracks", Path(".csv")), Output("vehicles", Path(".cars.json"))
 
@@ -27,15 +26,14 @@ OUTPUTS = Output("tracks", Path(".csv")), Output("vehicles", Path(".cars.json"))
 MakePlan = Callable[..., Plan]
 
 
-class InThread:
-    """One thread in place of processes."""
+class InTurn:
+    """This process in place of others: the calls are made in turn."""
 
     at_once = 1
 
     @contextmanager
-    def open(self) -> Iterator[Submit]:
-        with ThreadPoolExecutor(1) as pool:
-            yield pool.submit
+    def open(self) -> Iterator[SequentialBackend]:
+        yield SequentialBackend()
 
 
 @pytest.fixture
@@ -54,7 +52,7 @@ def plan(clips: Path) -> MakePlan:
 
 
 def run(planned: Plan) -> list[str | None]:
-    return [record.error for _, record in run_batch(planned, workers=InThread())]
+    return [record.error for _, record in run_batch(planned, workers=InTurn())]
 
 
 MADE = ["a/c.cars.json", "a/c.csv", "all.cars.json", "b/c.cars.json", "b/c.csv", "manifest.jsonl"]

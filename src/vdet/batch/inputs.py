@@ -26,10 +26,10 @@ DRAWN = ".vdet"
 
 @dataclass(frozen=True, slots=True)
 class InputVideo:
-    """A video, and its `place`: its path below the input folder or pattern."""
+    """A video, and its path relative to the input folder or pattern."""
 
     path: Path
-    place: Path
+    relative_path: Path
 
 
 def find_sources(clips: Sequence[Path]) -> list[InputVideo]:
@@ -41,9 +41,9 @@ def find_sources(clips: Sequence[Path]) -> list[InputVideo]:
     * a folder: the videos in it, recursively, without hidden files and folders. A folder that has
       numbered images and no videos is a video itself;
     * a pattern with ``*``, ``?`` or ``[``, where ``**`` means any folders: the videos that match,
-      and those in the folders that match. Their places are below the last folder of the pattern
-      that has no such character. If the pattern ends in a suffix, such as ``*.raw``, all matching
-      files are treated as videos.
+      and those in the folders that match. Their paths are relative to the last folder of the
+      pattern that has no such character. If the pattern ends in a suffix, such as ``*.raw``, all
+      matching files are treated as videos.
 
     Videos that vdet wrote beside their sources are skipped, unless they are passed by name.
     Numbered images with a gap are skipped with a warning (logger "vdet").
@@ -55,14 +55,14 @@ def find_sources(clips: Sequence[Path]) -> list[InputVideo]:
     VideoError
         One of `clips` is an address, or numbered images with a gap.
     """
-    found: dict[tuple[Path, Path], InputVideo] = {}
+    videos: dict[tuple[Path, Path], InputVideo] = {}
     for clip in clips:
-        sources = sorted(_videos_of(clip), key=lambda source: source.place)
-        if not sources:
+        videos_of_clip = sorted(_videos_of(clip), key=lambda video: video.relative_path)
+        if not videos_of_clip:
             raise BatchError(f"{clip}: no video found; check the name")
-        for source in sources:
-            found.setdefault((source.path.resolve(), source.place), source)
-    return list(found.values())
+        for video in videos_of_clip:
+            videos.setdefault((video.path.resolve(), video.relative_path), video)
+    return list(videos.values())
 
 
 def _videos_of(clip: Path) -> Iterable[InputVideo]:
@@ -90,7 +90,7 @@ def _matching(pattern: Path) -> Iterator[InputVideo]:
 
 
 def _below(folder: Path, base: Path) -> Iterator[InputVideo]:
-    for root, folders, names in os.walk(folder, onerror=_refuse_unreadable):
+    for root, folders, names in os.walk(folder, onerror=_reject_unreadable):
         folders[:] = [name for name in folders if not name.startswith(".")]
         videos = [path for name in names if _is_video(path := Path(root, name))]
         for path in videos:
@@ -108,15 +108,15 @@ def _images_in(folder: Path, base: Path) -> Iterator[InputVideo]:
         _log.warning("%s; skipped", error)
         return
     assert sequence is not None
-    place = Path(folder.absolute().name) if folder == base else folder.relative_to(base)
+    named = Path(folder.absolute().name) if folder == base else folder.relative_to(base)
     suffix = sequence.files[0].suffix
-    yield InputVideo(folder, place.with_name(f"{place.name}{suffix}"))
+    yield InputVideo(folder, named.with_name(f"{named.name}{suffix}"))
 
 
 def _is_video(path: Path) -> bool:
-    is_left_out = path.name.startswith(".") or path.stem.endswith(DRAWN)
-    return path.suffix.lower() in VIDEO_INPUT_SUFFIXES and not is_left_out
+    is_skipped = path.name.startswith(".") or path.stem.endswith(DRAWN)
+    return path.suffix.lower() in VIDEO_INPUT_SUFFIXES and not is_skipped
 
 
-def _refuse_unreadable(error: OSError) -> None:
+def _reject_unreadable(error: OSError) -> None:
     raise BatchError(f"{error.filename}: cannot be read: {error.strerror}; remove it") from error

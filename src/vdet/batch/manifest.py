@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from vdet.errors import OutputError
 from vdet.files import output_errors, remove_stale
@@ -23,7 +23,6 @@ from vdet.version import __version__
 
 MANIFEST = "manifest.jsonl"
 _NOTES = ".vdet-notes"
-_FLAGS = sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +76,7 @@ class Record:
     begin
         When the recording began, and the source of that time; None if unknown.
     facts
-        What steps found out about the whole video, by name.
+        Results of steps about the whole video, by name.
     outputs
         Empty after an error.
     error
@@ -128,13 +127,13 @@ def read_records(*paths: Path) -> Iterator[Record]:
     OutputError
         A file cannot be read.
     """
-    for path in filter(os.path.lexists, paths):
-        with output_errors(path), os.fdopen(os.open(path, os.O_RDONLY | _FLAGS), "rb") as file:
-            for text in file:
+    for path in paths:
+        with output_errors(path), suppress(FileNotFoundError), path.open("rb") as file:
+            for line in file:
                 with suppress(ValueError, TypeError, KeyError):
-                    line = json.loads(text)
-                    outputs = tuple(Written(**item) for item in line["outputs"])
-                    yield Record(**{**line, "outputs": outputs})
+                    values = json.loads(line)
+                    outputs = tuple(Written(**output) for output in values["outputs"])
+                    yield Record(**{**values, "outputs": outputs})
 
 
 def read_batch(folder: Path) -> Iterator[Record]:
@@ -160,29 +159,27 @@ def open_manifest(folder: Path) -> Iterator[Callable[[Record], None]]:
     """
     path = folder / MANIFEST
     with output_errors(path):
-        descriptor = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT | _FLAGS, 0o666)
-    with os.fdopen(descriptor, "r+b", buffering=0) as file:
+        file = path.open("a+b", buffering=0)
+    with file:
         try:
-            lock(descriptor)
+            lock(file.fileno())
         except BlockingIOError:
             message = f"{path}: another batch is writing here; wait, or use another folder"
             raise OutputError(message) from None
-        with output_errors(path):
-            size = file.seek(0, os.SEEK_END)
-            file.seek(max(0, size - 1))
-            if file.read() not in (b"", b"\n"):
-                file.write(b"\n")  # a power cut left half a line
+
+        def append(line: str) -> None:
+            with output_errors(path):
+                if file.write(line.encode()) < len(line):
+                    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+                os.fsync(file.fileno())
 
         def add(record: Record) -> None:
-            with output_errors(path):
-                end = file.seek(0, os.SEEK_END)
-                if file.write(record.line.encode()) != len(record.line):
-                    file.truncate(end)  # half a line would spoil the next one
-                    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-                os.fsync(descriptor)
+            append(record.line)
             if record.outputs:
                 note_path(folder, Path(record.outputs[0].path)).unlink(missing_ok=True)
 
+        if not _ends_with_whole_line(file):
+            append("\n")  # a power cut or a full disk left half a line
         for note in _notes(folder):
             for record in read_records(note):
                 add(record)
@@ -192,3 +189,9 @@ def open_manifest(folder: Path) -> Iterator[Callable[[Record], None]]:
             remove_stale(folder / _NOTES)
             with suppress(OSError):  # a worker of an earlier batch may still write into it
                 (folder / _NOTES).rmdir()
+
+
+def _ends_with_whole_line(file: BinaryIO) -> bool:
+    size = file.seek(0, os.SEEK_END)
+    file.seek(max(0, size - 1))
+    return file.read(1) in (b"", b"\n")

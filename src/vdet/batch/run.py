@@ -1,7 +1,7 @@
 """Plan and run a batch: process every file, and write its record when it is done."""
 
 import os
-from collections.abc import Generator, Iterable, Mapping, Sequence
+from collections.abc import Generator, Iterable, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
@@ -9,7 +9,13 @@ from pathlib import Path
 
 from vdet.batch.inputs import InputVideo, find_sources
 from vdet.batch.manifest import MANIFEST, Record, open_manifest, read_batch
-from vdet.batch.task import is_done, known_outputs, new_record, process_file, replacing_ours
+from vdet.batch.task import (
+    allow_replacing,
+    is_up_to_date,
+    new_record,
+    outputs_by_path,
+    process_file,
+)
 from vdet.detect.factory import load_detector
 from vdet.errors import BatchError
 from vdet.files import (
@@ -29,28 +35,36 @@ _KILLED = "{}: its process was killed or crashed; it may have run out of memory"
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
-    """The runs to process and those to skip; all their outputs are in `folder`.
+class TotalFile:
+    """A file over all videos.
 
-    Attributes
-    ----------
-    totals
-        The files over all videos: path, kind, and ending of the outputs that each is made from, by
-        the position of these outputs in every run.
+    `kind` writes it to `path`, from the outputs at position `output_number` in every run, whose
+    names have this `ending` after that of the video.
     """
+
+    path: Path
+    kind: BatchTotal
+    output_number: int
+    ending: str
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """The runs to process and those to skip; all their outputs are in `folder`."""
 
     folder: Path
     runs: tuple[Run, ...]
     skipped: tuple[Run, ...]
-    totals: Mapping[int, tuple[Path, BatchTotal, str]]
+    totals: tuple[TotalFile, ...]
 
 
 def make_plan(
     clips: Sequence[Path], folder: Path, common: Run, *, skip_existing: bool = False
 ) -> Plan:
-    """Plan a run for every video of `clips`; outputs are in `folder`, at the places of the videos.
+    """Plan a run for every video of `clips`.
 
-    The paths in the settings become absolute, because other machines have other working folders.
+    The outputs are in `folder`, where the videos are in their input folders. The paths in the
+    settings become absolute, because other machines have other working folders.
 
     Parameters
     ----------
@@ -75,7 +89,7 @@ def make_plan(
     settings = common.settings.with_paths(lambda path: str(Path(path).absolute()))
     load_detector(settings.detector)
     sources = find_sources(clips)
-    _refuse_nested(clips, sources, folder)
+    _reject_nested(clips, sources, folder)
     files = tuple(path.absolute() for path in common.settings_files)
     runs = [
         replace(
@@ -83,32 +97,35 @@ def make_plan(
             settings=settings,
             settings_files=files,
             source=source.path,
-            outputs=tuple(_named(output, folder / source.place) for output in common.outputs),
+            outputs=tuple(
+                _named(output, folder / source.relative_path) for output in common.outputs
+            ),
         )
         for source in sources
     ]
-    totals = {
-        number: (folder / f"{total.name}{total.suffix or ending}", total, ending)
+    totals = tuple(
+        TotalFile(folder / f"{kind.name}{kind.suffix or ending}", kind, number, ending)
         for number, output in enumerate(common.outputs)
         for ending in [output.path.name]
-        if (total := sink_kind(output.sink).total)
-    }
-    _refuse_shared(runs, [path for path, *_ in totals.values()], folder)
+        if (kind := sink_kind(output.sink).total)
+    )
+    _reject_shared(runs, totals, folder)
     inputs = input_files(*(source.path for source in sources), *files, settings=settings)
     manifest, skipped = folder / MANIFEST, []
     check_output(manifest, overwrite=True, makes_folder=True, inputs=inputs)
     if skip_existing:
-        known, every, runs = known_outputs(read_batch(folder)), runs, []
-        for run in every:
-            if is_done(run, known):
+        written = outputs_by_path(read_batch(folder))
+        all_runs, runs = runs, []
+        for run in all_runs:
+            if is_up_to_date(run, written):
                 skipped.append(run)
             else:
-                runs.append(replacing_ours(run, known))
+                runs.append(allow_replacing(run, written))
     for run in runs:
         check_sinks(run.outputs, overwrite=run.overwrite, makes_folder=True, inputs=inputs)
-    for path, *_ in totals.values():
-        replaces = common.overwrite or (skip_existing and manifest.exists())
-        check_output(path, overwrite=replaces, makes_folder=True, inputs=inputs)
+    replaces_totals = common.overwrite or (skip_existing and manifest.exists())
+    for total in totals:
+        check_output(total.path, overwrite=replaces_totals, makes_folder=True, inputs=inputs)
     return Plan(folder, tuple(runs), tuple(skipped), totals)
 
 
@@ -118,7 +135,7 @@ def _named(output: Output, video: Path) -> Output:
     return replace(output, path=video.with_suffix(ending))
 
 
-def _refuse_nested(clips: Iterable[Path], sources: Iterable[InputVideo], folder: Path) -> None:
+def _reject_nested(clips: Iterable[Path], sources: Iterable[InputVideo], folder: Path) -> None:
     inner = folder.resolve()
     for clip in clips:
         if clip.is_dir() and inner.is_relative_to(clip.resolve()):
@@ -128,10 +145,10 @@ def _refuse_nested(clips: Iterable[Path], sources: Iterable[InputVideo], folder:
             raise BatchError(f"{source.path}: is inside the output folder {folder}; use another")
 
 
-def _refuse_shared(runs: Iterable[Run], totals: Iterable[Path], folder: Path) -> None:
-    """Refuse an output with the name of another output, a total or the manifest."""
+def _reject_shared(runs: Iterable[Run], totals: Iterable[TotalFile], folder: Path) -> None:
+    """Reject an output with the name of another output, a total or the manifest."""
     owners = {folder / MANIFEST: "the manifest"}
-    makers = [(path, "the outputs of all videos") for path in totals]
+    makers = [(total.path, "the outputs of all videos") for total in totals]
     makers += [(output.path, str(run.source)) for run in runs for output in run.outputs]
     for path, maker in makers:
         if path in owners:
@@ -177,14 +194,17 @@ def run_batch(
 
 def _write_totals(plan: Plan) -> None:
     """Write the files over all videos, from the records of existing outputs."""
-    known = known_outputs(read_batch(plan.folder)) if plan.totals else {}
+    if not plan.totals:
+        return
+    written = outputs_by_path(read_batch(plan.folder))
     runs = sorted((*plan.runs, *plan.skipped), key=lambda run: run.outputs[0].path)
-    for number, (path, total, ending) in plan.totals.items():
+    for total in plan.totals:
         summaries = {}
-        for output in (run.outputs[number] for run in runs):
-            written = known.get(os.path.realpath(output.path))
-            if written and os.path.exists(output.path):  # noqa: PTH110  # too long a name
-                name = output.path.relative_to(plan.folder).as_posix()
-                summaries[name.removesuffix(ending)] = written[-1].summary
-        with OutputFiles(overwrite=True) as files, output_errors(path):
-            total.write(summaries, files.stage(path))
+        for run in runs:
+            path = run.outputs[total.output_number].path
+            versions = written.get(os.path.realpath(path))
+            if versions and os.path.exists(path):  # noqa: PTH110  # too long a name
+                name = path.relative_to(plan.folder).as_posix()
+                summaries[name.removesuffix(total.ending)] = versions[-1].summary
+        with OutputFiles(overwrite=True) as files, output_errors(total.path):
+            total.kind.write(summaries, files.stage(total.path))

@@ -23,8 +23,8 @@ from vdet.run.video import Run, write_outputs
 from vdet.version import __version__
 from vdet.workers import limit_library_threads
 
-Known = Mapping[str, Sequence[Written]]
-"""Records of outputs by their real paths; the latest is last."""
+WrittenByPath = Mapping[str, Sequence[Written]]
+"""Written outputs by their real paths; the latest is last."""
 
 
 def result_digest(run: Run) -> str:
@@ -35,58 +35,61 @@ def result_digest(run: Run) -> str:
     """
     settings = run.settings
     files = model_file(settings.detector), *(region.mask for region in settings.regions)
-    wanted = (
+    parts = (
         *(f"vdet {__version__}", run.start, run.end, run.frames, time.timezone, time.tzname),
-        *(_digest_of(file) for file in files),
-        *((file.name, stat.st_size, stat.st_mtime_ns) for file, stat in _states(run.source)),
+        *(_sha256(file) for file in files),
+        *_file_states(run.source),
         settings.with_paths(lambda _: "").model_dump_json(
             exclude={"train": True, "labels": True, "detector": {"model"}}
         ),
     )
-    return hashlib.sha256("\0".join(map(repr, wanted)).encode()).hexdigest()
+    return hashlib.sha256("\0".join(map(repr, parts)).encode()).hexdigest()
 
 
-def _states(source: Path) -> list[tuple[Path, os.stat_result]]:
+def _file_states(source: Path) -> list[tuple[str, int, int]]:
+    """Return name, size and modification time of the input, or of all files in its folder."""
     folder = source if source.is_dir() else source.parent
     with suppress(OSError):  # the input does not exist; reading it will fail
         files = [source] if source.is_file() else sorted(folder.iterdir())
-        return [(file, file.stat()) for file in files]
+        return [(file.name, file.stat().st_size, file.stat().st_mtime_ns) for file in files]
     return []
 
 
-def _digest_of(path: Path | str | None) -> str | None:
+def _sha256(path: Path | str | None) -> str | None:
     """Return the SHA-256 of a file; None if it does not exist."""
     with suppress(OSError):
         if path:
             state = Path(path).stat()
-            return _kept_digest(str(path), state.st_ino, state.st_mtime_ns, state.st_size)
+            return _cached_sha256(str(path), state.st_ino, state.st_mtime_ns, state.st_size)
     return None
 
 
 @lru_cache(maxsize=16)
-def _kept_digest(path: str, *_state: int) -> str:
+def _cached_sha256(path: str, *_state: int) -> str:
     return hashlib.sha256(Path(path).read_bytes()).hexdigest()
 
 
-def known_outputs(records: Iterable[Record]) -> Known:
+def outputs_by_path(records: Iterable[Record]) -> WrittenByPath:
     """Return the outputs in some records."""
-    found: dict[str, list[Written]] = {}
-    for written in (written for record in records for written in record.outputs):
-        found.setdefault(os.path.realpath(written.path), []).append(written)
-    return found
+    outputs: dict[str, list[Written]] = {}
+    for record in records:
+        for output in record.outputs:
+            outputs.setdefault(os.path.realpath(output.path), []).append(output)
+    return outputs
 
 
-def is_done(run: Run, known: Known) -> bool:
+def is_up_to_date(run: Run, written: WrittenByPath) -> bool:
     """Return whether the outputs of a run have their recorded sizes and the current digest."""
     digest = result_digest(run)
     for output in run.outputs:
-        state, written = output_state(output), known.get(os.path.realpath(output.path))
-        if not (state and written) or (written[-1].digest, written[-1].bytes) != (digest, state[0]):
+        size, _ = output_state(output) or (None, None)
+        latest = written.get(os.path.realpath(output.path), [None])[-1]
+        if size is None or latest is None or (latest.digest, latest.bytes) != (digest, size):
             return False
     return True
 
 
-def replacing_ours(run: Run, known: Known) -> Run:
+def allow_replacing(run: Run, written: WrittenByPath) -> Run:
     """Return a run that may replace its outputs, if vdet wrote all that exist.
 
     Raises
@@ -95,8 +98,8 @@ def replacing_ours(run: Run, known: Known) -> Run:
         A non-empty output has a size or time that is not in any record.
     """
     for output in run.outputs:
-        state, ours = output_state(output), known.get(os.path.realpath(output.path), ())
-        if state and state[0] and state not in {written.state for written in ours}:
+        state, versions = output_state(output), written.get(os.path.realpath(output.path), ())
+        if state and state[0] and state not in {version.state for version in versions}:
             raise BatchError(
                 f"{output.path}: has changed since vdet wrote it; remove it, or use --overwrite"
             )
@@ -115,10 +118,10 @@ def process_file(run: Run, *, folder: Path) -> Record:
     with _collected_warnings() as warnings:
         try:
             for earlier in read_records(note):
-                known = known_outputs([earlier])
-                if is_done(run, known):
+                written = outputs_by_path([earlier])
+                if is_up_to_date(run, written):
                     return earlier
-                run = run if run.overwrite else replacing_ours(run, known)
+                run = run if run.overwrite else allow_replacing(run, written)
             with OutputFiles(overwrite=run.overwrite, inputs=run.inputs) as files:
                 record = replace(_written(run, record, files), warnings=tuple(warnings))
                 write_whole(note, record.line, overwrite=True)
@@ -132,18 +135,20 @@ def process_file(run: Run, *, folder: Path) -> Record:
 def _written(run: Run, record: Record, files: OutputFiles) -> Record:
     """Write the outputs, still under temporary names, and return their record."""
     digest = result_digest(run)
-    chosen = pickle.dumps(run.settings.detector)  # settings of other packages may be unhashable
-    parts = Parts(_kept_detector(chosen, record.model_sha256))
-    totals = write_outputs(run, parts, files)
+    detector = pickle.dumps(run.settings.detector)  # settings of other packages may be unhashable
+    totals = write_outputs(run, Parts(_cached_detector(detector, record.model_sha256)), files)
     written = []
     for output in run.outputs:
-        state = output_state(output, files.staged_path(output.path)) or (0, 0)
+        size, changed = output_state(output, files.staged_path(output.path)) or (0, 0)
         path, summary = str(output.path.absolute()), totals.summaries[output.path]
-        written.append(Written(output.sink, path, *state, digest, summary))
+        written.append(Written(output.sink, path, size, changed, digest, summary))
     return replace(
         record,
         seconds=round(totals.seconds, 3),
-        **{name: getattr(totals, name) for name in ("width", "height", "frames", "tracks")},
+        width=totals.width,
+        height=totals.height,
+        frames=totals.frames,
+        tracks=totals.tracks,
         begin=str(totals.clock) if totals.clock else None,
         facts={name: fact.record() for name, fact in totals.facts.items()},
         outputs=tuple(written),
@@ -151,16 +156,20 @@ def _written(run: Run, record: Record, files: OutputFiles) -> Record:
 
 
 @lru_cache(maxsize=1)
-def _kept_detector(chosen: bytes, _sha256: str | None) -> DetectorModel:
+def _cached_detector(settings: bytes, _model_sha256: str | None) -> DetectorModel:
     """Load a detector, and keep it for the next videos of this process."""
-    return load_detector(pickle.loads(chosen))
+    return load_detector(pickle.loads(settings))
 
 
 def new_record(run: Run) -> Record:
     """Return the record of a run that starts now."""
-    source, now = str(run.source.absolute()), datetime.now(UTC).isoformat(timespec="seconds")
     model = model_file(run.settings.detector)
-    return Record(source, now, 0.0, model.name if model else None, _digest_of(model))
+    return Record(
+        input=str(run.source.absolute()),
+        started=datetime.now(UTC).isoformat(timespec="seconds"),
+        model=model.name if model else None,
+        model_sha256=_sha256(model),
+    )
 
 
 @contextmanager

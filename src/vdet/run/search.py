@@ -189,7 +189,7 @@ class FrameSearch:
         parts = segments(self._rate.choose(frames), MAX_KEY_INTERVAL if may_skip else 0)
         with SearchThreads(self._threads) as pool:
             for segment in parts:
-                self._first_phase.append((segment, pool.call(self._search_last, segment)))
+                self._first_phase.append((segment, pool.submit(self._search_last, segment)))
                 if len(self._first_phase) + len(self._second_phase) > self._threads:
                     yield from self._finish_segment(pool)
             while self._first_phase or self._second_phase:
@@ -210,7 +210,7 @@ class FrameSearch:
             is_still = before is not None and key is not None and shows_same(before, key)
             self._key_before = key
             between = [
-                pool.call(self._search, frame).result
+                pool.submit(self._search, frame).result
                 if is_chosen and not is_still
                 else partial(SearchedFrame, frame)
                 for frame, is_chosen in segment.frames[:-1]

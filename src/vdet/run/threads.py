@@ -119,7 +119,7 @@ def map_ordered(
 
         def pairs() -> Iterator[tuple[T, R]]:
             for item in items:
-                running.append((item, pool.call(function, item)))
+                running.append((item, pool.submit(function, item)))
                 if len(running) > threads:
                     first, future = running.popleft()
                     yield first, future.result()

@@ -88,7 +88,7 @@ def shaded(color: Color, factor: float) -> Color:
     return blue, green, red
 
 
-def mixed(color: Color, other: Color, fraction: float) -> Color:
-    """Return a colour mixed with a fraction, 0 to 1, of another one."""
-    blue, green, red = (round(a + (b - a) * fraction) for a, b in zip(color, other, strict=True))
+def mixed(color: Color, second: Color, fraction: float) -> Color:
+    """Return a colour mixed with a fraction, 0 to 1, of a second one."""
+    blue, green, red = (round(a + (b - a) * fraction) for a, b in zip(color, second, strict=True))
     return blue, green, red

@@ -68,8 +68,8 @@ class Renderer:
         image = self._background.copy()
         self._draw_ground(image, scene.station(index))
         _draw_plants(image, scene, scene.station(index))
-        for place, vehicle in reversed(scene.nearest_first(scene.time(index))):
-            draw_vehicle(image, vehicle, place, scene)
+        for position, vehicle in reversed(scene.nearest_first(scene.time(index))):
+            draw_vehicle(image, vehicle, position, scene)
         return self._expose(image, index)
 
     def _draw_ground(self, image: Image, station: float) -> None:

@@ -116,10 +116,12 @@ class SceneVehicle:
 
     def position(self, time: float) -> Waypoint | None:
         """Return where it is at `time`, or None while it does not exist."""
-        times, *places = zip(*map(astuple, self.path), strict=True)
+        points = np.array([astuple(point) for point in self.path])
+        times = points[:, 0]
         if not times[0] <= time <= times[-1]:
             return None
-        return Waypoint(time, *(float(np.interp(time, times, place)) for place in places))
+        ahead, lateral, heading = (np.interp(time, times, column) for column in points[:, 1:].T)
+        return Waypoint(time, float(ahead), float(lateral), float(heading))
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,13 +157,13 @@ class Scene:
 
     def nearest_first(self, time: float) -> list[tuple[Waypoint, SceneVehicle]]:
         """Return the vehicles that exist at a time, each with its position, the nearest first."""
-        placed = [(place, v) for v in self.vehicles if (place := v.position(time))]
+        visible = [(point, v) for v in self.vehicles if (point := v.position(time))]
 
         def nearest(pair: tuple[Waypoint, SceneVehicle]) -> float:
-            place, vehicle = pair
-            return place.ahead + min(0.0, math.cos(place.heading) * vehicle.body.length)
+            position, vehicle = pair
+            return position.ahead + min(0.0, math.cos(position.heading) * vehicle.body.length)
 
-        return sorted(placed, key=nearest)
+        return sorted(visible, key=nearest)
 
 
 _YELLOW: Color = (60, 180, 225)
@@ -193,15 +195,18 @@ def demo_scene(seed: int, *, width: int = 960, height: int = 540) -> Scene:
     scene = empty_road(rng, PinholeCamera.dashboard(width, height), lane=0, lanes=3, seed=seed)
     near, far = LANE_WIDTH, 2 * LANE_WIDTH
     paths = (
-        ((0.0, 25.0, 0.0), (4.0, 29.0, 0.1), (10.0, 26.0, -0.1)),
-        ((0.0, 20.0, far), (10.0, 30.0, far)),
-        ((0.0, 24.0, near), (2.0, 10.0, near), (4.5, -8.0, near)),
-        ((3.0, -8.0, near), (5.0, 7.0, near), (6.5, 13.0, near), (10.0, 26.0, near)),
+        (Waypoint(0, 25, 0), Waypoint(4, 29, 0.1), Waypoint(10, 26, -0.1)),
+        (Waypoint(0, 20, far), Waypoint(10, 30, far)),
+        (Waypoint(0, 24, near), Waypoint(2, 10, near), Waypoint(4.5, -8, near)),
+        (
+            *(Waypoint(3, -8, near), Waypoint(5, 7, near)),
+            *(Waypoint(6.5, 13, near), Waypoint(10, 26, near)),
+        ),
     )
     paints = rng.permutation(len(_PAINTS))
     vehicles = tuple(
-        SceneVehicle(n, tuple(Waypoint(*at) for at in path), _PAINTS[paints[n]], random_body(rng))
-        for n, path in enumerate(paths, start=1)
+        SceneVehicle(number, path, _PAINTS[paints[number]], random_body(rng))
+        for number, path in enumerate(paths, start=1)
     )
     return replace(scene, vehicles=vehicles, frames=250)
 
@@ -242,9 +247,9 @@ def busy_road(rng: np.random.Generator) -> Scene:
         for lateral in (np.arange(lanes) - lane) * LANE_WIDTH:
             near = rng.uniform(6.5, 16) + abs(lateral)
             for ahead in (near, near + rng.uniform(8, 24)):
-                place = Waypoint(scene.time(index), ahead, lateral + rng.uniform(-0.6, 0.6))
+                position = Waypoint(scene.time(index), ahead, lateral + rng.uniform(-0.6, 0.6))
                 color, body = cars[rng.integers(len(cars))]
-                vehicles.append(SceneVehicle(len(vehicles) + 1, (place,), color, body))
+                vehicles.append(SceneVehicle(len(vehicles) + 1, (position,), color, body))
     return replace(scene, vehicles=tuple(vehicles))
 
 

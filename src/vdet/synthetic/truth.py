@@ -36,16 +36,17 @@ def true_boxes(scene: Scene, index: int) -> tuple[TrueBox, ...]:
     """Return the vehicles that are at least partly inside frame `index`, ordered by id."""
     camera = scene.camera
     covered = np.zeros((camera.height, camera.width), np.uint8)
-    found = []
-    for place, vehicle in scene.nearest_first(scene.time(index)):
+    boxes = []
+    for position, vehicle in scene.nearest_first(scene.time(index)):
         mask = np.zeros_like(covered)
-        for outline, _ in outlines(vehicle, place, camera):
+        for outline, _ in outlines(vehicle, position, camera):
             fill_outline(mask, outline, _WHITE, smooth=False)
         if inside := cv2.countNonZero(mask):
             hidden = cv2.countNonZero(mask & covered) / inside
-            found.append(TrueBox(vehicle.id, Box.sized(*cv2.boundingRect(mask)), hidden))
+            x, y, width, height = cv2.boundingRect(mask)
+            boxes.append(TrueBox(vehicle.id, Box.sized(x, y, width, height), hidden))
         covered |= mask
-    return tuple(sorted(found, key=lambda box: box.id))
+    return tuple(sorted(boxes, key=lambda box: box.id))
 
 
 def must_be_found(vehicle: TrueBox, frame_height: int) -> bool:
@@ -76,6 +77,7 @@ def write_truth(path: Path, scene: Scene, *, overwrite: bool = False) -> None:
         for vehicle in true_boxes(scene, index):
             x, y, width, height = vehicle.box.xywh
             flag = int(must_be_found(vehicle, scene.camera.height))
-            place = f"{index + 1},{vehicle.id},{x + 1},{y + 1},{width},{height}"
-            lines.append(f"{place},{flag},{_CAR},{1 - vehicle.hidden:.3f}\n")
+            box = f"{x + 1},{y + 1},{width},{height}"
+            quality = f"{flag},{_CAR},{1 - vehicle.hidden:.3f}"
+            lines.append(f"{index + 1},{vehicle.id},{box},{quality}\n")
     write_whole(path, "".join(lines), overwrite=overwrite)

@@ -39,11 +39,11 @@ _Facet = tuple[Float64Array, Color]
 
 
 def outlines(
-    vehicle: SceneVehicle, place: Waypoint, camera: PinholeCamera
+    vehicle: SceneVehicle, position: Waypoint, camera: PinholeCamera
 ) -> list[tuple[Float64Array, Color]]:
     """Return the pixels `(n, 2)` and colour of each visible facet, in painting order."""
     corners, ends, colors = _facets(vehicle.body, vehicle.color)
-    parts = [beyond_near(part) for part in np.split(_placed(corners, place), ends)]
+    parts = [beyond_near(part) for part in np.split(_placed(corners, position), ends)]
     pixels = camera.project(np.concatenate(parts))
     ends = np.cumsum([len(part) for part in parts])[:-1]
     return [
@@ -53,23 +53,23 @@ def outlines(
     ]
 
 
-def draw_vehicle(image: Image, vehicle: SceneVehicle, place: Waypoint, scene: Scene) -> None:
+def draw_vehicle(image: Image, vehicle: SceneVehicle, position: Waypoint, scene: Scene) -> None:
     """Draw a vehicle and the shadow below it onto a frame."""
     half, sun = vehicle.body.width / 2, scene.light.sun
     front = vehicle.body.length - STANDS
     left, right = min(0.0, sun) - half, max(0.0, sun) + half
     shadow = _quad((left, 0, STANDS), (right, 0, STANDS), (right, 0, front), (left, 0, front))
-    scene.camera.draw(image, _placed(shadow, place), _SHADOW)
-    light = scene.brightness(scene.speed * place.time + place.ahead)
-    for outline, color in outlines(vehicle, place, scene.camera):
+    scene.camera.draw(image, _placed(shadow, position), _SHADOW)
+    light = scene.brightness(scene.speed * position.time + position.ahead)
+    for outline, color in outlines(vehicle, position, scene.camera):
         fill_outline(image, outline, shaded(color, light))
 
 
-def _placed(corners: Float64Array, place: Waypoint) -> Float64Array:
+def _placed(corners: Float64Array, position: Waypoint) -> Float64Array:
     """Return corners `(n, 3)` of a vehicle in the coordinates of the camera."""
-    sine, cosine = np.sin(place.heading), np.cos(place.heading)
+    sine, cosine = np.sin(position.heading), np.cos(position.heading)
     turn = np.array([[cosine, 0.0, -sine], [0.0, 1.0, 0.0], [sine, 0.0, cosine]])
-    return np.asarray(corners @ turn + (place.lateral, 0.0, place.ahead))
+    return np.asarray(corners @ turn + (position.lateral, 0.0, position.ahead))
 
 
 @lru_cache(maxsize=512)
@@ -126,21 +126,21 @@ def _ends(body: Body, color: Color) -> list[_Facet]:
     rear, front, z = _SILL + 0.32, _SILL + 0.2, body.length + 0.01
     light = mixed(_LIGHT, shaded(color, 0.5), 0.2)
     panels = [
-        (-half + 0.05, half - 0.05, _SILL, _SILL + 0.1, -0.01, shaded(color, 0.4)),
-        (-half, half, rear, rear + 0.03, -0.01, shaded(color, 0.5)),
-        (-half + 0.1, half - 0.1, belt - 0.05, belt, -0.01, shaded(color, 1.12)),
-        (-0.27, 0.27, rear + 0.05, rear + 0.17, -0.02, _PLATE),
-        (-half + 0.02, -half + 0.36, belt - 0.24, belt - 0.06, -0.02, light),
-        (half - 0.36, half - 0.02, belt - 0.24, belt - 0.06, -0.02, light),
-        (half - 0.05, -half + 0.05, _SILL, _SILL + 0.12, z, shaded(color, 0.4)),
-        (half - 0.5, -half + 0.5, front, belt - 0.12, z, shaded(_GLASS, 0.6)),
-        (0.26, -0.26, front, front + 0.12, z + 0.01, _PLATE),
-        (half - 0.04, half - 0.44, belt - 0.28, belt - 0.1, z, _HEADLIGHT),
-        (-half + 0.44, -half + 0.04, belt - 0.28, belt - 0.1, z, _HEADLIGHT),
+        (_upright(-half + 0.05, half - 0.05, _SILL, _SILL + 0.1, -0.01), shaded(color, 0.4)),
+        (_upright(-half, half, rear, rear + 0.03, -0.01), shaded(color, 0.5)),
+        (_upright(-half + 0.1, half - 0.1, belt - 0.05, belt, -0.01), shaded(color, 1.12)),
+        (_upright(-0.27, 0.27, rear + 0.05, rear + 0.17, -0.02), _PLATE),
+        (_upright(-half + 0.02, -half + 0.36, belt - 0.24, belt - 0.06, -0.02), light),
+        (_upright(half - 0.36, half - 0.02, belt - 0.24, belt - 0.06, -0.02), light),
+        (_upright(half - 0.05, -half + 0.05, _SILL, _SILL + 0.12, z), shaded(color, 0.4)),
+        (_upright(half - 0.5, -half + 0.5, front, belt - 0.12, z), shaded(_GLASS, 0.6)),
+        (_upright(0.26, -0.26, front, front + 0.12, z + 0.01), _PLATE),
+        (_upright(half - 0.04, half - 0.44, belt - 0.28, belt - 0.1, z), _HEADLIGHT),
+        (_upright(-half + 0.44, -half + 0.04, belt - 0.28, belt - 0.1, z), _HEADLIGHT),
     ]
     if body.belt > _HIGHEST_LIGHT:  # a windscreen
-        panels.append((half - 0.15, -half + 0.15, 1.5, 2.5, z, _GLASS))
-    return [(_upright(*sides), painted) for *sides, painted in panels]
+        panels.append((_upright(half - 0.15, -half + 0.15, 1.5, 2.5, z), _GLASS))
+    return panels
 
 
 def _cabin(body: Body, color: Color) -> list[_Facet]:

@@ -7,7 +7,7 @@ import pytest
 
 from learn.net.blocks import block_picture, block_source
 from vdet.config.schema import NetworkTrainingSettings
-from vdet.learn.net.augmentation import Drawing, Paster, SampleDrawer, repeat_factors
+from vdet.learn.net.augmentation import Drawing, Paster, SampleDrawer, repeat_factors, with_signs
 from vdet.learn.net.sources import MAX_PIXELS, NetSample, NetSource
 from vdet.learn.net.weather import with_weather
 
@@ -101,6 +101,26 @@ def test_pictures_with_rare_classes_come_more_often() -> None:
     # The bus is in a tenth of the pictures: √(0.4 / 0.1) = 2 times.
     factors = repeat_factors([*cars, bus], np.full(10, 0.1), 0.4)
     assert factors.tolist() == pytest.approx([1.0] * 9 + [2.0])
+
+
+def test_pictures_without_objects_come_as_often_as_those_of_a_rare_class() -> None:
+    samples = [*block_source(9).samples, without_objects(WHITE)]
+    cars = [replace(sample, classes=np.zeros_like(sample.classes)) for sample in samples]
+    factors = repeat_factors(cars, np.full(10, 0.1), 0.4)
+    assert factors.tolist() == pytest.approx([1.0] * 9 + [2.0])
+
+
+def test_signs_are_background_and_cover_no_object() -> None:
+    [block] = black_on_white().samples
+    drawn = [with_signs(np.random.default_rng(seed), block) for seed in range(200)]
+    with_sign = [sample for sample in drawn if not np.array_equal(sample.image, block.image)]
+    assert 30 <= len(with_sign) <= 90
+    for sample in with_sign:
+        assert np.array_equal(sample.boxes, block.boxes)
+        # A sign may cover a fifth, and there may be three and their posts.
+        assert (sample.image[48:80, 96:160] == 0).all(axis=2).mean() > 0.3
+    hidden = [(sample.image[48:80, 96:160] != 0).mean() for sample in with_sign]
+    assert np.mean(hidden) < 0.05
 
 
 def test_objects_of_rare_classes_are_pasted_with_their_boxes() -> None:

@@ -135,7 +135,6 @@ def test_a_table_has_the_sides_of_the_vehicle_in_a_patch(tmp_path: Path, make: M
         (ROWS[0], "vehicles/far/1.png,-0.5,-0.25,0.5"),
         (ROWS[0], "vehicles/far/1.png,-0.5,-0.25,0.5,0.25,0"),
         (ROWS[0], "vehicles/far/1.png,-0.5,-0.25,0.5,wide"),
-        (ROWS[0], "vehicles/far/1.png,-0.5,-0.25,0.5,inf"),
         (ROWS[0], ""),
     ],
 )

@@ -1,4 +1,4 @@
-"""Training images for the network: places, scales, mosaics, colours and pasted objects."""
+"""Training images for the network: random views, mosaics, colours and pasted objects."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -21,7 +21,7 @@ _SCALES = 0.5, 2.0
 _MOSAIC_SCALES = 0.5, 1.5
 """Smallest and largest scale of the four images of a mosaic."""
 _MIN_VISIBLE = 0.25  # fraction of a vehicle that is left after cropping, else it is ignored
-_ASPECT = 0.1  # most change of the width relative to the height
+_ASPECT = 0.1  # maximum change of the width relative to the height
 REPEAT_THRESHOLD = 0.4
 """Images with a class that is in a smaller fraction of the images are drawn more often."""
 _TILTED = 0.25  # fraction of images that are turned
@@ -40,7 +40,7 @@ _MAX_SIGNS = 3  # signs in an image
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """How images are drawn at a step of the training.
+    """How images are drawn at a training step.
 
     `width` and `height` are the size of the images, pixels; `magnified` multiplies all scales.
     """
@@ -79,10 +79,10 @@ class SampleDrawer:
             sample = self._mosaic(rng, drawing)
         else:
             scale = drawing.magnified * _scale(rng, _SCALES)
-            sample = _place(rng, self._pick(rng), (drawing.width, drawing.height), scale)
+            sample = _random_view(rng, self._pick(rng), (drawing.width, drawing.height), scale)
         if rng.random() < 0.5:
             sample = _mirrored(sample)
-        sample = _with_signs(rng, self._paster.paste(rng, sample))
+        sample = with_signs(rng, self._paster.paste(rng, sample))
         sides = sample.boxes[:, 2:] - sample.boxes[:, :2]
         may_have_lamps = ~sample.ignored & (sides[:, 0] > 0.45 * sides[:, 1])  # people have none
         image = _recolored(rng, sample.image)
@@ -100,11 +100,11 @@ class SampleDrawer:
         y = round(height * rng.uniform(0.3, 0.7))
         image = np.empty((height, width, 3), np.uint8)
         parts = []
-        places = (0, 0, x, y), (x, 0, width, y), (0, y, x, height), (x, y, width, height)
-        for left, top, right, bottom in places:
+        quarters = (0, 0, x, y), (x, 0, width, y), (0, y, x, height), (x, y, width, height)
+        for left, top, right, bottom in quarters:
             scale = drawing.magnified * _scale(rng, _MOSAIC_SCALES)
             fit = width / (right - left)  # the scale refers to the width of the whole image
-            part = _place(rng, self._pick(rng), (right - left, bottom - top), scale * fit / 2)
+            part = _random_view(rng, self._pick(rng), (right - left, bottom - top), scale * fit / 2)
             image[top:bottom, left:right] = part.image
             moved = part.boxes + np.array([left, top, left, top], np.float32)
             parts.append(replace(part, boxes=moved))
@@ -154,20 +154,22 @@ class Paster:
         sample = replace(sample, image=sample.image.copy())
         for _ in range(int(rng.integers(1, _MAX_PASTED + 1))):
             rare = self._rare[int(rng.integers(len(self._rare)))]
-            sample = _paste(rng, sample, *rare[int(rng.integers(len(rare)))])
+            donor, row = rare[int(rng.integers(len(rare)))]
+            sample = _paste(rng, sample, donor, row)
         return sample
 
 
 def _whole(sample: NetSample) -> list[int]:
     """Return the rows of the objects that are large, inside the image, and not hidden."""
     height, width = sample.image.shape[:2]
-    boxes, known = sample.boxes.astype(np.float64), sample.classes >= 0
+    boxes, has_class = sample.boxes.astype(np.float64), sample.classes >= 0
     overlaps = iou_matrix(boxes, boxes) - np.eye(len(boxes))
-    overlaps[:, sample.ignored & known] = 0  # the whole image
+    overlaps[:, sample.ignored & has_class] = 0  # the whole image
     large = (boxes[:, 2:] - boxes[:, :2]).max(1, initial=0) >= _MIN_DONOR
     inside = (boxes > 1).all(1) & (boxes[:, 2:] < np.array([width, height]) - 1).all(1)
     apart = overlaps.max(1, initial=0) < 0.1
-    return [int(row) for row in np.flatnonzero(large & inside & apart & known & ~sample.ignored)]
+    is_whole = large & inside & apart & has_class & ~sample.ignored
+    return [int(row) for row in np.flatnonzero(is_whole)]
 
 
 def _paste(rng: np.random.Generator, sample: NetSample, donor: NetSample, row: int) -> NetSample:
@@ -189,22 +191,22 @@ def _paste(rng: np.random.Generator, sample: NetSample, donor: NetSample, row: i
         return sample
     x, y = int(rng.integers(width - columns)), height // 4 + int(rng.integers(free))
     inner = (box - np.array([left, top] * 2)) * factor
-    place = (inner + np.array([x, y] * 2)).astype(np.float32)
-    others = sample.boxes[~sample.ignored].astype(np.float64)
-    if coverage(others, place[np.newaxis].astype(np.float64)).max(initial=0) > _MAX_COVERED:
+    pasted_box = (inner + np.array([x, y] * 2)).astype(np.float32)[np.newaxis]
+    objects = sample.boxes[~sample.ignored].astype(np.float64)
+    if coverage(objects, pasted_box.astype(np.float64)).max(initial=0) > _MAX_COVERED:
         return sample
     part = sample.image[y : y + rows, x : x + columns]
     opacity = _feather(columns, inner[0], inner[2]) * _feather(rows, inner[1], inner[3])[:, None]
     part[:] = blended(part, _image(patch), opacity)
     return replace(
         sample,
-        boxes=np.concatenate([sample.boxes, place[np.newaxis]]),
+        boxes=np.concatenate([sample.boxes, pasted_box]),
         classes=np.append(sample.classes, donor.classes[row]),
         ignored=np.append(sample.ignored, False),
     )
 
 
-def _with_signs(rng: np.random.Generator, sample: NetSample) -> NetSample:
+def with_signs(rng: np.random.Generator, sample: NetSample) -> NetSample:
     """Sometimes draw signs into the image of a sample; they cover no object."""
     if rng.random() >= _SIGNS:
         return sample
@@ -218,24 +220,24 @@ def _with_signs(rng: np.random.Generator, sample: NetSample) -> NetSample:
 
 def _feather(count: int, near: float, far: float) -> Float64Array:
     """Return an opacity `(count,)`: 1 from `near` to `far`, falling to 0 at both ends."""
-    places = (0, max(near, 0.5), min(far, count - 0.5), count)
-    return np.asarray(np.interp(np.arange(count) + 0.5, places, (0, 1, 1, 0)))
+    ends = (0, max(near, 0.5), min(far, count - 0.5), count)
+    return np.asarray(np.interp(np.arange(count) + 0.5, ends, (0, 1, 1, 0)))
 
 
 def _scale(rng: np.random.Generator, limits: tuple[float, float]) -> float:
     return float(np.exp(rng.uniform(*np.log(limits))))
 
 
-def _place(
+def _random_view(
     rng: np.random.Generator, sample: NetSample, size: tuple[int, int], scale: float
 ) -> NetSample:
-    """Return a part of an image of `size`; at scale 1 its width fits."""
+    """Return a random view of an image, of `size`; at scale 1 its width fits."""
     width, height = size
     whole = np.array(sample.image.shape[1::-1])
-    stretch = np.exp(rng.uniform(-_ASPECT, _ASPECT) / 2)
-    factors = scale * width / whole[0] * np.array([stretch, 1 / stretch])
-    room = np.array(size) - whole * factors
-    corner = rng.uniform(np.minimum(room, 0), np.maximum(room, 0))
+    aspect = np.exp(rng.uniform(-_ASPECT, _ASPECT) / 2)
+    factors = scale * width / whole[0] * np.array([aspect, 1 / aspect])
+    margin = np.array(size) - whole * factors
+    corner = rng.uniform(np.minimum(margin, 0), np.maximum(margin, 0))
     angle = rng.normal(0, _TILT) if rng.random() < _TILTED else 0.0
     turn = np.asarray(cv2.getRotationMatrix2D((width / 2, height / 2), angle, 1.0))
     placing = turn @ np.vstack([np.column_stack([np.diag(factors), corner]), [0, 0, 1]])

@@ -8,7 +8,8 @@ import copy
 import io
 import json
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping, Sequence
+from itertools import zip_longest
 from pathlib import Path
 
 import numpy as np
@@ -72,7 +73,7 @@ def export_network(
 def write_model(
     model: onnx.ModelProto, header: Header, path: Path, *, overwrite: bool = False
 ) -> None:
-    """Write the graph of a network of ours with a header. Raises `OutputError`."""
+    """Write the graph of a network of vdet train-net with a header. Raises `OutputError`."""
     text = json.dumps(header.model_dump(mode="json"))
     onnx.helper.set_model_props(model, {HEADER_KEY: text})
     onnx.checker.check_model(model)
@@ -84,70 +85,100 @@ def write_model(
 def start_from(network: Network, path: Path, images: Tensor, classes: Sequence[str]) -> None:
     """Give a network the weights of a file that `export_network` has written.
 
-    Normalisation is part of the convolutions there. Each normalisation of the network gets the
-    mean and deviation of what it sees in some images, and undoes itself at first. Layers may be
-    wider than those of the file: further channels have random weights and change no output yet.
-    So have classes that the file does not know.
+    Normalisation is part of the convolutions there, so the normalisations of the network are set to
+    change nothing at first. Layers may be wider than those of the file: further channels have
+    random weights, on which no output depends yet. The same holds for classes that the file does
+    not have.
 
     Parameters
     ----------
-    classes
-        Those of the network, in its order.
     images
         BGR, 0 to 255, float32 `(B, 3, H, W)`: at least a batch as the training shows them.
+    classes
+        Those of the network, in its order.
 
     Raises
     ------
     DataError
         The file is not a network of this form.
     """
-    bias = torch.empty(0)
-
-    def load(layer: nn.Module, inputs: tuple[Tensor]) -> None:
-        """Set a layer before it computes: a convolution, or the normalisation behind it."""
-        nonlocal bias
-        if isinstance(layer, nn.BatchNorm2d):
-            variance, mean = torch.var_mean(inputs[0], (0, 2, 3))
-            known = slice(len(bias))
-            layer.weight[known] = torch.sqrt(variance + layer.eps)[known]
-            layer.bias[known] = bias + mean[known]
-            layer.load_state_dict({"running_mean": mean, "running_var": variance}, strict=False)
-            return
-        weight, bias = next(folded)
-        rows = list(range(len(weight)))
-        if layer.bias is not None:  # a head: its classes may be others, or in another order
-            rows, weight, bias = places, weight[columns], bias[columns]
-            layer.bias[rows] = bias
-        layer.weight[rows] = 0  # the known channels do not depend on further inputs
-        layer.weight[rows, : weight.shape[1]] = 255 * weight if layer is network.stem else weight
-
-    layers = [
-        module for module in network.modules() if isinstance(module, nn.Conv2d | nn.BatchNorm2d)
-    ]
-    hooks = [layer.register_forward_pre_hook(load) for layer in layers]
     try:
         header = read_header(Session(path))
-        theirs = header.classes if header else ()
-        shared = [name for name in classes if name in theirs]
-        places = [*range(5), *(5 + classes.index(name) for name in shared)]
-        columns = [*range(5), *(5 + theirs.index(name) for name in shared)]
-        folded = _convolutions(onnx.load(str(path)).graph)
-        network(images)
-        if next(folded, None) is not None:
-            raise ValueError("more convolutions than the network has")
+        columns = _matching_columns(classes, header.classes if header else ())
+        biases = {}
+        folded = _folded_convolutions(onnx.load(str(path)).graph)
+        for (layer, norm), (weight, bias) in zip(_layers(network), folded, strict=True):
+            if norm is None:  # a head
+                for column, base_column in columns:
+                    _load(layer.weight[column : column + 1], weight[[base_column]])
+                    layer.bias[column] = bias[base_column]
+            else:
+                _load(layer.weight, 255 * weight if layer is network.stem else weight)
+                biases[norm] = bias
+        _calibrate(network, biases, images)
     except Exception as error:  # onnx and torch raise many kinds for a file of another form
         raise DataError(f"{path}: is not a network of vdet train-net") from error
-    finally:
-        for hook in hooks:
-            hook.remove()
 
 
-def _convolutions(graph: onnx.GraphProto) -> Iterator[tuple[Tensor, Tensor]]:
-    """Yield weight and bias of all convolutions, in the order of the graph."""
+def _folded_convolutions(graph: onnx.GraphProto) -> list[tuple[Tensor, Tensor]]:
+    """Return the weight and bias of all convolutions, in the order of the graph."""
     constants = {item.name: numpy_helper.to_array(item) for item in graph.initializer}
+    convolutions = []
     for node in graph.node:
         if node.op_type == "Identity" and node.input[0] in constants:  # equal ones are written once
             constants[node.output[0]] = constants[node.input[0]]
         elif node.op_type == "Conv":
             weight, bias = (torch.tensor(constants[name]) for name in node.input[1:3])
-            yield weight, bias
+            convolutions.append((weight, bias))
+    return convolutions
+
+
+def _layers(network: Network) -> list[tuple[nn.Conv2d, nn.BatchNorm2d | None]]:
+    """Return all convolutions, each with its normalisation, in the order in which they compute.
+
+    That is the order of the graph. Heads have no normalisation.
+    """
+    branches = [part for pair in zip(network.towers, network.heads, strict=True) for part in pair]
+    joined = network.lateral, network.down, network.up
+    parts = network.stem, network.stem_norm, network.stages, *joined, *branches
+    modules = [module for part in parts for module in part.modules()]
+    layers = [module for module in modules if isinstance(module, nn.Conv2d | nn.BatchNorm2d)]
+    return [
+        (layer, following if isinstance(following, nn.BatchNorm2d) else None)
+        for layer, following in zip_longest(layers, layers[1:])
+        if isinstance(layer, nn.Conv2d)
+    ]
+
+
+def _load(weight: Tensor, values: Tensor) -> None:
+    """Set the first channels of a weight; they do not depend on further inputs."""
+    outputs, inputs = values.shape[:2]
+    weight[:outputs] = 0
+    weight[:outputs, :inputs] = values
+
+
+def _matching_columns(classes: Sequence[str], base_classes: Sequence[str]) -> list[tuple[int, int]]:
+    """Return the columns of a network's output with those of its base that mean the same."""
+    shared = [name for name in classes if name in base_classes]
+    return [(column, column) for column in range(5)] + [
+        (5 + classes.index(name), 5 + base_classes.index(name)) for name in shared
+    ]
+
+
+def _calibrate(network: Network, biases: Mapping[nn.Module, Tensor], images: Tensor) -> None:
+    """Set each normalisation so that, for these images, it adds a bias and does nothing else.
+
+    It gets the mean and variance of its inputs, and undoes itself with its own weight and bias.
+    """
+
+    def calibrate(norm: nn.BatchNorm2d, inputs: tuple[Tensor]) -> None:
+        variance, mean = torch.var_mean(inputs[0], (0, 2, 3))
+        bias = biases[norm]
+        norm.weight[: len(bias)] = torch.sqrt(variance + norm.eps)[: len(bias)]
+        norm.bias[: len(bias)] = bias + mean[: len(bias)]
+        norm.load_state_dict({"running_mean": mean, "running_var": variance}, strict=False)
+
+    hooks = [norm.register_forward_pre_hook(calibrate) for norm in biases]
+    network(images)
+    for hook in hooks:
+        hook.remove()

@@ -195,10 +195,10 @@ def class_weights(sources: Sequence[NetSource], count: int) -> Tensor:
 
     The last one is that of vehicles of unknown kind, 1. The most frequent class has 1 too.
     """
-    found = np.zeros(count + 1)
+    counts = np.zeros(count + 1)
     for sample in (sample for source in sources for sample in source.samples):
-        found += np.bincount(sample.classes[~sample.ignored] % (count + 1), minlength=count + 1)
-    weights = (found[:count].max() / np.maximum(found, 1)) ** _BALANCE
+        counts += np.bincount(sample.classes[~sample.ignored] % (count + 1), minlength=count + 1)
+    weights = (counts[:count].max() / np.maximum(counts, 1)) ** _BALANCE
     return torch.tensor([*np.minimum(weights[:count], _MAX_WEIGHT), 1.0], dtype=torch.float32)
 
 
@@ -280,9 +280,9 @@ def assign(
     )
     count = overlaps.topk(CANDIDATES, dim=1).values.sum(1).int().clamp(min=1)
     cheapest = costs.topk(CANDIDATES, dim=1, largest=False)
-    wanted = torch.arange(CANDIDATES, device=count.device)[None] < count[:, None]
+    is_cheap = torch.arange(CANDIDATES, device=count.device)[None] < count[:, None]
     chosen = torch.full_like(costs, _NEVER)
-    chosen.scatter_(1, cheapest.indices, cheapest.values.where(wanted, _NEVER))
+    chosen.scatter_(1, cheapest.indices, cheapest.values.where(is_cheap, _NEVER))
     of_cells = vehicles.image[:, None].expand_as(chosen)
     lowest = torch.full_like(scores, _NEVER).scatter_reduce(0, of_cells, chosen, "amin")
     is_taken = (chosen < _NEVER) & (chosen == lowest[vehicles.image])

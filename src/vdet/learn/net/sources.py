@@ -1,4 +1,4 @@
-"""Labelled images and videos in memory, from which the training draws."""
+"""Labelled images and videos in memory, from which training images are drawn."""
 
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
@@ -95,7 +95,7 @@ Counts = dict[str, int]
 
 @dataclass(frozen=True, slots=True)
 class SourceReport:
-    """What a training makes of a source.
+    """What is learnt from a source.
 
     Attributes
     ----------
@@ -131,7 +131,7 @@ def _listed(counts: Counts) -> str:
 
 
 Source = tuple[NetSource, SourceReport]
-"""A source, and what a training makes of it."""
+"""A source, and what is learnt from it."""
 
 
 def image_source(labelled: LabelledImages, settings: Settings) -> Source:
@@ -157,9 +157,9 @@ def clip_source(video: Path, truth: Path, settings: Settings) -> Source:
     """
     roles = Roles.for_training(settings)
     saved = read_true_labels(truth, roles)
-    known = None if saved.known is None else [index + 1 for index in saved.known]
-    last = max((*(label.frame for label in saved.labels), *(known or ())), default=0)
-    used = spread_frames(known, EVERY, EVERY, last)
+    labelled_frames = None if saved.known is None else [index + 1 for index in saved.known]
+    last = max((*(label.frame for label in saved.labels), *(labelled_frames or ())), default=0)
+    used = spread_frames(labelled_frames, EVERY, EVERY, last)
     labels: dict[int, list[Label]] = defaultdict(list)
     for label in saved.labels:
         if label.frame in used:
@@ -192,12 +192,12 @@ def _source(name: str, frames: _Frames, labelled: LabelledImages, settings: Sett
         vehicles.update(names[class_] for class_ in sample.classes[~sample.ignored].tolist())
     unlabelled = {name for image in labelled.images for name in image.unlabelled}
     report = SourceReport(
-        name,
-        len(samples),
-        {name: vehicles[name] for name in names if vehicles[name]},
-        dict(labelled.ignored),
-        dict(labelled.others),
-        tuple(name for name in classes if name in unlabelled),
+        name=name,
+        images=len(samples),
+        vehicles={name: vehicles[name] for name in names if vehicles[name]},
+        ignored=dict(labelled.ignored),
+        background=dict(labelled.others),
+        unlabelled=tuple(name for name in classes if name in unlabelled),
     )
     return NetSource(name, samples), report
 

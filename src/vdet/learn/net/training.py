@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import torch
 
+from vdet.boxes import BoolArray
 from vdet.config.schema import NetworkTrainingSettings
 from vdet.detect.onnx.recognition import Header, read_header
 from vdet.detect.onnx.session import Session
@@ -34,7 +35,7 @@ _SMALL = 0.35
 _PLAIN = 0.12
 """Fraction of the steps, at the end, without mosaics."""
 _MOSAICS = 0.35
-"""Fraction of images put together of four."""
+"""Fraction of images that are mosaics of four."""
 _WARM_UP = 200
 """Steps in which the learning rate rises, or a tenth of all if that is less."""
 _LAST_RATE = 0.02
@@ -126,7 +127,7 @@ def train_network(
     """Train a network and return it with the moving average of its weights.
 
     On a CPU the same sources and settings give the same network on the same machine. A training
-    that was stopped resumes from its last checkpoint, also on another device. Threads draw the
+    run that was stopped resumes from its last checkpoint, also on another device. Threads draw the
     images: one for a CPU, one per core for a GPU.
 
     Parameters
@@ -136,7 +137,7 @@ def train_network(
     checkpoint
         File of the last checkpoint; it is made and replaced, and read where it exists.
     base
-        An exported network from whose weights the training starts.
+        An exported network whose weights are the first ones.
     device
         Where to compute: "cpu", "cuda", or "auto" for a GPU where torch finds one.
 
@@ -144,7 +145,7 @@ def train_network(
     ------
     DataError
         There is no such device, no source has a vehicle, a weight is given to a source that is not
-        there, the base is not such a network, or the checkpoint belongs to another training.
+        there, the base is not such a network, or the checkpoint belongs to another training run.
     """
     if not any((~sample.ignored).any() for source in sources for sample in source.samples):
         raise DataError("no image has a vehicle; pass labelled images")
@@ -216,17 +217,24 @@ def _drawing(settings: NetworkTrainingSettings, step: int) -> Drawing:
 def _to_batch(samples: Sequence[NetSample]) -> Batch:
     joined = join(samples, samples[0].image)
     image = np.repeat(np.arange(len(samples)), [len(sample.boxes) for sample in samples])
-    columns = [torch.from_numpy(item) for item in (image, joined.boxes, joined.classes)]
-    vehicles, ignored = (
-        Vehicles(*(column[rows] for column in columns))
-        for rows in map(torch.from_numpy, (~joined.ignored, joined.ignored))
-    )
+
+    def vehicles(rows: BoolArray) -> Vehicles:
+        return Vehicles(
+            image=torch.from_numpy(image[rows]),
+            boxes=torch.from_numpy(joined.boxes[rows]),
+            classes=torch.from_numpy(joined.classes[rows]),
+        )
+
     images = torch.from_numpy(np.stack([sample.image for sample in samples]))
-    return Batch(images.permute(0, 3, 1, 2), vehicles, ignored)
+    return Batch(
+        images=images.permute(0, 3, 1, 2),
+        vehicles=vehicles(~joined.ignored),
+        ignored=vehicles(joined.ignored),
+    )
 
 
 class _Training:
-    """The state of a training between two steps."""
+    """The state of a training run between two steps."""
 
     def __init__(
         self,
@@ -244,9 +252,9 @@ class _Training:
         self._network = network.to(device, memory_format=torch.channels_last).train()
         self.averaged = copy.deepcopy(self._network)
         weights = [parameter for parameter in self._network.parameters() if parameter.ndim > 1]
-        others = [parameter for parameter in self._network.parameters() if parameter.ndim <= 1]
+        biases = [parameter for parameter in self._network.parameters() if parameter.ndim <= 1]
         self._optimizer = torch.optim.AdamW(
-            [{"params": weights}, {"params": others, "weight_decay": 0.0}],
+            [{"params": weights}, {"params": biases, "weight_decay": 0.0}],
             settings.learning_rate,
             weight_decay=_WEIGHT_DECAY,
         )
@@ -310,7 +318,9 @@ class _Training:
                 part.load_state_dict(state[name])
             self.step = state["step"]
         except Exception as error:  # torch raises many kinds for a file of another form
-            raise DataError(f"{path}: is not a checkpoint of this training; remove it") from error
+            raise DataError(
+                f"{path}: is not a checkpoint of this training run; remove it"
+            ) from error
         if not same:
-            others = "with other settings, images or base"
-            raise DataError(f"{path}: belongs to a training {others}; remove it")
+            differing = "other settings, images or base"
+            raise DataError(f"{path}: belongs to a training run with {differing}; remove it")

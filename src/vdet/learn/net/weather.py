@@ -1,4 +1,4 @@
-"""Night, fog, rain and drops on the glass, drawn into images of clear days."""
+"""Night, fog, rain and drops on the lens, drawn into images of clear days."""
 
 from typing import Any
 
@@ -18,7 +18,7 @@ _LAMP = (0.03, 0.09)  # radius of a lamp, fraction of the vehicle's width: small
 _TWO_LAMPS = 0.75  # minimum width of a vehicle with two lamps, fraction of its height
 _STREET_LAMP = (0.6, 0.85, 1.0)  # BGR
 _WIPED = 0.15  # fraction of images in rain with a wiper
-_DROPS = 40  # most drops on the glass
+_DROPS = 40  # maximum number of drops on the lens
 
 
 def with_weather(rng: np.random.Generator, image: Image, boxes: Float32Array) -> Image:
@@ -61,8 +61,8 @@ def _at_night(rng: np.random.Generator, image: Image, boxes: Float32Array) -> Im
         for x in (x1 + inset, x2 - inset) if is_wide else ((x1 + x2) / 2,):
             lamp(x, y, radius, color)
     for _ in range(int(rng.integers(0, 5))):
-        place = rng.uniform(0, width), rng.uniform(0, height / 2)
-        lamp(*place, rng.uniform(0.5, 3.5), _STREET_LAMP)
+        x, y = rng.uniform(0, width), rng.uniform(0, height / 2)
+        lamp(x, y, rng.uniform(0.5, 3.5), _STREET_LAMP)
     # A wide blur is computed at a quarter of the size.
     small = cv2.resize(light, None, fx=0.25, fy=0.25, interpolation=cv2.INTER_AREA)
     bloom = cv2.GaussianBlur(small, (0, 0), width / 4 * rng.uniform(0.004, 0.02))
@@ -85,7 +85,7 @@ def _in_fog(rng: np.random.Generator, image: Image) -> Image:
 
 
 def _in_rain(rng: np.random.Generator, image: Image) -> Image:
-    """Dull the image and draw streaks; often with drops on the glass, sometimes with a wiper."""
+    """Dull the image and draw streaks; often with drops on the lens, sometimes with a wiper."""
     height, width = image.shape[:2]
     rain = np.zeros((height, width), np.uint8)
     slant = rng.uniform(-0.3, 0.3)
@@ -105,7 +105,7 @@ def _in_rain(rng: np.random.Generator, image: Image) -> Image:
 
 
 def _with_drops(rng: np.random.Generator, image: Image) -> Image:
-    """Draw drops on the glass: each shows a blurred, upside-down image of what is around it."""
+    """Draw drops on the lens: each shows a blurred, upside-down image of what is around it."""
     height, width = image.shape[:2]
     blurred = cv2.GaussianBlur(image, (0, 0), 0.004 * width * rng.uniform(0.5, 2))
     shown, mask = blurred.copy(), np.zeros((height, width), np.uint8)
@@ -126,18 +126,18 @@ def _with_wiper(rng: np.random.Generator, image: Image) -> Image:
     """Draw a dark, blurred wiper and what it smears."""
     height, width = image.shape[:2]
     mask = np.zeros((height, width), np.uint8)
-    foot = int(rng.integers(width)), height
-    tip = int(foot[0] + rng.uniform(-0.6, 0.6) * width), int(height * rng.uniform(0, 0.5))
-    cv2.line(mask, foot, tip, 255, max(2, int(width * rng.uniform(0.005, 0.025))))
+    pivot = int(rng.integers(width)), height
+    tip = int(pivot[0] + rng.uniform(-0.6, 0.6) * width), int(height * rng.uniform(0, 0.5))
+    cv2.line(mask, pivot, tip, 255, max(2, int(width * rng.uniform(0.005, 0.025))))
     smeared = cv2.blur(image, (1 + 2 * int(0.01 * width), 1))
     dark = np.full_like(image, 25)
     return blended(smeared, dark, cv2.GaussianBlur(mask, (0, 0), 0.006 * width) / 255.0)
 
 
-def blended(image: _Values, other: _Values, opacity: _Values) -> Image:
-    """Return the image with another one over it, of an opacity `(H, W)` from 0 to 1."""
+def blended(image: _Values, overlay: _Values, opacity: _Values) -> Image:
+    """Return the image under another one, whose opacity is `(H, W)`, 0 to 1."""
     over = np.asarray(opacity, np.float32)
-    return np.asarray(cv2.blendLinear(image, other, 1 - over, over), np.uint8)
+    return np.asarray(cv2.blendLinear(image, overlay, 1 - over, over), np.uint8)
 
 
 def _scaled(image: Image, gain: _Values | float, offset: _Values | float = 0.0) -> Image:

@@ -105,12 +105,12 @@ def _patch_file(source: Path, name: str, boxes: Mapping[str, Sides]) -> PatchFil
     if is_hidden(path) or path.suffix.lower() not in IMAGE_SUFFIXES:
         return None
     sides = boxes.get(name)
-    known = CLASSES | ({BOXED: True} if sides else {})
+    classes = CLASSES | ({BOXED: True} if sides else {})
     folders = [source.resolve().name, *path.parts[:-1]]
     for depth in range(len(folders) - 1, -1, -1):
-        if folders[depth] in known:
+        if folders[depth] in classes:
             group = escaped("/".join(folders[depth:]))
-            return PatchFile(source, name, group, known[folders[depth]], sides)
+            return PatchFile(source, name, group, classes[folders[depth]], sides)
     return None
 
 
@@ -125,14 +125,14 @@ def read_patches(files: Sequence[PatchFile]) -> Iterator[Image | None]:
     return map(decode_image, _contents((file.source, file.name) for file in files))
 
 
-def _contents(places: Iterable[tuple[Path, str]]) -> Iterator[bytes]:
-    """Yield the content of files in folders or zip files; an empty one if it cannot be read.
+def _contents(files: Iterable[tuple[Path, str]]) -> Iterator[bytes]:
+    """Yield the content of each file (folder or zip file, name); empty if it cannot be read.
 
     Each zip file is opened once.
     """
     with ExitStack() as stack:
         opened = cache(lambda source: stack.enter_context(open_archive(source)))
-        for source, name in places:
+        for source, name in files:
             try:
                 if source.is_dir():
                     path = source / name
@@ -157,8 +157,6 @@ def _read_table(source: Path) -> dict[str, Sides]:
 
 def _sides(values: Sequence[str]) -> Sides:
     left, top, right, bottom = (float(value or "nan") for value in values)
-    if math.inf in map(abs, (left, top, right, bottom)):
-        raise ValueError("a side is infinite")
     return left, top, right, bottom
 
 
@@ -181,8 +179,9 @@ def patch_archive(path: Path, *, overwrite: bool = False) -> Iterator[AddPatch]:
         def add(name: str, patch: Image, sides: Sides | None) -> None:
             store(file, name, cv2.imencode(".png", patch)[1].tobytes())
             if sides is not None:
-                known = ("" if math.isnan(side) else f"{side:.4f}" for side in sides)
-                rows.writerow([name, *known])
+                rows.writerow(
+                    [name, *("" if math.isnan(side) else f"{side:.4f}" for side in sides)]
+                )
 
         yield add
         store(file, TABLE, table.getvalue())

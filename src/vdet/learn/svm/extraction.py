@@ -13,7 +13,6 @@ from vdet.config.detector import FeatureSettings
 from vdet.detect.svm.features import FeatureExtractor, to_patch
 from vdet.errors import DataError
 from vdet.learn.svm.dataset import UNKNOWN, PatchFile, read_patches
-from vdet.run.threads import map_ordered
 from vdet.workers import core_count
 
 TEST_FRACTION = 0.2
@@ -71,8 +70,9 @@ class LabelledVectors:
         used = kept[self.origins]
         files = [file for file, is_kept in zip(self.files, kept, strict=True) if is_kept]
         origins = (np.cumsum(kept) - 1)[self.origins[used]]
-        rows = self.vectors[used], self.vehicle[used], self.sides[used]
-        return LabelledVectors(*rows, origins, files)
+        return LabelledVectors(
+            self.vectors[used], self.vehicle[used], self.sides[used], origins, files
+        )
 
 
 def extract(
@@ -99,9 +99,11 @@ def extract(
     DataError
         A patch is unreadable.
     """
+    from joblib import Parallel, delayed
+
     extractor = FeatureExtractor(features)
 
-    def samples() -> Iterator[list[PatchSample]]:
+    def samples_by_patch() -> Iterator[list[PatchSample]]:
         for file, image in zip(files, read_patches(files), strict=True):
             if image is None:
                 raise DataError(f"{file}: is not a readable image")
@@ -109,18 +111,25 @@ def extract(
             rng = np.random.default_rng(zlib.crc32(image.tobytes()))
             yield [whole, *(augment(whole, rng) if augmented else ())]
 
-    def describe(same: Sequence[PatchSample]) -> Float32Array:
-        return np.stack([extractor.describe(to_patch(item.image, features.patch)) for item in same])
+    def describe(samples: Sequence[PatchSample]) -> tuple[Sequence[PatchSample], Float32Array]:
+        patches = [to_patch(sample.image, features.patch) for sample in samples]
+        return samples, np.stack([extractor.describe(patch) for patch in patches])
 
+    in_threads = Parallel(jobs or core_count(), backend="threading", return_as="generator")
+    results = in_threads(delayed(describe)(samples) for samples in samples_by_patch())
     vectors: list[Float32Array] = []
-    labels: list[tuple[bool, Float32Array, int]] = []
-    with map_ordered(describe, samples(), jobs or core_count()) as results:
-        for number, (same, described) in enumerate(results):
-            vectors.append(described)
-            labels += [(item.vehicle, item.sides, number) for item in same]
-            progress(1)
-    vehicle, sides, origins = map(np.array, zip(*labels, strict=True))
-    return LabelledVectors(np.concatenate(vectors), vehicle, sides, origins, files)
+    vehicle: list[bool] = []
+    sides: list[Float32Array] = []
+    origins: list[int] = []
+    for number, (samples, described) in enumerate(results):
+        vectors.append(described)
+        vehicle += [sample.vehicle for sample in samples]
+        sides += [sample.sides for sample in samples]
+        origins += [number] * len(samples)
+        progress(1)
+    return LabelledVectors(
+        np.concatenate(vectors), np.array(vehicle), np.array(sides), np.array(origins), files
+    )
 
 
 def hold_out(groups: npt.NDArray[np.str_]) -> BoolArray:

@@ -60,8 +60,9 @@ def fit(rows: LabelledVectors, settings: Settings) -> LinearModel:
     penalty, labels = settings.train.svm.C, rows.labels
     fewest = min(np.count_nonzero(labels), np.count_nonzero(~labels))
     if fewest < FOLDS:
-        what = f"a class has {fewest} training patches, must be at least {FOLDS}"
-        raise DataError(f"{what}; add more")
+        raise DataError(
+            f"a class has {fewest} training patches, must be at least {FOLDS}; add more"
+        )
     scaler = StandardScaler(copy=False)
     for start in range(0, len(rows.vectors), _BLOCK):  # as a whole, it needs twice their memory
         scaler.partial_fit(rows.vectors[start : start + _BLOCK])
@@ -100,10 +101,10 @@ def _fit_svm(
     limits = {"maxiter": MAX_ITERATIONS, "maxfun": 10 * MAX_ITERATIONS}
     options = {**limits, "maxcor": _CORRECTIONS, "ftol": _TOLERANCE, "gtol": 0}
     zeros = np.zeros(vectors.shape[1] + 1)
-    found = minimize(loss, zeros, jac=True, method="L-BFGS-B", options=options)
-    if found.status == 1:  # the iterations are used up
+    solution = minimize(loss, zeros, jac=True, method="L-BFGS-B", options=options)
+    if solution.status == 1:  # the iterations are used up
         log.warning("the SVM has not converged; lower train.svm.C")
-    return np.asarray(found.x)
+    return np.asarray(solution.x)
 
 
 def _fit_sigmoid(scores: Float64Array, vehicle: BoolArray) -> tuple[float, float]:
@@ -115,8 +116,8 @@ def _fit_sigmoid(scores: Float64Array, vehicle: BoolArray) -> tuple[float, float
     targets = np.where(vehicle, (positives + 1) / (positives + 2), 1 / (negatives + 2))
     values, signs = np.tile(scores, 2)[:, np.newaxis], np.repeat([True, False], len(scores))
     weights = np.concatenate([targets, 1 - targets])
-    found = LogisticRegression(C=np.inf, tol=1e-8).fit(values, signs, weights)
-    return -found.coef_[0, 0], -found.intercept_[0]
+    sigmoid = LogisticRegression(C=np.inf, tol=1e-8).fit(values, signs, weights)
+    return -sigmoid.coef_[0, 0], -sigmoid.intercept_[0]
 
 
 def fit_boxes(
@@ -138,8 +139,9 @@ def fit_boxes(
     The regression, and the mean absolute error on the known sides of held-out patches, as a
     fraction of the patch's side. Either is None if there are no such patches.
     """
-    known: BoolArray = np.asarray(np.isfinite(data.sides).any(axis=1))
-    learnt, tested = known & ~held[data.origins], data.patches[held & known[data.patches]]
+    has_sides: BoolArray = np.asarray(np.isfinite(data.sides).any(axis=1))
+    learnt = has_sides & ~held[data.origins]
+    tested = data.patches[held & has_sides[data.patches]]
     if not learnt.any():
         return None, None
     regression = fit_sides(data.vectors[learnt, :hog_length], data.sides[learnt])
@@ -164,10 +166,10 @@ def fit_sides(hogs: Float32Array, sides: Float32Array) -> BoxRegression:
     weights = np.zeros((4, hogs.shape[1]), np.float32)
     biases = np.zeros(4, np.float32)
     for side in range(4):
-        known = ~np.isnan(sides[:, side])
-        if known.any():
-            ridge = Ridge(PENALTY * np.count_nonzero(known), copy_X=False)
-            ridge.fit(hogs[known], sides[known, side])
+        has_side = ~np.isnan(sides[:, side])
+        if has_side.any():
+            ridge = Ridge(PENALTY * np.count_nonzero(has_side), copy_X=False)
+            ridge.fit(hogs[has_side], sides[has_side, side])
             weights[side] = ridge.coef_ / spread
             biases[side] = ridge.intercept_
     return BoxRegression(weights, biases)

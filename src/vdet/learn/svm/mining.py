@@ -1,4 +1,4 @@
-"""Mining: cut patches for the training out of labelled videos, into a zip file.
+"""Mining: cut patches for training out of labelled videos, into a zip file.
 
 Each window of a frame is compared with each vehicle, and some windows of each kind become patches:
 vehicles and false alarms. Lengths are in sides of the window, from its centre. A vehicle that is
@@ -106,14 +106,17 @@ def choose_windows(
 
     def some(kind: PatchKind, flags: BoolArray, limit: int, sides: Any = None) -> Iterator[Any]:
         for row in sorted(rng.permutation(np.flatnonzero(flags))[:limit].tolist()):
-            seen = None if sides is None else tuple(sides[row].tolist())
-            yield ChosenWindow(kind, Box(*boxes[row].tolist()), seen)
+            x1, y1, x2, y2 = boxes[row].tolist()
+            sides_in_window = None if sides is None else tuple(sides[row].tolist())
+            yield ChosenWindow(kind, Box(x1, y1, x2, y2), sides_in_window)
 
     for number, comparison in enumerate(comparisons):
-        own = nearest == number
+        is_nearest = nearest == number
         is_part |= is_hit & comparison.part & ~np.delete(is_covered, number, axis=1).any(axis=1)
-        yield from some("vehicle", comparison.fits & own, limits.per_vehicle, comparison.sides)
-        yield from some("box", comparison.shows & own, limits.per_vehicle, comparison.sides)
+        yield from some(
+            "vehicle", comparison.fits & is_nearest, limits.per_vehicle, comparison.sides
+        )
+        yield from some("box", comparison.shows & is_nearest, limits.per_vehicle, comparison.sides)
     yield from some("false alarm", is_alarm, limits.false_alarms)
     yield from some("part", is_part, limits.parts)
 
@@ -240,8 +243,8 @@ class VideoSource:
         last = min(self.last or truth.last_frame, truth.last_frame)
         if last < self.first:
             raise TruthError(f"{self.truth}: ends at frame {truth.last_frame}; begin earlier")
-        known = None if truth.known is None else truth.known.tolist()
-        regular = spread_frames(known, self.every, self.first, last)
+        labelled_frames = None if truth.known is None else truth.known.tolist()
+        regular = spread_frames(labelled_frames, self.every, self.first, last)
         number = 0
         with VideoReader(self.path, frames=last, settings=settings.input) as reader:
             info, advance = reader.info, progress(last)
@@ -314,8 +317,9 @@ def mine(
             for frame, windows, labels in source.frames(model, settings, progress):
                 searched += 1
                 rng, width = np.random.default_rng(frame.index), frame.picture.width
-                boxes = labels.boxes, labels.ignored
-                for chosen in choose_windows(windows, *boxes, width, rng, limits=limits):
+                for chosen in choose_windows(
+                    windows, labels.boxes, labels.ignored, width, rng, limits=limits
+                ):
                     x, y, side, _ = chosen.box.xywh
                     patch = to_patch(cut_window(frame.image, x, y, side, side), PATCH)
                     folder = _FOLDERS[chosen.kind].format(stem)

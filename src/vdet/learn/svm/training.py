@@ -32,7 +32,7 @@ class Classification:
     precision, recall
         None if nothing is predicted to be a vehicle, or if there are no vehicles.
     confusion
-        Number of patches: found vehicles, missed vehicles; false alarms, other non-vehicles.
+        Number of patches: vehicles, predicted as such or not; then non-vehicles, the same.
     groups
         Accuracy of each group.
     """
@@ -48,13 +48,13 @@ class Classification:
     def of(cls, vehicle: BoolArray, predicted: BoolArray, groups: npt.NDArray[np.str_]) -> Self:
         """Compare truth and prediction, bool `(n,)` each; groups are `(n,)`."""
         right, cells = vehicle == predicted, 2 * ~vehicle + ~predicted
-        found, missed, alarms, others = np.bincount(cells, minlength=4).tolist()
+        hits, misses, alarms, rejections = np.bincount(cells, minlength=4).tolist()
         return cls(
             patches=len(right),
             accuracy=float(right.mean()),
-            precision=found / (found + alarms) if found + alarms else None,
-            recall=found / (found + missed) if found + missed else None,
-            confusion=[[found, missed], [alarms, others]],
+            precision=hits / (hits + alarms) if hits + alarms else None,
+            recall=hits / (hits + misses) if hits + misses else None,
+            confusion=[[hits, misses], [alarms, rejections]],
             groups={str(name): float(right[groups == name].mean()) for name in np.unique(groups)},
         )
 
@@ -63,8 +63,8 @@ class Classification:
         yield f"patches tested: {self.patches}"
         for name in ("accuracy", "precision", "recall"):
             yield f"{name} {figure(getattr(self, name), 4)}"
-        found, others = ([*map(str, row)] for row in self.confusion)
-        rows = [["is vehicle", *found], ["is non-vehicle", *others]]
+        names = "is vehicle", "is non-vehicle"
+        rows = [[name, *map(str, row)] for name, row in zip(names, self.confusion, strict=True)]
         yield from ("", *table(("", "predicted vehicle", "predicted non-vehicle"), rows))
         by_group = [[name, figure(accuracy, 4)] for name, accuracy in self.groups.items()]
         yield from ("", *table(("group", "accuracy"), by_group))
@@ -72,7 +72,7 @@ class Classification:
 
 @dataclass(frozen=True, slots=True)
 class TrainingMetrics:
-    """The metrics of a training: fitted on a part of the patches, tested on the others.
+    """The metrics of a training run: fitted on a part of the patches, tested on the others.
 
     Attributes
     ----------
