@@ -21,7 +21,7 @@ from vdet.pages.place import Mark, place_marks, with_marks
 from vdet.pages.render import TEMPLATES, jpeg_uri, render
 from vdet.track.track import FrameTracks
 from vdet.traffic.counting import count_frames
-from vdet.traffic.crossings import place
+from vdet.traffic.crossings import lines_and_zones
 from vdet.traffic.linking import VehiclePath, link_tracks
 from vdet.traffic.proposals import ProposedLine, propose_lines
 
@@ -110,7 +110,7 @@ class Drawing:
 
     def _marks(self) -> list[Mark]:
         counts = count_frames(self._frames, self._settings, self._size)
-        lines, zones = place(self._settings.traffic, *self._size)
+        lines, zones = lines_and_zones(self._settings.traffic, *self._size)
         ground = ground_of(self._settings.camera, *self._size)
         paths = {key: path.points.tolist() for path in self.paths for _, key in path.tracks}
         return place_marks(self._size, (*lines, *zones), counts, paths, ground)

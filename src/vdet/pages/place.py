@@ -18,7 +18,7 @@ from vdet.pages.charts import hex_color
 from vdet.pages.render import Table
 from vdet.polygons import Point
 from vdet.traffic.counts import Counts, Direction, Event, class_of, vehicle_flows
-from vdet.traffic.crossings import Border, PlacedLine
+from vdet.traffic.crossings import Border, Line
 from vdet.traffic.records import VehicleRecord
 
 _NO_OTHER = "–"
@@ -117,7 +117,7 @@ def border_marks(border: Border, totals: Mapping[Direction, int], text: str = ""
     """
     height = border.size[1]
     width = boxes.line_width(np.empty((int(height), 0), np.uint8))
-    if not isinstance(border, PlacedLine):
+    if not isinstance(border, Line):
         top = min(border.corners, key=lambda corner: corner[1])
         yield Mark(border.corners, boxes.ZONE, width, border.name + text, top, is_closed=True)
         return

@@ -21,7 +21,7 @@ from vdet.boxes import EDGE, Float64Array
 from vdet.lanes.ground import Ground
 from vdet.track.track import FrameTracks
 from vdet.traffic.counts import Counts
-from vdet.traffic.crossings import PlacedLine
+from vdet.traffic.crossings import Line
 
 WINDOW = 1.0
 """Length of the part of a path that a velocity is fitted to, seconds."""
@@ -177,7 +177,7 @@ def with_speeds(counts: Counts, meter: SpeedMeter | None) -> Counts:
     return replace(counts, events=tuple(events))
 
 
-def precision_at(line: PlacedLine, ground: Ground, speed: float) -> tuple[float, float, float]:
+def precision_at(line: Line, ground: Ground, speed: float) -> tuple[float, float, float]:
     """Return metres of road across and along in a pixel at the middle of a line, and an error.
 
     The error is the standard deviation of a `speed`, m/s, as a fraction of it, for feet that are
