@@ -221,7 +221,7 @@ class VideoPage:
         begins = [self.start, *(end for _, end in self.gaps)]
         ends = [*(begin for begin, _ in self.gaps), last]
         intervals = Intervals([(self.clock, list(zip(begins, ends, strict=True)))], step)
-        first = {number: intervals.start_in(0, number) for number in intervals.numbers}
+        first = {item.number: intervals.start_in(0, item.number) for item in intervals.periods}
         if len(first) == 1:
             return []
         came: dict[str, Counter[float]] = {}
