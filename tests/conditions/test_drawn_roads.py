@@ -32,7 +32,7 @@ def test_the_right_finding_is_there_in_time_and_can_be_ignored(
     ignoring = ConditionSettings(ignore=(code,) if code else ())
     conditions._settings = SETTINGS.model_copy(update={"conditions": ignoring})
     others = tuple(item for item in findings.items if item.code != code)
-    assert conditions.findings() == replace(findings, found=others)
+    assert conditions.findings() == replace(findings, items=others)
 
 
 def test_drops_are_reported_while_they_are_on_the_lens() -> None:

@@ -24,7 +24,7 @@ from vdet.draw.boxes import (
     write_text,
 )
 from vdet.media.frame import Coding, Planes
-from vdet.pages.place import border_marks, draw_marks
+from vdet.pages.traffic import border_marks, draw_marks
 from vdet.traffic.crossings import lines_and_zones
 
 Mask = NDArray[np.bool_]
