@@ -42,13 +42,8 @@ class Finding:
         """Return it as values for JSON; times are rounded to milliseconds."""
         times = [[round(first, 3), round(last, 3)] for first, last in self.spans]
         value = None if self.value is None else round(self.value, 3)
-        return {
-            "code": self.code,
-            "severity": self.severity,
-            "text": self.text,
-            "times": times,
-            "value": value,
-        }
+        values = {"code": self.code, "severity": self.severity, "text": self.text}
+        return values | {"times": times, "value": value}
 
 
 @dataclass(frozen=True, slots=True)

@@ -107,22 +107,20 @@ class MotionWatch:
 
     def _link(self, time: float, differs: Image, before: Image) -> None:
         """Link the movers; `before` marks the boxes of the previous plane."""
-        unmatched, self._movers = self._movers, []
+        lost, self._movers = self._movers, []
         for center, size in self._moving_areas(differs):
-            mover = min(
-                unmatched, key=lambda item: math.dist(item.points[-1], center), default=None
-            )
+            mover = min(lost, key=lambda item: math.dist(item.points[-1], center), default=None)
             if mover and math.dist(mover.points[-1], center) < _REACH * size:
-                unmatched.remove(mover)
+                lost.remove(mover)
             else:
                 mover = Mover(_is_in(center, before))
             mover.size = size
             mover.times.append(time)
             mover.points.append(center)
             self._movers.append(mover)
-        for mover in unmatched:
+        for mover in lost:
             mover.is_detected |= _is_in(mover.points[-1], self._covered)
-        self._ended += self._undetected(unmatched)
+        self._ended += self._undetected(lost)
 
     def _undetected(self, movers: Iterable[Mover]) -> list[list[float]]:
         """Return the times of each mover that travelled and was not detected."""

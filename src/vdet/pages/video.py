@@ -162,12 +162,8 @@ class VideoPage:
         longest = sorted(self.records, key=lambda record: -record.seconds)[:_MAX_VEHICLES]
         shown = sorted(longest, key=lambda record: (record.first, record.id))
         x = charts.time_axis(self.start, self.end, self.zero)
-        thumbnails = {
-            record.id: self.thumbnails[record.id][1]
-            for record in shown
-            if record.id in self.thumbnails
-        }
-        rows = self._rows(thumbnails)
+        ids = {record.id for record in shown}
+        rows = self._rows({key: uri for key, (_, uri) in self.thumbnails.items() if key in ids})
         speeds = [row.speed for row in rows if row.speed is not None]
         title = "Vehicles by their median speed"
         page, start = ("", self.player.start) if self.player else (None, 0.0)

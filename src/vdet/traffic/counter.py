@@ -96,13 +96,10 @@ class VehicleCounter:
         passages = self._ended + self._passages(self.linker.open_paths())
         events = [event for passage in passages for event in passage.events]
         events.sort(key=lambda event: (event.time, event.frame, event.id, event.name))
+        directions = tuple((item.name, way) for item in self._borders for way in item.directions)
         return Counts(
             events=tuple(events),
-            directions=tuple(
-                (border.name, direction)
-                for border in self._borders
-                for direction in border.directions
-            ),
+            directions=directions,
             zones=tuple(zone.name for zone in self.zones),
             spans=tuple(self.spans) or ((0.0, 0.0),),
             warnings=tuple(_line_warnings(self.lines, passages)),
@@ -131,20 +128,15 @@ class VehicleCounter:
         return [self._passage(path) for path in seen if is_chosen(path.class_name, classes)]
 
     def _passage(self, path: VehiclePath) -> _Passage:
-        by_border = {border.name: crossings(path, border) for border in self._borders}
-        events = [
-            _event(path, name, crossing)
-            for name, crossed in by_border.items()
-            for crossing in crossed
-        ]
-        heights = {
-            name: path.heights[[crossing.row for crossing in crossed]].tolist()
-            for name, crossed in by_border.items()
-        }
+        events, heights = list[Event](), {}
+        for border in self._borders:
+            crossed = crossings(path, border)
+            events += [_event(path, border.name, crossing) for crossing in crossed]
+            heights[border.name] = path.heights[[crossing.row for crossing in crossed]].tolist()
         # The ends of the path, except at the ends of the video.
         (start, _), (_, now) = self.spans[0], self.spans[-1]
         ends = [row for row in (0, path.seen - 1) if start < path.times[row] < now]
-        uncrossed = [line for line in self.lines if not by_border[line.name]]
+        uncrossed = [line for line in self.lines if not heights[line.name]]
         missed = lines_near(uncrossed, path.points[ends], _NEAR_LINE * path.heights[ends])
         return _Passage(events, heights, [line.name for line in missed])
 

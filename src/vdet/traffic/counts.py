@@ -272,14 +272,10 @@ def flow_table(videos: Sequence[Counts], interval: int | None = None) -> list[Fl
     Parameters and errors as for `count_table`.
     """
     intervals = _intervals(videos, interval)
-    counts = Counter(
-        (
-            intervals.number(index, first.time),
-            (first.name, last.name if last else None),
-            class_of(first),
-        )
-        for index, first, last in vehicle_flows(videos)
-    )
+    counts: Counter[tuple[int, tuple[str, str | None], str]] = Counter()
+    for index, first, last in vehicle_flows(videos):
+        flow = first.name, last.name if last else None
+        counts[intervals.number(index, first.time), flow, class_of(first)] += 1
     names: list[str | None] = [*dict.fromkeys(name for name, _ in _directions(videos)), None]
     flows = sorted({flow for _, flow, _ in counts}, key=lambda flow: list(map(names.index, flow)))
     return [

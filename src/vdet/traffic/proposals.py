@@ -113,7 +113,8 @@ def propose_lines(
         names[ahead] += 1
         name = f"{ahead} {names[ahead]}" if names[ahead] > 1 else ahead
         vehicles = int(uncounted[line.stream].sum())
-        lines.append(ProposedLine(name, *line.ends, ahead, back, vehicles))
+        start, end = line.ends
+        lines.append(ProposedLine(name, start, end, left=ahead, right=back, vehicles=vehicles))
         uncounted[line.stream] = False
         candidates = [item for item in candidates if meeting(item.ends, line.ends) is None]
     return tuple(lines)
@@ -146,12 +147,11 @@ class _Stream:
 
         `positions` are those of all vehicles that cross the line.
         """
-        margin, low, high = _MARGIN * self.height, self.low, self.high
-        before, after = positions[positions < low], positions[positions > high]
-        return (
-            max((low + before.max()) / 2 if len(before) else -math.inf, low - margin),
-            min((high + after.min()) / 2 if len(after) else math.inf, high + margin),
-        )
+        margin = _MARGIN * self.height
+        before, after = positions[positions < self.low], positions[positions > self.high]
+        low = max([self.low - margin, *((self.low + before) / 2)])
+        high = min([self.high + margin, *((self.high + after) / 2)])
+        return low, high
 
 
 class _Streams:

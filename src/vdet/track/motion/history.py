@@ -134,9 +134,8 @@ class History:
             # The misses in between belong to the same track.
             after = bisect_right(estimates, time, key=lambda estimate: estimate.time)
             before = after - 1
-        fraction = (time - estimates[before].time) / (
-            estimates[after].time - estimates[before].time
-        )
+        start, end = estimates[before].time, estimates[after].time
+        fraction = (time - start) / (end - start)
         return np.asarray(means[before][:, 0] * (1 - fraction) + means[after][:, 0] * fraction)
 
     def _entering(self, first: int, time: float) -> Position | None:

@@ -100,17 +100,13 @@ class MotionTracker:
         candidates = self._candidates(time)
         boxes = _boxes_of(candidates)
         hidden = are_hidden(boxes, [item.position.state != "predicted" for item in candidates])
-        shown = [
+        clear = [
             candidate
             for candidate, is_hidden in zip(candidates, hidden, strict=True)
             if self._is_clear(candidate) and not (is_hidden and candidate.is_guess)
         ]
-        nested = are_nested(_boxes_of(shown), [candidate.score for candidate in shown])
-        tracks = [
-            self._track(candidate)
-            for candidate, is_nested in zip(shown, nested, strict=True)
-            if not is_nested
-        ]
+        nested = are_nested(_boxes_of(clear), [candidate.score for candidate in clear])
+        tracks = map(self._track, compress(clear, ~nested))
         return sorted(tracks, key=lambda track: track.id)
 
     def _candidates(self, time: float) -> "list[_Candidate]":
@@ -118,12 +114,10 @@ class MotionTracker:
         vehicles = [*self._gone, *(vehicle for vehicle in self._vehicles if vehicle.confirmed)]
         positions = [(v, position) for v in vehicles if (position := self._position(v, time))]
         boxes = self._visible([position.mean for _, position in positions])
+        in_frame = compress(zip(positions, boxes, strict=True), _are_large(boxes))
         return [
             _Candidate(vehicle, position, box, *vehicle.history.scores(time))
-            for (vehicle, position), box, is_large in zip(
-                positions, boxes, _are_large(boxes), strict=True
-            )
-            if is_large
+            for (vehicle, position), box in in_frame
         ]
 
     def _position(self, vehicle: Vehicle, time: float) -> Position | None:
@@ -145,9 +139,8 @@ class MotionTracker:
 
     def _staying(self) -> list[Vehicle]:
         """Return the vehicles that are neither ended nor outside the frame."""
-        are_inside = _are_large(self._boxes(self._vehicles))
-        pairs = zip(self._vehicles, are_inside, strict=True)
-        return [vehicle for vehicle, is_inside in pairs if is_inside and not vehicle.is_over]
+        inside = compress(self._vehicles, _are_large(self._boxes(self._vehicles)))
+        return [vehicle for vehicle in inside if not vehicle.is_over]
 
     def _observations(self, detections: Boxes, picture: Picture | None) -> list[Observation]:
         boxes = clipped(detections.sides, self._size)
