@@ -48,7 +48,7 @@ class Player:
     is_drawn: bool
     start: float
 
-    def moment(self, time: float) -> str:
+    def position(self, time: float) -> str:
         """Return the position of the player at a time in the tracks, seconds."""
         return f"{max(0.0, time - self.start):.3f}"
 

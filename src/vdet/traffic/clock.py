@@ -199,22 +199,23 @@ class Intervals:
         self, videos: Sequence[tuple[Clock | None, Sequence[Span]]], length: int | None
     ) -> None:
         self._length = length
+        self._is_timed = len(videos) == 1
         self._origin: datetime | None = None
         self._zone: tzinfo | None = None
-        self._is_timed = len(videos) == 1
-        self._zeros = [0.0]
         clocks = [clock for clock, _ in videos if clock]
         if clocks and len(clocks) == len(videos):
             first = clocks[0].at(clocks[0].first)
             self._origin = datetime(1970, 1, 1, tzinfo=timezone(first.utcoffset() or timedelta()))
             self._zone = clocks[0].zone
             self._zeros = [(clock.zero - self._origin).total_seconds() for clock in clocks]
-        elif len(videos) > 1:
-            if length is not None:
-                message = "intervals over several videos need the time at which each begins"
-                raise ConfigError(f"{message}; pass --begin")
+        elif self._is_timed:
+            self._zeros = [0.0]
+        elif length is None:  # one after another
             ends = accumulate(spans[-1][1] - spans[0][0] for _, spans in videos)
             self._zeros = [end - spans[-1][1] for end, (_, spans) in zip(ends, videos, strict=True)]
+        else:
+            message = "intervals over several videos need the time at which each begins"
+            raise ConfigError(f"{message}; pass --begin")
         self._spans = [
             [(zero + first, zero + last) for first, last in spans]
             for zero, (_, spans) in zip(self._zeros, videos, strict=True)

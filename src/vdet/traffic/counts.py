@@ -205,8 +205,8 @@ class Counts:
         try:
             from matplotlib import pyplot as plt
         except ImportError as error:
-            message = "plot: matplotlib is not installed; pip install matplotlib"
-            raise ConfigError(message) from error
+            what = "plot: matplotlib is not installed; pip install matplotlib"
+            raise ConfigError(what) from error
         parts: dict[str, Counter[str]] = {}
         for row in self.table(interval):
             label = f"{row.name} {row.direction}"
