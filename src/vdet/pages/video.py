@@ -173,7 +173,8 @@ class VideoPage:
             figures=self._figures(),
             shown=shown,
             level_plot=charts.level_plot(self._spans, x, "Number of vehicles at once", self.gaps),
-            timeline=("When each vehicle is shown", x, _timeline(shown, self.findings)),
+            time_axis=x,
+            timeline=_timeline(shown, self.findings),
             interval_plots=self._interval_plots(x),
             speed_plot=charts.histogram(speeds, _SPEED_STEP, title, "km/h") if speeds else None,
             traffic=self.counts

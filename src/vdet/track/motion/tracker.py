@@ -208,13 +208,15 @@ class MotionTracker:
     def _track(self, candidate: "_Candidate") -> Track:
         vehicle = candidate.vehicle
         vehicle.id = next(self._ids) if vehicle.id is None else vehicle.id
+        x1, y1, x2, y2 = candidate.box.tolist()
+        left, _, right, bottom = whole_box(candidate.position.mean).tolist()
         return Track(
             vehicle.id,
-            Box(*candidate.box.tolist()),
+            Box(x1, y1, x2, y2),
             candidate.score,
             candidate.position.state,
             class_name=vehicle.votes.winner,
-            whole_foot=Box(*whole_box(candidate.position.mean).tolist()).foot,
+            whole_foot=((left + right) / 2, bottom),
         )
 
 

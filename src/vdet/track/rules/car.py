@@ -106,7 +106,8 @@ class Car:
             self.votes.add(region.classes, vote_weight(box, region.score, size))
         self._seen.append(region)
         sides = zip(*(seen.box.xywh for seen in self._seen), strict=True)
-        self.box = Box.sized(*(round(fmean(values)) for values in sides))
+        x, y, width, height = (round(fmean(values)) for values in sides)
+        self.box = Box.sized(x, y, width, height)
         xs, ys = zip(*(seen.centroid for seen in self._seen), strict=True)
         self.centroid = fmean(xs), fmean(ys)
         self.matches = self.matches + 1 if by_match else 0
