@@ -162,7 +162,7 @@ class Road:
 
     def is_right(self, kind: str, findings: Findings) -> bool:
         """Return whether the right finding is there in time; without a change, none."""
-        starts = {item.code: item.spans[0][0] for item in findings.found}
+        starts = {item.code: item.spans[0][0] for item in findings.items}
         expected = EXPECTED[kind]
         if expected is None or expected not in starts:
             return expected is None and not starts

@@ -177,7 +177,7 @@ def _both(
         boxes = search.detect(search.search(picture, 0))
         sure = [item.box for item in boxes if item.score >= _SHOWN]
         found = sum(any(box.iou(other) >= _FOUND for other in sure) for box in truth)
-        look = visibility.look(*planes_of(picture), boxes.scores)
+        look = visibility.measure(*planes_of(picture), boxes.scores)
         yield Searched(name, change, tuple(look.tolist()), len(truth), found)
 
 

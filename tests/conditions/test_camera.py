@@ -79,7 +79,7 @@ def test_a_camera_that_is_turned_away_is_reported_until_its_view_is_back(
     watch = watched(lambda time: (180, 80, 0) if 5 <= time < back else (0, 0, 0))
     (finding,) = watch.findings()
     assert (finding.code, finding.spans) == ("camera-moves", (span,))
-    assert "out of its view" in finding.text
+    assert "to another view" in finding.text
 
 
 @pytest.mark.parametrize(("end", "is_clear"), [(6, True), (40, False)], ids=["lorry", "fog"])

@@ -31,8 +31,8 @@ def test_the_right_finding_is_there_in_time_and_can_be_ignored(
     assert road.is_right(kind, findings), findings
     ignoring = ConditionSettings(ignore=(code,) if code else ())
     conditions._settings = SETTINGS.model_copy(update={"conditions": ignoring})
-    others = tuple(item for item in findings.found if item.code != code)
-    assert conditions.findings() == replace(findings, found=others)
+    others = tuple(item for item in findings.items if item.code != code)
+    assert conditions.findings() == replace(findings, items=others)
 
 
 def test_drops_are_reported_while_they_are_on_the_lens() -> None:
@@ -52,19 +52,19 @@ def found(settings: Settings, width: int = 640, unknown: tuple[str, ...] = ()) -
     image = np.full((90, width, 3), 90, np.uint8)
     for number in range(10):
         conditions.add(number / 2, Picture(image), NO_BOXES, ())
-    return [finding.code for finding in conditions.findings().found]
+    return [finding.code for finding in conditions.findings().items]
 
 
 @pytest.mark.parametrize("apart", [6 / 30, 6 / 25, 6 / 24])
 def test_every_search_of_an_empty_road_is_analysed(
     apart: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    look = Mock(side_effect=visibility.look)
-    monkeypatch.setattr(visibility, "look", look)
+    measure = Mock(side_effect=visibility.measure)
+    monkeypatch.setattr(visibility, "measure", measure)
     conditions, image = Conditions(SETTINGS, 640), np.full((90, 640, 3), 90, np.uint8)
     for number in range(50):
         conditions.add(number * apart, Picture(image), NO_BOXES, ())
-    assert look.call_count == 50
+    assert measure.call_count == 50
 
 
 def test_what_the_settings_make_doubtful_is_said() -> None:

@@ -24,8 +24,8 @@ from vdet.draw.boxes import (
     write_text,
 )
 from vdet.media.frame import Coding, Planes
-from vdet.pages.place import border_marks, draw_marks
-from vdet.traffic.crossings import place
+from vdet.pages.traffic import border_marks, draw_marks
+from vdet.traffic.crossings import lines_and_zones
 
 Mask = NDArray[np.bool_]
 WIDTH, HEIGHT = 320, 240
@@ -45,7 +45,7 @@ PLACES = TrafficSettings(
     lines=(LineSettings(name="a", start=(0.06, 0.8), end=(0.9, 0.75), left="in", right="out"),),
     zones=(ZoneSettings(name="z", points=((0, 0.1), (0.5, 0.12), (0.3, 0.5))),),
 )
-[LINE], [ZONE] = place(PLACES, WIDTH, HEIGHT)
+[LINE], [ZONE] = lines_and_zones(PLACES, WIDTH, HEIGHT)
 CORNERS = np.array([[11, 21], [151, 61], [90, 200]], np.int32)
 BEYOND = np.array([[-30, 21], [151, 61], [400, 300]], np.int32)
 Draw = Callable[[Surface], object]

@@ -23,7 +23,7 @@ from vdet.lanes.ground import fit_ground
 from vdet.pages.drawing import Drawing
 from vdet.track.track import FrameTracks, Track
 from vdet.traffic.counting import count_frames
-from vdet.traffic.crossings import Border, crossings, place
+from vdet.traffic.crossings import Border, crossings, lines_and_zones
 
 DOWN = [through((n, 380 + 60 * n, 60), (4 + n, 360 + 80 * n, 700)) for n in range(6)]
 RIGHT = [through((n, 20, 330 + 10 * n), (5 + n, 1260, 350 + 10 * n)) for n in range(5)]
@@ -76,7 +76,7 @@ def test_the_page_counts_as_python_does(window: Browser, tmp_path: Path) -> None
     settings = settings_for(LINE, at_edge, steep, ZONE, corner)
     for seed in range(4):
         made = drawing(wandering(seed), json.loads(settings.model_dump_json()), settings)
-        lines, zones = place(settings.traffic, WIDTH, HEIGHT)
+        lines, zones = lines_and_zones(settings.traffic, WIDTH, HEIGHT)
         borders: tuple[Border, ...] = *lines, *zones
         expected = [
             [path.vehicle, border.name, crossing.direction, crossing.row, round(crossing.time, 3)]

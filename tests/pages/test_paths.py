@@ -5,7 +5,7 @@ import pytest
 
 from traffic.scenes import HEIGHT, WIDTH, Path, frames, through
 from vdet.boxes import Image
-from vdet.pages.place import direction_color, draw_marks, path_marks
+from vdet.pages.traffic import direction_color, draw_marks, path_marks
 from vdet.polygons import Point
 from vdet.traffic.records import VehicleRecords
 

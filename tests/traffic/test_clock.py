@@ -140,7 +140,7 @@ class TestZone:
             "2026-10-25 02:50:00+01:00",
         ]
         intervals = Intervals([(found, [(0.0, 7200.0)])], 3600)
-        starts = [str(intervals.moments(number)[0]) for number in intervals.numbers]
+        starts = [str(period.start) for period in intervals.periods]
         assert starts == [
             "2026-10-25 01:00:00+02:00",
             "2026-10-25 02:00:00+02:00",

@@ -18,7 +18,7 @@ from traffic.scenes import (
 )
 from vdet.track.track import FrameTracks
 from vdet.traffic.counter import VehicleCounter
-from vdet.traffic.crossings import Border, crossings, place
+from vdet.traffic.crossings import Border, crossings, lines_and_zones
 from vdet.traffic.linking import VehiclePath, link_tracks
 
 SETTINGS = settings_for(LINE, ZONE)
@@ -39,7 +39,7 @@ def test_the_path_of_a_vehicle_has_the_rows_of_all_its_tracks() -> None:
     (path,) = link_tracks(joined(old, new), WIDTH, HEIGHT)
     assert (path.vehicle, path.tracks, path.seconds) == (1, ((0.0, 1), (2.2, 7)), 5)
     assert path.points[[0, path.seen - 1]].tolist() == [[600, 250], [600, 550]]
-    line, zone = (item for (item,) in place(SETTINGS.traffic, WIDTH, HEIGHT))
+    line, zone = (item for (item,) in lines_and_zones(SETTINGS.traffic, WIDTH, HEIGHT))
     assert rounded(path, line) == [(2.5, 63, "here", None)]
     assert rounded(path, zone) == [(0.83, 21, "enter", None), (4.17, 105, "exit", 3.33)]
 
@@ -76,6 +76,6 @@ def test_a_vehicle_that_stands_for_long_takes_no_memory() -> None:
     (path,) = link_tracks(stands(), WIDTH, HEIGHT)
     assert len(path.times) < 1000
     assert path.seconds == pytest.approx(20_099 / 25)
-    line, _ = (item for (item,) in place(SETTINGS.traffic, WIDTH, HEIGHT))
+    line, _ = (item for (item,) in lines_and_zones(SETTINGS.traffic, WIDTH, HEIGHT))
     (event,) = crossings(path, line)
     assert (event.direction, path.frames[event.row]) == ("here", 20_050)

@@ -135,11 +135,11 @@ def _shipped(path: Path) -> str:
 def _camera(settings: "Settings") -> Facts:
     """Return lines, zones and the fit of the ground points in the settings of a camera."""
     from vdet.lanes.ground import ground_of
-    from vdet.traffic.crossings import place
+    from vdet.traffic.crossings import lines_and_zones
     from vdet.traffic.speeds import KMH, precision_at
 
     size = settings.camera.size or _ANY_SIZE
-    lines, zones = place(settings.traffic, *size)
+    lines, zones = lines_and_zones(settings.traffic, *size)
     facts: Facts = {
         "kind": "settings of a camera",
         "lines": [line.name for line in lines],

@@ -37,14 +37,14 @@ class CameraWatch:
         self._even = cv2.createCLAHE(4, (10, 6))
         """Equalizes contrast, against changes of light and fog (Zuiderveld 1994)."""
         self._times: list[float] = []
-        self._places: list[Float64Array] = []
+        self._positions: list[Float64Array] = []
         """Displacements of the corners of the frame since the start, `(4, 2)` each, fractions of
         the width: infinite in another view, NaN if unknown.
         """
         self._stood: list[bool] = []
         self._plane: Image | None = None
         self._points = np.empty((0, 1, 2), np.float32)
-        self._place = np.zeros((4, 2))
+        self._reference = np.zeros((4, 2))
         self._since = 0.0
 
     def add(self, time: float, plane: Image, boxes: Iterable[Box], *, is_clear: bool) -> bool:
@@ -55,16 +55,16 @@ class CameraWatch:
         """
         plane = np.asarray(self._even.apply(plane), np.uint8)
         moved = self._moved(plane, np.inf if is_clear else np.nan)
-        place = self._place + moved / plane.shape[1]
-        before = self._places[-1] if self._places else place
+        position = self._reference + moved / plane.shape[1]
+        before = self._positions[-1] if self._positions else position
         with np.errstate(invalid="ignore"):  # both may be other views
-            self._stood.append(bool(np.abs(place - before).max() <= _LIMIT / 2))
+            self._stood.append(bool(np.abs(position - before).max() <= _LIMIT / 2))
         self._times.append(time)
-        self._places.append(place)
-        is_old = time - self._since > _RENEWED and np.isfinite(place).all()
+        self._positions.append(position)
+        is_old = time - self._since > _RENEWED and np.isfinite(position).all()
         if is_old or len(self._points) < _MIN_POINTS:
             if np.abs(moved).max() > _ERROR:  # so that small errors do not add up
-                self._place = place
+                self._reference = position
             self._plane, self._since, self._points = plane, time, _corners(plane, boxes)
         return self._stood[-1]
 
@@ -75,9 +75,9 @@ class CameraWatch:
 
     def findings(self) -> list[Finding]:
         """Return when the camera moved, or when it was moved permanently."""
-        times, places = np.array(self._times), np.array(self._places)
-        is_known = np.isfinite(places).all(axis=(1, 2))
-        off = _distances(places, places[is_known][:5])
+        times, positions = np.array(self._times), np.array(self._positions)
+        is_known = np.isfinite(positions).all(axis=(1, 2))
+        off = _distances(positions, positions[is_known][:5])
         spans = [
             (first, last)
             for first, last in joined(times[off > _LIMIT].tolist())
@@ -86,16 +86,20 @@ class CameraWatch:
         if not spans:
             return []
         size = float(off[is_known].max())
-        much = f"by up to {size:.1%} of the width" if size > _LIMIT else "out of its view"
+        extent = f"by up to {size:.1%} of the width" if size > _LIMIT else "to another view"
         start, end = spans[-1]
-        after = places[is_known & (times > start + 1)]
+        after = positions[is_known & (times > start + 1)]
         rests = len(after) > 3 and np.quantile(_distances(after, after), 0.95) <= _LIMIT
         if rests and end == times[-1]:
-            what = f"the camera moved at {clock_text(int(start))}, {much}"
-            text = f"{what}: lines, zones and regions fit only one part; process both separately"
+            text = (
+                f"the camera moved at {clock_text(int(start))}, {extent}: lines, zones and regions "
+                "match only one part; process the two parts separately"
+            )
             return [Finding("camera-moved", text, ((start, end),), value=size)]
-        what = f"the camera moves {when(spans)}, {much}"
-        text = f"{what}: lines, zones and regions do not fit then; do not trust counts and speeds"
+        text = (
+            f"the camera moves {when(spans)}, {extent}: lines, zones and regions no longer match; "
+            "do not trust counts and speeds"
+        )
         return [Finding("camera-moves", text, tuple(spans), value=size)]
 
     def _moved(self, plane: Image, lost: float) -> Float64Array:
@@ -107,13 +111,13 @@ class CameraWatch:
             return np.zeros((4, 2))
         if len(self._points) < _MIN_POINTS:
             return np.full((4, 2), np.nan)
-        found, status, _ = cv2.calcOpticalFlowPyrLK(
+        tracked, status, _ = cv2.calcOpticalFlowPyrLK(
             self._plane, plane, self._points, np.empty(0), winSize=(9, 9), maxLevel=2
         )
         seen = status.ravel() > 0
         if seen.sum() >= _MIN_POINTS:
             matrix, agreeing = cv2.estimateAffinePartial2D(
-                self._points[seen], found[seen], ransacReprojThreshold=0.7, maxIters=200
+                self._points[seen], tracked[seen], ransacReprojThreshold=0.7, maxIters=200
             )
             if agreeing.sum() >= _AGREEING * len(seen):
                 height, width = plane.shape
@@ -122,9 +126,9 @@ class CameraWatch:
         return np.full((4, 2), lost)
 
 
-def _distances(places: Float64Array, usual: Float64Array) -> Float64Array:
-    """Return the mean distance of the corners from the median of the usual places, `(n,)`."""
-    x, y = np.moveaxis(places - np.median(usual, axis=0), -1, 0)
+def _distances(positions: Float64Array, usual: Float64Array) -> Float64Array:
+    """Return the mean distance of the corners from the median of the usual positions, `(n,)`."""
+    x, y = np.moveaxis(positions - np.median(usual, axis=0), -1, 0)
     return np.asarray(np.hypot(x, y).mean(axis=1))
 
 
@@ -133,5 +137,5 @@ def _corners(plane: Image, boxes: Iterable[Box]) -> Float32Array:
     mask = np.full(plane.shape, 255, np.uint8)
     for box in boxes:
         box.cut(mask)[:] = 0
-    found = cv2.goodFeaturesToTrack(plane, _POINTS, 0.02, 5, mask=mask)
-    return np.empty((0, 1, 2), np.float32) if found is None else np.asarray(found, np.float32)
+    corners = cv2.goodFeaturesToTrack(plane, _POINTS, 0.02, 5, mask=mask)
+    return np.empty((0, 1, 2), np.float32) if corners is None else np.asarray(corners, np.float32)

@@ -42,8 +42,8 @@ class Finding:
         """Return it as values for JSON; times are rounded to milliseconds."""
         times = [[round(first, 3), round(last, 3)] for first, last in self.spans]
         value = None if self.value is None else round(self.value, 3)
-        known = {"code": self.code, "severity": self.severity, "text": self.text}
-        return {**known, "times": times, "value": value}
+        values = {"code": self.code, "severity": self.severity, "text": self.text}
+        return values | {"times": times, "value": value}
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,31 +52,31 @@ class Findings:
 
     Attributes
     ----------
-    found
+    items
         All findings.
     is_still
         Whether the camera stood still.
     """
 
-    found: tuple[Finding, ...] = ()
+    items: tuple[Finding, ...] = ()
     is_still: bool = False
 
     @property
     def is_doubtful(self) -> bool:
         """Whether a result may be wrong."""
-        return any(finding.severity == "warning" for finding in self.found)
+        return any(finding.severity == "warning" for finding in self.items)
 
     def record(self) -> list[dict[str, Any]]:
         """Return them as values for JSON."""
-        return [finding.record() for finding in self.found]
+        return [finding.record() for finding in self.items]
 
     def __str__(self) -> str:
-        warnings = (finding for finding in self.found if finding.severity == "warning")
+        warnings = (finding for finding in self.items if finding.severity == "warning")
         return "\n".join(f"{finding.text} [{finding.code}]" for finding in warnings)
 
 
 def joined(times: Iterable[float], shortest: float = 0.0) -> list[Span]:
-    """Join ascending times that are near each other into spans; drop spans that are too short."""
+    """Join ascending times that are close together into spans; omit spans that are too short."""
     spans: list[Span] = []
     for time in times:
         if spans and time - spans[-1][1] <= _GAP:
@@ -89,5 +89,5 @@ def joined(times: Iterable[float], shortest: float = 0.0) -> list[Span]:
 def when(spans: Sequence[Span]) -> str:
     """Return "from 0:05 to 0:32"; for several spans, the longest and the number of others."""
     first, last = max(spans, key=lambda span: span[1] - span[0])
-    others = f" (and {len(spans) - 1} more)" if len(spans) > 1 else ""
-    return f"from {clock_text(int(first))} to {clock_text(int(last))}{others}"
+    more = f" (and {len(spans) - 1} more)" if len(spans) > 1 else ""
+    return f"from {clock_text(int(first))} to {clock_text(int(last))}{more}"

@@ -2,7 +2,7 @@
 
 The background is a running median of the planes (McFarlane and Schofield 1995). Areas that differ
 from it, outside the boxes, are linked from plane to plane. Only objects that travel count, not
-leaves, flags or drops on the lens.
+leaves, flags or water on the lens.
 """
 
 import itertools
@@ -39,21 +39,21 @@ _MIN_MOVERS, _MIN_FRACTION = 2, 0.15
 
 @dataclass(slots=True, eq=False)
 class Mover:
-    """A moving object: its times, places (pixels of a plane) and last size.
+    """A moving object: its times, positions (pixels of a plane) and last size.
 
-    `is_found` says whether it came out of the box of a vehicle, or was detected later.
+    `is_detected` says whether it came out of the box of a vehicle, or was detected later.
     """
 
-    is_found: bool
+    is_detected: bool
     size: float = 0.0
     times: list[float] = field(default_factory=list)
-    places: list[Point] = field(default_factory=list)
+    points: list[Point] = field(default_factory=list)
 
     def has_travelled(self, width: int) -> bool:
         """Return whether it travelled, in planes of this width."""
-        way = sum(map(math.dist, self.places, self.places[1:]))
-        minimum = max(_TRAVEL * width, self.size, _STRAIGHT * way)
-        return len(self.places) >= _PLANES and math.dist(self.places[0], self.places[-1]) >= minimum
+        length = sum(map(math.dist, self.points, self.points[1:]))
+        minimum = max(_TRAVEL * width, self.size, _STRAIGHT * length)
+        return len(self.points) >= _PLANES and math.dist(self.points[0], self.points[-1]) >= minimum
 
 
 class MotionWatch:
@@ -94,52 +94,54 @@ class MotionWatch:
 
     def findings(self) -> list[Finding]:
         """Return the fraction of travelling objects that are not detected vehicles, and when."""
-        left = self._ended + self._unexplained(self._movers)
-        fraction = len(left) / max(1, len(left) + len(self._driven))
-        if len(left) < _MIN_MOVERS or fraction < _MIN_FRACTION:
+        undetected = self._ended + self._undetected(self._movers)
+        fraction = len(undetected) / max(1, len(undetected) + len(self._driven))
+        if len(undetected) < _MIN_MOVERS or fraction < _MIN_FRACTION:
             return []
-        spans = joined(sorted(itertools.chain.from_iterable(left)))
-        what = f"{fraction:.0%} of the moving objects are not detected vehicles, mostly"
-        text = f"{what} {when(spans)}: poor visibility, or classes that are not detected"
+        spans = joined(sorted(itertools.chain.from_iterable(undetected)))
+        text = (
+            f"{fraction:.0%} of the moving objects are not detected as vehicles, mostly "
+            f"{when(spans)}: visibility is poor, or the detector lacks their classes"
+        )
         return [Finding("unexplained-motion", text, tuple(spans), value=fraction)]
 
     def _link(self, time: float, differs: Image, before: Image) -> None:
         """Link the movers; `before` marks the boxes of the previous plane."""
-        left, self._movers = self._movers, []
-        for center, size in self._things(differs):
-            mover = min(left, key=lambda item: math.dist(item.places[-1], center), default=None)
-            if mover and math.dist(mover.places[-1], center) < _REACH * size:
-                left.remove(mover)
+        lost, self._movers = self._movers, []
+        for center, size in self._moving_areas(differs):
+            mover = min(lost, key=lambda item: math.dist(item.points[-1], center), default=None)
+            if mover and math.dist(mover.points[-1], center) < _REACH * size:
+                lost.remove(mover)
             else:
                 mover = Mover(_is_in(center, before))
             mover.size = size
             mover.times.append(time)
-            mover.places.append(center)
+            mover.points.append(center)
             self._movers.append(mover)
-        for mover in left:
-            mover.is_found |= _is_in(mover.places[-1], self._covered)
-        self._ended += self._unexplained(left)
+        for mover in lost:
+            mover.is_detected |= _is_in(mover.points[-1], self._covered)
+        self._ended += self._undetected(lost)
 
-    def _unexplained(self, movers: Iterable[Mover]) -> list[list[float]]:
+    def _undetected(self, movers: Iterable[Mover]) -> list[list[float]]:
         """Return the times of each mover that travelled and was not detected."""
         width = self._covered.shape[1]
-        return [item.times for item in movers if not item.is_found and item.has_travelled(width)]
+        return [item.times for item in movers if not item.is_detected and item.has_travelled(width)]
 
-    def _things(self, differs: Image) -> list[tuple[Point, float]]:
+    def _moving_areas(self, differs: Image) -> list[tuple[Point, float]]:
         """Return centre and size of the areas that differ outside the boxes, the largest first."""
         closed = cv2.morphologyEx(differs, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
         _, labels, stats, _ = cv2.connectedComponentsWithStats(closed)
         labels[self._covered > 0] = 0
         areas = stats[:, cv2.CC_STAT_AREA]
         minimum, maximum = _MIN_AREA * differs.size, _MAX_AREA * differs.size
-        things = []
+        moving = []
         for number in np.argsort(-areas).tolist():
             if number and minimum <= areas[number] <= maximum:
                 rows, columns = np.nonzero(labels == number)
                 if len(rows) >= max(_OUTSIDE * areas[number], minimum):
                     center = float(columns.mean()), float(rows.mean())
-                    things.append((center, float(max(np.ptp(rows), np.ptp(columns)) + 1)))
-        return things
+                    moving.append((center, float(max(np.ptp(rows), np.ptp(columns)) + 1)))
+        return moving
 
 
 def _is_in(point: Point, covered: Image) -> bool:

@@ -1,7 +1,7 @@
 """Visibility in a video, and what the shipped network finds in such images.
 
 `benchmarks/visibility.py` measures its recall in images of many roads, and writes the weights of
-two logistic regressions: for the recall, and for the probability of drops on the lens.
+two logistic regressions: for the recall, and for the probability of water on the lens.
 """
 
 import json
@@ -23,12 +23,12 @@ WORDS: dict[Code, str] = {
     "dark": "it is dark",
     "haze": "contrast is low, as in fog or spray",
     "blur": "the image is blurred",
-    "drops": "drops, dirt or spray are on the lens",
+    "drops": "there is water or dirt on the lens",
 }
 PLAIN = 7
-"""Number of measures that do not depend on the detector: the first ones of `look`."""
+"""Number of measures that do not depend on the detector: the first ones of `measure`."""
 LIKELY = 0.9
-"""Minimum probability of drops on the lens to report them."""
+"""Minimum probability of water on the lens to report it."""
 _TOP = 0.35
 """Start of the part of the plane that shows a road, as a fraction of its height."""
 _LIGHT = 5.0
@@ -49,13 +49,13 @@ _AROUND = 5
 """Number of neighbouring planes whose most frequent reason counts."""
 _SURE = 0.4
 """Minimum score of a sure detection."""
-_NOTED = 0.6
+_MIN_RECALL = 0.6
 """Minimum recall at which poor visibility is only a note."""
 _TILES = 16, 9
 """Tiles of a plane whose fine contrast is compared: columns, rows."""
 
 
-def look(fine_plane: Image, plane: Image, scores: Float64Array) -> Float64Array:
+def measure(fine_plane: Image, plane: Image, scores: Float64Array) -> Float64Array:
     """Measure the visibility in a frame, from two of its planes, uint8.
 
     `scores` are those of all its detections.
@@ -65,8 +65,8 @@ def look(fine_plane: Image, plane: Image, scores: Float64Array) -> Float64Array:
     float64 `(9,)`: logarithms of the mean, of the local contrast, and of the fine contrast per
     coarse contrast, where the frame shows a road; logarithms of the finest and the next contrast of
     the whole frame, and of how even the finest is; how much edges have one direction; the fraction
-    of all scores that weak detections have, and the mean score of the others. Drops are soft,
-    everywhere, and of all directions.
+    of all scores that weak detections have, and the mean score of the others. Water is soft,
+    everywhere, and has edges of all directions.
     """
     lower = plane[int(_TOP * len(plane)) :].astype(np.float32)
     squares = cv2.blur(lower * lower, (15, 15)) - cv2.blur(lower, (15, 15)) ** 2
@@ -80,7 +80,7 @@ def look(fine_plane: Image, plane: Image, scores: Float64Array) -> Float64Array:
 
 
 def _texture(plane: Image) -> tuple[float, ...]:
-    """Return the measures of the whole frame, which reveal drops."""
+    """Return the measures of the whole frame, which reveal water on the lens."""
     pixels = plane.astype(np.float32)
     soft, softer, edges = (cv2.GaussianBlur(pixels, (0, 0), sigma) for sigma in (0.7, 1.4, 1.0))
     fine = np.abs(pixels - soft)
@@ -93,21 +93,21 @@ def _texture(plane: Image) -> tuple[float, ...]:
     return *np.log(levels + 0.001), even, directed.mean()
 
 
-def dim(looks: Float64Array, factor: float | Float64Array = 1.0) -> Codes:
+def dim(measures: Float64Array, factor: float | Float64Array = 1.0) -> Codes:
     """Return where it is dark, hazy or blurred; a larger factor widens these limits."""
-    light, contrast, sharpness = np.exp(looks[:, :3].T)
+    light, contrast, sharpness = np.exp(measures[:, :3].T)
     is_dark, is_hazy = light < factor * _DARK + _LIGHT, contrast < factor * _HAZY * light
-    is_so = is_dark, is_hazy, sharpness < factor * _BLURRED
-    return np.select(is_so, ("dark", "haze", "blur"), "")
+    is_blurred = sharpness < factor * _BLURRED
+    return np.select((is_dark, is_hazy, is_blurred), ("dark", "haze", "blur"), "")
 
 
-def reasons(looks: Float64Array) -> Codes:
-    """Return the reasons for poor visibility in frames; `looks` are `(n, 9)`."""
-    recall = probability(read_weights()["recall"], looks)
-    codes = dim(looks, np.where(recall < _DOUBTED, _WIDER, 1.0))
-    has_drops = probability(read_weights()["drops"], looks[:, :PLAIN]) > LIKELY
-    codes = np.where((codes == "") & has_drops, "drops", codes)
-    return np.where(looks[:, 1] < np.log(_EMPTY), "", codes)
+def reasons(measures: Float64Array) -> Codes:
+    """Return the reasons for poor visibility in frames; `measures` are `(n, 9)`."""
+    recall = probability(read_weights()["recall"], measures)
+    codes = dim(measures, np.where(recall < _DOUBTED, _WIDER, 1.0))
+    has_water = probability(read_weights()["drops"], measures[:, :PLAIN]) > LIKELY
+    codes = np.where((codes == "") & has_water, "drops", codes)
+    return np.where(measures[:, 1] < np.log(_EMPTY), "", codes)
 
 
 @cache
@@ -117,31 +117,32 @@ def read_weights() -> dict[str, list[float]]:
     return dict(json.loads(weights))
 
 
-def probability(weights: Sequence[float], looks: Float64Array) -> Float64Array:
-    """Return the probability that a logistic regression predicts for each look, `(n,)`."""
-    return np.asarray(1 / (1 + np.exp(-(looks @ weights[:-1] + weights[-1]))))
+def probability(weights: Sequence[float], measures: Float64Array) -> Float64Array:
+    """Return the probability that a logistic regression predicts for each row, `(n,)`."""
+    return np.asarray(1 / (1 + np.exp(-(measures @ weights[:-1] + weights[-1]))))
 
 
-def findings(times: Float64Array, looks: Float64Array, *, is_shipped: bool) -> list[Finding]:
+def findings(times: Float64Array, measures: Float64Array, *, is_shipped: bool) -> list[Finding]:
     """Return when visibility is poor, for each reason.
 
-    `times` are `(n,)` and `looks` `(n, 9)`. `is_shipped` says whether the shipped network is used,
-    whose recall is known.
+    `times` are `(n,)` and `measures` `(n, 9)`. `is_shipped` says whether the shipped network is
+    used, whose recall is known.
     """
-    found: list[Finding] = []
+    reported: list[Finding] = []
     if len(times) < _AROUND:
-        return found
-    codes, recall = reasons(looks), probability(read_weights()["recall"], looks)
-    near = [np.convolve(codes == code, np.ones(_AROUND), "same") for code in ("", *WORDS)]
-    usual = np.array(["", *WORDS])[np.argmax(near, axis=0)]
+        return reported
+    codes, recall = reasons(measures), probability(read_weights()["recall"], measures)
+    nearby = [np.convolve(codes == code, np.ones(_AROUND), "same") for code in ("", *WORDS)]
+    usual = np.array(["", *WORDS])[np.argmax(nearby, axis=0)]
     for code, words in WORDS.items():
         spans = tuple(joined(times[usual == code].tolist(), _SHORTEST))
         if spans and is_shipped:
             part = float(recall[usual == code].mean())
-            severity: Severity = "warning" if part < _NOTED else "note"
-            tells = f"in such images the network finds about {10 * part:.0f} of 10 vehicles"
-            found.append(Finding(code, f"{words} {when(spans)}: {tells}", spans, severity, part))
+            severity: Severity = "warning" if part < _MIN_RECALL else "note"
+            effect = f"in such images the network finds about {10 * part:.0f} of 10 vehicles"
+            text = f"{words} {when(spans)}: {effect}"
+            reported.append(Finding(code, text, spans, severity, part))
         elif spans:
-            text = f"{words} {when(spans)}: fewer vehicles are found in such images"
-            found.append(Finding(code, text, spans))
-    return found
+            text = f"{words} {when(spans)}: fewer vehicles are detected in such images"
+            reported.append(Finding(code, text, spans))
+    return reported

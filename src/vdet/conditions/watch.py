@@ -30,7 +30,7 @@ class Conditions:
     width
         Width of the frames, pixels.
     unknown
-        Classes in the settings that the network does not know.
+        Classes in the settings that the network does not have.
     """
 
     def __init__(self, settings: Settings, width: int, unknown: Sequence[str] = ()) -> None:
@@ -39,9 +39,11 @@ class Conditions:
         self._unknown = unknown
         self._camera, self._motion = CameraWatch(), MotionWatch()
         self._times: list[float] = []
-        self._looks: list[Float64Array] = []
+        self._measures: list[Float64Array] = []
 
-    def add(self, time: float, picture: Picture, found: Boxes, tracks: Sequence[Track]) -> None:
+    def add(
+        self, time: float, picture: Picture, detections: Boxes, tracks: Sequence[Track]
+    ) -> None:
         """Add a searched frame, with its detections and the vehicles shown."""
         if self._times and time - self._times[-1] < _STEP:
             return
@@ -49,33 +51,33 @@ class Conditions:
         scale = plane.shape[1] / picture.width
         boxes = {track.id: _enlarged(track.box, scale) for track in tracks}
         self._times.append(time)
-        self._looks.append(visibility.look(fine_plane, plane, found.scores))
-        is_clear = not visibility.reasons(self._looks[-1][np.newaxis])[0]
+        self._measures.append(visibility.measure(fine_plane, plane, detections.scores))
+        is_clear = not visibility.reasons(self._measures[-1][np.newaxis])[0]
         stood = self._camera.add(time, plane, boxes.values(), is_clear=is_clear)
         self._motion.add(time, plane, boxes, stood=stood)
 
     def findings(self) -> Findings:
         """Return the findings so far, except those that the settings suppress."""
         settings, detector = self._settings, self._settings.detector
-        found = []
+        findings = []
         if settings.lack_of_metres:
-            found.append(Finding("lane-geometry", settings.lack_of_metres))
+            findings.append(Finding("lane-geometry", settings.lack_of_metres))
         if self._unknown:
-            text = f"detector.classes: the network does not know {', '.join(self._unknown)}"
-            found.append(Finding("classes", text))
+            text = f"detector.classes: the network does not have {', '.join(self._unknown)}"
+            findings.append(Finding("classes", text))
         if self._width < _NARROW:
             text = f"frames are {self._width} pixels wide; detectors were measured on wider ones"
-            found.append(Finding("small-frames", text, severity="note"))
+            findings.append(Finding("small-frames", text, severity="note"))
         if self._times:
-            times, looks = np.array(self._times), np.array(self._looks)
+            times, measures = np.array(self._times), np.array(self._measures)
             if settings.traffic or settings.regions or settings.camera.ground:
-                found += self._camera.findings()
+                findings += self._camera.findings()
             if self._camera.is_still:
-                found += self._motion.findings()
+                findings += self._motion.findings()
             is_shipped = detector.kind == "net" and detector.model is None
-            found += visibility.findings(times, looks, is_shipped=is_shipped)
+            findings += visibility.findings(times, measures, is_shipped=is_shipped)
         ignored = settings.conditions.ignore
-        chosen = tuple(item for item in found if item.code not in ignored)
+        chosen = tuple(item for item in findings if item.code not in ignored)
         return Findings(chosen, self._camera.is_still)
 
 

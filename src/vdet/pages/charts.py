@@ -131,7 +131,8 @@ def level_plot(
     bars = [Bar(at, at + width, 0, level) for at, level in steps if level]
     y = number_axis(0, max(1, levels.max().item()))
     bars += [
-        Bar(*gap, 0, y.high, SOFT, f"no frames: {' to '.join(map(time_text, gap))}") for gap in gaps
+        Bar(first, last, 0, y.high, SOFT, f"no frames: {time_text(first)} to {time_text(last)}")
+        for first, last in gaps
     ]
     legend = [("no frames in the video", SOFT)] if gaps else []
     return Plot(title, x, y, bars, legend=legend)
@@ -152,12 +153,11 @@ def interval_plot(
     bars, highest = list[Bar](), 1
     colors = dict(zip(series, itertools.cycle(_COLORS), strict=False))
     for at in sorted(set().union(*series.values())):
-        below = 0
+        left, right, below = at + 0.1 * interval, at + 0.9 * interval, 0
         for name, counts in series.items():
             if count := counts[at]:
                 tip = f"{time_text(at, zero)}: {count} {name}"
-                place = at + 0.1 * interval, at + 0.9 * interval, below, below + count
-                bars.append(Bar(*place, colors[name], tip))
+                bars.append(Bar(left, right, below, below + count, colors[name], tip))
                 below += count
         highest = max(highest, below)
     legend = [(f"{name}: {counts.total()}", colors[name]) for name, counts in series.items()]

@@ -1,4 +1,4 @@
-"""The outputs of `vdet draw`: the page, proposed settings, and the image of a place."""
+"""The outputs of `vdet draw`: the page, proposed settings, and an image of the traffic."""
 
 import base64
 import zlib
@@ -17,25 +17,25 @@ from vdet.config.schema import Settings
 from vdet.detect.classes import UNKNOWN
 from vdet.lanes.ground import ground_of
 from vdet.media.images import encode_image
-from vdet.pages.place import Mark, place_marks, with_marks
 from vdet.pages.render import TEMPLATES, jpeg_uri, render
+from vdet.pages.traffic import Mark, traffic_marks, with_marks
 from vdet.track.track import FrameTracks
 from vdet.traffic.counting import count_frames
-from vdet.traffic.crossings import place
+from vdet.traffic.crossings import lines_and_zones
 from vdet.traffic.linking import VehiclePath, link_tracks
 from vdet.traffic.proposals import ProposedLine, propose_lines
 
-_PLACES = {"ground": "camera", "regions": "other", "lines": "traffic", "zones": "traffic"}
+_SECTIONS = {"ground": "camera", "regions": "other", "lines": "traffic", "zones": "traffic"}
 """The lists that the page edits, and their section in the settings file."""
 
 
 class Drawing:
-    """A place with the paths of its vehicles.
+    """A frame of a camera with the paths of its vehicles.
 
     Parameters
     ----------
     image
-        The place, BGR uint8 `(H, W, 3)`.
+        The frame, BGR uint8 `(H, W, 3)`.
     frames
         The tracks of its vehicles.
     values
@@ -79,12 +79,14 @@ class Drawing:
         marks = self._marks()
         if path.suffix.lower() == ".svg":
             width, height = self._size
-            page = render("place.svg", picture=self._image, width=width, height=height, marks=marks)
-            return page.encode("utf-8", "backslashreplace")
+            svg = render(
+                "traffic.svg", picture=self._image, width=width, height=height, marks=marks
+            )
+            return svg.encode("utf-8", "backslashreplace")
         return encode_image(with_marks(self._image, marks), path)
 
     def _page(self, name: str) -> str:
-        places, rest = split(self._values, self._size)
+        shapes, other_settings = split(self._values, self._size)
         times = [frame.time for frame in self._frames]
         data = {
             "name": name,
@@ -92,8 +94,8 @@ class Drawing:
             "span": (times[0], times[-1]) if times else (0, 0),
             "picture": jpeg_uri(self._image),
             "paths": pack_paths(self.paths),
-            "places": places,
-            "rest": rest,
+            "places": shapes,
+            "rest": other_settings,
             "proposals": [asdict(proposal) for proposal in self.proposals],
         }
         script = Markup((TEMPLATES / "draw.js").read_text("utf-8"))
@@ -110,10 +112,10 @@ class Drawing:
 
     def _marks(self) -> list[Mark]:
         counts = count_frames(self._frames, self._settings, self._size)
-        lines, zones = place(self._settings.traffic, *self._size)
+        lines, zones = lines_and_zones(self._settings.traffic, *self._size)
         ground = ground_of(self._settings.camera, *self._size)
         paths = {key: path.points.tolist() for path in self.paths for _, key in path.tracks}
-        return place_marks(self._size, (*lines, *zones), counts, paths, ground)
+        return traffic_marks(self._size, (*lines, *zones), counts, paths, ground)
 
 
 _PROPOSED = """\
@@ -125,17 +127,17 @@ _PROPOSED = """\
 def split(
     values: Mapping[str, Any], size: tuple[int, int]
 ) -> tuple[dict[str, list[Any]], dict[str, list[str]]]:
-    """Return the places in settings, in pixels, and the rest as lines of YAML."""
+    """Return the shapes in settings, in pixels, and the other settings as lines of YAML."""
     whole = in_pixels(values, size)
     sections = {"camera": whole.pop("camera"), "traffic": whole.pop("traffic", None) or {}}
     sections["other"] = whole
-    places = {kind: sections[name].pop(kind, None) or [] for kind, name in _PLACES.items()}
+    shapes = {kind: sections[name].pop(kind, None) or [] for kind, name in _SECTIONS.items()}
     del sections["camera"]["size"]
-    rest = {
+    other_settings = {
         name: [line if name == "other" else f"  {line}" for line in as_yaml(section)]
         for name, section in sections.items()
     }
-    return places, rest
+    return shapes, other_settings
 
 
 def in_pixels(values: Mapping[str, Any], size: tuple[int, int]) -> dict[str, Any]:
@@ -162,8 +164,8 @@ class _Dumper(yaml.SafeDumper):
 def pack_paths(paths: Sequence[VehiclePath]) -> dict[str, Any]:
     """Return paths as values for JSON: second differences of rows, in byte planes, deflated.
 
-    Times are µs since the first row, feet are hundredths of a pixel; the page restores them
-    exactly.
+    Times are µs since the first row, ground points are hundredths of a pixel; the page restores
+    them exactly.
     """
     columns = [np.empty((4, 0))]
     for path in paths:
@@ -172,8 +174,15 @@ def pack_paths(paths: Sequence[VehiclePath]) -> dict[str, Any]:
         columns.append(np.diff(np.diff(rows, prepend=0), prepend=0))
     planes = np.hstack(columns).astype("<i4").view(np.uint8).reshape(-1, 4).T
     vehicles = [
-        (one.vehicle, one.class_name or UNKNOWN, one.size, one.times[0], one.seen, len(one.times))
-        for one in paths
+        (
+            path.vehicle,
+            path.class_name or UNKNOWN,
+            path.size,
+            path.times[0],
+            path.seen,
+            len(path.times),
+        )
+        for path in paths
     ]
     data = base64.b64encode(zlib.compress(planes.tobytes())).decode("ascii")
     return {"vehicles": vehicles, "data": data}

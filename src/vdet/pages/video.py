@@ -1,6 +1,6 @@
 """The page of a video: which vehicles appear, when, where, and their images."""
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -14,8 +14,8 @@ from vdet.media import VideoInfo
 from vdet.pages import charts
 from vdet.pages.batch import NO_STILL, Part, VehicleRow, VideoFacts, table_json
 from vdet.pages.charts import Axis, Plot, TimelineBar, hex_color, interval_plot
-from vdet.pages.place import path_marks, traffic_part, with_marks
 from vdet.pages.render import jpeg_uri, render
+from vdet.pages.traffic import path_marks, traffic_part, with_marks
 from vdet.traffic.clock import Clock, Intervals
 from vdet.traffic.counts import Counts
 from vdet.traffic.crossings import Border
@@ -48,7 +48,7 @@ class Player:
     is_drawn: bool
     start: float
 
-    def moment(self, time: float) -> str:
+    def position(self, time: float) -> str:
         """Return the position of the player at a time in the tracks, seconds."""
         return f"{max(0.0, time - self.start):.3f}"
 
@@ -162,8 +162,8 @@ class VideoPage:
         longest = sorted(self.records, key=lambda record: -record.seconds)[:_MAX_VEHICLES]
         shown = sorted(longest, key=lambda record: (record.first, record.id))
         x = charts.time_axis(self.start, self.end, self.zero)
-        known = {number: picture for number, (_, picture) in self.thumbnails.items()}
-        rows = self._rows({item.id: known[item.id] for item in shown if item.id in known})
+        ids = {record.id for record in shown}
+        rows = self._rows({key: uri for key, (_, uri) in self.thumbnails.items() if key in ids})
         speeds = [row.speed for row in rows if row.speed is not None]
         title = "Vehicles by their median speed"
         page, start = ("", self.player.start) if self.player else (None, 0.0)
@@ -173,7 +173,8 @@ class VideoPage:
             figures=self._figures(),
             shown=shown,
             level_plot=charts.level_plot(self._spans, x, "Number of vehicles at once", self.gaps),
-            timeline=("When each vehicle is shown", x, _timeline(shown, self.findings)),
+            time_axis=x,
+            timeline=_timeline(shown, self.findings),
             interval_plots=self._interval_plots(x),
             speed_plot=charts.histogram(speeds, _SPEED_STEP, title, "km/h") if speeds else None,
             traffic=self.counts
@@ -221,19 +222,19 @@ class VideoPage:
         begins = [self.start, *(end for _, end in self.gaps)]
         ends = [*(begin for begin, _ in self.gaps), last]
         intervals = Intervals([(self.clock, list(zip(begins, ends, strict=True)))], step)
-        first = {number: intervals.start_in(0, number) for number in intervals.numbers}
+        first = {item.number: intervals.start_in(0, item.number) for item in intervals.periods}
         if len(first) == 1:
             return []
-        came: dict[str, Counter[float]] = {}
+        appeared: defaultdict[str, Counter[float]] = defaultdict(Counter)
         for record in self._driven:
-            name = record.class_name or UNKNOWN
-            came.setdefault(name, Counter())[first[intervals.number(0, record.first)]] += 1
-        counted: dict[str, Counter[float]] = {}
+            start = first[intervals.number(0, record.first)]
+            appeared[record.class_name or UNKNOWN][start] += 1
+        counted: defaultdict[str, Counter[float]] = defaultdict(Counter)
         for event in self.counts.events if self.counts else ():
-            found = counted.setdefault(f"{event.name}: {event.direction}", Counter())
-            found[first[intervals.number(0, event.time)]] += 1
-        series = ("First seen", came), ("At lines and zones", counted)
-        return [interval_plot(some, x, step, name, self.zero) for name, some in series if some]
+            start = first[intervals.number(0, event.time)]
+            counted[f"{event.name}: {event.direction}"][start] += 1
+        plots = ("First seen", appeared), ("At lines and zones", counted)
+        return [interval_plot(data, x, step, title, self.zero) for title, data in plots if data]
 
     def _paths(self) -> Image | None:
         """Return the poster with the paths of all vehicles."""
@@ -248,22 +249,32 @@ def _timeline(shown: Sequence[VehicleRecord], findings: Sequence[Finding]) -> li
 
     The first row has the times at which the results are doubtful, if any.
     """
-    bars = [TimelineBar(0, *at, it.text, *_DOUBT, it.code) for it in findings for at in it.spans]
-    first, rows = bool(bars), charts.pack_rows((record.first, record.last) for record in shown)
+    fill, ink = _DOUBT
+    bars = [
+        TimelineBar(0, first, last, title=finding.text, color=fill, ink=ink, label=finding.code)
+        for finding in findings
+        for first, last in finding.spans
+    ]
+    top, rows = bool(bars), charts.pack_rows((record.first, record.last) for record in shown)
     for record, row in zip(shown, rows, strict=True):
-        bars += _spans(record, first + row)
+        bars += _vehicle_bars(record, top + row)
     return bars
 
 
-def _spans(record: VehicleRecord, row: int) -> list[TimelineBar]:
+def _vehicle_bars(record: VehicleRecord, row: int) -> list[TimelineBar]:
     """Return a bar for each time span in which a vehicle is tracked; the longest is labelled."""
-    name = f" ({record.class_name})" if record.class_name else ""
-    times = " to ".join(map(charts.time_text, (record.first, record.last)))
-    title = f"vehicle {record.id}{name}: {times}"
+    kind = f" ({record.class_name})" if record.class_name else ""
+    times = f"{charts.time_text(record.first)} to {charts.time_text(record.last)}"
     fill = color_of(record.id)
-    colors = hex_color(fill), hex_color(text_color(fill))
     longest = max(record.followed, key=lambda span: span[1] - span[0])
     return [
-        TimelineBar(row, *span, title, *colors, f"#{record.id}" if span is longest else "")
+        TimelineBar(
+            row,
+            *span,
+            title=f"vehicle {record.id}{kind}: {times}",
+            color=hex_color(fill),
+            ink=hex_color(text_color(fill)),
+            label=f"#{record.id}" if span is longest else "",
+        )
         for span in record.followed
     ]

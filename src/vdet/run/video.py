@@ -221,7 +221,7 @@ class Results(Iterator[FrameResult]):
     @property
     def findings(self) -> tuple[Finding, ...]:
         """Reasons to doubt the results; empty before the last frame."""
-        return findings_in(self._video.facts).found if self._video else ()
+        return findings_in(self._video.facts).items if self._video else ()
 
 
 def run_video(run: Run, parts: Parts, *, progress: Progress = no_progress) -> RunTotals:

@@ -36,10 +36,10 @@ class Track:
         "predicted": the detector did not find it again; the box follows its motion or, with the
         rules tracker, a match of its image.
     class_name
-        Its class, one of `Boxes.names`; None if the detector does not know classes.
+        Its class, one of `Boxes.names`; None if the detector has no classes.
     whole_foot
         Middle of the lower edge of the whole box, including the part outside the frame; x and y,
-        pixels. None if the tracker does not know it: see `foot`.
+        pixels. None if unknown: see `foot`.
     distance
         Metres along the road from the camera to the vehicle; None if unknown.
     lane
@@ -58,12 +58,12 @@ class Track:
 
     @property
     def foot(self) -> tuple[float, float]:
-        """Where the vehicle stands: the middle of its lower edge, x and y in pixels."""
+        """Its ground point: the middle of the lower edge of the whole box, x and y in pixels."""
         return self.whole_foot or self.box.foot
 
     @property
     def written_foot(self) -> tuple[float, float]:
-        """The foot as written to files, to a hundredth of a pixel."""
+        """`foot` as written to files, to a hundredth of a pixel."""
         x, y = self.whole_foot or self.box.foot
         return round(100 * x) / 100, round(100 * y) / 100  # round(x, 2) is three times slower
 
@@ -113,9 +113,9 @@ class FrameTracks:
         """
         import pandas as pd
 
-        when = {"frame": self.index, "time": self.time}
-        rows = [when | asdict(track.box) | asdict(track) for track in self.tracks]
-        names = [*when, *("x1", "y1", "x2", "y2"), *(field.name for field in fields(Track))]
+        frame = {"frame": self.index, "time": self.time}
+        rows = [frame | asdict(track.box) | asdict(track) for track in self.tracks]
+        names = [*frame, *("x1", "y1", "x2", "y2"), *(field.name for field in fields(Track))]
         return pd.DataFrame(rows, columns=[name for name in names if name != "box"])
 
 

@@ -16,7 +16,7 @@ all votes that it needs. On images that it has not seen, the shipped network is 
 0.93, but takes trucks and buses for cars to a third or a half.
 """
 
-_OTHERS_NEED = 0.3
+_UNUSUAL_NEED = 0.3
 """Fraction of all votes that another class needs; without one, the class is `UNKNOWN`."""
 
 _CLOSE = 0.05
@@ -37,20 +37,20 @@ class ClassVotes:
         """The class with the most votes, or `UNKNOWN`; None if no detection had a class."""
         if not self._sums:
             return None
-        total, others = sum(self._sums.values()), dict(self._sums)
-        if others.pop(_USUAL, 0.0) >= _USUAL_NEEDS * total or not others:
+        total, unusual = sum(self._sums.values()), dict(self._sums)
+        if unusual.pop(_USUAL, 0.0) >= _USUAL_NEEDS * total or not unusual:
             return _USUAL
-        name = max(others, key=others.__getitem__)
-        return name if others[name] >= _OTHERS_NEED * total else UNKNOWN
+        name = max(unusual, key=unusual.__getitem__)
+        return name if unusual[name] >= _UNUSUAL_NEED * total else UNKNOWN
 
     def add(self, classes: Mapping[str, float], weight: float) -> None:
         """Add the votes of a search: the probability of each class, times the weight."""
-        for name, likely in classes.items():
-            self._sums[name] += weight * likely
+        for name, probability in classes.items():
+            self._sums[name] += weight * probability
 
-    def join(self, other: "ClassVotes") -> None:
+    def join(self, votes: "ClassVotes") -> None:
         """Add the votes of another track of the same vehicle."""
-        self.add(other._sums, 1.0)
+        self.add(votes._sums, 1.0)
 
 
 def vote_weight(box: Float64Array, score: float, size: tuple[int, int]) -> float:

@@ -2,8 +2,8 @@
 
 The counts of a video depend only on its tracks (`FrameTracks`), live or from a file. The rule:
 
-1. The position of a vehicle is its foot, the middle of the lower edge of its whole box, in each
-   frame that shows it.
+1. The position of a vehicle is its ground point, the middle of the lower edge of its whole
+   box, in each frame that shows it.
 2. Near a line or the border of a zone, a vehicle is on neither side. Farther away, its side is
    settled after 0.1 seconds, or at once if two consecutive frames, or its last frame, show it one
    box height away.
@@ -24,8 +24,8 @@ The counts of a video depend only on its tracks (`FrameTracks`), live or from a 
    found again continues for 0.3 seconds.
 9. Only events are stored. All totals, flows and stays are computed from them.
 
-`linking` joins the tracks of each vehicle to a path. `crossings` places lines and zones in the
-frame, and computes the crossings of one path and one line or zone, without state. `counter`
+`linking` joins the tracks of each vehicle to a path. `crossings` has the lines and zones in
+the frame, and computes the crossings of one path and one line or zone, without state. `counter`
 collects the events while frames are processed, and `counting` those of saved tracks. `counts` has
 the events and the tables computed from them, `clock` the start time of a video and the intervals of
 all tables and pages, and `output` the files of counts and flows.

@@ -87,14 +87,16 @@ def find_clock(
     if settings.input.begin:
         begin, source = moment(settings.input.begin), "as given"
         zone = zone or begin.tzinfo
-    elif found := _found(path, settings, created):
-        begin, source = found
+    elif begin_and_source := _begin_by_name(path, settings, created):
+        begin, source = begin_and_source
     else:
         return None
     return Clock(_utc(begin, zone) - timedelta(seconds=start), source, zone, start)
 
 
-def _found(path: Path, settings: Settings, created: str | None) -> tuple[datetime, str] | None:
+def _begin_by_name(
+    path: Path, settings: Settings, created: str | None
+) -> tuple[datetime, str] | None:
     """Return the start time by the name and metadata of a video, and which of them it is from."""
     clock, zone = settings.camera.clock, settings.camera.clock.zone
     sequence = find_sequence(path)
@@ -106,10 +108,11 @@ def _found(path: Path, settings: Settings, created: str | None) -> tuple[datetim
     if not named:
         return (written, "its creation time") if written else None
     if written and not clock.pattern and abs(_utc(named, zone) - _utc(written, zone)) > _SAME:
-        times = (_text(_utc(time, zone).astimezone(zone)) for time in (named, written))
         _log.warning(
             "%s: begins %s by its name, %s by its metadata; using the name; --begin overrides it",
-            *(path, *times),
+            path,
+            _text(_utc(named, zone).astimezone(zone)),
+            _text(_utc(written, zone).astimezone(zone)),
         )
     return named, "from its name"
 
@@ -126,7 +129,7 @@ def _text(time: datetime) -> str:
 Span = tuple[float, float]
 """Start and end of a time span, seconds; of a part with video, its first and last frame."""
 
-Moment = datetime | float | None
+ClockTime = datetime | float | None
 """A clock time; without a clock, seconds in the video; None for several videos without one."""
 
 _LONGEST_FRAME = 60.0
@@ -147,6 +150,27 @@ def add_frame(spans: list[Span], frame: FrameTracks, before: FrameTracks | None)
         spans.append((time, time))
 
 
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """An interval of a table.
+
+    Attributes
+    ----------
+    number
+        Its number, see `Intervals`.
+    start, end
+        Its limits, as they are shown.
+    first, last
+        Its part between the first and the last frame of all videos, seconds of `Intervals`.
+    """
+
+    number: int
+    start: ClockTime
+    end: ClockTime
+    first: float
+    last: float
+
+
 class Intervals:
     """The numbered intervals of one or several videos that contain video.
 
@@ -160,6 +184,11 @@ class Intervals:
     length
         Seconds; None for a single interval.
 
+    Attributes
+    ----------
+    periods
+        The intervals, in order.
+
     Raises
     ------
     ConfigError
@@ -170,22 +199,23 @@ class Intervals:
         self, videos: Sequence[tuple[Clock | None, Sequence[Span]]], length: int | None
     ) -> None:
         self._length = length
+        self._is_timed = len(videos) == 1
         self._origin: datetime | None = None
         self._zone: tzinfo | None = None
-        self._is_timed = len(videos) == 1
-        self._zeros = [0.0]
         clocks = [clock for clock, _ in videos if clock]
         if clocks and len(clocks) == len(videos):
             first = clocks[0].at(clocks[0].first)
             self._origin = datetime(1970, 1, 1, tzinfo=timezone(first.utcoffset() or timedelta()))
             self._zone = clocks[0].zone
             self._zeros = [(clock.zero - self._origin).total_seconds() for clock in clocks]
-        elif len(videos) > 1:
-            if length is not None:
-                what = "intervals over several videos need the time at which each begins"
-                raise ConfigError(f"{what}; pass --begin")
+        elif self._is_timed:
+            self._zeros = [0.0]
+        elif length is None:  # one after another
             ends = accumulate(spans[-1][1] - spans[0][0] for _, spans in videos)
             self._zeros = [end - spans[-1][1] for end, (_, spans) in zip(ends, videos, strict=True)]
+        else:
+            message = "intervals over several videos need the time at which each begins"
+            raise ConfigError(f"{message}; pass --begin")
         self._spans = [
             [(zero + first, zero + last) for first, last in spans]
             for zero, (_, spans) in zip(self._zeros, videos, strict=True)
@@ -193,8 +223,8 @@ class Intervals:
         self._every = [span for spans in self._spans for span in spans]
         self._first = min(first for first, _ in self._every)
         self._last = max(last for _, last in self._every)
-        ranges = [(self.number_at(first), self.number_at(last)) for first, last in self._every]
-        self.numbers = sorted({n for first, last in ranges for n in range(first, last + 1)})
+        ranges = [range(self.number_at(a), self.number_at(b) + 1) for a, b in self._every]
+        self.periods = tuple(map(self._interval, sorted(set().union(*ranges))))
 
     def seconds(self, index: int, time: float) -> float:
         """Convert a time in one of the videos to the seconds of the intervals.
@@ -213,32 +243,29 @@ class Intervals:
         """Return the number of the interval of `seconds`."""
         return 0 if self._length is None else int(seconds // self._length)
 
-    def limits(self, number: int) -> Span:
-        """Return the part of an interval between the first and last frame of all videos."""
-        begin, end = self._ends(number)
-        return max(begin, self._first), min(end, self._last)
-
-    def _ends(self, number: int) -> Span:
-        if self._length is None:
-            return self._first, self._last
-        return float(number * self._length), float((number + 1) * self._length)
-
     def start_in(self, index: int, number: int) -> float:
-        """Return the start of an interval, in the time of one of the videos."""
-        return round(self._ends(number)[0] - self._zeros[index], 3)
+        """Return the start of an interval of some length, in the time of one of the videos."""
+        assert self._length is not None
+        return round(number * self._length - self._zeros[index], 3)
 
-    def covered(self, number: int) -> float:
+    def covered(self, period: Interval) -> float:
         """Return the seconds of video in an interval."""
-        begin, end = self.limits(number)
-        return sum(max(0.0, min(end, last) - max(begin, first)) for first, last in self._every)
+        return sum(max(0.0, min(period.last, b) - max(period.first, a)) for a, b in self._every)
 
-    def moments(self, number: int) -> tuple[Moment, Moment]:
-        """Return the start and the end of an interval."""
-        start, end = self._ends(number)
-        return self._moment(start), self._moment(end)
+    def _interval(self, number: int) -> Interval:
+        start, end = self._first, self._last
+        if self._length is not None:
+            start, end = float(number * self._length), float((number + 1) * self._length)
+        return Interval(
+            number=number,
+            start=self._clock_time(start),
+            end=self._clock_time(end),
+            first=max(start, self._first),
+            last=min(end, self._last),
+        )
 
-    def _moment(self, seconds: float) -> Moment:
+    def _clock_time(self, seconds: float) -> ClockTime:
         if self._origin:
-            found = self._origin + timedelta(milliseconds=round(1000 * seconds))
-            return found.astimezone(self._zone)
+            time = self._origin + timedelta(milliseconds=round(1000 * seconds))
+            return time.astimezone(self._zone)
         return round(seconds, 3) if self._is_timed else None

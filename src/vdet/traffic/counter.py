@@ -15,10 +15,10 @@ from vdet.traffic.crossings import (
     VANISH,
     Border,
     Crossing,
-    PlacedLine,
+    Line,
     crossings,
+    lines_and_zones,
     lines_near,
-    place,
 )
 from vdet.traffic.linking import MAX_GAP, TrackLinker, VehiclePath
 
@@ -53,7 +53,7 @@ class VehicleCounter:
     Attributes
     ----------
     lines, zones
-        Places in its frames.
+        In pixels of its frames.
     spans
         The parts with video, seconds.
     linker
@@ -67,15 +67,15 @@ class VehicleCounter:
 
     def __init__(self, settings: Settings, width: int, height: int, started: int = 0) -> None:
         self._settings = settings
-        self.lines, self.zones = place(settings.traffic, width, height)
+        self.lines, self.zones = lines_and_zones(settings.traffic, width, height)
         self.spans: list[Span] = []
         self._borders: tuple[Border, ...] = (*self.lines, *self.zones)
         self.linker = TrackLinker(width, height, started)
-        self._ended: list[_Passage] = []
-        self._tally: Counter[Direction] = Counter()  # of those
         self._latest: FrameTracks | None = None
-        self._so_far: Counter[Direction] = Counter()
-        self._counted = -math.inf
+        self._ended: list[_Passage] = []
+        self._ended_counts: Counter[Direction] = Counter()
+        self._running_counts: Counter[Direction] = Counter()
+        self._counted_at = -math.inf
 
     def update(self, frame: FrameTracks) -> None:
         """Add the tracks of the next frame."""
@@ -84,7 +84,7 @@ class VehicleCounter:
         ended = self._passages(self.linker.add(frame))
         self._ended += ended
         events = (event for passage in ended for event in passage.events)
-        self._tally.update((event.name, event.direction) for event in events)
+        self._ended_counts.update((event.name, event.direction) for event in events)
 
     def start_video(self) -> None:
         """Treat the ids of the next frames as other tracks, because they are of another video."""
@@ -95,11 +95,15 @@ class VehicleCounter:
         """Return all results, as if the video ended now."""
         passages = self._ended + self._passages(self.linker.open_paths())
         events = [event for passage in passages for event in passage.events]
-        events.sort(key=lambda item: (item.time, item.frame, item.id, item.name))
-        pairs = tuple((border.name, name) for border in self._borders for name in border.directions)
-        zones, spans = tuple(zone.name for zone in self.zones), tuple(self.spans) or ((0.0, 0.0),)
-        warnings = tuple(_line_warnings(self.lines, passages))
-        return Counts(tuple(events), pairs, zones, spans, warnings=warnings)
+        events.sort(key=lambda event: (event.time, event.frame, event.id, event.name))
+        directions = tuple((item.name, way) for item in self._borders for way in item.directions)
+        return Counts(
+            events=tuple(events),
+            directions=directions,
+            zones=tuple(zone.name for zone in self.zones),
+            spans=tuple(self.spans) or ((0.0, 0.0),),
+            warnings=tuple(_line_warnings(self.lines, passages)),
+        )
 
     def so_far(self) -> Counter[Direction]:
         """Return the count of each direction so far; vehicles in a zone have not left it.
@@ -107,16 +111,15 @@ class VehicleCounter:
         The counts may be `_MAX_AGE` seconds old, so that this can be called for each frame.
         """
         now = self.spans[-1][1]
-        if now - self._counted >= _MAX_AGE:
-            self._counted = now
-            still = self._passages(self.linker.open_paths())
-            self._so_far = self._tally + Counter(
+        if now - self._counted_at >= _MAX_AGE:
+            self._counted_at = now
+            self._running_counts = self._ended_counts + Counter(
                 (event.name, event.direction)
-                for passage in still
+                for passage in self._passages(self.linker.open_paths())
                 for event in passage.events
                 if event.direction != VANISH or now - event.time > MAX_GAP
             )
-        return self._so_far
+        return self._running_counts
 
     def _passages(self, paths: Iterable[VehiclePath]) -> list[_Passage]:
         """Return the passages that count: of the classes, seen long enough, and not parked."""
@@ -125,46 +128,52 @@ class VehicleCounter:
         return [self._passage(path) for path in seen if is_chosen(path.class_name, classes)]
 
     def _passage(self, path: VehiclePath) -> _Passage:
-        found = {border.name: crossings(path, border) for border in self._borders}
-        last, (start, _), (_, now) = path.seen - 1, self.spans[0], self.spans[-1]
-        # The ends of the path, except at the ends of the video.
-        rows = [row for row in (0, last) if start < path.times[row] < now]
-        points, reach = path.points[rows], _NEAR_LINE * path.heights[rows]
         events, heights = list[Event](), {}
-        for name, crossed in found.items():
-            events += [_event(path, name, crossing) for crossing in crossed]
-            heights[name] = path.heights[[crossing.row for crossing in crossed]].tolist()
-        others = [line for line in self.lines if not found[line.name]]
-        missed = [line.name for line in lines_near(others, points, reach)]
-        return _Passage(events, heights, missed)
+        for border in self._borders:
+            crossed = crossings(path, border)
+            events += [_event(path, border.name, crossing) for crossing in crossed]
+            heights[border.name] = path.heights[[crossing.row for crossing in crossed]].tolist()
+        # The ends of the path, except at the ends of the video.
+        (start, _), (_, now) = self.spans[0], self.spans[-1]
+        ends = [row for row in (0, path.seen - 1) if start < path.times[row] < now]
+        uncrossed = [line for line in self.lines if not heights[line.name]]
+        missed = lines_near(uncrossed, path.points[ends], _NEAR_LINE * path.heights[ends])
+        return _Passage(events, heights, [line.name for line in missed])
 
 
 def _event(path: VehiclePath, name: str, crossing: Crossing) -> Event:
-    row, stay = crossing.row, crossing.seconds
-    time, frame, score = round(crossing.time, 3), int(path.frames[row]), float(path.scores[row])
-    known = path.track_at(row), path.vehicle, path.class_name, round(score, 4)
-    stay = None if stay is None else round(stay, 3)
-    return Event(time, frame, name, crossing.direction, *known, stay)
+    row = crossing.row
+    return Event(
+        time=round(crossing.time, 3),
+        frame=int(path.frames[row]),
+        name=name,
+        direction=crossing.direction,
+        id=path.track_at(row),
+        vehicle=path.vehicle,
+        class_name=path.class_name,
+        score=round(float(path.scores[row]), 4),
+        seconds=None if crossing.seconds is None else round(crossing.seconds, 3),
+    )
 
 
-def _line_warnings(lines: Sequence[PlacedLine], passages: Sequence[_Passage]) -> Iterator[str]:
+def _line_warnings(lines: Sequence[Line], passages: Sequence[_Passage]) -> Iterator[str]:
     """Yield a sentence for each problem of a line that the tracks of a run show."""
     for line in lines if passages else ():
-        found = [heights for passage in passages if (heights := passage.heights[line.name])]
-        few = _FEW_WRONG * len(found)
+        crossed = [heights for passage in passages if (heights := passage.heights[line.name])]
+        tolerated = _FEW_WRONG * len(crossed)
         missed = sum(line.name in passage.missed for passage in passages)
-        again = sum(len(heights) > 1 for heights in found)
-        if not found:
+        repeated = sum(len(heights) > 1 for heights in crossed)
+        if not crossed:
             yield f"{line.name}: no path crosses this line; move it"
-        if missed > few:
+        if missed > tolerated:
             yield (
                 f"{line.name}: tracks that begin or end at this line and are not counted: "
                 f"{missed}; move it to where vehicles are tracked longer"
             )
-        if again > few:
+        if repeated > tolerated:
             yield (
-                f"{line.name}: paths that cross this line more than once: {again}; place it across "
-                "the road"
+                f"{line.name}: paths that cross this line more than once: {repeated}; place it "
+                "across the road"
             )
-        if found and line.length < median(height for heights in found for height in heights):
+        if crossed and line.length < median(height for heights in crossed for height in heights):
             yield f"{line.name}: this line is shorter than a vehicle; make it longer"

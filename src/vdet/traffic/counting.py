@@ -14,7 +14,7 @@ from vdet.progress import Advance
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Clock, Span, find_clock
 from vdet.traffic.counter import VehicleCounter
-from vdet.traffic.counts import Counts
+from vdet.traffic.counts import Counts, Event
 from vdet.traffic.speeds import SpeedMeter, with_speeds
 
 _SEAM = 2.0
@@ -66,11 +66,11 @@ def count_files(
         if not saved.has_times:
             raise TruthError(f"{path}: has no times; pass the frame rate, as in --rate 25")
         clock = find_clock(path, settings, None, saved.times.get(0, 0.0), saved.begin)
-        place = _size(settings, size or saved.size)
+        frame_size = _frame_size(settings, size or saved.size)
         first = min(saved.times.values(), default=None)
-        if group is None or not group.precedes(place, clock, first):
+        if group is None or not group.precedes(frame_size, clock, first):
             counted |= group.counts() if group else {}
-            group = _Group(settings, place, group.counter.linker.started if group else 0)
+            group = _Group(settings, frame_size, group.counter.linker.started if group else 0)
         group.add(str(path), clock, first or 0.0, saved)
         advance(1)
     return counted | (group.counts() if group else {})
@@ -80,12 +80,12 @@ def count_frames(
     frames: Iterable[FrameTracks], settings: Settings, size: tuple[int, int] | None = None
 ) -> Counts:
     """Count the vehicles in the tracks of each frame; arguments and errors as for `count_files`."""
-    group = _Group(settings, _size(settings, size))
+    group = _Group(settings, _frame_size(settings, size))
     group.add("", None, 0.0, frames)
     return group.counts()[""]
 
 
-def _size(settings: Settings, size: tuple[int, int] | None) -> tuple[int, int]:
+def _frame_size(settings: Settings, size: tuple[int, int] | None) -> tuple[int, int]:
     if not settings.traffic:
         raise ConfigError("no lines or zones to count at; add them to the settings")
     if size := size or settings.camera.size:
@@ -111,6 +111,10 @@ class _Video:
         """When it ends in the group, seconds."""
         return self.spans[-1][1] + self.shift
 
+    def unshifted(self, event: Event) -> Event:
+        """Return an event of the group at its time in this video."""
+        return replace(event, time=round(event.time - self.shift, 3))
+
 
 class _Group:
     """Videos that follow one another, with one counter."""
@@ -133,15 +137,10 @@ class _Group:
     def add(
         self, name: str, clock: Clock | None, first: float, frames: Iterable[FrameTracks]
     ) -> None:
-        """Count in the next video."""
-        shift = 0.0
+        """Count in the next video; `first` is the time of its first frame."""
+        shift = self._shift(clock, first)
         meter = SpeedMeter(self._ground, *self._size) if self._ground else None
         if self._videos:
-            begin, before = self._videos[0], self._videos[-1]
-            if clock and begin.clock:
-                shift = (clock.zero - begin.clock.zero).total_seconds()
-            if first + shift - before.end < _SEAM:
-                shift = before.end + _STEP - first
             self.counter.start_video()
         span_count, latest = len(self.counter.spans), -math.inf
         for frame in frames:
@@ -158,16 +157,33 @@ class _Group:
         spans = tuple((round(begin - shift, 6), round(end - shift, 6)) for begin, end in new)
         self._videos.append(_Video(name, clock, spans, shift, meter))
 
+    def _shift(self, clock: Clock | None, first: float) -> float:
+        """Return the seconds from the times of the next video to those of the group."""
+        if not self._videos:
+            return 0.0
+        shift, begin, end = 0.0, self._videos[0].clock, self._videos[-1].end
+        if clock and begin:
+            shift = (clock.zero - begin.zero).total_seconds()
+        return shift if first + shift - end >= _SEAM else end + _STEP - first
+
     def counts(self) -> dict[str, Counts]:
-        """Return the counts of each video, with its own times."""
-        whole = self.counter.counts()
-        times = [event.time for event in whole.events]
-        ends = [bisect_right(times, video.end) for video in self._videos[:-1]]
-        found: dict[str, Counts] = {}
-        for video, first, end in zip(self._videos, [0, *ends], [*ends, None], strict=True):
-            own, shift = whole.events[first:end], video.shift
-            events = tuple(replace(event, time=round(event.time - shift, 3)) for event in own)
-            counts = replace(whole, events=events, spans=video.spans, clock=video.clock)
-            found[video.name] = with_speeds(counts, video.meter)
-            whole = replace(whole, warnings=())  # reported once
-        return found
+        """Return the counts of each video, with times in that video."""
+        total = self.counter.counts()
+        times = [event.time for event in total.events]
+        counts: dict[str, Counts] = {}
+        first = 0
+        for video in self._videos:
+            is_last = video is self._videos[-1]
+            end = len(times) if is_last else bisect_right(times, video.end)
+            counts[video.name] = with_speeds(
+                replace(
+                    total,
+                    events=tuple(map(video.unshifted, total.events[first:end])),
+                    spans=video.spans,
+                    clock=video.clock,
+                    warnings=() if counts else total.warnings,  # reported once
+                ),
+                video.meter,
+            )
+            first = end
+        return counts

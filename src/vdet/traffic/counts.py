@@ -3,15 +3,15 @@
 Tables cover the whole video or intervals of it. Several videos have one table.
 """
 
-from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, fields
-from itertools import accumulate, pairwise
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, fields
+from itertools import accumulate, pairwise, product
 from typing import TYPE_CHECKING, TypeVar
 
 from vdet.detect.classes import UNKNOWN
 from vdet.errors import ConfigError
-from vdet.traffic.clock import Clock, Intervals, Moment, Span
+from vdet.traffic.clock import Clock, ClockTime, Interval, Intervals, Span
 from vdet.traffic.crossings import APPEAR, ENTER
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ Direction = tuple[str, str]
 
 _IN = ENTER, APPEAR
 
-R = TypeVar("R")
+Key = TypeVar("Key")
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,8 +89,8 @@ class CountRow:
     The class is `UNKNOWN` if the detector has no classes, as in `FlowRow`.
     """
 
-    start: Moment
-    end: Moment
+    start: ClockTime
+    end: ClockTime
     name: str
     direction: str
     class_name: str
@@ -104,8 +104,8 @@ class FlowRow:
     The interval is that of the first event. `destination` is None for vehicles with one event only.
     """
 
-    start: Moment
-    end: Moment
+    start: ClockTime
+    end: ClockTime
     origin: str
     destination: str | None
     class_name: str
@@ -126,8 +126,8 @@ class ZoneRow:
         Of the vehicles that left or vanished, seconds; None if none did.
     """
 
-    start: Moment
-    end: Moment
+    start: ClockTime
+    end: ClockTime
     name: str
     entered: int
     left: int
@@ -183,7 +183,7 @@ class Counts:
         """Return `table` with a column for each field; needs the package pandas."""
         import pandas as pd
 
-        names = [field.name for field in fields(CountRow)]
+        names = [column.name for column in fields(CountRow)]
         return pd.DataFrame(self.table(interval), columns=names)
 
     def plot(self, interval: int | None = None, axes: "Axes | None" = None) -> "Axes":
@@ -214,10 +214,10 @@ class Counts:
             parts.setdefault(part, Counter())[bar] += row.count
         axes = axes or plt.gca()
         heights = Counter[str]()
-        for part, found in parts.items():
-            bottom = [heights[bar] for bar in found]
-            axes.bar(list(found), list(found.values()), bottom=bottom, label=part)
-            heights.update(found)
+        for part, bars in parts.items():
+            bottom = [heights[bar] for bar in bars]
+            axes.bar(list(bars), list(bars.values()), bottom=bottom, label=part)
+            heights.update(bars)
         axes.set_ylabel("vehicles")
         axes.yaxis.get_major_locator().set_params(integer=True)
         axes.legend()
@@ -226,12 +226,17 @@ class Counts:
 
 def direction_totals(videos: Sequence[Counts]) -> tuple[DirectionTotal, ...]:
     """Return the totals of each direction over all videos."""
-    classes = {key: Counter[str]() for video in videos for key in video.directions}
+    classes = {key: Counter[str]() for key in _directions(videos)}
     for event in (event for video in videos for event in video.events):
         classes[event.name, event.direction][event.class_name or ""] += 1
     return tuple(
-        DirectionTotal(*key, found.total(), {name: found[name] for name in sorted(found) if name})
-        for key, found in classes.items()
+        DirectionTotal(
+            name=name,
+            direction=direction,
+            count=counts.total(),
+            classes={kind: counts[kind] for kind in sorted(counts) if kind},
+        )
+        for (name, direction), counts in classes.items()
     )
 
 
@@ -249,13 +254,15 @@ def count_table(videos: Sequence[Counts], interval: int | None = None) -> list[C
         `interval` is set, and one of several videos has no clock.
     """
     intervals = _intervals(videos, interval)
-    found: _Found = Counter(
+    counts = Counter(
         (intervals.number(index, event.time), (event.name, event.direction), class_of(event))
         for index, video in enumerate(videos)
         for event in video.events
     )
-    directions = dict.fromkeys(key for video in videos for key in video.directions)
-    return _rows(CountRow, intervals, found, directions)
+    return [
+        CountRow(period.start, period.end, name, direction, kind, count)
+        for period, (name, direction), kind, count in _cells(intervals, counts, _directions(videos))
+    ]
 
 
 def flow_table(videos: Sequence[Counts], interval: int | None = None) -> list[FlowRow]:
@@ -265,14 +272,16 @@ def flow_table(videos: Sequence[Counts], interval: int | None = None) -> list[Fl
     Parameters and errors as for `count_table`.
     """
     intervals = _intervals(videos, interval)
-    found: _Found = Counter()
+    counts: Counter[tuple[int, tuple[str, str | None], str]] = Counter()
     for index, first, last in vehicle_flows(videos):
         flow = first.name, last.name if last else None
-        found[intervals.number(index, first.time), flow, class_of(first)] += 1
-    names = dict.fromkeys(name for video in videos for name, _ in video.directions)
-    order = {name: number for number, name in enumerate((*names, None))}
-    flows = sorted({flow for _, flow, _ in found}, key=lambda flow: [order[name] for name in flow])
-    return _rows(FlowRow, intervals, found, flows)
+        counts[intervals.number(index, first.time), flow, class_of(first)] += 1
+    names: list[str | None] = [*dict.fromkeys(name for name, _ in _directions(videos)), None]
+    flows = sorted({flow for _, flow, _ in counts}, key=lambda flow: list(map(names.index, flow)))
+    return [
+        FlowRow(period.start, period.end, origin, destination, kind, count)
+        for period, (origin, destination), kind, count in _cells(intervals, counts, flows)
+    ]
 
 
 def vehicle_flows(videos: Sequence[Counts]) -> Iterator[tuple[int, Event, Event | None]]:
@@ -285,8 +294,8 @@ def vehicle_flows(videos: Sequence[Counts]) -> Iterator[tuple[int, Event, Event 
         for event in video.events:
             if event.name not in video.zones or event.direction in _IN:
                 trips.setdefault(event.vehicle, []).append((index, event))
-    for (index, first), *others in trips.values():
-        yield index, first, others[-1][1] if others else None
+    for (index, first), *later in trips.values():
+        yield index, first, later[-1][1] if later else None
 
 
 def zone_table(videos: Sequence[Counts], interval: int | None = None) -> list[ZoneRow]:
@@ -294,44 +303,62 @@ def zone_table(videos: Sequence[Counts], interval: int | None = None) -> list[Zo
     intervals = _intervals(videos, interval)
     rows = []
     for name in dict.fromkeys(name for video in videos for name in video.zones):
-        visits: dict[int, list[_Visit]] = {number: [] for number in intervals.numbers}
+        changes: defaultdict[int, list[_Change]] = defaultdict(list)
         for index, video in enumerate(videos):
             for event in (event for event in video.events if event.name == name):
                 time = intervals.seconds(index, event.time)
-                visit = time, 1 if event.direction in _IN else -1, event.seconds
-                visits[intervals.number_at(time)].append(visit)
+                change = _Change(time, 1 if event.direction in _IN else -1, event.seconds)
+                changes[intervals.number_at(time)].append(change)
         inside = 0
-        for number, changes in visits.items():
-            rows.append(_zone_row(name, intervals, number, changes, inside))
-            inside += sum(change for _, change, _ in changes)
+        for period in intervals.periods:
+            covered = intervals.covered(period)
+            rows.append(_zone_row(name, period, covered, sorted(changes[period.number]), inside))
+            inside += sum(change.vehicles for change in changes[period.number])
     return rows
 
 
-_Visit = tuple[float, int, float | None]
-"""When a vehicle enters (1) or leaves (-1) a zone, and if it leaves, how long it was inside."""
+@dataclass(frozen=True, slots=True, order=True)
+class _Change:
+    """A vehicle enters (1) or leaves (-1) a zone; `stay` is how long it was inside, if it leaves.
+
+    At the same time, leaving comes first.
+    """
+
+    time: float
+    vehicles: int
+    stay: float | None = field(compare=False)
 
 
 def _zone_row(
-    name: str, intervals: Intervals, number: int, visits: Sequence[_Visit], inside: int
+    name: str, period: Interval, covered: float, changes: Sequence[_Change], inside: int
 ) -> ZoneRow:
-    """Return the use in one interval, given the number of vehicles inside at its start."""
-    begin, end = intervals.limits(number)
-    visits = sorted(visits, key=lambda visit: visit[:2])  # at the same time, leaving comes first
-    levels = list(accumulate((change for _, change, _ in visits), initial=inside))
-    times = [begin, *(time for time, _, _ in visits), end]
+    """Return the use in one interval.
+
+    It has `covered` seconds of video, and `inside` vehicles at its start.
+    """
+    levels = list(accumulate((change.vehicles for change in changes), initial=inside))
+    times = [period.first, *(change.time for change in changes), period.last]
     used = sum(n * (b - a) for n, (a, b) in zip(levels, pairwise(times), strict=True))
-    covered = intervals.covered(number)  # 0 if the interval has only one frame
-    stays = [stay for _, _, stay in visits if stay is not None]
-    changes = sum(change > 0 for _, change, _ in visits), sum(change < 0 for _, change, _ in visits)
-    mean = round(used / covered, 3) if covered else float(inside)
-    stay = round(sum(stays) / len(stays), 3) if stays else None
-    use = name, *changes, mean, max(levels), stay, max(stays, default=None)
-    start, until = intervals.moments(number)
-    return ZoneRow(start, until, *use)
+    stays = [change.stay for change in changes if change.stay is not None]
+    return ZoneRow(
+        start=period.start,
+        end=period.end,
+        name=name,
+        entered=sum(change.vehicles > 0 for change in changes),
+        left=sum(change.vehicles < 0 for change in changes),
+        mean=round(used / covered, 3) if covered else float(inside),  # 0: it has only one frame
+        max=max(levels),
+        mean_stay=round(sum(stays) / len(stays), 3) if stays else None,
+        max_stay=max(stays, default=None),
+    )
 
 
 def _intervals(videos: Sequence[Counts], interval: int | None) -> Intervals:
     return Intervals([(video.clock, video.spans) for video in videos], interval)
+
+
+def _directions(videos: Sequence[Counts]) -> list[Direction]:
+    return list(dict.fromkeys(direction for video in videos for direction in video.directions))
 
 
 def class_of(event: Event) -> str:
@@ -339,21 +366,13 @@ def class_of(event: Event) -> str:
     return event.class_name or UNKNOWN
 
 
-_Found = Counter[tuple[int, tuple[str, str | None], str]]
-"""Number of vehicles by number of the interval, direction or flow, and class."""
+def _cells(
+    intervals: Intervals, counts: Counter[tuple[int, Key, str]], keys: Iterable[Key]
+) -> Iterator[tuple[Interval, Key, str, int]]:
+    """Yield the count of each interval, direction or flow, and class that occurs, even if it is 0.
 
-
-def _rows(
-    make: Callable[..., R],
-    intervals: Intervals,
-    found: _Found,
-    pairs: Iterable[tuple[str, str | None]],
-) -> list[R]:
-    """Return a row for each interval, direction and class that occurs, even if its count is 0."""
-    classes = sorted({name for _, _, name in found}) or [UNKNOWN]
-    keys = [(pair, name) for pair in pairs for name in classes]
-    return [
-        make(*intervals.moments(number), *pair, name, found[number, pair, name])
-        for number in intervals.numbers
-        for pair, name in keys
-    ]
+    The keys of `counts` are the number of the interval, the direction or flow, and the class.
+    """
+    classes = sorted({kind for _, _, kind in counts}) or [UNKNOWN]
+    for period, key, kind in product(intervals.periods, keys, classes):
+        yield period, key, kind, counts[period.number, key, kind]

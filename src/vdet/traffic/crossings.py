@@ -1,4 +1,4 @@
-"""Lines and zones placed in frames, and the crossings of a whole path.
+"""Lines and zones in pixels of the frames, and the crossings of a whole path.
 
 `vdet.traffic` explains the rule.
 """
@@ -6,6 +6,7 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from enum import Enum, auto
 from itertools import pairwise
 
 import numpy as np
@@ -36,7 +37,7 @@ _Size = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
-class PlacedLine:
+class Line:
     """A line; its positive side is the left, seen from `start` towards `end`.
 
     `directions` are the names of left and right. `start` and `end` as drawn, and `size`, width and
@@ -56,7 +57,7 @@ class PlacedLine:
 
     @property
     def reach(self) -> Segment:
-        """The line, extended where it ends at the edge of the frame: feet may be beyond it."""
+        """The line, extended where it ends at the edge of the frame: vehicles stand beyond it."""
         (ax, ay), (bx, by) = self.start, self.end
         factor = sum(self.size) / self.length
         dx, dy = factor * (bx - ax), factor * (by - ay)
@@ -123,21 +124,19 @@ class Zone:
         return np.clip(points, _INSIDE, np.array(self.size) - _INSIDE)
 
 
-Border = PlacedLine | Zone
+Border = Line | Zone
 """Its first direction leads to its positive side, its second to its negative side."""
 
 
 def distances_to(segments: Sequence[Segment], points: Float64Array) -> Float64Array:
     """Return how far points `(n, 2)` are from the nearest points of segments `(m)`, `(n, m)`."""
     starts, ends = np.array(segments).swapaxes(0, 1)
-    vectors, there = ends - starts, points[:, np.newaxis] - starts
-    fractions = np.clip((there * vectors).sum(axis=2) / (vectors**2).sum(axis=1), 0, 1)
-    return np.asarray(np.hypot(*np.moveaxis(there - fractions[..., np.newaxis] * vectors, 2, 0)))
+    vectors, offsets = ends - starts, points[:, np.newaxis] - starts
+    fractions = np.clip((offsets * vectors).sum(axis=2) / (vectors**2).sum(axis=1), 0, 1)
+    return np.asarray(np.hypot(*np.moveaxis(offsets - fractions[..., np.newaxis] * vectors, 2, 0)))
 
 
-def lines_near(
-    lines: Sequence[PlacedLine], points: Float64Array, reach: Float64Array
-) -> Iterator[PlacedLine]:
+def lines_near(lines: Sequence[Line], points: Float64Array, reach: Float64Array) -> Iterator[Line]:
     """Yield the lines that have one of the points `(n, 2)` within its reach, `(n,)`."""
     if lines:
         distances = distances_to([(line.start, line.end) for line in lines], points)
@@ -157,29 +156,31 @@ def _are_inside(corners: Sequence[Point], points: Float64Array) -> BoolArray:
     return np.asarray(met.sum(axis=1) % 2 == 1)
 
 
-def place(
+def lines_and_zones(
     settings: TrafficSettings, width: int, height: int
-) -> tuple[tuple[PlacedLine, ...], tuple[Zone, ...]]:
-    """Place lines and zones in frames of `width` × `height` pixels."""
+) -> tuple[tuple[Line, ...], tuple[Zone, ...]]:
+    """Return the lines and zones in frames of `width` × `height` pixels."""
     size = width, height
 
-    def placed(point: Point) -> Point:
+    def in_frame(point: Point) -> Point:
         return _snapped(point[0] * width, width), _snapped(point[1] * height, height)
 
     lines = tuple(
-        PlacedLine(line.name, (line.left, line.right), placed(line.start), placed(line.end), size)
+        Line(line.name, (line.left, line.right), in_frame(line.start), in_frame(line.end), size)
         for line in settings.lines
     )
-    zones = tuple(Zone(zone.name, tuple(map(placed, zone.points)), size) for zone in settings.zones)
+    zones = tuple(
+        Zone(zone.name, tuple(map(in_frame, zone.points)), size) for zone in settings.zones
+    )
     return lines, zones
 
 
 def _snapped(value: float, length: float) -> float:
     """Return a coordinate, moved onto the edge of the frame if it is very near to it."""
-    near = max(min(1.0, _MAX_AT_EDGE * length), _AT_EDGE * length)
-    if value <= near:
+    reach = max(min(1.0, _MAX_AT_EDGE * length), _AT_EDGE * length)
+    if value <= reach:
         return 0.0
-    return float(length) if length - value <= near else value
+    return float(length) if length - value <= reach else value
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,75 +207,121 @@ class Crossing:
 
 def crossings(path: VehiclePath, border: Border) -> list[Crossing]:
     """Return the crossings of a border by a vehicle, in order; a pure function."""
-    found = list(_changes(path, border))
-    if not isinstance(border, Zone) or not found:
-        return found
-    visits = found[:1]
-    for before, item in pairwise(found):
-        stay = item.time - before.time if item.direction == EXIT else None
-        visits.append(replace(item, seconds=stay))
-    last = path.seen - 1
-    if found[-1].direction != EXIT:
-        end = max(float(path.times[last]), found[-1].time)  # it may enter in extrapolated rows
-        visits.append(Crossing(end, last, VANISH, end - found[-1].time))
+    changes = list(_changes(path, border))
+    if not isinstance(border, Zone) or not changes:
+        return changes
+    visits = changes[:1]
+    for entry, change in pairwise(changes):
+        stay = change.time - entry.time if change.direction == EXIT else None
+        visits.append(replace(change, seconds=stay))
+    entry, last = changes[-1], path.seen - 1
+    if entry.direction != EXIT:
+        end = max(float(path.times[last]), entry.time)  # it may enter in extrapolated rows
+        visits.append(Crossing(end, last, VANISH, end - entry.time))
     return visits
+
+
+class _Side(Enum):
+    """The side of a border on which a vehicle is."""
+
+    UNSETTLED = auto()
+    POSITIVE = auto()
+    NEGATIVE = auto()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Run:
+    """Consecutive rows of a path on one side of a border, from row `start`.
+
+    `height` is the minimum height of the box, pixels, of the rows in which the vehicle settles;
+    `is_clear` says whether it is clearly on this side in one of them.
+    """
+
+    start: int
+    side: _Side
+    height: float
+    is_clear: bool
 
 
 def _changes(path: VehiclePath, border: Border) -> Iterator[Crossing]:
     """Yield the changes of the settled side, and the start of a path inside a zone."""
+    settled = _Side.UNSETTLED
+    latest: _BorderPoint | None = None  # the latest crossing, unless it was beyond the line's ends
+    for run in _runs(path, border):
+        if run.side is settled:
+            continue
+        if settled is _Side.UNSETTLED:
+            settled = run.side
+            if settled is _Side.POSITIVE and isinstance(border, Zone):
+                yield Crossing(float(path.times[0]), 0, APPEAR)
+            continue
+        point = _border_point(path, border, run.start)
+        distance = math.dist(latest.position, point.position) if latest else math.inf
+        if not run.is_clear and run.height > distance:
+            continue  # it is still near the latest crossing
+        settled, latest = run.side, point if point.is_on_border else None
+        if latest:
+            direction = border.directions[0 if settled is _Side.POSITIVE else 1]
+            yield Crossing(latest.time, latest.row, direction)
+
+
+def _runs(path: VehiclePath, border: Border) -> Iterator[_Run]:
+    """Yield the runs in which the vehicle settles; none if it stays on one side, except inside."""
     distances = border.distances(path.points)
-    side = distances >= 0
-    turns = (np.flatnonzero(side[1:] != side[:-1]) + 1).tolist()
-    if not turns and not (side[0] and isinstance(border, Zone)):
+    is_positive = distances >= 0
+    turns = (np.flatnonzero(is_positive[1:] != is_positive[:-1]) + 1).tolist()
+    if not turns and not (is_positive[0] and isinstance(border, Zone)):
         return  # as for most paths
     settles, is_clear = _settling(path, border, distances)
-    settled: bool | None = None  # the side
-    crossed: Point | None = None  # where it crossed last
-    for row, end in pairwise([0, *turns, len(side)]):
-        is_positive, rows = bool(side[row]), row + np.flatnonzero(settles[row:end])
-        if not len(rows) or settled == is_positive:
-            continue
-        if settled is not None:
-            fraction, time, place = _meeting(path, border, row)
-            distance = math.inf if crossed is None else math.dist(crossed, place)
-            if not (is_clear[rows] | (path.heights[rows] <= distance)).any():
-                continue  # it is not far enough from there
-            crossed = None if fraction is None else place
-            if fraction is not None:
-                at = row if fraction else row - 1
-                yield Crossing(time, at, border.directions[1 - is_positive])
-        elif is_positive and isinstance(border, Zone):
-            yield Crossing(float(path.times[0]), 0, APPEAR)
-        settled = is_positive
+    for start, end in pairwise([0, *turns, len(is_positive)]):
+        rows = start + np.flatnonzero(settles[start:end])
+        if len(rows):
+            side = _Side.POSITIVE if is_positive[start] else _Side.NEGATIVE
+            yield _Run(start, side, float(path.heights[rows].min()), bool(is_clear[rows].any()))
 
 
 def _settling(
     path: VehiclePath, border: Border, distances: Float64Array
 ) -> tuple[BoolArray, BoolArray]:
-    """Return the rows that settle a side, and those in which the side is clear.
+    """Return the rows in which a vehicle settles on its side, and those in which that is clear.
 
-    It is clear if this row or the previous one is one box height away from the border.
+    It is clear if this row or the previous one is one box height away from the border. Otherwise
+    the vehicle settles after some time outside the band.
     """
-    side, away, times = distances >= 0, np.abs(distances), path.times
-    is_off = away > np.maximum(_BAND * path.heights, _MIN_BAND * border.size[1])
-    is_far = is_off & (away >= path.heights)
-    is_same = side[1:] == side[:-1]
-    was_far = np.append(False, is_far[:-1] & is_same)
-    begins = np.append(True, ~(is_off[1:] & is_off[:-1] & is_same))
+    is_positive, away, times = distances >= 0, np.abs(distances), path.times
+    is_outside = away > np.maximum(_BAND * path.heights, _MIN_BAND * border.size[1])
+    is_far = is_outside & (away >= path.heights)
+    stays = is_positive[1:] == is_positive[:-1]
+    was_far = np.append(False, is_far[:-1] & stays)
+    begins = np.append(True, ~(is_outside[1:] & is_outside[:-1] & stays))
     since = times[np.maximum.accumulate(np.where(begins, np.arange(len(times)), 0))]
-    settles = was_far | (is_off & (np.round(times - since, DURATION_DIGITS) >= _SETTLED))
+    settles = was_far | (is_outside & (np.round(times - since, DURATION_DIGITS) >= _SETTLED))
     settles[-1] |= is_far[-1]
     return settles, is_far | was_far
 
 
-def _meeting(path: VehiclePath, border: Border, row: int) -> tuple[float | None, float, Point]:
-    """Return where a path meets a border between a row and the previous one.
+@dataclass(frozen=True, slots=True)
+class _BorderPoint:
+    """Where a path passes a border: time in seconds, first row at or after it, and position.
 
-    Returns the fraction of the distance, None if they do not meet, and the time and position.
+    `is_on_border` says whether it meets the line between its ends.
     """
+
+    time: float
+    row: int
+    position: Point
+    is_on_border: bool
+
+
+def _border_point(path: VehiclePath, border: Border, row: int) -> _BorderPoint:
+    """Return where a path passes a border between the previous row and this one."""
     (ax, ay), (bx, by) = path.points[row - 1 : row + 1].tolist()
     before, after = path.times[row - 1 : row + 1].tolist()
     fraction = border.meeting(((ax, ay), (bx, by)))
     along = 1.0 if fraction is None else fraction
-    place = ax + along * (bx - ax), ay + along * (by - ay)
-    return fraction, before + along * (after - before), place
+    return _BorderPoint(
+        time=before + along * (after - before),
+        row=row if along else row - 1,
+        position=(ax + along * (bx - ax), ay + along * (by - ay)),
+        is_on_border=fraction is not None,
+    )

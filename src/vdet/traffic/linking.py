@@ -4,12 +4,12 @@ import math
 from array import array
 from collections.abc import Container, Iterable
 from dataclasses import dataclass, field
-from operator import itemgetter
 from struct import Struct
 
 import numpy as np
 
 from vdet.boxes import Box, Float64Array
+from vdet.polygons import Point
 from vdet.track.track import FrameTracks, Track
 
 MAX_GAP = 1.0
@@ -44,13 +44,10 @@ _PARKED_ROWS, _PARKED_EXTENT = 250, 0.05
 parked vehicles need no memory.
 """
 _COLUMNS = 10
-"""Numbers stored for a frame: time, x and y of the foot, x1 and y1 of the box, score, number of the
-frame, id of the track, x2 and y2 of the box.
+"""Numbers stored for a frame: time, x and y of the ground point, x1 and y1 of the box, score,
+number of the frame, id of the track, x2 and y2 of the box.
 """
 _ROW = Struct(f"{_COLUMNS}d")
-
-_Lost = tuple[int, float, float, float]
-"""Key of a lost vehicle, x and y of its last or expected foot, and height of its box, pixels."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,7 +67,7 @@ class VehiclePath:
     times
         float64 `(n,)`, as are the other columns; seconds.
     points
-        Feet, pixels, `(n, 2)`.
+        Ground points, pixels, `(n, 2)`.
     heights
         Heights of its box, pixels.
     scores, frames
@@ -115,6 +112,18 @@ def link_tracks(frames: Iterable[FrameTracks], width: int, height: int) -> list[
     linker = TrackLinker(width, height)
     ended = [path for frame in frames for path in linker.add(frame)]
     return [*ended, *linker.open_paths()]
+
+
+@dataclass(frozen=True, slots=True)
+class _Lost:
+    """The last or expected ground point of a lost vehicle, and the height of its box, pixels.
+
+    `key` is its key in `TrackLinker`.
+    """
+
+    key: int
+    point: Point
+    height: float
 
 
 class TrackLinker:
@@ -170,23 +179,25 @@ class TrackLinker:
             is_old = self._now - vehicle.last_seen > MAX_GAP
             if key in shown or is_old or vehicle.is_leaving(width, height):
                 continue
-            last, expected = vehicle.extrapolated(self._now)[:, [1, 2, 4]].tolist()
-            if 0 <= expected[0] <= width and 0 <= expected[1] <= height:
-                lost += [(key, *last), (key, *expected)]
+            points = [(x, y) for x, y in vehicle.extrapolated(self._now)[:, 1:3].tolist()]
+            x, y = points[-1]
+            if 0 <= x <= width and 0 <= y <= height:
+                lost += [_Lost(key, point, vehicle.box.xywh[3]) for point in points]
         return lost
 
     def _begin(self, track: Track, lost: Iterable[_Lost]) -> "_Vehicle":
         """Return the nearest lost vehicle that the track continues, or a new one."""
-        foot, height = track.written_foot, track.box.xywh[3]
-        near = [
-            (distance, key)
-            for key, x, y, other in lost
-            if key in self._vehicles  # no other track continues it
-            and max(height, other) <= _MAX_GROWTH * min(height, other)
-            and (distance := math.dist(foot, (x, y))) <= _MAX_DISTANCE * max(height, other)
+        point, height = track.written_foot, track.box.xywh[3]
+        candidates = [
+            vehicle
+            for vehicle in lost
+            if vehicle.key in self._vehicles  # no other track continues it
+            and max(height, vehicle.height) <= _MAX_GROWTH * min(height, vehicle.height)
+            and math.dist(point, vehicle.point) <= _MAX_DISTANCE * max(height, vehicle.height)
         ]
-        if near:
-            vehicle = self._vehicles.pop(min(near, key=itemgetter(0))[1])
+        if candidates:
+            nearest = min(candidates, key=lambda vehicle: math.dist(point, vehicle.point))
+            vehicle = self._vehicles.pop(nearest.key)
         else:
             self.started += 1
             vehicle = _Vehicle(self.started, track.box, self._now)
@@ -230,8 +241,7 @@ class _Vehicle:
             self.returned = len(self.rows)
         self.box = box = track.box
         self.last_seen, (x, y) = time, track.foot
-        known = track.score, frame, track.id
-        row = _ROW.pack(time, x, y, box.x1, box.y1, *known, box.x2, box.y2)
+        row = _ROW.pack(time, x, y, box.x1, box.y1, track.score, frame, track.id, box.x2, box.y2)
         self.rows.frombytes(row)  # three times faster than `extend`
         if len(self.rows) % (_PARKED_ROWS * _COLUMNS) == 0 and self.returned is None:
             latest = _table(self.rows[-_PARKED_ROWS * _COLUMNS :])
@@ -245,9 +255,9 @@ class _Vehicle:
             return False
         before = _velocity(self.rows[: self.returned])
         first, *_, last = _table(self.rows[self.returned :])
-        way, speed, height = complex(*(last - first)[1:3]), abs(before), last[4]
-        onward = (way * before.conjugate()).real / max(speed, 1e-9)
-        backward = max(_TURN_HEIGHTS * height, _TURN_FRACTION * abs(way))
+        moved, speed, height = complex(*(last - first)[1:3]), abs(before), last[4]
+        onward = (moved * before.conjugate()).real / max(speed, 1e-9)
+        backward = max(_TURN_HEIGHTS * height, _TURN_FRACTION * abs(moved))
         has_turned = bool(speed > _LEAVING_SPEED * height and onward < -backward)
         if not has_turned:
             self.returned = None
@@ -281,15 +291,24 @@ class _Vehicle:
         seen, last = len(rows), rows[-1]
         if now - last[0] > MAX_GAP and math.dist(last[1:3], rows[0, 1:3]) > last[4]:
             rows = np.concatenate([rows, self.extrapolated(*np.add(last[0], _EXTRAPOLATED))[1:]])
-        times, points, (heights, scores, frames, ids) = rows[:, 0], rows[:, 1:3], rows[:, 4:].T
+        heights, scores, frames, ids = rows[:, 4:].T
         largest = max(reversed(self.classes), key=lambda key: heights[ids == key].max(initial=0))
-        known = self.number, self.classes[largest], tuple(self.tracks), seen
-        size = max(self.size, _max_size(rows))
-        return VehiclePath(*known, times, points, heights, scores, frames, size)
+        return VehiclePath(
+            vehicle=self.number,
+            class_name=self.classes[largest],
+            tracks=tuple(self.tracks),
+            seen=seen,
+            times=rows[:, 0],
+            points=rows[:, 1:3],
+            heights=heights,
+            scores=scores,
+            frames=frames,
+            size=max(self.size, _max_size(rows)),
+        )
 
 
 def _table(rows: "array[float]") -> Float64Array:
-    """Return times, feet, widths and heights of boxes, scores, frames and ids: `(n, 8)`.
+    """Return times, ground points, widths and heights of boxes, scores, frames and ids: `(n, 8)`.
 
     They are rounded as in files of tracks, so that counts of saved tracks are the same.
     """

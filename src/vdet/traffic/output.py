@@ -13,7 +13,7 @@ from typing import Any
 
 from vdet.traffic import counts as tables
 from vdet.traffic.counts import CountRow, Counts, Event, FlowRow, ZoneRow
-from vdet.traffic.tables import VIDEO, is_json, join_tables, plain_moment, write_content
+from vdet.traffic.tables import VIDEO, is_json, join_tables, plain_time, write_content
 
 _HEADINGS = {"class_name": "class", "origin": "from", "destination": "to"}
 
@@ -64,9 +64,10 @@ def counts_content(path: Path, videos: Videos, interval: int | None = None) -> A
         return wide_table(tables.count_table(every, interval), ": ")
     if _is_table(path, ".zones"):
         return [_ZONES, *map(_cells, tables.zone_table(every, interval))]
-    alone = len(videos) == 1  # then the name is left out
-    rows = [(name, *_event(video, e)) for name, video in videos.items() for e in video.events]
-    return [(VIDEO, *_EVENTS)[alone:], *(row[alone:] for row in rows)]
+    events = {name: [_event(video, e) for e in video.events] for name, video in videos.items()}
+    if len(videos) == 1:
+        return [_EVENTS, *(row for rows in events.values() for row in rows)]
+    return [(VIDEO, *_EVENTS), *([name, *row] for name, rows in events.items() for row in rows)]
 
 
 def flows_content(path: Path, videos: Videos, interval: int | None = None) -> Any:
@@ -92,30 +93,30 @@ def wide_table(rows: Sequence[CountRow | FlowRow], between: str) -> list[Sequenc
 
     `between` is the text between the two names of a pair.
     """
-    found: Counter[tuple[Any, ...]] = Counter()
+    sums: Counter[tuple[Any, ...]] = Counter()
     cells = [_cells(row) for row in rows]
     for start, end, *pair, name, count in cells:
         for interval in ((start, end), (ALL, "")):
             for column in ((*pair, name), (*pair, ALL), (ALL,)):
-                found[*interval, *column] += count
+                sums[*interval, *column] += count
     intervals = dict.fromkeys(tuple(row[:2]) for row in cells)
     classes = dict.fromkeys(row[4] for row in cells)
     pairs = dict.fromkeys(tuple(row[2:4]) for row in cells)
     columns = [*((*pair, name) for pair in pairs for name in (*classes, ALL)), (ALL,)]
     heading = (*(f"{between.join(pair)}, {name}" for *pair, name in columns[:-1]), ALL)
     times = (*intervals, (ALL, ""))
-    body = ((*time, *(found[*time, *column] for column in columns)) for time in times)
+    body = ((*time, *(sums[*time, *column] for column in columns)) for time in times)
     return [("start", "end", *heading), *body]
 
 
 def flow_matrix(videos: Sequence[Counts]) -> dict[str, dict[str, int]]:
     """Return the number of vehicles by origin and destination, which may be `NOWHERE`."""
-    found = Counter(
+    flows = Counter(
         (first.name, last.name if last else NOWHERE)
         for _, first, last in tables.vehicle_flows(videos)
     )
     names = dict.fromkeys(name for video in videos for name, _ in video.directions)
-    return {origin: {end: found[origin, end] for end in (*names, NOWHERE)} for origin in names}
+    return {origin: {end: flows[origin, end] for end in (*names, NOWHERE)} for origin in names}
 
 
 def _join(table: str, videos: Mapping[str, Any], path: Path) -> None:
@@ -127,11 +128,12 @@ def _join(table: str, videos: Mapping[str, Any], path: Path) -> None:
     if not is_json(path):
         write_content(path, join_tables(videos, missing=0))
         return
-    found: Counter[tuple[tuple[str, Any], ...]] = Counter()
+    sums: Counter[tuple[tuple[str, Any], ...]] = Counter()
     for row in (row for video in videos.values() for row in video[table]):
-        found[tuple(row.items())[2:-1]] += row["count"]
-    sums = [dict(key) | {"count": count} for key, count in found.items()]
-    write_content(path, {table: sums, "videos": videos})
+        names = tuple(row.items())[2:-1]  # without the interval and the count
+        sums[names] += row["count"]
+    rows = [dict(names) | {"count": count} for names, count in sums.items()]
+    write_content(path, {table: rows, "videos": videos})
 
 
 join_counts, join_flows = partial(_join, "totals"), partial(_join, "flows")
@@ -140,15 +142,15 @@ join_counts, join_flows = partial(_join, "totals"), partial(_join, "flows")
 def _json(
     videos: Videos, interval: int | None, tables: Mapping[str, Any], *, events: bool
 ) -> dict[str, Any]:
-    facts: dict[str, Any] = {}
+    by_video: dict[str, Any] = {}
     for name, video in videos.items():
-        begin = plain_moment(video.clock and video.clock.at(video.spans[0][0]))
-        facts[name] = {"begin": begin, "warnings": list(video.warnings)}
+        begin = plain_time(video.clock and video.clock.at(video.spans[0][0]))
+        by_video[name] = {"begin": begin, "warnings": list(video.warnings)}
         if events:
             rows = (_event(video, event) for event in video.events)
-            facts[name]["events"] = [dict(zip(_EVENTS, row, strict=True)) for row in rows]
-    alone = facts.popitem()[1] if len(facts) == 1 else {"videos": facts}
-    return {"interval": interval, **tables, **alone}
+            by_video[name]["events"] = [dict(zip(_EVENTS, row, strict=True)) for row in rows]
+    facts = by_video.popitem()[1] if len(videos) == 1 else {"videos": by_video}
+    return {"interval": interval, **tables, **facts}
 
 
 def _is_table(path: Path, kind: str) -> bool:
@@ -156,14 +158,14 @@ def _is_table(path: Path, kind: str) -> bool:
 
 
 def _event(video: Counts, event: Event) -> list[Any]:
-    time, *others = astuple(event)
-    return [time, plain_moment(video.clock and video.clock.at(time)), *others]
+    time, *values = astuple(event)
+    return [time, plain_time(video.clock and video.clock.at(time)), *values]
 
 
 def _items(columns: Sequence[str], rows: Iterable[Any]) -> list[dict[str, Any]]:
-    return [dict(zip(columns, map(plain_moment, astuple(row)), strict=True)) for row in rows]
+    return [dict(zip(columns, map(plain_time, astuple(row)), strict=True)) for row in rows]
 
 
 def _cells(row: Any) -> list[Any]:
-    cells = list(map(plain_moment, astuple(row)))
+    cells = list(map(plain_time, astuple(row)))
     return [NOWHERE if n == 3 and cell is None else cell for n, cell in enumerate(cells)]

@@ -22,7 +22,7 @@ _MIN_VEHICLES, _MIN_FRACTION = 5, 0.08
 """Minimum vehicles of a stream that gets a line: their number, and as a fraction of all."""
 _MAX_TRIED = 30
 """Maximum number of paths of a group along which lines are tried."""
-_PLACES = (0.5, 0.4, 0.6, 0.3, 0.7)
+_FRACTIONS = (0.5, 0.4, 0.6, 0.3, 0.7)
 """Where lines are tried along a path, as fractions of its length; the first ones are better."""
 _MIN_FROM_END = 0.12
 """Minimum distance of a line from both ends of a path, as a fraction of its length."""
@@ -37,7 +37,7 @@ _GROUP_DISTANCE = 1.25
 _MAX_OTHERS = 0.34
 """Maximum number of other vehicles that cross a line, as a fraction of its own."""
 _NEAR_BEST = 0.9
-"""Fraction of the maximum gain at which a better place along the path is preferred."""
+"""Fraction of the maximum gain at which a better position along the path is preferred."""
 _SPACING, _AROUND = 0.01, 4
 """Distance of the points of a path, as a fraction of the frame's width; number of points before and
 after a point from which its heading follows.
@@ -65,23 +65,23 @@ class ProposedLine:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Candidate:
-    """A line across a `heading`, and the indices of its own vehicles and of others that cross it.
+    """A line across a `heading`, the vehicles of its stream, and others that cross it (indices).
 
-    `place` is the index in `_PLACES` of its place on a path.
+    `rank` is the index in `_FRACTIONS` of its position on a path.
     """
 
     ends: Segment
     heading: Float64Array
-    place: int
-    own: Int64Array
+    rank: int
+    stream: Int64Array
     others: Int64Array
 
     def gain(self, uncounted: BoolArray) -> int:
-        """Return the number of `uncounted` vehicles of its own, minus all others; 0 if too few."""
-        own = int(uncounted[self.own].sum())
-        others = len(self.others) + len(self.own) - own
-        is_enough = own >= max(_MIN_VEHICLES, _MIN_FRACTION * len(uncounted))
-        return own - others if is_enough and others <= _MAX_OTHERS * own else 0
+        """Return the number of `uncounted` vehicles of its stream, minus all others; 0 if few."""
+        gained = int(uncounted[self.stream].sum())
+        others = len(self.others) + len(self.stream) - gained
+        is_enough = gained >= max(_MIN_VEHICLES, _MIN_FRACTION * len(uncounted))
+        return gained - others if is_enough and others <= _MAX_OTHERS * gained else 0
 
 
 def propose_lines(
@@ -108,13 +108,14 @@ def propose_lines(
     while gains := [(gain, item) for item in candidates if (gain := item.gain(uncounted))]:
         best = max(gain for gain, _ in gains)
         good = (item for gain, item in gains if gain >= _NEAR_BEST * best)
-        line = min(good, key=lambda item: item.place)
+        line = min(good, key=lambda item: item.rank)
         ahead, back = _directions(line.heading, facing)
         names[ahead] += 1
         name = f"{ahead} {names[ahead]}" if names[ahead] > 1 else ahead
-        vehicles = int(uncounted[line.own].sum())
-        lines.append(ProposedLine(name, *line.ends, ahead, back, vehicles))
-        uncounted[line.own] = False
+        vehicles = int(uncounted[line.stream].sum())
+        start, end = line.ends
+        lines.append(ProposedLine(name, start, end, left=ahead, right=back, vehicles=vehicles))
+        uncounted[line.stream] = False
         candidates = [item for item in candidates if meeting(item.ends, line.ends) is None]
     return tuple(lines)
 
@@ -128,6 +129,31 @@ def _directions(heading: Float64Array, facing: str | None) -> tuple[str, str]:
     return f"{_NAMES[ahead % 8]}bound", f"{_NAMES[(ahead + 4) % 8]}bound"
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Stream:
+    """The vehicles of a group that cross a line side by side.
+
+    `vehicles` are their indices, `low` and `high` the outermost positions along the line, and
+    `height` is the median height of their boxes, pixels.
+    """
+
+    vehicles: Int64Array
+    low: float
+    high: float
+    height: float
+
+    def limits(self, positions: Float64Array) -> tuple[float, float]:
+        """Return the ends of its line; it ends halfway to the next vehicle of another stream.
+
+        `positions` are those of all vehicles that cross the line.
+        """
+        margin = _MARGIN * self.height
+        before, after = positions[positions < self.low], positions[positions > self.high]
+        low = max([self.low - margin, *((self.low + before) / 2)])
+        high = min([self.high + margin, *((self.high + after) / 2)])
+        return low, high
+
+
 class _Streams:
     """The points of all paths: position, heading, vehicle, group, and fraction of the path."""
 
@@ -137,7 +163,7 @@ class _Streams:
         self._numbers = np.repeat(np.arange(len(paths)), [len(row) for row in rows])
         joined = np.concatenate(rows)
         self._points, self._headings = joined[:, :2], joined[:, 2:4]
-        self._heights, self._gone = joined[:, 4:].T
+        self._heights, self._fractions = joined[:, 4:].T
         self._groups = _groups(rows)[self._numbers]
 
     def candidates(self) -> Iterator[_Candidate]:
@@ -146,45 +172,54 @@ class _Streams:
             tried = np.linspace(0, len(members) - 1, min(len(members), _MAX_TRIED)).astype(int)
             for number in members[tried].tolist():
                 rows = np.flatnonzero(self._numbers == number)
-                for place, gone in enumerate(_PLACES):
-                    row = int(rows[np.searchsorted(self._gone[rows], gone)])
-                    if candidate := self._across(row, place):
+                for rank, fraction in enumerate(_FRACTIONS):
+                    row = int(rows[np.searchsorted(self._fractions[rows], fraction)])
+                    if candidate := self._across(row, rank):
                         yield candidate
 
-    def _across(self, row: int, place: int) -> _Candidate | None:
+    def _across(self, row: int, rank: int) -> _Candidate | None:
         """Return the line across a path at one of its points; None if it counts no vehicle."""
         base, heading, numbers = self._points[row], self._headings[row], self._numbers
         across = np.array([-heading[1], heading[0]])
-        ahead, aside = (self._points - base) @ heading, (self._points - base) @ across
-        at = np.flatnonzero(((ahead[:-1] < 0) != (ahead[1:] < 0)) & (numbers[:-1] == numbers[1:]))
-        at = at[np.argsort(aside[at])]
-        own = at[
-            (self._groups[at] == self._groups[row])
-            & (self._headings[at] @ heading >= _MIN_COSINE)
-            & (np.abs(self._gone[at] - 0.5) <= 0.5 - _MIN_FROM_END)
-        ]
-        if not len(own):
+        is_behind = (self._points - base) @ heading < 0
+        positions = (self._points - base) @ across
+        rows = np.flatnonzero((is_behind[:-1] != is_behind[1:]) & (numbers[:-1] == numbers[1:]))
+        rows = rows[np.argsort(positions[rows])]  # where a path crosses the infinite line
+        if (stream := self._stream(row, rows, positions[rows])) is None:
             return None
-        height = float(np.median(self._heights[own]))
-        parts = np.concatenate([[0], np.cumsum(np.diff(aside[own]) > _MAX_GAP * height)])
-        own = own[parts == parts[np.argmin(np.abs(aside[own]))]]
-        # The line ends halfway to the next vehicle of another stream.
-        (low, high), beside = aside[own[[0, -1]]].tolist(), aside[at]
-        low = max([low - _MARGIN * height, *((low + beside[beside < low]) / 2)])
-        high = min([high + _MARGIN * height, *((high + beside[beside > high]) / 2)])
+        low, high = stream.limits(positions[rows])
         ends = np.clip(np.rint([base + low * across, base + high * across]), 0, self._size)
         start, end = map(tuple, ends.tolist())
-        vehicles = np.unique(numbers[own])
-        others = np.setdiff1d(numbers[at[(beside >= low) & (beside <= high)]], vehicles)
-        return _Candidate((start, end), heading, place, vehicles, others) if start != end else None
+        if start == end:
+            return None
+        is_crossing = (positions[rows] >= low) & (positions[rows] <= high)
+        others = np.setdiff1d(numbers[rows[is_crossing]], stream.vehicles)
+        return _Candidate((start, end), heading, rank, stream.vehicles, others)
+
+    def _stream(self, row: int, rows: Int64Array, positions: Float64Array) -> _Stream | None:
+        """Return the stream of the path at `row`, of the `rows` of all that cross its line."""
+        is_member = (
+            (self._groups[rows] == self._groups[row])
+            & (self._headings[rows] @ self._headings[row] >= _MIN_COSINE)
+            & (np.abs(self._fractions[rows] - 0.5) <= 0.5 - _MIN_FROM_END)
+        )
+        if not is_member.any():
+            return None
+        members, offsets = rows[is_member], positions[is_member]
+        height = float(np.median(self._heights[members]))
+        parts = np.concatenate([[0], np.cumsum(np.diff(offsets) > _MAX_GAP * height)])
+        is_beside = parts == parts[np.argmin(np.abs(offsets))]
+        vehicles = np.unique(self._numbers[members[is_beside]])
+        low, high = offsets[is_beside][[0, -1]].tolist()
+        return _Stream(vehicles, low, high, height)
 
 
 def _spaced(path: VehiclePath, spacing: float) -> Float64Array:
     """Return points of a path: x, y, heading x and y, height, fraction of the length: `(n, 6)`."""
-    feet, heights = path.points[: path.seen], path.heights[: path.seen]
-    along = np.concatenate([[0], np.cumsum(np.hypot(*np.diff(feet, axis=0).T))])
+    points, heights = path.points[: path.seen], path.heights[: path.seen]
+    along = np.concatenate([[0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
     at = np.linspace(0, along[-1], max(9, math.ceil(along[-1] / spacing) + 1))
-    x, y, height = (np.interp(at, along, values) for values in (*feet.T, heights))
+    x, y, height = (np.interp(at, along, values) for values in (*points.T, heights))
     rows = np.arange(len(at))
     after, before = np.minimum(rows + _AROUND, rows[-1]), np.maximum(rows - _AROUND, 0)
     headings = np.array([x[after] - x[before], y[after] - y[before]])

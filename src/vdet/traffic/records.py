@@ -2,10 +2,10 @@
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 
@@ -16,23 +16,12 @@ from vdet.track.track import FrameTracks, State, Track
 from vdet.traffic.clock import Clock
 from vdet.traffic.linking import has_moved
 from vdet.traffic.speeds import KMH, SpeedMeter, Speeds
-from vdet.traffic.tables import VIDEO, is_json, join_tables, plain_moment, write_content
+from vdet.traffic.tables import VIDEO, is_json, join_tables, plain_time, write_content
 
 PATH_STEP = 0.01
 """Minimum distance between points of a path, as a fraction of the frame's width.
 
 Shorter movements are jitter of the boxes.
-"""
-
-_COLUMNS = (
-    *("id", "class", "clock", "first", "last", "seconds", "detected", "interpolated", "predicted"),
-    *("mean_score", "best_score"),
-    *("start_x", "start_y", "end_x", "end_y", "length", "length_fraction"),
-    *("x", "y", "width", "height"),
-    *("metres", "speed", "speed_85", "speed_sd", "motion", "distance", "lane"),
-)
-"""Columns of a `.csv`. `clock` is the clock time of `first`; x, y, width and height are the largest
-box; speeds are in km/h; `distance` is the minimum distance from the camera, metres.
 """
 
 _STANDING = 60.0
@@ -68,8 +57,8 @@ class VehicleRecord:
     class_name
         The class in its last frame: see `vdet.track.votes`.
     path
-        Feet (`Track.foot`): the first, one after each step of `PATH_STEP`, and the last. Predicted
-        ones are omitted, unless all are.
+        Ground points (`Track.foot`): the first, one after each step of `PATH_STEP`, and the last.
+        Predicted ones are omitted, unless all are.
     followed
         Spans in which it is shown and not predicted, seconds; if it always is, the whole span.
     speeds
@@ -135,11 +124,12 @@ class VehicleRecord:
             self.distance = min(track.distance, self.distance or track.distance)
         if track.lane is not None:
             self.lanes[track.lane] += 1
-        only_lost = self.states.total() == self.states["predicted"]
-        if track.state != "predicted" and only_lost:
+        is_predicted = track.state == "predicted"
+        was_seen = self.states.total() > self.states["predicted"]
+        if not is_predicted and not was_seen:
             self.path.clear()
             self.followed.clear()
-        if track.state != "predicted" or only_lost:
+        if not (is_predicted and was_seen):
             self._go_to(track.foot)
             continues = bool(self.followed) and self.followed[-1][1] == before
             first = self.followed.pop()[0] if continues else time
@@ -206,18 +196,53 @@ class VehicleRecords:
             return tuple(records)
         for record in records:
             record.judge()
-        ways = [point for record in records if record.has_driven for point in record.path]
+        driven = [point for record in records if record.has_driven for point in record.path]
         return tuple(
             record
             for record in records
             if record.has_driven
             or record.mean_score >= _MIN_STILL_SCORE
-            or any(map(record.largest.contains, ways))
+            or any(map(record.largest.contains, driven))
         )
 
     def _show(self) -> None:
         for track in self._latest.tracks if self._latest else ():
             self._vehicles[track.id].seconds += self._period
+
+
+_COLUMNS: dict[str, Callable[[VehicleRecord], Any]] = {
+    "id": lambda record: record.id,
+    "class": lambda record: record.class_name,
+    "clock": lambda _: None,  # filled in if the clock is known
+    "first": lambda record: round(record.first, 6),
+    "last": lambda record: round(record.last, 6),
+    "seconds": lambda record: round(record.seconds, 3),
+    "detected": lambda record: record.states["detected"],
+    "interpolated": lambda record: record.states["interpolated"],
+    "predicted": lambda record: record.states["predicted"],
+    "mean_score": lambda record: round(record.mean_score, 4),
+    "best_score": lambda record: round(record.best_score, 4),
+    "start_x": lambda record: round(record.path[0][0], 1),
+    "start_y": lambda record: round(record.path[0][1], 1),
+    "end_x": lambda record: round(record.path[-1][0], 1),
+    "end_y": lambda record: round(record.path[-1][1], 1),
+    "length": lambda record: round(record.length, 1),
+    "length_fraction": lambda record: round(record.length_fraction, 4),
+    "x": lambda record: record.largest.xywh[0],
+    "y": lambda record: record.largest.xywh[1],
+    "width": lambda record: record.largest.xywh[2],
+    "height": lambda record: record.largest.xywh[3],
+    "metres": lambda record: record.speeds and round(record.speeds.metres, 1),
+    "speed": lambda record: record.speeds and round(KMH * record.speeds.quantile(0.5), 1),
+    "speed_85": lambda record: record.speeds and round(KMH * record.speeds.quantile(0.85), 1),
+    "speed_sd": lambda record: record.speeds and round(KMH * record.speeds.deviation, 1),
+    "motion": lambda record: record.motion,
+    "distance": lambda record: None if record.distance is None else round(record.distance, 1),
+    "lane": lambda record: record.lane,
+}
+"""The columns of a `.csv`. `clock` is the clock time of `first`; x, y, width and height are the
+largest box; speeds are in km/h; `distance` is the minimum distance from the camera, metres.
+"""
 
 
 def records_content(
@@ -227,7 +252,7 @@ def records_content(
     rows = [_row(record, clock) for record in records]
     if is_json(path):
         return [_item(row) for row in rows]
-    return [_COLUMNS, *(list(row.values()) for row in rows)]
+    return [tuple(_COLUMNS), *(list(row.values()) for row in rows)]
 
 
 def join_records(videos: Mapping[str, list[Any]], target: Path) -> None:
@@ -241,33 +266,23 @@ def join_records(videos: Mapping[str, list[Any]], target: Path) -> None:
 
 def _row(record: VehicleRecord, clock: Clock | None) -> dict[str, Any]:
     """Return the values of a record by column."""
-    begin = plain_moment(clock and clock.at(round(record.first, 3)))
-    times = round(record.first, 6), round(record.last, 6), round(record.seconds, 3)
-    states = [record.states[state] for state in get_args(State)]
-    scores = round(record.mean_score, 4), round(record.best_score, 4)
-    ends = [round(value, 1) for point in (record.path[0], record.path[-1]) for value in point]
-    lengths = round(record.length, 1), round(record.length_fraction, 4)
-    speeds: list[float | None] = [None] * 4
-    if known := record.speeds:
-        measured = known.quantile(0.5), known.quantile(0.85), known.deviation
-        speeds = [round(value, 1) for value in (known.metres, *(KMH * item for item in measured))]
-    distance = None if record.distance is None else round(record.distance, 1)
-    seen = record.id, record.class_name, begin, *times, *states, *scores
-    places = *ends, *lengths, *record.largest.xywh
-    values = *seen, *places, *speeds, record.motion, distance, record.lane
-    return dict(zip(_COLUMNS, values, strict=True))
+    row = {name: value(record) for name, value in _COLUMNS.items()}
+    return row | {"clock": plain_time(clock and clock.at(round(record.first, 3)))}
 
 
 def _item(row: Mapping[str, Any]) -> dict[str, Any]:
     """Return a row for JSON, with the path and the largest box as objects."""
-
-    def values(*names: str) -> dict[str, Any]:
-        return {name: row[name] for name in names}
-
-    ends = {end: [row[f"{end}_x"], row[f"{end}_y"]] for end in ("start", "end")}
-    path, largest = values("length", "length_fraction"), values("x", "y", "width", "height")
-    places = {"path": ends | path, "largest": largest}
-    return values(*_COLUMNS[:11]) | places | values(*_COLUMNS[-7:])
+    path = {end: [row[f"{end}_x"], row[f"{end}_y"]] for end in ("start", "end")}
+    path |= {name: row[name] for name in ("length", "length_fraction")}
+    largest = {name: row[name] for name in ("x", "y", "width", "height")}
+    columns = list(row)
+    start, end = columns.index("start_x"), columns.index("metres")
+    return {
+        **{name: row[name] for name in columns[:start]},
+        "path": path,
+        "largest": largest,
+        **{name: row[name] for name in columns[end:]},
+    }
 
 
 _PADDING = 0.1  # margin around a vehicle, as a fraction of the width and height of its box

@@ -1,14 +1,17 @@
 """The speed of each vehicle on the road plane.
 
-1. A vehicle stands at the foot of its box, which the plane maps to a place in metres.
-2. The foot is its nearest point. Its middle is half its extent farther away, which depends on where
-   it heads; its length follows from the width of its box.
-3. Velocity is the slope of a straight line, fitted by weighted least squares to the places of
-   `WINDOW` seconds (Cleveland 1979 without the robust steps). Places are weighted by the precision
-   of a row of pixels there. Places far off the line are dropped, and the line is fitted again.
+1. A vehicle stands at its ground point, the middle of the lower edge of its box, which the plane
+   maps to a position in metres.
+2. This is its nearest point. Its middle is half its extent farther away, which depends on where it
+   heads; its length follows from the width of its box.
+3. Velocity is the slope of a straight line, fitted by weighted least squares to the positions of
+   `WINDOW` seconds (Cleveland 1979 without the robust steps). Positions are weighted by the
+   precision of a row of pixels there. Positions far off the line are dropped, and the line is
+   fitted again.
 4. The standard deviation has two parts. One follows from the scatter about the lines; neighbouring
-   places have similar errors, so they count as fewer. The other applies to the whole vehicle: the
-   box may end too low or too high, and the plane is only as exact as the pixels it was fitted to.
+   positions have similar errors, so they count as fewer. The other applies to the whole vehicle:
+   the box may end too low or too high, and the plane is only as exact as the pixels it was fitted
+   to.
 """
 
 import math
@@ -21,7 +24,7 @@ from vdet.boxes import EDGE, Float64Array
 from vdet.lanes.ground import Ground
 from vdet.track.track import FrameTracks
 from vdet.traffic.counts import Counts
-from vdet.traffic.crossings import PlacedLine
+from vdet.traffic.crossings import Line
 
 WINDOW = 1.0
 """Length of the part of a path that a velocity is fitted to, seconds."""
@@ -35,13 +38,13 @@ _SLIMNESS = 0.4
 _LENGTHS = 1.5, 20.0
 """Lengths of vehicles, metres."""
 _OUTLIERS = 0.1, 4.0
-"""Maximum distance of a place from the line: in heights of the box, or in median distances; the
+"""Maximum distance of a position from the line: in heights of the box, or in median distances; the
 larger one applies.
 """
-_FOOT_ERROR = 0.03
+_BOTTOM_ERROR = 0.03
 """Standard deviation of the height at which a box ends, as a fraction of its height."""
 _MAX_CORRELATION = 0.9
-"""Maximum correlation of neighbouring places that is assumed."""
+"""Maximum correlation of neighbouring positions that is assumed."""
 _MOVES = 1.0
 """Minimum speed at which the heading of a vehicle is known, m/s."""
 _MIN_DISTANCE = 1.0
@@ -58,20 +61,20 @@ _NOTHING = 1e-9
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Speeds:
-    """The places and speeds of a vehicle at some `times`, seconds, float64 `(n,)`.
+    """The positions and speeds of a vehicle at some `times`, seconds, float64 `(n,)`.
 
     Attributes
     ----------
-    places
+    positions
         As measured, metres, `(n, 2)`.
     speeds, deviations
-        Smoothed speeds, and their standard deviations from the scatter of the places, m/s.
+        Smoothed speeds, and their standard deviations from the scatter of the positions, m/s.
     common
         Relative standard deviation that all speeds of the vehicle share.
     """
 
     times: Float64Array
-    places: Float64Array
+    positions: Float64Array
     speeds: Float64Array
     deviations: Float64Array
     common: float
@@ -100,18 +103,18 @@ class Speeds:
         """Return the speed and its standard deviation at a time, m/s; None if unknown."""
         if not self.times[0] <= time <= self.times[-1]:
             return None
-        known = self.speeds, self.deviations
-        speed, scatter = (float(np.interp(time, self.times, values)) for values in known)
+        speed = float(np.interp(time, self.times, self.speeds))
+        scatter = float(np.interp(time, self.times, self.deviations))
         return speed, float(np.hypot(scatter, self.common * speed))
 
     def between(self, first: float, last: float) -> float | None:
-        """Return the mean speed between the places at two times, m/s; None if one is unknown.
+        """Return the mean speed between the positions at two times, m/s; None if one is unknown.
 
-        It uses only these two places, so it checks the smoothed speeds.
+        It uses only these two positions, so it checks the smoothed speeds.
         """
         if not self.times[0] <= first < last <= self.times[-1]:
             return None
-        ends = [np.interp((first, last), self.times, item) for item in self.places.T]
+        ends = [np.interp((first, last), self.times, item) for item in self.positions.T]
         return float(np.hypot(*np.diff(ends)[:, 0])) / (last - first)
 
     @property
@@ -136,7 +139,7 @@ class SpeedMeter:
         self.ground = ground
         self._sides = EDGE * width, (1 - EDGE) * width, (1 - EDGE) * height
         self._rows: dict[int, array[float]] = {}
-        self._known: dict[int, Speeds | None] = {}
+        self._gone: dict[int, Speeds | None] = {}  # of vehicles that are no longer shown
 
     def add(self, frame: FrameTracks) -> None:
         """Add the next frame. Predicted boxes, and those cut off by the frame, are omitted."""
@@ -148,40 +151,42 @@ class SpeedMeter:
                 self._rows.setdefault(track.id, array("d")).extend(row)
         oldest = frame.time - _GONE
         for number in [key for key, rows in self._rows.items() if rows[-_COLUMNS] < oldest]:
-            self._known[number] = self._measured(number)
+            self._gone[number] = self._measured(number)
             del self._rows[number]
 
     def speeds(self) -> dict[int, Speeds]:
         """Return the known speeds so far, by the ids of the vehicles."""
-        known = self._known | {number: self._measured(number) for number in self._rows}
-        return {number: speeds for number, speeds in known.items() if speeds}
+        every = self._gone | {number: self._measured(number) for number in self._rows}
+        return {number: speeds for number, speeds in every.items() if speeds}
 
     def _measured(self, number: int) -> Speeds | None:
         rows = np.array(self._rows[number]).reshape(-1, _COLUMNS)
-        return measure(self.ground, rows) or self._known.get(number)
+        return measure(self.ground, rows) or self._gone.get(number)
 
 
 def with_speeds(counts: Counts, meter: SpeedMeter | None) -> Counts:
     """Return the counts of a video with the speeds of its vehicles at their events."""
     if not meter:
         return counts
-    known = meter.speeds()
+    by_track = meter.speeds()
     latest: dict[int, float] = {}
     events = list(counts.events)
     for row, event in enumerate(events):
-        if speeds := known.get(event.id):
+        if speeds := by_track.get(event.id):
+            speed, deviation = speeds.at(event.time) or (None, None)
             mean = speeds.between(latest.get(event.id, math.inf), event.time)
-            speed, deviation, mean = map(_kmh, (*(speeds.at(event.time) or (None, None)), mean))
-            events[row] = replace(event, speed=speed, speed_sd=deviation, mean_speed=mean)
+            events[row] = replace(
+                event, speed=_kmh(speed), speed_sd=_kmh(deviation), mean_speed=_kmh(mean)
+            )
             latest[event.id] = event.time
     return replace(counts, events=tuple(events))
 
 
-def precision_at(line: PlacedLine, ground: Ground, speed: float) -> tuple[float, float, float]:
+def precision_at(line: Line, ground: Ground, speed: float) -> tuple[float, float, float]:
     """Return metres of road across and along in a pixel at the middle of a line, and an error.
 
-    The error is the standard deviation of a `speed`, m/s, as a fraction of it, for feet that are
-    off by a pixel. All are NaN far from the points of the ground.
+    The error is the standard deviation of a `speed`, m/s, as a fraction of it, for ground
+    points that are off by a pixel. All are NaN far from the points of the ground.
     """
     x, y = np.mean([line.start, line.end], axis=0)
     here, beside, above = ground.place(np.array([(x, y), (x + 1, y), (x, y - 1)]))
@@ -196,17 +201,17 @@ def _kmh(speed: float | None) -> float | None:
 def measure(ground: Ground, rows: Float64Array) -> Speeds | None:
     """Return the speeds of a vehicle; None if too little of its path is in the calibrated area.
 
-    `rows` are time, x and y of the foot, width and height of the box, `(n, 5)`.
+    `rows` are time, x and y of the ground point, width and height of the box, `(n, 5)`.
     """
     rows = rows[np.isfinite(_Geometry.of(ground, rows).weights)]
     if len(rows) < 3 or rows[-1, 0] - rows[0, 0] < MIN_SECONDS:
         return None
     whole = _Geometry.of(ground, rows)
-    _, fitted, _ = whole.lines(whole.places)
-    off = np.hypot(*(whole.places - fitted).T) * np.sqrt(whole.weights)  # in heights of the box
+    _, fitted, _ = whole.lines(whole.positions)
+    off = np.hypot(*(whole.positions - fitted).T) * np.sqrt(whole.weights)  # in heights of the box
     rows = rows[off <= max(_OUTLIERS[0], _OUTLIERS[1] * float(np.median(off)))]
     clean = _Geometry.of(ground, rows)
-    rough, *_ = clean.lines(clean.places)
+    rough, *_ = clean.lines(clean.positions)
     middles = clean.middles(rough)
     velocities, _, deviations = clean.lines(middles)
     speeds, times = np.hypot(*velocities.T), clean.times
@@ -219,12 +224,12 @@ def measure(ground: Ground, rows: Float64Array) -> Speeds | None:
 def _common(ground: Ground, rows: Float64Array) -> float:
     """Return the relative standard deviation of all speeds of a vehicle.
 
-    A box that ends too low moves the first and the last place; the difference is false movement.
+    A box that ends too low moves the first and the last position; the difference is false movement.
     """
     first, last = rows[[0, -1], 1:3]
-    low = [(0, _FOOT_ERROR * height) for height in rows[[0, -1], 4]]
-    places = ground.place(np.array([first, last, first + low[0], last + low[1]]))
-    driven, moved = places[1] - places[0], places[3] - places[2]
+    low = [(0, _BOTTOM_ERROR * height) for height in rows[[0, -1], 4]]
+    positions = ground.place(np.array([first, last, first + low[0], last + low[1]]))
+    driven, moved = positions[1] - positions[0], positions[3] - positions[2]
     length = max(float(np.hypot(*driven)), _MIN_DISTANCE)
     box = float(np.hypot(*(moved - driven))) / length
     return math.hypot(0.0 if math.isnan(box) else box, ground.scale_error)
@@ -232,15 +237,15 @@ def _common(ground: Ground, rows: Float64Array) -> float:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Geometry:
-    """The `places` of a vehicle in metres, `(n, 2)`, and the geometry of the pixels there.
+    """The `positions` of a vehicle in metres, `(n, 2)`, and the geometry of the pixels there.
 
     `depth` is the unit vector across the rows of pixels, away from the camera. `away` points along
     a column of pixels, and is 1 m deep. Both are `(n, 2)`. `widths` are the widths of the box in
-    metres, `weights` the weights of the places, `(n,)`.
+    metres, `weights` the weights of the positions, `(n,)`.
     """
 
     times: Float64Array
-    places: Float64Array
+    positions: Float64Array
     depth: Float64Array
     away: Float64Array
     widths: Float64Array
@@ -250,14 +255,14 @@ class _Geometry:
     def of(cls, ground: Ground, rows: Float64Array) -> "_Geometry":
         """Return the geometry for all `rows` of `measure`; unknown weights are NaN."""
         around = rows[:, 1:3] - _AROUND[:, np.newaxis]
-        places, above, left = ground.place(around.reshape(-1, 2)).reshape(around.shape)
-        away, beside = above - places, left - places
+        positions, above, left = ground.place(around.reshape(-1, 2)).reshape(around.shape)
+        away, beside = above - positions, left - positions
         pixel = np.hypot(*beside.T)
         depth = np.column_stack([-beside[:, 1], beside[:, 0]]) / pixel[:, None]
         row = np.sum(depth * away, axis=1)[:, None]
         weights = 1 / (np.abs(row[:, 0]) * rows[:, 4]) ** 2
         away, depth = away / np.abs(row), depth * np.sign(row)
-        return cls(rows[:, 0], places, depth, away, pixel * rows[:, 3], weights)
+        return cls(rows[:, 0], positions, depth, away, pixel * rows[:, 3], weights)
 
     def middles(self, velocities: Float64Array) -> Float64Array:
         """Return the vehicle's centres on the road, metres, `(n, 2)`.
@@ -267,29 +272,29 @@ class _Geometry:
         speeds = np.hypot(*velocities.T)
         moves = speeds >= _MOVES
         if not moves.any():
-            return self.places
+            return self.positions
         along = np.abs(np.sum(velocities * self.depth, axis=1))[moves] / speeds[moves]
         along = np.interp(self.times, self.times[moves], along)
         across = np.sqrt(np.maximum(0, 1 - along**2))
         lengths = self.widths / (across + _SLIMNESS * along)
         length = np.clip(np.median(lengths), *_LENGTHS)
         extent = length * (along + _SLIMNESS * across)
-        return np.asarray(self.places + self.away * extent[:, None] / 2)
+        return np.asarray(self.positions + self.away * extent[:, None] / 2)
 
-    def lines(self, places: Float64Array) -> tuple[Float64Array, Float64Array, Float64Array]:
-        """Fit a straight line to the places of the window around each time.
+    def lines(self, positions: Float64Array) -> tuple[Float64Array, Float64Array, Float64Array]:
+        """Fit a straight line to the positions of the window around each time.
 
         Returns
         -------
         velocities
             float64 `(n, 2)`, m/s.
         fitted
-            float64 `(n, 2)`: the places on the lines, metres.
+            float64 `(n, 2)`: the positions on the lines, metres.
         deviations
             float64 `(n,)`: standard deviations of the speeds, m/s.
         """
         weights = self.weights
-        t, origin = self.times - self.times[0], places.mean(axis=0)
+        t, origin = self.times - self.times[0], positions.mean(axis=0)
         starts = np.clip(t - WINDOW / 2, 0, max(0.0, t[-1] - WINDOW))
         first = np.searchsorted(t, starts - _NOTHING)
         end = np.searchsorted(t, starts + WINDOW + _NOTHING)
@@ -301,13 +306,13 @@ class _Geometry:
         weight = total(weights)
         middle = total(weights * t) / weight
         spread = np.maximum(total(weights * t**2) - weight * middle**2, _NOTHING)
-        velocities, fitted = np.empty_like(places), np.empty_like(places)
-        for axis, x in enumerate((places - origin).T):
+        velocities, fitted = np.empty_like(positions), np.empty_like(positions)
+        for axis, x in enumerate((positions - origin).T):
             mean = total(weights * x) / weight
             velocities[:, axis] = (total(weights * t * x) - weight * middle * mean) / spread
             fitted[:, axis] = origin[axis] + mean + velocities[:, axis] * (t - middle)
         heading = velocities / np.maximum(np.hypot(*velocities.T), _NOTHING)[:, None]
-        off = np.sum((places - fitted) * heading, axis=1) * np.sqrt(weights)
+        off = np.sum((positions - fitted) * heading, axis=1) * np.sqrt(weights)
         products = float(np.sum(off[1:] * off[:-1])) / max(float(np.sum(off**2)), _NOTHING)
         correlation = min(max(0.0, products), _MAX_CORRELATION)
         variance = np.mean(off**2) * (1 + correlation) / (1 - correlation)

@@ -30,7 +30,7 @@ def _plain_text(cell: Any) -> Any:
     return f"'{cell}" if isinstance(cell, str) and _FORMULA.match(cell) else cell
 
 
-def plain_moment(value: Any) -> Any:
+def plain_time(value: Any) -> Any:
     """Return a clock time as text, with its time zone; other values unchanged."""
     if not isinstance(value, datetime):
         return value
@@ -85,15 +85,15 @@ def join_tables(
     """
     columns: list[str] = []
     for heading, *_ in tables.values():
-        place = len(columns)
+        position = len(columns)
         for column in reversed(heading):
             if column in columns:
-                place = columns.index(column)
+                position = columns.index(column)
             else:
-                columns.insert(place, column)
+                columns.insert(position, column)
     rows = (
-        [name, *(known.get(column, missing) for column in columns)]
+        [name, *(cells.get(column, missing) for column in columns)]
         for name, (heading, *body) in tables.items()
-        for known in (dict(zip(heading, row, strict=True)) for row in body)
+        for cells in (dict(zip(heading, row, strict=True)) for row in body)
     )
     return [[VIDEO, *columns], *rows]

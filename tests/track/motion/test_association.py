@@ -6,7 +6,7 @@ import pytest
 from vdet.boxes import Float64Array
 from vdet.config.schema import MotionTrackerSettings
 from vdet.track.motion.association import take_over_ids, without_duplicates
-from vdet.track.motion.vehicle import Look, Observation, Vehicle
+from vdet.track.motion.vehicle import Observation, SearchedFrame, Vehicle
 
 SIZE = (1000, 500)
 BOX = np.array([400.0, 200.0, 500.0, 260.0])
@@ -20,7 +20,9 @@ def vehicle(
     confirmed: bool = True,
     unseen: float = 0,
 ) -> Vehicle:
-    made = Vehicle(Observation(box, score), Look(-unseen, 0.04, SIZE), MotionTrackerSettings())
+    made = Vehicle(
+        Observation(box, score), SearchedFrame(-unseen, 0.04, SIZE), MotionTrackerSettings()
+    )
     made.confirmed, made.id, made.unseen = confirmed, number, unseen
     return made
 
@@ -34,7 +36,7 @@ def test_one_of_which_only_a_part_was_seen_first_is_found_where_it_is_now() -> N
     take_over_ids([lost, new])
     assert new.id is None
     new.predict(0.04)
-    new.see(Observation(BOX, 1.0), Look(0.04, 0.04, SIZE))
+    new.see(Observation(BOX, 1.0), SearchedFrame(0.04, 0.04, SIZE))
     take_over_ids([lost, new])
     assert new.id == 7
 

@@ -36,7 +36,7 @@ def associate(
 
 
 def boxes_of(tracker: RulesTracker) -> dict[Car, Box]:
-    return {car: place.box for car, place in tracker.places.items()}
+    return {car: place.box for car, place in tracker.assigned.items()}
 
 
 # Rule 2
@@ -93,7 +93,7 @@ def test_confirmed_cars_that_overlap_become_one_new_car_shown_at_once() -> None:
     (car,) = result.cars
     assert car not in cars
     assert boxes_of(result) == {car: around}
-    place = result.places[car]
+    place = result.assigned[car]
     car.see(place, frame)
     assert car.is_shown
     assert car.box == around
@@ -117,7 +117,7 @@ def test_confirmed_cars_apart_stay_apart_and_move_to_their_matches() -> None:
     assert result.cars == cars
     assert [car.id for car in result.cars] == [3, 5]
     assert boxes_of(result) == {cars[0]: left, cars[1]: right}
-    assert [place.centroid for place in result.places.values()] == [left.center, right.center]
+    assert [place.centroid for place in result.assigned.values()] == [left.center, right.center]
 
 
 # Rules 6 to 8 and 11: one car and one region
@@ -144,7 +144,7 @@ def test_a_region_of_good_size_in_or_near_a_car_is_added_to_it(
 ) -> None:
     known = a_car(car, road())
     result = associate([known], [region])
-    assert (known in result.places, len(result.cars)) == (added, cars)
+    assert (known in result.assigned, len(result.cars)) == (added, cars)
 
 
 @pytest.mark.parametrize(("peak", "needed"), [(4.0, 10), (4.1, 3)])
@@ -161,7 +161,7 @@ def test_a_peak_above_4_makes_a_known_or_a_new_car_need_only_3_detections(
 
 def test_of_two_near_cars_the_nearer_gets_the_region() -> None:
     cars = [a_car(LEFT, road()), a_car(RIGHT, road())]
-    assert list(associate(cars, [Box.sized(225, 200, 80, 80)]).places) == [cars[1]]
+    assert list(associate(cars, [Box.sized(225, 200, 80, 80)]).assigned) == [cars[1]]
 
 
 def test_of_two_near_cars_the_one_without_a_region_goes_first() -> None:
@@ -182,7 +182,7 @@ def test_two_regions_by_a_car_that_make_up_its_size_are_added_as_one(parts: list
     car = a_car(LORRY, road())
     result = associate([car], parts)
     assert boxes_of(result) == {car: COMBINED}
-    assert result.places[car].centroid == pytest.approx(((70 * 115 + 60 * 280) / 130, 250))
+    assert result.assigned[car].centroid == pytest.approx(((70 * 115 + 60 * 280) / 130, 250))
     assert result.cars == [car]
 
 
@@ -196,7 +196,7 @@ def test_regions_that_are_not_the_cars_size_combined_are_judged_alone() -> None:
     car = a_car(LEFT, road())
     left, right = Box.sized(30, 200, 80, 80), Box.sized(190, 200, 80, 80)
     result = associate([car], [left, right])
-    assert result.places[car].box == left
+    assert result.assigned[car].box == left
     assert [boxes_of(result)[new] for new in result.cars if new is not car] == [right]
 
 
@@ -212,7 +212,7 @@ def test_regions_of_a_cars_size_but_too_wide_make_two_cars_shown_at_once(
     result = associate([car], regions)
     assert car not in result.cars
     assert boxes_of(result) == dict(zip(result.cars, [OTHER, ONE], strict=True))
-    for new, place in result.places.items():
+    for new, place in result.assigned.items():
         new.see(place, road())
         assert new.is_shown
 
@@ -224,5 +224,5 @@ def test_a_region_beside_a_car_that_has_its_own_is_a_new_car() -> None:
     car = a_car(LEFT, road())
     beside = Box.sized(220, 200, 90, 80)
     result = associate([car], [LEFT, beside])
-    assert result.places[car].box == LEFT
+    assert result.assigned[car].box == LEFT
     assert [boxes_of(result)[new] for new in result.cars if new is not car] == [beside]

@@ -107,7 +107,7 @@ def _class_number(name: str | None) -> int:
 
 def draw_running_counts(surface: Surface, counter: "VehicleCounter") -> None:
     """Draw the lines and zones with their current counts; vehicles are drawn over them."""
-    from vdet.pages.place import border_marks, draw_marks
+    from vdet.pages.traffic import border_marks, draw_marks
 
     counts = counter.so_far()
     marks = [mark for line in counter.lines for mark in border_marks(line, counts)]

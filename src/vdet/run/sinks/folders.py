@@ -188,7 +188,7 @@ class PageSink(BaseSink):
             pictures=self._pictures(),
             borders=(*counter.lines, *counter.zones) if counter else (),
             ground=speeds.ground if speeds else None,
-            findings=findings_in(self.context.facts).found,
+            findings=findings_in(self.context.facts).items,
         )
 
     def _pictures(self) -> dict[int, str]:

@@ -7,14 +7,15 @@ two would be in the same place.
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from enum import Enum, auto
-from typing import NamedTuple
 
 import numpy as np
 
 from vdet.boxes import BoolArray, Float64Array, coverage, iou_matrix
+from vdet.track.motion.history import carried
 from vdet.track.motion.pairing import differences
-from vdet.track.motion.vehicle import Vehicle, carried
+from vdet.track.motion.vehicle import Vehicle
 
 _REACH = 0.75
 _REACH_GROWTH = 0.35
@@ -114,16 +115,16 @@ def take_over_ids(vehicles: Sequence[Vehicle]) -> list[Vehicle]:
     -------
     The vehicles without the lost ones that were found.
     """
-    left = list(vehicles)
+    remaining = list(vehicles)
     for new in vehicles:
         if not new.confirmed or new.unseen or new.id is not None:
             continue
-        lost = [v for v in left if v.confirmed and v.unseen and _may_be(v, new)]
+        lost = [v for v in remaining if v.confirmed and v.unseen and _may_be(v, new)]
         if lost:
             nearest = min(lost, key=lambda vehicle: _astray(vehicle, new))
             new.take_over(nearest)
-            left.remove(nearest)
-    return left
+            remaining.remove(nearest)
+    return remaining
 
 
 class Case(Enum):
@@ -141,7 +142,8 @@ class Case(Enum):
     """It was apart, and now shows the vehicle that hides its own: it is lost."""
 
 
-class _Overlap(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class _Overlap:
     """How the box of a track overlaps that of another one.
 
     Attributes
@@ -185,15 +187,15 @@ def without_duplicates(vehicles: Sequence[Vehicle], boxes: Float64Array) -> list
 
     for row in sorted(range(len(vehicles)), key=rank):
         vehicle = vehicles[row]
-        near = [] if vehicle.unseen else [at for at in kept if overlaps[row, at] > _LEVEL_OVERLAP]
-        for at in near:
-            other = vehicles[at]
-            if other.unseen or not other.confirmed:
+        overlapping = [at for at in kept if overlaps[row, at] > _LEVEL_OVERLAP]
+        for at in () if vehicle.unseen else overlapping:
+            higher = vehicles[at]
+            if higher.unseen or not higher.confirmed:
                 continue
             overlap = _Overlap(inside[row, at], same[row, at], alike[row, at])
-            match _case(vehicle, other, overlap, hidden):
+            match _case(vehicle, higher, overlap, hidden):
                 case Case.DUPLICATE:
-                    other.merge(vehicle)
+                    higher.merge(vehicle)
                     break
                 case Case.PART:
                     break
@@ -206,20 +208,20 @@ def without_duplicates(vehicles: Sequence[Vehicle], boxes: Float64Array) -> list
     return [vehicles[row] for row in sorted(kept)]
 
 
-def _case(vehicle: Vehicle, other: Vehicle, overlap: _Overlap, hidden: Sequence[Vehicle]) -> Case:
+def _case(vehicle: Vehicle, higher: Vehicle, overlap: _Overlap, hidden: Sequence[Vehicle]) -> Case:
     """Return the relation of a track to an overlapping one of higher rank; both are detected."""
-    if min(vehicle.age, other.age) > _APART:
+    if min(vehicle.age, higher.age) > _APART:
         if not overlap.alike:
             return Case.APART
         return Case.HIDDEN if vehicle.confirmed else Case.PART
     if vehicle.confirmed:
-        fraction = PART if max(vehicle.age, other.age) > _APART else _LEVEL_OVERLAP
+        fraction = PART if max(vehicle.age, higher.age) > _APART else _LEVEL_OVERLAP
         return Case.DUPLICATE if overlap.same > fraction else Case.APART
-    if vehicle.scores.value <= other.scores.value and overlap.same > _LEVEL_OVERLAP:
+    if vehicle.scores.value <= higher.scores.value and overlap.same > _LEVEL_OVERLAP:
         return Case.PART
     if overlap.inside > PART:
-        is_doubted = other.detection_scores.value < _DOUBTED * vehicle.detection_scores.value
-        is_whole = is_doubted or _comes_out(vehicle, other, hidden)
+        is_doubted = higher.detection_scores.value < _DOUBTED * vehicle.detection_scores.value
+        is_whole = is_doubted or _comes_out(vehicle, higher, hidden)
         return Case.EMERGING if is_whole else Case.PART
     return Case.APART
 
@@ -227,8 +229,8 @@ def _case(vehicle: Vehicle, other: Vehicle, overlap: _Overlap, hidden: Sequence[
 def _comes_out(vehicle: Vehicle, nearer: Vehicle, hidden: Sequence[Vehicle]) -> bool:
     """Return whether a `hidden` vehicle was near, and this one is as clear as the nearer one."""
     is_clear = vehicle.detection_scores.value > CLEAR * nearer.detection_scores.value
-    here = vehicle.state.mean[:, 0]
-    return is_clear and any(_distance(vehicle.state.mean[:, 0], here) < _NEAR for vehicle in hidden)
+    position = vehicle.state.mean[:, 0]
+    return is_clear and any(_distance(item.state.mean[:, 0], position) < _NEAR for item in hidden)
 
 
 def _may_be(lost: Vehicle, new: Vehicle) -> bool:
@@ -252,22 +254,22 @@ def _astray(lost: Vehicle, new: Vehicle) -> float:
     Its current position also counts if only a part may have been seen at first: the lost vehicle
     was hidden, or the first box has another size.
     """
-    last, first = lost.history.last_seen, new.history.moments[0]
+    last, first = lost.history.last_seen, new.history.estimates[0]
     expected = carried(last.state.mean, max(first.time - last.time, 0.0))
-    then = _distance(expected, new.history.means()[0][:, 0])
+    at_first = _distance(expected, new.history.means()[0][:, 0])
     now = _distance(lost.state.mean[:, 0], new.state.mean[:, 0])
-    return min(then, now) if lost.hidden or math.isinf(then) else then
+    return min(at_first, now) if lost.hidden or math.isinf(at_first) else at_first
 
 
-def _distance(one: Float64Array, other: Float64Array) -> float:
+def _distance(a: Float64Array, b: Float64Array) -> float:
     """Return the distance of two positions in mean sizes; infinite if the sizes differ too much.
 
     Parameters
     ----------
-    one, other
+    a, b
         Centre x and y and log width and height, `(4,)`.
     """
-    if abs(float(np.sum(one[2:] - other[2:]))) > math.log(_GROWTH):
+    if abs(float(np.sum(a[2:] - b[2:]))) > math.log(_GROWTH):
         return math.inf
-    sizes = (np.exp(one[2:]) + np.exp(other[2:])) / 2
-    return math.hypot(*((one[:2] - other[:2]) / sizes))
+    sizes = (np.exp(a[2:]) + np.exp(b[2:])) / 2
+    return math.hypot(*((a[:2] - b[:2]) / sizes))

@@ -30,28 +30,28 @@ Most vehicles differ from each other by more, and from themselves a second ago b
 
 
 def buffered_iou(
-    expected: Float64Array, buffers: Float64Array, found: Float64Array
+    expected: Float64Array, buffers: Float64Array, detected: Float64Array
 ) -> Float64Array:
-    """Return how well each expected box fits each found one, 0 to 1, `(n, m)`.
+    """Return how well each expected box fits each detected one, 0 to 1, `(n, m)`.
 
     Both boxes are widened by the buffer of the expected one, in fractions of their own sizes, so
     boxes that do not touch can still match if the motion is uncertain.
 
     Parameters
     ----------
-    expected, found
+    expected, detected
         Shapes `(n, 4)` and `(m, 4)`: x1, y1, x2, y2 in pixels, each with an area.
     buffers
         Shape `(n, 2)`: fractions of width and height by which a box is widened on each side.
     """
     fractions = np.minimum(buffers, WIDEST_BUFFER)[:, np.newaxis]
-    return iou(_widened(expected[:, np.newaxis], fractions), _widened(found, fractions))
+    return iou(_widened(expected[:, np.newaxis], fractions), _widened(detected, fractions))
 
 
 def _widened(boxes: Float64Array, fractions: Float64Array | float) -> Float64Array:
-    near, far = boxes[..., :2], boxes[..., 2:]
-    margin = (far - near) * fractions
-    return np.concatenate([near - margin, far + margin], axis=-1)
+    start, end = boxes[..., :2], boxes[..., 2:]
+    margin = (end - start) * fractions
+    return np.concatenate([start - margin, end + margin], axis=-1)
 
 
 def appearances(picture: Picture | None, boxes: Float64Array) -> Float64Array:
@@ -77,9 +77,9 @@ def appearances(picture: Picture | None, boxes: Float64Array) -> Float64Array:
     return np.reshape(means, (-1, 2, 3))
 
 
-def differences(some: Float64Array, others: Float64Array) -> Float64Array:
+def differences(a: Float64Array, b: Float64Array) -> Float64Array:
     """Return the difference of appearances, `(…, 2, 3)`: 0 if they are equal or unknown."""
-    units = (some - others) / _UNITS
+    units = (a - b) / _UNITS
     return np.asarray(np.sqrt(np.nan_to_num(units**2).mean(axis=(-2, -1))))
 
 
@@ -114,11 +114,11 @@ def pair(values: Float64Array, rounds: Sequence[Sequence[int]]) -> dict[int, int
     -------
     The column of each paired row; each round maximizes the sum of values.
     """
-    left = values.copy()
+    remaining = values.copy()
     pairs: dict[int, int] = {}
     for rows in rounds:
-        pairs |= {rows[row]: column for row, column in assign(left[list(rows)])}
-        left[:, list(pairs.values())] = 0
+        pairs |= {rows[row]: column for row, column in assign(remaining[list(rows)])}
+        remaining[:, list(pairs.values())] = 0
     return pairs
 
 

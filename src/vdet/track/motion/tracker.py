@@ -1,7 +1,8 @@
 """The motion tracker, frame by frame."""
 
 from collections.abc import Sequence
-from itertools import count
+from dataclasses import dataclass
+from itertools import compress, count
 
 import numpy as np
 
@@ -10,9 +11,10 @@ from vdet.config.schema import MotionTrackerSettings
 from vdet.media import Picture
 from vdet.track.factory import TrackerKind
 from vdet.track.motion.association import are_hidden, are_parts, take_over_ids, without_duplicates
+from vdet.track.motion.history import Position
 from vdet.track.motion.pairing import appearances, buffered_iou, differences, pair
 from vdet.track.motion.state import whole_box
-from vdet.track.motion.vehicle import Look, Observation, Place, Vehicle
+from vdet.track.motion.vehicle import Observation, SearchedFrame, Vehicle
 from vdet.track.track import Track
 
 FIRST_STEP = 0.04
@@ -65,7 +67,7 @@ class MotionTracker:
         """
         observations = self._observations(detections, picture)
         seconds = FIRST_STEP if self._time is None else time - self._time
-        self._time, look = time, Look(time, seconds, self._size)
+        self._time, frame = time, SearchedFrame(time, seconds, self._size)
         longest = self._settings.keep_id_seconds + self._settings.keep_hidden_id_seconds
         self._keep([v for v in self._vehicles if v.unseen + seconds <= longest])
         for vehicle in self._vehicles:
@@ -74,13 +76,17 @@ class MotionTracker:
         pairs = self._pair(observations)
         for row, vehicle in enumerate(self._vehicles):
             if row in pairs:
-                vehicle.see(observations[pairs[row]], look)
+                vehicle.see(observations[pairs[row]], frame)
             else:
-                vehicle.miss(look)
+                vehicle.miss(frame)
         self._keep(self._staying())
-        left = [o for number, o in enumerate(observations) if number not in pairs.values()]
-        # Detections with scores below the decay never add up to a vehicle.
-        new = [Vehicle(o, look, self._settings) for o in left if o.score > self._settings.decay]
+        new = [
+            Vehicle(observation, frame, self._settings)
+            for number, observation in enumerate(observations)
+            if number not in pairs.values()
+            # Detections with scores below the decay never add up to a vehicle.
+            and observation.score > self._settings.decay
+        ]
         vehicles = take_over_ids(self._vehicles + new)
         self._vehicles = without_duplicates(vehicles, self._boxes(vehicles))
         before = time - 2 * self._settings.look_ahead
@@ -91,35 +97,40 @@ class MotionTracker:
 
     def at(self, time: float) -> list[Track]:
         """Return the vehicles shown at a time; see `TimedTracker.at`."""
-        known = [*self._gone, *(vehicle for vehicle in self._vehicles if vehicle.confirmed)]
-        placed = [(v, place) for v in known if (place := self._place(v, time)) is not None]
-        every_box = self._visible([place.mean for _, place in placed])
-        rows = np.flatnonzero(_are_large(every_box))
-        placed, boxes = [placed[row] for row in rows], every_box[rows]
-        hidden = are_hidden(boxes, [place.state != "predicted" for _, place in placed])
-        shown: list[tuple[Vehicle, Place, Float64Array, float]] = []
-        for (vehicle, place), box, is_hidden in zip(placed, boxes, hidden, strict=True):
-            seen_score, score = vehicle.history.scores(time)
-            is_guess = place.bridges or place.state == "predicted"
-            if self._is_clear(vehicle, place, box, seen_score) and not (is_hidden and is_guess):
-                shown.append((vehicle, place, box, score))
-        shown_boxes = np.reshape([box for _, _, box, _ in shown], (-1, 4))
-        nested = are_nested(shown_boxes, [score for *_, score in shown])
-        pairs = zip(shown, nested, strict=True)
-        tracks = [self._track(*item) for item, is_nested in pairs if not is_nested]
+        candidates = self._candidates(time)
+        boxes = _boxes_of(candidates)
+        hidden = are_hidden(boxes, [item.position.state != "predicted" for item in candidates])
+        clear = [
+            candidate
+            for candidate, is_hidden in zip(candidates, hidden, strict=True)
+            if self._is_clear(candidate) and not (is_hidden and candidate.is_guess)
+        ]
+        nested = are_nested(_boxes_of(clear), [candidate.score for candidate in clear])
+        tracks = map(self._track, compress(clear, ~nested))
         return sorted(tracks, key=lambda track: track.id)
 
-    def _place(self, vehicle: Vehicle, time: float) -> Place | None:
-        """Return the place of a vehicle at a time; None if it is not shown then."""
+    def _candidates(self, time: float) -> "list[_Candidate]":
+        """Return the vehicles in the frame at a time that may be shown."""
+        vehicles = [*self._gone, *(vehicle for vehicle in self._vehicles if vehicle.confirmed)]
+        positions = [(v, position) for v in vehicles if (position := self._position(v, time))]
+        boxes = self._visible([position.mean for _, position in positions])
+        in_frame = compress(zip(positions, boxes, strict=True), _are_large(boxes))
+        return [
+            _Candidate(vehicle, position, box, *vehicle.history.scores(time))
+            for (vehicle, position), box in in_frame
+        ]
+
+    def _position(self, vehicle: Vehicle, time: float) -> Position | None:
+        """Return the position of a vehicle at a time; None if it is not shown then."""
         assert self._time is not None
         history = vehicle.history
-        place = history.at(time, self._settings.look_ahead)
-        if place is not None or time < history.last_seen.time or vehicle in self._gone:
-            return place
+        position = history.at(time, self._settings.look_ahead)
+        if position is not None or time < history.last_seen.time or vehicle in self._gone:
+            return position
         if not vehicle.is_present:
             return None
         mean = vehicle.state.moved(time - self._time)
-        return Place(mean[:, 0], "predicted" if vehicle.unseen else "interpolated")
+        return Position(mean[:, 0], "predicted" if vehicle.unseen else "interpolated")
 
     def _keep(self, vehicles: list[Vehicle]) -> None:
         """Track only these vehicles; the others, if confirmed, can be shown at earlier times."""
@@ -128,19 +139,22 @@ class MotionTracker:
 
     def _staying(self) -> list[Vehicle]:
         """Return the vehicles that are neither ended nor outside the frame."""
-        are_inside = _are_large(self._boxes(self._vehicles))
-        pairs = zip(self._vehicles, are_inside, strict=True)
-        return [vehicle for vehicle, is_inside in pairs if is_inside and not vehicle.is_over]
+        inside = compress(self._vehicles, _are_large(self._boxes(self._vehicles)))
+        return [vehicle for vehicle in inside if not vehicle.is_over]
 
     def _observations(self, detections: Boxes, picture: Picture | None) -> list[Observation]:
         boxes = clipped(detections.sides, self._size)
-        columns = detections.scores.tolist(), detections.likely_classes
-        rows = zip(boxes, *columns, appearances(picture, boxes), strict=True)
-        large = _are_large(boxes)
-        return [Observation(*row) for row, is_large in zip(rows, large, strict=True) if is_large]
+        observations = map(
+            Observation,
+            boxes,
+            detections.scores.tolist(),
+            detections.likely_classes,
+            appearances(picture, boxes),
+        )
+        return list(compress(observations, _are_large(boxes)))
 
     def _visible(self, means: Sequence[Float64Array]) -> Float64Array:
-        """Return the part in the frame of each centre and size, `(n, 4)`; see `Place`."""
+        """Return the part in the frame of each centre and size, `(n, 4)`; see `Position`."""
         return clipped(whole_box(np.reshape(means, (-1, 4))), self._size)
 
     def _boxes(self, vehicles: Sequence[Vehicle]) -> Float64Array:
@@ -163,44 +177,71 @@ class MotionTracker:
         vehicles = self._vehicles
         present = [row for row, vehicle in enumerate(vehicles) if vehicle.is_present]
         new = [row for row, vehicle in enumerate(vehicles) if not vehicle.confirmed]
-        found = np.array([observation.box for observation in observations])
+        boxes = np.array([observation.box for observation in observations])
         buffers = np.array([vehicle.state.deviation for vehicle in vehicles])
-        values = buffered_iou(self._boxes(vehicles), buffers, found)
+        values = buffered_iou(self._boxes(vehicles), buffers, boxes)
         values[values < _OVERLAP] = 0
-        known = np.array([[vehicle.appearance] for vehicle in vehicles])
-        looks = np.array([observation.appearance for observation in observations])
-        values *= np.exp(-(differences(known, looks) ** 2))
+        expected = np.array([[vehicle.appearance] for vehicle in vehicles])
+        observed = np.array([observation.appearance for observation in observations])
+        values *= np.exp(-(differences(expected, observed) ** 2))
         scores = np.array([[vehicle.detection_scores.value] for vehicle in vehicles])
         values *= 1 - _UNSURE * (1 - scores)
-        parts = are_parts(found, np.array([observation.score for observation in observations]))
+        parts = are_parts(boxes, np.array([observation.score for observation in observations]))
         values[np.ix_(self._hidden(), parts)] = 0  # parts of the vehicle that hides it
         return pair(values**2, [present, new])
 
-    def _is_clear(self, vehicle: Vehicle, place: Place, box: Float64Array, score: float) -> bool:
+    def _is_clear(self, candidate: "_Candidate") -> bool:
         """Return whether a vehicle is large enough, and its score high enough, to be shown.
 
         A vehicle shown before may have a slightly lower score. If the left or right side of the
         frame cuts it off, its size is that of a car as wide as the visible part: a strip is not
         large.
         """
-        left, _, right, _ = whole_box(place.mean)
-        width, height = box[2:] - box[:2]
+        left, _, right, _ = whole_box(candidate.position.mean)
+        width, height = candidate.box[2:] - candidate.box[:2]
         if left < 0 or right > self._size[0]:
             height = min(height, _CAR_HEIGHT * width)
         is_large = width * height >= (self._settings.min_size * self._size[0]) ** 2
-        minimum = self._settings.min_score * (1.0 if vehicle.id is None else _STAYS)
-        return bool(is_large) and score >= minimum
+        minimum = self._settings.min_score * (1.0 if candidate.vehicle.id is None else _STAYS)
+        return bool(is_large) and candidate.seen_score >= minimum
 
-    def _track(self, vehicle: Vehicle, place: Place, box: Float64Array, score: float) -> Track:
+    def _track(self, candidate: "_Candidate") -> Track:
+        vehicle = candidate.vehicle
         vehicle.id = next(self._ids) if vehicle.id is None else vehicle.id
+        x1, y1, x2, y2 = candidate.box.tolist()
+        left, _, right, bottom = whole_box(candidate.position.mean).tolist()
         return Track(
             vehicle.id,
-            Box(*box.tolist()),
-            score,
-            place.state,
+            Box(x1, y1, x2, y2),
+            candidate.score,
+            candidate.position.state,
             class_name=vehicle.votes.winner,
-            whole_foot=Box(*whole_box(place.mean).tolist()).foot,
+            whole_foot=((left + right) / 2, bottom),
         )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Candidate:
+    """A vehicle that may be shown at a time.
+
+    `box` is its visible part, `(4,)`. `seen_score` and `score` are mean scores around that time,
+    without and with misses as 0.
+    """
+
+    vehicle: Vehicle
+    position: Position
+    box: Float64Array
+    seen_score: float
+    score: float
+
+    @property
+    def is_guess(self) -> bool:
+        """Whether a search missed it at this time."""
+        return self.position.bridges or self.position.state == "predicted"
+
+
+def _boxes_of(candidates: Sequence[_Candidate]) -> Float64Array:
+    return np.reshape([candidate.box for candidate in candidates], (-1, 4))
 
 
 def _are_large(boxes: Float64Array) -> BoolArray:

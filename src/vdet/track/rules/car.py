@@ -105,9 +105,11 @@ class Car:
             box, size = np.array(astuple(region.box)), (image.shape[1], image.shape[0])
             self.votes.add(region.classes, vote_weight(box, region.score, size))
         self._seen.append(region)
-        rows = zip(*((*item.box.xywh, *item.centroid) for item in self._seen), strict=True)
-        *sides, x, y = map(fmean, rows)
-        self.box, self.centroid = Box.sized(*map(round, sides)), (x, y)
+        sides = zip(*(seen.box.xywh for seen in self._seen), strict=True)
+        x, y, width, height = (round(fmean(values)) for values in sides)
+        self.box = Box.sized(x, y, width, height)
+        xs, ys = zip(*(seen.centroid for seen in self._seen), strict=True)
+        self.centroid = fmean(xs), fmean(ys)
         self.matches = self.matches + 1 if by_match else 0
         self.in_a_row += 1
         self.count += 1
@@ -141,8 +143,8 @@ class Car:
         x1, y1, x2, y2 = last.box.pixels
         around = Box(x1 - distance, y1 - distance, x2 + distance, y2 + distance)
         area = around.clipped(image.shape[1], image.shape[0])
-        found = cv2.matchTemplate(area.cut(image), self._image, cv2.TM_CCOEFF_NORMED)
-        scores = np.asarray(found, np.float32)
+        matches = cv2.matchTemplate(area.cut(image), self._image, cv2.TM_CCOEFF_NORMED)
+        scores = np.asarray(matches, np.float32)
         dy, dx = np.ogrid[: scores.shape[0], : scores.shape[1]]
         scores[np.hypot(area.x1 + dx - x1, area.y1 + dy - y1) > distance] = -1
         y, x = np.unravel_index(int(scores.argmax()), scores.shape)
@@ -153,8 +155,8 @@ class Car:
 
 def combine(first: Region, second: Region) -> Region:
     """Combine two regions: the box around both, centroids weighted by area, the higher peak."""
-    one, two = first.box.area, second.box.area
+    a, b = first.box.area, second.box.area
     (x1, y1), (x2, y2) = first.centroid, second.centroid
-    centroid = (x1 * one + x2 * two) / (one + two), (y1 * one + y2 * two) / (one + two)
+    centroid = (x1 * a + x2 * b) / (a + b), (y1 * a + y2 * b) / (a + b)
     higher = max(first, second, key=lambda region: region.peak)
     return replace(higher, box=first.box.union(second.box), centroid=centroid)

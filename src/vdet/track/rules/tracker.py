@@ -2,8 +2,8 @@
 
 Where the description of the original system can be read in two ways, this is the choice:
 
-* A car is in a region if its average centroid lies in the region's bounding box. A car has at most
-  one place in a frame; regions are taken in the order given.
+* A car is in a region if its average centroid lies in the region's bounding box. A car is assigned
+  at most one region in a frame; regions are taken in the order of the detections.
 * Regions with cars in them come first, then those without, so that no car is lost from its own
   region to a neighbour. All positions are those before this frame.
 * Of several cars in a region only those count that the template match confirms. If that leaves
@@ -11,15 +11,15 @@ Where the description of the original system can be read in two ways, this is th
   nearest.
 * If any two of the confirmed cars overlap, all become one, because the new car takes the whole
   region. Cars that stay apart also take their rectangle from the match, at their old size, and
-  count as detected by region, because the heat covers their places.
+  count as detected by region, because the heat covers them.
 * One car and a region that is not of good size: the region is not added, and the car is left
   without one (it may yet be found by match). Such a region is a piece of that car: it makes no new
   car, but may be combined with another one.
 * The distance of a car and a region is the gap between the car's average rectangle and the
-  region's. Of several near cars, one without a place goes first, then the nearest.
+  region's. Of several cars near it, one without a region goes first, then the nearest.
 * Combined regions that are not about the car's size are not parts of it: the region is judged
-  alone. A near region that is not of good size is ignored, unless the car has a region of its own
-  already: then it belongs to another car, and becomes a new one.
+  alone. A region near a car that is not of good size is ignored, unless the car already has a
+  region: then it belongs to another car, and becomes a new one.
 * A car made of others keeps the lowest id that was shown among them. Of the two cars that one
   becomes, the one nearer to its centroid keeps the id.
 * A car counts as shown before if it ever was, not only in the frame before.
@@ -55,15 +55,15 @@ class RulesTracker:
     Attributes
     ----------
     cars
-        The cars known so far, each detected at least once.
-    places
-        The cars that have a place in the latest frame; its `box` and `centroid` are the detection.
+        All cars so far, each detected at least once.
+    assigned
+        The region assigned to each car detected in the latest frame.
     """
 
     def __init__(self, settings: RulesTrackerSettings) -> None:
         self._settings = settings
         self.cars: list[Car] = []
-        self.places: dict[Car, Region] = {}
+        self.assigned: dict[Car, Region] = {}
         self._created: list[Car] = []
         self._unused: list[Region] = []
         self._ids = count(1)
@@ -79,9 +79,9 @@ class RulesTracker:
             raise ValueError("the rules tracker needs the frame; pass its image")
         regions = large_enough(detections, picture.width, picture.height, self._settings)
         self.associate(regions, picture.image)
-        for car, place in self.places.items():
-            car.see(place, picture.image)
-        for car in [car for car in self.cars if car not in self.places]:
+        for car, region in self.assigned.items():
+            car.see(region, picture.image)
+        for car in [car for car in self.cars if car not in self.assigned]:
             if not self._absorb(car):
                 self._search(car, picture.image)
         self.cars = [car for car in self.cars if not car.is_over]
@@ -92,28 +92,30 @@ class RulesTracker:
         """Assign the regions of the next frame to cars, old and new ones (rules 2 to 11).
 
         The regions lie inside the frame `image`, BGR uint8 `(H, W, 3)`, and are large enough. Cars
-        get places, ids and counts, but no detections yet.
+        get regions, ids and counts, but no detections yet.
         """
-        self.places, self._created, self._unused = {}, [], list(regions)
-        for region in [region for region in regions if not self._place_inside(region, image)]:
+        self.assigned, self._created, self._unused = {}, [], list(regions)
+        for region in [region for region in regions if not self._assign_inside(region, image)]:
             if region in self._unused:
-                self._place_near(region)
+                self._assign_nearby(region)
         self.cars += self._created
 
-    def _place_inside(self, region: Region, image: Image) -> bool:
+    def _assign_inside(self, region: Region, image: Image) -> bool:
         """Rules 2 to 7; False where no car is inside the region."""
         inside = [
-            car for car in self.cars if car not in self.places and region.box.contains(car.centroid)
+            car
+            for car in self.cars
+            if car not in self.assigned and region.box.contains(car.centroid)
         ]
-        found = {car: car.find_in(image) for car in inside} if len(inside) > 1 else {}
-        matches = {car: match for car, match in found.items() if match is not None}
+        searched = inside if len(inside) > 1 else []
+        matches = {car: match for car in searched if (match := car.find_in(image))}
         if len(matches) > 1:
             self._merge_or_separate(region, matches)
         elif inside:
             car = min(matches or inside, key=lambda match: _distance(match, region))
             car.trust(region.peak)
             if car.is_filled_by(region):
-                self._place(car, region)
+                self._assign(car, region)
         return bool(inside)
 
     def _merge_or_separate(self, region: Region, matches: dict[Car, Region]) -> None:
@@ -124,37 +126,39 @@ class RulesTracker:
             self._create(region, min(ids, default=None)).vouch()
             return
         for car, match in matches.items():
-            place = replace(region, box=match.box, centroid=match.centroid)
-            self._place(car, place, region)
+            self._assign(car, replace(region, box=match.box, centroid=match.centroid), region)
 
-    def _place_near(self, region: Region) -> None:
+    def _assign_nearby(self, region: Region) -> None:
         """Rules 8 to 11."""
         gaps = {car: car.box.gap(region.box) for car in self.cars}
         car = min(
             (car for car, gap in gaps.items() if gap <= self._settings.near),
-            key=lambda car: (car in self.places, gaps[car], _distance(car, region)),
+            key=lambda car: (car in self.assigned, gaps[car], _distance(car, region)),
             default=None,
         )
-        if car is not None and self._place_combined(region, car):
+        if car is not None and self._assign_combined(region, car):
             return
-        if car is None or car in self.places:
+        if car is None or car in self.assigned:
             self._create(region).trust(region.peak)
         elif car.is_filled_by(region):
-            self._place(car, region)
+            self._assign(car, region)
 
-    def _place_combined(self, region: Region, car: Car) -> bool:
+    def _assign_combined(self, region: Region, car: Car) -> bool:
         """Rules 9 and 10; False where no other region makes up the car together with this one."""
-        others = (other for other in self._unused if other is not region)
-        near = [other for other in others if car.box.gap(other.box) <= self._settings.near]
-        nearest = min(near, key=lambda other: _distance(car, other), default=None)
-        other = self.places.get(car, nearest)
-        if other is None or not car.is_as_wide_as(combined := combine(region, other)):
+        nearby = (
+            candidate
+            for candidate in self._unused
+            if candidate is not region and car.box.gap(candidate.box) <= self._settings.near
+        )
+        nearest = min(nearby, key=lambda candidate: _distance(car, candidate), default=None)
+        partner = self.assigned.get(car, nearest)
+        if partner is None or not car.is_as_wide_as(combined := combine(region, partner)):
             return False
         if combined.box.width < self._settings.max_combined:
-            self._place(car, combined, region, other)
+            self._assign(car, combined, region, partner)
             return True
         self._forget(car)
-        closer, farther = sorted((region, other), key=lambda item: _distance(car, item))
+        closer, farther = sorted((region, partner), key=lambda part: _distance(car, part))
         self._create(closer, car.id).vouch()
         self._create(farther).vouch()
         return True
@@ -162,25 +166,25 @@ class RulesTracker:
     def _create(self, region: Region, number: int | None = None) -> Car:
         car = Car(self._settings, number)
         self._created.append(car)
-        self._place(car, region)
+        self._assign(car, region)
         return car
 
     def _forget(self, *cars: Car) -> None:
         for car in cars:
             self.cars.remove(car)
-            self.places.pop(car, None)
+            self.assigned.pop(car, None)
 
-    def _place(self, car: Car, place: Region, *parts: Region) -> None:
-        """Give the car a place, made of these regions; without them it is a region itself."""
-        self.places[car] = place
-        self._unused = [item for item in self._unused if item not in (parts or (place,))]
+    def _assign(self, car: Car, region: Region, *parts: Region) -> None:
+        """Assign a region to a car; it is made of these parts, if any, which are then used."""
+        self.assigned[car] = region
+        self._unused = [item for item in self._unused if item not in (parts or (region,))]
 
     def _absorb(self, car: Car) -> bool:
         """Rule 12: a shown car gives way to the one that is now where it was."""
-        there = [other for other in self.places if other.box.contains(car.centroid)]
-        if car.id is None or not there:
+        covering = [item for item in self.assigned if item.box.contains(car.centroid)]
+        if car.id is None or not covering:
             return False
-        successor = min(there, key=lambda other: math.dist(other.centroid, car.centroid))
+        successor = min(covering, key=lambda item: math.dist(item.centroid, car.centroid))
         successor.vouch()
         if successor.id is None:
             successor.id = car.id
@@ -189,11 +193,11 @@ class RulesTracker:
 
     def _search(self, car: Car, image: Image) -> None:
         """Rule 13: search the frame for the image of a shown car."""
-        found = None if car.id is None else car.find_in(image)
-        if found is None:
+        match = None if car.id is None else car.find_in(image)
+        if match is None:
             car.miss()
         else:
-            car.see(found, image, by_match=True)
+            car.see(match, image, by_match=True)
 
     def _track(self, car: Car) -> Track:
         """Return what is shown of a car; it gets its id when it is first shown."""
@@ -225,7 +229,7 @@ def _distance(car: Car, region: Region) -> float:
 
 def _any_overlap(regions: Iterable[Region], pixels: int) -> bool:
     """Return whether two regions overlap by more than `pixels`, across and down (rule 4)."""
-    common = (one.box.intersection(other.box) for one, other in combinations(regions, 2))
+    common = (a.box.intersection(b.box) for a, b in combinations(regions, 2))
     return any(box.width > pixels and box.height > pixels for box in common)
 
 

@@ -1,6 +1,6 @@
-"""The traffic at a place, for pages and reports: lines, zones, paths and flows with their counts.
+"""Lines, zones, paths and flows with their counts, for pages and reports.
 
-Its image consists of marks, which are drawn into a frame or written as SVG.
+Their image consists of marks, which are drawn into a frame or written as SVG.
 """
 
 import math
@@ -18,10 +18,10 @@ from vdet.pages.charts import hex_color
 from vdet.pages.render import Table
 from vdet.polygons import Point
 from vdet.traffic.counts import Counts, Direction, Event, class_of, vehicle_flows
-from vdet.traffic.crossings import Border, PlacedLine
+from vdet.traffic.crossings import Border, Line
 from vdet.traffic.records import VehicleRecord
 
-_NO_OTHER = "–"
+_NO_DESTINATION = "–"
 """Destination of a flow with a single line or zone."""
 
 _WIDEST = 0.012
@@ -59,12 +59,12 @@ def flows_of(counts: Counts) -> dict[tuple[str, str], list[tuple[Event, Event]]]
     """Return the first and last event of each vehicle by flow, the largest flow first."""
     flows: dict[tuple[str, str], list[tuple[Event, Event]]] = {}
     for _, first, last in vehicle_flows([counts]):
-        flow = first.name, last.name if last else _NO_OTHER
+        flow = first.name, last.name if last else _NO_DESTINATION
         flows.setdefault(flow, []).append((first, last or first))
     return dict(sorted(flows.items(), key=lambda flow: -len(flow[1])))
 
 
-def place_marks(
+def traffic_marks(
     size: tuple[int, int],
     borders: Sequence[Border],
     counts: Counts,
@@ -78,15 +78,21 @@ def place_marks(
     totals = {(total.name, total.direction): total.count for total in counts.totals}
     marks = [mark for border in borders for mark in border_marks(border, totals)]
     flows = flows_of(counts)
-    most = max(map(len, flows.values()), default=1)
+    maximum = max(map(len, flows.values()), default=1)
     for number, trips in enumerate(flows.values()):
         shown = sorted((paths[last.id] for _, last in trips if last.id in paths), key=len)
-        middle = shown[len(shown) // 2] if shown else ()
-        path = _inside(middle, size)
+        typical = shown[len(shown) // 2] if shown else ()
+        path = _inside(typical, size)
         if len(path) > 1:
-            wide = max(2, round(_WIDEST * size[0] * len(trips) / most))
-            label, at = str(len(trips)), path[len(path) // 2]
-            marks.insert(0, Mark(path, boxes.color_of(number), wide, label, at, is_arrow=True))
+            arrow = Mark(
+                path,
+                color=boxes.color_of(number),
+                width=max(2, round(_WIDEST * size[0] * len(trips) / maximum)),
+                label=str(len(trips)),
+                at=path[len(path) // 2],
+                is_arrow=True,
+            )
+            marks.insert(0, arrow)
     return [*marks, *(_scale(ground, size) if ground else ())]
 
 
@@ -117,7 +123,7 @@ def border_marks(border: Border, totals: Mapping[Direction, int], text: str = ""
     """
     height = border.size[1]
     width = boxes.line_width(np.empty((int(height), 0), np.uint8))
-    if not isinstance(border, PlacedLine):
+    if not isinstance(border, Line):
         top = min(border.corners, key=lambda corner: corner[1])
         yield Mark(border.corners, boxes.ZONE, width, border.name + text, top, is_closed=True)
         return
@@ -154,8 +160,8 @@ def draw_marks(surface: Surface, marks: Iterable[Mark]) -> None:
         boxes.draw_lines(surface, mark.points, mark.color, mark.width, closed=mark.is_closed)
         if mark.is_arrow:
             end, length = mark.points[-1], max(3 * mark.width, _TIP * surface.shape[1])
-            back = (point for point in reversed(mark.points) if math.dist(point, end) >= length)
-            start = next(back, mark.points[0])
+            points = (point for point in reversed(mark.points) if math.dist(point, end) >= length)
+            start = next(points, mark.points[0])
             tip = length / max(length, math.dist(start, end))
             boxes.draw_arrow(surface, start, end, mark.color, mark.width, tip=tip)
     for mark in drawn:
@@ -203,7 +209,7 @@ def traffic_part(
     if frame is not None:
         paths = {record.id: record.path for record in records}
         size = frame.shape[1], frame.shape[0]
-        picture = with_marks(frame, place_marks(size, borders, counts, paths, ground))
+        picture = with_marks(frame, traffic_marks(size, borders, counts, paths, ground))
     table = ("from", "to", *several, "vehicles"), rows
     return TrafficPart(_totals(counts, several), table, colors, picture)
 
@@ -224,5 +230,5 @@ def _totals(counts: Counts, classes: Sequence[str]) -> Table:
 
 def _numbers(events: Sequence[Event], classes: Sequence[str]) -> list[str]:
     """Return the number of events of each class, and in total."""
-    found = Counter(map(class_of, events))
-    return [*(str(found[name]) for name in classes), str(len(events))]
+    numbers = Counter(map(class_of, events))
+    return [*(str(numbers[name]) for name in classes), str(len(events))]

@@ -1,4 +1,4 @@
-"""A video in pictures: the best one of each vehicle, and where vehicles were."""
+"""The best image of each vehicle."""
 
 import numpy as np
 
