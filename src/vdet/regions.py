@@ -7,8 +7,7 @@ import cv2
 import numpy as np
 
 from vdet.boxes import BoolArray
-from vdet.config.camera import CameraSettings
-from vdet.config.places import RegionSettings
+from vdet.config.places import RegionSettings, aspect_problem
 from vdet.errors import ConfigError
 from vdet.media.images import read_header, read_image
 from vdet.polygons import Point
@@ -46,7 +45,7 @@ class Regions:
             if setting.mask:
                 layer |= _read_mask(setting.mask, width, height)
             else:
-                corners = [(x * width, y * height) for x, y in setting.points or ()]
+                corners = list(setting.for_frames(width, height).points or ())
                 polygons[setting.kind][setting.name] = corners
                 # With the pixels of its sides.
                 cv2.fillPoly(layer, [np.floor(corners).astype(np.int32)], 1)
@@ -81,11 +80,9 @@ def check_masks(settings: Sequence[RegionSettings]) -> None:
 def _read_mask(path: str, width: int, height: int) -> BoolArray:
     image = read_image(Path(path))
     rows, columns = image.shape[:2]
-    try:
-        CameraSettings(size=(columns, rows)).check_frames(width, height)
-    except ConfigError as error:
+    if aspect_problem((columns, rows), width, height):
         raise ConfigError(
             f"{path}: its aspect ratio differs from frames of {width}×{height}; draw it on a frame"
-        ) from error
+        )
     grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
     return np.asarray(cv2.resize(grey, (width, height), interpolation=cv2.INTER_NEAREST) >= _WHITE)

@@ -3,18 +3,16 @@
 import re
 from contextlib import suppress
 from datetime import datetime
-from typing import Annotated
+from typing import Annotated, ClassVar
 from zoneinfo import ZoneInfo
 
 from pydantic import Field, field_validator
 from pydantic_core.core_schema import ValidationInfo
 
-from vdet.config.places import Coordinate, Place, Size
+from vdet.config.places import Coordinate, FramePoint, Shape, Size, aspect_problem
 from vdet.config.section import Section
 from vdet.errors import ConfigError
 
-_ASPECT_TOLERANCE = 0.01
-"""Largest relative difference of the aspect ratios of a frame and of the reference size."""
 _EARLIEST, _LATEST = 1990, 9000
 """Years of moments; cameras without a clock begin in 1904, 1970 or 1980."""
 _LENS_TOLERANCE = 0.005  # accepts 854×480 for 1280×720
@@ -74,10 +72,12 @@ class LensSettings(Section):
         return (fx * across, 0.0, x), (0.0, fy * down, y), last
 
 
-class GroundPoint(Section):
+class GroundPoint(Shape):
     """A point of the road."""
 
-    pixel: Place
+    point_fields: ClassVar[tuple[str, ...]] = ("pixel",)
+
+    pixel: FramePoint
     """Position in the frame, x and y; whole numbers are the centres of pixels."""
     metres: tuple[Coordinate, Coordinate]
     """Position on the road, x and y in metres at right angles, from any origin."""
@@ -144,7 +144,8 @@ class CameraSettings(Section):
 
     size: Size | None = None
     """Width and height in pixels of the frames that points in this file refer to. Other frame sizes
-    need the same aspect ratio. null: points are fractions of the frame, 0 to 1.
+    need the same aspect ratio. null: points are fractions of the frame, 0 to 1. The key size of an
+    item with points overrides it; [1, 1] stands for fractions.
     """
     lens: LensSettings | None = None
     """The lens, from `vdet calibrate`. null: no distortion."""
@@ -156,12 +157,5 @@ class CameraSettings(Section):
 
     def check_frames(self, width: int, height: int) -> None:
         """Raise a `ConfigError` if frames have another aspect ratio than `size`."""
-        if self.size is None:
-            return
-        given_width, given_height = self.size
-        aspect = (width / height) / (given_width / given_height)
-        if abs(aspect - 1) > _ASPECT_TOLERANCE:
-            raise ConfigError(
-                f"camera.size: points are for frames of {given_width}×{given_height}, "
-                f"whose aspect ratio differs from {width}×{height}; define them for this size"
-            )
+        if self.size and (problem := aspect_problem(self.size, width, height)):
+            raise ConfigError(f"camera.size: {problem}")

@@ -13,7 +13,8 @@ import yaml
 from pydantic.fields import FieldInfo
 from pydantic_core import to_jsonable_python
 
-from vdet.config.places import to_pixels
+from vdet.config.loading import shapes_in
+from vdet.config.places import FRACTIONS, Shape
 from vdet.config.schema import Section, Settings
 
 HEADING = "# vdet settings. `vdet config` prints the effective ones."
@@ -25,8 +26,11 @@ def render_settings(settings: Settings) -> str:
 
     Each key is preceded by what it means; the keys of list items stand before the list.
     """
-    # An item says only what it has.
-    values = to_pixels(to_jsonable_python(settings, exclude_none=True))
+    # An item says only what it has, and its size only if it differs from that of the file.
+    values = to_jsonable_python(settings, exclude_none=True)
+    for _, shape in shapes_in(values):
+        if shape["size"] == list(settings.camera.size or FRACTIONS):
+            del shape["size"]
     return "\n".join([HEADING, *_section(settings, values, "")]) + "\n"
 
 
@@ -54,6 +58,8 @@ def _section(section: Section, values: Mapping[str, Any], indent: str) -> Iterat
     texts = explanations(type(section))
     for name, field in type(section).model_fields.items():
         value = getattr(section, name)
+        if name == "size" and isinstance(section, Shape) and name not in values:
+            continue
         if not indent:
             yield ""
         if isinstance(value, Section):
@@ -79,7 +85,10 @@ def _item_keys(field: FieldInfo, indent: str) -> Iterator[str]:
         what = _first_line(item)
         yield from _comment(f"{subject} is {what[:1].lower()}{what[1:]}", indent)
         texts = explanations(item)
+        explained = Shape.model_fields if issubclass(item, Shape) else ()  # at camera.size
         for name in item.model_fields:
+            if name in explained:
+                continue
             key, rest = f"{indent}#   ", f"{indent}#     "
             yield from textwrap.wrap(
                 f"{name}: {texts.get(name, '')}", WIDTH, initial_indent=key, subsequent_indent=rest

@@ -19,7 +19,7 @@ from pydantic import (
 from vdet.config.camera import CameraSettings, moment
 from vdet.config.detector import DetectorSettings, NetworkSettings, SvmSettings
 from vdet.config.kinds import with_kind
-from vdet.config.places import Place, RegionList, TrafficSettings
+from vdet.config.places import FramePoint, RegionList, Shape, TrafficSettings
 from vdet.config.section import Ratio, Section
 from vdet.config.tracker import MotionTrackerSettings, TrackerSettings
 from vdet.errors import ConfigError
@@ -27,7 +27,7 @@ from vdet.errors import ConfigError
 Metres = Annotated[float, Field(gt=0, le=200)]
 
 
-class LaneSettings(Section):
+class LaneSettings(Shape):
     """The lane: whether to find it, and a trapezoid along its lines on a straight road.
 
     The trapezoid here is where many dashboard cameras see their lane. For a camera of your own,
@@ -38,7 +38,7 @@ class LaneSettings(Section):
 
     enabled: bool = False
     """Find and draw the lane."""
-    points: tuple[Place, Place, Place, Place] = (
+    points: tuple[FramePoint, FramePoint, FramePoint, FramePoint] = (
         (0.21, 0.93), (0.79, 0.93), (0.54, 0.63), (0.46, 0.63),
     )  # fmt: skip
     """Where the lines cross two rows: near left, near right, far right, far left; x and y."""

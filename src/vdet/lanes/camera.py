@@ -109,16 +109,16 @@ class TopView:
     def __init__(self, settings: LaneSettings, width: int, height: int) -> None:
         self.lane_width, self.length = settings.metres or _USUAL
         """Of the lane that is looked for, and along the trapezoid, metres."""
-        corners = np.array(settings.points)
+        corners = np.array(settings.for_frames(width, height).points)
         near_left, near_right, far_right, far_left = corners[:, 0].tolist()
-        near, far = near_right - near_left, far_right - far_left  # of the frame's width
+        near, far = near_right - near_left, far_right - far_left
         start = self.length * far / (near - far)  # widths in the frame are proportional to 1/z
         end = start + self.length
         left = (near_left - far_left) / (near - far) * self.lane_width
         right = left + self.lane_width
         ground = np.array([(left, start), (right, start), (right, end), (left, end)], np.float32)
-        frame = (corners * (width, height)).astype(np.float32)
-        self._to_frame = np.asarray(cv2.getPerspectiveTransform(ground, frame), np.float64)
+        to_frame = cv2.getPerspectiveTransform(ground, corners.astype(np.float32))
+        self._to_frame = np.asarray(to_frame, np.float64)
         """From `(x, z, 1)`, metres, to pixels of the undistorted frame."""
         self._to_ground = np.linalg.inv(self._to_frame)
         rows = round(self.length * ALONG)

@@ -82,8 +82,9 @@ def ground_of(camera: CameraSettings, width: int, height: int) -> "Ground | None
     """
     if not camera.ground:
         return None
-    pixels = np.array([point.pixel for point in camera.ground], np.float64) * (width, height)
-    metres = np.array([point.metres for point in camera.ground], np.float64)
+    points = [point.for_frames(width, height) for point in camera.ground]
+    pixels = np.array([point.pixel for point in points], np.float64)
+    metres = np.array([point.metres for point in points], np.float64)
     return fit_ground(pixels, metres, Undistorter(camera.lens, width, height))
 
 

@@ -161,10 +161,10 @@ def place(
     settings: TrafficSettings, width: int, height: int
 ) -> tuple[tuple[PlacedLine, ...], tuple[Zone, ...]]:
     """Place lines and zones in frames of `width` × `height` pixels."""
-    size = width, height
+    size, settings = (width, height), settings.for_frames(width, height)
 
     def placed(point: Point) -> Point:
-        return _snapped(point[0] * width, width), _snapped(point[1] * height, height)
+        return _snapped(point[0], width), _snapped(point[1], height)
 
     lines = tuple(
         PlacedLine(line.name, (line.left, line.right), placed(line.start), placed(line.end), size)
