@@ -28,11 +28,11 @@ import numpy as np
 
 from vdet.boxes import Box, Boxes, Image
 from vdet.conditions.finding import Finding
-from vdet.config.kinds import kind_of_model
+from vdet.config.kinds import DetectorKind, TrackerKind, kind_of_model
 from vdet.config.loading import find_config
 from vdet.config.loading import load_settings as load_layers
 from vdet.config.schema import DetectorSettings, Settings, TrackerSettings
-from vdet.detect.factory import DetectorKind, DetectorObject, as_model, load_detector
+from vdet.detect.factory import DetectorObject, as_model, load_detector
 from vdet.detect.protocol import DetectorModel, VideoDetector
 from vdet.errors import ImageError, VdetError
 from vdet.evaluate.scores import Scores
@@ -51,7 +51,7 @@ from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind, check_sinks
 from vdet.run.steps import Step, StepContext
 from vdet.run.video import Results, Run, RunTotals, open_video, run_video
-from vdet.track.factory import TrackerKind, make_tracker
+from vdet.track.factory import make_tracker
 from vdet.track.track import FrameTracks, Track, VideoTracker
 from vdet.traffic.counting import count_files, count_frames
 from vdet.traffic.counts import Counts, Event

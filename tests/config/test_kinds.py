@@ -104,7 +104,7 @@ FAKE = '''
 from typing import Literal
 from pydantic import Field
 from vdet.config.schema import DetectorSettings, Section
-from vdet.detect.factory import DetectorKind
+from vdet.config.kinds import DetectorKind
 
 class PartSettings(Section):
     """A part of it."""
@@ -174,7 +174,7 @@ class TestOtherPackages:
         ("assignment", "words"),
         [
             ("level=9", r"\.level: belongs to detector\.kind: fake, .* with net$"),
-            ("kind=best", ": best: .* known: svm, net, broken, fake, missing, nameless, odd$"),
+            ("kind=best", ": best: .* known: net, svm, broken, fake, missing, nameless, odd$"),
             ("kind=broken", r": broken: fake_vdet:NOTHING cannot be loaded \(AttributeError: .*"),
             ("kind=missing", r": missing: no_such.* cannot be loaded \(ModuleNotFoundError: .*"),
             ("kind=nameless", ': nameless: has no settings of kind = "nameless"; repair'),

@@ -1,7 +1,7 @@
 """The section `detector`: of networks, and of the linear SVM with its features and windows."""
 
 import math
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -11,13 +11,7 @@ Searches = Annotated[float | None, Field(gt=0, le=1000)]
 
 
 class DetectorSettings(Section):
-    """Which detector finds vehicles, and its settings; each kind has its own class.
-
-    `model_suffix` is the ending of its model files; None for a kind whose files have no ending of
-    their own.
-    """
-
-    model_suffix: ClassVar[str | None] = None
+    """Which detector finds vehicles, and its settings; each kind has its own class."""
 
     kind: str
     model: str | None = Field(None, min_length=1, max_length=4096)
@@ -48,8 +42,6 @@ class DetectorSettings(Section):
 
 class NetworkSettings(DetectorSettings):
     """The detector: a network in an ONNX file, shipped or from another tool."""
-
-    model_suffix: ClassVar[str | None] = ".onnx"
 
     kind: Literal["net"] = "net"
     """net: a network."""
@@ -218,8 +210,6 @@ class ScoreSettings(Section):
 
 class SvmSettings(DetectorSettings):
     """The detector: a linear SVM on HOG and colour features, sliding windows and a heatmap."""
-
-    model_suffix: ClassVar[str | None] = ".npz"
 
     kind: Literal["svm"] = "svm"
     """svm: a linear SVM on HOG and colour features."""

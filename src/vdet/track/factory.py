@@ -1,33 +1,16 @@
 """Trackers of any kind, made from settings."""
 
-from collections.abc import Callable
-from dataclasses import astuple, dataclass, replace
+from dataclasses import astuple, replace
 from math import inf
-from typing import Any
 
 import numpy as np
 
 from vdet.boxes import Box, Boxes
-from vdet.config.schema import Settings, TrackerSettings
+from vdet.config.kinds import TrackerKind
+from vdet.config.schema import Settings
 from vdet.media import Picture
 from vdet.plugins import TRACKERS, load_plugin
 from vdet.track.track import State, TimedTracker, Track, VideoTracker
-
-
-@dataclass(frozen=True, slots=True)
-class TrackerKind:
-    """A kind of tracker, as registered under its name.
-
-    Attributes
-    ----------
-    settings
-        Class of the section `tracker` for this kind; the default of its `kind` is the name.
-    make
-        Takes these settings and the width and height of the frames, pixels.
-    """
-
-    settings: type[TrackerSettings]
-    make: Callable[[Any, int, int], VideoTracker]
 
 
 def make_tracker(settings: Settings, width: int, height: int) -> TimedTracker:

@@ -39,7 +39,6 @@ from vdet.boxes import Boxes, Image
 from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
 from vdet.config.tracker import RulesTrackerSettings
 from vdet.media import Picture
-from vdet.track.factory import TrackerKind
 from vdet.track.rules.car import Car, Region, combine
 from vdet.track.track import State, Track
 
@@ -229,8 +228,6 @@ def _any_overlap(regions: Iterable[Region], pixels: int) -> bool:
     return any(box.width > pixels and box.height > pixels for box in common)
 
 
-def _make(settings: RulesTrackerSettings, _width: int, height: int) -> RulesTracker:
+def make_rules_tracker(settings: RulesTrackerSettings, _width: int, height: int) -> RulesTracker:
+    """Return a tracker for frames of `height` rows."""
     return RulesTracker(scale_lengths(settings, height / REFERENCE_HEIGHT))
-
-
-RULES = TrackerKind(RulesTrackerSettings, _make)
