@@ -36,8 +36,8 @@ def refusal(path: Path, text: str, *assignments: str) -> str:
     [
         (
             "{kind: rules, history: 12}",
-            ("tracker.young=3",),
-            RulesTrackerSettings(history=12, young=3),
+            ("tracker.young=3",),  # the old name
+            RulesTrackerSettings(history=12, detections_to_keep=3),
         ),
         ("{kind: rules, history: 12}", ("tracker.kind=rules",), RulesTrackerSettings(history=12)),
         (
@@ -78,7 +78,7 @@ RULES_ONLY = "belongs to tracker.kind: rules, and has no effect with motion"
 @pytest.mark.parametrize(
     ("text", "assignments", "message"),
     [
-        ("tracker:\n  near: 3\n", (), f"my.yaml:2:3: tracker.near: {RULES_ONLY}"),
+        ("tracker:\n  max_misses: 3\n", (), f"my.yaml:2:3: tracker.max_misses: {RULES_ONLY}"),
         (
             "tracker: {kind: rules, decay: 0.3, history: 3}",
             (),

@@ -51,7 +51,9 @@ class NetworkSettings(DetectorSettings):
     """
     min_score_still: Ratio = 0.4
     min_score: float = Field(0.03, gt=0, lt=1)
-    """Ignore boxes with a lower score."""
+    """Ignore boxes with a lower score. Of the others, a video shows what reaches tracker.min_score,
+    and an image what reaches min_score_still.
+    """
     nms_iou: Ratio = 0.55
     """Remove a box if its intersection over union with a better one is higher."""
     classes: tuple[str, ...] = Field(

@@ -130,7 +130,7 @@ class RulesTracker:
         """Rules 8 to 11."""
         gaps = {car: car.box.gap(region.box) for car in self.cars}
         car = min(
-            (car for car, gap in gaps.items() if gap <= self._settings.near),
+            (car for car, gap in gaps.items() if gap <= self._settings.max_distance),
             key=lambda car: (car in self.places, gaps[car], _distance(car, region)),
             default=None,
         )
@@ -144,7 +144,7 @@ class RulesTracker:
     def _place_combined(self, region: Region, car: Car) -> bool:
         """Rules 9 and 10; False where no other region makes up the car together with this one."""
         others = (other for other in self._unused if other is not region)
-        near = [other for other in others if car.box.gap(other.box) <= self._settings.near]
+        near = [other for other in others if car.box.gap(other.box) <= self._settings.max_distance]
         nearest = min(near, key=lambda other: _distance(car, other), default=None)
         other = self.places.get(car, nearest)
         if other is None or not car.is_as_wide_as(combined := combine(region, other)):
