@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
-from vdet.errors import INTERRUPTED, ClusterError
+from vdet.errors import INTERRUPTED, ClusterError, needing
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -198,13 +198,13 @@ class DaskCluster:
 
         Raises
         ------
+        PackageError
+            Dask is not installed.
         ClusterError
-            Dask is not installed, or the scheduler does not answer, has no worker, or ends.
+            The scheduler does not answer, has no worker, or ends.
         """
-        try:
+        with needing("dask"):
             from distributed import Client
-        except ImportError as error:
-            raise ClusterError("--scheduler needs Dask; pip install dask distributed") from error
         for name in ("distributed", "distributed.client"):
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # errors are raised
         with contextlib.ExitStack() as stack:

@@ -7,7 +7,7 @@ import click
 from vdet.cli import options
 from vdet.cli.command import command
 from vdet.cli.messages import live_bar, print_lines, progress_steps
-from vdet.errors import DataError, counted
+from vdet.errors import counted, needing
 from vdet.files import check_output
 from vdet.workers import limit_library_threads
 
@@ -146,11 +146,9 @@ def train_net(
         raise click.UsageError("nothing to learn from; pass DATA or --video")
     options.check_file(output, ".onnx", what="networks", overwrite=overwrite)
     settings = options.read_settings()
-    try:
+    with needing("train"):
         from vdet.learn.net.sources import clip_source, image_source
         from vdet.learn.net.training import train_to_file
-    except ImportError as error:
-        raise DataError(f"{error.name} is not installed; pip install torch onnx") from error
     from vdet.labels.reading import read_labelled_images
     from vdet.labels.roles import Roles
 

@@ -38,6 +38,7 @@ from itertools import combinations, count
 from vdet.boxes import Boxes, Image
 from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
 from vdet.config.tracker import RulesTrackerSettings
+from vdet.errors import ArgumentError
 from vdet.media import Picture
 from vdet.track.rules.car import Car, Region, combine
 from vdet.track.track import State, Track
@@ -75,7 +76,7 @@ class RulesTracker:
     ) -> list[Track]:
         """Follow the cars into the next frame, as `VideoTracker.update`; `picture` is required."""
         if picture is None:
-            raise ValueError("the rules tracker needs the frame; pass its image")
+            raise ArgumentError("image: the rules tracker needs the frame; pass it")
         regions = large_enough(detections, picture.width, picture.height, self._settings)
         self.associate(regions, picture.image)
         for car, place in self.places.items():
