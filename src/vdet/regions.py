@@ -30,7 +30,7 @@ class Regions:
     Raises
     ------
     ConfigError
-        A mask has another aspect ratio.
+        The points of a polygon, or a mask, have another aspect ratio.
     ImageError
         A mask cannot be read.
     """
@@ -47,27 +47,18 @@ class Regions:
             else:
                 corners = list(setting.for_frames(width, height).points or ())
                 polygons[setting.kind][setting.name] = corners
-                # With the pixels of its sides.
                 cv2.fillPoly(layer, [np.floor(corners).astype(np.int32)], 1)
         shows_all = not any(setting.kind == "include" for setting in settings)
         self.pixels: BoolArray = (shows_all | (layers["include"] > 0)) & (layers["exclude"] == 0)
 
     def contains(self, point: Point) -> bool:
-        """Return whether a vehicle whose foot is at a point, x and y in pixels, is shown.
+        """Return whether a vehicle that stands at a point, x and y in pixels, is shown.
 
         A point outside the frame counts as at its edge.
         """
         height, width = self.pixels.shape
         x, y = min(max(int(point[0]), 0), width - 1), min(max(int(point[1]), 0), height - 1)
         return bool(self.pixels[y, x])
-
-
-def lay_regions(settings: Sequence[RegionSettings], width: int, height: int) -> Regions | None:
-    """Return the regions of the settings in frames of this size; None for the whole frame.
-
-    Errors as of `Regions`.
-    """
-    return Regions(settings, width, height) if settings else None
 
 
 def check_masks(settings: Sequence[RegionSettings]) -> None:

@@ -77,7 +77,6 @@ def draw(
         # Without regions, because the page shows their effect.
         run = Run(clip, (), settings.model_copy(update={"regions": ()}), start, end)
         image, frames = read_scene(run, tracks, steps)
-    settings.camera.check_frames(image.shape[1], image.shape[0])
     drawing = Drawing(image, frames, settings, options.own_values(), facing)
     if propose and not drawing.proposals:
         raise ConfigError(f"{clip}: no stream has enough vehicles; draw lines with -o gate.html")

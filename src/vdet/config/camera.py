@@ -1,4 +1,4 @@
-"""The section `camera`: the frames that places are given for, the lens, the road and the clock."""
+"""The section `camera`: the size that points are given for, the lens, the road and the clock."""
 
 import re
 from contextlib import suppress
@@ -9,12 +9,12 @@ from zoneinfo import ZoneInfo
 from pydantic import Field, field_validator
 from pydantic_core.core_schema import ValidationInfo
 
-from vdet.config.places import Coordinate, FramePoint, Shape, Size, aspect_problem
+from vdet.config.places import Coordinate, FramePoint, Shape, Size
 from vdet.config.section import Section
 from vdet.errors import ConfigError
 
 _EARLIEST, _LATEST = 1990, 9000
-"""Years of moments; cameras without a clock begin in 1904, 1970 or 1980."""
+"""Years of recordings; cameras without a clock begin in 1904, 1970 or 1980."""
 _LENS_TOLERANCE = 0.005  # accepts 854×480 for 1280×720
 
 _Coefficient = Annotated[float, Field(ge=-1000, le=1000)]
@@ -93,15 +93,13 @@ _USUAL = re.compile(
 """A time in a name, such as 2026-05-01_07-00-00, 20260501T070000Z or 20260501070000."""
 
 
-def moment(text: str) -> datetime:
-    """Return a moment as ISO 8601 writes it. Raises `ValueError`."""
-    try:
-        found = datetime.fromisoformat(text)
-    except ValueError:
-        found = datetime.min
-    if not _EARLIEST <= found.year <= _LATEST:
-        raise ValueError(f"{text!r} is not a time; expected one such as '2026-05-01 07:00+02:00'")
-    return found
+def parse_date_time(text: str) -> datetime:
+    """Return the date and time that a text in ISO 8601 states. Raises `ValueError`."""
+    with suppress(ValueError):
+        date_time = datetime.fromisoformat(text)
+        if _EARLIEST <= date_time.year <= _LATEST:
+            return date_time
+    raise ValueError(f"{text!r} is not a time; expected one such as '2026-05-01 07:00+02:00'")
 
 
 class ClockSettings(Section):
@@ -118,8 +116,8 @@ class ClockSettings(Section):
     @classmethod
     def _has_known_codes(cls, pattern: str | None) -> str | None:
         if pattern is not None:
-            rest = re.sub("|".join(_CODES), "", pattern)
-            if "%" in rest or pattern == rest:
+            literal_text = re.sub("|".join(_CODES), "", pattern)
+            if "%" in literal_text or pattern == literal_text:
                 raise ValueError(f"a pattern can only contain {', '.join(_CODES)} and other text")
         return pattern
 
@@ -133,9 +131,9 @@ class ClockSettings(Section):
         for text in texts:
             with suppress(ValueError):
                 if not self.pattern:
-                    return moment(text)
+                    return parse_date_time(text)
                 zone = "Z" if "%SZ" in self.pattern else ""
-                return moment(datetime.strptime(text, self.pattern).isoformat() + zone)
+                return parse_date_time(datetime.strptime(text, self.pattern).isoformat() + zone)
         return None
 
 
@@ -154,8 +152,3 @@ class CameraSettings(Section):
     speeds and distances are measured.
     """
     clock: ClockSettings = ClockSettings()
-
-    def check_frames(self, width: int, height: int) -> None:
-        """Raise a `ConfigError` if frames have another aspect ratio than `size`."""
-        if self.size and (problem := aspect_problem(self.size, width, height)):
-            raise ConfigError(f"camera.size: {problem}")

@@ -31,8 +31,8 @@ class DetectorSettings(Section):
         return "car", "truck", "bus", "vehicle"
 
     @property
-    def foot(self) -> float:
-        """Distance from the tyres down to the lower edge of a box, as a fraction of its height."""
+    def tyre_height(self) -> float:
+        """Height of the tyres above the lower edge of a box, as a fraction of its height."""
         return 0.0
 
     def showing_all(self) -> Self:
@@ -225,6 +225,6 @@ class SvmSettings(DetectorSettings):
     score: ScoreSettings = ScoreSettings()
 
     @property
-    def foot(self) -> float:
-        """Distance from the tyres down to the lower edge of a box, as a fraction of its height."""
+    def tyre_height(self) -> float:
+        """Height of the tyres above the lower edge of a box, as a fraction of its height."""
         return 0.0 if self.heat.votes is None else 0.04

@@ -157,9 +157,9 @@ def _rounded(value: Any) -> Any:
 
 
 def _over(below: Document, above: Document) -> Document:
-    """Lay a document over another one."""
+    """Return a document with the values of `above` instead of those of `below`."""
     values = _joined(below.values, above.values)
-    return Document(below.name, values, below.places | above.places)
+    return Document(below.name, values, below.positions | above.positions)
 
 
 def _joined(below: Any, above: Any) -> Any:
@@ -169,13 +169,13 @@ def _joined(below: Any, above: Any) -> Any:
 
 
 def _with_kinds_over(below: Document, above: Document) -> Document:
-    """Lay a document over another one; a section whose kind it changes starts anew."""
+    """Do as `_over`; a section whose kind `above` changes starts from its defaults."""
     values = dict(below.values)
     for name in GROUPS:
         kind = inside(above.values, name, "kind")
         if kind is not None and kind != (inside(values, name, "kind") or default_kind(name)):
             values[name] = {}
-    return _over(Document(below.name, values, below.places), above)
+    return _over(Document(below.name, values, below.positions), above)
 
 
 def inside(values: Any, *keys: str) -> Any:
@@ -195,7 +195,7 @@ _EXPECTED = {
 def _describe(mistake: ErrorDetails, merged: Document) -> str:
     key = tuple(mistake["loc"])
     named = f"{document.format_key(key)}: " if key else ""
-    return f"{merged.place_of(key)}: {named}{_expected(mistake, key)}"
+    return f"{merged.position_of(key)}: {named}{_expected(mistake, key)}"
 
 
 def _expected(mistake: ErrorDetails, key: Key) -> str:
@@ -212,16 +212,16 @@ def _expected(mistake: ErrorDetails, key: Key) -> str:
 
 
 def _unknown(key: Key, section: type[Section]) -> str:
-    """Return a hint: the kind that has this key, the key probably meant, or all known ones."""
-    name, group, known = str(key[-1]), str(key[0]), list(section.model_fields)
+    """Return a hint: the kind that has this key, the key probably meant, or all keys."""
+    name, group, keys = str(key[-1]), str(key[0]), list(section.model_fields)
     if len(key) == 2 and group in GROUPS:
         owners = [kind for kind in plugin_names(GROUPS[group]) if name in _keys_of(group, kind)]
         if owners:
             words = f"belongs to {group}.kind: {' or '.join(owners)}, and has no effect with"
             return f"{words} {section.model_fields['kind'].default}"
-    if close := difflib.get_close_matches(name, known, n=1):
+    if close := difflib.get_close_matches(name, keys, n=1):
         return f"unknown setting; did you mean {close[0]}?"
-    return f"unknown setting; known settings: {', '.join(known)}"
+    return f"unknown setting; known settings: {', '.join(keys)}"
 
 
 def _keys_of(group: str, kind: str) -> Collection[str]:

@@ -37,8 +37,8 @@ def aspect_problem(size: tuple[int, int], width: int, height: int) -> str | None
     if size == FRACTIONS or abs(aspect - 1) <= _ASPECT_TOLERANCE:
         return None
     return (
-        f"points are for frames of {size[0]}×{size[1]}, whose aspect ratio differs from "
-        f"{width}×{height}; define them for this size"
+        f"camera.size: points are for frames of {size[0]}×{size[1]}, whose aspect ratio differs "
+        f"from {width}×{height}; define them for this size"
     )
 
 

@@ -40,7 +40,7 @@ def explanations(section: type[Section]) -> Mapping[str, str]:
     It is the description of its field, or else the text below the field in the source. That is read
     here, and not by pydantic: parsing all sections would take a third of the start of a command.
     """
-    found: dict[str, str] = {}
+    texts: dict[str, str] = {}
     for item in reversed(section.__mro__):
         if not issubclass(item, Section):
             continue
@@ -49,9 +49,9 @@ def explanations(section: type[Section]) -> Mapping[str, str]:
             for field, text in pairwise(kind.body if isinstance(kind, ast.ClassDef) else ()):
                 match field, text:
                     case ast.AnnAssign(ast.Name(name)), ast.Expr(ast.Constant(str(words))):
-                        found[name] = inspect.cleandoc(words)
+                        texts[name] = inspect.cleandoc(words)
     described = {name: field.description for name, field in section.model_fields.items()}
-    return found | {name: text for name, text in described.items() if text}
+    return texts | {name: text for name, text in described.items() if text}
 
 
 def _section(section: Section, values: Mapping[str, Any], indent: str) -> Iterator[str]:
@@ -82,16 +82,18 @@ def _item_keys(field: FieldInfo, indent: str) -> Iterator[str]:
         if not (isclass(item) and issubclass(item, Section)):
             continue
         subject = "Each item" if get_origin(field.annotation) is tuple else "It"
-        what = _first_line(item)
-        yield from _comment(f"{subject} is {what[:1].lower()}{what[1:]}", indent)
+        title = _first_line(item)
+        yield from _comment(f"{subject} is {title[:1].lower()}{title[1:]}", indent)
         texts = explanations(item)
         explained = Shape.model_fields if issubclass(item, Shape) else ()  # at camera.size
         for name in item.model_fields:
             if name in explained:
                 continue
-            key, rest = f"{indent}#   ", f"{indent}#     "
             yield from textwrap.wrap(
-                f"{name}: {texts.get(name, '')}", WIDTH, initial_indent=key, subsequent_indent=rest
+                f"{name}: {texts.get(name, '')}",
+                WIDTH,
+                initial_indent=f"{indent}#   ",
+                subsequent_indent=f"{indent}#     ",
             )
 
 

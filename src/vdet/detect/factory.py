@@ -63,8 +63,8 @@ class _Shared:
         return self.detector if isinstance(self.detector, VideoDetector) else self
 
     def search(self, picture: Picture, index: int | None) -> Boxes:  # noqa: ARG002
-        found: Boxes = self.detector(picture.image)
-        return found
+        detections: Boxes = self.detector(picture.image)
+        return detections
 
     def detect(self, candidates: Boxes) -> Boxes:
         return candidates

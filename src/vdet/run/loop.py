@@ -313,7 +313,6 @@ def build(
         The points or the lens in the settings do not fit the frames.
     """
     height, width = (video.height, video.width) if video else images[0].shape[:2]
-    settings.camera.check_frames(width, height)
     detector = parts.model.for_video(width, height, images)
     unknown = getattr(detector, "unknown_classes", ())
     made = make_steps(StepContext(settings, width, height, video, unknown), parts.steps)

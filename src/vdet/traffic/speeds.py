@@ -184,7 +184,7 @@ def precision_at(line: PlacedLine, ground: Ground, speed: float) -> tuple[float,
     off by a pixel. All are NaN far from the points of the ground.
     """
     x, y = np.mean([line.start, line.end], axis=0)
-    here, beside, above = ground.place(np.array([(x, y), (x + 1, y), (x, y - 1)]))
+    here, beside, above = ground.metres(np.array([(x, y), (x + 1, y), (x, y - 1)]))
     across, along = np.hypot(*(beside - here)), np.hypot(*(above - here))
     return across, along, np.hypot(ground.scale_error, 2**0.5 * along / (WINDOW * speed))
 
@@ -223,7 +223,7 @@ def _common(ground: Ground, rows: Float64Array) -> float:
     """
     first, last = rows[[0, -1], 1:3]
     low = [(0, _FOOT_ERROR * height) for height in rows[[0, -1], 4]]
-    places = ground.place(np.array([first, last, first + low[0], last + low[1]]))
+    places = ground.metres(np.array([first, last, first + low[0], last + low[1]]))
     driven, moved = places[1] - places[0], places[3] - places[2]
     length = max(float(np.hypot(*driven)), _MIN_DISTANCE)
     box = float(np.hypot(*(moved - driven))) / length
@@ -250,7 +250,7 @@ class _Geometry:
     def of(cls, ground: Ground, rows: Float64Array) -> "_Geometry":
         """Return the geometry for all `rows` of `measure`; unknown weights are NaN."""
         around = rows[:, 1:3] - _AROUND[:, np.newaxis]
-        places, above, left = ground.place(around.reshape(-1, 2)).reshape(around.shape)
+        places, above, left = ground.metres(around.reshape(-1, 2)).reshape(around.shape)
         away, beside = above - places, left - places
         pixel = np.hypot(*beside.T)
         depth = np.column_stack([-beside[:, 1], beside[:, 0]]) / pixel[:, None]
