@@ -234,16 +234,10 @@ def vehicles(
 
     Parameters and errors as for `follow`.
     """
-    results = follow(
-        source,
-        settings=settings,
-        detector=detector,
-        tracker=tracker,
-        steps=steps,
-        start=start,
-        end=end,
-        frames=frames,
+    run, parts = _prepare(
+        source, settings, detector, tracker, steps, start=start, end=end, frames=frames
     )
+    results = Results(open_video(run, parts))
     for _ in results:
         pass
     return results.vehicles

@@ -7,7 +7,6 @@ import pytest
 import yaml
 from pydantic import ValidationError
 
-from vdet.config.camera import CameraSettings
 from vdet.config.loading import load_settings
 from vdet.config.places import LineSettings, TrafficSettings
 from vdet.config.rendering import render_settings
@@ -99,11 +98,6 @@ def test_frames_of_another_shape_than_the_camera_are_refused() -> None:
         assert gate.for_frames(*size).size == size
     with pytest.raises(ConfigError, match="1280×720, whose aspect ratio differs from 640"):
         gate.for_frames(640, 480)
-
-
-def test_a_size_has_two_sides() -> None:
-    with pytest.raises(ValidationError, match=r"size\.1"):
-        CameraSettings.model_validate({"size": [1280]})
 
 
 class TestFiles:

@@ -83,12 +83,8 @@ SVM = DetectorKind(
     shipped=_imported("vdet.detect.svm.detector:shipped_model"),
     model_suffix=".npz",
 )
-MOTION = TrackerKind(
-    MotionTrackerSettings, make=_imported("vdet.track.motion.tracker:MotionTracker")
-)
-RULES = TrackerKind(
-    RulesTrackerSettings, make=_imported("vdet.track.rules.tracker:make_rules_tracker")
-)
+MOTION = TrackerKind(MotionTrackerSettings, _imported("vdet.track.motion.tracker:MotionTracker"))
+RULES = TrackerKind(RulesTrackerSettings, _imported("vdet.track.rules.tracker:make_rules_tracker"))
 
 
 def default_kind(section: str) -> str:

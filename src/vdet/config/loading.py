@@ -72,8 +72,8 @@ def load_settings(
     for layer in layers:
         if isinstance(model := inside(layer.values, "detector", "model"), str):
             detector = kind_of_model(Path(model)) or detector
-    chosen = Document("defaults", {"detector": {"kind": detector}} if detector else {})
-    merged = reduce(_with_kinds_over, layers, chosen)
+    default = Document("defaults", {"detector": {"kind": detector}} if detector else {})
+    merged = reduce(_with_kinds_over, layers, default)
     try:
         return Settings.model_validate(merged.values)
     except ValidationError as error:
@@ -99,8 +99,8 @@ def given_values(paths: Sequence[Path]) -> dict[str, Any]:
 def _read_layer(path: Path) -> Document:
     """Read a file as a layer, with paths relative to the working folder."""
     layer = _with_sizes(document.read_document(path))
-    masks = [region for kind, region in shapes_in(layer.values) if kind is RegionSettings]
-    for section in (layer.values.get("detector"), *masks):
+    regions = [region for kind, region in shapes_in(layer.values) if kind is RegionSettings]
+    for section in (layer.values.get("detector"), *regions):
         for key in ("model", "mask"):
             if isinstance(section, dict) and isinstance(section.get(key), str):
                 section[key] = str(path.parent / section[key])

@@ -16,6 +16,7 @@ from vdet.polygons import Point, crosses_itself
 Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
 FramePoint = tuple[Coordinate, Coordinate]
 """x to the right and y down, in frames of the size that belongs to the point."""
+Length = Annotated[int, Field(ge=1, le=100_000)]
 Side = Annotated[int, Field(ge=16, le=100_000)]
 Size = tuple[Side, Side]
 """Width and height of frames, in pixels."""
@@ -50,10 +51,8 @@ class Shape(Section):
 
     point_fields: ClassVar[tuple[str, ...]] = ("points",)
 
-    size: tuple[
-        Annotated[int, Field(ge=1, le=100_000)], Annotated[int, Field(ge=1, le=100_000)]
-    ] = FRACTIONS
-    """Width and height of the frames that its points refer to, explained at `camera.size`."""
+    size: tuple[Length, Length] = FRACTIONS
+    """Width and height of the frames that the points refer to, explained at `camera.size`."""
 
     def for_frames(self, width: int, height: int) -> Self:
         """Return the shape with its points in pixels of frames of `width` × `height`.
