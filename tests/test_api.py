@@ -203,6 +203,8 @@ def test_messages_name_parameters(clip_path: Path, tmp_path: Path) -> None:
     (taken := tmp_path / "a.csv").touch()
     with pytest.raises(vdet.VdetError, match=r"already exists; use overwrite=True to replace it"):
         vdet.detect_video(clip_path, tracks=taken, detector=red_boxes)
+    with pytest.raises(vdet.VdetError, match=r"^assignments: output.crf: must be less than"):
+        vdet.load_settings(assignments=["output.crf=99"])
     line = "traffic.lines=[{name: a, start: [0, 0], end: [1, 1]}]"
     settings = vdet.load_settings(assignments=[line])
     with pytest.raises(vdet.VdetError, match=r"pass size, such as size=\(1280, 720\)"):

@@ -74,6 +74,30 @@ AnyTracker = str | VideoTracker
 Seconds = float | Fraction
 
 
+_PARAMETERS = {
+    "--set": "assignments",
+    "use --overwrite": "use overwrite=True",
+    "--size, such as 1280x720": "size, such as size=(1280, 720)",
+    "--rate 25": "rate=25",
+    "--model": "detector=FILE",
+    "--begin": "the setting input.begin",
+    "an earlier --at": "an earlier Run.at",
+}
+"""Options of the command line in messages, and the parameters that take their place in Python."""
+
+
+@contextmanager
+def _named_for_python() -> Iterator[None]:
+    """Raise errors with the names of parameters in place of those of command line options."""
+    try:
+        yield
+    except VdetError as error:
+        for option, parameter in _PARAMETERS.items():
+            error.args = tuple(str(line).replace(option, parameter) for line in error.args)
+        raise
+
+
+@_named_for_python()
 def load_settings(config: Paths = (), assignments: Sequence[str] = ()) -> Settings:
     """Read settings.
 
@@ -219,6 +243,7 @@ def follow(
     return Results(open_video(run, parts))
 
 
+@_named_for_python()
 def vehicles(
     source: PathName | Run,
     *,
@@ -241,28 +266,6 @@ def vehicles(
     for _ in results:
         pass
     return results.vehicles
-
-
-@contextmanager
-def _named_for_python() -> Iterator[None]:
-    """Raise errors with the names of parameters in place of those of command line options."""
-    try:
-        yield
-    except VdetError as error:
-        for option, parameter in _PARAMETERS.items():
-            error.args = tuple(str(line).replace(option, parameter) for line in error.args)
-        raise
-
-
-_PARAMETERS = {
-    "use --overwrite": "use overwrite=True",
-    "--size, such as 1280x720": "size, such as size=(1280, 720)",
-    "--rate 25": "rate=25",
-    "--model": "detector=FILE",
-    "--begin": "the setting input.begin",
-    "an earlier --at": "an earlier Run.at",
-}
-"""Advice in messages: options of the command line, and what takes their place in Python."""
 
 
 @_named_for_python()
@@ -405,6 +408,7 @@ def _prepare(
     return replace(run, settings=effective), replace(parts, steps=steps)
 
 
+@_named_for_python()
 def _choose(
     settings: Settings | None, detector: AnyDetector | None, tracker: AnyTracker | None = None
 ) -> tuple[Settings, Parts]:
