@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vdet.config.places import RegionSettings
 from vdet.config.schema import Settings
+from vdet.config.shapes import RegionSettings
 from vdet.errors import ConfigError, ImageError
 from vdet.regions import Regions, check_masks
 from writing import write_image

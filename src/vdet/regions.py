@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 
 from vdet.boxes import BoolArray
-from vdet.config.places import RegionSettings, aspect_problem
+from vdet.config.shapes import RegionSettings, aspect_problem
 from vdet.errors import ConfigError
 from vdet.media.images import read_header, read_image
 from vdet.polygons import Point

@@ -9,8 +9,8 @@ from zoneinfo import ZoneInfo
 from pydantic import Field, field_validator
 from pydantic_core.core_schema import ValidationInfo
 
-from vdet.config.places import Coordinate, FramePoint, Shape, Size
 from vdet.config.section import Section
+from vdet.config.shapes import Coordinate, FramePoint, Shape, Size
 from vdet.errors import ConfigError
 
 _EARLIEST, _LATEST = 1990, 9000

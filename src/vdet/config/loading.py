@@ -16,8 +16,8 @@ from vdet.config import document
 from vdet.config.camera import GroundPoint
 from vdet.config.document import Document, Key
 from vdet.config.kinds import GROUPS, default_kind, kind_of_model, kind_settings
-from vdet.config.places import FRACTIONS, LineSettings, RegionSettings, Shape, ZoneSettings
 from vdet.config.schema import LaneSettings, Section, Settings
+from vdet.config.shapes import FRACTIONS, LineSettings, RegionSettings, Shape, ZoneSettings
 from vdet.errors import ConfigError
 from vdet.plugins import plugin_names
 

@@ -19,8 +19,8 @@ from pydantic import (
 from vdet.config.camera import CameraSettings, parse_date_time
 from vdet.config.detector import DetectorSettings, NetworkSettings, SvmSettings
 from vdet.config.kinds import with_kind
-from vdet.config.places import FramePoint, RegionList, Shape, TrafficSettings
 from vdet.config.section import Ratio, Section
+from vdet.config.shapes import FramePoint, RegionList, Shape, TrafficSettings
 from vdet.config.tracker import MotionTrackerSettings, TrackerSettings
 from vdet.errors import ConfigError
 
