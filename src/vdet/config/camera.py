@@ -60,13 +60,11 @@ class LensSettings(Section):
         ConfigError
             The aspect ratio differs, so the frame is not a resized one.
         """
-        across, down = width / self.size[0], height / self.size[1]
+        lens_width, lens_height = self.size
+        across, down = width / lens_width, height / lens_height
         if abs(across / down - 1) > _LENS_TOLERANCE:
-            raise ConfigError(
-                "camera.lens: is for {}×{}, not {width}×{height}; calibrate again".format(
-                    *self.size, width=width, height=height
-                )
-            )
+            sizes = f"{lens_width}×{lens_height}, not {width}×{height}"
+            raise ConfigError(f"camera.lens: is for {sizes}; calibrate again")
         (fx, _, cx), (_, fy, cy), last = self.matrix
         x, y = (cx + 0.5) * across - 0.5, (cy + 0.5) * down - 0.5
         return (fx * across, 0.0, x), (0.0, fy * down, y), last
@@ -123,7 +121,7 @@ class ClockSettings(Section):
 
     def time_in(self, name: str) -> datetime | None:
         """Return the time in the name of a file; None without one. It is in UTC after a ``Z``."""
-        texts = ["{}{}{}T{}{}{}{}".format(*groups) for groups in _USUAL.findall(name)]
+        texts = [match.expand(r"\1\2\3T\4\5\6\7") for match in _USUAL.finditer(name)]
         if self.pattern:
             parts = re.findall(r"%[a-zA-Z]|[^%]", self.pattern, re.DOTALL)
             form = "".join(_CODES.get(part) or re.escape(part) for part in parts)

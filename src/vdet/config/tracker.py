@@ -34,8 +34,8 @@ class MotionTrackerSettings(TrackerSettings):
     At 0.018, a car seen from behind is 2 % of the frame wide.
     """
     min_score: Ratio = 0.4
-    """Minimum mean score of a vehicle's latest detections to be shown. A lower value has no effect
-    where the detector already ignores such boxes (detector.min_score).
+    """Minimum mean score of a vehicle's latest detections to be shown. Values below
+    detector.min_score have no effect.
     """
     confirm_seconds: Seconds = 0.1
     """Evidence needed to show a vehicle: seconds of detections with score 1."""
