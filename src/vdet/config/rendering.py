@@ -85,10 +85,9 @@ def _item_keys(field: FieldInfo, indent: str) -> Iterator[str]:
         title = _first_line(item)
         yield from _comment(f"{subject} is {title[:1].lower()}{title[1:]}", indent)
         texts = explanations(item)
-        explained = Shape.model_fields if issubclass(item, Shape) else ()  # at camera.size
         for name in item.model_fields:
-            if name in explained:
-                continue
+            if name == "size" and issubclass(item, Shape):
+                continue  # explained at camera.size
             yield from textwrap.wrap(
                 f"{name}: {texts.get(name, '')}",
                 WIDTH,
