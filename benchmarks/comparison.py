@@ -17,8 +17,8 @@ from typing import Any
 import vdet
 from benchmarks.rounds import seconds_of
 from vdet.config.detector import NetworkSettings
-from vdet.config.places import LineSettings, TrafficSettings
 from vdet.config.schema import Settings
+from vdet.config.shapes import LineSettings, TrafficSettings
 from vdet.evaluate.scores import Scores, score
 from vdet.labels.label import Label, LabelledVideo
 from vdet.labels.reading import read_truth

@@ -19,8 +19,8 @@ import numpy as np
 from vdet.boxes import Boxes, Image
 from vdet.conditions.finding import Findings
 from vdet.conditions.watch import Conditions
-from vdet.config.places import LineSettings, TrafficSettings
 from vdet.config.schema import Settings
+from vdet.config.shapes import LineSettings, TrafficSettings
 from vdet.media import Picture
 from vdet.synthetic.render import Renderer
 from vdet.synthetic.scene import Scene, pole_scene

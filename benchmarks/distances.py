@@ -183,7 +183,7 @@ class Shown:
 
     def __call__(self, drive: Drive) -> Iterator[Sample]:
         """Give the shown vehicles that must be found."""
-        rate, lanes = drive.scene.rate, LaneStep(drive.finder(), self.settings.detector.foot)
+        rate, lanes = drive.scene.rate, LaneStep(drive.finder(), self.settings.detector.tyre_height)
         clip = (
             Frame(i, Fraction(i) / rate, Picture(image)) for i, image in enumerate(drive.images())
         )

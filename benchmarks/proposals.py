@@ -16,8 +16,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from benchmarks.pole_cameras import HEIGHT, WIDTH, PoleScene, detected, pole_scenes
-from vdet.config.places import LineSettings, TrafficSettings
 from vdet.config.schema import Settings
+from vdet.config.shapes import LineSettings, TrafficSettings
 from vdet.detect.factory import load_detector
 from vdet.track.track import FrameTracks
 from vdet.traffic.counting import count_frames

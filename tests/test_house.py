@@ -1,4 +1,4 @@
-"""The house rules that a machine can check: who imports whom, how long, how quick to start."""
+"""The house rules that a machine can check: who imports whom, how quick to start."""
 
 import ast
 import graphlib
@@ -13,7 +13,6 @@ import pytest
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src" / "vdet"
 MODULES = sorted(PACKAGE.rglob("*.py"))
-LONGEST = 400
 
 ROOMS = (
     "__main__", "process", "cli", "demo", "testing", "api", "batch", "learn", "evaluate", "run",
@@ -97,9 +96,8 @@ def test_a_module_imports_only_what_stands_below_its_room() -> None:
     assert upward == []
 
 
-@pytest.mark.parametrize("room", ["errors", "boxes"])
-def test_the_foundations_import_nothing_of_vdet(room: str) -> None:
-    assert list(imports_of(NAMES[room])) == []
+def test_the_foundation_imports_nothing_of_vdet() -> None:
+    assert list(imports_of(NAMES["errors"])) == []
 
 
 def test_nothing_imports_the_command_line() -> None:
@@ -116,11 +114,6 @@ def test_no_modules_import_each_other_in_a_circle() -> None:
     graph = {name: set(imports_of(path, at_start=True)) - {name} for name, path in NAMES.items()}
     order = list(graphlib.TopologicalSorter(graph).static_order())  # CycleError names the circle
     assert len(order) == len(NAMES)
-
-
-def test_no_module_is_so_long_that_it_must_do_more_than_one_job() -> None:
-    lines = {name: len(path.read_text("utf-8").splitlines()) for name, path in NAMES.items()}
-    assert {name: count for name, count in lines.items() if count > LONGEST} == {}
 
 
 HEAVY = {"av", "cv2", "joblib", "numpy", "onnxruntime", "scipy", "sklearn", "torch"}

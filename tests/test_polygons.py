@@ -1,13 +1,10 @@
 """Points, segments and polygons."""
 
 import pytest
-from hypothesis import strategies as st
 
 from vdet.polygons import Point, crosses_itself, meeting, side_of
 
 SQUARE = ((0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0))
-whole = st.integers(-50, 50).map(float)
-points = st.tuples(whole, whole)
 
 
 def test_right_is_below_a_line_to_the_right() -> None:

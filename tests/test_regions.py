@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vdet.config.places import RegionSettings
 from vdet.config.schema import Settings
+from vdet.config.shapes import RegionSettings
 from vdet.errors import ConfigError, ImageError
-from vdet.regions import Regions, check_masks, lay_regions
+from vdet.regions import Regions, check_masks
 from writing import write_image
 
 ROAD = {"name": "road", "points": [[0.5, 0.5], [1, 0.5], [1, 1], [0.25, 1]]}
@@ -17,13 +17,7 @@ BUSH = {"name": "bush", "points": [[0.8, 0.6], [0.9, 0.6], [0.9, 0.8], [0.8, 0.8
 
 
 def laid(*regions: dict[str, Any], size: tuple[int, int] = (320, 180)) -> Regions:
-    found = lay_regions(Settings.model_validate({"regions": regions}).regions, *size)
-    assert found is not None
-    return found
-
-
-def test_without_regions_the_whole_frame_counts() -> None:
-    assert lay_regions((), 320, 180) is None
+    return Regions(Settings.model_validate({"regions": regions}).regions, *size)
 
 
 def test_a_point_counts_where_it_is_included_and_not_excluded() -> None:

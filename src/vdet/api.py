@@ -16,25 +16,25 @@ A name is that of a kind of detector or tracker, from vdet or another package, o
 
 import math
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from fractions import Fraction
 from itertools import chain
 from os import PathLike
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from vdet.boxes import Box, Boxes, Image
 from vdet.conditions.finding import Finding
-from vdet.config.kinds import kind_of_model
+from vdet.config.kinds import DetectorKind, TrackerKind, kind_of_model
 from vdet.config.loading import find_config
 from vdet.config.loading import load_settings as load_layers
 from vdet.config.schema import DetectorSettings, Settings, TrackerSettings
-from vdet.detect.factory import DetectorKind, DetectorObject, as_model, load_detector
+from vdet.detect.factory import DetectorObject, as_model, load_detector
 from vdet.detect.protocol import DetectorModel, VideoDetector
-from vdet.errors import ImageError, VdetError
+from vdet.errors import ArgumentError, ArgumentTypeError, ImageError, VdetError
 from vdet.evaluate.scores import Scores
 from vdet.evaluate.video import score_files
 from vdet.labels.formats import Format
@@ -51,7 +51,7 @@ from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind, check_sinks
 from vdet.run.steps import Step, StepContext
 from vdet.run.video import Results, Run, RunTotals, open_video, run_video
-from vdet.track.factory import TrackerKind, make_tracker
+from vdet.track.factory import make_tracker
 from vdet.track.track import FrameTracks, Track, VideoTracker
 from vdet.traffic.counting import count_files, count_frames
 from vdet.traffic.counts import Counts, Event
@@ -74,6 +74,30 @@ AnyTracker = str | VideoTracker
 Seconds = float | Fraction
 
 
+_PARAMETERS = {
+    "--set": "assignments",
+    "use --overwrite": "use overwrite=True",
+    "--size, such as 1280x720": "size, such as size=(1280, 720)",
+    "--rate 25": "rate=25",
+    "--model": "detector=FILE",
+    "--begin": "the setting input.begin",
+    "an earlier --at": "an earlier Run.at",
+}
+"""Options of the command line in messages, and the parameters that take their place in Python."""
+
+
+@contextmanager
+def _named_for_python() -> Iterator[None]:
+    """Raise errors with the names of parameters in place of those of command line options."""
+    try:
+        yield
+    except VdetError as error:
+        for option, parameter in _PARAMETERS.items():
+            error.args = tuple(str(line).replace(option, parameter) for line in error.args)
+        raise
+
+
+@_named_for_python()
 def load_settings(config: Paths = (), assignments: Sequence[str] = ()) -> Settings:
     """Read settings.
 
@@ -111,25 +135,26 @@ class Detector:
     def __init__(
         self, settings: Settings | None = None, *, detector: AnyDetector | None = None
     ) -> None:
-        self._settings, self._model, _ = _resolved(settings, detector, None)
+        self._settings, parts = _choose(settings, detector)
+        self._model = parts.model
         self.for_video = self._model.for_video
 
     def detect(self, image: Image | PathName) -> Boxes:
         """Find the vehicles in an image: the path of a file, or an array, BGR uint8 `(H, W, 3)`.
 
         Each image is searched on its own; `follow` also uses the other frames of a video.
-        Raises `ImageError` if it cannot be read or is too small to search, `TypeError` or
-        `ValueError` if it is neither a path nor such an array.
+        Raises `ImageError` if it cannot be read or is too small to search, `ArgumentTypeError` or
+        `ArgumentError` (a `TypeError` or `ValueError`) if it is neither a path nor such an array.
         """
         source = Path("image")
         if isinstance(image, str | PathLike):
             source = Path(image)
             image = read_image(source)
-        wanted = "must be a path or an array, BGR uint8 (H, W, 3)"
+        expected = "must be a path or an array, BGR uint8 (H, W, 3)"
         if not isinstance(image, np.ndarray):
-            raise TypeError(f"image: {wanted}, not a {type(image).__name__}")
+            raise ArgumentTypeError(f"image: {expected}, not a {type(image).__name__}")
         if image.dtype != "uint8" or image.ndim != 3 or image.shape[2] != 3:
-            raise ValueError(f"image: {wanted}, not {image.dtype} {image.shape}")
+            raise ArgumentError(f"image: {expected}, not {image.dtype} {image.shape}")
         return ImageSearch(self._model, self._settings).detect(source, image).detections
 
 
@@ -160,7 +185,8 @@ class Tracker:
         image
             The frame; only the tracker `rules` needs it.
 
-        Raises `ValueError` if the time is not a finite number or does not increase.
+        Raises `ArgumentError`, a `ValueError`, if the time is not a finite number or does not
+        increase.
         """
         self.observe(detections, time, image)
         return self.at(time)
@@ -168,7 +194,7 @@ class Tracker:
     def observe(self, detections: Boxes, time: float, image: Image | Picture | None = None) -> None:
         """Track the vehicles into the next frame; arguments and errors as for `update`."""
         if not self._time < time < math.inf:
-            raise ValueError(f"time: {time} s; must be after the previous frame, {self._time} s")
+            raise ArgumentError(f"time: {time} s; must be after the previous frame, {self._time} s")
         picture = Picture(image) if isinstance(image, np.ndarray) else image
         self._tracker.observe(detections, time, picture)
         self._time = time
@@ -201,7 +227,7 @@ def follow(
         The video, or a `Run`, which has its own settings and part.
     detector, tracker
         Objects or names, see the module docstring; None: as set. With a detector object and no
-        settings, every frame is searched.
+        settings, every frame is searched. Several threads search frames at once.
     steps
         Each receives every result, and returns it, changed or unchanged.
     start, end
@@ -211,23 +237,38 @@ def follow(
 
     Raises `VideoError` with the first frame if the video cannot be read or searched.
     """
-    part = {"start": _exact(start), "end": _exact(end), "frames": frames}
-    run, parts = _run(source, settings, detector, tracker, steps, **part)
-    threads = run.threads if isinstance(source, Run) else 1
-    return Results(open_video(replace(run, threads=threads), parts))
+    run, parts = _prepare(
+        source, settings, detector, tracker, steps, start=start, end=end, frames=frames
+    )
+    return Results(open_video(run, parts))
 
 
-def vehicles(source: PathName | Run, **options: Any) -> tuple[VehicleRecord, ...]:
+@_named_for_python()
+def vehicles(
+    source: PathName | Run,
+    *,
+    settings: Settings | None = None,
+    detector: AnyDetector | None = None,
+    tracker: AnyTracker | None = None,
+    steps: Sequence[Step] = (),
+    start: Seconds | None = None,
+    end: Seconds | None = None,
+    frames: int | None = None,
+) -> tuple[VehicleRecord, ...]:
     """Return a record of each vehicle of a video, by id: its times, class and path.
 
     Parameters and errors as for `follow`.
     """
-    results = follow(source, **options)
+    run, parts = _prepare(
+        source, settings, detector, tracker, steps, start=start, end=end, frames=frames
+    )
+    results = Results(open_video(run, parts))
     for _ in results:
         pass
     return results.vehicles
 
 
+@_named_for_python()
 def detect_video(
     source: PathName | Run,
     video: PathName | None = None,
@@ -263,14 +304,14 @@ def detect_video(
 
     Other parameters as for `follow`; errors as for the command `vdet detect-video`.
     """
-    run, parts = _run(source, settings, detector, tracker, steps)
-    wanted = _outputs({"video": video or (), "tracks": tracks, **(outputs or {})})
-    run = replace(run, outputs=run.outputs + wanted, overwrite=overwrite or run.overwrite)
+    run, parts = _prepare(source, settings, detector, tracker, steps)
+    requested = _outputs({"video": video or (), "tracks": tracks, **(outputs or {})})
+    run = replace(run, outputs=run.outputs + requested, overwrite=overwrite or run.overwrite)
     check_masks(run.settings.regions)
-    reported = reporting(progress) if progress else no_progress
-    return run_video(run, parts, progress=reported)
+    return run_video(run, parts, progress=reporting(progress) if progress else no_progress)
 
 
+@_named_for_python()
 def detect_image(
     source: PathName,
     image: PathName | None = None,
@@ -284,18 +325,19 @@ def detect_image(
 
     `image` is the output, with a box around each vehicle; other parameters as for `detect_video`.
     """
-    settings, loaded, _ = _resolved(settings, detector, None)
+    settings, parts = _choose(settings, detector)
     job = ImageJob(Path(source), _outputs({"image": image or (), **(outputs or {})}))
     check_masks(settings.regions)
     inputs = input_files(job.source, settings=settings)
     check_sinks(job.outputs, overwrite=overwrite, inputs=inputs)
-    search = ImageSearch(loaded, settings)
-    (found,) = run_images([job], (), search, overwrite=overwrite, inputs=inputs)
-    if isinstance(found, ImageError):
-        raise found
-    return found.detections
+    search = ImageSearch(parts.model, settings)
+    (result,) = run_images([job], (), search, overwrite=overwrite, inputs=inputs)
+    if isinstance(result, ImageError):
+        raise result
+    return result.detections
 
 
+@_named_for_python()
 def count(
     tracks: PathName | Iterable[FrameTracks | FrameResult],
     settings: Settings,
@@ -320,8 +362,8 @@ def count(
     first = next(frames, None)
     if isinstance(first, FrameResult):
         size = size or (first.frame.picture.width, first.frame.picture.height)
-    every = frames if first is None else chain([first], frames)
-    shown = (item.frame_tracks if isinstance(item, FrameResult) else item for item in every)
+    items = frames if first is None else chain([first], frames)
+    shown = (item.frame_tracks if isinstance(item, FrameResult) else item for item in items)
     return count_frames(shown, settings, size)
 
 
@@ -340,49 +382,58 @@ def evaluate_tracks(tracks: PathName, truth: PathName, *, until: int | None = No
     return score_files(Path(tracks), Path(truth), until).scores
 
 
-def _run(
+def _prepare(
     source: PathName | Run,
     settings: Settings | None,
     detector: AnyDetector | None,
     tracker: AnyTracker | None,
     steps: Sequence[Step],
-    **part: Any,
+    *,
+    start: Seconds | None = None,
+    end: Seconds | None = None,
+    frames: int | None = None,
 ) -> tuple[Run, Parts]:
-    """Return the run and its parts; `part` is for a video, because a `Run` has its own."""
+    """Return the run and its parts; a `Run` has its own settings and part of the video."""
     if isinstance(source, Run):
-        for name, value in {"settings": settings, **part}.items():
+        arguments = {"settings": settings, "start": start, "end": end, "frames": frames}
+        for name, value in arguments.items():
             if value is not None:
-                raise ValueError(f"{name}: a Run has its own; remove it")
-        settings, run = source.settings, source
+                raise ArgumentError(f"{name}: a Run has its own; remove it")
+        run, settings = source, source.settings
     else:
-        run = Run(Path(source), **part)
-    settings, loaded, tracker = _resolved(settings, detector, tracker)
-    return replace(run, settings=settings), Parts(loaded, tracker, steps)
+        run = Run(Path(source), start=_exact(start), end=_exact(end), frames=frames)
+    effective, parts = _choose(settings, detector, tracker)
+    return replace(run, settings=effective), replace(parts, steps=steps)
 
 
-def _resolved(
-    settings: Settings | None, detector: AnyDetector | None, tracker: AnyTracker | None
-) -> tuple[Settings, DetectorModel, VideoTracker | None]:
-    """Return the settings, the detector, and the tracker, None if the settings choose it."""
-    changes: dict[str, object] = {}
+@_named_for_python()
+def _choose(
+    settings: Settings | None, detector: AnyDetector | None, tracker: AnyTracker | None = None
+) -> tuple[Settings, Parts]:
+    """Choose detector and tracker by name, by object, or as set; names change the settings."""
+    effective = settings or Settings()
     if isinstance(tracker, str):
-        changes["tracker"] = load_layers(assignments=[f"tracker.kind={tracker}"]).tracker
-        tracker = None
-    if isinstance(detector, str | PathLike):
-        name = os.fspath(detector)
-        if kind := kind_of_model(Path(name)):
-            own = settings.detector if settings else None
-            if own is None or own.kind != kind:
-                own = load_layers(detector=kind).detector
-            changes["detector"] = own.model_copy(update={"model": name})
-        else:
-            changes["detector"] = load_layers(detector=name).detector
-        detector = None
-    elif detector is not None and settings is None:
-        changes["detector"] = DetectorSettings(kind="object")  # every frame is searched
-    chosen = (settings or Settings()).model_copy(update=changes)
-    model = load_detector(chosen.detector) if detector is None else as_model(detector)
-    return chosen, model, tracker
+        section = load_layers(assignments=[f"tracker.kind={tracker}"]).tracker
+        effective, tracker = effective.model_copy(update={"tracker": section}), None
+    if detector is not None and not isinstance(detector, str | PathLike):
+        if settings is None:
+            every_frame = DetectorSettings(kind="object")
+            effective = effective.model_copy(update={"detector": every_frame})
+        return effective, Parts(as_model(detector), tracker)
+    if detector is not None:
+        effective = _with_detector(effective, os.fspath(detector))
+    return effective, Parts(load_detector(effective.detector), tracker)
+
+
+def _with_detector(settings: Settings, name: str) -> Settings:
+    """Return settings for a kind of detector, or for a model file, which decides the kind."""
+    kind = kind_of_model(Path(name))
+    section = settings.detector
+    if kind is None or section.kind != kind:
+        section = load_layers(detector=kind or name).detector
+    if kind is not None:
+        section = section.model_copy(update={"model": name})
+    return settings.model_copy(update={"detector": section})
 
 
 def _outputs(named: Mapping[str, Paths]) -> tuple[Output, ...]:

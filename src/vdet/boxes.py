@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 import numpy.typing as npt
 
+from vdet.errors import ArgumentError, needing
+
 if TYPE_CHECKING:
     import pandas as pd
     import supervision
@@ -168,7 +170,7 @@ class Boxes:
 
     Raises
     ------
-    ValueError
+    ArgumentError
         A column has the wrong shape, a value is not finite, a box has no area, a score is not from
         0 to 1, or a class has no name.
     """
@@ -203,13 +205,13 @@ class Boxes:
         put("data", {n: _column(data[n], np.float64, shape, n) for n, shape in shapes.items()})
         put("trace", trace)
         if (self.sides[:, 2:] <= self.sides[:, :2]).any():
-            raise ValueError("sides: a box has no area; must be x1 < x2 and y1 < y2")
+            raise ArgumentError("sides: a box has no area; must be x1 < x2 and y1 < y2")
         if ((self.scores < 0) | (self.scores > 1)).any():
-            raise ValueError("scores: must be from 0 to 1")
+            raise ArgumentError("scores: must be from 0 to 1")
         if self.classes is not None and not np.isin(self.classes, range(len(names))).all():
-            raise ValueError("classes: an index is not in `names`")
+            raise ArgumentError("classes: an index is not in `names`")
         if self.data.get("class_scores", np.empty((0, len(names)))).shape[1:] != (len(names),):
-            raise ValueError("class_scores: must have a column for each of `names`")
+            raise ArgumentError("class_scores: must have a column for each of `names`")
 
     def __len__(self) -> int:
         return len(self.sides)
@@ -257,7 +259,8 @@ class Boxes:
 
     def to_supervision(self) -> "supervision.Detections":
         """Return a `supervision.Detections` with copies; needs the package supervision."""
-        import supervision
+        with needing("notebook"):
+            import supervision
 
         names = {} if self.classes is None else {"class_name": np.array(self.class_names)}
         return supervision.Detections(
@@ -294,7 +297,8 @@ class Boxes:
 
         Its columns are x1, y1, x2, y2, score, class_name, id, and those of `data`.
         """
-        import pandas as pd
+        with needing("notebook"):
+            import pandas as pd
 
         columns: dict[str, Any] = dict(zip(("x1", "y1", "x2", "y2"), self.sides.T, strict=True))
         columns |= {"score": self.scores, "class_name": self.class_names, "id": self.ids}
@@ -314,9 +318,9 @@ def _column(
     if not column.size and 0 in shape:
         column = column.reshape(shape)
     if column.shape != shape:
-        raise ValueError(f"{name}: has shape {column.shape}, expected {shape}")
+        raise ArgumentError(f"{name}: has shape {column.shape}, expected {shape}")
     if not np.isfinite(column).all():
-        raise ValueError(f"{name}: a value is not a finite number")
+        raise ArgumentError(f"{name}: a value is not a finite number")
     column.flags.writeable = False
     return column
 

@@ -6,6 +6,8 @@ A message is one line (a `ConfigError` has one for each mistake): what is wrong,
 do.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from fractions import Fraction
 
 SOME_FAILED = 3
@@ -32,6 +34,32 @@ class ConfigError(VdetError, ValueError):
 
     def __str__(self) -> str:
         return "\n".join(self.args)
+
+
+class ArgumentError(VdetError, ValueError):
+    """An argument from Python has a wrong value."""
+
+
+class ArgumentTypeError(VdetError, TypeError):
+    """An argument from Python has a wrong type."""
+
+
+class PackageError(VdetError, ImportError):
+    """A package that only some features need is not installed."""
+
+
+@contextmanager
+def needing(extra: str) -> Iterator[None]:
+    """Raise a `PackageError` that names this extra of vdet, if an import in the block fails.
+
+    The command installs the package itself: vdet is on no index, where others could take its name.
+    """
+    try:
+        yield
+    except ImportError as error:
+        name = str(error.name).partition(".")[0]
+        advice = f'pip install {name}, or vdet with its extra "{extra}"'
+        raise PackageError(f"{name} is not installed; {advice}") from error
 
 
 class DataError(VdetError, ValueError):

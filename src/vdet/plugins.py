@@ -32,11 +32,8 @@ _BUILT_IN: dict[str, dict[str, str]] = {
         "train": "vdet.cli.train:train",
         "train-net": "vdet.cli.train:train_net",
     },
-    DETECTORS: {"svm": "vdet.detect.svm.detector:SVM", "net": "vdet.detect.onnx.detector:NET"},
-    TRACKERS: {
-        "motion": "vdet.track.motion.tracker:MOTION",
-        "rules": "vdet.track.rules.tracker:RULES",
-    },
+    DETECTORS: {"net": "vdet.config.kinds:NET", "svm": "vdet.config.kinds:SVM"},
+    TRACKERS: {"motion": "vdet.config.kinds:MOTION", "rules": "vdet.config.kinds:RULES"},
     SINKS: {
         name: f"vdet.run.sinks.{module}:{name.upper()}"
         for module, names in {
@@ -55,7 +52,7 @@ _BUILT_IN: dict[str, dict[str, str]] = {
         "yolo": "vdet.labels.yolo:YOLO",
     },
 }
-"""The plug-ins of vdet itself: where each name is defined."""
+"""The plug-ins of vdet itself: where each name is defined. The first of a group is the default."""
 
 
 def built_in_names(group: str) -> list[str]:
@@ -65,8 +62,8 @@ def built_in_names(group: str) -> list[str]:
 
 def plugin_names(group: str) -> list[str]:
     """Return all names in a group, those of vdet first."""
-    own = built_in_names(group)
-    return own + sorted({point.name for point in entry_points(group=group)} - set(own))
+    built_in = built_in_names(group)
+    return built_in + sorted({point.name for point in entry_points(group=group)} - set(built_in))
 
 
 def load_plugin(group: str, name: str) -> Any:
@@ -86,6 +83,6 @@ def load_plugin(group: str, name: str) -> Any:
             raise ConfigError(
                 f"{name}: {point.value} cannot be loaded ({type(error).__name__}: {error})"
             ) from error
-    known = ", ".join(plugin_names(group)) or "none"
+    names = ", ".join(plugin_names(group)) or "none"
     noun = group.removeprefix("vdet.").removesuffix("s")
-    raise ConfigError(f"{printable(name)}: unknown {noun}; known: {known}")
+    raise ConfigError(f"{printable(name)}: unknown {noun}; known: {names}")

@@ -7,8 +7,7 @@ import cv2
 import numpy as np
 
 from vdet.boxes import BoolArray
-from vdet.config.camera import CameraSettings
-from vdet.config.places import RegionSettings
+from vdet.config.shapes import RegionSettings, aspect_problem
 from vdet.errors import ConfigError
 from vdet.media.images import read_header, read_image
 from vdet.polygons import Point
@@ -31,7 +30,7 @@ class Regions:
     Raises
     ------
     ConfigError
-        A mask has another aspect ratio.
+        The points of a polygon, or a mask, have another aspect ratio.
     ImageError
         A mask cannot be read.
     """
@@ -46,29 +45,20 @@ class Regions:
             if setting.mask:
                 layer |= _read_mask(setting.mask, width, height)
             else:
-                corners = [(x * width, y * height) for x, y in setting.points or ()]
+                corners = list(setting.for_frames(width, height).points or ())
                 polygons[setting.kind][setting.name] = corners
-                # With the pixels of its sides.
                 cv2.fillPoly(layer, [np.floor(corners).astype(np.int32)], 1)
         shows_all = not any(setting.kind == "include" for setting in settings)
         self.pixels: BoolArray = (shows_all | (layers["include"] > 0)) & (layers["exclude"] == 0)
 
     def contains(self, point: Point) -> bool:
-        """Return whether a vehicle whose foot is at a point, x and y in pixels, is shown.
+        """Return whether a vehicle that stands at a point, x and y in pixels, is shown.
 
         A point outside the frame counts as at its edge.
         """
         height, width = self.pixels.shape
         x, y = min(max(int(point[0]), 0), width - 1), min(max(int(point[1]), 0), height - 1)
         return bool(self.pixels[y, x])
-
-
-def lay_regions(settings: Sequence[RegionSettings], width: int, height: int) -> Regions | None:
-    """Return the regions of the settings in frames of this size; None for the whole frame.
-
-    Errors as of `Regions`.
-    """
-    return Regions(settings, width, height) if settings else None
 
 
 def check_masks(settings: Sequence[RegionSettings]) -> None:
@@ -81,11 +71,9 @@ def check_masks(settings: Sequence[RegionSettings]) -> None:
 def _read_mask(path: str, width: int, height: int) -> BoolArray:
     image = read_image(Path(path))
     rows, columns = image.shape[:2]
-    try:
-        CameraSettings(size=(columns, rows)).check_frames(width, height)
-    except ConfigError as error:
+    if aspect_problem((columns, rows), width, height):
         raise ConfigError(
             f"{path}: its aspect ratio differs from frames of {width}×{height}; draw it on a frame"
-        ) from error
+        )
     grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
     return np.asarray(cv2.resize(grey, (width, height), interpolation=cv2.INTER_NEAREST) >= _WHITE)

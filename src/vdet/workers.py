@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
-from vdet.errors import INTERRUPTED, ClusterError
+from vdet.errors import INTERRUPTED, ClusterError, needing
 from vdet.system import blocked_interrupts
 
 T = TypeVar("T")
@@ -181,13 +181,13 @@ class DaskCluster:
 
         Raises
         ------
+        PackageError
+            Dask is not installed.
         ClusterError
-            Dask is not installed, or the scheduler does not respond, has no worker, or ends.
+            The scheduler does not respond, has no worker, or ends.
         """
-        try:
+        with needing("dask"):
             from distributed import Client
-        except ImportError as error:
-            raise ClusterError("--scheduler needs Dask; pip install dask distributed") from error
         for name in ("distributed", "distributed.client"):
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # errors are raised
         with contextlib.ExitStack() as stack:

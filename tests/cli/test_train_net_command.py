@@ -27,4 +27,5 @@ def test_without_torch_the_message_says_how_to_install_it(
     monkeypatch.setitem(sys.modules, "torch", None)
     result = run("train-net", tmp_path, "-o", tmp_path / "a.onnx")
     assert result.code == 1
-    assert result.err == "vdet: torch is not installed; pip install torch onnx\n"
+    advice = 'pip install torch, or vdet with its extra "train"'
+    assert result.err == f"vdet: torch is not installed; {advice}\n"

@@ -53,11 +53,11 @@ def test_every_key_has_the_place_where_it_or_the_nearest_thing_around_it_stands(
         ("a", "x"): "1:1",
         ("x",): "1:1",
     }
-    assert {key: document.place_of(key) for key in places} == {
+    assert {key: document.position_of(key) for key in places} == {
         key: f"my.yaml:{place}" for key, place in places.items()
     }
-    assert parse_assignment("a.b.c=1").place_of(("a",)) == "--set"
-    assert parse_document("", "empty.yaml").place_of(("a",)) == "empty.yaml"
+    assert parse_assignment("a.b.c=1").position_of(("a",)) == "--set"
+    assert parse_document("", "empty.yaml").position_of(("a",)) == "empty.yaml"
 
 
 @pytest.mark.parametrize(

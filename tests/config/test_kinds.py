@@ -36,8 +36,8 @@ def refusal(path: Path, text: str, *assignments: str) -> str:
     [
         (
             "{kind: rules, history: 12}",
-            ("tracker.young=3",),
-            RulesTrackerSettings(history=12, young=3),
+            ("tracker.young=3",),  # the old name
+            RulesTrackerSettings(history=12, detections_to_keep=3),
         ),
         ("{kind: rules, history: 12}", ("tracker.kind=rules",), RulesTrackerSettings(history=12)),
         (
@@ -78,7 +78,7 @@ RULES_ONLY = "belongs to tracker.kind: rules, and has no effect with motion"
 @pytest.mark.parametrize(
     ("text", "assignments", "message"),
     [
-        ("tracker:\n  near: 3\n", (), f"my.yaml:2:3: tracker.near: {RULES_ONLY}"),
+        ("tracker:\n  max_misses: 3\n", (), f"my.yaml:2:3: tracker.max_misses: {RULES_ONLY}"),
         (
             "tracker: {kind: rules, decay: 0.3, history: 3}",
             (),
@@ -104,7 +104,7 @@ FAKE = '''
 from typing import Literal
 from pydantic import Field
 from vdet.config.schema import DetectorSettings, Section
-from vdet.detect.factory import DetectorKind
+from vdet.config.kinds import DetectorKind
 
 class PartSettings(Section):
     """A part of it."""
@@ -174,7 +174,7 @@ class TestOtherPackages:
         ("assignment", "words"),
         [
             ("level=9", r"\.level: belongs to detector\.kind: fake, .* with net$"),
-            ("kind=best", ": best: .* known: svm, net, broken, fake, missing, nameless, odd$"),
+            ("kind=best", ": best: .* known: net, svm, broken, fake, missing, nameless, odd$"),
             ("kind=broken", r": broken: fake_vdet:NOTHING cannot be loaded \(AttributeError: .*"),
             ("kind=missing", r": missing: no_such.* cannot be loaded \(ModuleNotFoundError: .*"),
             ("kind=nameless", ': nameless: has no settings of kind = "nameless"; repair'),

@@ -15,7 +15,7 @@ BOTH = Settings(
 """Settings with every frame length: window sets over fixed rows, and the rules."""
 LENGTHS = {
     *(f"detector.search.windows.0.{key}" for key in ("size", "top", "bottom")),
-    *(f"tracker.{key}" for key in ("min_region", "near", "wide", "max_combined")),
+    *(f"tracker.{key}" for key in ("min_region", "max_distance", "accepted_width", "max_combined")),
     *("tracker.merge_overlap", "tracker.match_distance"),
 }
 

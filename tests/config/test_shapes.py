@@ -4,12 +4,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 from pydantic import ValidationError
 
-from vdet.config.camera import CameraSettings
 from vdet.config.loading import load_settings
-from vdet.config.places import TrafficSettings
+from vdet.config.rendering import render_settings
 from vdet.config.schema import Settings
+from vdet.config.shapes import LineSettings, TrafficSettings
 from vdet.errors import ConfigError
 
 SQUARE = [[0.1, 0.1], [0.3, 0.1], [0.3, 0.3], [0.1, 0.3]]
@@ -92,17 +93,11 @@ def test_an_interval_divides_a_day(text: str, message: str) -> None:
 
 
 def test_frames_of_another_shape_than_the_camera_are_refused() -> None:
-    camera = CameraSettings(size=(1280, 720))
+    gate = LineSettings(name="gate", size=(1280, 720), start=(0, 360), end=(1280, 360))
     for size in ((640, 360), (1920, 1088)):
-        camera.check_frames(*size)
+        assert gate.for_frames(*size).size == size
     with pytest.raises(ConfigError, match="1280×720, whose aspect ratio differs from 640"):
-        camera.check_frames(640, 480)
-    CameraSettings().check_frames(640, 480)
-
-
-def test_a_size_has_two_sides() -> None:
-    with pytest.raises(ValidationError, match=r"size\.1"):
-        CameraSettings.model_validate({"size": [1280]})
+        gate.for_frames(640, 480)
 
 
 class TestFiles:
@@ -116,12 +111,25 @@ class TestFiles:
         (tmp_path / "more.yaml").write_text(
             "traffic: {lines: [{name: b, start: [0, 0.5], end: [1, 1]}]}"
         )
-        settings = load_settings([tmp_path / "gate.yaml", tmp_path / "more.yaml"])
-        assert settings.camera.size == (1280, 720)
-        assert settings.camera.ground[0].pixel == (0.25, 0.25)
-        assert settings.regions[0].points == ((0, 0), (1, 0), (1, 1))
-        assert settings.traffic.zones[0].points == ((0, 0), (0.5, 0), (0.5, 0.5))
-        assert [(line.name, line.end) for line in settings.traffic.lines] == [("b", (1, 1))]
+        (tmp_path / "bush.yaml").write_text(
+            "camera: {size: [640, 360]}\n"
+            "regions: [{name: b, points: [[0, 0], [640, 0], [640, 360]]}]\n"
+        )
+        settings = load_settings([tmp_path / f"{name}.yaml" for name in ("gate", "more", "bush")])
+        point, [line], [zone], [region] = (
+            settings.camera.ground[0], settings.traffic.lines, settings.traffic.zones,
+            settings.regions,
+        )  # fmt: skip
+        assert (point.size, point.pixel) == ((1280, 720), (320, 180))
+        assert (line.size, line.name, line.end) == ((1, 1), "b", (1, 1))
+        assert (zone.size, zone.points[2]) == ((1280, 720), (640, 360))
+        assert (region.size, region.name) == ((640, 360), "b")
+        assert point.for_frames(640, 360).pixel == (160, 90)
+        assert line.for_frames(640, 360).start == (0, 180)
+        assert zone.for_frames(1280, 720) == zone
+        (tmp_path / "printed.yaml").write_text(printed := render_settings(settings))
+        assert load_settings([tmp_path / "printed.yaml"]) == settings
+        assert yaml.safe_load(printed)["regions"][0].keys() == {"name", "points", "kind"}
 
     def test_paths_are_relative_to_their_file(self, tmp_path: Path) -> None:
         (tmp_path / "gate.yaml").write_text(

@@ -45,5 +45,5 @@ class TestLinearModel:
 
 def test_an_unknown_kind_is_refused_and_the_known_ones_are_named() -> None:
     for load in (load_detector, model_file):
-        with pytest.raises(ConfigError, match=r"^sonar: unknown detector; known: svm"):
+        with pytest.raises(ConfigError, match=r"^sonar: unknown detector; known: net, svm"):
             load(DetectorSettings(kind="sonar"))

@@ -30,19 +30,19 @@ def fitted(metres: Float64Array = CORNERS, pixels: Float64Array | None = None) -
 def test_places_on_the_road_have_their_metres() -> None:
     places = np.array([(0.0, 20.0), (-4.0, 45.0), (3.0, 15.0)])
     ground = fitted()
-    assert ground.place(seen(places) + EDGE) == pytest.approx(places, abs=1e-3)
+    assert ground.metres(seen(places) + EDGE) == pytest.approx(places, abs=1e-3)
     assert ground.pixels(places) == pytest.approx(seen(places) + EDGE, abs=1e-3)
 
 
 def test_a_place_above_the_horizon_is_not_known() -> None:
-    assert np.isnan(fitted().place(np.array([(640.0, 20.0)]))).all()
+    assert np.isnan(fitted().metres(np.array([(640.0, 20.0)]))).all()
 
 
 @pytest.mark.parametrize(("beyond", "known"), [(30.0, True), (45.0, False)])
 def test_a_place_is_known_up_to_one_length_beyond_the_area(beyond: float, known: bool) -> None:
     ground = fitted()
     assert ground.length == pytest.approx(np.hypot(12, 36), abs=0.01)
-    place = ground.place(seen(np.array([(0.0, 50.0 + beyond)])) + EDGE)
+    place = ground.metres(seen(np.array([(0.0, 50.0 + beyond)])) + EDGE)
     assert np.isfinite(place).all() == known
 
 
@@ -85,7 +85,7 @@ def test_a_file_is_for_frames_of_any_size_and_the_same_shape(tmp_path: Path) -> 
     place = np.array([(2.0, 30.0)])
     half = ground_of(camera, WIDTH // 2, HEIGHT // 2)
     assert half is not None
-    assert half.place(seen(place) / 2 + EDGE) == pytest.approx(place, abs=0.01)
+    assert half.metres(seen(place) / 2 + EDGE) == pytest.approx(place, abs=0.01)
 
 
 def test_a_lens_that_distorts_is_corrected(tmp_path: Path) -> None:
@@ -94,4 +94,4 @@ def test_a_lens_that_distorts_is_corrected(tmp_path: Path) -> None:
     place = np.array([(2.0, 30.0)])
     ground = ground_of(camera.model_copy(update={"lens": CAMERA}), WIDTH, HEIGHT)
     assert ground is not None
-    assert ground.place(lens.distorted(seen(place)) + EDGE) == pytest.approx(place, abs=0.02)
+    assert ground.metres(lens.distorted(seen(place)) + EDGE) == pytest.approx(place, abs=0.02)

@@ -203,7 +203,7 @@ def test_two_known_lengths_along_a_lane_are_enough_for_the_ground(
         np.array([value["metres"] for value in values]),
         Undistorter(None, 1280, 720),
     )
-    lane = ground.place(np.array([seen(along) for along in (20.0, 30.0, 40.0, 50.0, 60.0)]))
+    lane = ground.metres(np.array([seen(along) for along in (20.0, 30.0, 40.0, 50.0, 60.0)]))
     steps = np.hypot(*np.diff(lane, axis=0).T)
     assert steps == pytest.approx([10, 10, 10, 10], rel=0.02)
 

@@ -11,7 +11,6 @@ from red_cars import CAR, PERSPECTIVE, SETTINGS, WIDTH, drive, road
 from run.red_runs import follow, model_for, outputs, run_red
 from vdet.batch.task import result_digest
 from vdet.boxes import Box
-from vdet.config.camera import CameraSettings
 from vdet.config.schema import Settings
 from vdet.errors import ImageError, VideoError
 from vdet.media.images import read_image
@@ -56,7 +55,7 @@ def test_a_picture_shows_only_what_stands_in_the_region(settings: Settings) -> N
 
 
 def test_regions_for_another_shape_name_the_file(red_clip: Path, tmp_path: Path) -> None:
-    settings = within().model_copy(update={"camera": CameraSettings(size=(100, 100))})
+    settings = within(size=(100, 100))
     with pytest.raises(VideoError, match=r"red\.mp4: camera\.size: points are for frames"):
         run_red(Run(red_clip, outputs(tracks=tmp_path / "t.csv")), settings)
     with pytest.raises(ImageError, match=r"a\.png: camera\.size"):

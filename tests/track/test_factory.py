@@ -23,7 +23,7 @@ def test_the_lengths_of_the_rules_are_scaled_to_the_frame(monkeypatch: pytest.Mo
     made: list[RulesTrackerSettings] = []
     monkeypatch.setattr(RulesTracker, "__init__", lambda _, settings: made.append(settings))
     make_tracker(SEED, 640, 360)
-    assert (made[0].min_region, made[0].near) == (25, 25)
+    assert (made[0].min_region, made[0].max_distance) == (25, 25)
 
 
 CAR = Box.sized(100, 100, 50, 40)

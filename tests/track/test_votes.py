@@ -8,8 +8,8 @@ import pytest
 
 import vdet
 from vdet.boxes import NO_BOXES, Box, Boxes
-from vdet.config.places import LineSettings, TrafficSettings
 from vdet.config.schema import MotionTrackerSettings, Settings
+from vdet.config.shapes import LineSettings, TrafficSettings
 from vdet.config.tracker import RulesTrackerSettings
 from vdet.labels.formats import SourceVideo, TrackWriter, last_classes, track_formats
 from vdet.media import Picture

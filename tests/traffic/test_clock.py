@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from pydantic import ValidationError
 
-from vdet.config.camera import CameraSettings, ClockSettings, moment
+from vdet.config.camera import CameraSettings, ClockSettings, parse_date_time
 from vdet.config.schema import InputSettings, Settings
 from vdet.errors import ConfigError
 from vdet.traffic.clock import Clock, Intervals, find_clock
@@ -75,7 +75,7 @@ def test_a_name_and_metadata_that_disagree_are_both_said(
 ) -> None:
     found = clock_of("20260501_070000.mp4", None, created)
     assert str(found) == "2026-05-01 07:00:00+02:00 (from its name)"
-    other = moment(created).astimezone().isoformat(" ", "seconds")
+    other = parse_date_time(created).astimezone().isoformat(" ", "seconds")
     said = f"begins 2026-05-01 07:00:00+02:00 by its name, {other} by its metadata"
     expected = f"clips/20260501_070000.mp4: {said}; using the name; --begin overrides it"
     assert caplog.messages == [expected] * is_said

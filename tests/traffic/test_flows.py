@@ -14,8 +14,8 @@ import pytest
 
 from running import rows_of
 from traffic.scenes import ZONE, counts, frames, joined, numbered, through
-from vdet.config.places import LineSettings
-from vdet.errors import ConfigError
+from vdet.config.shapes import LineSettings
+from vdet.errors import ConfigError, PackageError
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Clock
 from vdet.traffic.counts import Counts, count_table, flow_table, zone_table
@@ -112,7 +112,7 @@ def test_counts_are_a_table_of_pandas_and_bars_of_matplotlib(
         table: Any = found.to_pandas(5)
     assert table == [asdict(row) for row in found.table(5)]
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    with pytest.raises(ConfigError, match=r"^plot: matplotlib is not installed; pip install mat"):
+    with pytest.raises(PackageError, match=r"^matplotlib is not installed; pip install matplotlib"):
         found.plot()
     monkeypatch.setitem(sys.modules, "matplotlib", Mock())
     ways, moments = ["west left", "west right"], ["0.0", "5.0", "10.0"]

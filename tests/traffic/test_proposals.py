@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import pytest
 
 from traffic.scenes import HEIGHT, WIDTH, Path, frames, settings_for, through
-from vdet.config.places import LineSettings
+from vdet.config.shapes import LineSettings
 from vdet.polygons import meeting
 from vdet.traffic.counting import count_frames
 from vdet.traffic.linking import link_tracks

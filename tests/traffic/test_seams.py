@@ -7,7 +7,7 @@ from pathlib import Path as File
 import pytest
 
 from traffic.scenes import Path, frames, settings_for, through
-from vdet.config.places import LineSettings, ZoneSettings
+from vdet.config.shapes import LineSettings, ZoneSettings
 from vdet.labels.formats import TrackWriter
 from vdet.labels.native import JSON_LINES
 from vdet.traffic.counting import count_files

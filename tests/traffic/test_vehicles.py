@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from traffic.scenes import counts, events, feet, frames, joined, numbered, through, track, ways
-from vdet.config.places import LineSettings
+from vdet.config.shapes import LineSettings
 from vdet.errors import TruthError
 from vdet.track.track import FrameTracks
 

@@ -3,7 +3,7 @@
 import pytest
 
 from traffic.scenes import LINE, counts, frames, through
-from vdet.config.places import LineSettings
+from vdet.config.shapes import LineSettings
 
 DOWN = through((1, 600, 300), (5, 600, 500))
 

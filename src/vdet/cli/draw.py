@@ -87,7 +87,6 @@ def draw(
         whole_frames = settings.model_copy(update={"regions": ()})
         run = Run(clip, settings=whole_frames, start=start, end=end)
         image, frames = read_scene(run, tracks, steps)
-    settings.camera.check_frames(image.shape[1], image.shape[0])
     drawing = Drawing(image, frames, settings, _user_values(source.configs), facing)
     if propose and not drawing.proposals:
         raise ConfigError(f"{clip}: no stream has enough vehicles; draw lines with -o gate.html")

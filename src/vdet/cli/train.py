@@ -9,7 +9,7 @@ from vdet.cli import options
 from vdet.cli.command import command
 from vdet.cli.messages import live_bar, print_lines, progress_steps
 from vdet.cli.options import Paths, SettingsSource
-from vdet.errors import DataError, counted
+from vdet.errors import counted, needing
 from vdet.workers import limit_library_threads
 
 
@@ -152,11 +152,9 @@ def train_net(
     inputs = source.inputs(*data, *chain(*clips), *([base] if base else ()))
     options.check_file(output, ".onnx", noun="networks", overwrite=overwrite, inputs=inputs)
     settings = source.load()
-    try:
+    with needing("train"):
         from vdet.learn.net.sources import clip_source, image_source
         from vdet.learn.net.training import train_to_file
-    except ImportError as error:
-        raise DataError(f"{error.name} is not installed; pip install torch onnx") from error
     from vdet.labels.reading import read_labelled_images
     from vdet.labels.roles import Roles
 

@@ -1,22 +1,20 @@
-"""The section `camera`: the frames that places are given for, the lens, the road and the clock."""
+"""The section `camera`: the size that points are given for, the lens, the road and the clock."""
 
 import re
 from contextlib import suppress
 from datetime import datetime
-from typing import Annotated
+from typing import Annotated, ClassVar
 from zoneinfo import ZoneInfo
 
 from pydantic import Field, field_validator
 from pydantic_core.core_schema import ValidationInfo
 
-from vdet.config.places import Coordinate, Place, Size
 from vdet.config.section import Section
+from vdet.config.shapes import Coordinate, FramePoint, Shape, Size
 from vdet.errors import ConfigError
 
-_ASPECT_TOLERANCE = 0.01
-"""Largest relative difference of the aspect ratios of a frame and of the reference size."""
 _EARLIEST, _LATEST = 1990, 9000
-"""Years of moments; cameras without a clock begin in 1904, 1970 or 1980."""
+"""Years of recordings; cameras without a clock begin in 1904, 1970 or 1980."""
 _LENS_TOLERANCE = 0.005  # accepts 854×480 for 1280×720
 
 _Coefficient = Annotated[float, Field(ge=-1000, le=1000)]
@@ -62,22 +60,22 @@ class LensSettings(Section):
         ConfigError
             The aspect ratio differs, so the frame is not a resized one.
         """
-        across, down = width / self.size[0], height / self.size[1]
+        lens_width, lens_height = self.size
+        across, down = width / lens_width, height / lens_height
         if abs(across / down - 1) > _LENS_TOLERANCE:
-            raise ConfigError(
-                "camera.lens: is for {}×{}, not {width}×{height}; calibrate again".format(
-                    *self.size, width=width, height=height
-                )
-            )
+            sizes = f"{lens_width}×{lens_height}, not {width}×{height}"
+            raise ConfigError(f"camera.lens: is for {sizes}; calibrate again")
         (fx, _, cx), (_, fy, cy), last = self.matrix
         x, y = (cx + 0.5) * across - 0.5, (cy + 0.5) * down - 0.5
         return (fx * across, 0.0, x), (0.0, fy * down, y), last
 
 
-class GroundPoint(Section):
+class GroundPoint(Shape):
     """A point of the road."""
 
-    pixel: Place
+    point_fields: ClassVar[tuple[str, ...]] = ("pixel",)
+
+    pixel: FramePoint
     """Position in the frame, x and y; whole numbers are the centres of pixels."""
     metres: tuple[Coordinate, Coordinate]
     """Position on the road, x and y in metres at right angles, from any origin."""
@@ -93,15 +91,13 @@ _USUAL = re.compile(
 """A time in a name, such as 2026-05-01_07-00-00, 20260501T070000Z or 20260501070000."""
 
 
-def moment(text: str) -> datetime:
-    """Return a moment as ISO 8601 writes it. Raises `ValueError`."""
-    try:
-        found = datetime.fromisoformat(text)
-    except ValueError:
-        found = datetime.min
-    if not _EARLIEST <= found.year <= _LATEST:
-        raise ValueError(f"{text!r} is not a time; expected one such as '2026-05-01 07:00+02:00'")
-    return found
+def parse_date_time(text: str) -> datetime:
+    """Return the date and time that a text in ISO 8601 states. Raises `ValueError`."""
+    with suppress(ValueError):
+        date_time = datetime.fromisoformat(text)
+        if _EARLIEST <= date_time.year <= _LATEST:
+            return date_time
+    raise ValueError(f"{text!r} is not a time; expected one such as '2026-05-01 07:00+02:00'")
 
 
 class ClockSettings(Section):
@@ -118,14 +114,14 @@ class ClockSettings(Section):
     @classmethod
     def _has_known_codes(cls, pattern: str | None) -> str | None:
         if pattern is not None:
-            rest = re.sub("|".join(_CODES), "", pattern)
-            if "%" in rest or pattern == rest:
+            literal_text = re.sub("|".join(_CODES), "", pattern)
+            if "%" in literal_text or pattern == literal_text:
                 raise ValueError(f"a pattern can only contain {', '.join(_CODES)} and other text")
         return pattern
 
     def time_in(self, name: str) -> datetime | None:
         """Return the time in the name of a file; None without one. It is in UTC after a ``Z``."""
-        texts = ["{}{}{}T{}{}{}{}".format(*groups) for groups in _USUAL.findall(name)]
+        texts = [match.expand(r"\1\2\3T\4\5\6\7") for match in _USUAL.finditer(name)]
         if self.pattern:
             parts = re.findall(r"%[a-zA-Z]|[^%]", self.pattern, re.DOTALL)
             form = "".join(_CODES.get(part) or re.escape(part) for part in parts)
@@ -133,9 +129,9 @@ class ClockSettings(Section):
         for text in texts:
             with suppress(ValueError):
                 if not self.pattern:
-                    return moment(text)
+                    return parse_date_time(text)
                 zone = "Z" if "%SZ" in self.pattern else ""
-                return moment(datetime.strptime(text, self.pattern).isoformat() + zone)
+                return parse_date_time(datetime.strptime(text, self.pattern).isoformat() + zone)
         return None
 
 
@@ -144,7 +140,8 @@ class CameraSettings(Section):
 
     size: Size | None = None
     """Width and height in pixels of the frames that points in this file refer to. Other frame sizes
-    need the same aspect ratio. null: points are fractions of the frame, 0 to 1.
+    need the same aspect ratio. null: points are fractions of the frame, 0 to 1. The key size of an
+    item with points overrides it; [1, 1] stands for fractions.
     """
     lens: LensSettings | None = None
     """The lens, from `vdet calibrate`. null: no distortion."""
@@ -153,15 +150,3 @@ class CameraSettings(Section):
     speeds and distances are measured.
     """
     clock: ClockSettings = ClockSettings()
-
-    def check_frames(self, width: int, height: int) -> None:
-        """Raise a `ConfigError` if frames have another aspect ratio than `size`."""
-        if self.size is None:
-            return
-        given_width, given_height = self.size
-        aspect = (width / height) / (given_width / given_height)
-        if abs(aspect - 1) > _ASPECT_TOLERANCE:
-            raise ConfigError(
-                f"camera.size: points are for frames of {given_width}×{given_height}, "
-                f"whose aspect ratio differs from {width}×{height}; define them for this size"
-            )

@@ -1,7 +1,7 @@
 """The section `detector`: of networks, and of the linear SVM with its features and windows."""
 
 import math
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -11,13 +11,7 @@ Searches = Annotated[float | None, Field(gt=0, le=1000)]
 
 
 class DetectorSettings(Section):
-    """Which detector finds vehicles, and its settings; each kind has its own class.
-
-    `model_suffix` is the ending of its model files; None for a kind whose files have no ending of
-    their own.
-    """
-
-    model_suffix: ClassVar[str | None] = None
+    """Which detector finds vehicles, and its settings; each kind has its own class."""
 
     kind: str
     model: str | None = Field(None, min_length=1, max_length=4096)
@@ -37,8 +31,8 @@ class DetectorSettings(Section):
         return "car", "truck", "bus", "vehicle"
 
     @property
-    def foot(self) -> float:
-        """Distance from the tyres down to the lower edge of a box, as a fraction of its height."""
+    def tyre_height(self) -> float:
+        """Height of the tyres above the lower edge of a box, as a fraction of its height."""
         return 0.0
 
     def showing_all(self) -> Self:
@@ -49,8 +43,6 @@ class DetectorSettings(Section):
 class NetworkSettings(DetectorSettings):
     """The detector: a network in an ONNX file, shipped or from another tool."""
 
-    model_suffix: ClassVar[str | None] = ".onnx"
-
     kind: Literal["net"] = "net"
     """net: a network."""
     searches_per_second: Searches = 12.0
@@ -59,7 +51,9 @@ class NetworkSettings(DetectorSettings):
     """
     min_score_still: Ratio = 0.4
     min_score: float = Field(0.03, gt=0, lt=1)
-    """Ignore boxes with a lower score."""
+    """Ignore boxes with a lower score. Of the others, a video shows what reaches tracker.min_score,
+    and an image what reaches min_score_still.
+    """
     nms_iou: Ratio = 0.55
     """Remove a box if its intersection over union with a better one is higher."""
     classes: tuple[str, ...] = Field(
@@ -219,8 +213,6 @@ class ScoreSettings(Section):
 class SvmSettings(DetectorSettings):
     """The detector: a linear SVM on HOG and colour features, sliding windows and a heatmap."""
 
-    model_suffix: ClassVar[str | None] = ".npz"
-
     kind: Literal["svm"] = "svm"
     """svm: a linear SVM on HOG and colour features."""
     searches_per_second: Searches = 8.0
@@ -233,6 +225,6 @@ class SvmSettings(DetectorSettings):
     score: ScoreSettings = ScoreSettings()
 
     @property
-    def foot(self) -> float:
-        """Distance from the tyres down to the lower edge of a box, as a fraction of its height."""
+    def tyre_height(self) -> float:
+        """Height of the tyres above the lower edge of a box, as a fraction of its height."""
         return 0.0 if self.heat.votes is None else 0.04

@@ -1,4 +1,4 @@
-"""YAML text → plain values, each with its place in the text, so that errors can name it."""
+"""YAML text → plain values, each with its position in the text, so that errors can name it."""
 
 import re
 import reprlib
@@ -22,18 +22,18 @@ Key = tuple[str | int, ...]
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """Values read from the source `name`, and the place of each key: `file:line:column`."""
+    """Values read from the source `name`, and the position of each key: `file:line:column`."""
 
     name: str
     values: dict[str, Any]
-    places: dict[Key, str] = field(default_factory=dict)
+    positions: dict[Key, str] = field(default_factory=dict)
 
-    def place_of(self, key: Key) -> str:
-        """Return the place of a key, or of the nearest one in or around it."""
+    def position_of(self, key: Key) -> str:
+        """Return the position of a key, or of the nearest one in or around it."""
         for length in range(len(key), -1, -1):
-            for at, place in self.places.items():
-                if at[:length] == key[:length]:
-                    return place
+            for candidate, position in self.positions.items():
+                if candidate[:length] == key[:length]:
+                    return position
         return self.name
 
 
@@ -50,7 +50,7 @@ class _Loader(yaml.SafeLoader):
     """Safe YAML without aliases, tags, duplicate keys, and keys that are not text.
 
     A few aliases can expand to billions of values, and a tag can ask for any type; settings need
-    neither. `key_marks` are the places of all keys.
+    neither. `key_marks` are the positions of all keys.
     """
 
     def __init__(self, text: str) -> None:
@@ -60,9 +60,9 @@ class _Loader(yaml.SafeLoader):
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
         event = self.peek_event()  # type: ignore[no-untyped-call]
         if self.check_event(yaml.AliasEvent):
-            raise _refused("aliases (*name) are not accepted", event)
+            raise _rejected("aliases (*name) are not accepted", event)
         if getattr(event, "tag", None):
-            raise _refused("tags (!name) are not accepted", event)
+            raise _rejected("tags (!name) are not accepted", event)
         return super().compose_node(parent, index)
 
     def read(self, node: yaml.Node, key: Key) -> Any:
@@ -75,25 +75,25 @@ class _Loader(yaml.SafeLoader):
         try:
             value = self.construct_object(node)
         except ValueError as error:
-            raise _refused(str(error), node) from error
+            raise _rejected(str(error), node) from error
         if isinstance(value, int) and value.bit_length() > MAX_INTEGER_BITS:
-            raise _refused("the number is too large", node)
+            raise _rejected("the number is too large", node)
         return value
 
     def _mapping(self, node: yaml.MappingNode, key: Key) -> dict[str, Any]:
         values: dict[str, Any] = {}
         for name, value in node.value:
             if not isinstance(name, yaml.ScalarNode):
-                raise _refused(f"a {name.id} cannot be a key", name)
+                raise _rejected(f"a {name.id} cannot be a key", name)
             if name.value in values:
-                raise _refused(f"{printable(name.value)} appears twice; remove one", name)
+                raise _rejected(f"{printable(name.value)} appears twice; remove one", name)
             self.key_marks[(*key, name.value)] = name.start_mark
             values[name.value] = self.read(value, (*key, name.value))
         return values
 
 
-def _refused(problem: str, what: Any) -> ConstructorError:
-    return ConstructorError(None, None, problem, what.start_mark)
+def _rejected(problem: str, node: Any) -> ConstructorError:
+    return ConstructorError(None, None, problem, node.start_mark)
 
 
 # In YAML 1.1 a number with an exponent needs a dot and a sign: `1.0e-3`.
@@ -122,11 +122,11 @@ def read_document(path: Path) -> Document:
 
 def parse_document(text: str, name: str) -> Document:
     """Read YAML text; `name` is its name in messages. Raises `ConfigError`."""
-    values, places = _parse(text, name)
+    values, positions = _parse(text, name)
     if not isinstance(values, dict | None):
         got = reprlib.repr(values)
         raise ConfigError(f"{name}:1:1: expected settings (key: value), got {got}")
-    return Document(name, values or {}, places)
+    return Document(name, values or {}, positions)
 
 
 def parse_assignment(text: str) -> Document:
@@ -141,24 +141,28 @@ def parse_assignment(text: str) -> Document:
     path: Key = tuple(key.strip().split("."))
     if not equals or not all(path):
         raise ConfigError(f"--set {text}: expected KEY=VALUE, as in output.crf=18")
-    nested, places = _parse(value, "--set")
+    nested, positions = _parse(value, "--set")
     for part in reversed(path):
         nested = {part: nested}
-    inside = ((*path, *key) for key in places or [()])
+    inside = ((*path, *key) for key in positions or [()])
     return Document("--set", nested, dict.fromkeys(inside, "--set"))
 
 
 def _parse(text: str, name: str) -> tuple[Any, dict[Key, str]]:
-    """Return the value of YAML text, and the places of all keys in it. Raises `ConfigError`."""
+    """Return the value of YAML text, and the positions of all its keys. Raises `ConfigError`."""
     try:
         loader = _Loader(text)
         node = loader.get_single_node()
         value = None if node is None else loader.read(node, ())
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
-        place = f"{name}:{mark.line + 1}:{mark.column + 1}" if mark else name
-        raise ConfigError(f"{place}: is not YAML: {error.problem or error.context}") from error
-    except (yaml.YAMLError, ValueError, OverflowError) as error:  # a character that YAML refuses
+        position = f"{name}:{mark.line + 1}:{mark.column + 1}" if mark else name
+        raise ConfigError(f"{position}: is not YAML: {error.problem or error.context}") from error
+    except (
+        yaml.YAMLError,
+        ValueError,
+        OverflowError,
+    ) as error:  # a forbidden character
         raise ConfigError(f"{name}: is not YAML: {' '.join(str(error).split())}") from error
     except RecursionError as error:
         raise ConfigError(f"{name}: is nested too deeply") from error

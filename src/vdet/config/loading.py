@@ -1,10 +1,10 @@
 """Layers of settings → one `Settings`: the defaults, then YAML files, then assignments."""
 
 import contextlib
+import copy
 import difflib
 import reprlib
-from collections.abc import Collection, Sequence
-from dataclasses import replace
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from functools import reduce
 from pathlib import Path
 from typing import Any
@@ -13,10 +13,11 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from vdet.config import document
+from vdet.config.camera import GroundPoint
 from vdet.config.document import Document, Key
 from vdet.config.kinds import GROUPS, default_kind, kind_of_model, kind_settings
-from vdet.config.places import inside, to_fractions, with_changed
-from vdet.config.schema import Section, Settings
+from vdet.config.schema import LaneSettings, Section, Settings
+from vdet.config.shapes import FRACTIONS, LineSettings, RegionSettings, Shape, ZoneSettings
 from vdet.errors import ConfigError
 from vdet.plugins import plugin_names
 
@@ -67,12 +68,12 @@ def load_settings(
         One line for each mistake, with file, line, column, key and what was expected.
     """
     assigned = reduce(_over, map(document.parse_assignment, assignments), Document("--set", {}))
-    layers = [*map(_read_file, paths), _with_fractions(assigned)]
-    models = [inside(layer.values, "detector", "model") for layer in layers]
-    for model in filter(lambda model: isinstance(model, str), models):
-        detector = kind_of_model(Path(model)) or detector
-    chosen = Document("defaults", {"detector": {"kind": detector}} if detector else {})
-    merged = reduce(_with_kinds_over, layers, chosen)
+    layers = [*map(_read_layer, paths), _with_sizes(assigned)]
+    for layer in layers:
+        if isinstance(model := inside(layer.values, "detector", "model"), str):
+            detector = kind_of_model(Path(model)) or detector
+    default = Document("defaults", {"detector": {"kind": detector}} if detector else {})
+    merged = reduce(_with_kinds_over, layers, default)
     try:
         return Settings.model_validate(merged.values)
     except ValidationError as error:
@@ -84,40 +85,81 @@ def load_settings(
 
 
 def given_values(paths: Sequence[Path]) -> dict[str, Any]:
-    """Return the merged values of files, unchecked: points as fractions, paths as written.
+    """Return the merged values of files, unchecked: each shape with its size, paths as written.
 
     Raises
     ------
     ConfigError
         A file cannot be read, or is not YAML.
     """
-    layers = (_with_fractions(document.read_document(path)) for path in paths)
+    layers = (_with_sizes(document.read_document(path)) for path in paths)
     return reduce(_with_kinds_over, layers, Document("settings", {})).values
 
 
-def _with_fractions(layer: Document) -> Document:
-    return replace(layer, values=to_fractions(layer.values))
+def _read_layer(path: Path) -> Document:
+    """Read a file as a layer, with paths relative to the working folder."""
+    layer = _with_sizes(document.read_document(path))
+    regions = [region for kind, region in shapes_in(layer.values) if kind is RegionSettings]
+    for section in (layer.values.get("detector"), *regions):
+        for key in ("model", "mask"):
+            if isinstance(section, dict) and isinstance(section.get(key), str):
+                section[key] = str(path.parent / section[key])
+    return layer
 
 
-def _read_file(path: Path) -> Document:
-    """Read a file as a layer, with points as fractions and paths relative to the working folder."""
+def _with_sizes(layer: Document) -> Document:
+    """Add to each shape of a layer the size that its points are given for."""
+    size = inside(layer.values, "camera", "size")
+    for _, shape in shapes_in(layer.values):
+        shape.setdefault("size", list(FRACTIONS) if size is None else size)
+    return layer
 
-    def from_here(name: Any) -> Any:
-        return str(path.parent / name) if isinstance(name, str) else name
 
-    layer = _with_fractions(document.read_document(path))
-    found = {
-        name: with_changed(section, {"mask", "model"}, from_here)
-        for name, section in layer.values.items()
-        if name in ("detector", "regions")  # in `labels.roles` these keys may be labels
-    }
-    return replace(layer, values=layer.values | found)
+_SHAPES: dict[tuple[str, ...], type[Shape]] = {
+    ("camera", "ground"): GroundPoint,
+    ("regions",): RegionSettings,
+    ("traffic", "lines"): LineSettings,
+    ("traffic", "zones"): ZoneSettings,
+    ("lanes",): LaneSettings,
+}
+"""Where settings have shapes: a list of them, or one."""
+
+
+def shapes_in(values: dict[str, Any]) -> Iterator[tuple[type[Shape], dict[str, Any]]]:
+    """Yield the plain values of each shape in plain settings, with its class."""
+    for keys, kind in _SHAPES.items():
+        items = inside(values, *keys)
+        for item in items if isinstance(items, list) else [items]:
+            if isinstance(item, dict) and (kind is not LaneSettings or "points" in item):
+                yield kind, item
+
+
+def in_pixels(values: Mapping[str, Any], width: int, height: int) -> dict[str, Any]:
+    """Return `given_values` for frames of this size: `camera.size`, and all points in its pixels.
+
+    Raises
+    ------
+    ConfigError
+        The points are for frames of another aspect ratio.
+    """
+    scaled = copy.deepcopy({**values, "camera": values.get("camera") or {}})
+    scaled["camera"]["size"] = [width, height]
+    for kind, item in shapes_in(scaled):
+        shape = kind.model_validate(item).for_frames(width, height)
+        points = shape.model_dump(mode="json", include={*kind.point_fields} & set(item))
+        item |= {name: _rounded(value) for name, value in points.items()}
+        item.pop("size", None)
+    return scaled
+
+
+def _rounded(value: Any) -> Any:
+    return [*map(_rounded, value)] if isinstance(value, list) else value and round(value, 3)
 
 
 def _over(below: Document, above: Document) -> Document:
-    """Lay a document over another one."""
+    """Return a document with the values of `above` instead of those of `below`."""
     values = _joined(below.values, above.values)
-    return Document(below.name, values, below.places | above.places)
+    return Document(below.name, values, below.positions | above.positions)
 
 
 def _joined(below: Any, above: Any) -> Any:
@@ -127,13 +169,20 @@ def _joined(below: Any, above: Any) -> Any:
 
 
 def _with_kinds_over(below: Document, above: Document) -> Document:
-    """Lay a document over another one; a section whose kind it changes starts anew."""
+    """Do as `_over`; a section whose kind `above` changes starts from its defaults."""
     values = dict(below.values)
     for name in GROUPS:
         kind = inside(above.values, name, "kind")
         if kind is not None and kind != (inside(values, name, "kind") or default_kind(name)):
             values[name] = {}
-    return _over(Document(below.name, values, below.places), above)
+    return _over(Document(below.name, values, below.positions), above)
+
+
+def inside(values: Any, *keys: str) -> Any:
+    """Return the value of a key in nested sections; None where there is none."""
+    for key in keys:
+        values = values.get(key) if isinstance(values, dict) else None
+    return values
 
 
 _EXPECTED = {
@@ -146,7 +195,7 @@ _EXPECTED = {
 def _describe(mistake: ErrorDetails, merged: Document) -> str:
     key = tuple(mistake["loc"])
     named = f"{document.format_key(key)}: " if key else ""
-    return f"{merged.place_of(key)}: {named}{_expected(mistake, key)}"
+    return f"{merged.position_of(key)}: {named}{_expected(mistake, key)}"
 
 
 def _expected(mistake: ErrorDetails, key: Key) -> str:
@@ -163,16 +212,16 @@ def _expected(mistake: ErrorDetails, key: Key) -> str:
 
 
 def _unknown(key: Key, section: type[Section]) -> str:
-    """Return a hint: the kind that has this key, the key probably meant, or all known ones."""
-    name, group, known = str(key[-1]), str(key[0]), list(section.model_fields)
+    """Return a hint: the kind that has this key, the key probably meant, or all keys."""
+    name, group, keys = str(key[-1]), str(key[0]), list(section.model_fields)
     if len(key) == 2 and group in GROUPS:
         owners = [kind for kind in plugin_names(GROUPS[group]) if name in _keys_of(group, kind)]
         if owners:
             words = f"belongs to {group}.kind: {' or '.join(owners)}, and has no effect with"
             return f"{words} {section.model_fields['kind'].default}"
-    if close := difflib.get_close_matches(name, known, n=1):
+    if close := difflib.get_close_matches(name, keys, n=1):
         return f"unknown setting; did you mean {close[0]}?"
-    return f"unknown setting; known settings: {', '.join(known)}"
+    return f"unknown setting; known settings: {', '.join(keys)}"
 
 
 def _keys_of(group: str, kind: str) -> Collection[str]:

@@ -13,8 +13,9 @@ import yaml
 from pydantic.fields import FieldInfo
 from pydantic_core import to_jsonable_python
 
-from vdet.config.places import to_pixels
+from vdet.config.loading import shapes_in
 from vdet.config.schema import Section, Settings
+from vdet.config.shapes import FRACTIONS, Shape
 
 HEADING = "# vdet settings. `vdet config` prints the effective ones."
 WIDTH = 100
@@ -25,8 +26,11 @@ def render_settings(settings: Settings) -> str:
 
     Each key is preceded by what it means; the keys of list items stand before the list.
     """
-    # An item says only what it has.
-    values = to_pixels(to_jsonable_python(settings, exclude_none=True))
+    # An item says only what it has, and its size only if it differs from that of the file.
+    values = to_jsonable_python(settings, exclude_none=True)
+    for _, shape in shapes_in(values):
+        if shape["size"] == list(settings.camera.size or FRACTIONS):
+            del shape["size"]
     return "\n".join([HEADING, *_section(settings, values, "")]) + "\n"
 
 
@@ -36,7 +40,7 @@ def explanations(section: type[Section]) -> Mapping[str, str]:
     It is the description of its field, or else the text below the field in the source. That is read
     here, and not by pydantic: parsing all sections would take a third of the start of a command.
     """
-    found: dict[str, str] = {}
+    texts: dict[str, str] = {}
     for item in reversed(section.__mro__):
         if not issubclass(item, Section):
             continue
@@ -45,15 +49,17 @@ def explanations(section: type[Section]) -> Mapping[str, str]:
             for field, text in pairwise(kind.body if isinstance(kind, ast.ClassDef) else ()):
                 match field, text:
                     case ast.AnnAssign(ast.Name(name)), ast.Expr(ast.Constant(str(words))):
-                        found[name] = inspect.cleandoc(words)
+                        texts[name] = inspect.cleandoc(words)
     described = {name: field.description for name, field in section.model_fields.items()}
-    return found | {name: text for name, text in described.items() if text}
+    return texts | {name: text for name, text in described.items() if text}
 
 
 def _section(section: Section, values: Mapping[str, Any], indent: str) -> Iterator[str]:
     texts = explanations(type(section))
     for name, field in type(section).model_fields.items():
         value = getattr(section, name)
+        if name == "size" and isinstance(section, Shape) and name not in values:
+            continue
         if not indent:
             yield ""
         if isinstance(value, Section):
@@ -76,13 +82,17 @@ def _item_keys(field: FieldInfo, indent: str) -> Iterator[str]:
         if not (isclass(item) and issubclass(item, Section)):
             continue
         subject = "Each item" if get_origin(field.annotation) is tuple else "It"
-        what = _first_line(item)
-        yield from _comment(f"{subject} is {what[:1].lower()}{what[1:]}", indent)
+        title = _first_line(item)
+        yield from _comment(f"{subject} is {title[:1].lower()}{title[1:]}", indent)
         texts = explanations(item)
         for name in item.model_fields:
-            key, rest = f"{indent}#   ", f"{indent}#     "
+            if name == "size" and issubclass(item, Shape):
+                continue  # explained at camera.size
             yield from textwrap.wrap(
-                f"{name}: {texts.get(name, '')}", WIDTH, initial_indent=key, subsequent_indent=rest
+                f"{name}: {texts.get(name, '')}",
+                WIDTH,
+                initial_indent=f"{indent}#   ",
+                subsequent_indent=f"{indent}#     ",
             )
 
 

@@ -16,18 +16,18 @@ from pydantic import (
     model_validator,
 )
 
-from vdet.config.camera import CameraSettings, moment
+from vdet.config.camera import CameraSettings, parse_date_time
 from vdet.config.detector import DetectorSettings, NetworkSettings, SvmSettings
 from vdet.config.kinds import with_kind
-from vdet.config.places import Place, RegionList, TrafficSettings
 from vdet.config.section import Ratio, Section
+from vdet.config.shapes import FramePoint, RegionList, Shape, TrafficSettings
 from vdet.config.tracker import MotionTrackerSettings, TrackerSettings
 from vdet.errors import ConfigError
 
 Metres = Annotated[float, Field(gt=0, le=200)]
 
 
-class LaneSettings(Section):
+class LaneSettings(Shape):
     """The lane: whether to find it, and a trapezoid along its lines on a straight road.
 
     The trapezoid here is where many dashboard cameras see their lane. For a camera of your own,
@@ -38,7 +38,7 @@ class LaneSettings(Section):
 
     enabled: bool = False
     """Find and draw the lane."""
-    points: tuple[Place, Place, Place, Place] = (
+    points: tuple[FramePoint, FramePoint, FramePoint, FramePoint] = (
         (0.21, 0.93), (0.79, 0.93), (0.54, 0.63), (0.46, 0.63),
     )  # fmt: skip
     """Where the lines cross two rows: near left, near right, far right, far left; x and y."""
@@ -146,9 +146,9 @@ class InputSettings(Section):
 
     @field_validator("begin")
     @classmethod
-    def _is_a_moment(cls, begin: str | None) -> str | None:
+    def _is_a_date_and_time(cls, begin: str | None) -> str | None:
         if begin is not None:
-            moment(begin)
+            parse_date_time(begin)
         return begin
 
 
@@ -223,12 +223,12 @@ class Settings(Section):
     def _are_looked_for(cls, classes: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
         detector = info.data.get("detector")
         if classes and isinstance(detector, SvmSettings):
-            raise ValueError("has no effect: the linear SVM knows no classes")
-        known = detector.vehicle_classes if detector else classes
+            raise ValueError("has no effect: the linear SVM has no classes")
+        detected = detector.vehicle_classes if detector else classes
         for name in classes:
-            if name not in known:
-                words = f"{name}: unknown class; known: {', '.join(known)}"
-                raise ValueError(f"{words}; detector.classes can have more")
+            if name not in detected:
+                problem = f"{name}: unknown class; known: {', '.join(detected)}"
+                raise ValueError(f"{problem}; detector.classes can have more")
         return classes
 
     def with_paths(self, change: Callable[[str], str]) -> "Settings":
@@ -243,7 +243,7 @@ class Settings(Section):
 
     @property
     def lack_of_metres(self) -> str | None:
-        """A sentence that says what is missing, where lanes are looked for without a camera."""
+        """What is missing for values in metres, if lanes are searched for without a camera."""
         needed = {"camera.lens": self.camera.lens, "lanes.metres": self.lanes.metres}
         missing = ", ".join(key for key, value in needed.items() if value is None)
         is_lacking = self.lanes.enabled and bool(missing)

@@ -1,6 +1,8 @@
 """The base class of all sections of the settings."""
 
-from typing import Annotated, Any, TypeVar
+import logging
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -13,7 +15,12 @@ Ratio = Annotated[float, Field(ge=0, le=1)]
 
 
 class Section(BaseModel):
-    """A part of the settings: immutable; unknown keys and NaN are refused."""
+    """A part of the settings: immutable; unknown keys and NaN are rejected.
+
+    `renamed` has the new names of keys whose old names are still read.
+    """
+
+    renamed: ClassVar[Mapping[str, str]] = {}
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
@@ -26,8 +33,12 @@ class Section(BaseModel):
         """
         if not isinstance(values, dict | None):
             return values
-        known = cls.model_fields
-        return {key: value if key in known else cls for key, value in (values or {}).items()}
+        marked: dict[str, Any] = {}
+        for key, value in (values or {}).items():
+            if new_name := cls.renamed.get(key):
+                logging.getLogger(__name__).warning("%s: is deprecated; use %s", key, new_name)
+            marked[new_name or key] = value if (new_name or key) in cls.model_fields else cls
+        return marked
 
 
 S = TypeVar("S", bound=Section)

@@ -1,6 +1,7 @@
 """The section `tracker`: how the detections of consecutive frames become tracks."""
 
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
@@ -33,7 +34,9 @@ class MotionTrackerSettings(TrackerSettings):
     At 0.018, a car seen from behind is 2 % of the frame wide.
     """
     min_score: Ratio = 0.4
-    """Minimum mean score of a vehicle's latest detections to be shown."""
+    """Minimum mean score of a vehicle's latest detections to be shown. Values below
+    detector.min_score have no effect.
+    """
     confirm_seconds: Seconds = 0.1
     """Evidence needed to show a vehicle: seconds of detections with score 1."""
     decay: Ratio = 0.2
@@ -49,13 +52,17 @@ class MotionTrackerSettings(TrackerSettings):
 class RulesTrackerSettings(TrackerSettings):
     """The rules of the original system (`vdet.track.rules` lists them); times are in frames."""
 
+    renamed: ClassVar[Mapping[str, str]] = {
+        "near": "max_distance", "wide": "accepted_width", "young": "detections_to_keep",
+    }  # fmt: skip
+
     kind: Literal["rules"] = "rules"
     """motion or rules."""
     history: int = Field(10, ge=1, le=1000)
     """Number of detections to average for a car's box."""
     min_region: Pixels = 50
     """Ignore detections narrower or lower than this."""
-    near: Pixels = 50
+    max_distance: Pixels = 50
     """Maximum distance of a detection from its car."""
     confident_peak: float = Field(2.0, ge=0)
     """Heat above which a peak is confident, and its car is shown earlier."""
@@ -63,7 +70,7 @@ class RulesTrackerSettings(TrackerSettings):
     """Consecutive detections needed to show a car."""
     confident_detections_needed: int = Field(3, ge=1)
     """Consecutive detections needed to show a car after a confident peak."""
-    wide: Pixels = 200
+    accepted_width: Pixels = 200
     """A wider detection is always accepted for its car."""
     good_fraction: Ratio = 2 / 3
     """A detection wider than this fraction of its car is also accepted."""
@@ -78,7 +85,7 @@ class RulesTrackerSettings(TrackerSettings):
     """Maximum distance from a car's last position to search its image."""
     match_score: Ratio = 0.5
     """Minimum score of a match; 1 is perfect."""
-    young: int = Field(7, ge=0)
+    detections_to_keep: int = Field(7, ge=0)
     """Minimum detections to keep a car at its first miss."""
     max_matches: int = Field(12, ge=1)
     """Consecutive matches after which a car is deleted."""

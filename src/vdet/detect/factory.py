@@ -6,30 +6,12 @@ from pathlib import Path
 from typing import Any
 
 from vdet.boxes import Boxes, Image
+from vdet.config.kinds import DetectorKind, kind_of_model
 from vdet.config.schema import DetectorSettings
 from vdet.detect.protocol import DetectorModel, VideoDetector
 from vdet.errors import ConfigError
 from vdet.media import Picture
 from vdet.plugins import DETECTORS, load_plugin
-
-
-@dataclass(frozen=True, slots=True)
-class DetectorKind:
-    """A kind of detector, as registered under its name.
-
-    Attributes
-    ----------
-    settings
-        Class of the section `detector` for this kind; the default of its `kind` is the name.
-    load
-        Loads the detector from its settings and a model file, None for the shipped one.
-    shipped
-        Returns the shipped model file for given settings; None if the kind needs no file.
-    """
-
-    settings: type[DetectorSettings]
-    load: Callable[[Any, Path | None], DetectorModel]
-    shipped: Callable[[Any], Path | None] = lambda _: None
 
 
 def load_detector(settings: DetectorSettings) -> DetectorModel:
@@ -42,14 +24,14 @@ def load_detector(settings: DetectorSettings) -> DetectorModel:
     ModelError
         The model file cannot be used.
     """
-    model = Path(settings.model) if settings.model else None
-    if model and settings.model_suffix:
-        from vdet.config.kinds import kind_of_model  # it imports YAML
-
-        if (kind := kind_of_model(model)) not in (None, settings.kind):
-            advice = f"is for detector.kind: {kind}, not {settings.kind}; remove one of them"
-            raise ConfigError(f"{model}: {advice}")
-    return _kind(settings).load(settings, model)
+    kind = _kind(settings)
+    path = Path(settings.model) if settings.model else None
+    of_model = kind_of_model(path) if path and kind.model_suffix else None
+    if of_model not in (None, settings.kind):
+        advice = f"is for detector.kind: {of_model}, not {settings.kind}; remove one of them"
+        raise ConfigError(f"{path}: {advice}")
+    model: DetectorModel = kind.load(settings, path)
+    return model
 
 
 def model_file(settings: DetectorSettings) -> Path | None:
@@ -81,8 +63,8 @@ class _Shared:
         return self.detector if isinstance(self.detector, VideoDetector) else self
 
     def search(self, picture: Picture, index: int | None) -> Boxes:  # noqa: ARG002
-        found: Boxes = self.detector(picture.image)
-        return found
+        detections: Boxes = self.detector(picture.image)
+        return detections
 
     def detect(self, candidates: Boxes) -> Boxes:
         return candidates

@@ -16,7 +16,7 @@ from vdet.labels.label import Label, LabelledVideo
 from vdet.labels.reading import read_predictions, read_truth
 from vdet.labels.roles import Roles
 from vdet.progress import Progress, no_progress
-from vdet.regions import lay_regions
+from vdet.regions import Regions
 from vdet.run.loop import Parts
 from vdet.run.video import Run, open_video
 
@@ -132,7 +132,8 @@ def evaluate_clip(
             advance(1)
     clip.truth.check_end(clip.truth_path, frames)
     truth = clip.truth.until(frames)
-    if regions := lay_regions(settings.regions, info.width, info.height):
+    if settings.regions:
+        regions = Regions(settings.regions, info.width, info.height)
         outside = [not regions.contains(Box(*sides).foot) for sides in truth.boxes.tolist()]
         truth = replace(truth, ignored=truth.ignored | np.array(outside, np.bool_))
     comparison = compare(LabelledVideo.of(labels), truth)

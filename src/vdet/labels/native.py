@@ -16,7 +16,7 @@ from typing import Annotated, Any, NotRequired
 from pydantic import FailFast, Field, TypeAdapter, ValidationError
 from typing_extensions import TypedDict
 
-from vdet.config.camera import moment
+from vdet.config.camera import parse_date_time
 from vdet.errors import TruthError
 from vdet.labels.formats import Format
 from vdet.labels.label import Label, SavedTracks, from_size, limited, line_error
@@ -151,7 +151,7 @@ def _begin(path: Path, line: int, first: Mapping[str, Any]) -> datetime | None:
     """Return the clock time at time 0 from the time and clock of the first line."""
     clock = first.get(CLOCK)
     try:
-        return moment(clock) - timedelta(seconds=float(first["time"])) if clock else None
+        return parse_date_time(clock) - timedelta(seconds=float(first["time"])) if clock else None
     except (ValueError, OverflowError) as error:
         raise line_error(path, line, f"clock: {error}") from error
 

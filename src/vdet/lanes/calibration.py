@@ -59,8 +59,8 @@ def calibrate(paths: Iterable[Path], pattern: Pattern) -> Calibration:
 
     The frame size is the most frequent size of the photographs. Photographs whose sides differ
     by at most `SIZE_TOLERANCE` pixels are used unchanged, others are skipped. After a first fit,
-    photographs with an error above `OUTLIER_RATIO` × the median are dropped, and the rest is
-    fitted again.
+    photographs with an error above `OUTLIER_RATIO` × the median are dropped, and the others
+    are fitted again.
 
     Raises
     ------
@@ -97,8 +97,8 @@ def find_corners(image: Image, pattern: Pattern) -> Float32Array | None:
     gray = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
     scale = min(1.0, math.sqrt(MAX_SEARCH_PIXELS / gray.size))
     small = cv2.resize(gray, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
-    found, corners = cv2.findChessboardCorners(small, pattern)
-    if not found:
+    has_board, corners = cv2.findChessboardCorners(small, pattern)
+    if not has_board:
         return None
     corners = np.asarray((corners + 0.5) / scale - 0.5, np.float32)
     points = corners.reshape(pattern[1], pattern[0], 2)

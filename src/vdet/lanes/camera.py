@@ -26,8 +26,8 @@ Maps = tuple[cv2.typing.MatLike, cv2.typing.MatLike]
 
 def warped(layer: Image, maps: Maps, outside: int = 0) -> Image:
     """Return a remapped layer of a picture; pixels from beyond its edges are `outside`."""
-    border = cv2.BORDER_CONSTANT, (outside,)
-    return np.asarray(cv2.remap(layer, *maps, cv2.INTER_LINEAR, None, *border), np.uint8)
+    x, y = maps
+    return np.asarray(cv2.remap(layer, x, y, cv2.INTER_LINEAR, borderValue=(outside,)), np.uint8)
 
 
 class Undistorter:
@@ -97,8 +97,8 @@ ACROSS = 30.0
 """Pixels per metre, across the road."""
 ALONG = 8.0
 """Pixels per metre, along the road."""
-_USUAL = 3.7, 37.0
-"""Metres of a lane that nobody measured, across and along: for the search, not for results."""
+_ASSUMED = 3.7, 37.0
+"""`lanes.metres` where it is not set, across and along: for the search, not for results."""
 _MARGIN = 3.0
 """Metres of road that are shown on each side of the lane."""
 
@@ -107,18 +107,18 @@ class TopView:
     """Converts between ground, undistorted frames of one size, and pictures from above."""
 
     def __init__(self, settings: LaneSettings, width: int, height: int) -> None:
-        self.lane_width, self.length = settings.metres or _USUAL
+        self.lane_width, self.length = settings.metres or _ASSUMED
         """Of the lane that is looked for, and along the trapezoid, metres."""
-        corners = np.array(settings.points)
+        corners = np.array(settings.for_frames(width, height).points)
         near_left, near_right, far_right, far_left = corners[:, 0].tolist()
-        near, far = near_right - near_left, far_right - far_left  # of the frame's width
+        near, far = near_right - near_left, far_right - far_left
         start = self.length * far / (near - far)  # widths in the frame are proportional to 1/z
         end = start + self.length
         left = (near_left - far_left) / (near - far) * self.lane_width
         right = left + self.lane_width
         ground = np.array([(left, start), (right, start), (right, end), (left, end)], np.float32)
-        frame = (corners * (width, height)).astype(np.float32)
-        self._to_frame = np.asarray(cv2.getPerspectiveTransform(ground, frame), np.float64)
+        to_frame = cv2.getPerspectiveTransform(ground, corners.astype(np.float32))
+        self._to_frame = np.asarray(to_frame, np.float64)
         """From `(x, z, 1)`, metres, to pixels of the undistorted frame."""
         self._to_ground = np.linalg.inv(self._to_frame)
         rows = round(self.length * ALONG)
@@ -154,8 +154,8 @@ class TopView:
         1 / z, in 1/m, is proportional to the rows below the horizon; it is 0 there, and negative
         above it. x / z does not depend on the scale of the ground, and has no unit.
         """
-        x, z, one = (self._to_ground @ (*pixel, 1.0)).tolist()
-        return x / z, one / z
+        x, z, scale = (self._to_ground @ (*pixel, 1.0)).tolist()
+        return x / z, scale / z
 
     def frame_to_top(self, pixels: Float64Array) -> Float64Array:
         """Return where pixels `(n, 2)` of the undistorted frame lie in the top view, `(n, 2)`."""

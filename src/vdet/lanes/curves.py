@@ -115,8 +115,8 @@ def paint_along(
 ) -> list[LinePaint]:
     """Return the middle of the paint within `margin` metres of each line, row by row.
 
-    Each of `lines` is the x of one line in each row, metres `(rows,)`. A row is left out if a part
-    of it is hidden near the line: the middle of the rest would be wrong.
+    Each of `lines` is the x of a line in each row, metres `(rows,)`. A row is left out if a part of
+    it is hidden near the line, because the middle of the visible part would be wrong.
     """
     half = max(1, round(margin * ACROSS))
     around = np.arange(-half, half + 1)
@@ -147,10 +147,10 @@ def find_base(mask: Image, top_view: TopView) -> tuple[float, float] | None:
     spread = round(FINE_MARGIN * ACROSS) | 1
     histogram = np.asarray(cv2.blur(counts[None], (spread, 1)), np.float64).ravel()
     expected = top_view.lane_width
-    widths = expected - WIDTH_TOLERANCE, expected + WIDTH_TOLERANCE
-    minimum, most = (round(width * ACROSS) for width in widths)
+    narrowest = round((expected - WIDTH_TOLERANCE) * ACROSS)
+    widest = round((expected + WIDTH_TOLERANCE) * ACROSS)
     best, base = 0.0, None
-    for gap in range(max(1, minimum), most + 1):
+    for gap in range(max(1, narrowest), widest + 1):
         left, right = top_view.laterals[:-gap], top_view.laterals[gap:]
         score = histogram[:-gap] * histogram[gap:] * ((left < 0) & (right > 0))
         peak = int(score.argmax())
@@ -194,13 +194,13 @@ _PRIOR = np.diag([_BEND_WEIGHT, _MIN_WEIGHT, _MIN_WEIGHT, _MIN_WEIGHT, _PITCH_WE
 _PRIOR += _WIDTH_WEIGHT * np.outer(_APART, _APART)
 
 _MIN_VISIBLE = 0.25
-"""Less of a line asks for no less paint: a little paint can be anything."""
+"""Visible fraction of a line below which it needs no less paint: a little can be anything."""
 _MARKING = 4.0
 """Shortest length of paint by which a wholly visible line is seen, metres."""
 _SCATTER = 0.08
 """Largest root mean square distance of paint from its curve, metres."""
 _CONVERGENCE = 1.6
-"""Most that the lines converge or diverge over the top view, metres: a vehicle pitches."""
+"""Maximum convergence of the lines over the top view, metres; it comes from the vehicle's pitch."""
 _MIN_RADIUS = 150.0
 """Smallest radius of a bend, metres."""
 _JUMP = 0.35
@@ -264,7 +264,9 @@ def solve(equations: Equations, width: float) -> LaneCurves:
     With little paint, they are straight and level, and the lane is `width` metres wide.
     """
     vector = equations[:, -1] + _WIDTH_WEIGHT * width * _APART
-    return LaneCurves(*np.linalg.solve(equations[:, :-1] + _PRIOR, vector).tolist())
+    solution = np.linalg.solve(equations[:, :-1] + _PRIOR, vector).tolist()
+    bend, heading, left, right, pitch = solution
+    return LaneCurves(bend=bend, heading=heading, left=left, right=right, pitch=pitch)
 
 
 def _rows(
@@ -291,11 +293,11 @@ class FrameFit:
         The pitch of a vehicle changes from frame to frame; its position and the road do not. The
         earlier pitch is eliminated (Schur complement).
         """
-        known = earlier.equations
-        factors = known[:, _PITCH] / (known[_PITCH, _PITCH] + _PITCH_WEIGHT)
-        rest = known - np.outer(factors, known[_PITCH])
-        rest[_PITCH] = rest[:, _PITCH] = 0
-        equations = self.equations + _MEMORY * rest
+        pitch_row = earlier.equations[_PITCH]
+        factors = earlier.equations[:, _PITCH] / (pitch_row[_PITCH] + _PITCH_WEIGHT)
+        without_pitch = earlier.equations - np.outer(factors, pitch_row)
+        without_pitch[_PITCH] = without_pitch[:, _PITCH] = 0
+        equations = self.equations + _MEMORY * without_pitch
         return FrameFit(solve(equations, earlier.curves.width), equations, self.seen)
 
 
@@ -315,8 +317,9 @@ def fit_new(mask: Image, top_view: TopView) -> FrameFit | None:
     base = find_base(mask, top_view)
     if base is None:
         return None
-    positions = slide_windows(mask, top_view, base)
-    fit = _fit(mask, top_view, positions, LaneCurves(0, 0, *base, 0))
+    left, right = base
+    guess = LaneCurves(bend=0, heading=0, left=left, right=right, pitch=0)
+    fit = _fit(mask, top_view, slide_windows(mask, top_view, base), guess)
     return fit if all(fit.seen) and fit.curves.contain_camera else None
 
 

@@ -53,7 +53,7 @@ class Ground:
         """Relative standard deviation of lengths, for points that are off by at least a pixel."""
         return self.row * max(self.pixel_error, 1.0) / self.length
 
-    def place(self, pixels: Float64Array) -> Float64Array:
+    def metres(self, pixels: Float64Array) -> Float64Array:
         """Return where on the road points `(n, 2)` of the frame are, metres `(n, 2)`.
 
         Whole numbers of pixels are the edges of pixels, as in boxes. NaN above the horizon, and
@@ -61,7 +61,7 @@ class Ground:
         """
         metres = _mapped(self.to_metres, self.undistorter.points(pixels - 0.5))
         along = np.roll(self.area, -1, axis=0) - self.area
-        outward = np.column_stack([along[:, 1], -along[:, 0]]) / np.hypot(*along.T)[:, None]
+        outward = np.column_stack([along[:, 1], -along[:, 0]]) / _lengths(along)[:, None]
         outside = (metres[:, None] - self.area) * outward
         beyond = outside.sum(axis=2).max(axis=1)
         return np.where((beyond <= self.length)[:, None], metres, np.nan)
@@ -72,7 +72,7 @@ class Ground:
         return self.undistorter.distorted(_mapped(back, metres)) + 0.5
 
 
-def ground_of(camera: CameraSettings, width: int, height: int) -> "Ground | None":
+def ground_of(camera: CameraSettings, width: int, height: int) -> Ground | None:
     """Fit the road plane of a camera for frames of `width` × `height` pixels; None without points.
 
     Raises
@@ -82,8 +82,9 @@ def ground_of(camera: CameraSettings, width: int, height: int) -> "Ground | None
     """
     if not camera.ground:
         return None
-    pixels = np.array([point.pixel for point in camera.ground], np.float64) * (width, height)
-    metres = np.array([point.metres for point in camera.ground], np.float64)
+    points = [point.for_frames(width, height) for point in camera.ground]
+    pixels = np.array([point.pixel for point in points], np.float64)
+    metres = np.array([point.metres for point in points], np.float64)
     return fit_ground(pixels, metres, Undistorter(camera.lens, width, height))
 
 
@@ -110,9 +111,9 @@ def fit_ground(pixels: Float64Array, metres: Float64Array, undistorter: Undistor
     if not (np.all(depths > 0) or np.all(depths < 0)):
         raise ConfigError("camera.ground: the horizon is between the points; two may be swapped")
     to_metres = np.asarray(inverse * np.sign(depths[0]), np.float64)
-    off = np.hypot(*(_mapped(to_metres, straight) - metres).T)
+    off = _lengths(_mapped(to_metres, straight) - metres)
     back = np.asarray(np.linalg.inv(to_metres), np.float64)
-    pixel_off = np.hypot(*(_mapped(back, metres) - straight).T)
+    pixel_off = _lengths(_mapped(back, metres) - straight)
     area = cv2.convexHull(metres.astype(np.float32))[:, 0].astype(np.float64)
     error, pixel_error = (float(np.sqrt(np.mean(item**2))) for item in (off, pixel_off))
     if error > _MAX_ERROR * _length(area):
@@ -121,7 +122,7 @@ def fit_ground(pixels: Float64Array, metres: Float64Array, undistorter: Undistor
             f"camera.ground[{worst}]: is {off[worst]:.1f} m from where the other points place it"
         )
     rows = _mapped(to_metres, straight + np.array((0, 1))) - _mapped(to_metres, straight)
-    row = float(np.median(np.hypot(*rows.T)))
+    row = float(np.median(_lengths(rows)))
     return Ground(to_metres, area, error, pixel_error, row, undistorter)
 
 
@@ -136,5 +137,9 @@ def _is_thin(points: Float64Array) -> bool:
     return bool(lengths[1] <= _THIN * lengths[0])
 
 
+def _lengths(vectors: Float64Array) -> Float64Array:
+    return np.asarray(np.hypot(vectors[..., 0], vectors[..., 1]))
+
+
 def _length(points: Float64Array) -> float:
-    return float(np.max(np.hypot(*(points[:, None] - points).transpose(2, 0, 1))))
+    return float(np.max(_lengths(points[:, None] - points)))

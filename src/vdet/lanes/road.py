@@ -1,4 +1,4 @@
-"""The road in the frames of a video: its lane, places on it, and their drawings.
+"""The road in the frames of a video: its lane, positions on it, and their drawings.
 
 `RoadFinder.observe` does the work that needs one frame only. `RoadFinder.update` takes the frames
 in order: it fits the lane near the last one, or finds a new one, and smooths it over time.
@@ -22,18 +22,18 @@ from vdet.media import Picture
 from vdet.media.images import to_ycrcb
 
 CARRY = 12
-"""Number of frames for which an unseen line is kept."""
+"""Number of frames for which a line is kept that is not seen."""
 _CURVE_MEMORY = 0.95
-"""Fraction of the frames before in the radius that is shown."""
+"""Weight of the earlier frames in the radius that is shown."""
 _STRAIGHT = 5000.0
 """Radius from which the road counts as straight, metres."""
 _LINE_POINTS = 24  # of each line of a `Lane`
 _REACH = 1.25
 """Farthest reported vehicle, as a multiple of the distance up to which the lane is fitted."""
-_ROW = 0.1
-"""Largest relative error of a distance for an error of one row: more is near the horizon."""
+_MAX_ROW_ERROR = 0.1
+"""Maximum relative error of a distance for an error of one row; it is larger near the horizon."""
 _LANES = 3
-"""Number of lanes to each side of the own one that are reported."""
+"""Number of lanes to each side of the camera's lane that are reported."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ class Lane:
     """Radius of the bend, metres; None if the road is straight (5000 m or more)."""
     offset: float | None
     """Distance of the camera from the middle of the lane, metres; positive: it is to the right.
-    None where the camera is not described; then the radius and the width are not known either.
+    None, like the radius and the width, where the camera is not described.
     """
     width: float | None
     """Width of the lane, metres."""
@@ -76,29 +76,29 @@ class RoadPosition:
     distance: float
     """Metres along the road from below the camera's lens."""
     lane: int | None
-    """0 for the own lane, 1 for the next one to the right, -1 to the left and so on; None for one
-    that is too far to the side."""
+    """0 for the camera's lane, 1 for the next one to the right, -1 to the left and so on; None for
+    one that is too far to the side."""
 
 
 def position_on_road(
-    foot: tuple[float, float], curves: LaneCurves, top_view: TopView
+    point: tuple[float, float], curves: LaneCurves, top_view: TopView
 ) -> RoadPosition | None:
-    """Return where on the road the point at a pixel of the undistorted frame is.
+    """Return where on the road a point of the undistorted frame is.
 
-    `foot` is `(x, y)`; whole numbers are pixel centres. None if it is above or near the horizon, or
-    farther than the lane is known.
+    `point` is `(x, y)`, pixels; whole numbers are pixel centres. None if it is above or near the
+    horizon, or farther away than the lane reaches.
 
     1 / z in the top view grows by the same amount with every row below the horizon. A camera that
     pitches by a little moves all rows by the same amount, so the true distance Z is given by
-    1 / Z = 1 / z - pitch. The other lanes are taken to be as wide as the own one, and to follow the
-    same curve.
+    1 / Z = 1 / z - pitch. The other lanes are assumed to be as wide as the camera's lane, and to
+    follow the same curve.
     """
-    x, y = foot
-    slope, nearness = top_view.sight(foot)
+    x, y = point
+    slope, nearness = top_view.sight(point)
     _, below = top_view.sight((x, y + 1))
     nearness, row = nearness - curves.pitch, below - nearness
     farthest = _REACH * float(top_view.distances[0])
-    if not (nearness * farthest >= 1 and row <= _ROW * nearness):  # NaN too is not known
+    if not (nearness * farthest >= 1 and row <= _MAX_ROW_ERROR * nearness):  # also for NaN
         return None
     distance = 1 / nearness
     shift = curves.heading * distance + curves.bend * distance**2  # of all lines, at the distance
@@ -122,7 +122,7 @@ class Road:
     """The road in one frame of a video."""
 
     view: FrameView
-    """The frame's pictures, from `RoadFinder.observe`; in `mask`, vehicles are `HIDDEN`."""
+    """The frame and its paint, from `RoadFinder.observe`; in `mask`, vehicles are `HIDDEN`."""
     lane: Lane | None
     """The lane, smoothed over this frame and those before; None if it is not reliably known."""
     curves: LaneCurves | None
@@ -132,7 +132,7 @@ class Road:
     """Moves boxes and points of the frame to the undistorted one."""
 
     def without_metres(self) -> "Road":
-        """Return the road without what only a described camera can tell."""
+        """Return the road without the values that need the description of a camera."""
         lane = self.lane and replace(self.lane, radius=None, offset=None, width=None)
         return replace(self, lane=lane, curves=None)
 
@@ -146,21 +146,21 @@ class Road:
         beside = box.x1 <= EDGE * width or box.x2 >= (1 - EDGE) * width
         return bool(beside or box.y2 >= (1 - EDGE) * height)
 
-    def position(self, foot: tuple[float, float]) -> RoadPosition | None:
-        """Return where on the road a vehicle with its foot at `foot` in the frame is.
+    def position(self, point: tuple[float, float]) -> RoadPosition | None:
+        """Return where on the road a vehicle is that stands at a point of the frame.
 
-        `foot` is `(x, y)` in pixels; whole numbers are the edges of pixels, as in boxes. None
+        `point` is `(x, y)`, pixels; whole numbers are the edges of pixels, as in boxes. None
         without a lane or metres, and where the lane does not reach: see `position_on_road`.
         """
         if self.curves is None:
             return None
-        [[x, y]] = self.undistorter.points(np.array([foot]) - 0.5)
+        [[x, y]] = self.undistorter.points(np.array([point]) - 0.5)
         return position_on_road((x, y), self.curves, self.top_view)
 
 
 @dataclass(frozen=True, slots=True)
 class _LaneState:
-    """What the frames so far tell about the lane."""
+    """The lane according to the frames so far."""
 
     fit: FrameFit
     unseen: tuple[int, int]
@@ -193,8 +193,8 @@ class RoadFinder:
         shown = self._top_view.pixels()
         seen = self._undistorter.distorted(shown.reshape(-1, 2)).reshape(shown.shape)
         self._maps: list[Maps] = [
-            cv2.convertMaps(places[..., 0], places[..., 1], cv2.CV_16SC2)
-            for places in np.array([seen, (seen + 0.5) / 2 - 0.5], np.float32)
+            cv2.convertMaps(pixels[..., 0], pixels[..., 1], cv2.CV_16SC2)
+            for pixels in np.array([seen, (seen + 0.5) / 2 - 0.5], np.float32)
         ]
         """Where the pixels of the top view lie in the frame, and in its chroma."""
 
@@ -214,11 +214,16 @@ class RoadFinder:
 
         `vehicles` are the boxes of the vehicles in it, which hide paint.
         """
-        placed = [self._undistorter.box(box) for box in vehicles]
-        view = replace(view, mask=hide(view.mask, self._top_view, placed))
+        boxes = [self._undistorter.box(box) for box in vehicles]
+        view = replace(view, mask=hide(view.mask, self._top_view, boxes))
         self._state = state = self._next_state(view.mask)
-        lane, curves = (self._lane(state), state.fit.curves) if state else (None, None)
-        return Road(view, lane, curves, self._top_view, self._undistorter)
+        return Road(
+            view,
+            lane=self._lane(state) if state else None,
+            curves=state.fit.curves if state else None,
+            top_view=self._top_view,
+            undistorter=self._undistorter,
+        )
 
     def _next_state(self, mask: Image) -> _LaneState | None:
         """Fit near the last lane; else find a new one; else keep the last one for some frames."""
@@ -227,7 +232,7 @@ class RoadFinder:
         if state and near and (updated := _advance(state, near)):
             return updated
         if new := fit_new(mask, self._top_view):
-            return _LaneState(new, (0, 0), 2 * new.curves.bend)
+            return _LaneState(new, unseen=(0, 0), curvature=2 * new.curves.bend)
         return _advance(state, None) if state and not near else None
 
     def _lane(self, state: _LaneState) -> Lane:
@@ -237,7 +242,7 @@ class RoadFinder:
         left, right = np.split(self._undistorter.distorted(lines), 2)
         radius = None if abs(curvature) * _STRAIGHT < 1 else 1 / abs(curvature)
         offset = -(curves.left + curves.right) / 2
-        return Lane(curvature, radius, offset, curves.width, left, right)
+        return Lane(curvature, radius, offset, curves.width, left=left, right=right)
 
 
 def _advance(state: _LaneState, fit: FrameFit | None) -> _LaneState | None:
@@ -246,14 +251,16 @@ def _advance(state: _LaneState, fit: FrameFit | None) -> _LaneState | None:
     The lane is lost if one of its lines was not seen in more than `CARRY` frames in a
     row, or if the camera has left it.
     """
-    seen = fit.seen if fit else (False, False)
-    left, right = (0 if now else before + 1 for now, before in zip(seen, state.unseen, strict=True))
-    joined, curvature = fit.with_earlier(state.fit) if fit else state.fit, state.curvature
+    sees_left, sees_right = fit.seen if fit else (False, False)
+    left, right = state.unseen
+    unseen = 0 if sees_left else left + 1, 0 if sees_right else right + 1
+    joined, curvature = state.fit, state.curvature
     if fit:
+        joined = fit.with_earlier(state.fit)
         curvature += (1 - _CURVE_MEMORY) * (2 * joined.curves.bend - curvature)
-    if max(left, right) > CARRY or not joined.curves.contain_camera:
+    if max(unseen) > CARRY or not joined.curves.contain_camera:
         return None
-    return _LaneState(joined, (left, right), curvature)
+    return _LaneState(joined, unseen, curvature)
 
 
 AREA: Color = (80, 200, 60)
@@ -271,15 +278,16 @@ def draw_lane(surface: Surface, lane: Lane) -> None:
 
 
 def lane_text(lane: Lane) -> tuple[str, ...]:
-    """Return two lines of text: the lane's width and bend, and the camera's place in it.
+    """Return two lines of text: the lane's width and bend, and the camera's position in it.
 
     It is empty for a lane without metres.
     """
     if lane.width is None or lane.offset is None:
         return ()
-    side, place = ("left" if way else "right" for way in (lane.curvature < 0, lane.offset <= 0))
-    bend = f"bends {side}, radius {lane.radius:.0f} m" if lane.radius else "straight"
-    middle = f"{abs(lane.offset):.2f} m {place} of its middle"
+    bend_side = "left" if lane.curvature < 0 else "right"
+    camera_side = "left" if lane.offset <= 0 else "right"
+    bend = f"bends {bend_side}, radius {lane.radius:.0f} m" if lane.radius else "straight"
+    middle = f"{abs(lane.offset):.2f} m {camera_side} of its middle"
     return f"lane {lane.width:.1f} m wide, {bend}", middle
 
 
@@ -293,8 +301,11 @@ def stage_images(road: Road) -> dict[str, Image]:
     above = _enlarge(road.top_view.picture(frame))
     fit = above.copy()
     if lane := road.lane:
-        straight = (road.undistorter.points(line) for line in (lane.left, lane.right))
-        _draw_area(fit, *(road.top_view.frame_to_top(line) * _SCALE for line in straight))
+        left, right = (
+            road.top_view.frame_to_top(road.undistorter.points(line)) * _SCALE
+            for line in (lane.left, lane.right)
+        )
+        _draw_area(fit, left, right)
     draw_lines(frame, road.top_view.outline, LINE, line_width(frame), closed=True)
     mask = np.asarray(cv2.cvtColor(road.view.mask, cv2.COLOR_GRAY2BGR), np.uint8)
     return {"road": frame, "above": above, "mask": _enlarge(mask), "fit": fit}

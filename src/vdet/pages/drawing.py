@@ -12,7 +12,7 @@ import yaml
 from markupsafe import Markup
 
 from vdet.boxes import Image
-from vdet.config.places import to_pixels
+from vdet.config import loading
 from vdet.config.schema import Settings
 from vdet.detect.classes import UNKNOWN
 from vdet.lanes.ground import ground_of
@@ -39,7 +39,7 @@ class Drawing:
     frames
         The tracks of its vehicles.
     values
-        Values of the settings files so far, with points as fractions of the frame.
+        Values of the settings files so far, as of `given_values`.
     facing
         As for `propose_lines`.
 
@@ -142,8 +142,7 @@ def split(
 
 def in_pixels(values: Mapping[str, Any], size: tuple[int, int]) -> dict[str, Any]:
     """Return settings with fractions converted to pixels of frames of this width and height."""
-    camera = {**(values.get("camera") or {}), "size": list(size)}
-    return to_pixels({**values, "camera": camera})
+    return loading.in_pixels(values, *size)
 
 
 def as_yaml(values: Mapping[str, Any]) -> list[str]:

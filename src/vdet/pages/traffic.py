@@ -143,7 +143,7 @@ def _scale(ground: Ground, size: tuple[int, int]) -> Iterator[Mark]:
     pixels = ground.pixels(ground.area)
     x = min(max(pixels[:, 0].mean().item(), _SCALE * columns), (1 - _SCALE) * columns)
     y = min(pixels[:, 1].max().item(), _LOWEST * rows)
-    metres = math.dist(*ground.place(np.array([(x, y), (x + 1, y)])))
+    metres = math.dist(*ground.metres(np.array([(x, y), (x + 1, y)])))
     if metres > 0:
         lengths = [scale for scale in _SCALES if scale <= _SCALE * columns * metres]
         length = max(lengths, default=_SCALES[0])

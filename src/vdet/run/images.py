@@ -121,7 +121,6 @@ class ImageSearch:
         frame = Frame(0, Fraction(0), Picture(image))
         height, width = image.shape[:2]
         with named_errors(source, ImageError):
-            self.settings.camera.check_frames(width, height)
             detector = self.model.for_video(width, height, [image])
             steps = make_steps(StepContext(self.settings, width, height))
             detections = detector.detect(detector.search(frame.picture, None))

@@ -143,7 +143,6 @@ def build(parts: Parts, settings: Settings, video: VideoInfo, images: Sequence[I
         The points or the lens in the settings do not fit the frames.
     """
     width, height = video.width, video.height
-    settings.camera.check_frames(width, height)
     detector = parts.model.for_video(width, height, images)
     missing_classes = getattr(detector, "unknown_classes", ())
     context = StepContext(settings, width, height, video, missing_classes)

@@ -88,7 +88,7 @@ def make_steps(context: StepContext) -> list[Step]:
 
         roads = RoadFinder(settings.camera.lens, settings.lanes, width, height)
         has_metres = settings.lack_of_metres is None
-        steps.append(LaneStep(roads, settings.detector.foot, has_metres=has_metres))
+        steps.append(LaneStep(roads, settings.detector.tyre_height, has_metres=has_metres))
     if settings.regions:
         steps.append(RegionStep(Regions(settings.regions, width, height)))
     steps += [load_plugin(STEPS, name)(context) for name in settings.steps]

@@ -1,33 +1,15 @@
 """Trackers of any kind, made from settings."""
 
-from collections.abc import Callable
-from dataclasses import astuple, dataclass, replace
+from collections.abc import Sequence
+from dataclasses import astuple, replace
 from math import inf
-from typing import Any
-
-import numpy as np
 
 from vdet.boxes import Box, Boxes
-from vdet.config.schema import Settings, TrackerSettings
+from vdet.config.kinds import TrackerKind
+from vdet.config.schema import Settings
 from vdet.media import Picture
 from vdet.plugins import TRACKERS, load_plugin
 from vdet.track.track import State, TimedTracker, Track, VideoTracker
-
-
-@dataclass(frozen=True, slots=True)
-class TrackerKind:
-    """A kind of tracker, as registered under its name.
-
-    Attributes
-    ----------
-    settings
-        Class of the section `tracker` for this kind; the default of its `kind` is the name.
-    make
-        Takes these settings and the width and height of the frames, pixels.
-    """
-
-    settings: type[TrackerSettings]
-    make: Callable[[Any, int, int], VideoTracker]
 
 
 def make_tracker(settings: Settings, width: int, height: int) -> TimedTracker:
@@ -83,7 +65,11 @@ class InterpolatingTracker:
 
 def _moved(track: Track, end: Track, fraction: float) -> Track:
     """Return a track that has done this fraction of its way to `end`."""
-    first, last = (np.array([*item.foot, *astuple(item.box)]) for item in (track, end))
-    x, y, *sides = (first + (last - first) * fraction).tolist()
+
+    def between(first: Sequence[float], last: Sequence[float]) -> list[float]:
+        return [a + (b - a) * fraction for a, b in zip(first, last, strict=True)]
+
+    foot_x, foot_y = between(track.foot, end.foot)
+    x1, y1, x2, y2 = between(astuple(track.box), astuple(end.box))
     state: State = "predicted" if track.state == "predicted" else "interpolated"
-    return replace(track, box=Box(*sides), whole_foot=(x, y), state=state)
+    return replace(track, box=Box(x1, y1, x2, y2), whole_foot=(foot_x, foot_y), state=state)

@@ -5,6 +5,7 @@ from dataclasses import asdict, astuple, dataclass, field, fields
 from typing import TYPE_CHECKING, Any, Literal, Protocol, runtime_checkable
 
 from vdet.boxes import Box, Boxes
+from vdet.errors import needing
 from vdet.media import Picture
 
 if TYPE_CHECKING:
@@ -111,7 +112,8 @@ class FrameTracks:
 
         Its columns are frame, time, x1, y1, x2, y2, and the other fields of `Track`.
         """
-        import pandas as pd
+        with needing("notebook"):
+            import pandas as pd
 
         frame = {"frame": self.index, "time": self.time}
         rows = [frame | asdict(track.box) | asdict(track) for track in self.tracks]

@@ -8,7 +8,7 @@ from datetime import UTC, datetime, timedelta, timezone, tzinfo
 from itertools import accumulate
 from pathlib import Path
 
-from vdet.config.camera import moment
+from vdet.config.camera import parse_date_time
 from vdet.config.schema import Settings
 from vdet.errors import ConfigError
 from vdet.media.images import find_sequence
@@ -85,7 +85,7 @@ def find_clock(
     if zero and not (settings.input.begin or clock.pattern):
         return Clock(_utc(zero, zone), "from the file", zone or zero.tzinfo, start)
     if settings.input.begin:
-        begin, source = moment(settings.input.begin), "as given"
+        begin, source = parse_date_time(settings.input.begin), "as given"
         zone = zone or begin.tzinfo
     elif begin_and_source := _begin_by_name(path, settings, created):
         begin, source = begin_and_source
@@ -104,7 +104,7 @@ def _begin_by_name(
     if clock.pattern and not named:
         raise ConfigError(f"{path}: its name does not match camera.clock.pattern, {clock.pattern}")
     with suppress(ValueError):
-        written = moment(created or "")
+        written = parse_date_time(created or "")
     if not named:
         return (written, "its creation time") if written else None
     if written and not clock.pattern and abs(_utc(named, zone) - _utc(written, zone)) > _SAME:

@@ -120,7 +120,6 @@ class _Group:
     """Videos that follow one another, with one counter."""
 
     def __init__(self, settings: Settings, size: tuple[int, int], started: int = 0) -> None:
-        settings.camera.check_frames(*size)
         self._size = size
         self._ground = ground_of(settings.camera, *size)
         self.counter = VehicleCounter(settings, *size, started)

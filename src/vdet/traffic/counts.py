@@ -10,7 +10,7 @@ from itertools import accumulate, pairwise, product
 from typing import TYPE_CHECKING, TypeVar
 
 from vdet.detect.classes import UNKNOWN
-from vdet.errors import ConfigError
+from vdet.errors import needing
 from vdet.traffic.clock import Clock, ClockTime, Interval, Intervals, Span
 from vdet.traffic.crossings import APPEAR, ENTER
 
@@ -181,7 +181,8 @@ class Counts:
 
     def to_pandas(self, interval: int | None = None) -> "pd.DataFrame":
         """Return `table` with a column for each field; needs the package pandas."""
-        import pandas as pd
+        with needing("notebook"):
+            import pandas as pd
 
         names = [column.name for column in fields(CountRow)]
         return pd.DataFrame(self.table(interval), columns=names)
@@ -199,14 +200,11 @@ class Counts:
 
         Raises
         ------
-        ConfigError
+        PackageError
             matplotlib is not installed.
         """
-        try:
+        with needing("notebook"):
             from matplotlib import pyplot as plt
-        except ImportError as error:
-            what = "plot: matplotlib is not installed; pip install matplotlib"
-            raise ConfigError(what) from error
         parts: dict[str, Counter[str]] = {}
         for row in self.table(interval):
             label = f"{row.name} {row.direction}"

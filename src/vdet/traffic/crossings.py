@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from vdet.boxes import BoolArray, Float64Array
-from vdet.config.places import TrafficSettings
+from vdet.config.shapes import TrafficSettings
 from vdet.polygons import Point, Segment, meeting, side_of, sides
 from vdet.traffic.linking import DURATION_DIGITS, VehiclePath
 
@@ -160,10 +160,10 @@ def lines_and_zones(
     settings: TrafficSettings, width: int, height: int
 ) -> tuple[tuple[Line, ...], tuple[Zone, ...]]:
     """Return the lines and zones in frames of `width` × `height` pixels."""
-    size = width, height
+    size, settings = (width, height), settings.for_frames(width, height)
 
     def in_frame(point: Point) -> Point:
-        return _snapped(point[0] * width, width), _snapped(point[1] * height, height)
+        return _snapped(point[0], width), _snapped(point[1], height)
 
     lines = tuple(
         Line(line.name, (line.left, line.right), in_frame(line.start), in_frame(line.end), size)

@@ -189,7 +189,7 @@ def precision_at(line: Line, ground: Ground, speed: float) -> tuple[float, float
     points that are off by a pixel. All are NaN far from the points of the ground.
     """
     x, y = np.mean([line.start, line.end], axis=0)
-    here, beside, above = ground.place(np.array([(x, y), (x + 1, y), (x, y - 1)]))
+    here, beside, above = ground.metres(np.array([(x, y), (x + 1, y), (x, y - 1)]))
     across, along = np.hypot(*(beside - here)), np.hypot(*(above - here))
     return across, along, np.hypot(ground.scale_error, 2**0.5 * along / (WINDOW * speed))
 
@@ -228,7 +228,7 @@ def _common(ground: Ground, rows: Float64Array) -> float:
     """
     first, last = rows[[0, -1], 1:3]
     low = [(0, _BOTTOM_ERROR * height) for height in rows[[0, -1], 4]]
-    positions = ground.place(np.array([first, last, first + low[0], last + low[1]]))
+    positions = ground.metres(np.array([first, last, first + low[0], last + low[1]]))
     driven, moved = positions[1] - positions[0], positions[3] - positions[2]
     length = max(float(np.hypot(*driven)), _MIN_DISTANCE)
     box = float(np.hypot(*(moved - driven))) / length
@@ -255,7 +255,7 @@ class _Geometry:
     def of(cls, ground: Ground, rows: Float64Array) -> "_Geometry":
         """Return the geometry for all `rows` of `measure`; unknown weights are NaN."""
         around = rows[:, 1:3] - _AROUND[:, np.newaxis]
-        positions, above, left = ground.place(around.reshape(-1, 2)).reshape(around.shape)
+        positions, above, left = ground.metres(around.reshape(-1, 2)).reshape(around.shape)
         away, beside = above - positions, left - positions
         pixel = np.hypot(*beside.T)
         depth = np.column_stack([-beside[:, 1], beside[:, 0]]) / pixel[:, None]

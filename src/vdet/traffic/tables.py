@@ -7,7 +7,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from vdet.errors import OutputError
+from vdet.errors import needing
 from vdet.files import json_text, write_text
 
 SUFFIXES = (".csv", ".json", ".parquet")
@@ -38,12 +38,10 @@ def plain_time(value: Any) -> Any:
 
 
 def check_table(path: Path) -> None:
-    """Raise `OutputError` if a table needs a package that is not installed."""
+    """Raise `PackageError` if a table needs a package that is not installed."""
     if path.suffix.lower() == ".parquet":
-        try:
+        with needing("parquet"):
             import pyarrow.parquet  # noqa: F401
-        except ImportError as error:
-            raise OutputError(f"{path}: pyarrow is not installed; pip install pyarrow") from error
 
 
 def _write_parquet(path: Path, columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:

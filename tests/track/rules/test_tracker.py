@@ -122,7 +122,7 @@ def test_a_missed_car_is_not_shown_and_counted_from_the_start_again() -> None:
 def test_a_car_with_fewer_detections_than_seven_is_deleted_at_its_first_miss(
     detections: int, young: int, id_after: int
 ) -> None:
-    cars = RulesTracker(tracker_but(young=young, detections_needed=1))
+    cars = RulesTracker(tracker_but(detections_to_keep=young, detections_needed=1))
     see(cars, SEDAN, frames=detections)
     see(cars)
     assert ids(see(cars, SEDAN)[0]) == [id_after]

@@ -11,7 +11,6 @@ import numpy as np
 from vdet.boxes import Boxes, Image, Int32Array, clipped
 from vdet.config.schema import NetworkSettings
 from vdet.detect.classes import our_name
-from vdet.detect.factory import DetectorKind
 from vdet.detect.onnx.merging import combine, suppress
 from vdet.detect.onnx.recognition import Recognized, read_header, recognize
 from vdet.detect.onnx.session import Session
@@ -173,8 +172,11 @@ def trained_on(path: Path) -> tuple[str, ...]:
     return tuple(dict.fromkeys(names))
 
 
-NET = DetectorKind(
-    NetworkSettings,
-    lambda settings, path: NetworkModel(path or SHIPPED, settings),
-    lambda _: SHIPPED,
-)
+def load_network(settings: NetworkSettings, path: Path | None) -> NetworkModel:
+    """Load a network; `path` is its file, None for the shipped one. Errors as of `NetworkModel`."""
+    return NetworkModel(path or SHIPPED, settings)
+
+
+def shipped_network(_: NetworkSettings) -> Path:
+    """Return the file of the shipped network."""
+    return SHIPPED

@@ -13,7 +13,6 @@ import numpy as np
 from vdet.boxes import Box, Boxes, Image, are_nested, from_xywh
 from vdet.config.detector import FeatureSettings
 from vdet.config.schema import SvmSettings
-from vdet.detect.factory import DetectorKind
 from vdet.detect.svm.heat import Heat, HotRegion, find_regions, sum_heat
 from vdet.detect.svm.horizon import DEFAULT_HORIZON, find_horizon
 from vdet.detect.svm.model import LinearModel, load_model
@@ -248,9 +247,6 @@ def trained_on(path: Path) -> tuple[str, ...]:
         return tuple(dict.fromkeys(str(group).rpartition("/")[2] for group in groups))
     except (LookupError, TypeError):
         return ()
-
-
-SVM = DetectorKind(SvmSettings, load_svm, shipped_model)
 
 
 def blend_heat(image: Image, heat: Heat) -> Image:

@@ -22,7 +22,7 @@ from vdet.media.writer import is_marked
 from vdet.pages.batch import write_index
 from vdet.pages.render import PAGE_NAME, jpeg_uri, link_to
 from vdet.pages.video import Player, VideoPage
-from vdet.regions import lay_regions
+from vdet.regions import Regions
 from vdet.run.result import FrameResult, findings_in
 from vdet.run.sinks.drawn import IMAGE_LABELS, label_text
 from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
@@ -57,7 +57,8 @@ class StagesSink(BaseSink):
         self._is_done = True
         pictures = self.context.stage_images(result.frame.image, result.detections)
         height, width = result.frame.image.shape[:2]
-        if regions := lay_regions(self.context.settings.regions, width, height):
+        if self.context.settings.regions:
+            regions = Regions(self.context.settings.regions, width, height)
             pictures["regions"] = draw_regions(result.frame.image, regions)
         pictures[_BOXES] = _with_boxes(result)
         if result.road:

@@ -9,7 +9,6 @@ import numpy as np
 from vdet.boxes import BoolArray, Box, Boxes, Float64Array, are_nested, clipped
 from vdet.config.schema import MotionTrackerSettings
 from vdet.media import Picture
-from vdet.track.factory import TrackerKind
 from vdet.track.motion.association import are_hidden, are_parts, take_over_ids, without_duplicates
 from vdet.track.motion.history import Position
 from vdet.track.motion.pairing import appearances, buffered_iou, differences, pair
@@ -247,6 +246,3 @@ def _boxes_of(candidates: Sequence[_Candidate]) -> Float64Array:
 def _are_large(boxes: Float64Array) -> BoolArray:
     """Return for each box, `(n, 4)`, whether both sides are at least a pixel."""
     return np.asarray((boxes[:, 2:] - boxes[:, :2] >= 1).all(axis=1))
-
-
-MOTION = TrackerKind(MotionTrackerSettings, MotionTracker)

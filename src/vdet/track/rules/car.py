@@ -84,13 +84,13 @@ class Car:
     @property
     def is_over(self) -> bool:
         """Whether there is a reason to delete it (rules 15, 16 and 17)."""
-        is_young_and_missed = self.misses > 0 and self.count < self._settings.young
+        is_young_and_missed = self.misses > 0 and self.count < self._settings.detections_to_keep
         is_only_matched = self.matches >= self._settings.max_matches
         return is_young_and_missed or is_only_matched or self.misses >= self._settings.max_misses
 
     def is_filled_by(self, region: Region) -> bool:
         """Return whether a region is wide enough to be the whole car (rules 7 and 8)."""
-        minimum = min(self._settings.wide, self._settings.good_fraction * self.box.width)
+        minimum = min(self._settings.accepted_width, self._settings.good_fraction * self.box.width)
         return region.box.width > minimum
 
     def is_as_wide_as(self, region: Region) -> bool:

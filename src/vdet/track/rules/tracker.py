@@ -38,8 +38,8 @@ from itertools import combinations, count
 from vdet.boxes import Boxes, Image
 from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
 from vdet.config.tracker import RulesTrackerSettings
+from vdet.errors import ArgumentError
 from vdet.media import Picture
-from vdet.track.factory import TrackerKind
 from vdet.track.rules.car import Car, Region, combine
 from vdet.track.track import State, Track
 
@@ -76,7 +76,7 @@ class RulesTracker:
     ) -> list[Track]:
         """Follow the cars into the next frame, as `VideoTracker.update`; `picture` is required."""
         if picture is None:
-            raise ValueError("the rules tracker needs the frame; pass its image")
+            raise ArgumentError("image: the rules tracker needs the frame; pass it")
         regions = large_enough(detections, picture.width, picture.height, self._settings)
         self.associate(regions, picture.image)
         for car, region in self.assigned.items():
@@ -132,7 +132,7 @@ class RulesTracker:
         """Rules 8 to 11."""
         gaps = {car: car.box.gap(region.box) for car in self.cars}
         car = min(
-            (car for car, gap in gaps.items() if gap <= self._settings.near),
+            (car for car, gap in gaps.items() if gap <= self._settings.max_distance),
             key=lambda car: (car in self.assigned, gaps[car], _distance(car, region)),
             default=None,
         )
@@ -148,7 +148,7 @@ class RulesTracker:
         nearby = (
             candidate
             for candidate in self._unused
-            if candidate is not region and car.box.gap(candidate.box) <= self._settings.near
+            if candidate is not region and car.box.gap(candidate.box) <= self._settings.max_distance
         )
         nearest = min(nearby, key=lambda candidate: _distance(car, candidate), default=None)
         partner = self.assigned.get(car, nearest)
@@ -233,8 +233,6 @@ def _any_overlap(regions: Iterable[Region], pixels: int) -> bool:
     return any(box.width > pixels and box.height > pixels for box in common)
 
 
-def _make(settings: RulesTrackerSettings, _width: int, height: int) -> RulesTracker:
+def make_rules_tracker(settings: RulesTrackerSettings, _width: int, height: int) -> RulesTracker:
+    """Return a tracker for frames of `height` rows."""
     return RulesTracker(scale_lengths(settings, height / REFERENCE_HEIGHT))
-
-
-RULES = TrackerKind(RulesTrackerSettings, _make)

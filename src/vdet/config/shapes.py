@@ -1,40 +1,97 @@
-"""The sections `regions` and `traffic`: places in the frame.
+"""The sections `regions` and `traffic`, and the base class of all shapes: points in the frame.
 
-Points are fractions of the frame's width and height. In a file with `camera.size` they are pixels
-of frames of that size, until `to_fractions` changes them.
+Points keep the size that they are given for, and `Shape.for_frames` scales them once, for the
+frames at hand.
 """
 
-from collections.abc import Callable, Collection, Iterable
-from typing import Annotated, Any, Literal
+from collections.abc import Iterable
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from vdet.config.section import Section
+from vdet.errors import ConfigError
 from vdet.polygons import Point, crosses_itself
 
 Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
-Place = tuple[Coordinate, Coordinate]
+FramePoint = tuple[Coordinate, Coordinate]
+"""x to the right and y down, in frames of the size that belongs to the point."""
+Length = Annotated[int, Field(ge=1, le=100_000)]
 Side = Annotated[int, Field(ge=16, le=100_000)]
 Size = tuple[Side, Side]
 """Width and height of frames, in pixels."""
 Name = Annotated[str, Field(min_length=1, max_length=80)]
 
+FRACTIONS = 1, 1
+"""The size of points that are fractions of the frame."""
 MAX_CORNERS = 100
 MAX_SHAPES = 100
 SHORTEST_LINE = 0.01
 """Length of the shortest line, as a fraction of the frame's width or height."""
+_ASPECT_TOLERANCE = 0.01
+"""Largest relative difference of the aspect ratios of a frame and of the size of points."""
 
 
-def check_shapes(shapes: Iterable[tuple[str, Iterable[Point]]]) -> None:
+def aspect_problem(size: tuple[int, int], width: int, height: int) -> str | None:
+    """Return what is wrong with points for `size` in frames of another aspect ratio, else None."""
+    aspect = (width / height) / (size[0] / size[1])
+    if size == FRACTIONS or abs(aspect - 1) <= _ASPECT_TOLERANCE:
+        return None
+    return (
+        f"camera.size: points are for frames of {size[0]}×{size[1]}, whose aspect ratio differs "
+        f"from {width}×{height}; define them for this size"
+    )
+
+
+class Shape(Section):
+    """Points in frames of one size.
+
+    `point_fields` are the fields with a point or a tuple of points.
+    """
+
+    point_fields: ClassVar[tuple[str, ...]] = ("points",)
+
+    size: tuple[Length, Length] = FRACTIONS
+    """Width and height of the frames that the points refer to, explained at `camera.size`."""
+
+    def for_frames(self, width: int, height: int) -> Self:
+        """Return the shape with its points in pixels of frames of `width` × `height`.
+
+        Raises
+        ------
+        ConfigError
+            The points are for frames of another aspect ratio.
+        """
+        if self.size == (width, height):
+            return self
+        if problem := aspect_problem(self.size, width, height):
+            raise ConfigError(problem)
+        across, down = self.size
+
+        def scaled(value: Any) -> Any:
+            match value:
+                case (int() | float() as x, int() | float() as y):
+                    return x * width / across, y * height / down
+                case tuple():
+                    return tuple(map(scaled, value))
+            return value  # a region with a mask has no points
+
+        points = {name: scaled(getattr(self, name)) for name in self.point_fields}
+        return self.model_copy(update={**points, "size": (width, height)})
+
+
+def check_shapes(shapes: Iterable["RegionSettings | LineSettings | ZoneSettings"]) -> None:
     """Raise a `ValueError` if two shapes have one name, or a point is not in the frame."""
     seen: set[str] = set()
-    for name, points in shapes:
-        if name in seen:
-            raise ValueError(f"{name}: the name is used twice; names must be unique")
-        seen.add(name)
-        if any(not (0 <= x <= 1 and 0 <= y <= 1) for x, y in points):
+    for shape in shapes:
+        if shape.name in seen:
+            raise ValueError(f"{shape.name}: the name is used twice; names must be unique")
+        seen.add(shape.name)
+        points = (shape.start, shape.end) if isinstance(shape, LineSettings) else shape.points or ()
+        width, height = shape.size
+        if any(not (0 <= x <= width and 0 <= y <= height) for x, y in points):
             raise ValueError(
-                f"{name}: a point is outside the frame; points are in pixels of "
+                f"{shape.name}: a point is outside the frame; points are in pixels of "
                 "camera.size, or without it in fractions of the frame"
             )
 
@@ -50,11 +107,11 @@ def _check_polygon(points: tuple[Point, ...]) -> tuple[Point, ...]:
 
 
 Polygon = Annotated[
-    tuple[Place, ...], Field(max_length=MAX_CORNERS), AfterValidator(_check_polygon)
+    tuple[FramePoint, ...], Field(max_length=MAX_CORNERS), AfterValidator(_check_polygon)
 ]
 
 
-class RegionSettings(Section):
+class RegionSettings(Shape):
     """A region in which vehicles are shown, or not: a polygon or a mask."""
 
     name: Name
@@ -74,7 +131,7 @@ class RegionSettings(Section):
 
 
 def _check_regions(regions: tuple[RegionSettings, ...]) -> tuple[RegionSettings, ...]:
-    check_shapes((region.name, region.points or ()) for region in regions)
+    check_shapes(regions)
     return regions
 
 
@@ -83,14 +140,16 @@ RegionList = Annotated[
 ]
 
 
-class LineSettings(Section):
+class LineSettings(Shape):
     """A line; crossings are counted by direction."""
+
+    point_fields: ClassVar[tuple[str, ...]] = ("start", "end")
 
     name: Name
     """Unique name."""
-    start: Place
+    start: FramePoint
     """Start, x and y."""
-    end: Place
+    end: FramePoint
     """End, x and y."""
     left: Name = "left"
     """Name of the direction to the left, seen from the start."""
@@ -104,7 +163,7 @@ class LineSettings(Section):
         return self
 
 
-class ZoneSettings(Section):
+class ZoneSettings(Shape):
     """A zone; vehicles that enter, leave and stay are counted."""
 
     name: Name
@@ -155,61 +214,15 @@ class TrafficSettings(Section):
 
     @model_validator(mode="after")
     def _lie_in_the_frame(self) -> "TrafficSettings":
-        lines = [(line.name, (line.start, line.end)) for line in self.lines]
-        check_shapes([*lines, *((zone.name, zone.points) for zone in self.zones)])
-        for name, ((ax, ay), (bx, by)) in lines:
-            if max(abs(ax - bx), abs(ay - by)) < SHORTEST_LINE:
-                raise ValueError(f"{name}: is shorter than 1 % of the frame; make it longer")
+        check_shapes((*self.lines, *self.zones))
+        for line in self.lines:
+            (ax, ay), (bx, by), (width, height) = line.start, line.end, line.size
+            if max(abs(ax - bx) / width, abs(ay - by) / height) < SHORTEST_LINE:
+                raise ValueError(f"{line.name}: is shorter than 1 % of the frame; make it longer")
         return self
 
-
-_POINTS = {"points", "start", "end", "pixel"}
-"""The keys of points, or lists of points, in all sections."""
-_DIGITS = 3  # of pixels
-
-
-def to_fractions(values: dict[str, Any]) -> dict[str, Any]:
-    """Return settings with `camera.size` with the points as fractions of the frame.
-
-    What is not a point or a size is kept, to be reported with all other mistakes.
-    """
-    return _scaled(values, lambda value, side: value / side)
-
-
-def to_pixels(values: dict[str, Any]) -> dict[str, Any]:
-    """Return settings with `camera.size` with the points as pixels of such frames."""
-    return _scaled(values, lambda value, side: round(value * side, _DIGITS))
-
-
-def _scaled(values: dict[str, Any], scale: Callable[[float, float], float]) -> dict[str, Any]:
-    def scaled(value: Any) -> Any:
-        match value:
-            case [int() | float() as x, int() | float() as y]:
-                return [scale(x, size[0]), scale(y, size[1])]
-            case [*points]:
-                return [scaled(point) for point in points]
-        return value
-
-    match size := inside(values, "camera", "size"):
-        case [int() | float() as width, int() | float() as height] if width > 0 and height > 0:
-            return dict(with_changed(values, _POINTS, scaled))
-    return values
-
-
-def with_changed(values: Any, keys: Collection[str], change: Callable[[Any], Any]) -> Any:
-    """Return settings with the values of some keys changed, in nested sections and lists too."""
-    if isinstance(values, list):
-        return [with_changed(item, keys, change) for item in values]
-    if not isinstance(values, dict):
-        return values
-    return {
-        key: change(value) if key in keys else with_changed(value, keys, change)
-        for key, value in values.items()
-    }
-
-
-def inside(values: Any, *keys: str) -> Any:
-    """Return the value of a key in nested sections; None where there is none."""
-    for key in keys:
-        values = values.get(key) if isinstance(values, dict) else None
-    return values
+    def for_frames(self, width: int, height: int) -> "TrafficSettings":
+        """Return the section with all points in pixels of frames; errors as `Shape.for_frames`."""
+        lines = tuple(line.for_frames(width, height) for line in self.lines)
+        zones = tuple(zone.for_frames(width, height) for zone in self.zones)
+        return self.model_copy(update={"lines": lines, "zones": zones})
