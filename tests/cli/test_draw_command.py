@@ -26,15 +26,18 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Six cars that go to the right, 4 pixels a frame, before a grey picture."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "lines.yaml").write_text(LINES)
+    write_tracks(tmp_path / "tracks.csv", 0)
+    write_image(tmp_path / "frame.png", np.full((240, 320, 3), 90, np.uint8))
+    return tmp_path
+
+
+def write_tracks(path: Path, begins: int) -> None:
     rows = [
-        f"{n},{n / 25:.6f},{number},{4 * n},{40 + 20 * number},40,20"
+        f"{n},{begins + n / 25:.6f},{number},{4 * n},{40 + 20 * number},40,20"
         for n in range(60)
         for number in range(1, 7)
     ]
-    text = "\n".join(["frame,time,id,x,y,width,height", *rows])
-    (tmp_path / "tracks.csv").write_text(text + "\n")
-    write_image(tmp_path / "frame.png", np.full((240, 320, 3), 90, np.uint8))
-    return tmp_path
+    path.write_text("\n".join(["frame,time,id,x,y,width,height", *rows, ""]))
 
 
 def data_of(page: str) -> dict[str, Any]:
@@ -84,15 +87,27 @@ def test_proposed_lines_work_at_once_beside_what_a_file_has(run: Run) -> None:
     assert "eastbound: 6 vehicles" in facing.out
 
 
+@pytest.mark.parametrize("begins", [0, 100])
 @pytest.mark.parametrize(
     ("part", "vehicles"),
     [(("--start", "1"), 6), (("--start", "10"), 0), (("--end", "1"), 6), (("--end", "0"), 0)],
 )
-def test_a_part_of_saved_tracks_is_used(run: Run, part: tuple[str, str], vehicles: int) -> None:
-    tracks = ("--tracks-from", "tracks.csv")
-    result = run("draw", "frame.png", *tracks, *part, "-o", "gate.html")
+def test_a_part_of_saved_tracks_is_used(
+    run: Run, begins: int, part: tuple[str, str], vehicles: int
+) -> None:
+    """Times of a part are seconds from the first frame, whenever that is."""
+    write_tracks(Path("tracks.csv"), begins)
+    result = run("draw", "frame.png", "--tracks-from", "tracks.csv", *part, "-o", "gate.html")
     said = f"gate.html: written, {vehicles} vehicles"
     assert (result.code, result.out.splitlines()[:1]) == (0, [said])
+
+
+def test_the_page_has_only_the_classes_that_are_counted(run: Run) -> None:
+    for name, vehicles in (("vehicle", 6), ("truck", 0)):
+        output = f"{name}.html"
+        command = ("draw", "frame.png", "--tracks-from", "tracks.csv", "-o", output)
+        result = run(*command, "--set", f"classes=[{name}]")
+        assert result.out.splitlines()[:1] == [f"{output}: written, {vehicles} vehicles"]
 
 
 def test_the_picture_for_a_report_has_lines_flows_and_numbers(run: Run) -> None:

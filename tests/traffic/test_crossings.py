@@ -16,9 +16,10 @@ from traffic.scenes import (
     settings_for,
     through,
 )
+from vdet.polygons import Point
 from vdet.track.track import FrameTracks
 from vdet.traffic.counter import VehicleCounter
-from vdet.traffic.crossings import Border, crossings, lines_and_zones
+from vdet.traffic.crossings import Border, Line, crossings, lines_and_zones
 from vdet.traffic.linking import VehiclePath, link_tracks
 
 SETTINGS = settings_for(LINE, ZONE)
@@ -79,3 +80,16 @@ def test_a_vehicle_that_stands_for_long_takes_no_memory() -> None:
     line, _ = (item for (item,) in lines_and_zones(SETTINGS.traffic, WIDTH, HEIGHT))
     (event,) = crossings(path, line)
     assert (event.direction, path.frames[event.row]) == ("here", 20_050)
+
+
+def test_a_vehicle_that_is_exactly_on_an_oblique_line_in_a_frame_crosses_it_once() -> None:
+    """Rounding must not put the crossing before or after both neighbours of this frame."""
+
+    def scaled(x: int, y: int) -> Point:
+        return x / WIDTH * WIDTH, y / HEIGHT * HEIGHT  # as where points are fractions
+
+    ends = scaled(545, 302), scaled(473, 198)
+    line = Line("oblique", ("left", "right"), *ends, (WIDTH, HEIGHT))
+    path = feet(*((527 + 8 * k, 276 + 3 * k) for k in range(-15, 16)), height=30)
+    (linked,) = link_tracks(path, WIDTH, HEIGHT)
+    assert [crossing.row for crossing in crossings(linked, line)] == [15]

@@ -14,7 +14,7 @@ from markupsafe import Markup
 from vdet.boxes import Image
 from vdet.config import loading
 from vdet.config.schema import Settings
-from vdet.detect.classes import UNKNOWN
+from vdet.detect.classes import UNKNOWN, is_chosen
 from vdet.lanes.ground import ground_of
 from vdet.media.images import encode_image
 from vdet.pages.render import TEMPLATES, jpeg_uri, render
@@ -46,7 +46,7 @@ class Drawing:
     Attributes
     ----------
     paths
-        Paths of the vehicles that count.
+        Paths of the vehicles that count, of the classes in the settings.
     proposals
         A line across each main stream.
     """
@@ -63,7 +63,11 @@ class Drawing:
         self._image, self._frames, self._size = image, frames, (width, height)
         self._settings, self._values = settings, values
         minimum, linked = settings.traffic.min_seen_seconds, link_tracks(frames, width, height)
-        self.paths: list[VehiclePath] = [path for path in linked if path.seconds >= minimum]
+        self.paths: list[VehiclePath] = [
+            path
+            for path in linked
+            if path.seconds >= minimum and is_chosen(path.class_name, settings.classes)
+        ]
         self.proposals: tuple[ProposedLine, ...] = propose_lines(self.paths, width, height, facing)
 
     def output(self, path: Path, name: str) -> bytes:

@@ -10,7 +10,7 @@ from vdet.boxes import Image
 from vdet.detect.factory import load_detector
 from vdet.errors import TruthError, VideoError
 from vdet.labels.reading import read_tracks
-from vdet.media import Frame
+from vdet.media import Frame, VideoInfo
 from vdet.media.images import is_image_name, read_image
 from vdet.media.reader import VideoReader
 from vdet.progress import Steps
@@ -40,7 +40,7 @@ def read_scene(run: Run, tracks: Path | None, steps: Steps) -> tuple[Image, list
         The source or the file of tracks cannot be used.
     """
     if is_image_name(run.source) and "%" not in run.source.name:
-        return read_image(run.source), _saved(tracks, None, run) if tracks else []
+        return read_image(run.source), _saved(tracks, run) if tracks else []
     images, shown = (
         _with_saved_tracks(run, tracks, steps) if tracks else _with_detection(run, steps)
     )
@@ -56,7 +56,7 @@ def _with_saved_tracks(
     with VideoReader(
         run.source, start=run.start, end=run.end, frames=_STILL_FRAMES, settings=run.settings.input
     ) as reader:
-        saved = _saved(tracks, float(reader.info.rate), run)
+        saved = _saved(tracks, run, reader.info)
         steps("reading the scene", None)
         return _spread(reader), saved
 
@@ -88,11 +88,16 @@ def _spread(frames: Iterable[Frame]) -> list[Image]:
     return images
 
 
-def _saved(tracks: Path, rate: float | None, run: Run) -> list[FrameTracks]:
-    """Return the frames of a file of tracks. Raises `TruthError`."""
-    saved = read_tracks(tracks, rate)
+def _saved(tracks: Path, run: Run, video: VideoInfo | None = None) -> list[FrameTracks]:
+    """Return the frames of a file of tracks in the part of a run. Raises `TruthError`.
+
+    Without a video, the first frame of the file is the first one of the video.
+    """
+    saved = read_tracks(tracks, float(video.rate) if video else None)
     if not saved.has_times:
         raise TruthError(f"{tracks}: has no times; CLIP must be the video")
-    start = -math.inf if run.start is None else run.start
-    end = math.inf if run.end is None else run.end
-    return [frame for frame in saved if start <= frame.time < end]
+    frames = list(saved)
+    origin = float(video.start) if video else next((frame.time for frame in frames), 0.0)
+    start = origin + float(run.start or 0)
+    end = math.inf if run.end is None else origin + float(run.end)
+    return [frame for frame in frames if start <= frame.time < end]

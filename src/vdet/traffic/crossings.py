@@ -76,8 +76,18 @@ class Line:
         return np.asarray(side_of(self.end, self.start, (x, y)))
 
     def meeting(self, path: Segment) -> float | None:
-        """Return the fraction of `path` at which it meets the line; None if it does not."""
-        return meeting(path, self.reach)
+        """Return the fraction at which a path that changes the side meets the line.
+
+        It follows from the distances that also give the side, so that none is lost by rounding.
+        None if the path passes beyond the ends of the line.
+        """
+        before, after = self.distances(np.array(path)).tolist()
+        along = before / (before - after)
+        (ax, ay), (bx, by) = path
+        (cx, cy), (dx, dy) = self.reach
+        x, y = ax + along * (bx - ax) - cx, ay + along * (by - ay) - cy
+        across = (x * (dx - cx) + y * (dy - cy)) / ((dx - cx) ** 2 + (dy - cy) ** 2)
+        return along if 0 <= across <= 1 else None
 
 
 @dataclass(frozen=True, slots=True)

@@ -64,7 +64,12 @@ function placeLine(line, size) {
     away: (x, y) => Math.abs(distance(x, y)),
     cuts: ([left, top, right, bottom]) => Math.abs(distance((left + right) / 2, (top + bottom) / 2)) <=
       INSIDE + (Math.abs(wx) * (bottom - top) + Math.abs(wy) * (right - left)) / (2 * length),
-    meeting: (a, b) => meeting(a, b, reach),
+    meeting(a, b) { // from the distances that also give the side, so that none is lost by rounding
+      const before = distance(...a), along = before / (before - distance(...b)), [[cx, cy], [dx, dy]] = reach;
+      const x = a[0] + along * (b[0] - a[0]) - cx, y = a[1] + along * (b[1] - a[1]) - cy;
+      const across = (x * (dx - cx) + y * (dy - cy)) / ((dx - cx) ** 2 + (dy - cy) ** 2);
+      return across >= 0 && across <= 1 ? along : null;
+    },
   };
 }
 
