@@ -89,9 +89,8 @@ def detect_video(
     no_video
         Do not write a video, only other outputs.
     tracks
-        Write the boxes of every frame: .txt (MOTChallenge), .csv, .jsonl, .coco.json, .kitti.txt or
-        .yolo.zip. With -, write .jsonl to standard output. With -d, only the ending of the names.
-        Can be repeated.
+        Write the boxes of every frame: .txt (MOTChallenge), .csv, .jsonl or .coco.json. With -,
+        write .jsonl to standard output. With -d, only the ending of the names. Can be repeated.
     vehicles
         Write a record of each vehicle: .csv, .json or .parquet. With -d, only the ending of the
         names.

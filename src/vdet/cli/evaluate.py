@@ -100,8 +100,8 @@ def patches(data: tuple[Path, ...], **targets: Any) -> None:
 def tracks(prediction: Path, truth: Path, until: int | None, **targets: Any) -> None:
     """Compare a file of tracks with the ground truth.
 
-    PRED is a file of vdet detect-video --tracks. TRUTH is a MOTChallenge gt.txt, KITTI tracking
-    labels, COCO or YOLO with tracks, or a .csv or .jsonl of vdet.
+    PRED is a file of vdet detect-video --tracks. TRUTH is a MOTChallenge gt.txt, COCO with
+    tracks, or a .csv or .jsonl of vdet.
 
     Examples
     --------

@@ -22,7 +22,7 @@ end
 until
     Stop after this frame, counted from 1.
 truths
-    Ground truth: MOTChallenge, KITTI, COCO, YOLO, .csv or .jsonl. Repeat for each video.
+    Ground truth: MOTChallenge, COCO, .csv or .jsonl. Repeat for each video.
 counts
     Write counts at lines and zones: .csv has the events, .totals.csv, .wide.csv and .zones.csv have
     tables by interval, .json has everything. Can be repeated.

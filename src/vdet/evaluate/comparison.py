@@ -135,9 +135,9 @@ def compare(prediction: LabelledVideo, truth: LabelledVideo) -> Comparison:
         There are more than `MAX_IDS`, `MAX_IN_FRAME` or `MAX_PAIRS`, far more than on any road.
     """
     step = 1
-    if truth.known is not None:
-        prediction = prediction.where(np.isin(prediction.frames, truth.known))
-        step = int(np.diff(truth.known).min(initial=truth.last_frame or 1))
+    if truth.covered is not None:
+        prediction = prediction.where(np.isin(prediction.frames, truth.covered))
+        step = int(np.diff(truth.covered).min(initial=truth.last_frame or 1))
     _check_size(prediction, truth)
     numbers = np.union1d(prediction.frames, truth.frames).tolist()
     kept = [_apply_regions(prediction.frame(number), truth.frame(number)) for number in numbers]

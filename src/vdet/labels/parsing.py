@@ -35,7 +35,7 @@ Index = Annotated[int, Field(ge=0, le=LIMIT)]
 """Fields of JSON documents and of tables."""
 
 Times = dict[int, tuple[int | str, float]]
-"""The place in the file and the time, seconds, of each frame, counted from 0."""
+"""The position in the file and the time, seconds, of each frame, counted from 0."""
 
 
 def read_bytes(path: Path) -> bytes:
@@ -97,10 +97,10 @@ def label_lines(
         columns = content.split(separator)
         try:
             if counts is not None and len(columns) not in counts:
-                wanted, between = " or ".join(map(str, counts)), "commas" if separator else "spaces"
+                numbers = " or ".join(map(str, counts))
                 raise ValueError(
-                    f"{form} has {wanted} columns separated by {between}; this line has "
-                    f"{len(columns)}"
+                    f"{form} has {numbers} columns separated by "
+                    f"{'commas' if separator else 'spaces'}; this line has {len(columns)}"
                 )
             label = parse(line, columns)
         except ValueError as error:
@@ -145,17 +145,17 @@ def checked_times(path: Path, times: Times) -> dict[int, float]:
         A time is not a number, is too large, or is less than that of an earlier frame.
     """
     latest = -_LATEST
-    for frame, (place, time) in sorted(times.items()):
+    for frame, (position, time) in sorted(times.items()):
         if not latest <= time <= _LATEST:
-            what = f"frame {frame} is at {time:g} s; times must be numbers and must not decrease"
-            raise line_error(path, place, what)
+            message = f"frame {frame} is at {time:g} s; times must be numbers and must not decrease"
+            raise line_error(path, position, message)
         latest = time
     return {frame: time for frame, (_, time) in times.items()}
 
 
 def first_mistake(error: ValidationError) -> str:
-    """Return one line that describes the first mistake in a document, and its place."""
+    """Return one line that describes the first mistake in a document, and its position."""
     first = error.errors(include_url=False, include_input=False, include_context=False)[0]
-    place = ".".join(str(part) for part in first["loc"])
-    what = first["msg"].removeprefix("Value error, ")
-    return f"{place}: {what}" if place else what
+    position = ".".join(str(part) for part in first["loc"])
+    message = first["msg"].removeprefix("Value error, ")
+    return f"{position}: {message}" if position else message

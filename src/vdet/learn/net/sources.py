@@ -157,7 +157,7 @@ def clip_source(video: Path, truth: Path, settings: Settings) -> Source:
     """
     roles = Roles.for_training(settings)
     saved = read_true_labels(truth, roles)
-    known = None if saved.known is None else [index + 1 for index in saved.known]
+    known = None if saved.covered is None else [index + 1 for index in saved.covered]
     last = max((*(label.frame for label in saved.labels), *(known or ())), default=0)
     used = spread_frames(known, EVERY, EVERY, last)
     labels: dict[int, list[Label]] = defaultdict(list)
