@@ -64,10 +64,10 @@ class _Writer:
     def add_box(self, image: int, box: Box, category: int, score: float, **more: Any) -> None:
         """Add an annotation; other programs ignore its `score`."""
         x, y, width, height = box.xywh
-        whose = {"id": len(self._lists["annotations"]) + 1, "image_id": image}
+        ids = {"id": len(self._lists["annotations"]) + 1, "image_id": image}
         sides = {"bbox": [x, y, width, height], "area": width * height, "segmentation": []}
-        known = {"category_id": category, **sides, "iscrowd": 0, "score": round(score, 4)}
-        self.add("annotations", **whose, **known, **more)
+        values = {"category_id": category, **sides, "iscrowd": 0, "score": round(score, 4)}
+        self.add("annotations", **ids, **values, **more)
 
     def category(self, name: str) -> int:
         """Return the id of a category, and add it if it is new."""
@@ -78,8 +78,10 @@ class _Writer:
 
     def end(self, file: BinaryIO) -> None:
         """Write the document."""
-        parts = (f'"{name}": [\n' + ",\n".join(some) + "\n]" for name, some in self._lists.items())
-        file.write(("{\n" + ",\n".join(parts) + "\n}\n").encode())
+        lists = (
+            f'"{name}": [\n' + ",\n".join(texts) + "\n]" for name, texts in self._lists.items()
+        )
+        file.write(("{\n" + ",\n".join(lists) + "\n}\n").encode())
 
 
 def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) -> None:

@@ -78,8 +78,8 @@ class LabelledImage:
         image = read_image(self.path)
         height, width = image.shape[:2]
         if self.size not in (None, (width, height)):
-            wanted = f"{self.size[0]}×{self.size[1]}"
-            raise ImageError(f"{self.path}: is {width}×{height}, but its labels are for {wanted}")
+            labelled = f"{self.size[0]}×{self.size[1]}"
+            raise ImageError(f"{self.path}: is {width}×{height}, but its labels are for {labelled}")
         return image
 
 

@@ -6,7 +6,7 @@ JSON lines have a record for each frame, even without a box. CSV has a row for e
 import csv
 import io
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import datetime, timedelta
 from itertools import islice
 from pathlib import Path
@@ -33,43 +33,14 @@ from vdet.track.track import FrameTracks, State, Track
 CLOCK = "clock"
 """Name of the fact and the column with the clock time of a frame, ISO 8601."""
 
-_NEEDED = ("frame", "time", "id", "x", "y", "width", "height")
-_OPTIONAL = ("score", "state", "class", "foot_x", "foot_y", "distance", "lane", CLOCK)
-"""Columns of CSV."""
+_COLUMNS = (
+    *("frame", "time", "id", "x", "y", "width", "height"),
+    *("score", "state", "class", "foot_x", "foot_y", "distance", "lane", CLOCK),
+)
+_NEEDED = _COLUMNS[:7]
 
 _BLOCK = 300
 """Number of rows of CSV to check at once; they fit into the cache."""
-
-_Score = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
-_Lane = Annotated[int, Field(ge=-LIMIT, le=LIMIT)]
-
-_Box = TypedDict(
-    "_Box",
-    {
-        "id": Index,
-        "x": Number,
-        "y": Number,
-        "width": Number,
-        "height": Number,
-        "score": NotRequired[_Score | None],
-        "state": NotRequired[State | None],
-        "class": NotRequired[str | None],
-        "foot": NotRequired[tuple[Number, Number] | None],
-        "distance": NotRequired[Number | None],
-        "lane": NotRequired[_Lane | None],
-    },
-)
-"""A box of a record, in pixels; unknown keys are ignored."""
-
-
-class _Record(TypedDict):
-    """A line of JSON."""
-
-    frame: Index
-    time: float
-    tracks: Annotated[list[_Box], FailFast()]
-    clock: NotRequired[str]
-
 
 _Table = TypedDict(
     "_Table",
@@ -81,20 +52,33 @@ _Table = TypedDict(
         "y": list[Number],
         "width": list[Number],
         "height": list[Number],
-        "score": list[_Score | None],
+        "score": list[Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] | None],
         "state": list[State | None],
         "class": list[str | None],
-        "foot_x": list[Number | None],
-        "foot_y": list[Number | None],
+        "foot": list[tuple[Number, Number] | None],
         "distance": list[Number | None],
-        "lane": list[_Lane | None],
-        "clock": list[str | None],
+        "lane": list[Annotated[int, Field(ge=-LIMIT, le=LIMIT)] | None],
     },
 )
-"""Consecutive rows of CSV, by column; None for an empty cell, and in a missing column."""
+"""Boxes in pixels, by column; the time is in seconds."""
+
+_TABLE = TypeAdapter(_Table)
+_OF_BOX = tuple(_Table.__annotations__)[2:]
+
+_Rows = tuple[Sequence[int], Mapping[str, Sequence[Any]]]
+"""The lines of some boxes, and their columns as they are in the file."""
+
+
+class _Record(TypedDict):
+    """A line of JSON."""
+
+    frame: Index
+    time: float
+    tracks: Annotated[list[dict[str, Any]], FailFast()]
+    clock: NotRequired[str]
+
 
 _RECORD = TypeAdapter(_Record)
-_TABLE = TypeAdapter(_Table)
 
 
 def track_record(track: Track) -> dict[str, Any]:
@@ -152,7 +136,7 @@ def read_json_lines(path: Path, data: bytes) -> SavedTracks:
         The file is empty, a line is not such a record, frames do not increase, or a time is wrong.
     """
     times: Times = {}
-    labels = limited(path, _json_labels(path, data, times))
+    labels = limited(path, _labels(path, _json_rows(path, data, times), times))
     if not times:
         raise TruthError(f"{path}: is empty; it should have a record for every frame")
     seconds = checked_times(path, times)
@@ -162,7 +146,7 @@ def read_json_lines(path: Path, data: bytes) -> SavedTracks:
     return SavedTracks(labels, tuple(seconds), seconds, begin=begin)
 
 
-def _json_labels(path: Path, data: bytes, times: Times) -> Iterator[Label]:
+def _json_rows(path: Path, data: bytes, times: Times) -> Iterator[_Rows]:
     """Yield the boxes of every record, and put the time of its frame into `times`."""
     last = -1
     for line, content in numbered_lines(path, data):
@@ -170,25 +154,14 @@ def _json_labels(path: Path, data: bytes, times: Times) -> Iterator[Label]:
             record = _RECORD.validate_json(content)
         except ValidationError as error:
             raise line_error(path, line, first_mistake(error)) from error
-        frame = record["frame"]
+        frame, time, boxes = record["frame"], record["time"], record["tracks"]
         if frame <= last:
             raise line_error(path, line, f"frame {frame} comes after frame {last}")
         last = frame
-        times[frame] = line, record["time"]
-        for box in record["tracks"]:
-            score = box.get("score")
-            yield Label(
-                position=line,
-                box=from_size(box["x"], box["y"], box["width"], box["height"]),
-                name=box.get("class"),
-                frame=frame + 1,
-                id=box["id"],
-                score=1.0 if score is None else score,
-                state=box.get("state") or "detected",
-                foot=box.get("foot"),
-                distance=box.get("distance"),
-                lane=box.get("lane"),
-            )
+        times[frame] = line, time
+        columns = {name: [box.get(name) for box in boxes] for name in _OF_BOX}
+        columns |= {"frame": [frame] * len(boxes), "time": [time] * len(boxes)}
+        yield [line] * len(boxes), columns
 
 
 def read_csv(path: Path, data: bytes) -> SavedTracks:
@@ -203,67 +176,35 @@ def read_csv(path: Path, data: bytes) -> SavedTracks:
         type, or a time is wrong.
     """
     times: Times = {}
-    labels = limited(path, _csv_labels(path, data, times))
+    labels = limited(path, _labels(path, _csv_rows(path, data), times))
     seconds = checked_times(path, times)
-    begin = None
-    for lines, table in _csv_tables(path, data):
-        begin = _begin(path, lines[0], table["clock"][0], table["time"][0])
-        break
-    return SavedTracks(labels, times=seconds, begin=begin)
+    for lines, columns in _csv_rows(path, data):
+        begin = _begin(path, lines[0], columns[CLOCK][0], float(columns["time"][0]))
+        return SavedTracks(labels, times=seconds, begin=begin)
+    return SavedTracks(labels)
 
 
-def _csv_labels(path: Path, data: bytes, times: Times) -> Iterator[Label]:
-    """Yield the box of every row, and put the time of its frame into `times`."""
-    for lines, table in _csv_tables(path, data):
-        times.update(zip(table["frame"], zip(lines, table["time"], strict=True), strict=True))
-        boxes = map(from_size, table["x"], table["y"], table["width"], table["height"])
-        for row, box in enumerate(boxes):
-            score, foot_x, foot_y = table["score"][row], table["foot_x"][row], table["foot_y"][row]
-            yield Label(
-                position=lines[row],
-                box=box,
-                name=table["class"][row],
-                frame=table["frame"][row] + 1,
-                id=table["id"][row],
-                score=1.0 if score is None else score,
-                state=table["state"][row] or "detected",
-                foot=None if foot_x is None or foot_y is None else (foot_x, foot_y),
-                distance=table["distance"][row],
-                lane=table["lane"][row],
-            )
-
-
-def _csv_tables(path: Path, data: bytes) -> Iterator[tuple[Sequence[int], _Table]]:
-    """Yield some rows at a time: the numbers of their lines, and their values.
-
-    Raises `TruthError` if the header or a row is wrong.
-    """
+def _csv_rows(path: Path, data: bytes) -> Iterator[_Rows]:
+    """Yield some rows at a time; empty cells, and those of missing columns, are None."""
     numbered = numbered_lines(path, data)
     header = _cells(path, *next(numbered, (1, "")))
     if any(header.count(name) != 1 for name in _NEEDED):
         names = ", ".join(_NEEDED)
         raise line_error(path, 1, f"the header must name each of these columns once: {names}")
     while block := list(islice(numbered, _BLOCK)):
-        lines, rows = [], []
+        rows = []
         for line, content in block:
-            lines.append(line)
-            rows.append(_cells(path, line, content))
-            if len(rows[-1]) != len(header):
-                message = f"this line has {len(rows[-1])} cells, but the header has {len(header)}"
+            cells = _cells(path, line, content)
+            if len(cells) != len(header):
+                message = f"this line has {len(cells)} cells, but the header has {len(header)}"
                 raise line_error(path, line, message)
-        columns = dict.fromkeys(_OPTIONAL, [""] * len(lines))
-        columns |= dict(zip(header, map(list, zip(*rows, strict=True)), strict=True))
-        try:
-            yield (
-                lines,
-                _TABLE.validate_python(
-                    {name: [cell or None for cell in cells] for name, cells in columns.items()}
-                ),
-            )
-        except ValidationError as error:
-            mistake = min(error.errors(), key=lambda mistake: mistake["loc"][1])
-            column, row = mistake["loc"][:2]
-            raise line_error(path, lines[int(row)], f"{column}: {mistake['msg']}") from error
+            rows.append(cells)
+        columns: dict[str, list[Any]] = dict.fromkeys(_COLUMNS, [None] * len(rows))
+        for name, column in zip(header, zip(*rows, strict=True), strict=True):
+            columns[name] = [cell or None for cell in column]
+        feet = zip(columns["foot_x"], columns["foot_y"], strict=True)
+        columns["foot"] = [None if None in foot else foot for foot in feet]
+        yield [line for line, _ in block], columns
 
 
 def _cells(path: Path, line: int, content: str) -> list[str]:
@@ -275,6 +216,33 @@ def _cells(path: Path, line: int, content: str) -> list[str]:
         raise line_error(path, line, str(error)) from error
 
 
+def _labels(path: Path, blocks: Iterable[_Rows], times: Times) -> Iterator[Label]:
+    """Yield the label of each row, and put the time of its frame into `times`."""
+    for lines, columns in blocks:
+        try:
+            table = _TABLE.validate_python(columns)
+        except ValidationError as error:
+            mistake = min(error.errors(), key=lambda mistake: mistake["loc"][1])
+            column, row = mistake["loc"][:2]
+            raise line_error(path, lines[int(row)], f"{column}: {mistake['msg']}") from error
+        times.update(zip(table["frame"], zip(lines, table["time"], strict=True), strict=True))
+        boxes = map(from_size, table["x"], table["y"], table["width"], table["height"])
+        for row, box in enumerate(boxes):
+            score = table["score"][row]
+            yield Label(
+                position=lines[row],
+                box=box,
+                name=table["class"][row],
+                frame=table["frame"][row] + 1,
+                id=table["id"][row],
+                score=1.0 if score is None else score,
+                state=table["state"][row] or "detected",
+                foot=table["foot"][row],
+                distance=table["distance"][row],
+                lane=table["lane"][row],
+            )
+
+
 def _begin(path: Path, line: int, clock: str | None, time: float) -> datetime | None:
     """Return the clock time at time 0 from the clock and the time of the first line."""
     try:
@@ -284,4 +252,4 @@ def _begin(path: Path, line: int, clock: str | None, time: float) -> datetime | 
 
 
 JSON_LINES = Format("JSON lines", ".jsonl", read_json_lines, _json_lines)
-CSV = Format("CSV", ".csv", read_csv, _csv_lines, ",".join((*_NEEDED, *_OPTIONAL)) + "\n")
+CSV = Format("CSV", ".csv", read_csv, _csv_lines, ",".join(_COLUMNS) + "\n")
