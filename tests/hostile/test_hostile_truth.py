@@ -110,7 +110,7 @@ def test_too_many_boxes_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     path.write_text("".join(f"{n},1,1,1,1,1,1,1,1\n" for n in range(1, 11)))
     assert len(read_truth(path)) == 10
     path.write_text(path.read_text() + "11,1,1,1,1,1,1,1,1\n")
-    with pytest.raises(TruthError, match=r"t\.txt:11: has more than 10 boxes; cut it into parts"):
+    with pytest.raises(TruthError, match=r"t\.txt: has more than 10 boxes; cut it into parts"):
         read_truth(path)
 
 

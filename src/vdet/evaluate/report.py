@@ -312,5 +312,7 @@ def _mistake_table(clip: ClipResult) -> list[str]:
 
 def _others(source: MeasuredSet) -> str:
     """Return the labels that are not vehicles, as a line."""
-    named = ", ".join(f"{printable(name)} ({count})" for name, count in source.labelled.others)
+    named = ", ".join(
+        f"{printable(name)} ({count})" for name, count in source.labelled.others.items()
+    )
     return f"not vehicles in {source.labelled.name}: {named}"

@@ -4,8 +4,8 @@ import logging
 import math
 import os
 from collections import Counter
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 
 import numpy as np
@@ -94,8 +94,8 @@ class LabelledImages:
 
     name: str
     images: tuple[LabelledImage, ...]
-    others: tuple[tuple[str, int], ...] = ()
-    ignored: tuple[tuple[str, int], ...] = ()
+    others: Mapping[str, int] = field(default_factory=dict)
+    ignored: Mapping[str, int] = field(default_factory=dict)
 
 
 def checked_images(
@@ -145,10 +145,7 @@ def checked_images(
         duplicates = counted(repeated, "label")
         log.warning("%s: has %s twice in the same image; each counts once", name, duplicates)
     return LabelledImages(
-        name=name,
-        images=tuple(checked.values()),
-        others=tuple(others.most_common()),
-        ignored=tuple(ignored.most_common()),
+        name, tuple(checked.values()), dict(others.most_common()), dict(ignored.most_common())
     )
 
 

@@ -84,25 +84,18 @@ def line_error(path: Path | str, position: int | str, message: str) -> TruthErro
     return TruthError(f"{path}:{position}: {message}")
 
 
-def limited(path: Path, labels: Iterable[Label]) -> tuple[Label, ...]:
-    """Return the labels of a file. Raises `TruthError` if there are more than `MAX_LABELS`."""
-    first_labels = tuple(islice(labels, MAX_LABELS + 1))
-    if len(first_labels) > MAX_LABELS:
-        message = f"has more than {MAX_LABELS:,} boxes; cut it into parts"
-        raise line_error(path, first_labels[-1].position, message)
-    return first_labels
-
-
 def checked_labels(path: Path, labels: Iterable[Label]) -> tuple[Label, ...]:
     """Return the labels of the file `path` if they can all be boxes of one video.
 
     Raises
     ------
     TruthError
-        A frame before the first, a negative id of a vehicle, an id twice in a frame, a box without
-        area, or a name of more than 100 characters.
+        More than `MAX_LABELS`, a frame before the first, a negative id of a vehicle, an id twice in
+        a frame, a box without area, or a name of more than 100 characters.
     """
-    checked = tuple(labels)
+    checked = tuple(islice(labels, MAX_LABELS + 1))
+    if len(checked) > MAX_LABELS:
+        raise TruthError(f"{path}: has more than {MAX_LABELS:,} boxes; cut it into parts")
     keys: set[tuple[int, int]] = set()
     for label in checked:
         mistake = mistake_in_box(label)

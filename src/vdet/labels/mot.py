@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from vdet.labels.formats import Format
-from vdet.labels.label import Label, SavedTracks, from_size, limited
+from vdet.labels.label import Label, SavedTracks, from_size
 from vdet.labels.parsing import label_lines, parse_number, parse_whole
 from vdet.track.track import FrameTracks
 
@@ -40,7 +40,7 @@ def read_mot(path: Path, data: bytes) -> SavedTracks:
     """
     counts = _TRUTH_COLUMNS, _RESULT_COLUMNS
     labels = label_lines(path, data, _label, form="MOTChallenge", counts=counts, separator=",")
-    return SavedTracks(limited(path, labels))
+    return SavedTracks(tuple(labels))
 
 
 def _label(line: int, columns: Sequence[str]) -> Label:

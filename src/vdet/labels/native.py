@@ -18,7 +18,7 @@ from typing_extensions import TypedDict
 from vdet.config.camera import moment
 from vdet.errors import TruthError
 from vdet.labels.formats import Format
-from vdet.labels.label import Label, SavedTracks, from_size, limited, line_error
+from vdet.labels.label import Label, SavedTracks, from_size, line_error
 from vdet.labels.parsing import (
     LIMIT,
     Index,
@@ -136,7 +136,7 @@ def read_json_lines(path: Path, data: bytes) -> SavedTracks:
         The file is empty, a line is not such a record, frames do not increase, or a time is wrong.
     """
     times: Times = {}
-    labels = limited(path, _labels(path, _json_rows(path, data, times), times))
+    labels = tuple(_labels(path, _json_rows(path, data, times), times))
     if not times:
         raise TruthError(f"{path}: is empty; it should have a record for every frame")
     seconds = checked_times(path, times)
@@ -176,7 +176,7 @@ def read_csv(path: Path, data: bytes) -> SavedTracks:
         type, or a time is wrong.
     """
     times: Times = {}
-    labels = limited(path, _labels(path, _csv_rows(path, data), times))
+    labels = tuple(_labels(path, _csv_rows(path, data), times))
     seconds = checked_times(path, times)
     for lines, columns in _csv_rows(path, data):
         begin = _begin(path, lines[0], columns[CLOCK][0], float(columns["time"][0]))

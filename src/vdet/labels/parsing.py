@@ -12,7 +12,7 @@ from pydantic import Field, ValidationError
 
 from vdet.errors import TruthError
 from vdet.files import read_whole
-from vdet.labels.label import Label, line_error
+from vdet.labels.label import MAX_LABELS, Label, line_error
 
 LIMIT = 10_000_000
 """Maximum frame number, id or pixel coordinate. Larger numbers mean damage, and would overflow."""
@@ -22,9 +22,6 @@ MAX_BYTES = 300_000_000
 
 MAX_PART = 1_000_000
 """Maximum size of a line, bytes."""
-
-MAX_LINES = 10_000_000
-"""Maximum number of lines in a file of boxes."""
 
 _LAST_NUMBER = re.compile(r"([0-9]{1,8})$", re.ASCII)
 _LATEST = 1e11
@@ -49,14 +46,14 @@ def numbered_lines(path: Path | str, data: bytes) -> Iterator[tuple[int, str]]:
     Raises
     ------
     TruthError
-        The content is not UTF-8, has more than `MAX_LINES`, or a line is longer than `MAX_PART`.
+        The content is not UTF-8, has more than `MAX_LABELS` lines, or one longer than `MAX_PART`.
     """
     try:
         for number, line in enumerate(io.BytesIO(data.removeprefix(codecs.BOM_UTF8)), start=1):
             if len(line) > MAX_PART:
                 raise line_error(path, number, f"the line is longer than {MAX_PART:,} bytes")
-            if number > MAX_LINES:
-                raise TruthError(f"{path}: has more than {MAX_LINES:,} lines; cut it into parts")
+            if number > MAX_LABELS:
+                raise TruthError(f"{path}: has more than {MAX_LABELS:,} lines; cut it into parts")
             if stripped := line.decode().strip():
                 yield number, stripped
     except UnicodeDecodeError as error:

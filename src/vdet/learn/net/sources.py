@@ -168,7 +168,7 @@ def clip_source(video: Path, truth: Path, settings: Settings) -> Source:
     ignored = Counter(
         label.name or "" for some in labels.values() for label in some if label.ignored
     )
-    labelled = LabelledImages(video.name, (), ignored=tuple(ignored.most_common()))
+    labelled = LabelledImages(video.name, (), ignored=dict(ignored.most_common()))
 
     def frames() -> _Frames:
         with VideoReader(video, frames=last, settings=settings.input) as reader:
