@@ -210,7 +210,7 @@ class Report:
         Images of mistakes by the name of their source, made with the page.
     """
 
-    lines: Sequence[str]
+    lines: list[str]
     values: Mapping[str, Any]
     sheets: Sequence[tuple[str, Iterable[Tile]]] = ()
 

@@ -151,7 +151,7 @@ class SavedTracks:
     @property
     def has_times(self) -> bool:
         """Whether every frame has a time; if not, pass a rate to `at_rate`."""
-        return all(index in self.times for index in self._indices())
+        return self._indices() <= self.times.keys()
 
     def at_rate(self, rate: float) -> "SavedTracks":
         """Return the same tracks; frames without a time get that of `rate` frames per second."""
@@ -167,23 +167,28 @@ class SavedTracks:
         by_frame: dict[int, list[Label]] = defaultdict(list)
         for label in self.labels:
             by_frame[label.frame - 1].append(label)
+        names = {
+            name: name and (our_name(name) or name)
+            for name in {label.name for label in self.labels}
+        }
         for index in self._indices():
             labels = sorted(by_frame[index], key=attrgetter("id"))
             time = self.times.get(index, math.nan)
-            yield FrameTracks(index, time, tuple(map(_track, labels)))
+            tracks = [_track(label, names[label.name]) for label in labels]
+            yield FrameTracks(index, time, tuple(tracks))
 
-    def _indices(self) -> list[int]:
-        return sorted({label.frame - 1 for label in self.labels}.union(self.covered or ()))
+    def _indices(self) -> set[int]:
+        return {label.frame - 1 for label in self.labels}.union(self.covered or ())
 
 
-def _track(label: Label) -> Track:
+def _track(label: Label, class_name: str | None) -> Track:
     x1, y1, x2, y2 = [math.floor(side + 0.5) for side in label.box]  # as `Box.xywh`, but faster
     return Track(
         id=label.id,
         box=Box(x1, y1, max(x1 + 1, x2), max(y1 + 1, y2)),
         score=min(max(label.score, 0.0), 1.0),
         state=label.state,
-        class_name=None if label.name is None else our_name(label.name) or label.name,
+        class_name=class_name,
         whole_foot=label.foot,
         distance=label.distance,
         lane=label.lane,

@@ -6,6 +6,7 @@ JSON lines have a record for each frame, even without a box. CSV has a row for e
 import csv
 import io
 import json
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import datetime, timedelta
 from itertools import islice
@@ -40,7 +41,7 @@ _COLUMNS = (
 _NEEDED = _COLUMNS[:7]
 
 _BLOCK = 300
-"""Number of rows of CSV to check at once; they fit into the cache."""
+"""Number of boxes to check at once; they fit into the cache."""
 
 _Table = TypedDict(
     "_Table",
@@ -149,6 +150,8 @@ def read_json_lines(path: Path, data: bytes) -> SavedTracks:
 def _json_rows(path: Path, data: bytes, times: Times) -> Iterator[_Rows]:
     """Yield the boxes of every record, and put the time of its frame into `times`."""
     last = -1
+    lines: list[int] = []
+    columns: dict[str, list[Any]] = defaultdict(list)
     for line, content in numbered_lines(path, data):
         try:
             record = _RECORD.validate_json(content)
@@ -159,9 +162,16 @@ def _json_rows(path: Path, data: bytes, times: Times) -> Iterator[_Rows]:
             raise line_error(path, line, f"frame {frame} comes after frame {last}")
         last = frame
         times[frame] = line, time
-        columns = {name: [box.get(name) for box in boxes] for name in _OF_BOX}
-        columns |= {"frame": [frame] * len(boxes), "time": [time] * len(boxes)}
-        yield [line] * len(boxes), columns
+        lines += [line] * len(boxes)
+        columns["frame"] += [frame] * len(boxes)
+        columns["time"] += [time] * len(boxes)
+        for name in _OF_BOX:
+            columns[name] += [box.get(name) for box in boxes]
+        if len(lines) >= _BLOCK:
+            yield lines, columns
+            lines, columns = [], defaultdict(list)
+    if lines:
+        yield lines, columns
 
 
 def read_csv(path: Path, data: bytes) -> SavedTracks:
@@ -227,19 +237,20 @@ def _labels(path: Path, blocks: Iterable[_Rows], times: Times) -> Iterator[Label
             raise line_error(path, lines[int(row)], f"{column}: {mistake['msg']}") from error
         times.update(zip(table["frame"], zip(lines, table["time"], strict=True), strict=True))
         boxes = map(from_size, table["x"], table["y"], table["width"], table["height"])
-        for row, box in enumerate(boxes):
-            score = table["score"][row]
+        optional = (table[name] for name in ("score", "state", "class", "foot", "distance", "lane"))
+        rows = zip(lines, table["frame"], table["id"], boxes, *optional, strict=True)
+        for line, frame, id_, box, score, state, name, foot, distance, lane in rows:
             yield Label(
-                position=lines[row],
+                position=line,
                 box=box,
-                name=table["class"][row],
-                frame=table["frame"][row] + 1,
-                id=table["id"][row],
+                name=name,
+                frame=frame + 1,
+                id=id_,
                 score=1.0 if score is None else score,
-                state=table["state"][row] or "detected",
-                foot=table["foot"][row],
-                distance=table["distance"][row],
-                lane=table["lane"][row],
+                state=state or "detected",
+                foot=foot,
+                distance=distance,
+                lane=lane,
             )
 
 

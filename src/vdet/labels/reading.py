@@ -39,7 +39,7 @@ def read_tracks(path: Path, rate: float | None = None) -> SavedTracks:
     try:
         saved = recognize(path, data).read(path, data)
         regions = set(filter(is_region, {label.name for label in saved.labels}))
-        vehicles = (label for label in saved.labels if not (label.ignored or label.name in regions))
+        vehicles = [label for label in saved.labels if not (label.ignored or label.name in regions)]
         saved = replace(saved, labels=checked_labels(path, vehicles))
     finally:
         gc.enable()
