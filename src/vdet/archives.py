@@ -15,7 +15,7 @@ _ENCRYPTED = 1  # bit of a member's flags
 
 
 class ArchiveError(ValueError):
-    """A zip file, or a member of it, is refused; the message says why."""
+    """A zip file, or a member of it, is rejected; the message says why."""
 
 
 def open_archive(file: Path | IO[bytes]) -> zipfile.ZipFile:
