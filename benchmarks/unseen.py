@@ -281,7 +281,7 @@ def video_lines(clip: tuple[Path, Path], network: Path, settings: Settings) -> l
     """Return how well a network finds and follows the vehicles of a video."""
     model = load_detector(NetworkSettings(model=str(network)))
     found = evaluate_clip(open_clip(*clip), settings, model)
-    return video_report([found], RunName("net", network, None)).lines()
+    return video_report([found], RunName("net", network, None)).lines
 
 
 class Unseen:

@@ -293,8 +293,8 @@ def detect_video(
     video
         Output: the video with a box around each vehicle, .mp4, .mov or .mkv.
     tracks
-        Output: the boxes of every frame, one file or several: .txt (MOTChallenge), .csv, .jsonl,
-        .coco.json, .kitti.txt or .yolo.zip.
+        Output: the boxes of every frame, one file or several: .txt (MOTChallenge), .csv, .jsonl
+        or .coco.json.
     outputs
         Other outputs by the name of their sink, one path or several.
     overwrite

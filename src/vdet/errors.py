@@ -144,13 +144,19 @@ def printable(name: str) -> str:
 
 
 def counted(count: int, noun: str) -> str:
-    """Return `1 car`, `6 buses`."""
+    """Return `1 car`, `6 buses`, `2 people`."""
     return f"{count:,} {named(count, noun)}"
 
 
 def named(count: int, noun: str) -> str:
-    """Return the noun for a number of things: `car`, `cars`, `buses`."""
-    return noun if count == 1 else noun + ("es" if noun.endswith(("s", "x", "ch")) else "s")
+    """Return the noun for a number of things: `car`, `cars`, `buses`, `lorries`, `people`."""
+    if count == 1:
+        return noun
+    if noun.endswith("person"):
+        return noun.removesuffix("person") + "people"
+    if noun.endswith("y") and noun[-2:-1] not in "aeiou":
+        return noun[:-1] + "ies"
+    return noun + ("es" if noun.endswith(("s", "x", "ch", "sh")) else "s")
 
 
 def clock_text(seconds: float | Fraction, digits: int = 0, *, hours: bool = False) -> str:

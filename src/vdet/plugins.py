@@ -48,7 +48,6 @@ _BUILT_IN: dict[str, dict[str, str]] = {
         "csv": "vdet.labels.native:CSV",
         "jsonl": "vdet.labels.native:JSON_LINES",
         "coco": "vdet.labels.coco:COCO",
-        "kitti": "vdet.labels.kitti:KITTI",
         "yolo": "vdet.labels.yolo:YOLO",
     },
 }

@@ -108,9 +108,9 @@ class TestJobs:
         assert not Path("out").exists()
 
     def test_a_sink_may_write_several_outputs_of_each_video(self) -> None:
-        tracks = endings(*(("tracks", end) for end in (".txt", ".kitti.txt", ".coco.json")))
+        tracks = endings(*(("tracks", end) for end in (".txt", ".csv", ".coco.json")))
         plan = make_plan([Path("clips/a.mp4")], Path("out"), replace(COMMON, outputs=tracks))
-        assert outputs(plan.runs) == [["out/a.txt", "out/a.kitti.txt", "out/a.coco.json"]]
+        assert outputs(plan.runs) == [["out/a.txt", "out/a.csv", "out/a.coco.json"]]
 
     def test_jobs_whose_outputs_are_all_there_and_up_to_date_are_skipped(self) -> None:
         record("clips/a.mp4", "out/a.mp4", "out/a.csv")

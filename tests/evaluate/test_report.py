@@ -13,7 +13,7 @@ from vdet.evaluate.comparison import compare
 from vdet.evaluate.images import Counting, ImagesResult, MeasuredImage, score_source
 from vdet.evaluate.output import RunName
 from vdet.evaluate.report import (
-    FOUND,
+    DETECTED,
     TRUE,
     images_report,
     mistake_tiles,
@@ -38,7 +38,7 @@ class TestVideo:
 
     def test_several_clips_have_a_row_each_and_a_total_and_classes_a_table(self) -> None:
         report = video_report(self.clips(TEN, range(1, 6)), NAME)
-        lines = report.lines()
+        lines = report.lines
         assert [line.split("  ")[0] for line in lines[3:6]] == ["clip 0", "clip 1", "total"]
         assert lines[7].split("  ")[0] == "class"
         assert lines[8].split() == ["car", "2", "2", "0", "0.000", "0.000", "0.000", "bus", "2"]
@@ -49,7 +49,7 @@ class TestVideo:
 
     def test_one_clip_is_its_own_total(self) -> None:
         report = video_report(self.clips(TEN), NAME)
-        lines, values = report.lines(), report.values
+        lines, values = report.lines, report.values
         assert [line.split("  ")[0] for line in lines[2:5]] == ["video", "clip 0", ""]
         assert (values["detector"], values["assignments"]) == ("svm", ("b=1",))
         assert values["total"]["f1"] == values["videos"][0]["f1"] == 1
@@ -62,7 +62,7 @@ class TestVideo:
         assert covered.scores.false_positives == 0
         line = f"{found}: frames 1–10 compared"
         report = tracks_report(covered, truth)
-        assert line in report.lines()
+        assert line in report.lines
         assert line in report.page()
         assert score_files(found, truth, until=15).scores.false_positives == 5
 
@@ -82,7 +82,7 @@ class TestMistakesInVideo:
             "false alarm, track 2, frame 3",
         }
         missed = images["missed vehicle 7, frame 5"]
-        for color in (TRUE, FOUND):
+        for color in (TRUE, DETECTED):
             assert np.any((missed == color).all(axis=2))
 
     def test_the_picture_of_one_at_the_edge_lies_inside_the_frame(self, clip_path: Path) -> None:
@@ -110,7 +110,8 @@ class TestPictures:
     def test_the_page_names_detector_source_and_labels_left_out(self, tmp_path: Path) -> None:
         result = self.result(tmp_path / "a_$x_{$ set", self.CAR.box)
         html = images_report(result, RunName("net", Path("x/my.onnx"), "net")).page()
-        assert "detector net, model my.onnx, settings net; boxes from score 0.50" in html
+        assert "detector net, model my.onnx, settings net" in html
+        assert "boxes from score 0.50" in html
         assert "not vehicles in" in html
         assert "cow (1)" in html
 
@@ -121,5 +122,5 @@ class TestPictures:
         first, second = worst_tiles(self.result(tmp_path, (70, 10, 20, 30)).sources[0])
         assert (first.title, first.caption) == ("a.png", "1 missed, 1 false alarm")
         assert (second.title, second.caption) == ("b.png", "0 missed, 1 false alarm")
-        for color in (TRUE, FOUND):
+        for color in (TRUE, DETECTED):
             assert np.any((first.image == color).all(axis=2))

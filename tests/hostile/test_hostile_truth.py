@@ -11,7 +11,7 @@ from labels.saving import car, frame, written
 from vdet.boxes import Box
 from vdet.errors import TruthError
 from vdet.evaluate.comparison import MAX_IDS, compare
-from vdet.labels import coco, kitti, label, native
+from vdet.labels import coco, label, native
 from vdet.labels.label import MAX_IN_FRAME
 from vdet.labels.mot import MOT
 from vdet.labels.reading import read_predictions, read_truth
@@ -22,11 +22,9 @@ FRAMES = [
     frame(f, *(car(i, Box.sized(90 * i, 40, 60, 50)) for at, i in BOXES if at == f))
     for f in range(6)
 ]
-RESULTS, KITTI, COCO, CSV, JSONL = (
-    written(form, FRAMES).decode()
-    for form in (MOT, kitti.KITTI, coco.COCO, native.CSV, native.JSON_LINES)
+RESULTS, COCO, CSV, JSONL = (
+    written(form, FRAMES).decode() for form in (MOT, coco.COCO, native.CSV, native.JSON_LINES)
 )
-KITTI += "3 -1 DontCare -1 -1 -10 300 40 350 80 -1 -1 -1 -1000 -1000 -1000 -10 0\n"
 WORDS = (
     *("0", "-1", "1", "1e999", "-1e999", "nan", "inf", "1e-300", "10000000", "10000001"),
     *("9" * 400, "1_000", "0x10", "١", "", " ", "Car", "Pedestrian", "tractor", "1.5", "+3"),
@@ -45,7 +43,7 @@ def test_damaged_files_of_boxes_are_read_or_refused(tmp_path: Path) -> None:
     found, true = tmp_path / "found.txt", tmp_path / "gt.txt"
     found.write_text(RESULTS)
     true.write_text(GT)
-    truths = {"mot.txt": GT, "kitti.txt": KITTI, "a.coco.json": COCO}
+    truths = {"mot.txt": GT, "a.coco.json": COCO}
     tracks = {"results.txt": RESULTS, "tracks.csv": CSV, "tracks.jsonl": JSONL}
     contents: dict[str, bytes] = {}
     for seed, (name, text) in enumerate((truths | tracks).items()):
@@ -59,7 +57,7 @@ def test_damaged_files_of_boxes_are_read_or_refused(tmp_path: Path) -> None:
         return ["eval", "tracks", *files, "--json", out / f"{path.name}.json"]
 
     trials = try_files(tmp_path, contents, arguments)
-    assert 12 < sum(trial.code == 0 for trial in trials) < 100
+    assert 4 < sum(trial.code == 0 for trial in trials) < 100
 
 
 DEEP = 1_000_000
@@ -79,14 +77,13 @@ WICKED = {
         '{"]": ' * DEEP,
         "is not JSON: nested too deeply",
     ),
-    "a long key in COCO": ("t.coco.json", '{"' + "k" * 17 * DEEP, "has an entry of more than"),
+    "a long key in COCO": ("t.coco.json", '{"' + "k" * 17 * DEEP, "is not JSON"),
     "no numbers in COCO": (
         "t.coco.json",
         '{"images": [], "categories": [], "annotations": [{"bbox": [1e999, NaN, 1, 1]}]}',
-        "is not JSON: parse error",
+        "is not COCO: annotations.0.image_id: Field required",
     ),
     "a huge id in COCO": ("t.coco.json", '{"images": [{"id": ' + "9" * DEEP, "is not JSON"),
-    "no zip file": ("t.yolo.zip", "PK" + "x" * DEEP, "is not a folder or a readable zip"),
 }
 
 
@@ -113,7 +110,7 @@ def test_too_many_boxes_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     path.write_text("".join(f"{n},1,1,1,1,1,1,1,1\n" for n in range(1, 11)))
     assert len(read_truth(path)) == 10
     path.write_text(path.read_text() + "11,1,1,1,1,1,1,1,1\n")
-    with pytest.raises(TruthError, match=r"t\.txt:11: has more than 10 boxes; cut it into parts"):
+    with pytest.raises(TruthError, match=r"t\.txt: has more than 10 boxes; cut it into parts"):
         read_truth(path)
 
 

@@ -3,13 +3,17 @@ from pathlib import Path
 import pytest
 
 from labels.saving import car, frame, written
-from vdet.errors import TruthError
+from vdet.errors import OutputError, TruthError
 from vdet.labels.coco import COCO
-from vdet.labels.formats import Format, format_for, track_formats, track_suffixes
-from vdet.labels.kitti import KITTI
+from vdet.labels.formats import (
+    Format,
+    check_track_name,
+    format_for,
+    track_formats,
+    track_suffixes,
+)
 from vdet.labels.mot import MOT
 from vdet.labels.reading import read_tracks
-from vdet.labels.yolo import YOLO
 
 
 def test_every_format_has_an_ending_of_its_own() -> None:
@@ -23,8 +27,6 @@ def test_every_format_has_an_ending_of_its_own() -> None:
         ("gt.txt", MOT),
         ("gt", MOT),
         ("gt.csv", MOT),
-        ("0000.txt", KITTI),
-        ("annotations.zip", YOLO),
         ("instances_default.json", COCO),
     ],
 )
@@ -40,8 +42,9 @@ def test_the_content_tells_the_format_where_the_name_leaves_it_open(
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
-        ("gt.txt", "1;1;10;20;30;40", "columns must be separated by commas or spaces, not by ';'"),
-        ("a.csv", "frame;time;id", "columns must be separated by commas or spaces, not by ';'"),
+        ("gt.txt", "1;1;10;20;30;40", "columns must be separated by commas"),
+        ("0000.txt", "0 3 Car 0 2 -1.57", "KITTI tracks are no longer read"),
+        ("a.yolo.zip", "PK", "a zip file of YOLO has no tracks; save or export them as COCO"),
         ("t.xml", "<annotations>", r"t\.xml: XML is not supported; export the labels as COCO"),
     ],
 )
@@ -51,6 +54,11 @@ def test_what_other_tools_write_is_refused_in_words_that_fit(
     (tmp_path / name).write_text(content)
     with pytest.raises(TruthError, match=message):
         read_tracks(tmp_path / name)
+
+
+def test_tracks_are_not_written_under_the_name_of_a_format_that_is_gone() -> None:
+    with pytest.raises(OutputError, match=r"use \.txt or \.coco\.json"):
+        check_track_name(Path("a.kitti.txt"))
 
 
 def test_an_empty_file_of_another_name_is_refused(tmp_path: Path) -> None:

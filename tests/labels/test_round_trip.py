@@ -18,9 +18,8 @@ from vdet.boxes import Box
 from vdet.detect.classes import OUR_NAMES, UNKNOWN
 from vdet.errors import TruthError
 from vdet.labels.coco import COCO, read_coco_images
-from vdet.labels.formats import Format, ImageTracks, track_formats
+from vdet.labels.formats import Format, ImageTracks, image_suffixes, track_formats
 from vdet.labels.images import LabelledImage
-from vdet.labels.kitti import KITTI
 from vdet.labels.label import SavedTracks
 from vdet.labels.mot import MOT
 from vdet.labels.native import CSV, JSON_LINES
@@ -31,10 +30,8 @@ from writing import write_image
 WHOLE = {CSV, JSON_LINES}
 """Formats that keep all that is known of a track."""
 TIMED = WHOLE | {COCO}
-LISTING = {JSON_LINES, COCO, YOLO}
+LISTING = {JSON_LINES, COCO}
 """Formats that keep the frames without a box."""
-SCORED = {MOT, CSV, JSON_LINES, COCO, KITTI}
-SIZED = {COCO, YOLO}
 MARKING = WHOLE | {COCO}
 """Formats that keep which vehicles are lost."""
 
@@ -86,18 +83,12 @@ def videos(draw: st.DrawFn) -> list[FrameTracks]:
 
 def kept(form: Format, track: Track) -> Track:
     """Return what a format keeps of a track."""
-    kitti = {"car": "car", "truck": "truck", "bus": "truck", "vehicle": "car", None: "car"}
-    names: dict[Format, str | None] = {
-        MOT: None,
-        KITTI: kitti.get(track.class_name, "Misc"),
-        **dict.fromkeys(WHOLE, track.class_name),
-    }
+    names: dict[Format, str | None] = {MOT: None, **dict.fromkeys(WHOLE, track.class_name)}
     whole = form in WHOLE
     marks_lost = form in MARKING and track.state == "predicted"
     state: State = track.state if whole else "predicted" if marks_lost else "detected"
     return replace(
         track,
-        score=track.score if form in SCORED else 1.0,
         state=state,
         class_name=names.get(form, track.class_name or "vehicle"),
         whole_foot=track.whole_foot if whole else None,
@@ -125,7 +116,7 @@ def test_what_is_written_is_read_again(
         seconds = item.index / 25 if form in TIMED else math.nan
         assert item.time == pytest.approx(seconds, nan_ok=True)
     if any(saved):
-        assert saved.size == ((1280, 720) if form in SIZED else None)
+        assert saved.size == ((1280, 720) if form is COCO else None)
 
 
 @every_format
@@ -151,8 +142,7 @@ def test_a_damaged_file_is_read_or_refused_in_one_line(
 def test_a_box_may_reach_out_of_the_frame(tmp_path: Path, form: Format) -> None:
     box = Box.sized(-5, 700, 30, 60)
     saved = read_back(form, tmp_path, written(form, [frame(2, car(1, box))]))
-    inside = box.clipped(1280, 720)
-    assert list(saved)[-1].tracks[0].box == (inside if form is YOLO else box)
+    assert list(saved)[-1].tracks[0].box == box
 
 
 @st.composite
@@ -173,7 +163,7 @@ def labelled(draw: st.DrawFn) -> list[ImageTracks]:
 
 
 def test_every_format_that_pictures_are_written_in_is_read() -> None:
-    assert {form for form in FORMATS if form.images} == READERS.keys()
+    assert set(image_suffixes()) == {form.suffix for form in READERS}
 
 
 @pytest.mark.parametrize("form", READERS, ids=lambda form: form.name)

@@ -34,8 +34,8 @@ _HEADINGS = {
 @click.option("--no-video", is_flag=True, help="Do not write a video, only other outputs.")
 @options.output_files(
     "--tracks",
-    help="Write the boxes of every frame: .txt (MOTChallenge), .csv, .jsonl, .coco.json, "
-    ".kitti.txt or .yolo.zip. With -, write .jsonl to standard output. Can be repeated.",
+    help="Write the boxes of every frame: .txt (MOTChallenge), .csv, .jsonl or .coco.json. With "
+    "-, write .jsonl to standard output. Can be repeated.",
 )
 @options.output_files("--vehicles", help="Write a record of each vehicle: .csv, .json or .parquet.")
 @options.output_folders("--crops", help="Write the best image of each vehicle into DIR.")

@@ -114,8 +114,8 @@ def tracks(
 ) -> None:
     """Compare a file of tracks with the ground truth.
 
-    PRED is a file of vdet detect-video --tracks. TRUTH is a MOTChallenge gt.txt, KITTI tracking
-    labels, COCO or YOLO with tracks, or a .csv or .jsonl of vdet.
+    PRED is a file of vdet detect-video --tracks. TRUTH is a MOTChallenge gt.txt, COCO with
+    tracks, or a .csv or .jsonl of vdet.
 
     \b
     Examples:

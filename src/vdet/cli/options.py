@@ -135,7 +135,7 @@ truths_option = input_file(
     "--truth",
     "truths",
     multiple=True,
-    help="Ground truth: MOTChallenge, KITTI, COCO, YOLO, .csv or .jsonl. Repeat for each video.",
+    help="Ground truth: MOTChallenge, COCO, .csv or .jsonl. Repeat for each video.",
 )
 until_option = number_option(
     "--until",

@@ -76,7 +76,7 @@ class ResultFiles:
 
     def print_report(self, report: "Report") -> None:
         """Print and write the report of an evaluation, as `print` does."""
-        self.print(report.lines(), report.values, report.page)
+        self.print(report.lines, report.values, report.page)
 
 
 def facts_options(command: Function) -> Function:

@@ -67,13 +67,13 @@ class ComparedFrame:
     columns: Int64Array
 
     @property
-    def found(self) -> Int64Array:
+    def paired_vehicles(self) -> Int64Array:
         """The vehicles that are found, int64 `(k,)`: indices as in `vehicles`."""
         return self.vehicles[self.rows]
 
     @property
-    def found_by(self) -> Int64Array:
-        """The track that finds each of `found`, int64 `(k,)`."""
+    def pairing_tracks(self) -> Int64Array:
+        """The track that finds each of `paired_vehicles`, int64 `(k,)`."""
         return self.tracks[self.columns]
 
 
@@ -113,7 +113,7 @@ class Comparison:
 
         Boxes dropped for an ignore region do not count: a track without other boxes is not false.
         """
-        right = counts((frame.found_by for frame in self.frames), len(self.track_ids))
+        right = counts((frame.pairing_tracks for frame in self.frames), len(self.track_ids))
         return np.flatnonzero(2 * right < self.track_lengths())
 
 
@@ -135,9 +135,9 @@ def compare(prediction: LabelledVideo, truth: LabelledVideo) -> Comparison:
         There are more than `MAX_IDS`, `MAX_IN_FRAME` or `MAX_PAIRS`, far more than on any road.
     """
     step = 1
-    if truth.known is not None:
-        prediction = prediction.where(np.isin(prediction.frames, truth.known))
-        step = int(np.diff(truth.known).min(initial=truth.last_frame or 1))
+    if truth.covered is not None:
+        prediction = prediction.where(np.isin(prediction.frames, truth.covered))
+        step = int(np.diff(truth.covered).min(initial=truth.last_frame or 1))
     _check_size(prediction, truth)
     numbers = np.union1d(prediction.frames, truth.frames).tolist()
     kept = [_apply_regions(prediction.frame(number), truth.frame(number)) for number in numbers]
@@ -152,15 +152,30 @@ def compare(prediction: LabelledVideo, truth: LabelledVideo) -> Comparison:
             iou = iou_matrix(vehicles.boxes, tracks.boxes)
             together = partners[of_vehicles][:, np.newaxis] == of_tracks
             weights = np.where(at_least(iou, MATCH_IOU), iou + _KEEP_BONUS * together, 0)
-            boxes = vehicles.boxes, tracks.boxes, tracks.scores
-            frame = ComparedFrame(number, of_vehicles, of_tracks, *boxes, iou, *assign(weights))
+            rows, columns = assign(weights)
+            frame = ComparedFrame(
+                number=number,
+                vehicles=of_vehicles,
+                tracks=of_tracks,
+                vehicle_boxes=vehicles.boxes,
+                track_boxes=tracks.boxes,
+                scores=tracks.scores,
+                iou=iou,
+                rows=rows,
+                columns=columns,
+            )
             frames.append(frame)
             if iou.size:
                 partners[:] = UNMATCHED
-                partners[frame.found] = frame.found_by
-    names = tuple(truth.classes.get(id_, UNKNOWN) for id_ in vehicle_ids.tolist())
-    found_names = tuple(prediction.classes.get(id_, UNKNOWN) for id_ in track_ids.tolist())
-    return Comparison(tuple(frames), vehicle_ids, track_ids, names, found_names, step)
+                partners[frame.paired_vehicles] = frame.pairing_tracks
+    return Comparison(
+        frames=tuple(frames),
+        vehicle_ids=vehicle_ids,
+        track_ids=track_ids,
+        vehicle_names=tuple(truth.classes.get(id_, UNKNOWN) for id_ in vehicle_ids.tolist()),
+        track_names=tuple(prediction.classes.get(id_, UNKNOWN) for id_ in track_ids.tolist()),
+        step=step,
+    )
 
 
 def pool(comparisons: Sequence[Comparison]) -> Comparison:
@@ -170,19 +185,19 @@ def pool(comparisons: Sequence[Comparison]) -> Comparison:
     """
     frames: list[ComparedFrame] = []
     vehicles = tracks = 0
-    for one in comparisons:
+    for video in comparisons:
         frames += [
             replace(frame, vehicles=frame.vehicles + vehicles, tracks=frame.tracks + tracks)
-            for frame in one.frames
+            for frame in video.frames
         ]
-        vehicles += len(one.vehicle_ids)
-        tracks += len(one.track_ids)
+        vehicles += len(video.vehicle_ids)
+        tracks += len(video.track_ids)
     return Comparison(
-        tuple(frames),
-        joined(one.vehicle_ids for one in comparisons),
-        joined(one.track_ids for one in comparisons),
-        tuple(name for one in comparisons for name in one.vehicle_names),
-        tuple(name for one in comparisons for name in one.track_names),
+        frames=tuple(frames),
+        vehicle_ids=joined(video.vehicle_ids for video in comparisons),
+        track_ids=joined(video.track_ids for video in comparisons),
+        vehicle_names=tuple(name for video in comparisons for name in video.vehicle_names),
+        track_names=tuple(name for video in comparisons for name in video.track_names),
     )
 
 
@@ -221,18 +236,20 @@ def joined(arrays: Iterable[Int64Array]) -> Int64Array:
 
 
 def _check_size(prediction: LabelledVideo, truth: LabelledVideo) -> None:
-    """Refuse a comparison that would take hours and gigabytes."""
-    tracks, vehicles = (len(np.unique(video.ids)) for video in (prediction, truth))
+    """Raise `TruthError` for a comparison that would take hours and gigabytes."""
+    tracks, vehicles = len(np.unique(prediction.ids)), len(np.unique(truth.ids))
     last = max(prediction.last_frame, truth.last_frame)
-    found, true = (np.bincount(video.frames, minlength=last + 1) for video in (prediction, truth))
+    predicted_boxes = np.bincount(prediction.frames, minlength=last + 1)
+    true_boxes = np.bincount(truth.frames, minlength=last + 1)
     if (
         max(tracks, vehicles) > MAX_IDS
-        or max(found.max(), true.max()) > MAX_IN_FRAME
-        or max(tracks * vehicles, int(np.sum(found * true))) > MAX_PAIRS
+        or max(predicted_boxes.max(), true_boxes.max()) > MAX_IN_FRAME
+        or max(tracks * vehicles, int(np.sum(predicted_boxes * true_boxes))) > MAX_PAIRS
     ):
-        found_ones = f"{tracks:,} tracks with {len(prediction):,} boxes"
-        what = f"{found_ones} and {vehicles:,} vehicles with {len(truth):,}"
-        raise TruthError(f"{what} are too many to compare; cut the video into parts")
+        raise TruthError(
+            f"{tracks:,} tracks with {len(prediction):,} boxes and {vehicles:,} vehicles with "
+            f"{len(truth):,} are too many to compare; cut the video into parts"
+        )
 
 
 def _apply_regions(

@@ -52,17 +52,17 @@ class MeasuredImage:
     shown: Comparison
 
     @classmethod
-    def of(cls, image: LabelledImage, width: int, found: Boxes, counting: Counting) -> Self:
+    def of(cls, image: LabelledImage, width: int, boxes: Boxes, counting: Counting) -> Self:
         """Compare the detections with the labels of an image, `width` pixels wide."""
         minimum = counting.min_width * width
         regions = image.ignored | (_widths(image.boxes) < minimum)
         truth = _one_frame(image.boxes, np.ones(len(regions)), regions, image.classes)
-        is_labelled = [name not in image.unlabelled for name in found.class_names]
-        found = found[np.flatnonzero(is_labelled)]
-        found = found[np.argsort(-found.scores, kind="stable")[:MAX_IN_FRAME]]
-        narrow = _widths(found.sides) < minimum
-        detected = _one_frame(found.sides, found.scores, narrow, found.class_names)
-        shown = detected.where(found.scores >= counting.score)
+        is_labelled = [name not in image.unlabelled for name in boxes.class_names]
+        boxes = boxes[np.flatnonzero(is_labelled)]
+        boxes = boxes[np.argsort(-boxes.scores, kind="stable")[:MAX_IN_FRAME]]
+        narrow = _widths(boxes.sides) < minimum
+        detected = _one_frame(boxes.sides, boxes.scores, narrow, boxes.class_names)
+        shown = detected.where(boxes.scores >= counting.score)
         return cls(image, compare(detected, truth), compare(shown, truth))
 
 
@@ -123,12 +123,12 @@ class ImagesResult:
     def mean(self) -> ImageScores:
         """The mean over the sources."""
         scores = [source.scores for source in self.sources]
-        known = [score for score in scores if score.vehicles] or scores
+        with_vehicles = [score for score in scores if score.vehicles] or scores
         means: dict[str, Any] = {}
         for name in (field.name for field in fields(ImageScores)):
             total = sum(getattr(score, name) for score in scores)
-            is_count = isinstance(total, int)
-            means[name] = total if is_count else fmean(getattr(item, name) for item in known)
+            ratios = [getattr(score, name) for score in with_vehicles]
+            means[name] = total if isinstance(total, int) else fmean(ratios)
         best, at_score = best_f1([source.ranked for source in self.sources])
         return ImageScores(**means | {"best_f1": best, "best_score": at_score})
 
@@ -165,8 +165,8 @@ def evaluate_images(
 
     def search(labelled: LabelledImage) -> MeasuredImage:
         image = labelled.read()
-        found = whole.detect(labelled.path, image).detections
-        return MeasuredImage.of(labelled, image.shape[1], found, counting)
+        detections = whole.detect(labelled.path, image).detections
+        return MeasuredImage.of(labelled, image.shape[1], detections, counting)
 
     sources = []
     for labelled in sets:
@@ -181,12 +181,12 @@ def evaluate_images(
 
 def score_source(labelled: LabelledImages, images: Sequence[MeasuredImage]) -> MeasuredSet:
     """Return the scores of one source."""
-    found = score_boxes(pool([image.shown for image in images]))
+    detection = score_boxes(pool([image.shown for image in images]))
     ranked = rank_predictions(pool([image.every for image in images]))
     ap50, ap50_95 = ranked.average_precisions()
     best, at_score = best_f1([ranked])
     scores = ImageScores(
-        **vars(found),
+        **vars(detection),
         images=len(images),
         vehicles=ranked.vehicles,
         ap50=ap50,
@@ -199,9 +199,9 @@ def score_source(labelled: LabelledImages, images: Sequence[MeasuredImage]) -> M
 
 def best_f1(sources: Sequence[RankedPredictions]) -> tuple[float, float]:
     """Return the highest mean F1 at any one score, and that score; 0 without vehicles."""
-    known = [ranked for ranked in sources if ranked.vehicles and len(ranked.scores)]
-    if not known:
+    sources = [ranked for ranked in sources if ranked.vehicles and len(ranked.scores)]
+    if not sources:
         return 0.0, 0.0
-    scores = np.unique(np.concatenate([ranked.scores for ranked in known]))[::-1]
-    means = np.mean([ranked.f1_at(scores) for ranked in known], axis=0)
+    scores = np.unique(np.concatenate([ranked.scores for ranked in sources]))[::-1]
+    means = np.mean([ranked.f1_at(scores) for ranked in sources], axis=0)
     return float(means.max()), float(scores[np.argmax(means)])

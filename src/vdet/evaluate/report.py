@@ -1,4 +1,4 @@
-"""Reports of evaluations: as text, as values for JSON, and as a page with the mistakes."""
+"""Reports of evaluations: as text, as values for JSON, and as a page that shows the mistakes."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -20,17 +20,15 @@ from vdet.evaluate.output import RunName, figure, table
 from vdet.evaluate.scores import ClassResult, class_results, score_boxes
 from vdet.evaluate.video import ClipResult, total
 from vdet.media.reader import VideoReader
-from vdet.pages.render import Table, render
+from vdet.pages.render import render
 from vdet.version import __version__
 
 TRUE: Color = (90, 220, 60)
-FOUND: Color = (40, 120, 255)
+DETECTED: Color = (40, 120, 255)
 
 _MAX_IMAGES, _MAX_CROPS = 9, 24  # of each source; of each video
+_MAX_MISTAKES = 10  # listed for a video
 _SCALE = 3.0  # width of the part around a box, in sizes of the box
-
-_Seen = tuple[int, Float64Array, float]
-"""Number of a frame with a mistake, the box, and its best IoU with any box of the other side."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,33 +72,52 @@ class Mistake:
         return f"{self.first}–{self.last}" if self.boxes > 1 else str(self.first)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _UnpairedBox:
+    """A box with a mistake, and its best IoU with any box of the other side."""
+
+    frame: int
+    box: Float64Array
+    overlap: float
+
+
 def mistakes(comparison: Comparison) -> tuple[Mistake, ...]:
     """Return all mistakes, the longest first.
 
     Frames in which a vehicle or a track does not count are not mistakes, and split a mistake.
     """
-    seen: dict[tuple[str, int], list[_Seen]] = defaultdict(list)
+    unpaired: dict[tuple[str, int], list[_UnpairedBox]] = defaultdict(list)
     for frame in comparison.frames:
-        missed = comparison.vehicle_ids[frame.vehicles], frame.vehicle_boxes, frame.iou, frame.rows
-        false = comparison.track_ids[frame.tracks], frame.track_boxes, frame.iou.T, frame.columns
-        for what, sides in (("missed vehicle", missed), ("false alarm, track", false)):
-            ids, boxes, iou, paired = sides
+        vehicles, tracks = (
+            (comparison.vehicle_ids[frame.vehicles], frame.vehicle_boxes, frame.iou, frame.rows),
+            (comparison.track_ids[frame.tracks], frame.track_boxes, frame.iou.T, frame.columns),
+        )
+        for what, side in (("missed vehicle", vehicles), ("false alarm, track", tracks)):
+            ids, boxes, iou, paired = side
             for row in np.setdiff1d(np.arange(len(ids)), paired).tolist():
                 overlap = float(iou[row].max(initial=0))
-                seen[what, int(ids[row])].append((frame.number, boxes[row], overlap))
-    found = []
-    for (what, id_), frames in seen.items():
+                box = _UnpairedBox(frame.number, boxes[row], overlap)
+                unpaired[what, int(ids[row])].append(box)
+    result = []
+    for (what, id_), sequence in unpaired.items():
         # Consecutive frames have a constant difference between number and position.
-        runs = groupby(enumerate(frames), lambda placed: placed[1][0] - comparison.step * placed[0])
-        found += [_mistake(what, id_, [item for _, item in run]) for _, run in runs]
-    return tuple(sorted(found, key=lambda one: (-one.boxes, one.first, one.what, one.id)))
+        runs = groupby(enumerate(sequence), lambda it: it[1].frame - comparison.step * it[0])
+        result += [_mistake(what, id_, [box for _, box in run]) for _, run in runs]
+    return tuple(sorted(result, key=lambda it: (-it.boxes, it.first, it.what, it.id)))
 
 
-def _mistake(what: str, id_: int, frames: Sequence[_Seen]) -> Mistake:
-    (first, *_), (last, *_) = frames[0], frames[-1]
-    middle, box, _ = frames[(len(frames) - 1) // 2]
-    overlap = sum(frame[2] for frame in frames) / len(frames)
-    return Mistake(what, id_, first, middle, last, len(frames), tuple(box.tolist()), overlap)
+def _mistake(what: str, id_: int, boxes: Sequence[_UnpairedBox]) -> Mistake:
+    middle = boxes[(len(boxes) - 1) // 2]
+    return Mistake(
+        what=what,
+        id=id_,
+        first=boxes[0].frame,
+        middle=middle.frame,
+        last=boxes[-1].frame,
+        boxes=len(boxes),
+        box=tuple(middle.box.tolist()),
+        overlap=sum(box.overlap for box in boxes) / len(boxes),
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,10 +138,9 @@ def worst_tiles(source: MeasuredSet) -> Iterator[Tile]:
     scored.sort(key=lambda pair: -pair[0].false_positives - pair[0].misses)
     for scores, image in scored[:_MAX_IMAGES]:
         if scores.false_positives or scores.misses:
-            (frame,), labelled = image.shown.frames, image.labelled
+            drawn = _with_boxes(image.labelled.read(), image.shown.frames[0])
             alarms = counted(scores.false_positives, "false alarm")
-            caption = f"{scores.misses} missed, {alarms}"
-            yield Tile(_with_boxes(labelled.read(), frame), labelled.path.name, caption)
+            yield Tile(drawn, image.labelled.path.name, f"{scores.misses} missed, {alarms}")
 
 
 def mistake_tiles(video: Path, comparison: Comparison) -> Iterator[Tile]:
@@ -145,20 +161,23 @@ def mistake_tiles(video: Path, comparison: Comparison) -> Iterator[Tile]:
 
 
 def _middle_frames(video: Path, chosen: Sequence[Mistake]) -> list[tuple[Mistake, Image]]:
-    wanted = {mistake.middle for mistake in chosen}
+    numbers = {mistake.middle for mistake in chosen}
     tolerant = InputSettings(max_damaged=1)  # it was accepted when it was scored
-    with VideoReader(video, frames=max(wanted, default=1), settings=tolerant) as reader:
-        images = {frame.index + 1: frame.image for frame in reader if frame.index + 1 in wanted}
+    with VideoReader(video, frames=max(numbers, default=1), settings=tolerant) as reader:
+        images = {frame.index + 1: frame.image for frame in reader if frame.index + 1 in numbers}
     return [(mistake, images[mistake.middle]) for mistake in chosen if mistake.middle in images]
 
 
 def _with_boxes(image: Image, frame: ComparedFrame) -> Image:
     drawn, line = image.copy(), 1 + image.shape[1] // 700
-    for boxes, color in ((frame.vehicle_boxes, TRUE), (frame.track_boxes, FOUND)):
+    for boxes, color in ((frame.vehicle_boxes, TRUE), (frame.track_boxes, DETECTED)):
         for x1, y1, x2, y2 in boxes.round().astype(int).tolist():
             cv2.rectangle(drawn, (x1, y1), (x2, y2), color, line)
     return drawn
 
+
+_Named = tuple[str, object]
+"""A name and its scores."""
 
 _OF_BOXES = "precision", "recall", "f1", "ap50", "mean_iou", "false_positives"
 _OF_IMAGES = "images", "vehicles", *_OF_BOXES, "best_f1", "best_score"
@@ -176,8 +195,6 @@ _HEADINGS = {
 }  # fmt: skip
 """Headings of columns that differ from the name of the attribute."""
 
-_MAX_MISTAKES = 10  # listed for a video
-
 
 @dataclass(frozen=True, slots=True)
 class Report:
@@ -185,55 +202,52 @@ class Report:
 
     Attributes
     ----------
-    head, tables, notes
-        The measured detector; tables, scores first; further lines of text.
+    lines
+        Text: the measured detector, tables with the scores first, and notes.
     values
         Values for JSON.
     sheets
         Images of mistakes by the name of their source, made with the page.
     """
 
-    head: Sequence[str]
-    tables: Sequence[Table]
-    notes: Sequence[str]
+    lines: list[str]
     values: Mapping[str, Any]
     sheets: Sequence[tuple[str, Iterable[Tile]]] = ()
 
-    def lines(self) -> list[str]:
-        """Return everything except the images as text, with empty lines between parts."""
-        tables = (table(*item) for item in self.tables if item[1])
-        parts = filter(None, (self.head, *tables, self.notes))
-        return [line for part in parts for line in ("", *part)][1:]
-
     def page(self) -> str:
-        """Return a page as HTML; the last row of the scores is at the top.
+        """Return a page as HTML: the lines and the images.
 
         Raises `ImageError` or `VideoError` if a source can no longer be read.
         """
         return render("eval.html", report=self, sheets=[(n, list(t)) for n, t in self.sheets])
 
 
+def _joined(*parts: Sequence[str]) -> list[str]:
+    """Return the parts that are not empty, with an empty line between them."""
+    return [line for part in parts if part for line in ("", *part)][1:]
+
+
 def images_report(result: ImagesResult, name: RunName) -> Report:
     """Report the scores of labelled images: a row for each source, and their mean."""
+    counting, mean, classes = result.counting, result.mean, class_results(result.comparison)
     rows = [(source.labelled.name, source.scores) for source in result.sources]
     sources = [
         {"source": title, **asdict(scores), "not_vehicles": dict(source.labelled.others)}
         for source, (title, scores) in zip(result.sources, rows, strict=True)
     ]
-    mean, counting, classes = result.mean, result.counting, class_results(result.comparison)
     if len(rows) > 1:
-        known = sum(scores.vehicles > 0 for _, scores in rows)
-        rows.append((f"mean of {known}", mean))
-    width = f"; vehicles from {counting.min_width:.1%} of the width"
-    what = f"boxes from score {counting.score:.2f}{width if counting.min_width else ''}"
-    values = {"mean": asdict(mean), "sources": sources, "classes": list(map(asdict, classes))}
-    return Report(
-        [name.line, what],
-        [_score_table("source", _OF_IMAGES, rows), _class_table(classes)],
+        with_vehicles = sum(scores.vehicles > 0 for _, scores in rows)
+        rows.append((f"mean of {with_vehicles}", mean))
+    width = f"; vehicles from {counting.min_width:.1%} of the width" if counting.min_width else ""
+    lines = _joined(
+        [name.line, f"boxes from score {counting.score:.2f}{width}"],
+        _score_table("source", _OF_IMAGES, rows),
+        _class_table(classes),
         [_others(source) for source in result.sources if source.labelled.others],
-        {**name.values, **asdict(counting), **values},
-        [(source.labelled.name, worst_tiles(source)) for source in result.sources],
     )
+    values = {"mean": asdict(mean), "sources": sources, "classes": list(map(asdict, classes))}
+    sheets = [(source.labelled.name, worst_tiles(source)) for source in result.sources]
+    return Report(lines, {**name.values, **asdict(counting), **values}, sheets)
 
 
 def video_report(clips: Sequence[ClipResult], name: RunName) -> Report:
@@ -248,53 +262,57 @@ def tracks_report(clip: ClipResult, truth: Path) -> Report:
     return replace(report, values=values | {"classes": classes})
 
 
-def _clips_report(clips: Sequence[ClipResult], what: str, facts: Mapping[str, Any]) -> Report:
+def _clips_report(clips: Sequence[ClipResult], title: str, facts: Mapping[str, Any]) -> Report:
     rows = [*clips, total(clips)] if len(clips) > 1 else clips
     classes = class_results(rows[-1].comparison)
+    lines = _joined(
+        [title],
+        _score_table("video", _OF_VIDEO, [(clip.name, clip.scores) for clip in rows]),
+        _class_table(classes),
+        *map(_mistake_table, clips),
+        [f"{clip.name}: frames 1–{clip.until} compared" for clip in clips],
+    )
     values = {
         "total": asdict(rows[-1].scores),
         "classes": list(map(asdict, classes)),
         "videos": list(map(_clip_values, clips)),
     }
-    scores = [(clip.name, clip.scores) for clip in rows]
-    tables = [
-        _score_table("video", _OF_VIDEO, scores),
-        _class_table(classes),
-        *map(_mistake_table, clips),
-    ]
-    notes = [f"{clip.name}: frames 1–{clip.until} compared" for clip in clips]
-    sheets = [
-        (clip.name, mistake_tiles(clip.video, clip.comparison)) for clip in clips if clip.video
-    ]
-    return Report([what], tables, notes, {**facts, **values}, sheets)
+    videos = [(clip, clip.video) for clip in clips if clip.video]
+    sheets = [(clip.name, mistake_tiles(video, clip.comparison)) for clip, video in videos]
+    return Report(lines, {**facts, **values}, sheets)
 
 
 def _clip_values(clip: ClipResult) -> dict[str, Any]:
-    wrong = list(map(asdict, mistakes(clip.comparison)))
-    return {"video": clip.name, "until": clip.until, **asdict(clip.scores), "mistakes": wrong}
+    largest_first = list(map(asdict, mistakes(clip.comparison)))
+    scores = asdict(clip.scores)
+    return {"video": clip.name, "until": clip.until, **scores, "mistakes": largest_first}
 
 
-def _score_table(first: str, columns: Sequence[str], named: Iterable[tuple[str, object]]) -> Table:
-    """Return a table of named scores; `first` is the heading of the names."""
-    headings = [first, *(_HEADINGS.get(column, column) for column in columns)]
+def _score_table(title: str, columns: Sequence[str], named: Sequence[_Named]) -> list[str]:
+    """Return a table of named scores; `title` is the heading of the names."""
+    headings = [title, *(_HEADINGS.get(column, column) for column in columns)]
     rows = [[name, *(figure(getattr(scores, key)) for key in columns)] for name, scores in named]
-    return headings, rows
+    return table(headings, rows) if rows else []
 
 
-def _class_table(classes: Iterable[ClassResult]) -> Table:
+def _class_table(classes: Iterable[ClassResult]) -> list[str]:
     """Return a row for each class."""
     return _score_table("class", _OF_CLASSES, [(class_.name, class_) for class_ in classes])
 
 
-def _mistake_table(clip: ClipResult) -> Table:
+def _mistake_table(clip: ClipResult) -> list[str]:
     """Return the largest mistakes."""
-    return (f"worst errors in {clip.name}", "frames", "boxes", "best IoU"), [
+    rows = [
         [mistake.name, mistake.span, str(mistake.boxes), figure(mistake.overlap, 2)]
         for mistake in mistakes(clip.comparison)[:_MAX_MISTAKES]
     ]
+    headings = (f"worst errors in {clip.name}", "frames", "boxes", "best IoU")
+    return table(headings, rows) if rows else []
 
 
 def _others(source: MeasuredSet) -> str:
     """Return the labels that are not vehicles, as a line."""
-    named = ", ".join(f"{printable(name)} ({count})" for name, count in source.labelled.others)
+    named = ", ".join(
+        f"{printable(name)} ({count})" for name, count in source.labelled.others.items()
+    )
     return f"not vehicles in {source.labelled.name}: {named}"

@@ -109,19 +109,26 @@ def score_boxes(comparison: Comparison) -> DetectionScores:
     tracks = sum(len(frame.tracks) for frame in frames)
     matches = sum(len(frame.rows) for frame in frames)
     overlap = sum(float(frame.iou[frame.rows, frame.columns].sum()) for frame in frames)
-    precision, recall = ratio(matches, tracks), ratio(matches, vehicles)
-    ratios = precision, recall, ratio(2 * matches, tracks + vehicles), ratio(overlap, matches)
-    return DetectionScores(matches, tracks - matches, vehicles - matches, *ratios)
+    return DetectionScores(
+        matches=matches,
+        false_positives=tracks - matches,
+        misses=vehicles - matches,
+        precision=ratio(matches, tracks),
+        recall=ratio(matches, vehicles),
+        f1=ratio(2 * matches, tracks + vehicles),
+        mean_iou=ratio(overlap, matches),
+    )
 
 
 def score_comparison(comparison: Comparison) -> Scores:
     """Score a comparison: one video, or several that `pool` has joined."""
     detection, delays = score_boxes(comparison), tracking.delays(comparison)
-    known = [delay for delay in delays if delay is not None]
+    of_found = [delay for delay in delays if delay is not None]
     lengths, shown = comparison.vehicle_lengths(), int(comparison.track_lengths().sum())
     boxes, vehicles = int(lengths.sum()), len(lengths)
-    found = counts((frame.found for frame in comparison.frames), vehicles) / lengths
-    tracked, lost = int(np.sum(found > _MOSTLY_TRACKED)), int(np.sum(found < _MOSTLY_LOST))
+    matches = counts((frame.paired_vehicles for frame in comparison.frames), vehicles)
+    tracked = int(np.sum(matches / lengths > _MOSTLY_TRACKED))
+    lost = int(np.sum(matches / lengths < _MOSTLY_LOST))
     switches, agreeing = tracking.id_switches(comparison), tracking.identity_matches(comparison)
     right = detection.matches - detection.false_positives - switches
     ap50, ap50_95 = rank_predictions(comparison).average_precisions()
@@ -148,7 +155,7 @@ def score_comparison(comparison: Comparison) -> Scores:
         tracks=len(comparison.track_ids),
         track_boxes=shown,
         delays=delays,
-        mean_delay=fmean(known) if known else None,
+        mean_delay=fmean(of_found) if of_found else None,
         false_tracks=len(comparison.false_tracks()),
     )
 
@@ -225,9 +232,9 @@ def _right_predictions(frame: ComparedFrame) -> BoolArray:
 
 
 def _average_precision(right: BoolArray, vehicles: int) -> float:
-    found = np.cumsum(right)
-    recall = found / vehicles
-    precision = found / np.arange(1, len(right) + 1)
+    matches = np.cumsum(right)
+    recall = matches / vehicles
+    precision = matches / np.arange(1, len(right) + 1)
     highest_from_here = np.maximum.accumulate(precision[::-1])[::-1]
     reached = np.searchsorted(recall, _RECALLS, side="left")
     return float(np.append(highest_from_here, 0)[reached].mean())
@@ -271,8 +278,8 @@ def class_results(comparison: Comparison) -> tuple[ClassResult, ...]:
     if not set(comparison.track_names) - {UNKNOWN}:
         return ()
     pairs = Counter(_pairs(comparison))
-    known = set(comparison.vehicle_names) - {UNKNOWN}
-    ordered = [name for name in OUR_NAMES if name in known] + sorted(known - set(OUR_NAMES))
+    names = set(comparison.vehicle_names) - {UNKNOWN}
+    ordered = [name for name in OUR_NAMES if name in names] + sorted(names - set(OUR_NAMES))
     return tuple(_result(name, pairs) for name in ordered)
 
 
@@ -283,7 +290,9 @@ _Pair = tuple[str | None, str | None]
 def _pairs(comparison: Comparison) -> Iterator[_Pair]:
     together = Counter[tuple[int, int]]()
     for frame in comparison.frames:
-        together.update(zip(frame.found.tolist(), frame.found_by.tolist(), strict=True))
+        together.update(
+            zip(frame.paired_vehicles.tolist(), frame.pairing_tracks.tolist(), strict=True)
+        )
     names: dict[int, str] = {}
     for (vehicle, track), _ in together.most_common():
         names.setdefault(vehicle, comparison.track_names[track])
@@ -294,9 +303,17 @@ def _pairs(comparison: Comparison) -> Iterator[_Pair]:
 
 
 def _result(name: str, pairs: Counter[_Pair]) -> ClassResult:
-    named = Counter({found: count for (true, found), count in pairs.items() if true == name})
-    vehicles, right = named.total(), named[name]
-    shown = sum(pairs[true, found] for true, found in pairs if found == name and true != UNKNOWN)
-    ratios = ratio(right, shown), ratio(right, vehicles), ratio(2 * right, shown + vehicles)
-    given = {found: count for found, count in named.most_common() if found}
-    return ClassResult(name, vehicles, sum(given.values()), right, *ratios, given)
+    by_track = Counter({track: n for (vehicle, track), n in pairs.items() if vehicle == name})
+    named = {track: n for track, n in by_track.most_common() if track}
+    vehicles, right = by_track.total(), by_track[name]
+    shown = sum(n for (vehicle, track), n in pairs.items() if track == name and vehicle != UNKNOWN)
+    return ClassResult(
+        name=name,
+        vehicles=vehicles,
+        found=sum(named.values()),
+        right=right,
+        precision=ratio(right, shown),
+        recall=ratio(right, vehicles),
+        f1=ratio(2 * right, shown + vehicles),
+        named=named,
+    )

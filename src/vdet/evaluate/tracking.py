@@ -21,11 +21,14 @@ def delays(comparison: Comparison) -> tuple[int | None, ...]:
     None: the vehicle is never found.
     """
     appears: dict[int, int] = {}
-    found: dict[int, int] = {}
+    first_match: dict[int, int] = {}
     for frame in reversed(comparison.frames):  # so the first frame is the one that stays
         appears |= dict.fromkeys(frame.vehicles.tolist(), frame.number)
-        found |= dict.fromkeys(frame.found.tolist(), frame.number)
-    return tuple(found[one] - appears[one] if one in found else None for one in sorted(appears))
+        first_match |= dict.fromkeys(frame.paired_vehicles.tolist(), frame.number)
+    return tuple(
+        first_match[vehicle] - appears[vehicle] if vehicle in first_match else None
+        for vehicle in sorted(appears)
+    )
 
 
 def id_switches(comparison: Comparison) -> int:
@@ -33,9 +36,9 @@ def id_switches(comparison: Comparison) -> int:
     last = np.full(len(comparison.vehicle_ids), UNMATCHED)
     switches = 0
     for frame in comparison.frames:
-        before = last[frame.found]
-        switches += int(np.sum((before != UNMATCHED) & (before != frame.found_by)))
-        last[frame.found] = frame.found_by
+        before = last[frame.paired_vehicles]
+        switches += int(np.sum((before != UNMATCHED) & (before != frame.pairing_tracks)))
+        last[frame.paired_vehicles] = frame.pairing_tracks
     return switches
 
 
@@ -49,7 +52,7 @@ def fragmentations(comparison: Comparison) -> int:
     for frame in comparison.frames:
         if frame.iou.size:
             now = np.zeros_like(before)
-            now[frame.found] = True
+            now[frame.paired_vehicles] = True
             starts += now & ~before
             before = now
     return int(np.maximum(starts - 1, 0).sum())
@@ -80,25 +83,23 @@ def hota(comparison: Comparison) -> tuple[float, float, float]:
         rows, columns = assign(aligned * frame.iou)
         pairs.append((frame.vehicles[rows], frame.tracks[columns], frame.iou[rows, columns]))
     vehicles, tracks, iou = map(np.concatenate, zip(*pairs, strict=True))
-    found = []
+    accuracies = []
     for alpha in ALPHAS:
         chosen = at_least(iou, alpha)
         together = np.zeros(lengths.shape)
         np.add.at(together, (vehicles[chosen], tracks[chosen]), 1)
         matches = int(np.count_nonzero(chosen))
         agreement = float(np.sum(together**2 / (lengths - together)))
-        found.append((matches / (boxes - matches), agreement / max(matches, 1)))
-    accuracies = np.array(found)
-    deta, assa = accuracies.mean(axis=0)
-    return float(np.sqrt(accuracies.prod(axis=1)).mean()), float(deta), float(assa)
+        accuracies.append((matches / (boxes - matches), agreement / max(matches, 1)))
+    deta, assa = np.mean(accuracies, axis=0)
+    return float(np.sqrt(np.prod(accuracies, axis=1)).mean()), float(deta), float(assa)
 
 
 def _alignment(comparison: Comparison, lengths: Int64Array) -> Float64Array:
     """Return how well vehicle and track agree over the whole video, `(vehicles, tracks)`."""
     shared = np.zeros(lengths.shape)
     for frame in comparison.frames:
-        others = frame.iou.sum(axis=0)[np.newaxis, :] + frame.iou.sum(axis=1)[:, np.newaxis]
-        total = others - frame.iou
+        total = frame.iou.sum(axis=0) + frame.iou.sum(axis=1)[:, np.newaxis] - frame.iou
         part = np.divide(frame.iou, total, out=np.zeros_like(total), where=total > 0)
         shared[np.ix_(frame.vehicles, frame.tracks)] += part
     return shared / (lengths - shared)

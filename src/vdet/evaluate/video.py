@@ -89,10 +89,10 @@ def score_files(
     TruthError
         A file cannot be used.
     """
-    found = read_predictions(prediction)
+    tracks = read_predictions(prediction)
     truth = read_truth(truth_path, Roles.from_settings(settings))
     last = until or truth.last_frame
-    return ClipResult(str(prediction), compare(found.until(last), truth.until(last)), last)
+    return ClipResult(str(prediction), compare(tracks.until(last), truth.until(last)), last)
 
 
 def evaluate_clip(

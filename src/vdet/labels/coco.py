@@ -12,23 +12,22 @@ format"; Dave et al., "TAO: A Large-Scale Benchmark for Tracking Any Object", 20
 of CVAT, `dataset_manager/bindings.py`.
 """
 
-import io
 import json
-from collections.abc import Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from math import nan
 from pathlib import Path
-from typing import Annotated, Any, BinaryIO
+from typing import Annotated, Any, BinaryIO, TypeVar
 
-from pydantic import AfterValidator, Field, TypeAdapter, ValidationError
+from pydantic import AfterValidator, FailFast, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
 from vdet.boxes import Box
 from vdet.detect.classes import UNKNOWN
-from vdet.errors import TruthError
+from vdet.errors import TruthError, printable
 from vdet.labels.formats import Format, ImageTracks, SourceVideo, last_classes
 from vdet.labels.images import LabelledImage, image_folder, inside
-from vdet.labels.json_stream import json_values
 from vdet.labels.label import MAX_LABELS, NO_ID, Label, SavedTracks, Size, from_size, line_error
 from vdet.labels.parsing import (
     LIMIT,
@@ -38,8 +37,12 @@ from vdet.labels.parsing import (
     checked_times,
     first_mistake,
     frame_number,
+    read_bytes,
 )
-from vdet.track.track import FrameTracks, State
+from vdet.track.track import FrameTracks
+
+MAX_VALUES = 30_000_000
+"""Maximum number of values in a document, which limits the memory for it."""
 
 _VIDEO = 1
 """Id of the only video."""
@@ -61,10 +64,10 @@ class _Writer:
     def add_box(self, image: int, box: Box, category: int, score: float, **more: Any) -> None:
         """Add an annotation; other programs ignore its `score`."""
         x, y, width, height = box.xywh
-        whose = {"id": len(self._lists["annotations"]) + 1, "image_id": image}
+        ids = {"id": len(self._lists["annotations"]) + 1, "image_id": image}
         sides = {"bbox": [x, y, width, height], "area": width * height, "segmentation": []}
-        known = {"category_id": category, **sides, "iscrowd": 0, "score": round(score, 4)}
-        self.add("annotations", **whose, **known, **more)
+        values = {"category_id": category, **sides, "iscrowd": 0, "score": round(score, 4)}
+        self.add("annotations", **ids, **values, **more)
 
     def category(self, name: str) -> int:
         """Return the id of a category, and add it if it is new."""
@@ -75,8 +78,10 @@ class _Writer:
 
     def end(self, file: BinaryIO) -> None:
         """Write the document."""
-        parts = (f'"{name}": [\n' + ",\n".join(some) + "\n]" for name, some in self._lists.items())
-        file.write(("{\n" + ",\n".join(parts) + "\n}\n").encode())
+        lists = (
+            f'"{name}": [\n' + ",\n".join(texts) + "\n]" for name, texts in self._lists.items()
+        )
+        file.write(("{\n" + ",\n".join(lists) + "\n}\n").encode())
 
 
 def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) -> None:
@@ -123,6 +128,14 @@ class _Category:
 
 
 @_entry
+class _Attributes:
+    """What CVAT has in `attributes`; other programs have values of their own there."""
+
+    track_id: Any = None
+    occluded: Any = False
+
+
+@_entry
 class _Annotation:
     image_id: int
     category_id: int
@@ -130,13 +143,22 @@ class _Annotation:
     iscrowd: bool = False
     track_id: Index | None = None
     score: Number = 1.0
-    attributes: dict[str, Any] | None = None
+    attributes: _Attributes | None = None
 
-    @property
-    def track(self) -> int:
-        """Id of the track, which CVAT has in `attributes`; `NO_ID` without one."""
-        own = (self.attributes or {}).get("track_id") if self.track_id is None else self.track_id
-        return own if isinstance(own, int) and 0 <= own <= LIMIT else NO_ID
+    def label(self, position: str, name: str, frame: int) -> Label:
+        """Return the box as a label of a frame, counted from 1; `NO_ID` without a track."""
+        attributes = self.attributes or _Attributes()
+        id_ = attributes.track_id if self.track_id is None else self.track_id
+        return Label(
+            position=position,
+            box=from_size(*self.bbox),
+            name=name,
+            frame=frame,
+            id=id_ if isinstance(id_, int) and 0 <= id_ <= LIMIT else NO_ID,
+            score=self.score,
+            ignored=self.iscrowd,
+            state="predicted" if attributes.occluded else "detected",
+        )
 
 
 @_entry
@@ -147,7 +169,6 @@ class _Image:
     file_name: Annotated[str, AfterValidator(inside)] = ""
     frame_index: Index | None = None
     time: float | str | None = None  # "night" in some sets of images
-    labels: list[Label] = Field(default_factory=list, init=False)
 
     @property
     def frame(self) -> int | None:
@@ -162,42 +183,69 @@ class _Image:
         return (self.width, self.height) if self.width and self.height else None
 
 
-_LISTS: dict[str, TypeAdapter[Any]] = {
-    "images": TypeAdapter(_Image),
-    "categories": TypeAdapter(_Category),
-    "annotations": TypeAdapter(_Annotation),
-    "info.unlabelled_classes": TypeAdapter(str),  # of our own: they may be there without a label
+@_entry
+class _Info:
+    unlabelled_classes: tuple[str, ...] = ()
+    """A key of our own: classes that the images may show without a label."""
+
+
+_Entry = TypeVar("_Entry")
+_Entries = Annotated[list[_Entry], FailFast(), Field(max_length=MAX_LABELS)]
+
+
+@_entry
+class _Document:
+    images: _Entries[_Image] = Field(default_factory=list)
+    categories: _Entries[_Category] = Field(default_factory=list)
+    annotations: _Entries[_Annotation] = Field(default_factory=list)
+    info: _Info | None = None
+
+
+_DOCUMENT = TypeAdapter(_Document)
+_KEYS = {
+    name
+    for kind in (_Document, _Info, _Image, _Category, _Annotation, _Attributes)
+    for name in kind.__annotations__
 }
 
 
-def _read(path: Path, file: BinaryIO) -> tuple[list[_Image], tuple[str, ...]]:
-    """Return the images with their labels, and classes without labels. Raises `TruthError`."""
-    found: dict[str, list[Any]] = {name: [] for name in _LISTS}
-    for place, values in json_values(path, file, *(f"{name}.item" for name in found)):
-        name = place.removesuffix(".item")
-        entries = found[name]
-        if len(entries) == MAX_LABELS:
-            raise TruthError(f"{path}: has more than {MAX_LABELS:,} {name}; cut it into parts")
-        try:
-            entries.append(_LISTS[name].validate_python(values))
-        except ValidationError as error:
-            entry = f"{name}.{len(entries)}" + (": ", ".")[bool(error.errors()[0]["loc"])]
-            raise TruthError(f"{path}: is not COCO: {entry}{first_mistake(error)}") from error
-    images, categories, annotations, unlabelled = found.values()
-    by_id = {image.id: image for image in images}
-    names = {category.id: category.name for category in categories}
-    if len(by_id) < len(images) or len(names) < len(categories):
-        raise TruthError(f"{path}: is not COCO: an id of images or categories occurs twice")
-    for number, entry in enumerate(annotations):
-        place = f"annotations.{number}"
-        if entry.image_id not in by_id or entry.category_id not in names:
-            what = f"image {entry.image_id} or category {entry.category_id} not found"
-            raise line_error(path, place, what)
-        image, box = by_id[entry.image_id], from_size(*entry.bbox)
-        state: State = "predicted" if (entry.attributes or {}).get("occluded") else "detected"
-        known = entry.track, entry.score, entry.iscrowd, state
-        image.labels.append(Label(place, box, names[entry.category_id], 1, *known))
-    return images, tuple(unlabelled)
+def _used_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return an object of JSON without what is not used, such as outlines: it takes most memory."""
+    return {key: value for key, value in pairs if key in _KEYS}
+
+
+def _read(path: Path, data: bytes) -> _Document:
+    """Return the document. Raises `TruthError`."""
+    if sum(map(data.count, (b",", b"[", b"{"))) > MAX_VALUES:
+        raise TruthError(f"{path}: has more than {MAX_VALUES:,} values; cut it into parts")
+    try:
+        values = json.loads(data, object_pairs_hook=_used_keys)
+    except RecursionError:
+        raise TruthError(f"{path}: is not JSON: nested too deeply") from None
+    except ValueError as error:
+        raise TruthError(f"{path}: is not JSON: {printable(str(error))}") from error
+    try:
+        document = _DOCUMENT.validate_python(values)
+    except ValidationError as error:
+        raise TruthError(f"{path}: is not COCO: {first_mistake(error)}") from error
+    for entries in (document.images, document.categories):
+        if len({entry.id for entry in entries}) < len(entries):
+            raise TruthError(f"{path}: is not COCO: an id of images or categories occurs twice")
+    return document
+
+
+def _labels(path: Path, document: _Document, frames: Mapping[int, int]) -> Iterator[Label]:
+    """Yield the label of each annotation; `frames` are numbers from 1 by the id of the image.
+
+    Raises `TruthError` if an image or a category is missing.
+    """
+    names = {category.id: category.name for category in document.categories}
+    for number, entry in enumerate(document.annotations):
+        position = f"annotations.{number}"
+        if entry.image_id not in frames or entry.category_id not in names:
+            message = f"image {entry.image_id} or category {entry.category_id} not found"
+            raise line_error(path, position, message)
+        yield entry.label(position, names[entry.category_id], frames[entry.image_id])
 
 
 def read_coco(path: Path, data: bytes) -> SavedTracks:
@@ -209,24 +257,26 @@ def read_coco(path: Path, data: bytes) -> SavedTracks:
         The file is not in this format or is too large, an id of images or categories or a frame
         occurs twice, a time is wrong, or an annotation refers to a missing image or category.
     """
-    images, _ = _read(path, io.BytesIO(data))
-    frames = {image.frame: image for image in images if image.frame is not None}
-    ids = (label.id for image in images for label in image.labels)
-    if any(image.frame is None for image in images) or NO_ID in ids:
-        what = "needs the frame_index of each image and the track_id of each annotation"
-        raise TruthError(f"{path}: {what}; in CVAT, draw each box as a track")
-    if len(frames) < len(images):
+    document = _read(path, data)
+    images = {image.frame: image for image in document.images if image.frame is not None}
+    frames = {image.id: (image.frame or 0) + 1 for image in document.images}
+    labels = tuple(_labels(path, document, frames))
+    if any(image.frame is None for image in document.images) or NO_ID in {
+        label.id for label in labels
+    }:
+        raise TruthError(
+            f"{path}: needs the frame_index of each image and the track_id of each annotation; in "
+            "CVAT, draw each box as a track"
+        )
+    if len(images) < len(document.images):
         raise TruthError(f"{path}: a frame_index occurs twice; use one file for each video")
     times: Times = {
         frame: (f"images.{number}", nan if isinstance(image.time, str) else image.time)
-        for number, (frame, image) in enumerate(frames.items())
+        for number, (frame, image) in enumerate(images.items())
         if image.time is not None
     }
-    labels = tuple(
-        label._replace(frame=frame + 1) for frame, image in frames.items() for label in image.labels
-    )
-    size = images[0].size if images else None
-    return SavedTracks(labels, tuple(sorted(frames)), checked_times(path, times), size)
+    size = document.images[0].size if images else None
+    return SavedTracks(labels, tuple(sorted(images)), checked_times(path, times), size)
 
 
 COCO = Format("COCO", ".coco.json", read_coco, whole=_write, images=_write_images)
@@ -244,13 +294,18 @@ def read_coco_images(path: Path) -> Iterator[LabelledImage]:
         The file is not in this format, an annotation refers to a missing image or category, an id
         occurs twice, or an image is outside the set.
     """
+    document = _read(path, read_bytes(path))
+    by_image: dict[int, list[Label]] = defaultdict(list)
+    labels = _labels(path, document, dict.fromkeys((image.id for image in document.images), 1))
+    for entry, label in zip(document.annotations, labels, strict=True):
+        by_image[entry.image_id].append(label)
     folder = None
-    try:
-        with path.open("rb") as file:
-            images, unlabelled = _read(path, file)
-    except OSError as error:
-        raise TruthError(f"{path}: cannot be read: {error.strerror}") from error
-    for image in images:
+    for image in document.images:
         folder = folder or image_folder(path, image.file_name)
-        place, labels = folder / image.file_name, tuple(image.labels)
-        yield LabelledImage(place, path, labels, image.size, unlabelled)
+        yield LabelledImage(
+            path=folder / image.file_name,
+            file=path,
+            labels=tuple(by_image[image.id]),
+            size=image.size,
+            unlabelled=document.info.unlabelled_classes if document.info else (),
+        )

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from vdet.detect.classes import UNKNOWN
-from vdet.errors import TruthError
+from vdet.errors import OutputError, TruthError
 from vdet.labels.label import SavedTracks, Size
 from vdet.labels.parsing import numbered_lines
 from vdet.plugins import FORMATS, load_plugin, plugin_names
@@ -53,7 +53,7 @@ class Format:
         Ending of its file names, lower case, with a leading dot.
     read
         Function that takes the path of a file, for messages, and its content. It raises
-        `TruthError` with the place of the first mistake; its labels are not checked elsewhere.
+        `TruthError` with the position of the first mistake; its labels are not checked elsewhere.
     lines, heading
         For a format with lines for each frame: function that returns the lines, with line ends, and
         the first line of the file.
@@ -102,7 +102,7 @@ def last_classes(frames: Iterable[FrameTracks]) -> dict[int, str]:
 
 def track_formats() -> list[Format]:
     """Return all formats of tracks, those of vdet first. Raises `ConfigError`."""
-    return [load_plugin(FORMATS, name) for name in plugin_names(FORMATS)]
+    return [form for form in _formats() if form.lines or form.whole]
 
 
 def track_suffixes() -> list[str]:
@@ -112,13 +112,23 @@ def track_suffixes() -> list[str]:
 
 def image_suffixes() -> list[str]:
     """Return the endings of files with labels of images."""
-    return [form.suffix for form in track_formats() if form.images]
+    return [form.suffix for form in _formats() if form.images]
+
+
+def _formats() -> list[Format]:
+    return [load_plugin(FORMATS, name) for name in plugin_names(FORMATS)]
 
 
 def format_for(path: Path) -> Format | None:
     """Return the format by the ending of a name; None if it is unknown."""
-    fitting = [form for form in track_formats() if path.name.lower().endswith(form.suffix)]
-    return max(fitting, key=lambda form: len(form.suffix), default=None)
+    matching = [form for form in _formats() if path.name.lower().endswith(form.suffix)]
+    return max(matching, key=lambda form: len(form.suffix), default=None)
+
+
+def check_track_name(path: Path) -> None:
+    """Raise `OutputError` for `.kitti.txt`, which 1.0 wrote; MOTChallenge has its ending, too."""
+    if path.name.lower().endswith(".kitti.txt"):
+        raise OutputError(f"{path}: KITTI tracks are no longer written; use .txt or .coco.json")
 
 
 _AMBIGUOUS = (".txt", ".csv")
@@ -131,13 +141,13 @@ def recognize(path: Path, data: bytes) -> Format:
     Raises
     ------
     TruthError
-        The file is empty, and the ending of its name is unknown; its columns are separated by
-        semicolons; or it is XML.
+        The file is empty, and the ending of its name is unknown; its columns are not separated by
+        commas; or it is XML.
     """
     by_name = format_for(path)
     if by_name and by_name.suffix not in _AMBIGUOUS:
         return by_name
-    content = _content(path, data)
+    content = _format_name(path, data)
     form: Format | None = load_plugin(FORMATS, content) if content else by_name
     if form is None:
         suffixes = ", ".join(track_suffixes())
@@ -145,17 +155,20 @@ def recognize(path: Path, data: bytes) -> Format:
     return form
 
 
-def _content(path: Path, data: bytes) -> str | None:
+def _format_name(path: Path, data: bytes) -> str | None:
     """Return the registered name of the format of a file; None if it is empty."""
     if data.startswith(b"PK"):
         return "yolo"
     _, first = next(numbered_lines(path, data), (0, ""))
+    if not first:
+        return None
     if first.startswith("<"):
         raise TruthError(f"{path}: XML is not supported; export the labels as COCO")
-    if first[:1] in ("", "{"):
-        return "coco" if first else None
+    if first.startswith("{"):
+        return "coco"
     if "," in first:
         return "mot" if first[0] in "0123456789+-." else "csv"
-    if ";" in first:
-        raise TruthError(f"{path}: columns must be separated by commas or spaces, not by ';'")
-    return "kitti"
+    raise TruthError(
+        f"{path}: columns must be separated by commas, as in MOTChallenge and CSV; KITTI tracks "
+        "are no longer read"
+    )

@@ -4,8 +4,8 @@ import logging
 import math
 import os
 from collections import Counter
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 
 import numpy as np
@@ -78,8 +78,8 @@ class LabelledImage:
         image = read_image(self.path)
         height, width = image.shape[:2]
         if self.size not in (None, (width, height)):
-            wanted = f"{self.size[0]}×{self.size[1]}"
-            raise ImageError(f"{self.path}: is {width}×{height}, but its labels are for {wanted}")
+            labelled = f"{self.size[0]}×{self.size[1]}"
+            raise ImageError(f"{self.path}: is {width}×{height}, but its labels are for {labelled}")
         return image
 
 
@@ -94,8 +94,8 @@ class LabelledImages:
 
     name: str
     images: tuple[LabelledImage, ...]
-    others: tuple[tuple[str, int], ...] = ()
-    ignored: tuple[tuple[str, int], ...] = ()
+    others: Mapping[str, int] = field(default_factory=dict)
+    ignored: Mapping[str, int] = field(default_factory=dict)
 
 
 def checked_images(
@@ -113,33 +113,40 @@ def checked_images(
         `MAX_BOXES` in total, or more than `MAX_IN_FRAME` in one image.
     """
     checked: dict[Path, LabelledImage] = {}
-    counts = Counter[str](), Counter[str]()
+    others, ignored = Counter[str](), Counter[str]()
     boxes = repeated = absurd = 0
     for image in images:
-        labels = tuple({label[1:]: label for label in image.labels}.values())
+        labels = tuple(
+            {(label.box, label.name, label.ignored): label for label in image.labels}.values()
+        )
         boxes += len(labels)
         repeated += len(image.labels) - len(labels)
         absurd += sum(_is_absurd(label.box, image.size) for label in labels)
         if len(checked) == MAX_IMAGES or boxes > MAX_BOXES:
-            most = f"{MAX_IMAGES:,} images or {MAX_BOXES:,} boxes"
-            raise TruthError(f"{name}: has more than {most}; cut it into parts")
+            raise TruthError(
+                f"{name}: has more than {MAX_IMAGES:,} images or {MAX_BOXES:,} boxes; cut it into "
+                "parts"
+            )
         if image.path in checked:
             raise TruthError(f"{name}: has the image {printable(image.path.name)} twice")
         checked[image.path] = replace(
             image,
-            labels=tuple(_with_roles(replace(image, labels=labels), roles, *counts)),
+            labels=tuple(_with_roles(replace(image, labels=labels), roles, others, ignored)),
             unlabelled=tuple(filter(None, map(roles.class_of, image.unlabelled))),
         )
     if not checked:
         raise TruthError(f"{name}: has no labelled images")
     if absurd > boxes / 2:
-        what = f"{absurd} of {counted(boxes, 'box')} are outside their images or within a pixel"
-        raise TruthError(f"{name}: {what}; the numbers must be in the unit of the format")
+        raise TruthError(
+            f"{name}: {absurd} of {counted(boxes, 'box')} are outside their images or within a "
+            "pixel; the numbers must be in the unit of the format"
+        )
     if repeated:
-        twice = counted(repeated, "label")
-        log.warning("%s: has %s twice in the same image; each counts once", name, twice)
-    others, ignored = (tuple(count.most_common()) for count in counts)
-    return LabelledImages(name, tuple(checked.values()), others, ignored)
+        duplicates = counted(repeated, "label")
+        log.warning("%s: has %s twice in the same image; each counts once", name, duplicates)
+    return LabelledImages(
+        name, tuple(checked.values()), dict(others.most_common()), dict(ignored.most_common())
+    )
 
 
 def _is_absurd(box: Corners, size: Size | None) -> bool:
@@ -166,7 +173,7 @@ def _with_roles(
         if count == MAX_IN_FRAME:
             mistake = f"the image has more than {MAX_IN_FRAME:,} boxes"
         if mistake:
-            raise line_error(image.file, label.place, mistake)
+            raise line_error(image.file, label.position, mistake)
         count += 1
         ignored.update([name] if role == "ignored" and not label.ignored else [])
         is_ignored = label.ignored or role == "ignored"
@@ -194,12 +201,12 @@ def image_folder(path: Path, name: str) -> Path:
     near, shown = path.parent, printable(name)
     above = near.parent if near.name == "annotations" else near
     for level in ([near], [above], sorted(above.glob("*/")), sorted(above.glob("*/*/"))):
-        found = [folder for folder in level if is_file(folder / name)]
-        if len(found) > 1:
-            where = " and ".join(str(folder) for folder in found[:2])
-            raise TruthError(f"{path}: its first image, {shown}, is in {where}; keep one")
-        if found:
-            return found[0]
+        folders = [folder for folder in level if is_file(folder / name)]
+        if len(folders) > 1:
+            both = " and ".join(str(folder) for folder in folders[:2])
+            raise TruthError(f"{path}: its first image, {shown}, is in {both}; keep one")
+        if folders:
+            return folders[0]
     raise TruthError(f"{path}: its first image, {shown}, was not found beside it or below")
 
 
@@ -209,12 +216,13 @@ def paired_files(images: Path, labels: Path) -> Iterator[tuple[Path, Path | None
     Hidden files and files of the system or of label tools are skipped; an image may have no label
     file. Raises `TruthError` at the end if a label file has no image of its name.
     """
-    found = filter(Path.is_file, labels.rglob("*.txt"))  # a FIFO may never end
-    names = (file.relative_to(labels) for file in found)
+    names = (file.relative_to(labels) for file in labels.rglob("*.txt"))
     files = {
         name.with_suffix(""): labels / name
         for name in names
-        if not is_hidden(name) and name.name != "classes.txt"
+        if (labels / name).is_file()  # a FIFO may never end
+        and not is_hidden(name)
+        and name.name != "classes.txt"
     }
     used = set()
     for image in sorted(filter(is_image_name, images.rglob("*"))):

@@ -39,12 +39,14 @@ Size = tuple[int, int]
 
 
 class Label(NamedTuple):
-    """A labelled box of a file; there may be millions.
+    """A labelled box of a file.
+
+    There may be millions, and a frozen dataclass takes six times as long to make.
 
     Attributes
     ----------
-    place
-        Its line in the file, or a description of its place, such as "annotations.3".
+    position
+        Its line in the file, or a name of its position, such as "annotations.3".
     box
         x1, y1, x2, y2 in pixels of the frame from 0; the far sides are exclusive.
     name
@@ -54,12 +56,12 @@ class Label(NamedTuple):
     score
         Confidence, higher is better; 1 where the file has none.
     ignored
-        Whether it is an ignore region, and not a vehicle.
+        Whether it is an ignore region, not a vehicle.
     state, foot, distance, lane
         As in `vdet.track.track.Track`; None if the file does not have them.
     """
 
-    place: int | str
+    position: int | str
     box: Corners
     name: str | None = None
     frame: int = 1
@@ -77,18 +79,9 @@ def from_size(x: float, y: float, width: float, height: float) -> Corners:
     return x, y, x + width, y + height
 
 
-def line_error(path: Path | str, place: int | str, what: str) -> TruthError:
-    """Return the error for a mistake in a line, or in another place, of a file."""
-    return TruthError(f"{path}:{place}: {what}")
-
-
-def limited(path: Path, labels: Iterable[Label]) -> tuple[Label, ...]:
-    """Return the labels of a file. Raises `TruthError` if there are more than `MAX_LABELS`."""
-    found = tuple(islice(labels, MAX_LABELS + 1))
-    if len(found) > MAX_LABELS:
-        what = f"has more than {MAX_LABELS:,} boxes; cut it into parts"
-        raise line_error(path, found[-1].place, what)
-    return found
+def line_error(path: Path | str, position: int | str, message: str) -> TruthError:
+    """Return the error for a mistake in a line, or at another position, of a file."""
+    return TruthError(f"{path}:{position}: {message}")
 
 
 def checked_labels(path: Path, labels: Iterable[Label]) -> tuple[Label, ...]:
@@ -97,10 +90,12 @@ def checked_labels(path: Path, labels: Iterable[Label]) -> tuple[Label, ...]:
     Raises
     ------
     TruthError
-        A frame before the first, a negative id of a vehicle, an id twice in a frame, a box without
-        area, or a name of more than 100 characters.
+        More than `MAX_LABELS`, a frame before the first, a negative id of a vehicle, an id twice in
+        a frame, a box without area, or a name of more than 100 characters.
     """
-    checked = tuple(labels)
+    checked = tuple(islice(labels, MAX_LABELS + 1))
+    if len(checked) > MAX_LABELS:
+        raise TruthError(f"{path}: has more than {MAX_LABELS:,} boxes; cut it into parts")
     keys: set[tuple[int, int]] = set()
     for label in checked:
         mistake = mistake_in_box(label)
@@ -112,7 +107,7 @@ def checked_labels(path: Path, labels: Iterable[Label]) -> tuple[Label, ...]:
         elif key in keys and label.id != NO_ID:
             mistake = f"id {label.id} occurs twice in the same frame"
         if mistake is not None:
-            raise line_error(path, label.place, mistake)
+            raise line_error(path, label.position, mistake)
         keys.add(key)
     return checked
 
@@ -136,9 +131,9 @@ class SavedTracks:
     ----------
     labels
         The boxes, exactly as in the file.
-    known
-        The frames that the file is about, also those without a box, counted from 0, ascending;
-        None: all up to its last box.
+    covered
+        The frames that the file covers, also those without a box, counted from 0, ascending; None:
+        all up to its last box.
     times
         Seconds of each frame with a time in the file; empty if the format has no times.
     size
@@ -148,7 +143,7 @@ class SavedTracks:
     """
 
     labels: tuple[Label, ...]
-    known: Sequence[int] | None = None
+    covered: Sequence[int] | None = None
     times: Mapping[int, float] = field(default_factory=dict)
     size: tuple[int, int] | None = None
     begin: datetime | None = None
@@ -156,7 +151,7 @@ class SavedTracks:
     @property
     def has_times(self) -> bool:
         """Whether every frame has a time; if not, pass a rate to `at_rate`."""
-        return all(index in self.times for index in self._indices())
+        return self._indices() <= self.times.keys()
 
     def at_rate(self, rate: float) -> "SavedTracks":
         """Return the same tracks; frames without a time get that of `rate` frames per second."""
@@ -164,7 +159,7 @@ class SavedTracks:
         return replace(self, times=times | dict(self.times))
 
     def __iter__(self) -> Iterator[FrameTracks]:
-        """Yield the frames with a box and the known frames, in order.
+        """Yield the frames with a box and the covered frames, in order.
 
         Boxes are rounded to whole pixels, and scores lie between 0 and 1. A class is one of
         `OUR_NAMES` if the label means one, else the label. An unknown time is NaN: see `has_times`.
@@ -172,33 +167,44 @@ class SavedTracks:
         by_frame: dict[int, list[Label]] = defaultdict(list)
         for label in self.labels:
             by_frame[label.frame - 1].append(label)
+        names = {
+            name: name and (our_name(name) or name)
+            for name in {label.name for label in self.labels}
+        }
         for index in self._indices():
             labels = sorted(by_frame[index], key=attrgetter("id"))
             time = self.times.get(index, math.nan)
-            yield FrameTracks(index, time, tuple(map(_track, labels)))
+            tracks = [_track(label, names[label.name]) for label in labels]
+            yield FrameTracks(index, time, tuple(tracks))
 
-    def _indices(self) -> list[int]:
-        return sorted({label.frame - 1 for label in self.labels}.union(self.known or ()))
-
-
-def _track(label: Label) -> Track:
-    _, box, name, _, number, score, _, state, foot, metres, lane = label
-    x1, y1, x2, y2 = [math.floor(side + 0.5) for side in box]  # as `Box.xywh`, but faster
-    whole, score = Box(x1, y1, max(x1 + 1, x2), max(y1 + 1, y2)), min(max(score, 0.0), 1.0)
-    named = None if name is None else our_name(name) or name
-    return Track(number, whole, score, state, named, foot, metres, lane)
+    def _indices(self) -> set[int]:
+        return {label.frame - 1 for label in self.labels}.union(self.covered or ())
 
 
-def spread_frames(known: Iterable[int] | None, every: int, first: int, last: int) -> set[int]:
+def _track(label: Label, class_name: str | None) -> Track:
+    x1, y1, x2, y2 = [math.floor(side + 0.5) for side in label.box]  # as `Box.xywh`, but faster
+    return Track(
+        id=label.id,
+        box=Box(x1, y1, max(x1 + 1, x2), max(y1 + 1, y2)),
+        score=min(max(label.score, 0.0), 1.0),
+        state=label.state,
+        class_name=class_name,
+        whole_foot=label.foot,
+        distance=label.distance,
+        lane=label.lane,
+    )
+
+
+def spread_frames(covered: Iterable[int] | None, every: int, first: int, last: int) -> set[int]:
     """Return numbers of frames from `first` to `last`, each at least `every` after the one before.
 
-    Only the `known` ones are taken, which ascend; None: any.
+    Only `covered` frames are used, which ascend; None: any.
     """
-    chosen, wanted = set(), first
-    for number in range(first, last + 1) if known is None else known:
-        if wanted <= number <= last:
+    chosen, earliest = set(), first
+    for number in range(first, last + 1) if covered is None else covered:
+        if earliest <= number <= last:
             chosen.add(number)
-            wanted = number + every
+            earliest = number + every
     return chosen
 
 
@@ -221,11 +227,11 @@ class LabelledVideo:
         predictions: the row counts only if it finds a vehicle.
     frame_count
         Number of frames of the video, None if it is not known.
-    known
-        int64: numbers of the frames that the labels are about, ascending; of the others nothing is
-        known. None: all frames.
+    covered
+        int64: numbers of the frames that the labels cover, ascending; nothing is known about the
+        others. None: all frames.
     classes
-        The class of each vehicle by its id, the last one that it has; without those not known.
+        The last class of each vehicle by its id; vehicles without a class are missing.
     """
 
     frames: Int64Array
@@ -234,14 +240,14 @@ class LabelledVideo:
     scores: Float64Array
     ignored: BoolArray
     frame_count: int | None = None
-    known: Int64Array | None = None
+    covered: Int64Array | None = None
     classes: Mapping[int, str] = field(default_factory=dict)
 
     @staticmethod
-    def of(labels: Iterable[Label], known: Sequence[int] | None = None) -> "LabelledVideo":
+    def of(labels: Iterable[Label], covered: Sequence[int] | None = None) -> "LabelledVideo":
         """Order labels by frame, without checks; those of one frame keep their order.
 
-        `known` are the frames that they are about, from 0.
+        `covered` are the frames that they cover, from 0.
         """
         ordered = sorted(labels, key=lambda label: label.frame)
         return LabelledVideo(
@@ -250,7 +256,7 @@ class LabelledVideo:
             boxes=np.array([label.box for label in ordered], np.float64).reshape(-1, 4),
             scores=np.array([label.score for label in ordered], np.float64),
             ignored=np.array([label.ignored for label in ordered], np.bool_),
-            known=None if known is None else np.array(known, np.int64) + 1,
+            covered=None if covered is None else np.array(covered, np.int64) + 1,
             classes={
                 label.id: our_name(label.name) or label.name
                 for label in ordered
@@ -263,16 +269,19 @@ class LabelledVideo:
 
     @property
     def last_frame(self) -> int:
-        """Number of the last known frame of the video, also without a box; 0 if there is none."""
-        known = self.frames if self.known is None else self.known
-        return max([self.frame_count or 0, *map(int, (*self.frames[-1:], *known[-1:]))])
+        """Number of the last frame that is known, also without a box; 0 if there is none."""
+        covered = self.frames if self.covered is None else self.covered
+        last = [int(numbers.max(initial=0)) for numbers in (self.frames, covered)]
+        return max(self.frame_count or 0, *last)
 
     def check_end(self, path: Path, frames: int) -> None:
-        """Refuse boxes of the file `path` beyond a video's last frame. Raises `TruthError`."""
+        """Raise `TruthError` if the file `path` has a box beyond the last frame of the video."""
         last = int(self.frames.max(initial=0))
         if last > frames:
-            what = f"has a box in frame {last} of a video of {frames}; is it for another video?"
-            raise TruthError(f"{path}: {what}")
+            raise TruthError(
+                f"{path}: has a box in frame {last} of a video of {frames}; is it for another "
+                "video?"
+            )
 
     def frame(self, number: int) -> "LabelledVideo":
         """Return the rows of one frame, counted from 1, in their order."""
@@ -281,10 +290,16 @@ class LabelledVideo:
 
     def until(self, last: int) -> "LabelledVideo":
         """Return the frames 1 to `last` as a video of that many frames."""
-        known = None if self.known is None else self.known[self.known <= last]
-        return replace(self.where(self.frames <= last), frame_count=last, known=known)
+        covered = None if self.covered is None else self.covered[self.covered <= last]
+        return replace(self.where(self.frames <= last), frame_count=last, covered=covered)
 
     def where(self, rows: slice | BoolArray) -> "LabelledVideo":
         """Return only these rows, in their order."""
-        columns = ("frames", "ids", "boxes", "scores", "ignored")
-        return replace(self, **{name: getattr(self, name)[rows] for name in columns})
+        return replace(
+            self,
+            frames=self.frames[rows],
+            ids=self.ids[rows],
+            boxes=self.boxes[rows],
+            scores=self.scores[rows],
+            ignored=self.ignored[rows],
+        )

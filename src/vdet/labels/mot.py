@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from vdet.labels.formats import Format
-from vdet.labels.label import Label, SavedTracks, from_size, limited
+from vdet.labels.label import Label, SavedTracks, from_size
 from vdet.labels.parsing import label_lines, parse_number, parse_whole
 from vdet.track.track import FrameTracks
 
@@ -18,8 +18,10 @@ def _lines(frame: FrameTracks) -> Iterator[str]:
     """Yield a line for each box: frame, id, left, top, width, height, score, -1, -1, -1."""
     for track in frame.tracks:
         x, y, width, height = track.box.xywh
-        place = f"{x + 1},{y + 1},{width},{height}"
-        yield f"{frame.index + 1},{track.id},{place},{track.score:.4f},-1,-1,-1\n"
+        yield (
+            f"{frame.index + 1},{track.id},{x + 1},{y + 1},{width},{height},{track.score:.4f},"
+            "-1,-1,-1\n"
+        )
 
 
 def read_mot(path: Path, data: bytes) -> SavedTracks:
@@ -38,18 +40,26 @@ def read_mot(path: Path, data: bytes) -> SavedTracks:
     """
     counts = _TRUTH_COLUMNS, _RESULT_COLUMNS
     labels = label_lines(path, data, _label, form="MOTChallenge", counts=counts, separator=",")
-    return SavedTracks(limited(path, labels))
+    return SavedTracks(tuple(labels))
 
 
-def _label(place: int, columns: Sequence[str]) -> Label:
+def _label(line: int, columns: Sequence[str]) -> Label:
     frame, id_ = map(parse_whole, columns[:2])
-    left, top, width, height, seventh, *_ = map(parse_number, columns[2:])
+    left, top, width, height, flag_or_score, *_ = map(parse_number, columns[2:])
     is_truth = len(columns) == _TRUTH_COLUMNS
-    if is_truth and seventh not in {0, 1}:
-        what = f"with nine columns, column 7 must be a flag, 0 or 1, but is {seventh:g}"
-        raise ValueError(f"{what}; a results file needs ten columns")
-    box, score = from_size(left - 1, top - 1, width, height), 1.0 if is_truth else seventh
-    return Label(place, box, None, frame, id_, score, ignored=is_truth and seventh == 0)
+    if is_truth and flag_or_score not in {0, 1}:
+        raise ValueError(
+            f"with nine columns, column 7 must be a flag, 0 or 1, but is {flag_or_score:g}; a "
+            "results file needs ten columns"
+        )
+    return Label(
+        position=line,
+        box=from_size(left - 1, top - 1, width, height),
+        frame=frame,
+        id=id_,
+        score=1.0 if is_truth else flag_or_score,
+        ignored=is_truth and flag_or_score == 0,
+    )
 
 
 MOT = Format("MOTChallenge", ".txt", read_mot, _lines)

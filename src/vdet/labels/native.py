@@ -6,10 +6,10 @@ JSON lines have a record for each frame, even without a box. CSV has a row for e
 import csv
 import io
 import json
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import datetime, timedelta
 from itertools import islice
-from operator import itemgetter
 from pathlib import Path
 from typing import Annotated, Any, NotRequired
 
@@ -19,7 +19,7 @@ from typing_extensions import TypedDict
 from vdet.config.camera import parse_date_time
 from vdet.errors import TruthError
 from vdet.labels.formats import Format
-from vdet.labels.label import Label, SavedTracks, from_size, limited, line_error
+from vdet.labels.label import Label, SavedTracks, from_size, line_error
 from vdet.labels.parsing import (
     LIMIT,
     Index,
@@ -31,39 +31,48 @@ from vdet.labels.parsing import (
 )
 from vdet.track.track import FrameTracks, State, Track
 
-_NEEDED = ("frame", "time", "id", "x", "y", "width", "height")
-_COLUMNS = (*_NEEDED, "score", "state", "class", "foot_x", "foot_y", "distance", "lane")
-_FOOT = slice(10, 12)  # columns
-
 CLOCK = "clock"
 """Name of the fact and the column with the clock time of a frame, ISO 8601."""
 
-_KINDS = {
-    "frame": Index,
-    "time": float,
-    "id": Index,
-    **dict.fromkeys(("x", "y", "width", "height"), Number),
-    "score": Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] | None,
-    "state": State | None,
-    "class": str | None,
-    "foot": tuple[Number, Number] | None,
-    "distance": Number | None,
-    "lane": Annotated[int, Field(ge=-LIMIT, le=LIMIT)] | None,
-}
-"""The values of a box, in pixels, after the frame and the time in seconds."""
-_OF_TRACK = tuple(_KINDS)[2:]
-_Columns: Any = tuple[(*(list[kind] for kind in _KINDS.values()),)]  # type: ignore[misc,valid-type]
-_TABLE: TypeAdapter[Any] = TypeAdapter(_Columns)
-_BLOCK = 300
-"""Number of rows to check at once; they fit into the cache."""
+_COLUMNS = (
+    *("frame", "time", "id", "x", "y", "width", "height"),
+    *("score", "state", "class", "foot_x", "foot_y", "distance", "lane", CLOCK),
+)
+_NEEDED = _COLUMNS[:7]
 
-_Row = tuple[int, Sequence[Any]]
-"""The line of a box in its file, and its cells."""
-_Block = tuple[Sequence[int], Sequence[Sequence[Any]]]
-"""The lines of boxes, and their columns in the order of `_KINDS`."""
+_BLOCK = 300
+"""Number of boxes to check at once; they fit into the cache."""
+
+_Table = TypedDict(
+    "_Table",
+    {
+        "frame": list[Index],
+        "time": list[float],
+        "id": list[Index],
+        "x": list[Number],
+        "y": list[Number],
+        "width": list[Number],
+        "height": list[Number],
+        "score": list[Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] | None],
+        "state": list[State | None],
+        "class": list[str | None],
+        "foot": list[tuple[Number, Number] | None],
+        "distance": list[Number | None],
+        "lane": list[Annotated[int, Field(ge=-LIMIT, le=LIMIT)] | None],
+    },
+)
+"""Boxes in pixels, by column; the time is in seconds."""
+
+_TABLE = TypeAdapter(_Table)
+_OF_BOX = tuple(_Table.__annotations__)[2:]
+
+_Rows = tuple[Sequence[int], Mapping[str, Sequence[Any]]]
+"""The lines of some boxes, and their columns as they are in the file."""
 
 
 class _Record(TypedDict):
+    """A line of JSON."""
+
     frame: Index
     time: float
     tracks: Annotated[list[dict[str, Any]], FailFast()]
@@ -73,6 +82,28 @@ class _Record(TypedDict):
 _RECORD = TypeAdapter(_Record)
 
 
+def track_record(track: Track) -> dict[str, Any]:
+    """Return a track as values for JSON; boxes are rounded to whole pixels."""
+    x, y, width, height = track.box.xywh
+    return {
+        "id": track.id,
+        "x": x,
+        "y": y,
+        "width": width,
+        "height": height,
+        "score": round(track.score, 4),
+        "state": track.state,
+        "class": track.class_name,
+        "foot": list(track.written_foot),
+        "distance": _written_distance(track),
+        "lane": track.lane,
+    }
+
+
+def _written_distance(track: Track) -> float | None:
+    return None if track.distance is None else round(track.distance, 2)
+
+
 def _json_lines(frame: FrameTracks) -> Iterator[str]:
     """Yield a record: `frame`, `time`, `tracks`, and the facts about the frame."""
     tracks = [track_record(track) for track in frame.tracks]
@@ -80,31 +111,21 @@ def _json_lines(frame: FrameTracks) -> Iterator[str]:
     yield json.dumps({**record, **frame.facts}) + "\n"
 
 
-def track_record(track: Track) -> dict[str, Any]:
-    """Return a track as values for JSON; boxes are rounded to whole pixels."""
-    return {
-        "id": track.id,
-        **dict(zip(("x", "y", "width", "height"), track.box.xywh, strict=True)),
-        "score": round(track.score, 4),
-        "state": track.state,
-        "class": track.class_name,
-        "foot": list(track.written_foot),
-        "distance": None if track.distance is None else round(track.distance, 2),
-        "lane": track.lane,
-    }
-
-
 def _csv_lines(frame: FrameTracks) -> Iterator[str]:
     """Yield a row for each box; unknown values are empty."""
-    rows, clock = io.StringIO(), frame.facts.get(CLOCK)
-    writer = csv.writer(rows, lineterminator="\n")
+    text = io.StringIO()
+    rows = csv.writer(text, lineterminator="\n")
     for track in frame.tracks:
-        known = track_record(track)
-        place, score = track.box.xywh, f"{track.score:.4f}"
-        cells = (frame.index, f"{frame.time:.6f}", track.id, *place, score, track.state)
-        others = (track.class_name, *known["foot"], known["distance"], known["lane"])
-        writer.writerow((*cells, *others, clock))
-    yield rows.getvalue()
+        x, y, width, height = track.box.xywh
+        foot_x, foot_y = track.written_foot
+        rows.writerow(
+            [
+                *(frame.index, f"{frame.time:.6f}", track.id, x, y, width, height),
+                *(f"{track.score:.4f}", track.state, track.class_name, foot_x, foot_y),
+                *(_written_distance(track), track.lane, frame.facts.get(CLOCK)),
+            ]
+        )
+    yield text.getvalue()
 
 
 def read_json_lines(path: Path, data: bytes) -> SavedTracks:
@@ -115,14 +136,42 @@ def read_json_lines(path: Path, data: bytes) -> SavedTracks:
     TruthError
         The file is empty, a line is not such a record, frames do not increase, or a time is wrong.
     """
-    found: Times = {}
-    labels = limited(path, _labels(path, _blocks(_json_rows(path, data, found)), found))
-    times = checked_times(path, found)
+    times: Times = {}
+    labels = tuple(_labels(path, _json_rows(path, data, times), times))
     if not times:
         raise TruthError(f"{path}: is empty; it should have a record for every frame")
+    seconds = checked_times(path, times)
     line, first = next(numbered_lines(path, data))
-    begin = _begin(path, line, _RECORD.validate_json(first))
-    return SavedTracks(labels, tuple(times), times, begin=begin)
+    record = _RECORD.validate_json(first)
+    begin = _begin(path, line, record.get("clock"), record["time"])
+    return SavedTracks(labels, tuple(seconds), seconds, begin=begin)
+
+
+def _json_rows(path: Path, data: bytes, times: Times) -> Iterator[_Rows]:
+    """Yield the boxes of every record, and put the time of its frame into `times`."""
+    last = -1
+    lines: list[int] = []
+    columns: dict[str, list[Any]] = defaultdict(list)
+    for line, content in numbered_lines(path, data):
+        try:
+            record = _RECORD.validate_json(content)
+        except ValidationError as error:
+            raise line_error(path, line, first_mistake(error)) from error
+        frame, time, boxes = record["frame"], record["time"], record["tracks"]
+        if frame <= last:
+            raise line_error(path, line, f"frame {frame} comes after frame {last}")
+        last = frame
+        times[frame] = line, time
+        lines += [line] * len(boxes)
+        columns["frame"] += [frame] * len(boxes)
+        columns["time"] += [time] * len(boxes)
+        for name in _OF_BOX:
+            columns[name] += [box.get(name) for box in boxes]
+        if len(lines) >= _BLOCK:
+            yield lines, columns
+            lines, columns = [], defaultdict(list)
+    if lines:
+        yield lines, columns
 
 
 def read_csv(path: Path, data: bytes) -> SavedTracks:
@@ -136,92 +185,36 @@ def read_csv(path: Path, data: bytes) -> SavedTracks:
         A column is missing or appears twice, a row has a wrong number of cells, a cell has a wrong
         type, or a time is wrong.
     """
-    found: Times = {}
-    labels = limited(path, _labels(path, _csv_blocks(path, data), found))
-    times = checked_times(path, found)
-    (_, head), *rows = islice(numbered_lines(path, data), 2)
-    begin = None
-    for line, row in rows:
-        cells = (_cells(path, line, text) for text in (head, row))
-        begin = _begin(path, line, dict(zip(*cells, strict=True)))
-    return SavedTracks(labels, times=times, begin=begin)
+    times: Times = {}
+    labels = tuple(_labels(path, _csv_rows(path, data), times))
+    seconds = checked_times(path, times)
+    for lines, columns in _csv_rows(path, data):
+        begin = _begin(path, lines[0], columns[CLOCK][0], float(columns["time"][0]))
+        return SavedTracks(labels, times=seconds, begin=begin)
+    return SavedTracks(labels)
 
 
-def _begin(path: Path, line: int, first: Mapping[str, Any]) -> datetime | None:
-    """Return the clock time at time 0 from the time and clock of the first line."""
-    clock = first.get(CLOCK)
-    try:
-        return parse_date_time(clock) - timedelta(seconds=float(first["time"])) if clock else None
-    except (ValueError, OverflowError) as error:
-        raise line_error(path, line, f"clock: {error}") from error
-
-
-def _labels(path: Path, blocks: Iterable[_Block], times: Times) -> Iterator[Label]:
-    """Yield the label of each row, and put the time of its frame into `times`."""
-    for lines, columns in blocks:
-        try:
-            values = _TABLE.validate_python(columns)
-        except ValidationError as error:
-            first = min(error.errors(), key=lambda mistake: mistake["loc"][1])
-            column, row = map(int, first["loc"][:2])
-            what = f"{tuple(_KINDS)[column]}: {first['msg']}"
-            raise line_error(path, lines[row], what) from error
-        frames, seconds, ids, *sides, scores, states, names, feet, distances, lanes = values
-        times.update(zip(frames, zip(lines, seconds, strict=True), strict=True))
-        numbers, regions = [frame + 1 for frame in frames], [False] * len(lines)
-        scores = [1.0 if score is None else score for score in scores]
-        states = [state or "detected" for state in states]
-        boxes = map(from_size, *sides)
-        known = numbers, ids, scores, regions, states, feet, distances, lanes
-        yield from map(Label._make, zip(lines, boxes, names, *known, strict=True))
-
-
-def _blocks(rows: Iterable[_Row]) -> Iterator[_Block]:
-    left = iter(rows)
-    while block := list(islice(left, _BLOCK)):
-        lines, cells = zip(*block, strict=True)
-        yield lines, tuple(zip(*cells, strict=True))
-
-
-def _json_rows(path: Path, data: bytes, times: Times) -> Iterator[_Row]:
-    """Yield the boxes of every record, and put the time of its frame into `times`."""
-    last = -1
-    for line, content in numbered_lines(path, data):
-        try:
-            record = _RECORD.validate_json(content)
-        except ValidationError as error:
-            raise line_error(path, line, first_mistake(error)) from error
-        if record["frame"] <= last:
-            raise line_error(path, line, f"frame {record['frame']} comes after frame {last}")
-        last, time = record["frame"], record["time"]
-        times[last] = line, time
-        for track in record["tracks"]:
-            yield line, (last, time, *map(track.get, _OF_TRACK))
-
-
-def _csv_blocks(path: Path, data: bytes) -> Iterator[_Block]:
-    """Yield the rows of a table; an empty cell is None, and so is one of a missing column."""
-    lines = numbered_lines(path, data)
-    names = _cells(path, *next(lines, (1, "")))
-    if any(names.count(name) != 1 for name in _NEEDED):
-        needed = ", ".join(_NEEDED)
-        raise line_error(path, 1, f"the header must name each of these columns once: {needed}")
-    pick = itemgetter(*(names.index(name) if name in names else -1 for name in _COLUMNS))
-    for numbers, columns in _blocks(_csv_rows(path, lines, len(names))):
-        found = pick((*columns, [""] * len(numbers)))
-        known = [[cell or None for cell in cells] if "" in cells else cells for cells in found]
-        feet = zip(*known[_FOOT], strict=True)
-        known[_FOOT] = [[None if None in foot else foot for foot in feet]]
-        yield numbers, known
-
-
-def _csv_rows(path: Path, lines: Iterable[tuple[int, str]], columns: int) -> Iterator[_Row]:
-    for line, content in lines:
-        cells = _cells(path, line, content)
-        if len(cells) != columns:
-            what = f"has {len(cells)} cells, but the header has {columns}"
-            raise line_error(path, line, f"this line {what}")
-        yield line, cells
+def _csv_rows(path: Path, data: bytes) -> Iterator[_Rows]:
+    """Yield some rows at a time; empty cells, and those of missing columns, are None."""
+    numbered = numbered_lines(path, data)
+    header = _cells(path, *next(numbered, (1, "")))
+    if any(header.count(name) != 1 for name in _NEEDED):
+        names = ", ".join(_NEEDED)
+        raise line_error(path, 1, f"the header must name each of these columns once: {names}")
+    while block := list(islice(numbered, _BLOCK)):
+        rows = []
+        for line, content in block:
+            cells = _cells(path, line, content)
+            if len(cells) != len(header):
+                message = f"this line has {len(cells)} cells, but the header has {len(header)}"
+                raise line_error(path, line, message)
+            rows.append(cells)
+        columns: dict[str, list[Any]] = dict.fromkeys(_COLUMNS, [None] * len(rows))
+        for name, column in zip(header, zip(*rows, strict=True), strict=True):
+            columns[name] = [cell or None for cell in column]
+        feet = zip(columns["foot_x"], columns["foot_y"], strict=True)
+        columns["foot"] = [None if None in foot else foot for foot in feet]
+        yield [line for line, _ in block], columns
 
 
 def _cells(path: Path, line: int, content: str) -> list[str]:
@@ -233,5 +226,41 @@ def _cells(path: Path, line: int, content: str) -> list[str]:
         raise line_error(path, line, str(error)) from error
 
 
+def _labels(path: Path, blocks: Iterable[_Rows], times: Times) -> Iterator[Label]:
+    """Yield the label of each row, and put the time of its frame into `times`."""
+    for lines, columns in blocks:
+        try:
+            table = _TABLE.validate_python(columns)
+        except ValidationError as error:
+            mistake = min(error.errors(), key=lambda mistake: mistake["loc"][1])
+            column, row = mistake["loc"][:2]
+            raise line_error(path, lines[int(row)], f"{column}: {mistake['msg']}") from error
+        times.update(zip(table["frame"], zip(lines, table["time"], strict=True), strict=True))
+        boxes = map(from_size, table["x"], table["y"], table["width"], table["height"])
+        optional = (table[name] for name in ("score", "state", "class", "foot", "distance", "lane"))
+        rows = zip(lines, table["frame"], table["id"], boxes, *optional, strict=True)
+        for line, frame, id_, box, score, state, name, foot, distance, lane in rows:
+            yield Label(
+                position=line,
+                box=box,
+                name=name,
+                frame=frame + 1,
+                id=id_,
+                score=1.0 if score is None else score,
+                state=state or "detected",
+                foot=foot,
+                distance=distance,
+                lane=lane,
+            )
+
+
+def _begin(path: Path, line: int, clock: str | None, time: float) -> datetime | None:
+    """Return the clock time at time 0 from the clock and the time of the first line."""
+    try:
+        return parse_date_time(clock) - timedelta(seconds=time) if clock else None
+    except (ValueError, OverflowError) as error:
+        raise line_error(path, line, f"clock: {error}") from error
+
+
 JSON_LINES = Format("JSON lines", ".jsonl", read_json_lines, _json_lines)
-CSV = Format("CSV", ".csv", read_csv, _csv_lines, ",".join((*_COLUMNS, CLOCK)) + "\n")
+CSV = Format("CSV", ".csv", read_csv, _csv_lines, ",".join(_COLUMNS) + "\n")

@@ -12,7 +12,7 @@ from pydantic import Field, ValidationError
 
 from vdet.errors import TruthError
 from vdet.files import read_whole
-from vdet.labels.label import Label, line_error
+from vdet.labels.label import MAX_LABELS, Label, line_error
 
 LIMIT = 10_000_000
 """Maximum frame number, id or pixel coordinate. Larger numbers mean damage, and would overflow."""
@@ -23,9 +23,6 @@ MAX_BYTES = 300_000_000
 MAX_PART = 1_000_000
 """Maximum size of a line, bytes."""
 
-MAX_LINES = 10_000_000
-"""Maximum number of lines in a file of boxes."""
-
 _LAST_NUMBER = re.compile(r"([0-9]{1,8})$", re.ASCII)
 _LATEST = 1e11
 """Maximum time in seconds, three thousand years of wall-clock time."""
@@ -35,7 +32,7 @@ Index = Annotated[int, Field(ge=0, le=LIMIT)]
 """Fields of JSON documents and of tables."""
 
 Times = dict[int, tuple[int | str, float]]
-"""The place in the file and the time, seconds, of each frame, counted from 0."""
+"""The position in the file and the time, seconds, of each frame, counted from 0."""
 
 
 def read_bytes(path: Path) -> bytes:
@@ -49,14 +46,14 @@ def numbered_lines(path: Path | str, data: bytes) -> Iterator[tuple[int, str]]:
     Raises
     ------
     TruthError
-        The content is not UTF-8, has more than `MAX_LINES`, or a line is longer than `MAX_PART`.
+        The content is not UTF-8, has more than `MAX_LABELS` lines, or one longer than `MAX_PART`.
     """
     try:
         for number, line in enumerate(io.BytesIO(data.removeprefix(codecs.BOM_UTF8)), start=1):
             if len(line) > MAX_PART:
                 raise line_error(path, number, f"the line is longer than {MAX_PART:,} bytes")
-            if number > MAX_LINES:
-                raise TruthError(f"{path}: has more than {MAX_LINES:,} lines; cut it into parts")
+            if number > MAX_LABELS:
+                raise TruthError(f"{path}: has more than {MAX_LABELS:,} lines; cut it into parts")
             if stripped := line.decode().strip():
                 yield number, stripped
     except UnicodeDecodeError as error:
@@ -97,10 +94,10 @@ def label_lines(
         columns = content.split(separator)
         try:
             if counts is not None and len(columns) not in counts:
-                wanted, between = " or ".join(map(str, counts)), "commas" if separator else "spaces"
+                numbers = " or ".join(map(str, counts))
                 raise ValueError(
-                    f"{form} has {wanted} columns separated by {between}; this line has "
-                    f"{len(columns)}"
+                    f"{form} has {numbers} columns separated by "
+                    f"{'commas' if separator else 'spaces'}; this line has {len(columns)}"
                 )
             label = parse(line, columns)
         except ValueError as error:
@@ -145,17 +142,17 @@ def checked_times(path: Path, times: Times) -> dict[int, float]:
         A time is not a number, is too large, or is less than that of an earlier frame.
     """
     latest = -_LATEST
-    for frame, (place, time) in sorted(times.items()):
+    for frame, (position, time) in sorted(times.items()):
         if not latest <= time <= _LATEST:
-            what = f"frame {frame} is at {time:g} s; times must be numbers and must not decrease"
-            raise line_error(path, place, what)
+            message = f"frame {frame} is at {time:g} s; times must be numbers and must not decrease"
+            raise line_error(path, position, message)
         latest = time
     return {frame: time for frame, (_, time) in times.items()}
 
 
 def first_mistake(error: ValidationError) -> str:
-    """Return one line that describes the first mistake in a document, and its place."""
+    """Return one line that describes the first mistake in a document, and its position."""
     first = error.errors(include_url=False, include_input=False, include_context=False)[0]
-    place = ".".join(str(part) for part in first["loc"])
-    what = first["msg"].removeprefix("Value error, ")
-    return f"{place}: {what}" if place else what
+    position = ".".join(str(part) for part in first["loc"])
+    message = first["msg"].removeprefix("Value error, ")
+    return f"{position}: {message}" if position else message

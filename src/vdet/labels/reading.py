@@ -32,14 +32,14 @@ def read_tracks(path: Path, rate: float | None = None) -> SavedTracks:
     Raises
     ------
     TruthError
-        The file cannot be read, or has a mistake; the message names its place.
+        The file cannot be read, or has a mistake; the message names its position.
     """
     data = read_bytes(path)
     gc.disable()  # labels have no cycles, and looking for some takes a quarter of the time
     try:
         saved = recognize(path, data).read(path, data)
-        regions = {name for name in {label.name for label in saved.labels} if is_region(name)}
-        vehicles = (label for label in saved.labels if not (label.ignored or label.name in regions))
+        regions = set(filter(is_region, {label.name for label in saved.labels}))
+        vehicles = [label for label in saved.labels if not (label.ignored or label.name in regions)]
         saved = replace(saved, labels=checked_labels(path, vehicles))
     finally:
         gc.enable()
@@ -62,7 +62,7 @@ def read_predictions(path: Path) -> LabelledVideo:
 def read_truth(path: Path, roles: Roles = DEFAULT_ROLES) -> LabelledVideo:
     """Read the ground truth of a video from any format of tracks, as `read_true_labels` does."""
     saved = read_true_labels(path, roles)
-    return LabelledVideo.of(saved.labels, saved.known)
+    return LabelledVideo.of(saved.labels, saved.covered)
 
 
 def read_true_labels(path: Path, roles: Roles) -> SavedTracks:
@@ -79,7 +79,7 @@ def read_true_labels(path: Path, roles: Roles) -> SavedTracks:
     Raises
     ------
     TruthError
-        The file cannot be read, is empty, or has a mistake; the message names its place.
+        The file cannot be read, is empty, or has a mistake; the message names its position.
     """
     data = read_bytes(path)
     if not data.strip():
@@ -98,8 +98,8 @@ def _with_roles(path: Path, labels: Iterable[Label], roles: Roles) -> Iterator[L
     for label in labels:
         role = "vehicle" if label.name is None else roles.role_of(label.name)
         if role is None:
-            what = f"label {label.name!r:.40} is unknown; set its role in labels.roles, or use "
-            raise line_error(path, label.place, f"{what}one of: {roles.known}")
+            message = f"label {label.name!r:.40} is unknown; set its role in labels.roles, or use "
+            raise line_error(path, label.position, f"{message}one of: {roles.known_words}")
         if role != "other":
             name = label.name and (roles.class_of(label.name) or "vehicle")
             ignored = label.ignored or role == "ignored"
@@ -119,30 +119,30 @@ def read_labelled_images(path: Path, roles: Roles = DEFAULT_ROLES) -> LabelledIm
     Raises
     ------
     TruthError
-        There is no labelled set, or it has a mistake; the message names its place.
+        There is no labelled set, or it has a mistake; the message names its position.
     """
     return checked_images(str(path), _images(path), roles)
 
 
 def _images(path: Path) -> Iterable[LabelledImage]:
-    for names, read in _FOLDERS.items():
-        images, labels = (path / name for name in names)
+    for folders, read in _FOLDERS.items():
+        images, labels = (path / folder for folder in folders)
         if images.is_dir() and labels.is_dir():
             return read(images, labels)
-    files = _files(path)
+    files = _coco_files(path)
     if len(files) == 1:
         return read_coco_images(files[0])
     if files:
-        found = ", ".join(str(file.relative_to(path)) for file in files[:5])
-        raise TruthError(f"{path}: contains several such files ({found}); pass the one with labels")
+        names = ", ".join(str(file.relative_to(path)) for file in files[:5])
+        raise TruthError(f"{path}: contains several such files ({names}); pass the one with labels")
     raise TruthError(
         f"{path}: labelled images not found; use a folder with one .json file (COCO), with image_2 "
         "and label_2 (KITTI), or with images and labels (YOLO)"
     )
 
 
-def _files(path: Path) -> list[Path]:
-    """Return the possible label files; only regular files, because a FIFO may never end."""
+def _coco_files(path: Path) -> list[Path]:
+    """Return the possible COCO files; only regular files, because a FIFO may never end."""
     if not path.is_dir():
         return [path] if path.suffix.lower() == ".json" and path.is_file() else []
     files = sorted(file for name in ("*.json", "annotations/*.json") for file in path.glob(name))

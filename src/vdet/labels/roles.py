@@ -15,7 +15,7 @@ from vdet.labels.label import Label
 RIDER = "rider"
 """A person on a motorcycle or a bicycle, labelled separately."""
 
-_MACHINES = ("motorcycle", "bicycle")
+_RIDDEN = ("motorcycle", "bicycle")
 _MIN_COVERED = 0.1  # fraction of a rider's box covered by the box of the vehicle
 _IGNORED = ("tram", "train", "misc", "trailer", "caravan", RIDER)
 _REGIONS = ("ignore", "ignored", "ignore region", "ignored region", "ignored regions", "dont care")
@@ -53,8 +53,8 @@ class Roles:
         words: dict[str, Role] = dict.fromkeys((*OUR_NAMES, *map(_key, _IGNORED)), "ignored")
         words.update(dict.fromkeys(map(_key, classes), "vehicle"))
         for word, role in roles.items():
-            is_found = words.get(_key(word)) == "vehicle"
-            words[_key(word)] = "ignored" if is_found and role == "other" else role
+            is_detected = words.get(_key(word)) == "vehicle"
+            words[_key(word)] = "ignored" if is_detected and role == "other" else role
         words.update(dict.fromkeys(_REGION_LETTERS, "ignored"))
         return cls(words, {letters(name): name for name in classes})
 
@@ -75,8 +75,8 @@ class Roles:
         Vehicles of unknown kind are learnt if the network learns cars, trucks or buses.
         """
         classes = settings.train.net.classes
-        unknown = () if set(_ANY_KIND).isdisjoint(classes) else ("vehicle",)
-        return cls.of(settings.labels.roles, (*classes, *unknown))
+        any_kind = () if set(_ANY_KIND).isdisjoint(classes) else ("vehicle",)
+        return cls.of(settings.labels.roles, (*classes, *any_kind))
 
     def role_of(self, label: str) -> Role | None:
         """Return the role of a label; None if it is unknown."""
@@ -87,8 +87,8 @@ class Roles:
         return self.classes.get(letters(label)) or our_name(label)
 
     @property
-    def known(self) -> str:
-        """All known words, for messages."""
+    def known_words(self) -> str:
+        """All words with a role, for messages."""
         return ", ".join(", ".join(WORDS.get(word, (word,))) for word in self.words)
 
 
@@ -106,19 +106,19 @@ def merge_riders(labels: Sequence[Label]) -> list[Label]:
 
     A rider belongs to the one that covers most of the rider's box. Riders without one are kept.
     """
-    machines = [row for row, label in enumerate(labels) if our_name(label.name or "") in _MACHINES]
+    ridden = [row for row, label in enumerate(labels) if our_name(label.name or "") in _RIDDEN]
     merged = dict(enumerate(labels))
     for row, rider in enumerate(labels):
-        if machines and letters(rider.name or "") == RIDER:
-            covered, machine = max((_covered(rider, labels[n]), n) for n in machines)
+        if ridden and letters(rider.name or "") == RIDER:
+            covered, vehicle = max((_covered(rider, labels[n]), n) for n in ridden)
             if covered >= _MIN_COVERED:
-                around = Box(*merged[machine].box).union(Box(*rider.box))
-                merged[machine] = merged[machine]._replace(box=astuple(around))
+                union = Box(*merged[vehicle].box).union(Box(*rider.box))
+                merged[vehicle] = merged[vehicle]._replace(box=astuple(union))
                 del merged[row]
     return list(merged.values())
 
 
-def _covered(rider: Label, machine: Label) -> float:
-    """Return the fraction of a rider's box that the box of a machine covers."""
+def _covered(rider: Label, vehicle: Label) -> float:
+    """Return the fraction of a rider's box that the box of a vehicle covers."""
     box = Box(*rider.box)
-    return box.intersection(Box(*machine.box)).area / box.area if box.area else 0.0
+    return box.intersection(Box(*vehicle.box)).area / box.area if box.area else 0.0

@@ -14,7 +14,7 @@ from vdet.media import Frame, Picture, VideoInfo
 from vdet.media.writer import VideoWriter
 
 SIZE = 256, 128
-FORMATS = (".txt", ".csv", ".jsonl", ".coco.json", ".kitti.txt", ".yolo.zip")
+FORMATS = (".txt", ".csv", ".jsonl", ".coco.json")
 GATE = "traffic: {lines: [{name: gate, start: [0.1, 0.5], end: [0.9, 0.5]}]}\n"
 
 

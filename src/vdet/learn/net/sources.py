@@ -157,7 +157,7 @@ def clip_source(video: Path, truth: Path, settings: Settings) -> Source:
     """
     roles = Roles.for_training(settings)
     saved = read_true_labels(truth, roles)
-    labelled_frames = None if saved.known is None else [index + 1 for index in saved.known]
+    labelled_frames = None if saved.covered is None else [index + 1 for index in saved.covered]
     last = max((*(label.frame for label in saved.labels), *(labelled_frames or ())), default=0)
     used = spread_frames(labelled_frames, EVERY, EVERY, last)
     labels: dict[int, list[Label]] = defaultdict(list)
@@ -168,7 +168,7 @@ def clip_source(video: Path, truth: Path, settings: Settings) -> Source:
     ignored = Counter(
         label.name or "" for some in labels.values() for label in some if label.ignored
     )
-    labelled = LabelledImages(video.name, (), ignored=tuple(ignored.most_common()))
+    labelled = LabelledImages(video.name, (), ignored=dict(ignored.most_common()))
 
     def frames() -> _Frames:
         with VideoReader(video, frames=last, settings=settings.input) as reader:

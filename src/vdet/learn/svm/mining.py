@@ -243,7 +243,7 @@ class VideoSource:
         last = min(self.last or truth.last_frame, truth.last_frame)
         if last < self.first:
             raise TruthError(f"{self.truth}: ends at frame {truth.last_frame}; begin earlier")
-        labelled_frames = None if truth.known is None else truth.known.tolist()
+        labelled_frames = None if truth.covered is None else truth.covered.tolist()
         regular = spread_frames(labelled_frames, self.every, self.first, last)
         number = 0
         with VideoReader(self.path, frames=last, settings=settings.input) as reader:

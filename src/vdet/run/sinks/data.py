@@ -16,6 +16,7 @@ from vdet.labels.formats import (
     ImageTracks,
     SourceVideo,
     TrackWriter,
+    check_track_name,
     format_for,
     image_suffixes,
     track_suffixes,
@@ -74,7 +75,14 @@ class TrackSink(BaseSink):
             sys.stdout.flush()
 
 
-TRACKS = SinkKind(TrackSink, track_suffixes, "tracks", writes_standard_output=True, takes="videos")
+TRACKS = SinkKind(
+    TrackSink,
+    track_suffixes,
+    "tracks",
+    writes_standard_output=True,
+    takes="videos",
+    check=check_track_name,
+)
 
 
 class LabelSink(BaseSink):
