@@ -88,7 +88,7 @@ def test_the_horizon_is_looked_for_in_the_first_frames_once(
 
 def test_a_whole_run_holds_few_frames_at_a_time(red_clip: Path, tmp_path: Path) -> None:
     def frames_alive() -> int:
-        return sum(isinstance(item, Frame) for item in gc.get_objects())
+        return sum(type(item) is Frame for item in gc.get_objects())
 
     others = frames_alive()  # of tests before this one
     calls = count()

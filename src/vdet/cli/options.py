@@ -193,6 +193,8 @@ class SettingsSource:
     @property
     def files(self) -> tuple[Path, ...]:
         """The settings files. Raises `ConfigError`."""
+        if not self.configs:
+            return ()
         from vdet.config.loading import find_config
 
         return tuple(find_config(name) for name in self.configs)
