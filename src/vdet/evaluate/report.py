@@ -150,7 +150,7 @@ def mistake_tiles(video: Path, comparison: Comparison) -> Iterator[Tile]:
     """
     frames = {frame.number: frame for frame in comparison.frames}
     for mistake, image in _middle_frames(video, mistakes(comparison)[:_MAX_CROPS]):
-        box = Box(*mistake.box)
+        box = Box.of(mistake.box)
         x, y = box.center
         width = max(_SCALE * max(box.width, box.height), image.shape[1] / 8)
         part = Box.sized(x - width / 2, y - width / 3, width, width / 1.5)

@@ -134,7 +134,7 @@ def evaluate_clip(
     truth = clip.truth.until(frames)
     if settings.regions:
         regions = Regions(settings.regions, info.width, info.height)
-        outside = [not regions.contains(Box(*sides).foot) for sides in truth.boxes.tolist()]
+        outside = [not regions.contains(Box.of(sides).foot) for sides in truth.boxes.tolist()]
         truth = replace(truth, ignored=truth.ignored | np.array(outside, np.bool_))
     comparison = compare(LabelledVideo.of(labels), truth)
     return ClipResult(str(clip.video), comparison, frames, clip.video)

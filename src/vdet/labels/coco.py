@@ -149,9 +149,10 @@ class _Annotation:
         """Return the box as a label of a frame, counted from 1; `NO_ID` without a track."""
         attributes = self.attributes or _Attributes()
         id_ = attributes.track_id if self.track_id is None else self.track_id
+        x, y, width, height = self.bbox
         return Label(
             position=position,
-            box=from_size(*self.bbox),
+            box=from_size(x, y, width, height),
             name=name,
             frame=frame,
             id=id_ if isinstance(id_, int) and 0 <= id_ <= LIMIT else NO_ID,

@@ -112,7 +112,7 @@ def merge_riders(labels: Sequence[Label]) -> list[Label]:
         if ridden and letters(rider.name or "") == RIDER:
             covered, vehicle = max((_covered(rider, labels[n]), n) for n in ridden)
             if covered >= _MIN_COVERED:
-                union = Box(*merged[vehicle].box).union(Box(*rider.box))
+                union = Box.of(merged[vehicle].box).union(Box.of(rider.box))
                 merged[vehicle] = merged[vehicle]._replace(box=astuple(union))
                 del merged[row]
     return list(merged.values())
@@ -120,5 +120,5 @@ def merge_riders(labels: Sequence[Label]) -> list[Label]:
 
 def _covered(rider: Label, vehicle: Label) -> float:
     """Return the fraction of a rider's box that the box of a vehicle covers."""
-    box = Box(*rider.box)
-    return box.intersection(Box(*vehicle.box)).area / box.area if box.area else 0.0
+    box = Box.of(rider.box)
+    return box.intersection(Box.of(vehicle.box)).area / box.area if box.area else 0.0
