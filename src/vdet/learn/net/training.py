@@ -127,8 +127,8 @@ def train_network(
     """Train a network and return it with the moving average of its weights.
 
     On a CPU the same sources and settings give the same network on the same machine. A training
-    run that was stopped resumes from its last checkpoint, also on another device. Threads draw the
-    images: one for a CPU, one per core for a GPU.
+    run that was stopped resumes from its last checkpoint, also on another device. torch computes on
+    all cores; threads draw the images: one for a CPU, one per core for a GPU.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ def train_network(
     }
     target = _device(device)
     threads = torch.get_num_threads()
-    torch.set_num_threads(1)  # two threads that wait for each other are slower than one
+    torch.set_num_threads(core_count())
     torch.set_flush_denormal(True)
     batches = _Batches(sources, settings)
     try:
