@@ -28,7 +28,7 @@ def from_checkpoint(path: Path, output: Path) -> None:
 
     state: dict[str, Any] = torch.load(path, weights_only=True)
     settings = dict(state["settings"])
-    network = Network(len(settings["classes"]))
+    network = Network(len(settings["classes"]), settings.get("channels", 1.0))
     network.load_state_dict(state["averaged"])
     sources = [{"name": name, "images": count} for name, count in settings.pop("sources")]
     base = settings.pop("base", "None")
