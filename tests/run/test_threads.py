@@ -1,14 +1,14 @@
 """Threads keep the order of items, and end with their block, also after an error in it."""
 
 import threading
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack, contextmanager, nullcontext
+from collections.abc import Callable, Generator, Iterable, Iterator
+from contextlib import ExitStack, closing, contextmanager, nullcontext
 from itertools import islice
 
 import pytest
 
 from running import SOON
-from vdet.run.threads import map_ordered, prefetch, write_async
+from vdet.run.threads import map_ordered, read_async, write_async
 
 PLACES = ("source", "function", "taker")
 Errors = pytest.mark.parametrize("kind", [ValueError, KeyboardInterrupt, SystemExit])
@@ -41,19 +41,19 @@ def recording(items: Iterable[int], seen: list[int]) -> Iterator[int]:
         yield item
 
 
-class TestPrefetch:
+class TestReading:
     @pytest.mark.parametrize("take", [1, 3])
     def test_a_generator_is_closed_by_the_thread_that_ran_it(self, take: int) -> None:
         threads: list[threading.Thread] = []
 
-        def items() -> Iterator[int]:
+        def items() -> Generator[int]:
             threads.append(threading.current_thread())
             try:
                 yield from range(3)
             finally:
                 threads.append(threading.current_thread())
 
-        with prefetch(items()) as read:
+        with read_async(closing(items())) as (_, read):
             assert list(islice(read, take)) == list(range(take))
         opened, closed = threads
         assert opened is closed is not threading.current_thread()
@@ -110,7 +110,7 @@ class TestAllTogether:
     ) -> None:
         with ExitStack() as stack:
             hand_over = stack.enter_context(write_async(take, within=nullcontext()))
-            items = stack.enter_context(prefetch(source))
+            _, items = stack.enter_context(read_async(nullcontext(source)))
             for _, result in stack.enter_context(map_ordered(function, items, threads=2)):
                 hand_over(result)
 

@@ -7,9 +7,9 @@ after `JOIN_TIMEOUT`, with the files that only it has open.
 
 import sys
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
-from contextlib import AbstractContextManager, closing, contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager
 from typing import Any, TypeVar
 
 T = TypeVar("T")
@@ -69,14 +69,6 @@ def read_async(source: AbstractContextManager[S]) -> Iterator[tuple[S, Iterator[
             for future in ahead:
                 future.cancel()
             thread.submit(source.__exit__, None, None, None)
-
-
-@contextmanager
-def prefetch(items: Iterable[T]) -> Iterator[Iterator[T]]:
-    """Iterate over `items` in a thread, at most `DEPTH` ahead; generators are closed in it too."""
-    source = closing(items) if isinstance(items, Generator) else nullcontext(items)
-    with read_async(source) as (_, ahead):
-        yield ahead
 
 
 @contextmanager
