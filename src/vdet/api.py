@@ -259,10 +259,16 @@ def vehicles(
 
     Parameters and errors as for `follow`.
     """
-    run, parts = _prepare(
-        source, settings, detector, tracker, steps, start=start, end=end, frames=frames
+    results = follow(
+        source,
+        settings=settings,
+        detector=detector,
+        tracker=tracker,
+        steps=steps,
+        start=start,
+        end=end,
+        frames=frames,
     )
-    results = Results(open_video(run, parts))
     for _ in results:
         pass
     return results.vehicles

@@ -158,11 +158,7 @@ def _parse(text: str, name: str) -> tuple[Any, dict[Key, str]]:
         mark = error.problem_mark or error.context_mark
         position = f"{name}:{mark.line + 1}:{mark.column + 1}" if mark else name
         raise ConfigError(f"{position}: is not YAML: {error.problem or error.context}") from error
-    except (
-        yaml.YAMLError,
-        ValueError,
-        OverflowError,
-    ) as error:  # a forbidden character
+    except (yaml.YAMLError, ValueError, OverflowError) as error:  # a forbidden character
         raise ConfigError(f"{name}: is not YAML: {' '.join(str(error).split())}") from error
     except RecursionError as error:
         raise ConfigError(f"{name}: is nested too deeply") from error

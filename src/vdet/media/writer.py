@@ -107,9 +107,9 @@ _X264 = "b-adapt=0:scenecut=0:b-pyramid=none"
 tenth of a run and save 1 % of the file size; and no B-frames as references, for fewer frames in
 memory: files are 2 % larger.
 """
-MARK = f"made by vdet {__version__}"
-"""Comment in the metadata of every video that vdet writes."""
 _MARKED = "made by vdet"
+MARK = f"{_MARKED} {__version__}"
+"""Comment in the metadata of every video that vdet writes."""
 _MP4 = (b"ftyp", b"styp", b"moov", b"moof", b"mdat", b"free", b"skip", b"wide")  # first boxes
 _FINEST = 10_000_000  # ticks a second; more is not safe in mp4 players
 
@@ -127,16 +127,15 @@ def may_replace_video(path: Path) -> bool:
     """
     if not path.is_file():
         return path.is_symlink()  # its target does not exist
-    comment = _comment(path)
-    if comment is None:
-        with contextlib.suppress(OSError), path.open("rb") as file:
-            return file.read(8)[4:] not in _MP4
-        return False
-    return comment.startswith(_MARKED)
+    if (comment := _comment(path)) is not None:
+        return comment.startswith(_MARKED)
+    with contextlib.suppress(OSError), path.open("rb") as file:
+        return file.read(8)[4:] not in _MP4
+    return False
 
 
 def _comment(path: Path) -> str | None:
-    """Return the comment in the metadata of a video, maybe an empty one; None if it is none."""
+    """Return the comment in the metadata of a video; None if the file is not a video."""
     try:
         with av.open(str(path.absolute()), options=SAFELY, metadata_errors="replace") as container:
             tags = {key.lower(): text for key, text in container.metadata.items()}

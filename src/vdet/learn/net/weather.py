@@ -97,7 +97,7 @@ def _in_rain(rng: np.random.Generator, image: Image) -> Image:
     streaks = cv2.GaussianBlur(rain, (0, 0), 0.7) / 255.0
     grey, veil = rng.uniform(90, 190), rng.uniform(0, 0.6)  # low contrast, as behind spray
     light = rng.uniform(0.6, 1.0)
-    dull = _scaled(image, (1 - veil) * light, grey * veil * light)
+    dull = cv2.convertScaleAbs(image, alpha=(1 - veil) * light, beta=grey * veil * light)
     wet = blended(dull, np.full_like(dull, 200), streaks)
     if rng.random() < 0.7:
         wet = _with_drops(rng, wet)
@@ -138,10 +138,3 @@ def blended(image: _Values, overlay: _Values, opacity: _Values) -> Image:
     """Return the image under another one, whose opacity is `(H, W)`, 0 to 1."""
     over = np.asarray(opacity, np.float32)
     return np.asarray(cv2.blendLinear(image, overlay, 1 - over, over), np.uint8)
-
-
-def _scaled(image: Image, gain: _Values | float, offset: _Values | float = 0.0) -> Image:
-    """Return the image times a gain plus an offset: numbers, or one for each channel."""
-    levels = np.arange(256)[:, np.newaxis]
-    table = np.broadcast_to(levels * np.asarray(gain) + offset, (256, 3)).clip(0, 255)
-    return np.asarray(cv2.LUT(image, table.astype(np.uint8)[np.newaxis]), np.uint8)
