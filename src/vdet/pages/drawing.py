@@ -12,7 +12,7 @@ import yaml
 from markupsafe import Markup
 
 from vdet.boxes import Image
-from vdet.config import loading
+from vdet.config.loading import in_pixels
 from vdet.config.schema import Settings
 from vdet.detect.classes import UNKNOWN, is_chosen
 from vdet.lanes.ground import ground_of
@@ -106,7 +106,7 @@ class Drawing:
         return render("draw.html", data=data, name=name, script=script)
 
     def _proposed_settings(self) -> str:
-        values = in_pixels(self._values, self._size)
+        values = in_pixels(self._values, *self._size)
         traffic = values["traffic"] = values.get("traffic") or {}
         lines = [asdict(proposal) for proposal in self.proposals]
         for line in lines:
@@ -132,7 +132,7 @@ def split(
     values: Mapping[str, Any], size: tuple[int, int]
 ) -> tuple[dict[str, list[Any]], dict[str, list[str]]]:
     """Return the shapes in settings, in pixels, and the other settings as lines of YAML."""
-    whole = in_pixels(values, size)
+    whole = in_pixels(values, *size)
     sections = {"camera": whole.pop("camera"), "traffic": whole.pop("traffic", None) or {}}
     sections["other"] = whole
     shapes = {kind: sections[name].pop(kind, None) or [] for kind, name in _SECTIONS.items()}
@@ -142,11 +142,6 @@ def split(
         for name, section in sections.items()
     }
     return shapes, other_settings
-
-
-def in_pixels(values: Mapping[str, Any], size: tuple[int, int]) -> dict[str, Any]:
-    """Return settings with fractions converted to pixels of frames of this width and height."""
-    return loading.in_pixels(values, *size)
 
 
 def as_yaml(values: Mapping[str, Any]) -> list[str]:

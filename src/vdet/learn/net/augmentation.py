@@ -33,7 +33,7 @@ _RARE = 0.5  # a class with fewer objects than this fraction of the mean is rare
 _MARGIN = 0.2  # surroundings of a pasted object on each side, fraction of the box
 _MIN_DONOR = 24.0  # longer side of an object to paste, pixels
 _PASTED_SIDES = 16.0, 0.4  # of the longer side: minimum in pixels, maximum of the image's height
-_MAX_COVERED = 0.2  # of another object by a pasted one or a sign
+_MAX_COVERED = 0.2  # of another object by a pasted one
 _SIGNS = 0.3  # fraction of images that get signs
 _MAX_SIGNS = 3  # signs in an image
 
@@ -210,12 +210,10 @@ def with_signs(rng: np.random.Generator, sample: NetSample) -> NetSample:
     """Sometimes draw signs into the image of a sample; they cover no object."""
     if rng.random() >= _SIGNS:
         return sample
-    objects = sample.boxes[~sample.ignored].astype(np.float64)
+    image, objects = sample.image.copy(), sample.boxes[~sample.ignored].astype(np.float64)
     for _ in range(int(rng.integers(1, _MAX_SIGNS + 1))):
-        image, box = draw_sign(rng, sample.image)
-        if coverage(objects, box).max(initial=0) <= _MAX_COVERED:
-            sample = replace(sample, image=image)
-    return sample
+        draw_sign(rng, image, objects)
+    return replace(sample, image=image)
 
 
 def _feather(count: int, near: float, far: float) -> Float64Array:

@@ -5,7 +5,7 @@ import string
 import cv2
 import numpy as np
 
-from vdet.boxes import Box, Float64Array, Image
+from vdet.boxes import Box, Float64Array, Image, coverage
 from vdet.learn.net.weather import blended
 
 _SIDES = 0.015, 0.4  # height of a sign, fraction of the image's height: smallest and largest
@@ -18,20 +18,18 @@ _COLORS = (
 )
 """BGR of signs: white, red, blue, green, yellow, orange, grey, brown."""
 _LETTERS = [*(string.ascii_uppercase + string.digits)]
+_MAX_COVERED = 0.2  # of an object
 
 
-def draw_sign(rng: np.random.Generator, image: Image) -> tuple[Image, Float64Array]:
-    """Return an image with a sign at a random position, and the box of the sign.
+def draw_sign(rng: np.random.Generator, image: Image, objects: Float64Array) -> None:
+    """Draw a sign at a random position into an image, unless it would cover an object there.
 
     Parameters
     ----------
     image
-        BGR uint8 `(H, W, 3)`.
-
-    Returns
-    -------
-    image, box
-        A new image, and float64 `(1, 4)`: x1, y1, x2, y2, pixels.
+        BGR uint8 `(H, W, 3)`; it is changed.
+    objects
+        Their boxes, float64 `(n, 4)`: x1, y1, x2, y2, pixels.
     """
     height, width = image.shape[:2]
     tall = height * float(np.exp(rng.uniform(*np.log(_SIDES))))
@@ -39,16 +37,17 @@ def draw_sign(rng: np.random.Generator, image: Image) -> tuple[Image, Float64Arr
     aspect = float(np.exp(rng.uniform(*np.log(_ASPECTS)))) if is_board else 1.0
     wide = min(tall * aspect, 0.8 * width)
     x, y = rng.uniform(0, width - wide), rng.uniform(0, 0.8 * height)
+    if coverage(objects, np.array([[x, y, x + wide, y + tall]])).max(initial=0) > _MAX_COVERED:
+        return
     sign, opacity = _board(rng, wide / tall) if is_board else _plate(rng)
-    shown = image.copy()
     if rng.random() < 0.7:
-        _draw_post(rng, shown, Box.sized(x, y, wide, tall))
+        _draw_post(rng, image, Box.sized(x, y, wide, tall))
     scale = np.array([max(2, wide) / sign.shape[1], max(2, tall) / sign.shape[0]])
     slant = rng.normal(0, 0.05, 2)
     placing = np.array([[scale[0], slant[0] * scale[1], x], [slant[1] * scale[0], scale[1], y]])
     margin = 0.2 * max(wide, tall) + 2  # for the slant
     left, top = max(0, int(x - margin)), max(0, int(y - margin))
-    around = shown[top : int(y + tall + margin), left : int(x + wide + margin)]
+    around = image[top : int(y + tall + margin), left : int(x + wide + margin)]
     placing[:, 2] -= left, top
     blur = 0.35 / float(scale.min())  # so that the sign is as sharp as the image
     layers = (cv2.GaussianBlur(layer, (0, 0), blur) for layer in (sign, opacity))
@@ -56,7 +55,6 @@ def draw_sign(rng: np.random.Generator, image: Image) -> tuple[Image, Float64Arr
     warped, mask = (cv2.warpAffine(layer, placing, size) for layer in layers)
     lit = cv2.convertScaleAbs(warped, alpha=rng.uniform(0.45, 1.1))
     around[:] = blended(around, lit, mask / 255.0)
-    return shown, np.array([[x, y, x + wide, y + tall]])
 
 
 def _draw_post(rng: np.random.Generator, image: Image, sign: Box) -> None:
