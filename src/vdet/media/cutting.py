@@ -1,5 +1,6 @@
 """Cut parts out of a video: copy whole key-frame intervals, or encode exact frames."""
 
+import io
 import math
 from collections.abc import Iterable, Iterator
 from contextlib import closing
@@ -7,6 +8,7 @@ from fractions import Fraction
 from pathlib import Path
 
 import av
+from av.container import OutputContainer
 from av.packet import Packet
 from av.stream import Stream
 
@@ -18,20 +20,46 @@ from vdet.media.reader import VideoReader
 from vdet.media.writer import MARK, VIDEO_SUFFIXES, VideoWriter
 
 _AUDIO_LAG = 1  # seconds of video after the end in which audio of the part may still follow
+_NO_TIMES = 0x0080  # FFmpeg's flag of raw streams: AVFMT_NOTIMESTAMPS
+_MOST_REORDERED = 17  # frames in H.264 and H.265, and one
+_FORMATS = {".mkv": "matroska"}
 
 
-def can_copy(source: Path) -> bool:
-    """Return whether parts of a video can be copied: it is seekable, and has one clock."""
+def copied_suffix(source: Path) -> str | None:
+    """Return the suffix of copied parts of a video; None if they must be encoded.
+
+    It is that of the source, or .mkv. Copies need a seekable file with times of its own, one clock,
+    and streams that the container supports.
+    """
     if not source.is_file() or is_image_name(source):
-        return False
+        return None
+    suffix = source.suffix.lower() if source.suffix.lower() in VIDEO_SUFFIXES else ".mkv"
     with closing(Demuxer(source)) as demuxer:
-        return not demuxer.may_restart
+        container, context = demuxer.container, demuxer.video.codec_context
+        has_no_times = container.format.flags & _NO_TIMES or (
+            container.format.name == "avi" and context.has_b_frames
+        )
+        if demuxer.may_restart or has_no_times:
+            return None
+        try:
+            container.seek(_ticks(demuxer, Fraction(0)))
+            with av.open(io.BytesIO(), "w", format=_FORMATS.get(suffix, suffix[1:])) as trial:
+                _add_streams(demuxer, trial)
+                trial.start_encoding()
+        except (ValueError, OSError, av.FFmpegError):
+            return None
+    return suffix
 
 
-def copied_suffix(source: Path) -> str:
-    """Return the suffix of copied parts: that of the source, or .mkv, which supports any codec."""
-    suffix = source.suffix.lower()
-    return suffix if suffix in VIDEO_SUFFIXES else ".mkv"
+def _ticks(demuxer: Demuxer, time: Fraction) -> int:
+    """Return a time to seek to, not before the start of the file."""
+    return max(int(time * av.time_base), demuxer.container.start_time or 0)
+
+
+def _add_streams(demuxer: Demuxer, written: OutputContainer) -> dict[int, Stream]:
+    """Add the video and the audio streams, by their index in the source."""
+    streams: list[Stream] = [demuxer.video, *demuxer.container.streams.audio]
+    return {item.index: written.add_stream_from_template(item, opaque=True) for item in streams}
 
 
 def copy_part(source: Path, start: Fraction, end: Fraction, target: Path) -> None:
@@ -41,21 +69,23 @@ def copy_part(source: Path, start: Fraction, end: Fraction, target: Path) -> Non
     ----------
     start, end
         Times as in `Frame.time`, seconds. The copy begins at the last key frame at or before
-        `start`, and ends before the first one at or after `end`.
+        `start`, and ends before the first one at or after `end`, or with it if frames before it
+        need it.
 
     Raises
     ------
     VideoError
         The source cannot be read.
     OutputError
-        The container of `target` cannot hold a stream of the source.
+        The container of `target` cannot hold a stream of the source, or an edit list hides the
+        first frames of the copy.
     """
     with closing(Demuxer(source)) as demuxer, av.open(str(target.absolute()), "w") as written:
         written.metadata["comment"] = MARK
-        streams: list[Stream] = [demuxer.video, *demuxer.container.streams.audio]
         try:
-            targets = {item.index: written.add_stream_from_template(item) for item in streams}
-            demuxer.container.seek(int(start * av.time_base))
+            targets = _add_streams(demuxer, written)
+            demuxer.container.seek(_ticks(demuxer, start))
+            streams = [demuxer.container.streams[index] for index in targets]
             for packet in _moved_to_zero(demuxer.packets(streams), demuxer.video, end):
                 packet.stream = targets[packet.stream_index]
                 written.mux(packet)
@@ -68,22 +98,34 @@ def _moved_to_zero(
 ) -> "Iterator[Packet[Stream]]":
     """Yield the packets from the first key frame of `video` to the first one at or after `end`.
 
-    The first key frame is moved to second 0.
+    The first key frame is moved to second 0. A key frame at the end is only yielded if earlier
+    frames follow it (an open group).
     """
     begin: Fraction | float = math.inf
     stop: Fraction | float = math.inf
+    held: list[Packet[Stream]] = []
+    last: dict[int, int] = {}  # decoding times, by stream
     for packet in packets:
-        if packet.pts is None or packet.dts is None:
-            continue
+        if packet.pts is None:
+            raise ValueError("it has packets without a time")
+        if packet.dts is None:  # in Matroska, of the first packets after a seek
+            packet.dts = last.get(packet.stream_index, packet.pts - _MOST_REORDERED) + 1
+        last[packet.stream_index] = packet.dts
         time, is_video = packet.pts * packet.time_base, packet.stream_index == video.index
         if is_video and packet.is_keyframe:
-            begin, stop = min(begin, time), min(stop, time if time >= end else math.inf)
+            if packet.is_discard and begin == math.inf:
+                raise ValueError("an edit list hides its first frames")
+            begin = min(begin, time)
+            if time >= end and stop == math.inf:
+                stop, held = time, [packet]
         if is_video and time > stop + _AUDIO_LAG:
             return
-        if begin <= time < stop and not (is_video and stop < math.inf):
-            shift = round(begin / packet.time_base)
-            packet.pts, packet.dts = packet.pts - shift, packet.dts - shift
-            yield packet
+        if begin <= time < stop:
+            for item in [*(held if is_video else ()), packet]:
+                shift = round(begin / item.time_base)
+                item.pts, item.dts = (item.pts or 0) - shift, (item.dts or 0) - shift
+                yield item
+            held = [] if is_video else held
 
 
 def encode_part(
@@ -96,10 +138,11 @@ def encode_part(
     start, end
         Seconds from the first frame; frames with start ≤ time < end are written.
 
-    Errors as for `VideoReader` and `VideoWriter`.
+    Any damage is tolerated. Other errors as for `VideoReader` and `VideoWriter`.
     """
+    tolerant = settings.input.model_copy(update={"max_damaged": 1.0})
     with (
-        VideoReader(source, start=start, end=end, settings=settings.input) as reader,
+        VideoReader(source, start=start, end=end, settings=tolerant) as reader,
         VideoWriter(target, reader.info, settings.output, whole_audio=False) as writer,
     ):
         for frame in reader:

@@ -1,11 +1,12 @@
 """The sink `clips`: which parts of a video it cuts out, and how."""
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from shutil import copy
+from typing import Any
 
 import av
 import pytest
@@ -34,12 +35,14 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_clip(path, count=COUNT, options=B_FRAMES | {"g": "10"}, sounds=["aac"])
 
 
-def results() -> list[FrameResult]:
+def results(
+    vehicles: Mapping[int, tuple[str, Collection[int]]] = SHOWN, count: int = COUNT
+) -> list[FrameResult]:
     found = []
-    for index in range(COUNT):
+    for index in range(count):
         shown = [
             Track(number, CAR, 0.9, "detected", kind)
-            for number, (kind, frames) in SHOWN.items()
+            for number, (kind, frames) in vehicles.items()
             if index in frames
         ]
         found.append(result_of(*shown, index=index, time=index / RATE))
@@ -51,10 +54,11 @@ def cut(
     folder: Path,
     *,
     exact: bool = False,
+    margin: float = 0.2,
     shown: Iterable[FrameResult] | None = None,
 ) -> dict[str, list[int]]:
     """Return the numbers of the frames of each clip, by its name."""
-    settings = SETTINGS.model_copy(update={"clips": ClipSettings(margin=0.2, exact=exact)})
+    settings = SETTINGS.model_copy(update={"clips": ClipSettings(margin=margin, exact=exact)})
     with VideoReader(source) as reader:
         video = replace(reader.info)
     frames = results() if shown is None else shown
@@ -79,8 +83,60 @@ def test_an_exact_clip_has_the_frames_from_the_margin_before_to_the_margin_after
     source: Path, tmp_path: Path
 ) -> None:
     assert cut(source, tmp_path, exact=True) == {
-        "clip-00-00-00-car-1+1.mp4": list(range(17, 33)),
-        "clip-00-00-02-fire-truck-3.mp4": list(range(45, 56)),
+        "clip-00-00-00-car-1+1.mp4": list(range(17, 34)),
+        "clip-00-00-02-fire-truck-3.mp4": list(range(45, 57)),
+    }
+
+
+def test_an_exact_clip_without_margin_has_all_frames_of_its_vehicle(
+    source: Path, tmp_path: Path
+) -> None:
+    shown = results({1: ("car", [20]), 2: ("car", range(30, 34)), 3: ("bus", [COUNT - 1])})
+    assert list(cut(source, tmp_path, exact=True, margin=0, shown=shown).values()) == [
+        [20],
+        [30, 31, 32, 33],
+        [COUNT - 1],
+    ]
+
+
+def test_a_clip_that_cannot_be_cut_is_left_out_with_a_warning(
+    source: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    beyond = results({1: ("car", [20]), 2: ("bus", [COUNT + 1])}, count=COUNT + 2)
+    assert list(cut(source, tmp_path, exact=True, margin=0, shown=beyond)) == [
+        "clip-00-00-00-car-1.mp4"
+    ]
+    assert "in.mp4: the clip clip-00-00-02-bus-2 was not written: " in caplog.text
+
+
+def test_damage_that_the_run_tolerates_is_tolerated_in_exact_clips(
+    source: Path, tmp_path: Path
+) -> None:
+    data = bytearray(source.read_bytes())
+    with av.open(str(source)) as container:
+        packets = [packet for packet in container.demux(video=0) if packet.pos is not None]
+    for packet in packets[24:27]:
+        begin = packet.pos or 0
+        data[begin + 4 : begin + packet.size] = bytes(packet.size - 4)
+    (tmp_path / "in.mp4").write_bytes(data)
+    (tmp_path / "clips").mkdir()
+    assert len(cut(tmp_path / "in.mp4", tmp_path / "clips", exact=True)) == 2
+
+
+def test_a_clip_shows_nothing_that_an_edit_list_hides(tmp_path: Path) -> None:
+    video = write_clip(
+        tmp_path / "in.mov",
+        count=COUNT,
+        begin=Fraction(-15, 25),
+        options={"g": "30", "bf": "0"},
+        muxing={"avoid_negative_ts": "disabled"},
+    )
+    assert read_number(read(video)[0].image) == 15, "the file hides 15 frames"
+    (tmp_path / "clips").mkdir()
+    shown = results({1: ("car", range(2, 7)), 2: ("bus", range(30, 33))}, count=48)
+    assert cut(video, tmp_path / "clips", shown=shown) == {
+        "clip-00-00-00-car-1.mp4": list(range(15, 27)),
+        "clip-00-00-01-bus-2.mov": list(range(30, 60)),
     }
 
 
@@ -88,7 +144,44 @@ def test_where_the_clock_may_restart_clips_are_exact(tmp_path: Path) -> None:
     part = write_clip(tmp_path / "a.ts", count=40, options={"g": "10"})
     stream = joined(tmp_path / "in.ts", part, part)
     (tmp_path / "clips").mkdir()
-    assert [len(found) for found in cut(stream, tmp_path / "clips").values()] == [16, 11]
+    assert [len(found) for found in cut(stream, tmp_path / "clips").values()] == [17, 12]
+
+
+COPIES = [(range(40), range(40, 60)), ".mkv"]
+ENCODED = [(range(17, 34), range(45, 57)), ".mp4"]
+
+
+@pytest.mark.parametrize(
+    ("suffix", "options", "expected"),
+    [
+        ("mkv", {"options": B_FRAMES | {"g": "10"}}, [(range(10, 40), range(40, 60)), ".mkv"]),
+        ("flv", {"options": {"g": "20"}}, COPIES),
+        ("avi", {"options": {"g": "20", "bf": "0"}}, COPIES),
+        ("avi", {"options": B_FRAMES | {"g": "10"}}, ENCODED),
+        ("avi", {"codec": "mpeg4", "sounds": ["adpcm_ms"]}, ENCODED),
+        ("h264", {"options": {"g": "10"}}, ENCODED),
+        ("y4m", {"codec": "wrapped_avframe"}, ENCODED),
+        ("3gp", {"codec": "h263", "size": (176, 144)}, ENCODED),
+        ("wmv", {"codec": "wmv2"}, ENCODED),
+        ("mp4", {"codec": "mpeg2video", "options": {"g": "8", "bf": "2"}}, None),
+    ],
+)
+def test_clips_are_copied_where_that_works_and_encoded_elsewhere(
+    tmp_path: Path, suffix: str, options: dict[str, Any], expected: list[Any] | None
+) -> None:
+    video = write_clip(tmp_path / f"in.{suffix}", count=COUNT, **options)
+    (tmp_path / "clips").mkdir()
+    found = cut(video, tmp_path / "clips")
+    if expected:
+        frames, ending = expected
+        assert found == {
+            f"clip-00-00-00-car-1+1{ending}": list(frames[0]),
+            f"clip-00-00-02-fire-truck-3{ending}": list(frames[1]),
+        }
+    first, other = found.values()
+    assert first == list(range(first[0], first[-1] + 1)), "each frame once"
+    assert {*range(17, 34)} <= {*first}, "with its margin, also where groups of frames are open"
+    assert {*range(45, 57)} <= {*other}
 
 
 @pytest.mark.parametrize("exact", [False, True])

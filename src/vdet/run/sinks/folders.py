@@ -11,11 +11,11 @@ from vdet.boxes import Image
 from vdet.config.rendering import render_settings
 from vdet.detect.classes import UNKNOWN, in_file_name
 from vdet.draw.boxes import WHITE, color_of, draw_box, draw_label, draw_regions
-from vdet.errors import OutputError, clock_text
+from vdet.errors import OutputError, VideoError, clock_text
 from vdet.files import write_text
 from vdet.lanes.road import stage_images
 from vdet.media import Picture
-from vdet.media.cutting import can_copy, copied_suffix, copy_part, encode_part
+from vdet.media.cutting import copied_suffix, copy_part, encode_part
 from vdet.media.demux import is_pipe
 from vdet.media.images import encode_image, is_image_name
 from vdet.media.writer import is_marked
@@ -260,25 +260,41 @@ class ClipSink(BaseSink):
             what = "can be read only once, so no clips can be cut out of it"
             raise OutputError(f"{self.video.path}: {what}; save it to a file first")
         self._state = _state(self.video.path)
+        is_exact = context.settings.clips.exact
+        self._copied_suffix = None if is_exact else copied_suffix(self.video.path)
 
     def finish(self) -> None:
-        """Write the clips."""
+        """Write the clips. One that cannot be cut is left out, with a warning."""
         folder = self.context.files.stage_folder(self.path, _is_clip)
-        settings, source = self.context.settings, self.video.path
+        source = self.video.path
         if _state(source) != self._state:
             log.warning("%s: changed during the run, so no clips were cut out of it", source)
             return
-        copies = not settings.clips.exact and can_copy(source)
-        suffix = copied_suffix(source) if copies else ".mp4"
-        for scene in scenes(self._chosen(), settings.clips.margin):
-            target = folder / f"{self._name(scene)}{suffix}"
-            sides = scene.start, scene.end
-            start, end = (Fraction(side).limit_denominator(_PRECISION) for side in sides)
-            if copies:
-                copy_part(source, start, end, target)
-            else:
-                part = max(start - self.video.start, Fraction(0)), end - self.video.start
-                encode_part(source, *part, target, settings)
+        for scene in scenes(self._chosen(), self.context.settings.clips.margin):
+            name = self._name(scene)
+            try:
+                self._cut(scene, folder / name)
+            except (OutputError, VideoError) as error:
+                if isinstance(error.__cause__, OSError):  # such as a full disk
+                    raise
+                (folder / f"{name}.mp4").unlink(missing_ok=True)
+                log.warning("%s: the clip %s was not written: %s", source, name, error)
+
+    def _cut(self, scene: Scene, stem: Path) -> None:
+        """Copy or encode a scene; a part that cannot be copied is encoded."""
+        video, sides = self.video, (scene.start, scene.end)
+        start, end = (Fraction(side).limit_denominator(_PRECISION) for side in sides)
+        end += 1 / video.rate / 2  # the frame at the end is shown too
+        if self._copied_suffix:
+            target = stem.with_name(stem.name + self._copied_suffix)
+            try:
+                return copy_part(video.path, start, end, target)
+            except OutputError as error:
+                target.unlink(missing_ok=True)
+                log.debug("%s; encoded instead", error)
+        target = stem.with_name(f"{stem.name}.mp4")
+        part = max(start - video.start, Fraction(0)), end - video.start
+        return encode_part(video.path, *part, target, self.context.settings)
 
     def _chosen(self) -> Sequence[VehicleRecord]:
         counts, records = self.traffic.counts(), self.traffic.vehicles
