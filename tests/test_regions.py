@@ -57,3 +57,22 @@ class TestMasks:
             region = RegionSettings(name="a", mask=str(tmp_path / name))
             with pytest.raises(ImageError, match=name):
                 check_masks([region])
+
+    @pytest.mark.parametrize("white", [0, 1])
+    def test_one_without_white_is_refused_before_any_work(self, tmp_path: Path, white: int) -> None:
+        write_image(tmp_path / "mask.png", np.full((9, 16, 3), white, np.uint8))
+        region = RegionSettings(name="a", mask=str(tmp_path / "mask.png"))
+        with pytest.raises(ConfigError, match=rf"mask\.png: .*brightest pixel is {white} of 255"):
+            check_masks([region])
+
+    @pytest.mark.parametrize("size", [(1, 1), (16, 9)])
+    def test_a_small_one_is_enlarged(self, tmp_path: Path, size: tuple[int, int]) -> None:
+        write_image(tmp_path / "mask.png", np.full((*size[::-1], 3), 255, np.uint8))
+        mask = {"name": "mask", "mask": str(tmp_path / "mask.png")}
+        assert laid(mask, size=(size[0] * 20, size[1] * 20)).pixels.all()
+
+
+def test_regions_that_leave_nothing_of_the_frame_are_refused() -> None:
+    everything = {"name": "all", "points": [[0, 0], [1, 0], [1, 1], [0, 1]], "kind": "exclude"}
+    with pytest.raises(ConfigError, match=r"regions \(road, all\): nothing of the frame is left"):
+        laid(ROAD, everything)

@@ -6,10 +6,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from vdet.boxes import BoolArray
+from vdet.boxes import BoolArray, Image
 from vdet.config.shapes import RegionSettings, aspect_problem
 from vdet.errors import ConfigError
-from vdet.media.images import read_header, read_image
+from vdet.media.images import read_image
 from vdet.polygons import Point
 
 _WHITE = 128
@@ -30,7 +30,8 @@ class Regions:
     Raises
     ------
     ConfigError
-        The points of a polygon, or a mask, have another aspect ratio.
+        The points of a polygon, or a mask, have another aspect ratio, a mask has no white, or the
+        regions leave no pixel.
     ImageError
         A mask cannot be read.
     """
@@ -50,6 +51,9 @@ class Regions:
                 cv2.fillPoly(layer, [np.floor(corners).astype(np.int32)], 1)
         shows_all = not any(setting.kind == "include" for setting in settings)
         self.pixels: BoolArray = (shows_all | (layers["include"] > 0)) & (layers["exclude"] == 0)
+        if not self.pixels.any():
+            names = ", ".join(setting.name for setting in settings)
+            raise ConfigError(f"regions ({names}): nothing of the frame is left; change one")
 
     def contains(self, point: Point) -> bool:
         """Return whether a vehicle that stands at a point, x and y in pixels, is shown.
@@ -62,18 +66,28 @@ class Regions:
 
 
 def check_masks(settings: Sequence[RegionSettings]) -> None:
-    """Check that all masks can be read. Raises `ImageError`."""
+    """Check that all masks can be read and have white. Raises `ImageError`, `ConfigError`."""
     for setting in settings:
         if setting.mask:
-            read_header(Path(setting.mask))
+            _read_grey(setting.mask)
+
+
+def _read_grey(path: str) -> Image:
+    """Return the grey values of a mask, uint8 `(H, W)`."""
+    grey = np.asarray(cv2.cvtColor(read_image(Path(path)), cv2.COLOR_BGR2GRAY), np.uint8)
+    if (brightest := int(grey.max())) < _WHITE:
+        raise ConfigError(
+            f"{path}: has no white: its brightest pixel is {brightest} of 255; "
+            f"draw the region with {_WHITE} or more"
+        )
+    return grey
 
 
 def _read_mask(path: str, width: int, height: int) -> BoolArray:
-    image = read_image(Path(path))
-    rows, columns = image.shape[:2]
+    grey = _read_grey(path)
+    rows, columns = grey.shape
     if aspect_problem((columns, rows), width, height):
         raise ConfigError(
             f"{path}: its aspect ratio differs from frames of {width}×{height}; draw it on a frame"
         )
-    grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
     return np.asarray(cv2.resize(grey, (width, height), interpolation=cv2.INTER_NEAREST) >= _WHITE)

@@ -1,8 +1,8 @@
 """No output takes the place of a file that the run reads, in whatever way that was found."""
 
-import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from conftest import Run
@@ -22,7 +22,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "frames").mkdir()
     for number in range(1, 4):
         show(tmp_path / "frames" / f"img_{number:04d}.png", road(CAR))
-    shutil.copy(tmp_path / "frames" / "img_0001.png", tmp_path / "mask.png")
+    show(tmp_path / "mask.png", np.full_like(road(CAR), 255))
     (tmp_path / "settings.yaml").write_text("regions: [{name: road, mask: mask.png}]\n")
     (tmp_path / "out").mkdir()
     (tmp_path / "again").symlink_to("out")  # as a second mount of the folder
