@@ -330,3 +330,13 @@ def test_what_a_killed_run_left_is_removed_and_that_of_a_running_one_is_kept(
     assert (tmp_path / "precious").is_dir()
     assert "b.mp4" in names(tmp_path)
     assert "a.csv" not in names(tmp_path)
+
+
+def test_folders_below_a_staged_one_share_its_lock_and_appear_with_it(tmp_path: Path) -> None:
+    with OutputFiles() as files:
+        for folder in (tmp_path / "out", *(tmp_path / "out" / str(n) for n in range(3))):
+            (files.stage_folder(folder) / "a.txt").write_text(folder.name)
+        assert len(list(tmp_path.rglob(".vdet-*"))) == 1
+    found = {str(path.relative_to(tmp_path)): path.read_text() for path in tmp_path.rglob("*.txt")}
+    assert found == {"out/a.txt": "out"} | {f"out/{n}/a.txt": str(n) for n in range(3)}
+    assert not list(tmp_path.rglob(".*"))

@@ -162,7 +162,15 @@ class OutputFiles:
             self._new_folders += reversed(missing)
             path.mkdir(parents=True, exist_ok=True)
             remove_stale(path)
-            self._folders[path] = _make_temporary(path, self._cleanup)
+            # Each lock keeps a file open, so those of thousands of folders share one.
+            outer = next(
+                (self._folders[item] for item in path.parents if item in self._folders), None
+            )
+            if outer and outer.stat().st_dev == path.stat().st_dev:
+                self._folders[path] = outer / f".{len(self._folders)}"
+                self._folders[path].mkdir()
+            else:
+                self._folders[path] = _make_temporary(path, self._cleanup)
         return self._folders[path]
 
     def __enter__(self) -> Self:
@@ -188,6 +196,7 @@ class OutputFiles:
             folder / file.name: file
             for folder, temporary in self._folders.items()
             for file in sorted(temporary.iterdir())
+            if not file.is_dir()
         }
         for path, file in files.items():
             with output_errors(path), file.open("rb+") as written:

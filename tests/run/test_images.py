@@ -10,6 +10,7 @@ import pytest
 from red_cars import CAR, SETTINGS, road
 from run.conftest import Register
 from run.red_runs import model_for
+from running import names
 from vdet.errors import ImageError, OutputError
 from vdet.run.images import ImageJob, ImageSearch, find_images, plan_images, run_images
 from vdet.run.result import FrameResult
@@ -143,14 +144,35 @@ class TestSeveral:
         assert [Path(item["image"]).name for item in items] == ["a.png", "c.png"]
         assert [len(item["boxes"]) for item in items] == [1, 1]
 
-    def test_a_shared_output_that_fails_at_the_end_leaves_those_of_the_pictures(
+    def test_a_shared_output_that_fails_at_the_end_leaves_nothing(
         self, jobs: list[ImageJob], tmp_path: Path, register: Register
     ) -> None:
         register("fails", SinkKind(Fails))
         shared = [Output("json", tmp_path / "boxes.json"), Output("fails", tmp_path / "fails.txt")]
         with pytest.raises(OutputError, match=r"fails\.txt: cannot be written: No space"):
             list(run_images(jobs, shared, ImageSearch(model_for(SETTINGS), SETTINGS)))
-        assert self.names(tmp_path) == ["out-a.png", "out-c.png"]
+        assert self.names(tmp_path) == []
+
+    @pytest.mark.usefixtures("jobs")
+    @pytest.mark.parametrize("is_stopped", [False, True])
+    def test_a_run_that_ends_early_or_clashes_leaves_no_picture(
+        self, tmp_path: Path, is_stopped: bool
+    ) -> None:
+        sources = placed(tmp_path, "a.png", "c.png")
+        plan = plan_images(sources, tmp_path / "out", tmp_path / "stages", overwrite=False)
+        results = run_images(plan, (), ImageSearch(model_for(SETTINGS), SETTINGS))
+        next(results)
+        assert not list(tmp_path.rglob("out/[a-z]*"))
+        if is_stopped:
+            results.close()
+            assert not (tmp_path / "out").exists()
+            assert not (tmp_path / "stages").exists()
+        else:
+            (tmp_path / "out" / "c.png").write_text("of another program")
+            with pytest.raises(OutputError, match=r"c\.png: appeared during the run"):
+                list(results)
+            assert names(tmp_path / "out") == ["c.png"]
+            assert not (tmp_path / "stages").exists()
 
     def test_the_outputs_of_one_picture_appear_together_or_not_at_all(
         self, jobs: list[ImageJob], tmp_path: Path, register: Register

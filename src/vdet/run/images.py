@@ -1,10 +1,10 @@
 """Vehicles in single images: read the image, detect, pass the result to the sinks."""
 
+import os
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import partial
 from pathlib import Path
 
 from vdet.archives import is_hidden
@@ -139,14 +139,14 @@ class ImageSearch:
     def open_sinks(
         self, outputs: Sequence[Output], names: Mapping[Path, Path], files: OutputFiles
     ) -> Iterator[Sinks]:
-        """Yield the sinks of some outputs, which appear together after the block."""
+        """Yield the sinks of some outputs, which write into `files`."""
 
         def stage_images(image: Image, detections: Boxes) -> dict[str, Image]:
             detector = self.model.for_video(image.shape[1], image.shape[0], [image])
             return stage_images_of(detector)(image, detections)
 
         context = SinkContext(files, self.settings, places=names, stage_images=stage_images)
-        with files, open_sinks(outputs, context) as sinks:
+        with open_sinks(outputs, context) as sinks:
             yield sinks
 
 
@@ -161,9 +161,8 @@ def run_images(
 ) -> Generator[FrameResult | ImageError]:
     """Search images; yield the result of each, or the error that prevented it.
 
-    `threads` images are read and searched at once. The outputs of one image appear together, before
-    its result is yielded. The `shared` outputs, which receive all results in order, appear after
-    the last one.
+    `threads` images are read and searched at once. The `shared` outputs receive all results in
+    order. All outputs appear together, after the last result.
 
     Raises
     ------
@@ -178,14 +177,25 @@ def run_images(
             return error
 
     names = {job.source: job.name for job in jobs if job.name}
-    files = partial(OutputFiles, overwrite=overwrite, inputs=inputs)
+    files, folders = OutputFiles(overwrite=overwrite, inputs=inputs), _common_folders(jobs)
     with (
-        search.open_sinks(shared, names, files()) as shared_sinks,
+        files,
+        search.open_sinks(shared, names, files) as shared_sinks,
         map_ordered(detect, jobs, threads) as results,
     ):
         for job, result in results:
             if isinstance(result, FrameResult):
-                with search.open_sinks(job.outputs, names, files()) as sinks:
+                for folder in folders:
+                    files.stage_folder(folder)
+                with search.open_sinks(job.outputs, names, files) as sinks:
                     sinks.write(result)
                     shared_sinks.write(result)
             yield result
+
+
+def _common_folders(jobs: Sequence[ImageJob]) -> list[Path]:
+    """Return the folder that has all outputs of each sink, of several images."""
+    parents: dict[str, list[Path]] = {}
+    for output in (output for job in jobs for output in job.outputs):
+        parents.setdefault(output.sink, []).append(output.path.parent)
+    return [Path(os.path.commonpath(paths)) for paths in parents.values() if len(paths) > 1]
