@@ -21,9 +21,9 @@ import numpy as np
 from sklearn.linear_model import LogisticRegression
 
 from vdet.boxes import BoolArray, Float64Array, Image, Int64Array
+from vdet.config.classes import OUR_NAMES, UNKNOWN
 from vdet.config.loading import load_settings
 from vdet.config.schema import NetworkSettings, Settings
-from vdet.detect.classes import OUR_NAMES, UNKNOWN
 from vdet.detect.factory import load_detector
 from vdet.detect.onnx.detector import NetworkDetector, trained_on
 from vdet.detect.onnx.recognition import Calibration, read_header

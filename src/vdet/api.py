@@ -436,7 +436,10 @@ def _with_detector(settings: Settings, name: str) -> Settings:
     kind = kind_of_model(Path(name))
     section = settings.detector
     if kind is None or section.kind != kind:
-        section = load_layers(detector=kind or name).detector
+        chosen = load_layers(detector=kind or name)
+        section = chosen.detector
+        if settings.tracker == Settings().tracker:
+            settings = settings.model_copy(update={"tracker": chosen.tracker})
     if kind is not None:
         section = section.model_copy(update={"model": name})
     return settings.model_copy(update={"detector": section})

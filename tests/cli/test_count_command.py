@@ -105,6 +105,20 @@ def test_classes_can_be_chosen(run: Run, folder: Path, tmp_path: Path) -> None:
     assert totals == [["0"], ["1"]]
 
 
+def test_classes_of_tracks_need_not_be_those_of_the_detector(
+    run: Run, folder: Path, tmp_path: Path
+) -> None:
+    tracks = write_tracks(tmp_path / "t.csv")
+    for name, warning in {
+        "Lorry": "",
+        "person": "",
+        "plane": "vdet: warning: --class plane: no vehicle of this class was counted\n",
+    }.items():
+        result = run("count", tracks, "-c", folder / "lines.yaml", "--class", name, code=0)
+        assert re.findall(r"gate +out +(\d+)", result.out) == ["0"]
+        assert result.err == warning
+
+
 def test_of_a_video_it_says_what_to_run_first(run: Run, folder: Path) -> None:
     result = run("count", folder / "red.mp4", "-c", folder / "lines.yaml")
     assert result.code == 2

@@ -49,7 +49,8 @@ def test_json_has_the_boxes(run: Run, picture: Path, model_path: Path, scene: Sc
 
 def test_a_picture_of_every_stage(run: Run, picture: Path, model_path: Path) -> None:
     stages = picture.parent.parent / "stages"
-    run("detect-image", picture, "--stages", stages, "--model", model_path, code=0)
+    result = run("detect-image", picture, "--stages", stages, "--model", model_path, code=0)
+    assert result.err.endswith(f"{stages}: written\n")
     names = ["1-windows.png", "2-hits.png", "3-heat.png", "4-boxes.png"]
     assert sorted(p.name for p in stages.iterdir()) == names
     for name in names:

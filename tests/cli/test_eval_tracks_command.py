@@ -45,3 +45,9 @@ def test_bad_truth_is_an_error_of_one_line(run: Run, found: Path, tmp_path: Path
     assert (result.code, result.out) == (1, "")
     assert result.err.startswith(f"vdet: {bad}:2: ")
     assert result.err.count("\n") == 1
+
+
+def test_regions_are_refused(run: Run, found: Path) -> None:
+    regions = "regions=[{name: a, points: [[0, 0], [1, 0], [1, 1]]}]"
+    result = run("eval", "tracks", found, found, "--set", regions, code=1)
+    assert result.err == "vdet: regions: this command uses whole frames; remove the regions\n"

@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from vdet.config.detector import HeatSettings, PerspectiveSettings, SearchSettings
+from vdet.config.detector import HeatSettings, NetworkSettings, PerspectiveSettings, SearchSettings
 from vdet.config.loading import find_config, load_settings
 from vdet.config.schema import Settings, SvmSettings, SvmTrainingSettings, TrainSettings
 from vdet.errors import ConfigError
@@ -126,3 +126,22 @@ def test_a_shipped_config_is_found_by_its_name_and_another_by_its_path(
             find_config(name)
         shipped = "default, project-camera, seed, svm"
         assert str(error.value) == f"{name}: not found; shipped settings files are: {shipped}"
+
+
+def test_all_ways_to_choose_the_linear_model_look_ahead_equally() -> None:
+    shipped = load_settings([find_config("svm")])
+    ways = [
+        load_settings(assignments=["detector.model=mine.npz"]),
+        load_settings(assignments=["detector.kind=svm"]),
+        load_settings(detector="svm"),
+    ]
+    assert [way.tracker for way in ways] == [shipped.tracker] * 3
+    assert load_settings(detector="svm", assignments=["tracker.kind=rules"]).tracker.look_ahead == 0
+
+
+def test_classes_have_our_names_or_lower_case() -> None:
+    texts = ["detector.classes=[Car, Lorry, van, Golf Cart]", "classes=[Truck, golf cart]"]
+    settings = load_settings(assignments=texts)
+    assert isinstance(settings.detector, NetworkSettings)
+    assert settings.detector.classes == ("car", "truck", "golf cart")
+    assert settings.classes == ("truck", "golf cart")

@@ -2,8 +2,8 @@
 
 import pytest
 
+from vdet.config.classes import OUR_NAMES
 from vdet.config.loading import load_settings
-from vdet.detect.classes import OUR_NAMES
 from vdet.labels.label import Label
 from vdet.labels.roles import DEFAULT_ROLES, Roles, merge_riders
 

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from labels.saving import VIDEO, car, frame, read_back, written
 from vdet.boxes import Box
-from vdet.detect.classes import OUR_NAMES, UNKNOWN
+from vdet.config.classes import OUR_NAMES, UNKNOWN
 from vdet.errors import TruthError
 from vdet.labels.coco import COCO, read_coco_images
 from vdet.labels.formats import Format, ImageTracks, image_suffixes, track_formats

@@ -10,6 +10,7 @@ import click
 from vdet.cli import options
 from vdet.cli.command import command
 from vdet.cli.messages import LOG, announce, print_lines, progress_steps
+from vdet.config.classes import OUR_NAMES, our_names
 from vdet.errors import counted
 from vdet.files import OutputFiles, output_errors
 
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
     help="Frame rate of the video, for TRACKS without times.",
 )
 @options.classes_option
-@options.settings_options(interval="traffic.interval", begin="input.begin", classes="classes")
+@options.settings_options(interval="traffic.interval", begin="input.begin")
 @options.overwrite_option
 def count(
     tracks: options.Paths,
@@ -46,6 +47,7 @@ def count(
     rate: float | None,
     source: options.SettingsSource,
     overwrite: bool,
+    classes: tuple[str, ...],
     **paths: options.Paths,
 ) -> None:
     """Count the vehicles of track files at lines and in zones.
@@ -62,6 +64,8 @@ def count(
     """
     _reject_videos(tracks)
     settings = source.load()
+    if classes:  # any class that TRACKS have
+        settings = settings.model_copy(update={"classes": our_names(classes)})
     if not settings.traffic:
         raise click.UsageError("no lines or zones to count at; add a settings file with -c FILE")
     outputs = options.requested_outputs((), paths)
@@ -80,6 +84,9 @@ def count(
             announce(f"{name}: begins {result.clock}")
         for warning in result.warnings:
             LOG.warning("%s: %s", name, warning)
+    found = {event.class_name for result in videos.values() for event in result.events}
+    for name in {*our_names(classes)} - {*found, *OUR_NAMES}:
+        LOG.warning("--class %s: no vehicle of this class was counted", name)
     with OutputFiles(overwrite=overwrite) as files:
         for output in outputs:
             content_of = {"counts": counts_content, "flows": flows_content}[output.sink]

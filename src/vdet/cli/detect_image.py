@@ -8,7 +8,7 @@ import click
 
 from vdet.cli import options
 from vdet.cli.command import command
-from vdet.cli.messages import LOG, print_lines, progress_steps
+from vdet.cli.messages import LOG, announce, print_lines, progress_steps
 from vdet.errors import ImageError, counted, failure_code
 from vdet.run.sinks import Output
 from vdet.workers import IMAGES, core_count, return_freed_memory
@@ -66,7 +66,7 @@ def detect_image(
     from vdet.detect.factory import load_detector
     from vdet.regions import check_masks
     from vdet.run.images import ImageSearch, find_images, plan_images, run_images
-    from vdet.run.sinks.protocol import check_sinks
+    from vdet.run.sinks.protocol import STANDARD_OUTPUT, check_sinks
 
     return_freed_memory(*IMAGES)
     check_masks(settings.regions)
@@ -90,6 +90,9 @@ def detect_image(
             elif is_printed:
                 _print_vehicles(result)
             advance(1)
+    if failed < len(jobs):
+        written = (output, stages, *(item.path for item in outputs if item.path != STANDARD_OUTPUT))
+        announce(*(f"{path}: written" for path in written if path))
     return failure_code(failed, len(jobs))
 
 

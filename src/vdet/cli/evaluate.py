@@ -126,6 +126,7 @@ def tracks(
 
     results.check(source.inputs(prediction, truth))
     settings = source.load()
+    options.reject_regions(settings)
     with progress_steps("") as steps:
         steps("comparing", None)
         score = score_files(prediction, truth, until, settings)
@@ -177,7 +178,7 @@ def _run_name(settings: "Settings", source: SettingsSource) -> "RunName":
     from vdet.evaluate.output import RunName
 
     detector, configs = settings.detector, " ".join(source.configs) or None
-    return RunName(detector.kind, model_file(detector), configs, tuple(source.assignments))
+    return RunName(detector.kind, model_file(detector), configs, source.changes)
 
 
 _HELP = "Measure detection, tracking or the classifier."

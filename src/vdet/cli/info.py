@@ -188,7 +188,7 @@ def _linear_model(path: Path) -> Facts:
 
 
 def _network(path: Path) -> Facts:
-    from vdet.detect.classes import our_name
+    from vdet.config.classes import our_name
     from vdet.detect.onnx.detector import trained_on
     from vdet.detect.onnx.recognition import recognize
     from vdet.detect.onnx.session import Session

@@ -199,6 +199,16 @@ class SettingsSource:
 
         return tuple(find_config(name) for name in self.configs)
 
+    @property
+    def changes(self) -> tuple[str, ...]:
+        """The assignments, also those of other options."""
+        used = (
+            f"{key}={json.dumps(value, default=str, ensure_ascii=False)}"
+            for key, value in self.shortcuts.items()
+            if value is not None and value is not False and value != ()
+        )
+        return (*self.assignments, *used)
+
     def inputs(self, *paths: Path, settings: "Settings | None" = None) -> FileIds:
         """Identify the files that a command reads: see `vdet.run.inputs`.
 
@@ -210,18 +220,13 @@ class SettingsSource:
 
     def load(self, *, detector: str | None = None) -> "Settings":
         """Read the settings; arguments and errors as for `load_settings`."""
-        used = [
-            f"{key}={json.dumps(value, default=str)}"
-            for key, value in self.shortcuts.items()
-            if value is not None and value is not False and value != ()
-        ]
-        if not (self.configs or self.assignments or used or detector):
+        if not (self.configs or self.changes or detector):
             from vdet.config.schema import Settings
 
             return Settings()  # without YAML
         from vdet.config.loading import load_settings
 
-        return load_settings(self.files, [*self.assignments, *used], detector=detector)
+        return load_settings(self.files, self.changes, detector=detector)
 
 
 def settings_options(**keys: str) -> Callable[[Function], Function]:

@@ -3,10 +3,12 @@
 import math
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
+from vdet.config.classes import our_names
 from vdet.config.section import FRAME_LENGTH, Pixels, Ratio, Section
 
+ClassNames = Annotated[tuple[str, ...], AfterValidator(our_names)]
 Searches = Annotated[float | None, Field(gt=0, le=1000)]
 
 
@@ -27,7 +29,7 @@ class DetectorSettings(Section):
 
     @property
     def vehicle_classes(self) -> tuple[str, ...]:
-        """The classes that the detector looks for, of `vdet.detect.classes.OUR_NAMES`."""
+        """The classes that the detector looks for, of `vdet.config.classes.OUR_NAMES`."""
         return "car", "truck", "bus", "vehicle"
 
     @property
@@ -56,7 +58,7 @@ class NetworkSettings(DetectorSettings):
     """
     nms_iou: Ratio = 0.55
     """Remove a box if its intersection over union with a better one is higher."""
-    classes: tuple[str, ...] = Field(
+    classes: ClassNames = Field(
         ("car", "truck", "bus", "motorcycle", "bicycle", "vehicle"), min_length=1, max_length=100
     )
     """Classes to detect: car, truck, bus, motorcycle, bicycle, person, vehicle (of unknown kind),

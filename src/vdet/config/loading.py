@@ -73,6 +73,10 @@ def load_settings(
         if isinstance(model := inside(layer.values, "detector", "model"), str):
             detector = kind_of_model(Path(model)) or detector
     default = Document("defaults", {"detector": {"kind": detector}} if detector else {})
+    kinds = [detector, *(inside(layer.values, "detector", "kind") for layer in layers)]
+    is_set = any(inside(layer.values, "tracker", "look_ahead") is not None for layer in layers)
+    if [kind for kind in kinds if kind][-1:] == ["svm"] and not is_set:  # its tracker differs
+        default.values["tracker"] = document.read_document(find_config("svm")).values["tracker"]
     merged = reduce(_with_kinds_over, layers, default)
     try:
         return Settings.model_validate(merged.values)

@@ -17,7 +17,7 @@ from pydantic import (
 )
 
 from vdet.config.camera import CameraSettings, parse_date_time
-from vdet.config.detector import DetectorSettings, NetworkSettings, SvmSettings
+from vdet.config.detector import ClassNames, DetectorSettings, NetworkSettings, SvmSettings
 from vdet.config.kinds import with_kind
 from vdet.config.section import Ratio, Section
 from vdet.config.shapes import FramePoint, RegionList, Shape, TrafficSettings
@@ -201,7 +201,7 @@ class Settings(Section):
     The position of a vehicle is the middle of its lower edge. Without an included region the whole
     frame counts, except excluded regions.
     """
-    classes: tuple[str, ...] = Field((), max_length=100)
+    classes: ClassNames = Field((), max_length=100)
     """Classes of vehicles to show and count, out of detector.classes. []: all.
 
     The class is that of the track: the current one in boxes, the final one everywhere else.

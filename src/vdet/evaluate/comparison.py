@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vdet.boxes import BoolArray, Float64Array, Int64Array, coverage, iou_matrix
-from vdet.detect.classes import UNKNOWN
+from vdet.config.classes import UNKNOWN
 from vdet.errors import TruthError
 from vdet.labels.label import MAX_IN_FRAME, LabelledVideo
 

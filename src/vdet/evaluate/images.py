@@ -8,8 +8,8 @@ from typing import Any, Self
 import numpy as np
 
 from vdet.boxes import BoolArray, Boxes, Float64Array
+from vdet.config.classes import UNKNOWN
 from vdet.config.schema import Settings
-from vdet.detect.classes import UNKNOWN
 from vdet.detect.protocol import DetectorModel
 from vdet.evaluate.comparison import Comparison, compare, pool
 from vdet.evaluate.scores import DetectionScores, RankedPredictions, rank_predictions, score_boxes

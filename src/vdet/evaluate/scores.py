@@ -8,7 +8,7 @@ from statistics import fmean
 import numpy as np
 
 from vdet.boxes import BoolArray, Float64Array
-from vdet.detect.classes import OUR_NAMES, UNKNOWN
+from vdet.config.classes import OUR_NAMES, UNKNOWN
 from vdet.evaluate import tracking
 from vdet.evaluate.comparison import ComparedFrame, Comparison, compare, counts
 from vdet.labels.label import LabelledVideo

@@ -24,7 +24,7 @@ from pydantic import AfterValidator, FailFast, Field, TypeAdapter, ValidationErr
 from pydantic.dataclasses import dataclass
 
 from vdet.boxes import Box
-from vdet.detect.classes import UNKNOWN
+from vdet.config.classes import UNKNOWN
 from vdet.errors import TruthError, printable
 from vdet.labels.formats import Format, ImageTracks, SourceVideo, last_classes
 from vdet.labels.images import LabelledImage, image_folder, inside

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import BinaryIO
 
-from vdet.detect.classes import UNKNOWN
+from vdet.config.classes import UNKNOWN
 from vdet.errors import OutputError, TruthError
 from vdet.labels.label import SavedTracks, Size
 from vdet.labels.parsing import numbered_lines

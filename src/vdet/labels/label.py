@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vdet.boxes import BoolArray, Box, Float64Array, Int64Array
-from vdet.detect.classes import our_name
+from vdet.config.classes import our_name
 from vdet.errors import TruthError
 from vdet.track.track import FrameTracks, State, Track
 

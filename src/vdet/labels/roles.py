@@ -8,8 +8,8 @@ from dataclasses import astuple, dataclass
 from typing import Self
 
 from vdet.boxes import Box
+from vdet.config.classes import OUR_NAMES, WORDS, letters, our_name
 from vdet.config.schema import Role, Settings
-from vdet.detect.classes import OUR_NAMES, WORDS, letters, our_name
 from vdet.labels.label import Label
 
 RIDER = "rider"

@@ -14,9 +14,9 @@ from typing import BinaryIO
 
 from vdet.archives import store
 from vdet.boxes import Box
+from vdet.config.classes import UNKNOWN
 from vdet.config.document import MAX_BYTES as MAX_DESCRIPTION
 from vdet.config.document import parse_document
-from vdet.detect.classes import UNKNOWN
 from vdet.errors import ConfigError, ImageError, OutputError, TruthError, escaped
 from vdet.labels.formats import Format, ImageTracks
 from vdet.labels.images import LabelledImage, paired_files

@@ -13,7 +13,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from vdet.detect.classes import UNKNOWN
+from vdet.config.classes import UNKNOWN
 from vdet.files import write_text
 from vdet.pages.render import PAGE_NAME, link_to, render
 

@@ -12,9 +12,9 @@ import yaml
 from markupsafe import Markup
 
 from vdet.boxes import Image
+from vdet.config.classes import UNKNOWN, is_chosen
 from vdet.config.loading import in_pixels
 from vdet.config.schema import Settings
-from vdet.detect.classes import UNKNOWN, is_chosen
 from vdet.lanes.ground import ground_of
 from vdet.media.images import encode_image
 from vdet.pages.render import TEMPLATES, jpeg_uri, render

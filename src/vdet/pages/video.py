@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from vdet.boxes import Image
 from vdet.conditions.finding import Finding
-from vdet.detect.classes import UNKNOWN
+from vdet.config.classes import UNKNOWN
 from vdet.draw.boxes import color_of, text_color
 from vdet.errors import named
 from vdet.lanes.ground import Ground

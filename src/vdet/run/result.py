@@ -10,7 +10,7 @@ import cv2
 
 from vdet.boxes import Boxes
 from vdet.conditions.finding import Findings
-from vdet.detect.classes import is_chosen
+from vdet.config.classes import is_chosen
 from vdet.draw.boxes import color_of, draw_box
 from vdet.media import Frame
 from vdet.track.track import FrameTracks, Track

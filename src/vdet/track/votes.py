@@ -8,7 +8,7 @@ from collections import defaultdict
 from collections.abc import Mapping
 
 from vdet.boxes import EDGE, Float64Array
-from vdet.detect.classes import UNKNOWN
+from vdet.config.classes import UNKNOWN
 
 _USUAL, _USUAL_NEEDS = "car", 0.6
 """The class that detectors take for small or unclear vehicles of every kind, and the fraction of

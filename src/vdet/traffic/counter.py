@@ -6,8 +6,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from statistics import median
 
+from vdet.config.classes import is_chosen
 from vdet.config.schema import Settings
-from vdet.detect.classes import is_chosen
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Span, add_frame
 from vdet.traffic.counts import Counts, Direction, Event

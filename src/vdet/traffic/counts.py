@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, fields
 from itertools import accumulate, pairwise, product
 from typing import TYPE_CHECKING, TypeVar
 
-from vdet.detect.classes import UNKNOWN
+from vdet.config.classes import UNKNOWN
 from vdet.errors import needing
 from vdet.traffic.clock import Clock, ClockTime, Interval, Intervals, Span
 from vdet.traffic.crossings import APPEAR, ENTER

@@ -2,8 +2,8 @@
 
 from dataclasses import replace
 
+from vdet.config.classes import is_chosen
 from vdet.config.schema import Settings
-from vdet.detect.classes import is_chosen
 from vdet.lanes.ground import ground_of
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Clock

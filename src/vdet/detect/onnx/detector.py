@@ -9,8 +9,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from vdet.boxes import Boxes, Image, Int32Array, clipped
+from vdet.config.classes import our_name
 from vdet.config.schema import NetworkSettings
-from vdet.detect.classes import our_name
 from vdet.detect.onnx.merging import combine, suppress
 from vdet.detect.onnx.recognition import Recognized, read_header, recognize
 from vdet.detect.onnx.session import Session

@@ -4,8 +4,8 @@ import zlib
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Self
 
+from vdet.config.classes import OUR_NAMES
 from vdet.config.schema import Settings
-from vdet.detect.classes import OUR_NAMES
 from vdet.draw import boxes
 from vdet.draw.boxes import Color, Surface, draw_lines
 from vdet.errors import OutputError

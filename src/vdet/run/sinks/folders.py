@@ -8,8 +8,8 @@ from fractions import Fraction
 from pathlib import Path
 
 from vdet.boxes import Image
+from vdet.config.classes import UNKNOWN, in_file_name
 from vdet.config.rendering import render_settings
-from vdet.detect.classes import UNKNOWN, in_file_name
 from vdet.draw.boxes import WHITE, color_of, draw_box, draw_label, draw_regions
 from vdet.errors import OutputError, VideoError, clock_text
 from vdet.files import write_text

@@ -1,7 +1,7 @@
 """Classes of vehicles: their names in all outputs, and their synonyms."""
 
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from functools import lru_cache
 
 OUR_NAMES = ("car", "truck", "bus", "motorcycle", "bicycle", "person", "vehicle")
@@ -45,3 +45,8 @@ _NAMES = {letters(word): name for name, words in WORDS.items() for word in words
 def our_name(label: str) -> str | None:
     """Return which of `OUR_NAMES` a label means; None if none."""
     return _NAMES.get(letters(label))
+
+
+def our_names(labels: Iterable[str]) -> tuple[str, ...]:
+    """Return what each label means, once: one of `OUR_NAMES`, or the label in lower case."""
+    return tuple(dict.fromkeys(our_name(label) or label.strip().lower() for label in labels))
