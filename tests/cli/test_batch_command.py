@@ -54,7 +54,8 @@ def test_a_folder_with_a_bad_file_from_the_first_run_to_the_last(
 
     refused = run(*arguments)
     assert refused.code == 1
-    assert refused.err == f"vdet: {out}/a.mp4: already exists; use --overwrite to replace it\n"
+    advice = "use --overwrite to replace it, or --skip-existing to keep it"
+    assert refused.err == f"vdet: {out}/a.mp4: already exists; {advice}\n"
 
     before = (out / "a.mp4").stat().st_mtime_ns
     write_drive(clips / "bad.mp4", 3)
@@ -152,7 +153,7 @@ def test_after_other_settings_or_another_model_videos_are_made_again(
         (("out.mp4", "--skip-existing"), "require -d"),
         (("out.mp4", "--jobs", "2"), "require -d"),
         (("out.mp4", "--scheduler", "tcp://x:1"), "require -d"),
-        (("b.mp4", "c.mp4"), "for several videos use a folder: vdet detect-video "),
+        (("b.mp4", "c.mp4"), "for several videos a folder: vdet detect-video "),
     ],
 )
 def test_wrong_usage(

@@ -127,7 +127,7 @@ def test_the_picture_for_a_report_has_lines_flows_and_numbers(run: Run) -> None:
     ("arguments", "message"),
     [
         ((), "no output; use -o FILE"),
-        (("-o", "a.txt"), "pages must end in .html"),
+        (("-o", "a.txt"), "pages must end in .html, .jpg, .png, .svg"),
         (("--propose", "a.txt"), "settings must end in .yaml"),
         (("-o", "a.jpg"), "a.jpg: nothing to draw"),
         (("-o", "lines.html", "-c", "wide.yaml"), "whose aspect ratio"),

@@ -1,5 +1,11 @@
 """Options that change settings."""
 
+from pathlib import Path
+
+import pytest
+
+from clips import write_clip
+from conftest import Run
 from vdet.cli.options import SettingsSource
 
 
@@ -8,3 +14,39 @@ def test_changes_are_those_of_all_options_also_with_odd_names() -> None:
     assert source.changes == ("output.crf=18", 'detector.model="🚗.onnx"')
     settings = source.load()
     assert (settings.detector.model, settings.output.crf) == ("🚗.onnx", 18)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (
+            ("--clips", "c", "--margin", "-1"),
+            "--margin: must be greater than or equal to 0 (got -1.0)",
+        ),
+        (("--counts", "c.csv", "--interval", "7min"), "--interval: 7min does not divide a day;"),
+        (("--tracks", "t.csv", "--class", "plane"), "--class: plane: unknown class; known: car, "),
+        (
+            ("--tracks", "t.csv", "--begin", "foo"),
+            "--begin: 'foo' is not a time; expected one such",
+        ),
+        (("--tracks", "t.csv", "--set", "clips.margin=-1"), "--set: clips.margin: must be greater"),
+    ],
+)
+def test_a_wrong_value_is_reported_with_the_option_that_has_it(
+    run: Run, options: tuple[str, ...], words: str
+) -> None:
+    result = run("detect-video", "in.mp4", "--no-video", *options, code=1)
+    assert result.err.startswith(f"vdet: {words}")
+
+
+def test_the_input_is_not_its_own_output(run: Run, tmp_path: Path) -> None:
+    clip = write_clip(tmp_path / "a.mp4")
+    for overwrite in ((), ("--overwrite",)):
+        result = run("detect-video", clip, clip, *overwrite, code=1)
+        assert result.err == f"vdet: {clip}: is the input itself; use another output\n"
+
+
+def test_an_empty_file_is_called_empty(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "a.mp4").touch()
+    result = run("detect-video", tmp_path / "a.mp4", "--no-video", "--tracks", tmp_path / "t.csv")
+    assert result.err.endswith("a.mp4: is empty; use a file that plays\n")

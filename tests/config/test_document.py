@@ -67,7 +67,7 @@ def test_every_key_has_the_place_where_it_or_the_nearest_thing_around_it_stands(
         ("a: 1e-3", {"a": 0.001}),
         ("a: 1E3", {"a": 1000.0}),
         ("a: .5e1", {"a": 5.0}),
-        ("a: yes", {"a": True}),
+        ("a: yes", {"a": "yes"}),
         ("a: ~", {"a": None}),
         ("1: a\ntrue: b\n<<: {c: 1}", {"1": "a", "true": "b", "<<": {"c": 1}}),
     ],
@@ -137,3 +137,11 @@ def test_an_assignment_needs_a_whole_key_and_a_value_in_yaml(text: str, message:
     with pytest.raises(ConfigError) as error:
         parse_assignment(text)
     assert str(error.value).startswith(message)
+
+
+def test_times_dates_and_words_are_text_that_settings_convert() -> None:
+    text = "a: 2026-05-01T07:00:00\nb: 2026-05-01\nc: 15:00\nd: no\ne: [on, true, 12]\n"
+    assert parse_document(text, "a.yaml").values == {
+        "a": "2026-05-01T07:00:00", "b": "2026-05-01", "c": "15:00", "d": "no",
+        "e": ["on", True, 12],
+    }  # fmt: skip

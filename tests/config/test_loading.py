@@ -145,3 +145,18 @@ def test_classes_have_our_names_or_lower_case() -> None:
     assert isinstance(settings.detector, NetworkSettings)
     assert settings.detector.classes == ("car", "truck", "golf cart")
     assert settings.classes == ("truck", "golf cart")
+
+
+def test_unquoted_words_and_times_are_accepted_and_numbers_are_refused_with_advice() -> None:
+    line = "start: [0, 0], end: [1, 1]"
+    settings = load_settings(
+        assignments=[
+            "input.begin=2026-05-01T07:00:00", f"traffic.lines=[{{name: no, {line}}}]",
+            "clips.exact=yes", "lanes.enabled=off",
+        ]
+    )  # fmt: skip
+    assert settings.input.begin == "2026-05-01T07:00:00"
+    assert (settings.traffic.lines[0].name, settings.clips.exact) == ("no", True)
+    assert not settings.lanes.enabled
+    with pytest.raises(ConfigError, match=r"lines\[0\].name: must be text; quote it \(got 12\)"):
+        load_settings(assignments=[f"traffic.lines=[{{name: 12, {line}}}]"])

@@ -77,8 +77,8 @@ def test_too_much_damage_is_an_error_and_nothing_is_written(
     assert result.code == 1
     assert result.err.count("\n") == 1, result.err
     assert (
-        f"damaged.{suffix}: 4 of 40 frames damaged or lost, more than input.max_damaged "
-        "allows; raise it" in result.err
+        f"damaged.{suffix}: 4 of 40 frames damaged or lost, more than input.max_damaged: "
+        "0.05 allows; raise it" in result.err
     )
     assert not list(out.parent.iterdir())
 

@@ -17,7 +17,7 @@ from vdet.batch.task import (
     process_file,
 )
 from vdet.detect.factory import load_detector
-from vdet.errors import BatchError
+from vdet.errors import BatchError, OutputError
 from vdet.files import (
     OutputFiles,
     check_output,
@@ -122,7 +122,13 @@ def make_plan(
             else:
                 runs.append(allow_replacing(run, written))
     for run in runs:
-        check_sinks(run.outputs, overwrite=run.overwrite, makes_folder=True, inputs=inputs)
+        try:
+            check_sinks(run.outputs, overwrite=run.overwrite, makes_folder=True, inputs=inputs)
+        except OutputError as error:
+            text = str(error).replace(
+                "to replace it", "to replace it, or --skip-existing to keep it"
+            )
+            raise OutputError(text) from error
     replaces_totals = common.overwrite or (skip_existing and manifest.exists())
     for total in totals:
         check_output(total.path, overwrite=replaces_totals, makes_folder=True, inputs=inputs)
@@ -148,7 +154,7 @@ def _reject_nested(clips: Iterable[Path], sources: Iterable[InputVideo], folder:
 def _reject_shared(runs: Iterable[Run], totals: Iterable[TotalFile], folder: Path) -> None:
     """Reject an output with the name of another output, a total or the manifest."""
     owners = {folder / MANIFEST: "the manifest"}
-    makers = [(total.path, "the outputs of all videos") for total in totals]
+    makers = [(total.path, f"the table of all {total.ending}") for total in totals]
     makers += [(output.path, str(run.source)) for run in runs for output in run.outputs]
     for path, maker in makers:
         if path in owners:

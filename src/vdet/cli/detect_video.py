@@ -12,7 +12,8 @@ import click
 from vdet.cli import batch, options
 from vdet.cli.command import command
 from vdet.cli.messages import announce, progress_steps
-from vdet.errors import DOUBTFUL, counted
+from vdet.errors import DOUBTFUL, OutputError, counted
+from vdet.files import file_ids
 from vdet.run.sinks import Output
 
 if TYPE_CHECKING:
@@ -200,10 +201,12 @@ def _with_video(paths: Sequence[Path], outputs: list[Output], *, no_video: bool)
     if has_default:
         videos = [_beside(source)]
     if len(videos) > 1 or (videos[0].is_file() and not may_replace_video(videos[0])):
+        if file_ids([source]) & file_ids(videos):
+            raise OutputError(f"{videos[0]}: is the input itself; use another output")
         shown = shlex.join(map(str, paths[:2])) + (" …" if len(paths) > 2 else "")
         raise click.UsageError(
-            f"{videos[0]} would be replaced, but vdet did not write it; remove it, or for several "
-            f"videos use a folder: vdet detect-video {shown} -d found"
+            f"{videos[0]} would be replaced, but vdet did not write it; use another name, or for "
+            f"several videos a folder: vdet detect-video {shown} -d found"
         )
     return [Output("video", videos[0]), *outputs]
 

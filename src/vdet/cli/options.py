@@ -184,11 +184,14 @@ class SettingsSource:
     shortcuts
         Values of other options by the setting that each changes. None, False and an empty tuple
         are the values of options that are not used.
+    options
+        Names of these options, by setting, for messages.
     """
 
     configs: Sequence[str] = ()
     assignments: Sequence[str] = ()
     shortcuts: Mapping[str, Any] = field(default_factory=dict)
+    options: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -226,7 +229,16 @@ class SettingsSource:
             return Settings()  # without YAML
         from vdet.config.loading import load_settings
 
-        return load_settings(self.files, self.changes, detector=detector)
+        try:
+            return load_settings(self.files, self.changes, detector=detector)
+        except ConfigError as error:
+            for key, option in self.options.items():
+                if self.shortcuts.get(key):
+                    lines = (str(line) for line in error.args)
+                    error.args = tuple(
+                        line.replace(f"--set: {key}", f"--{option}", 1) for line in lines
+                    )
+            raise
 
 
 def settings_options(**keys: str) -> Callable[[Function], Function]:
@@ -243,7 +255,9 @@ def settings_options(**keys: str) -> Callable[[Function], Function]:
             configs: tuple[str, ...], assignments: tuple[str, ...], **values: Any
         ) -> Any:
             shortcuts = {key: values.pop(name) for name, key in keys.items()}
-            return command(source=SettingsSource(configs, assignments, shortcuts), **values)
+            options = {key: "class" if name == "classes" else name for name, key in keys.items()}
+            source = SettingsSource(configs, assignments, shortcuts, options)
+            return command(source=source, **values)
 
         return with_source
 
@@ -280,7 +294,7 @@ def check_file(
 ) -> None:
     """Raise `OutputError` if an output has another suffix, or cannot be written."""
     if output.suffix.lower() not in suffixes:
-        raise OutputError(f"{output}: {noun} must end in {suffixes[0]}")
+        raise OutputError(f"{output}: {noun} must end in {', '.join(suffixes)}")
     check_output(output, overwrite=overwrite, inputs=inputs)
 
 

@@ -3,6 +3,7 @@
 import re
 import reprlib
 from dataclasses import dataclass, field
+from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,8 @@ from vdet.files import read_whole
 MAX_BYTES = 100_000
 """Ten times the size of all settings with all their comments."""
 MAX_INTEGER_BITS = 64
+
+_WORDS = ("yes", "no", "on", "off")
 
 Key = tuple[str | int, ...]
 """Path to a value from the root: `("search", "windows", 0, "size")`."""
@@ -76,6 +79,9 @@ class _Loader(yaml.SafeLoader):
             value = self.construct_object(node)
         except ValueError as error:
             raise _rejected(str(error), node) from error
+        # YAML 1.1 takes 2026-05-01, 15:00 and no for other kinds. Settings convert what they need.
+        if ":" in node.value or isinstance(value, date) or node.value.lower() in _WORDS:
+            return node.value
         if isinstance(value, int) and value.bit_length() > MAX_INTEGER_BITS:
             raise _rejected("the number is too large", node)
         return value

@@ -191,6 +191,7 @@ def inside(values: Any, *keys: str) -> Any:
 
 _EXPECTED = {
     "model_type": "must be a section, key: value",
+    "string_type": "must be text; quote it",
     "tuple_type": "must be a list",
     "zoneinfo_str": "must be a time zone, such as Europe/Berlin",
 }

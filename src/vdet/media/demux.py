@@ -52,6 +52,8 @@ def open_input(path: Path, sequence: ImageSequence | None = None) -> InputContai
         options = {"framerate": str(sequence.rate or ASSUMED_RATE), "pattern_type": "none"}
     elif not os.path.exists(path):  # noqa: PTH110  # also False if it is not accessible
         raise VideoError(f"{path}: not found; check the name")
+    elif path.is_file() and not path.stat().st_size:
+        raise VideoError(f"{path}: is empty; use a file that plays")
     name = str(file.absolute())  # "a:b.mp4" would be treated as a protocol
     try:  # tags may have any encoding
         return av.open(name, "r", container_format, options, metadata_errors="replace")

@@ -207,7 +207,8 @@ class VideoReader:
         if damaged:
             self._faults.insert(0, f"{damaged} of {total} frames damaged or lost")
         if damaged > math.ceil(self._settings.max_damaged * total):
-            limit = "more than input.max_damaged allows; raise it"
+            allowed = f"{self._settings.max_damaged:g}"
+            limit = f"more than input.max_damaged: {allowed} allows; raise it, as in 0.5 for half"
             raise VideoError(f"{self.info.path}: {self._faults[0]}, {limit}")
         if restarts := self._decoder.demuxer.restarts:
             self._faults.append(f"its clock restarts {restarts}×; the parts follow one another")
