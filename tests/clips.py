@@ -164,7 +164,7 @@ def write_clip(
         assert isinstance(stream, av.VideoStream)
         stream.height, stream.width = coded[0].shape[:2]
         stream.pix_fmt = pix_fmt
-        if codec.startswith(("libx", "libsvt")) and path.suffix != ".avi":
+        if codec.startswith(("libx", "libsvt")) and path.suffix not in (".avi", ".h264"):
             stream.time_base = stream.codec_context.time_base = Fraction(1, 90_000)
         if rotation:
             stream.set_display_rotation(rotation)

@@ -46,6 +46,9 @@ def test_counting_a_file_of_tracks_gives_what_the_run_gave(
     result = run("count", tracks, *lines, "--counts", again, *rate)
     assert (result.code, result.err) == (0, "")
     assert events_of(again) == events_of(live) != []
+    if form != "txt":
+        result = run("count", tracks, *lines, "--rate", "25")
+        assert "--rate changes nothing: the tracks have times; remove it" in result.err
 
 
 @pytest.mark.parametrize("form", ["csv", "jsonl"])

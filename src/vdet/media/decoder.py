@@ -92,7 +92,8 @@ class Decoder:
     Parameters
     ----------
     frame_rate
-        Rate of numbered images, per second; None: as their names say, else `ASSUMED_RATE`.
+        Rate of numbered images or of a raw stream, per second; None: as the names or the stream
+        say, else `ASSUMED_RATE`.
 
     Attributes
     ----------
@@ -118,12 +119,12 @@ class Decoder:
     def __init__(self, path: Path, frame_rate: float | None) -> None:
         self.before = 0
         self.sequence = find_sequence(path, frame_rate)
-        self.demuxer = Demuxer(path, self.sequence)
+        self.demuxer = Demuxer(path, self.sequence, frame_rate)
         self.stream = self.demuxer.video
         context = self.stream.codec_context
         context.options = {"max_pixels": str(demux.MAX_PIXELS)}
         context.thread_count = 1  # with more, frames near damage differ from run to run
-        self.damage = Damage(1 / demux.rate_of(self.stream) / demux.time_base_of(self.stream))
+        self.damage = Damage(1 / self.demuxer.rate / demux.time_base_of(self.stream))
         self._is_avi = self.demuxer.container.format.name == "avi"
         self.is_countable = context.name in _COUNTABLE and not (self._is_avi or demux.is_pipe(path))
         self._packets = self._read_images(self.sequence) if self.sequence else self._read()
@@ -179,6 +180,8 @@ class Decoder:
         for packet in self.demuxer.packets([self.stream], self._fail):
             if self._is_avi and self.stream.codec_context.has_b_frames:
                 packet.pts = packet.dts = None  # AVI has no presentation times
+            if self.demuxer.is_raw:
+                packet.pts = packet.dts = packet.duration = None  # those of FFmpeg are assumed
             self.damage.corrupt_packets += packet.is_corrupt
             self.damage.restarts = self.demuxer.restarts
             yield packet

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
-from typing import cast
 
 import av
 from av.container import InputContainer
@@ -75,6 +74,7 @@ def is_pipe(path: Path) -> bool:
 
 HDR_TRANSFERS = (16, 18)
 """PQ and HLG, in codes of ITU-T H.273."""
+_MAX_RATE = 1000  # frames per second; in a raw stream, a larger number is the unit of its clock
 _MAX_TERM = 1_000_000  # of a rate as a fraction; the encoder has 32-bit integers
 
 
@@ -119,14 +119,14 @@ def joined_videos(path: Path) -> int:
 
 
 def describe(
-    path: Path, stream: VideoStream, first: av.VideoFrame, sequence: ImageSequence | None
+    path: Path, demuxer: "Demuxer", first: av.VideoFrame, sequence: ImageSequence | None
 ) -> VideoInfo:
     """Describe a video, of which the `first` picture has been decoded."""
-    container = cast("InputContainer", stream.container)
-    rate, time_base = rate_of(stream), time_base_of(stream)
+    container, stream, rate = demuxer.container, demuxer.video, demuxer.rate
+    time_base = time_base_of(stream)
     start = (first.pts or 0) * time_base
-    duration = stated_duration(stream, start)
-    if duration is None and container.duration:  # of the longest stream
+    duration = None if demuxer.is_raw else stated_duration(stream, start)
+    if duration is None and container.duration and not demuxer.is_raw:  # of the longest stream
         duration = Fraction(container.duration, av.time_base)
     orientation = Orientation.of_frame(first)
     if sequence:
@@ -176,10 +176,16 @@ def stated_duration(stream: VideoStream, start: Fraction) -> Fraction | None:
     return None
 
 
-def rate_of(stream: VideoStream) -> Fraction:
-    """Return the average frame rate; 25 if the file does not declare one."""
-    rate = stream.average_rate or stream.guessed_rate or Fraction(25)
-    return rate.limit_denominator(_MAX_TERM) or Fraction(25)
+def _stated_rate(stream: VideoStream, *, is_raw: bool) -> Fraction | None:
+    """Return the frame rate that a file declares, on average; None if it does not.
+
+    FFmpeg's average of a raw stream is an assumption.
+    """
+    if is_raw:
+        rate = stream.codec_context.framerate
+        return rate if rate and rate <= _MAX_RATE else None
+    rate = stream.average_rate or stream.guessed_rate
+    return (rate and rate.limit_denominator(_MAX_TERM)) or None
 
 
 def time_base_of(stream: VideoStream) -> Fraction:
@@ -188,6 +194,7 @@ def time_base_of(stream: VideoStream) -> Fraction:
 
 
 _TS_DISCONT = 0x0200  # FFmpeg's flag of such formats: AVFMT_TS_DISCONT
+_NO_TIMES = 0x0080  # likewise: AVFMT_NOTIMESTAMPS
 _MAX_BACK = Fraction(1, 10)  # seconds; a larger step back begins a new part
 _MAX_FORWARD = 10  # seconds; a larger jump forward begins a new part, as in the ffmpeg program
 _MAX_FAILURES = 100  # in a row; a file with only errors must end too
@@ -198,7 +205,8 @@ class Demuxer:
 
     If its clock restarts, each stream enters the next part where its own clock jumps, because
     packets of both parts alternate near the joint. The first stream in a part determines its
-    offset. Parameters and errors are those of `open_input` and `video_stream`.
+    offset. Parameters and errors are those of `open_input` and `video_stream`; `frame_rate` is that
+    of a raw stream which declares none.
 
     Attributes
     ----------
@@ -206,18 +214,30 @@ class Demuxer:
         The file.
     video
         The video stream, whose restarts count.
+    is_raw
+        Whether packets have no times, as in a raw stream.
+    states_rate
+        Whether the file declares its frame rate.
+    rate
+        Frames per second; `ASSUMED_RATE` if it is unknown.
     may_restart
         Whether the clock may restart in files of this format.
     restarts
         How often it has restarted.
     """
 
-    def __init__(self, path: Path, sequence: ImageSequence | None = None) -> None:
+    def __init__(
+        self, path: Path, sequence: ImageSequence | None = None, frame_rate: float | None = None
+    ) -> None:
         self.container = open_input(path, sequence)
         self.video = video_stream(self.container, path)
         self.restarts = 0
         self.may_restart = bool(self.container.format.flags & _TS_DISCONT)
-        self._period = 1 / rate_of(self.video)
+        self.is_raw = not sequence and bool(self.container.format.flags & _NO_TIMES)
+        stated = _stated_rate(self.video, is_raw=self.is_raw)
+        given = Fraction(str(frame_rate)) if frame_rate and self.is_raw else ASSUMED_RATE
+        self.states_rate, self.rate = stated is not None, stated or given
+        self._period = 1 / self.rate
         self._offsets = [Fraction(0)]  # of each part, seconds; the first part keeps its clock
         self._part_of: dict[int, int] = {}  # the current part of each stream
         self._ends: dict[int, Fraction] = {}  # of each stream, seconds on the time line

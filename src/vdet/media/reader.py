@@ -55,7 +55,7 @@ class VideoReader:
     frames
         Maximum number of frames; None for no limit.
     settings
-        How much damage is tolerated, and the rate of numbered images.
+        How much damage is tolerated, and the rate of numbered images or of a raw stream.
 
     Attributes
     ----------
@@ -66,8 +66,9 @@ class VideoReader:
     Raises
     ------
     VideoError
-        The file is missing, is not a video, or no frame can be decoded. After the last frame: more
-        frames were lost or damaged than `settings` tolerates.
+        The file is missing, is not a video, or no frame can be decoded; or `settings` has a rate
+        that would change nothing. After the last frame: more frames were lost or damaged than
+        `settings` tolerates.
     """
 
     def __init__(
@@ -84,6 +85,7 @@ class VideoReader:
         self._faults: list[str] = []
         self._is_scaled = False
         self._decoder = Decoder(path, settings.frame_rate)
+        self._check_rate(path)
         first = next(self._decoder.pictures, None)
         if first is None or max(first.width, first.height) > _MAX_SIDE:
             limits = f"{demux.MAX_PIXELS // 10**6} million pixels and sides of {_MAX_SIDE}"
@@ -91,12 +93,12 @@ class VideoReader:
             raise VideoError(f"{path}: no frame can be decoded; {advice}")
         stream = self._decoder.stream
         sequence = self._decoder.sequence
-        self.info: VideoInfo = demux.describe(path, stream, first, sequence)
+        self.info: VideoInfo = demux.describe(path, self._decoder.demuxer, first, sequence)
         self.length: Fraction | None = None
         if sequence:
             self.length = (sequence.ticks[-1] + 1) * self.info.time_base
             self.info = replace(self.info, frames=len(sequence.files), duration=self.length)
-        elif not self._decoder.demuxer.may_restart:
+        elif not (self._decoder.demuxer.may_restart or self._decoder.demuxer.is_raw):
             self.length = demux.stated_duration(stream, self.info.start)
         self._to_standard_range = _standard_range_filter(first.color_trc, stream)
         self._faults += self._assumptions()
@@ -127,13 +129,23 @@ class VideoReader:
         self._frames.close()
         self._decoder.demuxer.close()
 
+    def _check_rate(self, path: Path) -> None:
+        """Raise `VideoError` if the settings have a rate, but the file has times or a rate."""
+        demuxer, has_rate = self._decoder.demuxer, self._settings.frame_rate is not None
+        if has_rate and not self._decoder.sequence and (demuxer.states_rate or not demuxer.is_raw):
+            demuxer.close()
+            raise VideoError(f"{path}: has a frame rate of its own; remove input.frame_rate")
+
     def _assumptions(self) -> Iterator[str]:
         """Yield assumptions that the user should know."""
-        if self._decoder.sequence and not self._decoder.sequence.rate:
-            yield f"{ASSUMED_RATE} images per second are assumed; set input.frame_rate"
-        if self._decoder.demuxer.container.streams.audio and not self.info.has_audio:
+        demuxer, sequence = self._decoder.demuxer, self._decoder.sequence
+        is_unknown = not sequence.rate if sequence else demuxer.is_raw and not demuxer.states_rate
+        if is_unknown and self._settings.frame_rate is None:
+            what = "images" if sequence else "frames"
+            yield f"{ASSUMED_RATE} {what} per second are assumed; set input.frame_rate"
+        if demuxer.container.streams.audio and not self.info.has_audio:
             yield "its audio is dropped: a pipe can be read only once"
-        streams = len(demux.moving_streams(self._decoder.demuxer.container))
+        streams = len(demux.moving_streams(demuxer.container))
         if streams > 1:
             yield f"has {streams} video streams; only the first is used"
 

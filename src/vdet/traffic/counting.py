@@ -56,15 +56,18 @@ def count_files(
     TruthError
         A file cannot be used, or its times are missing or wrong.
     ConfigError
-        The lines do not fit the frames, the size of the frames is unknown, or a name does not match
-        the pattern of the clock.
+        The lines do not fit the frames, the size of the frames is unknown, a name does not match
+        the pattern of the clock, or no file needs the `rate`.
     """
     counted: dict[str, Counts] = {}
     group: _Group | None = None
+    rate_is_used = rate is None
     for path in paths:
-        saved = read_tracks(path, rate)
+        saved = read_tracks(path)
         if not saved.has_times:
-            raise TruthError(f"{path}: has no times; pass the frame rate, as in --rate 25")
+            if rate is None:
+                raise TruthError(f"{path}: has no times; pass the frame rate, as in --rate 25")
+            saved, rate_is_used = saved.at_rate(rate), True
         clock = find_clock(path, settings, None, saved.times.get(0, 0.0), saved.begin)
         frame_size = _frame_size(settings, size or saved.size)
         first = min(saved.times.values(), default=None)
@@ -73,6 +76,8 @@ def count_files(
             group = _Group(settings, frame_size, group.counter.linker.started if group else 0)
         group.add(str(path), clock, first or 0.0, saved)
         advance(1)
+    if not rate_is_used:
+        raise ConfigError("--rate changes nothing: the tracks have times; remove it")
     return counted | (group.counts() if group else {})
 
 
