@@ -79,6 +79,7 @@ _PARAMETERS = {
     "use --overwrite": "use overwrite=True",
     "--size, such as 1280x720": "size, such as size=(1280, 720)",
     "--rate 25": "rate=25",
+    "--rate": "rate",
     "--model": "detector=FILE",
     "--begin": "the setting input.begin",
     "an earlier --at": "an earlier Run.at",

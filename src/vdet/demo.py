@@ -130,8 +130,10 @@ def _flows(folder: Path, scene: Scene, settings: Settings) -> list[list[str]]:
     """Return the flows seen from the pole: vehicles counted, and true ones."""
     size = scene.camera.width, scene.camera.height
     flows: dict[tuple[str, str], list[int]] = {}
-    for number, name in enumerate((_ON_POLE["tracks"], POLE_TRUTH)):
-        (video,) = count_files([folder / name], settings, size, float(scene.rate)).values()
+    for number, (name, rate) in enumerate(
+        ((_ON_POLE["tracks"], None), (POLE_TRUTH, float(scene.rate)))
+    ):
+        (video,) = count_files([folder / name], settings, size, rate).values()
         for row in video.flows():
             flows.setdefault((row.origin, row.destination or NOWHERE), [0, 0])[number] += row.count
     return [[*way, *map(str, numbers)] for way, numbers in flows.items()]

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -29,7 +30,7 @@ def test_the_rate_is_that_of_the_stream(
     suffix: str, tmp_path: Path, warnings: Callable[[], list[str]]
 ) -> None:
     rate = RATES.get(suffix, SLOW)
-    spec = {"codec": CODECS[suffix], "rate": rate, "size": (176, 144)}
+    spec: dict[str, Any] = {"codec": CODECS[suffix], "rate": rate, "size": (176, 144)}
     path = write_clip(tmp_path / f"clip.{suffix}", count=30, **spec)
     assert read(path) == ([number / rate for number in range(30)], rate, 30 / rate)
     assert warnings() == []
@@ -43,7 +44,7 @@ def test_the_rate_is_that_of_the_stream(
 def test_a_stream_without_a_rate_has_that_of_the_settings(
     given: float | None, rate: Fraction, tmp_path: Path, warnings: Callable[[], list[str]]
 ) -> None:
-    spec = {"codec": "mjpeg", "pix_fmt": "yuvj420p", "rate": SLOW}
+    spec: dict[str, Any] = {"codec": "mjpeg", "pix_fmt": "yuvj420p", "rate": SLOW}
     path = write_clip(tmp_path / "clip.mjpeg", count=30, **spec)
     assert read(path, given) == ([number / rate for number in range(30)], rate, 30 / rate)
     assumed = f"{path}: 25 frames per second are assumed; set input.frame_rate"

@@ -222,6 +222,21 @@ def test_planes_are_those_of_the_decoder(
         assert np.abs(frame.image - other).mean() < 3
 
 
+@pytest.mark.parametrize("codec", [("libx264", "bf=3:b-adapt=0"), ("mpeg4", "bf=2:q=2")])
+def test_empty_packets_of_avi_are_pauses_also_with_b_frames(
+    codec: tuple[str, str], tmp_path: Path, warnings: Warnings
+) -> None:
+    name, options = codec
+    times = [2 * number * PERIOD for number in range(40)]  # 12.5 per second, at a rate of 25
+    coding = dict(option.split("=") for option in options.split(":"))
+    path = write_clip(tmp_path / "clip.avi", codec=name, times=times, options=coding)
+    with VideoReader(path) as reader:
+        frames = list(reader)
+    assert [frame.time for frame in frames] == times
+    assert [read_number(frame.image) for frame in frames] == list(range(40))
+    assert warnings() == []
+
+
 def test_info_is_what_the_file_declares(tmp_path: Path) -> None:
     rate = Fraction(30_000, 1001)
     path = write_clip(tmp_path / "a.mp4", rate=rate, matrix=1, sounds=["aac"])

@@ -1,5 +1,6 @@
 """Decode a video stream from its first picture, or from a key frame, despite damage."""
 
+from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
@@ -125,6 +126,7 @@ class Decoder:
         context.options = {"max_pixels": str(demux.MAX_PIXELS)}
         context.thread_count = 1  # with more, frames near damage differ from run to run
         self.damage = Damage(1 / self.demuxer.rate / demux.time_base_of(self.stream))
+        self._times = deque[int]()  # of the packets of an AVI file that wait for their pictures
         self._is_avi = self.demuxer.container.format.name == "avi"
         self.is_countable = context.name in _COUNTABLE and not (self._is_avi or demux.is_pipe(path))
         self._packets = self._read_images(self.sequence) if self.sequence else self._read()
@@ -170,16 +172,29 @@ class Decoder:
                 decoded = self.stream.codec_context.decode(packet)
             except av.FFmpegError:
                 self._fail()
+                if self._times:
+                    self._times.pop()
             else:
-                yield from filter(self.damage.receive, decoded)
+                yield from filter(self.damage.receive, self._timed(decoded))
         if self.is_countable:
             self.damage.without_picture = self.damage.packets - self.damage.pictures
+
+    def _timed(self, pictures: list[av.VideoFrame]) -> Iterator[av.VideoFrame]:
+        """Yield pictures with their times; those of AVI are sorted, for lack of presentation times.
+
+        AVI counts its empty packets too.
+        """
+        for picture in pictures:
+            if self._is_avi and self.stream.codec_context.has_b_frames:
+                picture.pts = self._times.popleft() if self._times else None
+            yield picture
 
     def _read(self) -> "Iterator[Packet[Stream]]":
         """Yield the packets of the pictures."""
         for packet in self.demuxer.packets([self.stream], self._fail):
             if self._is_avi and self.stream.codec_context.has_b_frames:
-                packet.pts = packet.dts = None  # AVI has no presentation times
+                packet.pts = packet.dts
+                self._times += [] if packet.dts is None else [packet.dts]
             if self.demuxer.is_raw:
                 packet.pts = packet.dts = packet.duration = None  # those of FFmpeg are assumed
             self.damage.corrupt_packets += packet.is_corrupt
