@@ -132,7 +132,7 @@ class Decoder:
         self._packets = self._read_images(self.sequence) if self.sequence else self._read()
         self.pictures = self._decode()
 
-    def skip_to(self, time: int, first: int) -> bool:
+    def skip_to(self, time: int, first: int) -> int | None:
         """Begin at the last key frame at or before a time, and count the frames before it.
 
         Parameters
@@ -142,15 +142,16 @@ class Decoder:
 
         Returns
         -------
-        False if the frames cannot be counted without decoding them: packets have no times or are
-        damaged, or key frames are very rare. The decoder is then unusable.
+        The time of the key frame. None if the frames cannot be counted without decoding them:
+        packets have no times or are damaged, or key frames are very rare. The decoder is then
+        unusable.
         """
         group: list[Packet[Stream]] = []
         key, times = first, list[int]()
         for packet in self._packets:
             is_damaged = packet.is_corrupt or self.damage.errors
             if packet.pts is None or is_damaged or len(group) > _LONGEST_GROUP:
-                return False
+                return None
             if packet.is_keyframe and packet.pts <= time:
                 key, group = packet.pts, []
             group.append(packet)
@@ -162,7 +163,7 @@ class Decoder:
         following = chain(group, self._packets)
         # Pictures before the key frame may need older ones.
         self._packets = (packet for packet in following if packet.pts is None or packet.pts >= key)
-        return True
+        return key
 
     def _decode(self) -> Iterator[av.VideoFrame]:
         for packet in chain(self._packets, (None,)):

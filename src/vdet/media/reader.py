@@ -156,8 +156,10 @@ class VideoReader:
         if not is_countable or first.pts is None or time <= first.pts:
             return first
         decoder = Decoder(self.info.path, self._settings.frame_rate)
-        picture = next(decoder.pictures, None) if decoder.skip_to(time, first.pts) else None
-        if picture is None or decoder.damage.is_evident:
+        key = decoder.skip_to(time, first.pts)
+        picture = None if key is None else next(decoder.pictures, None)
+        # With intra refresh, the pictures after a key frame need older ones too.
+        if picture is None or picture.pts != key or decoder.damage.is_evident:
             decoder.demuxer.close()
             return first
         self._decoder.demuxer.close()
