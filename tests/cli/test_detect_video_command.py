@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import struct
 from fractions import Fraction
 from pathlib import Path
 
@@ -112,3 +113,17 @@ def test_stages_of_a_time_without_a_frame_are_an_error(
     assert result.code == 1
     assert f"{clip_path}: {words}" in result.err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_only_reading_decides_whether_a_time_is_beyond_the_end(run: Run, tmp_path: Path) -> None:
+    clip, out = (
+        write_foreign(tmp_path / "clip.mkv", count=250, options={"g": "10"}),
+        tmp_path / "o.mp4",
+    )
+    declared = struct.pack(">d", 10_000), struct.pack(">d", 333)  # ms
+    content = clip.read_bytes().replace(*declared).replace(b"00:00:10.000", b"00:00:00.333")
+    clip.write_bytes(content)
+    run("detect-video", clip, out, "--start", "9.8", code=0)
+    assert len(_times(out)) == 5
+    result = run("detect-video", clip, tmp_path / "p.mp4", "--start", "20", code=1)
+    assert f"{clip}: 20.00 s is beyond its end; it ends at 10.00 s" in result.err

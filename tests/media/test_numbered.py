@@ -9,7 +9,7 @@ import pytest
 from clips import draw_frame, read_number
 from vdet.config.schema import InputSettings
 from vdet.errors import VideoError
-from vdet.media.images import find_sequence
+from vdet.media.images import find_sequence, is_image_file
 from vdet.media.reader import VideoReader
 
 
@@ -114,3 +114,28 @@ def test_numbers_beside_one_time_are_numbers(tmp_path: Path) -> None:
     found = find_sequence(tmp_path)
     assert found is not None
     assert found.rate is None
+
+
+@pytest.mark.parametrize("content", [b"", b"no image"])
+@pytest.mark.parametrize("start", [0, 5, 25])
+def test_frames_keep_their_numbers_after_an_image_that_cannot_be_decoded(
+    content: bytes, start: int, tmp_path: Path
+) -> None:
+    for number in range(40):
+        assert cv2.imwrite(str(tmp_path / f"{number}.jpg"), draw_frame(number, 160, 96))
+    (tmp_path / "20.jpg").write_bytes(content)
+    settings = InputSettings(frame_rate=25, max_damaged=0.1)
+    with VideoReader(tmp_path, start=Fraction(start, 25), settings=settings) as reader:
+        frames = list(reader)
+        assert start == 25 or reader.damaged == 1
+    expected = [number for number in range(start, 40) if number != 20]
+    assert [frame.index for frame in frames] == expected
+    assert [frame.time for frame in frames] == [Fraction(number, 25) for number in expected]
+    assert [read_number(frame.image) for frame in frames] == expected
+
+
+@pytest.mark.parametrize("name", ["a%b.png", "a%d.png"])
+def test_an_image_with_a_per_cent_sign_is_an_image(name: str, tmp_path: Path) -> None:
+    assert not is_image_file(tmp_path / name)
+    make(tmp_path, name)
+    assert is_image_file(tmp_path / name)

@@ -304,6 +304,16 @@ class TestFaults:
             assert [read_number(frame.image) for frame in reader] == list(range(12))
         assert warnings() == [f"{path}: 3 videos are joined in one file; only the first is read"]
 
+    @pytest.mark.parametrize("name", ["clip.mp4", "clip.mov"])
+    def test_a_raw_stream_may_be_named_as_another_format(
+        self, name: str, tmp_path: Path, warnings: Warnings
+    ) -> None:
+        path = write_clip(tmp_path / "clip.h264").rename(tmp_path / name)
+        assert path.read_bytes().startswith(b"\0\0\0\1")  # as the length of a box: 64 bits follow
+        with VideoReader(path) as reader:
+            assert [read_number(frame.image) for frame in reader] == list(range(12))
+        assert warnings() == []
+
     def test_an_mp4_without_its_index_is_refused(self, tmp_path: Path) -> None:
         path = cut_off(write_clip(tmp_path / "cut.mp4", **GOPS), 0.3)
         with pytest.raises(VideoError, match=r"cut\.mp4: .* is not a video, or was cut off"):

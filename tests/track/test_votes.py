@@ -85,8 +85,7 @@ def test_what_is_made_at_the_end_has_the_last_class_of_the_track(tmp_path: Path)
             for frame in frames:
                 writer.write(frame)
             writer.end()
-        rate = RATE if form.suffix == ".coco.json" else None
-        saved = vdet.count(path, settings, size=SIZE, rate=rate)
+        saved = vdet.count(path, settings, size=SIZE)
         assert [(e.name, e.class_name) for e in saved.events] == [("gate", "truck")], form.name
 
 

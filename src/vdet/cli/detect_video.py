@@ -193,7 +193,8 @@ def _with_video(paths: Sequence[Path], outputs: list[Output], *, no_video: bool)
         if not outputs:
             raise click.UsageError("no output; add one, such as --tracks")
         return outputs
-    has_default = not (no_video or outputs or videos or source.is_dir() or "%" in source.name)
+    is_pattern = "%" in source.name and not source.exists()
+    has_default = not (no_video or outputs or videos or source.is_dir() or is_pattern)
     if no_video or not (videos or has_default):
         raise click.UsageError("pass either OUT or --no-video; for several videos, add -d DIR")
     from vdet.media.writer import may_replace_video

@@ -70,13 +70,13 @@ def info(path: Path | None, source: SettingsSource, results: ResultFiles) -> int
 
 
 def _file(path: Path, settings: "Settings") -> Facts:
-    from vdet.media.images import is_image_name
+    from vdet.media.images import is_image_file
 
     if path.suffix.lower() == ".npz":
         return _linear_model(path)
     if path.suffix.lower() == ".onnx":
         return _network(path)
-    if is_image_name(path) and "%" not in path.name:
+    if is_image_file(path):
         return _image(path)
     return _video(path, settings)
 

@@ -206,10 +206,13 @@ class Decoder:
         """Yield numbered images as packets."""
         for file, tick in zip(sequence.files, sequence.ticks, strict=True):
             try:
-                packet: Packet[Stream] = Packet(read_encoded(file))
+                data = read_encoded(file)
             except ImageError:
+                data = b""
+            if not data:  # an empty packet would end the decoder
                 self._fail()
             else:
+                packet: Packet[Stream] = Packet(data)
                 packet.stream, packet.time_base = self.stream, demux.time_base_of(self.stream)
                 packet.pts = packet.dts = tick
                 packet.is_keyframe = True

@@ -103,7 +103,7 @@ def joined_videos(path: Path) -> int:
     """Return how many MP4 or MOV videos, each with an index, were joined byte by byte."""
     if not path.is_file() or path.suffix.lower() not in {".mp4", ".mov", ".m4v"}:
         return 1
-    position = indexes = 0
+    position, indexes, size = 0, 0, path.stat().st_size
     with path.open("rb") as file:
         for _ in range(_MAX_BOXES):
             file.seek(position)
@@ -112,7 +112,7 @@ def joined_videos(path: Path) -> int:
             length = int.from_bytes(header[:4])
             if length == 1:  # it follows, in 64 bits
                 length = int.from_bytes(header[8:])
-            if length < 8:  # also at the end of the file
+            if length < 8 or position + length >= size:  # also if it is no MP4 file
                 break
             position += length
     return indexes

@@ -114,6 +114,11 @@ def is_image_name(path: Path) -> bool:
     return path.suffix.lower() in IMAGE_SUFFIXES and not path.name.startswith(".")
 
 
+def is_image_file(path: Path) -> bool:
+    """Return whether a path is that of one image, not a pattern such as `img_%04d.png`."""
+    return is_image_name(path) and ("%" not in path.name or path.is_file())
+
+
 def read_header(path: Path) -> tuple[tuple[int, int], Orientation]:
     """Return width and height of the upright image, pixels, and its orientation.
 

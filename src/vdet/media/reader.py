@@ -176,7 +176,10 @@ class VideoReader:
     def _selected(self, first: av.VideoFrame) -> Iterator[Frame]:
         info, period, time = self.info, 1 / self.info.rate, None
         pictures = itertools.chain([first], self._decoder.pictures)
-        for index, picture in enumerate(pictures, self._decoder.before):
+        sequence = self._decoder.sequence
+        numbers = {tick: index for index, tick in enumerate(sequence.ticks if sequence else ())}
+        for count, picture in enumerate(pictures, self._decoder.before):
+            index = count if picture.pts is None else numbers.get(picture.pts, count)
             stated = None if picture.pts is None else picture.pts * info.time_base
             time = next_time(time, stated, period)
             since = time - info.start

@@ -11,7 +11,7 @@ from vdet.detect.factory import load_detector
 from vdet.errors import TruthError, VideoError
 from vdet.labels.reading import read_tracks
 from vdet.media import Frame, VideoInfo
-from vdet.media.images import is_image_name, read_image
+from vdet.media.images import is_image_file, read_image
 from vdet.media.reader import VideoReader
 from vdet.progress import Steps
 from vdet.run.loop import Parts
@@ -39,7 +39,7 @@ def read_scene(run: Run, tracks: Path | None, steps: Steps) -> tuple[Image, list
     VdetError
         The source or the file of tracks cannot be used.
     """
-    if is_image_name(run.source) and "%" not in run.source.name:
+    if is_image_file(run.source):
         return read_image(run.source), _saved(tracks, run) if tracks else []
     images, shown = (
         _with_saved_tracks(run, tracks, steps) if tracks else _with_detection(run, steps)

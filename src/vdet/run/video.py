@@ -16,6 +16,7 @@ from vdet.detect.factory import as_model
 from vdet.detect.protocol import VideoDetector, stage_images_of
 from vdet.errors import ConfigError, FrameSizeError, VideoError
 from vdet.files import FileIds, OutputFiles
+from vdet.media.demux import is_pipe
 from vdet.media.images import video_files
 from vdet.media.reader import VideoReader
 from vdet.progress import Progress, no_progress
@@ -146,9 +147,7 @@ def open_video(run: Run, parts: Parts, *, with_traffic: bool = True) -> Iterator
     Reading and searching run in threads. Without `with_traffic`, nothing is counted or recorded.
     """
     with named_errors(run.source, VideoError), read_async(_opened(run)) as (reader, read):
-        first_time = max(run.start or Fraction(0), run.at)
-        if reader.length is not None and first_time >= reader.length:
-            raise _no_frame(run, f"{float(first_time):.2f} s is beyond its end", reader)
+        _check_times(run, reader)
         images, frames = peek(read)
         settings, info = run.settings, reader.info
         try:
@@ -303,6 +302,19 @@ def write_outputs(
         facts=video.facts,
         summaries=sinks.summaries,
     )
+
+
+def _check_times(run: Run, reader: VideoReader) -> None:
+    """Raise `VideoError` if the first time that is needed is beyond the end of the video.
+
+    A declared length may be wrong: it is only a reason to look.
+    """
+    first_time = max(run.start or Fraction(0), run.at)
+    if reader.length is None or first_time < reader.length or is_pipe(run.source):
+        return
+    with VideoReader(run.source, start=first_time, frames=1, settings=run.settings.input) as later:
+        if next(iter(later), None) is None:
+            raise _no_frame(run, f"{float(first_time):.2f} s is beyond its end", later)
 
 
 def _no_frame(run: Run, words: str, reader: VideoReader) -> VideoError:
