@@ -139,3 +139,47 @@ def test_an_image_with_a_per_cent_sign_is_an_image(name: str, tmp_path: Path) ->
     assert not is_image_file(tmp_path / name)
     make(tmp_path, name)
     assert is_image_file(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("names", "milliseconds"),
+    [
+        (["20260501_070001_400", "20260501_070001_800", "20260501_070003_000"], [0, 400, 1600]),
+        (["01-20260501070000-00", "01-20260501070001-00"], [0, 1000]),
+        (["1-20260501070000-0", "1-20260501070000-1", "1-20260501070002-0"], [0, 500, 2000]),
+        (["1777618800", "1777618801", "1777618805"], [0, 1000, 5000]),
+        (["cam_1777618800123", "cam_1777618800623", "cam_1777618802123"], [0, 500, 2000]),
+        (["20260501_070001_001", "20260501_070002_002", "20260501_070003_003"], [0, 1000, 2000]),
+    ],
+)
+def test_names_are_times_to_the_millisecond(
+    names: list[str], milliseconds: list[int], tmp_path: Path
+) -> None:
+    for number, name in enumerate(names):
+        assert cv2.imwrite(str(tmp_path / f"{name}.png"), draw_frame(number, 160, 96))
+    with VideoReader(tmp_path) as reader:
+        frames = list(reader)
+    assert [frame.time for frame in frames] == [Fraction(ms, 1000) for ms in milliseconds]
+    assert [read_number(frame.image) for frame in frames] == list(range(len(names)))
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ["20260501_070000_001", "20260501_070000_002", "20260501_070001_003"],
+        ["0000000000", "0000000001", "0000000002"],
+    ],
+)
+def test_counters_are_no_times(names: list[str], tmp_path: Path) -> None:
+    make(tmp_path, *(f"{name}.png" for name in names))
+    found = find_sequence(tmp_path)
+    assert found is not None
+    assert (list(found.ticks), found.rate) == ([0, 1, 2], None)
+
+
+def test_the_rate_of_names_that_are_times_is_the_usual_one(tmp_path: Path) -> None:
+    for milliseconds in ("000", "201", "400", "601", "799", "999"):
+        image = draw_frame(0, 160, 96)
+        assert cv2.imwrite(str(tmp_path / f"20260501_070000_{milliseconds}.png"), image)
+    with VideoReader(tmp_path) as reader:
+        assert (reader.info.rate, reader.length) == (Fraction(1000, 200), Fraction(1199, 1000))

@@ -140,6 +140,26 @@ def test_other_video_streams_are_reported(tmp_path: Path, warnings: Warnings) ->
     assert warnings() == [f"{path}: has 2 video streams; only the first is used"]
 
 
+@pytest.mark.parametrize(("captured", "is_slow"), [("120.000000", True), ("25.000000", False)])
+def test_slow_motion_is_reported(
+    captured: str, is_slow: bool, tmp_path: Path, warnings: Warnings
+) -> None:
+    source, path = write_clip(tmp_path / "source.mp4"), tmp_path / "clip.mp4"
+    flags = {"movflags": "+use_metadata_tags"}
+    with av.open(str(source)) as read, av.open(str(path), "w", container_options=flags) as written:
+        written.metadata["com.android.capture.fps"] = captured
+        stream = written.add_stream_from_template(read.streams.video[0])
+        for packet in read.demux(video=0):
+            if packet.size:
+                packet.stream = stream
+                written.mux(packet)
+    with VideoReader(path) as reader:
+        assert len(list(reader)) == 12
+    rates = "recorded at 120 frames per second, shown at 25"
+    words = f"{path}: is slow motion: {rates}; speeds are too low by this ratio"
+    assert warnings() == [words] * is_slow
+
+
 def write_hdr(path: Path, transfer: int, lumas: list[int]) -> Path:
     """Write grey columns of 10 bits with a transfer of BT.2100 and primaries of BT.2020."""
     with av.open(str(path), "w") as container:

@@ -154,10 +154,22 @@ def describe(
     )
 
 
+def capture_rate(stream: VideoStream) -> float | None:
+    """Return how many frames per second were recorded, if an Android camera says so."""
+    with suppress(KeyError, ValueError):
+        return float(_metadata(stream)["com.android.capture.fps"])
+    return None
+
+
+def _metadata(stream: VideoStream) -> dict[str, str]:
+    """Return the metadata of a stream and its file, with names in lower case."""
+    metadata = (stream.metadata | stream.container.metadata).items()
+    return {name.lower(): value for name, value in metadata}
+
+
 def _tags(stream: VideoStream) -> Tags:
     """Return metadata of the recording; the names differ between containers."""
-    metadata = (stream.metadata | stream.container.metadata).items()
-    tags = {name.lower(): value for name, value in metadata}
+    tags = _metadata(stream)
     location = tags.get("location") or tags.get("com.apple.quicktime.location.iso6709")
     return Tags(tags.get("creation_time"), location, tags.get("title"))
 

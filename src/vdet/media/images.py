@@ -4,12 +4,15 @@ import io
 import logging
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
+from statistics import median_low
 from typing import TYPE_CHECKING
 
 import cv2
@@ -236,6 +239,8 @@ def to_ycrcb(image: Image) -> tuple[Image, Image, Image]:
 
 _PATTERN = re.compile(r"((?:[^%]|%%)*)%(?:0([1-9]\d*))?d((?:[^%]|%%)*)", re.ASCII)
 _LAST_NUMBER = re.compile(r".*?(\d+)\D*\.\w+", re.ASCII | re.DOTALL)
+_UNIX_TIME = re.compile(r"(?<!\d)(1\d{9})[-_.]?(\d{3})?(?!\d)", re.ASCII)  # 2001 to 2033
+_MILLISECONDS = re.compile(r"\d\d[-_.](\d{3})\.\w+$", re.ASCII)
 ASSUMED_RATE = Fraction(25)
 """Images per second, if neither the settings nor the names determine it."""
 
@@ -257,6 +262,11 @@ class ImageSequence:
     files: tuple[Path, ...]
     ticks: Sequence[int]
     rate: Fraction | None = None
+
+    @property
+    def step(self) -> int:
+        """Usual time from one image to the next, in periods of the rate."""
+        return median_low([after - tick for tick, after in pairwise(self.ticks)] or [1])
 
 
 def find_sequence(path: Path, frame_rate: float | None = None) -> ImageSequence | None:
@@ -323,17 +333,44 @@ def _name_pattern(pattern: re.Match[str]) -> re.Pattern[str]:
     return re.compile(f"{before}({number}){after}", re.ASCII | re.DOTALL)
 
 
-def _ordered_by_time(files: Iterable[Path]) -> ImageSequence | None:
-    """Return the images if all their names are different times."""
-    times = [(ClockSettings().time_in(file.name), file) for file in files]
-    dated = {time: file for time, file in times if time}
-    if len(dated) < len(times) or len({time.tzinfo for time in dated}) > 1:
+def _ordered_by_time(files: Mapping[Path, int]) -> ImageSequence | None:
+    """Return the images if their names are times.
+
+    Images of the same second are spread over it, if their numbers begin again with each second.
+    """
+    numbers = set(files.values())
+    is_counter = len(numbers) > 1 and max(numbers) - min(numbers) < len(numbers)
+    groups: dict[datetime | None, list[Path]] = defaultdict(list)
+    for file in sorted(files, key=lambda file: (files[file], file)):
+        groups[_time_in(file.name, has_milliseconds=not is_counter)].append(file)
+    times = sorted(filter(None, groups))
+    if None in groups or len({time.tzinfo for time in times}) > 1:
         return None
-    ordered = sorted(dated)
-    seconds = [round((time - ordered[0]).total_seconds()) for time in ordered]
-    tick = math.gcd(*seconds) or 1
-    ticks = tuple(second // tick for second in seconds)
-    return ImageSequence(tuple(dated[time] for time in ordered), ticks, Fraction(1, tick))
+    is_spread = len(times) < len(files)
+    if is_spread and (len(times) == 1 or len(numbers) == len(files)):
+        return None
+    offsets: dict[int, Path] = {}
+    for time in times:
+        start = (time - times[0]) // timedelta(milliseconds=1)
+        for place, file in enumerate(groups[time]):
+            offsets[start + 1000 * place // len(groups[time])] = file
+    has_pairs = any(len({files[file] for file in group}) < len(group) for group in groups.values())
+    if has_pairs or len(offsets) < len(files) or list(offsets) != sorted(offsets):
+        return None
+    tick = math.gcd(*offsets) or 1000
+    ticks = tuple(offset // tick for offset in offsets)
+    return ImageSequence(tuple(offsets.values()), ticks, Fraction(1000, tick))
+
+
+def _time_in(name: str, *, has_milliseconds: bool) -> datetime | None:
+    """Return the time in the name of an image, maybe a Unix time; None without one."""
+    if unix := _UNIX_TIME.search(name):
+        seconds, milliseconds = int(unix[1]), int(unix[2] or 0)
+        return datetime.fromtimestamp(seconds, UTC) + timedelta(milliseconds=milliseconds)
+    time, rest = ClockSettings().time_in(name), _MILLISECONDS.search(name)
+    return (
+        time + timedelta(milliseconds=int(rest[1])) if time and rest and has_milliseconds else time
+    )
 
 
 def _ordered_by_number(files: Mapping[Path, int], path: Path) -> ImageSequence:

@@ -26,6 +26,7 @@ from vdet.media.images import ASSUMED_RATE, Orientation, upright
 _log = logging.getLogger("vdet")
 _DEFAULTS = InputSettings()
 _MAX_SIDE = 16_384  # pixels; H.264 cannot be written larger
+_SLOW_MOTION = 1.5  # ratio of rates; in darkness, a camera may also record at a lower rate
 _TOLERANCE = Fraction(1, 100)  # fraction of its duration that an intact file may lack
 
 
@@ -96,8 +97,10 @@ class VideoReader:
         self.info: VideoInfo = demux.describe(path, self._decoder.demuxer, first, sequence)
         self.length: Fraction | None = None
         if sequence:
-            self.length = (sequence.ticks[-1] + 1) * self.info.time_base
-            self.info = replace(self.info, frames=len(sequence.files), duration=self.length)
+            self.length = (sequence.ticks[-1] + sequence.step) * self.info.time_base
+            rate = self.info.rate / sequence.step
+            frames = len(sequence.files)
+            self.info = replace(self.info, rate=rate, frames=frames, duration=self.length)
         elif not (self._decoder.demuxer.may_restart or self._decoder.demuxer.is_raw):
             self.length = demux.stated_duration(stream, self.info.start)
         self._to_standard_range = _standard_range_filter(first.color_trc, stream)
@@ -143,6 +146,10 @@ class VideoReader:
         if is_unknown and self._settings.frame_rate is None:
             what = "images" if sequence else "frames"
             yield f"{ASSUMED_RATE} {what} per second are assumed; set input.frame_rate"
+        captured, shown = demux.capture_rate(demuxer.video) or 0, float(self.info.rate)
+        if captured > _SLOW_MOTION * shown:
+            rates = f"recorded at {captured:g} frames per second, shown at {shown:.3g}"
+            yield f"is slow motion: {rates}; speeds are too low by this ratio"
         if demuxer.container.streams.audio and not self.info.has_audio:
             yield "its audio is dropped: a pipe can be read only once"
         streams = len(demux.moving_streams(demuxer.container))
