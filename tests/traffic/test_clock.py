@@ -59,6 +59,64 @@ def test_a_time_in_the_name_is_local_time_or_utc_after_a_z(name: str, created: s
     assert str(clock_of(name, None, created)) == "2026-05-01 07:00:00+02:00 (from its name)"
 
 
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("2026-05-01T05-00-00.123Z.mp4", "2026-05-01T05:00:00.123000+00:00"),
+        ("2026-05-01T05-00-00-123Z.mp4", "2026-05-01T05:00:00.123000+00:00"),
+        ("20260501-123456+0200.mp4", "2026-05-01T10:34:56+00:00"),
+        ("20260501_070000-05:00.mp4", "2026-05-01T12:00:00+00:00"),
+        ("20260501_070000_UTC.mp4", "2026-05-01T07:00:00+00:00"),
+        ("2026-05-01 at 01.04.56\u202fPM.mov", "2026-05-01T11:04:56+00:00"),
+        ("2026-05-01 12.04.56 am.mov", "2026-04-30T22:04:56+00:00"),
+        ("20260501_070000-0001.mp4", "2026-05-01T05:00:00+00:00"),  # a counter
+        ("20260501_070000_left.720p.mp4", "2026-05-01T05:00:00+00:00"),
+    ],
+)
+def test_what_follows_a_time_in_a_name_is_read(name: str, text: str) -> None:
+    clock = clock_of(name)
+    assert clock is not None
+    assert clock.zero.isoformat() == text
+
+
+@pytest.mark.parametrize("suffix", ["-0500", "UTC+2", " CEST", "+02"])
+def test_a_zone_that_is_not_read_leaves_no_clock(
+    suffix: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    name = f"20260501_070000{suffix}.mp4"
+    assert clock_of(name, created="2026-05-01T05:00:00Z") is None
+    text = f"'{suffix.strip()}' after the time in its name may be a zone"
+    advice = "set camera.clock.pattern, with %z for a zone"
+    assert caplog.messages == [f"clips/{name}: {text}; {advice}"]
+
+
+@pytest.mark.parametrize(
+    ("name", "pattern", "text"),
+    [
+        ("2019_1_14__16_6.mp4", "%Y_%m_%d__%H_%M", "2019-01-14T15:06:00+00:00"),
+        ("2022-06-01/12/cam/05.33.mp4", "%Y-%m-%d/%H/cam/%M.%S", "2022-06-01T10:05:33+00:00"),
+        (
+            "1.5.26 1-4-56.25 PM +0300",
+            "%d.%m.%y %I-%M-%S.%f %p %z",
+            "2026-05-01T10:04:56.250000+00:00",
+        ),
+    ],
+)
+def test_a_pattern_has_folders_halves_of_days_zones_and_short_numbers(
+    name: str, pattern: str, text: str
+) -> None:
+    clock = clock_of(name, pattern=pattern)
+    assert clock is not None
+    assert clock.zero.isoformat() == text
+
+
+def test_saved_tracks_of_another_name_keep_their_clock() -> None:
+    settings = Settings(camera=CameraSettings(clock=ClockSettings(pattern="%Y/%m/%d/%H.%M")))
+    zero = parse_date_time("2026-05-01 07:00+02:00")
+    clock = find_clock(Path("05.33.jsonl"), settings, None, 0.0, zero)
+    assert str(clock) == "2026-05-01 07:00:00+02:00 (from the file)"
+
+
 @pytest.mark.parametrize("name", ["gate.mp4", "20261301_070000.mp4", "120260501_0700001.mp4"])
 def test_without_a_time_in_the_name_the_creation_time_says_it(name: str) -> None:
     assert clock_of(name) is None
@@ -159,7 +217,7 @@ def test_a_text_that_is_not_a_time_is_refused(text: str) -> None:
         InputSettings(begin=text)
 
 
-@pytest.mark.parametrize("text", ["%Y%q", "100%", "clip"])
+@pytest.mark.parametrize("text", ["%Y%q", "100%", "clip", "%Y%I"])
 def test_a_text_that_is_not_a_pattern_is_refused(text: str) -> None:
-    with pytest.raises(ValidationError, match="a pattern can only contain"):
+    with pytest.raises(ValidationError, match=r"a pattern can only contain|need each other"):
         ClockSettings(pattern=text)

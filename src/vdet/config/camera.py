@@ -3,6 +3,7 @@
 import re
 from contextlib import suppress
 from datetime import datetime
+from pathlib import Path
 from typing import Annotated, ClassVar
 from zoneinfo import ZoneInfo
 
@@ -81,14 +82,28 @@ class GroundPoint(Shape):
     """Position on the road, x and y in metres at right angles, from any origin."""
 
 
-_CODES = {"%Y": r"\d{4}", **dict.fromkeys(("%m", "%d", "%H", "%M", "%S", "%y"), r"\d\d")}
-"""The codes of a pattern of times, and the digits that each stands for."""
+_TWO_DIGITS = r"(?:\d\d|(?<!\d)\d(?!\d))"
+_CODES = {
+    "%Y": r"\d{4}",
+    **dict.fromkeys(("%m", "%d", "%H", "%I", "%M", "%S"), _TWO_DIGITS),
+    "%y": r"\d\d",
+    "%f": r"\d{1,6}",
+    "%p": "[AaPp][Mm]",
+    "%z": r"(?:Z|[+-]\d\d:?\d\d)",
+}
+"""The codes of a pattern of times, and the text that each stands for."""
 _USUAL = re.compile(
-    r"(?<!\d)(\d{4})[-_.]?(\d\d)[-_.]?(\d\d)[-_T ]?(\d\d)[-_.:]?(\d\d)[-_.:]?(\d\d)"
-    r"(?!\d)(Z(?![a-zA-Z]))?",
-    re.ASCII,
+    r"(?<!\d)(?P<date>\d{4}[-_.]?\d\d[-_.]?\d\d)(?:[-_T ]| at )?"
+    r"(?P<time>\d\d[-_.:]?\d\d[-_.:]?\d\d)(?!\d)"
+    r"(?:(?:[.,]|[-_](?=\d+[Zz]))(?P<fraction>\d{3}|\d{6})(?![\dp]))?"
+    r"(?:[-_\s]?(?:(?P<utc>[Zz]|UTC|GMT)|(?P<half>[AaPp])\.?[Mm])(?![a-zA-Z+])"
+    r"|[-_\s]?(?P<offset>[+]\d\d:?\d\d|-\d\d:\d\d)(?!\d)"
+    r"|[-_\s]?(?P<unread>(?:UTC|GMT)?[+]\d+|-(?:0[1-9]|1[0-2])[-_]?[03]0(?![-_.]?\d)"
+    r"|(?:[ACEHJKMNP]|AE|AK|NZ)[SD]T(?![a-zA-Z])|(?:[CEW]E|CES|EES|[BI]S)T(?![a-zA-Z])))?"
 )
-"""A time in a name, such as 2026-05-01_07-00-00, 20260501T070000Z or 20260501070000."""
+"""A time in a name, such as 2026-05-01_07-00-00, 20260501T070000.123Z or 20260501070000+0200, and
+what may be its zone but is not read: a number after a minus may count files, letters are ambiguous.
+"""
 
 
 def parse_date_time(text: str) -> datetime:
@@ -117,22 +132,49 @@ class ClockSettings(Section):
             literal_text = re.sub("|".join(_CODES), "", pattern)
             if "%" in literal_text or pattern == literal_text:
                 raise ValueError(f"a pattern can only contain {', '.join(_CODES)} and other text")
+            if ("%I" in pattern) != ("%p" in pattern):
+                raise ValueError("%I and %p, the hour and its half of the day, need each other")
         return pattern
 
-    def time_in(self, name: str) -> datetime | None:
-        """Return the time in the name of a file; None without one. It is in UTC after a ``Z``."""
-        texts = [match.expand(r"\1\2\3T\4\5\6\7") for match in _USUAL.finditer(name)]
-        if self.pattern:
-            parts = re.findall(r"%[a-zA-Z]|[^%]", self.pattern, re.DOTALL)
-            form = "".join(_CODES.get(part) or re.escape(part) for part in parts)
-            texts = re.findall(f"(?=({form}))", name, re.ASCII)
-        for text in texts:
+    def time_in(self, path: Path) -> datetime | None:
+        """Return the time in the name of a file; None without one.
+
+        If the pattern names folders, the last folders of the path are read, too. The time has a
+        zone if the name has one.
+
+        Raises
+        ------
+        ValueError
+            Without a pattern: a time is followed by what may be a zone, but cannot be read.
+        """
+        if self.pattern is None:
+            return _usual_time(path.name)
+        parts = re.findall(r"%[a-zA-Z]|[^%]", self.pattern, re.DOTALL)
+        form = "".join(_CODES.get(part) or re.escape(part) for part in parts)
+        name = "/".join(path.absolute().parts[-1 - self.pattern.count("/") :])
+        zone = "Z" if "%SZ" in self.pattern else ""
+        for text in re.findall(f"(?=({form}))", name, re.ASCII):
             with suppress(ValueError):
-                if not self.pattern:
-                    return parse_date_time(text)
-                zone = "Z" if "%SZ" in self.pattern else ""
                 return parse_date_time(datetime.strptime(text, self.pattern).isoformat() + zone)
         return None
+
+
+def _usual_time(name: str) -> datetime | None:
+    """Return the time in a name that has a usual form; None without one. Raises `ValueError`."""
+    for match in _USUAL.finditer(name):
+        values = match.groupdict(default="")
+        date, time = (re.sub(r"\D", "", values[key]) for key in ("date", "time"))
+        if half := values["half"].upper():
+            time = f"{int(time[:2]) % 12 + 12 * (half == 'P'):02}{time[2:]}"
+        zone = "Z" if values["utc"] else values["offset"]
+        with suppress(ValueError):
+            begin = parse_date_time(f"{date}T{time}.{values['fraction'] or '0'}{zone}")
+            if not values["unread"]:
+                return begin
+            break
+    else:
+        return None
+    raise ValueError(f"{values['unread']!r} after the time in its name may be a zone")
 
 
 class CameraSettings(Section):

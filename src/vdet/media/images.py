@@ -367,7 +367,11 @@ def _time_in(name: str, *, has_milliseconds: bool) -> datetime | None:
     if unix := _UNIX_TIME.search(name):
         seconds, milliseconds = int(unix[1]), int(unix[2] or 0)
         return datetime.fromtimestamp(seconds, UTC) + timedelta(milliseconds=milliseconds)
-    time, rest = ClockSettings().time_in(name), _MILLISECONDS.search(name)
+    try:
+        time = ClockSettings().time_in(Path(name))
+    except ValueError:
+        return None
+    rest = _MILLISECONDS.search(name)
     return (
         time + timedelta(milliseconds=int(rest[1])) if time and rest and has_milliseconds else time
     )

@@ -82,7 +82,8 @@ def find_clock(
     """
     clock = settings.camera.clock
     zone: tzinfo | None = clock.zone
-    if zero and not (settings.input.begin or clock.pattern):
+    is_named = clock.pattern and (zero is None or clock.time_in(path))
+    if zero and not (settings.input.begin or is_named):
         return Clock(_utc(zero, zone), "from the file", zone or zero.tzinfo, start)
     if settings.input.begin:
         begin, source = parse_date_time(settings.input.begin), "as given"
@@ -100,7 +101,12 @@ def _begin_by_name(
     """Return the start time by the name and metadata of a video, and which of them it is from."""
     clock, zone = settings.camera.clock, settings.camera.clock.zone
     sequence = find_sequence(path)
-    named, written = clock.time_in((sequence.files[0] if sequence else path).name), None
+    named = written = None
+    try:
+        named = clock.time_in(sequence.files[0] if sequence else path)
+    except ValueError as error:
+        _log.warning("%s: %s; set camera.clock.pattern, with %%z for a zone", path, error)
+        return None
     if clock.pattern and not named:
         raise ConfigError(f"{path}: its name does not match camera.clock.pattern, {clock.pattern}")
     with suppress(ValueError):
