@@ -3,14 +3,21 @@
 import os
 import time
 from collections.abc import Iterator
+from fractions import Fraction
 from pathlib import Path
 
+import av
 import pytest
 from pydantic import ValidationError
 
+from clips import write_clip
+from conftest import Run
 from vdet.config.camera import CameraSettings, ClockSettings, parse_date_time
 from vdet.config.schema import InputSettings, Settings
 from vdet.errors import ConfigError
+from vdet.labels.label import SavedTracks
+from vdet.media.frame import Tags
+from vdet.media.reader import VideoReader
 from vdet.traffic.clock import Clock, Intervals, find_clock
 
 
@@ -24,6 +31,21 @@ def time_zone(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     time.tzset()
 
 
+def write_copy(path: Path, **tags: str) -> Path:
+    """Write a clip, and a copy of it with these tags."""
+    with (
+        av.open(write_clip(path.with_stem("source"))) as source,
+        av.open(path, "w", container_options={"movflags": "use_metadata_tags"}) as target,
+    ):
+        target.metadata.update(tags)
+        stream = target.add_stream_from_template(source.streams.video[0])
+        for packet in source.demux(video=0):
+            if packet.dts is not None:
+                packet.stream = stream
+                target.mux(packet)
+    return path
+
+
 def clock_of(
     name: str | Path,
     given: str | None = None,
@@ -32,10 +54,13 @@ def clock_of(
     *,
     pattern: str | None = None,
     zone: str | None = None,
+    exporter: str | None = None,
+    length: Fraction | None = None,
 ) -> Clock | None:
     camera = CameraSettings(clock=ClockSettings(pattern=pattern, zone=zone))
     settings = Settings(input=InputSettings(begin=given), camera=camera)
-    return find_clock(Path("clips", name), settings, created, start)
+    tags = Tags(created, exporter=exporter)
+    return find_clock(Path("clips", name), settings, start, tags=tags, length=length)
 
 
 def test_a_time_that_is_given_is_taken() -> None:
@@ -112,8 +137,8 @@ def test_a_pattern_has_folders_halves_of_days_zones_and_short_numbers(
 
 def test_saved_tracks_of_another_name_keep_their_clock() -> None:
     settings = Settings(camera=CameraSettings(clock=ClockSettings(pattern="%Y/%m/%d/%H.%M")))
-    zero = parse_date_time("2026-05-01 07:00+02:00")
-    clock = find_clock(Path("05.33.jsonl"), settings, None, 0.0, zero)
+    saved = SavedTracks((), begin=parse_date_time("2026-05-01 07:00+02:00"))
+    clock = find_clock(Path("05.33.jsonl"), settings, 0.0, saved=saved)
     assert str(clock) == "2026-05-01 07:00:00+02:00 (from the file)"
 
 
@@ -140,6 +165,43 @@ def test_a_name_and_metadata_that_disagree_are_both_said(
     caplog.clear()
     clock_of("20260501_070000.mp4", "2026-05-01 07:00", created)
     assert caplog.messages == []
+
+
+def test_a_creation_time_at_the_end_of_the_video_is_no_contradiction(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    clock_of("20260501_070000.mp4", None, "2026-05-01T05:15:30Z", length=Fraction(900))
+    assert caplog.messages == []
+
+
+def test_the_creation_time_of_an_exported_file_is_doubtful(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    created = clock_of("a.mp4", None, "2026-05-01T05:00:00Z", exporter="HandBrake 1.6.1")
+    text = "2026-05-01 07:00:00+02:00 (its creation time, perhaps of an export)"
+    assert str(created) == text
+    assert caplog.messages == [f"clips/a.mp4: may not begin {text}; --begin overrides it"]
+
+
+def test_the_clock_of_tracks_is_as_doubtful_as_that_of_their_video(
+    tmp_path: Path, run: Run
+) -> None:
+    video = write_copy(tmp_path / "a.mp4", creation_time="2026-05-01T05:00:00Z")
+    tracks, lines = tmp_path / "a.jsonl", tmp_path / "l.yaml"
+    lines.write_text("traffic: {lines: [{name: gate, start: [0, 0.5], end: [1, 0.5]}]}")
+    live = run("detect-video", video, "--no-video", "--tracks", tracks, code=0)
+    again = run("count", tracks, "-c", lines, "--size", "160x96", code=0)
+    text = "2026-05-01 07:00:00+02:00 (its creation time, perhaps of an export)"
+    assert f"{video}: may not begin {text}; --begin overrides it" in live.err
+    assert f"{tracks}: may not begin {text}; --begin overrides it" in again.err
+
+
+def test_the_key_of_apple_has_the_zone_and_is_not_of_an_export(tmp_path: Path) -> None:
+    tags = {"com.apple.quicktime.creationdate": "2026-05-01T07:00:00-0300"}
+    path = write_copy(tmp_path / "a.mov", creation_time="2026-06-01T00:00:00Z", **tags)
+    with VideoReader(path) as reader:
+        clock = find_clock(path, Settings(), 0.0, tags=reader.info.tags)
+    assert str(clock) == "2026-05-01 07:00:00-03:00 (its creation time)"
 
 
 def test_pictures_that_are_named_by_the_clock_say_when_they_begin(tmp_path: Path) -> None:

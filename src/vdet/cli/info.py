@@ -218,7 +218,7 @@ def _video(path: Path, settings: "Settings") -> Facts:
 
     with VideoReader(path, settings=settings.input) as reader:
         video = reader.info
-    clock = find_clock(path, settings, video.tags.creation_time, float(video.start))
+    clock = find_clock(path, settings, float(video.start), tags=video.tags, length=video.duration)
     return {
         "kind": "video",
         "width": video.width,

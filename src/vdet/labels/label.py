@@ -140,6 +140,8 @@ class SavedTracks:
         Width and height of the frames in pixels; None if the file does not contain them.
     begin
         The moment of time 0, if the file has it.
+    begin_source
+        Where that is from.
     """
 
     labels: tuple[Label, ...]
@@ -147,6 +149,7 @@ class SavedTracks:
     times: Mapping[int, float] = field(default_factory=dict)
     size: tuple[int, int] | None = None
     begin: datetime | None = None
+    begin_source: str = "from the file"
 
     @property
     def has_times(self) -> bool:

@@ -8,6 +8,7 @@ import io
 import json
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from datetime import datetime, timedelta
 from itertools import islice
 from pathlib import Path
@@ -33,6 +34,9 @@ from vdet.track.track import FrameTracks, State, Track
 
 CLOCK = "clock"
 """Name of the fact and the column with the clock time of a frame, ISO 8601."""
+
+CLOCK_SOURCE = "clock_source"
+"""Name of the fact that says why a clock may be wrong."""
 
 _COLUMNS = (
     *("frame", "time", "id", "x", "y", "width", "height"),
@@ -77,6 +81,7 @@ class _Record(TypedDict):
     time: float
     tracks: Annotated[list[dict[str, Any]], FailFast()]
     clock: NotRequired[str]
+    clock_source: NotRequired[Annotated[str, Field(max_length=100)]]
 
 
 _RECORD = TypeAdapter(_Record)
@@ -144,7 +149,9 @@ def read_json_lines(path: Path, data: bytes) -> SavedTracks:
     line, first = next(numbered_lines(path, data))
     record = _RECORD.validate_json(first)
     begin = _begin(path, line, record.get("clock"), record["time"])
-    return SavedTracks(labels, tuple(seconds), seconds, begin=begin)
+    saved = SavedTracks(labels, tuple(seconds), seconds, begin=begin)
+    source = record.get("clock_source")
+    return replace(saved, begin_source=source) if source else saved
 
 
 def _json_rows(path: Path, data: bytes, times: Times) -> Iterator[_Rows]:

@@ -75,6 +75,8 @@ def is_pipe(path: Path) -> bool:
 HDR_TRANSFERS = (16, 18)
 """PQ and HLG, in codes of ITU-T H.273."""
 _MAX_RATE = 1000  # frames per second; in a raw stream, a larger number is the unit of its clock
+_EXPORTER = re.compile(r"Lav[fc]|HandBrake|Adobe|Blackmagic|DaVinci|VLC|vlc|iMovie|Final Cut")
+"""Start of the name of a program that encodes videos again, or copies them."""
 _MAX_TERM = 1_000_000  # of a rate as a fraction; the encoder has 32-bit integers
 
 
@@ -171,7 +173,19 @@ def _tags(stream: VideoStream) -> Tags:
     """Return metadata of the recording; the names differ between containers."""
     tags = _metadata(stream)
     location = tags.get("location") or tags.get("com.apple.quicktime.location.iso6709")
-    return Tags(tags.get("creation_time"), location, tags.get("title"))
+    recorded = tags.get("com.apple.quicktime.creationdate")  # with a zone, and kept by exports
+    return Tags(
+        creation_time=recorded or tags.get("creation_time"),
+        location=location,
+        title=tags.get("title"),
+        exporter=None if recorded else _exporter(tags),
+    )
+
+
+def _exporter(tags: Mapping[str, str]) -> str | None:
+    """Return the program that wrote a file again after the recording; None if none is known."""
+    encoder = tags.get("encoder", "")
+    return encoder if _EXPORTER.match(encoder) else None
 
 
 def stated_duration(stream: VideoStream, start: Fraction) -> Fraction | None:

@@ -287,11 +287,15 @@ class ColorTags:
 
 @dataclass(frozen=True, slots=True)
 class Tags:
-    """Metadata of the recording in the file; None if missing."""
+    """Metadata of the recording in the file; None if missing.
+
+    `exporter` is the program that wrote the file again, so that the creation time may be its own.
+    """
 
     creation_time: str | None = None
     location: str | None = None
     title: str | None = None
+    exporter: str | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -240,7 +240,7 @@ def to_ycrcb(image: Image) -> tuple[Image, Image, Image]:
 _PATTERN = re.compile(r"((?:[^%]|%%)*)%(?:0([1-9]\d*))?d((?:[^%]|%%)*)", re.ASCII)
 _LAST_NUMBER = re.compile(r".*?(\d+)\D*\.\w+", re.ASCII | re.DOTALL)
 _UNIX_TIME = re.compile(r"(?<!\d)(1\d{9})[-_.]?(\d{3})?(?!\d)", re.ASCII)  # 2001 to 2033
-_MILLISECONDS = re.compile(r"\d\d[-_.](\d{3})\.\w+$", re.ASCII)
+_MILLISECONDS = re.compile(r"\d\d[-_](\d{3})\.\w+$", re.ASCII)
 ASSUMED_RATE = Fraction(25)
 """Images per second, if neither the settings nor the names determine it."""
 

@@ -156,7 +156,9 @@ def open_video(run: Run, parts: Parts, *, with_traffic: bool = True) -> Iterator
             log.warning("%s: no vehicles can be detected: %s", run.source, error)
             pipeline = build(Parts(as_model(lambda _: NO_BOXES)), settings, info, images)
         del images  # otherwise they stay in memory for the whole run
-        clock = find_clock(run.source, settings, info.tags.creation_time, float(info.start))
+        clock = find_clock(
+            run.source, settings, float(info.start), tags=info.tags, length=info.duration
+        )
         traffic = LiveTraffic(settings, info.width, info.height, clock)
         facts: dict[str, Fact] = {}
 

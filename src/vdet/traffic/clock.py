@@ -5,18 +5,26 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta, timezone, tzinfo
+from fractions import Fraction
 from itertools import accumulate
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from vdet.config.camera import parse_date_time
 from vdet.config.schema import Settings
 from vdet.errors import ConfigError
+from vdet.media.frame import Tags
 from vdet.media.images import find_sequence
 from vdet.track.track import FrameTracks
+
+if TYPE_CHECKING:
+    from vdet.labels.label import SavedTracks
 
 _log = logging.getLogger("vdet")
 _SAME = timedelta(minutes=1)
 """Maximum difference between the times in the name and the metadata without a warning."""
+_CREATED = "its creation time"
+_EXPORTED = "its creation time, perhaps of an export"
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +52,11 @@ class Clock:
         return f"{_text(self.at(self.first))} ({self.source})"
 
     @property
+    def is_doubtful(self) -> bool:
+        """Whether it is only the creation time of a file that was written again."""
+        return self.source == _EXPORTED
+
+    @property
     def second_of_day(self) -> float:
         """The second of the day at time 0 in the video."""
         zero = self.at(0.0).replace(tzinfo=None)
@@ -55,25 +68,31 @@ class Clock:
 
 
 def find_clock(
-    path: Path, settings: Settings, created: str | None, start: float, zero: datetime | None = None
+    path: Path,
+    settings: Settings,
+    start: float,
+    *,
+    tags: Tags | None = None,
+    length: Fraction | None = None,
+    saved: "SavedTracks | None" = None,
 ) -> Clock | None:
     """Return the clock of a video; None if its start time is unknown.
 
-    `input.begin` has priority, then the pattern of `camera.clock`, then `zero`, then a time in the
-    name of the video or its first image, then the creation time of the video. A time without a zone
-    is local time of the camera. If the name and the creation time differ by more than a minute, a
-    warning (logger "vdet") shows both.
+    `input.begin` has priority, then the pattern of `camera.clock`, then saved tracks, then a time
+    in the name of the video or its first image, then the creation time of the video. A time without
+    a zone is local time of the camera. There is a warning (logger "vdet") if the creation time is
+    more than a minute from the start and from the end by the name, or may be that of an export.
 
     Parameters
     ----------
     path
         The video, or a file named after it.
-    created
-        The creation time in the metadata of the file.
     start
         Time of its first frame in the video, seconds.
-    zero
-        Clock time at time 0, if it is in the file itself.
+    tags, length
+        Its metadata, and its duration, seconds.
+    saved
+        Its tracks, if they are read from a file.
 
     Raises
     ------
@@ -82,21 +101,27 @@ def find_clock(
     """
     clock = settings.camera.clock
     zone: tzinfo | None = clock.zone
+    zero = saved.begin if saved else None
     is_named = clock.pattern and (zero is None or clock.time_in(path))
-    if zero and not (settings.input.begin or is_named):
-        return Clock(_utc(zero, zone), "from the file", zone or zero.tzinfo, start)
     if settings.input.begin:
         begin, source = parse_date_time(settings.input.begin), "as given"
         zone = zone or begin.tzinfo
-    elif begin_and_source := _begin_by_name(path, settings, created):
+    elif saved and zero and not is_named:
+        begin, source = _utc(zero, zone) + timedelta(seconds=start), saved.begin_source
+        zone = zone or zero.tzinfo
+    elif begin_and_source := _begin_by_name(path, settings, tags or Tags(), length):
         begin, source = begin_and_source
+        zone = zone or (begin.tzinfo if begin.utcoffset() else None)
     else:
         return None
-    return Clock(_utc(begin, zone) - timedelta(seconds=start), source, zone, start)
+    found_clock = Clock(_utc(begin, zone) - timedelta(seconds=start), source, zone, start)
+    if found_clock.is_doubtful:
+        _log.warning("%s: may not begin %s; --begin overrides it", path, found_clock)
+    return found_clock
 
 
 def _begin_by_name(
-    path: Path, settings: Settings, created: str | None
+    path: Path, settings: Settings, tags: Tags, length: Fraction | None
 ) -> tuple[datetime, str] | None:
     """Return the start time by the name and metadata of a video, and which of them it is from."""
     clock, zone = settings.camera.clock, settings.camera.clock.zone
@@ -110,16 +135,19 @@ def _begin_by_name(
     if clock.pattern and not named:
         raise ConfigError(f"{path}: its name does not match camera.clock.pattern, {clock.pattern}")
     with suppress(ValueError):
-        written = parse_date_time(created or "")
+        written = parse_date_time(tags.creation_time or "")
     if not named:
-        return (written, "its creation time") if written else None
-    if written and not clock.pattern and abs(_utc(named, zone) - _utc(written, zone)) > _SAME:
-        _log.warning(
-            "%s: begins %s by its name, %s by its metadata; using the name; --begin overrides it",
-            path,
-            _text(_utc(named, zone).astimezone(zone)),
-            _text(_utc(written, zone).astimezone(zone)),
-        )
+        return (written, _EXPORTED if tags.exporter else _CREATED) if written else None
+    if written and not clock.pattern:
+        later = _utc(written, zone) - _utc(named, zone)
+        if min(abs(later), abs(later - timedelta(seconds=float(length or 0)))) > _SAME:
+            _log.warning(
+                "%s: begins %s by its name, %s by its metadata; using the name; --begin overrides "
+                "it",
+                path,
+                _text(_utc(named, zone).astimezone(zone)),
+                _text(_utc(written, zone).astimezone(zone)),
+            )
     return named, "from its name"
 
 

@@ -68,7 +68,7 @@ def count_files(
             if rate is None:
                 raise TruthError(f"{path}: has no times; pass the frame rate, as in --rate 25")
             saved, rate_is_used = saved.at_rate(rate), True
-        clock = find_clock(path, settings, None, saved.times.get(0, 0.0), saved.begin)
+        clock = find_clock(path, settings, saved.times.get(0, 0.0), saved=saved)
         frame_size = _frame_size(settings, size or saved.size)
         first = min(saved.times.values(), default=None)
         if group is None or not group.precedes(frame_size, clock, first):

@@ -21,7 +21,7 @@ from vdet.labels.formats import (
     image_suffixes,
     track_suffixes,
 )
-from vdet.labels.native import CLOCK, JSON_LINES, track_record
+from vdet.labels.native import CLOCK, CLOCK_SOURCE, JSON_LINES, track_record
 from vdet.run.result import FrameResult, findings_in
 from vdet.run.sinks.protocol import STANDARD_OUTPUT, BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.traffic import output
@@ -69,7 +69,8 @@ class TrackSink(BaseSink):
         frame, clock = result.frame_tracks, self.traffic.clock
         if clock:
             clock_time = clock.at(frame.time).isoformat(" ", "microseconds")
-            frame = replace(frame, facts={CLOCK: clock_time, **frame.facts})
+            doubt = {CLOCK_SOURCE: clock.source} if clock.is_doubtful else {}
+            frame = replace(frame, facts={CLOCK: clock_time, **doubt, **frame.facts})
         self._writer.write(frame)
         if self._file is None:
             sys.stdout.flush()
