@@ -67,6 +67,7 @@ def changed(name: str, number: int, **values: object) -> bytes:
         (changed("annotations", 2, category_id=9), ":annotations.2: image 3 or category 9 not"),
         (changed("annotations", 2, bbox=[1, 2, 3]), ": is not COCO: annotations.2.bbox.3: Field"),
         (changed("images", 1, frame_index=None, file_name="im5.png"), ": needs the frame_index of"),
+        (changed("images", 1, frame_index=None, file_name="frame_123456789.txt"), ": needs the fr"),
         (exported({0: [1]}, attributes={}), ": needs the frame_index of each image and the track_"),
         (exported({0: [1]}, attributes={"track_id": "x"}), ": needs the frame_index of each image"),
     ],

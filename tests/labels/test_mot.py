@@ -14,6 +14,16 @@ def test_truth_of_the_older_form_has_ten_columns_and_a_flag(tmp_path: Path) -> N
     assert read_truth(path).ignored.tolist() == [False, True]
 
 
+def test_truth_with_spaces_is_read_and_several_classes_are_named(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    path = tmp_path / "gt.txt"
+    path.write_text("1 7 11 21 20 10 1 4 0 0\n1 8 1 1 9 9 1 1 0 0\n1 9 1 1 9 9 0 0 0 0\n")
+    assert read_truth(path).boxes.tolist() == [[10, 20, 30, 30], [0, 0, 9, 9], [0, 0, 9, 9]]
+    text = "column 8 has the classes 1, 4, which are all read as vehicles"
+    assert caplog.messages == [f"{path}: {text}; keep only the rows of vehicles"]
+
+
 def test_tracks_are_written_without_a_heading() -> None:
     assert written(MOT, [frame(4, car())]) == b"5,1,11,21,30,40,0.7500,-1,-1,-1\n"
 

@@ -27,7 +27,7 @@ from vdet.boxes import Box
 from vdet.config.classes import UNKNOWN
 from vdet.errors import TruthError, printable
 from vdet.labels.formats import Format, ImageTracks, SourceVideo, last_classes
-from vdet.labels.images import LabelledImage, image_folder, inside
+from vdet.labels.images import LabelledImage, image_names, inside, log
 from vdet.labels.label import MAX_LABELS, NO_ID, Label, SavedTracks, Size, from_size, line_error
 from vdet.labels.parsing import (
     LIMIT,
@@ -210,6 +210,10 @@ _KEYS = {
 }
 
 
+_OTHERS = {b'"_via_': "VIA", b'"imagePath"': "LabelMe", b'"box2d"': "BDD100K"}
+"""Other formats of JSON, by a part of their text."""
+
+
 def _used_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """Return an object of JSON without what is not used, such as outlines: it takes most memory."""
     return {key: value for key, value in pairs if key in _KEYS}
@@ -225,6 +229,9 @@ def _read(path: Path, data: bytes) -> _Document:
         raise TruthError(f"{path}: is not JSON: nested too deeply") from None
     except ValueError as error:
         raise TruthError(f"{path}: is not JSON: {printable(str(error))}") from error
+    if not (isinstance(values, dict) and "images" in values):
+        name = next((name for mark, name in _OTHERS.items() if mark in data), "JSON without images")
+        raise TruthError(f"{path}: is {name}, not COCO; export or convert the labels to COCO")
     try:
         document = _DOCUMENT.validate_python(values)
     except ValidationError as error:
@@ -232,6 +239,10 @@ def _read(path: Path, data: bytes) -> _Document:
     for entries in (document.images, document.categories):
         if len({entry.id for entry in entries}) < len(entries):
             raise TruthError(f"{path}: is not COCO: an id of images or categories occurs twice")
+    corners = [max(from_size(*entry.bbox)) for entry in document.annotations]
+    sides = [side for image in document.images for side in image.size or ()]
+    if corners and max(corners) <= 100 and min(sides, default=0) > 2 * 100:
+        log.warning("%s: no box reaches beyond pixel 100; COCO has pixels, no percentages", path)
     return document
 
 
@@ -286,8 +297,8 @@ COCO = Format("COCO", ".coco.json", read_coco, whole=_write, images=_write_image
 def read_coco_images(path: Path) -> Iterator[LabelledImage]:
     """Yield every image of a COCO file; `iscrowd: 1` marks an ignore region.
 
-    `image_folder` finds the images, such as in `images/default` from CVAT. Only boxes and
-    categories are used.
+    `image_names` finds the images, such as in `images/default` from CVAT. Only boxes and categories
+    are used.
 
     Raises
     ------
@@ -300,11 +311,10 @@ def read_coco_images(path: Path) -> Iterator[LabelledImage]:
     labels = _labels(path, document, dict.fromkeys((image.id for image in document.images), 1))
     for entry, label in zip(document.annotations, labels, strict=True):
         by_image[entry.image_id].append(label)
-    folder = None
-    for image in document.images:
-        folder = folder or image_folder(path, image.file_name)
+    names = image_names(path, [image.file_name for image in document.images])
+    for image, name in zip(document.images, names, strict=True):
         yield LabelledImage(
-            path=folder / image.file_name,
+            path=name,
             file=path,
             labels=tuple(by_image[image.id]),
             size=image.size,

@@ -3,6 +3,7 @@
 Formats are registered in the group `vdet.formats`: see `vdet.plugins`.
 """
 
+import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -164,11 +165,15 @@ def _format_name(path: Path, data: bytes) -> str | None:
         return None
     if first.startswith("<"):
         raise TruthError(f"{path}: XML is not supported; export the labels as COCO")
-    if first.startswith("{"):
+    if first[0] in "{[":
         return "coco"
-    if "," in first:
-        return "mot" if first[0] in "0123456789+-." else "csv"
+    if re.match(r"\S+ \S+ [A-Za-z]", first):
+        raise TruthError(f"{path}: KITTI tracks are no longer read; use MOTChallenge or COCO")
+    starts_with_number = first[0] in "0123456789+-."
+    if "," in first or (starts_with_number and ";" not in first):
+        return "mot" if starts_with_number else "csv"
+    separator = "tabs" if "\t" in first else "semicolons" if ";" in first else "spaces"
     raise TruthError(
-        f"{path}: columns must be separated by commas, as in MOTChallenge and CSV; KITTI tracks "
-        "are no longer read"
+        f"{path}: columns are separated by {separator}; they must be separated by commas, as in "
+        "MOTChallenge and CSV"
     )

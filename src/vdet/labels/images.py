@@ -3,8 +3,9 @@
 import logging
 import math
 import os
+import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 
@@ -187,9 +188,30 @@ def is_file(path: Path) -> bool:
 
 def inside(name: str) -> str:
     """Return an image name from a file. Raises `ValueError` if it points outside the set."""
-    if PurePosixPath(name).is_absolute() or ".." in PurePosixPath(name).parts:
+    if ".." in PurePosixPath(name.replace("\\", "/")).parts:
         raise ValueError(f"{printable(name)} points outside the set")
     return name
+
+
+def image_names(path: Path, names: Sequence[str]) -> list[Path]:
+    """Return the paths of the images that a file of labels names.
+
+    If the first one is not found, or one is absolute, only the last parts of the names are used,
+    such as `a.jpg` of `/data/upload/1/a.jpg` or `/data/?d=images/a.jpg`; a backslash separates
+    folders, too. Raises `TruthError` if an image is not found, or two have the same name.
+    """
+    try:
+        if any(PurePosixPath(name).is_absolute() for name in names):
+            raise TruthError(f"{path}: has absolute names of images; make them relative")
+        folder = image_folder(path, names[0]) if names else path.parent
+        return [folder / name for name in names]
+    except TruthError:
+        parts = (name.rpartition("?d=")[2].partition("?")[0] for name in names)
+        last_parts = [re.split(r"[/\\]", part)[-1] for part in parts]
+        if last_parts == list(names) or len(set(last_parts)) < len(names):
+            raise
+        folder = image_folder(path, last_parts[0])
+        return [folder / name for name in last_parts]
 
 
 def image_folder(path: Path, name: str) -> Path:

@@ -3,7 +3,9 @@
 Source: Milan et al., "MOT16: A Benchmark for Multi-Object Tracking", 2016, tables 3 and 4.
 """
 
+import logging
 from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 
 from vdet.labels.formats import Format
@@ -11,6 +13,8 @@ from vdet.labels.label import Label, SavedTracks, from_size
 from vdet.labels.parsing import label_lines, parse_number, parse_whole
 from vdet.track.track import FrameTracks
 
+_log = logging.getLogger("vdet")
+_MAX_CLASSES = 100  # more are positions, in the eighth column of results
 _TRUTH_COLUMNS, _RESULT_COLUMNS = 9, 10
 
 
@@ -30,7 +34,8 @@ def read_mot(path: Path, data: bytes) -> SavedTracks:
     Results have ten columns: frame, id, left, top, width, height, confidence, -1, -1, -1. Truth has
     nine, as in `gt.txt`: frame, id, left, top, width, height, flag, class, visibility. Flag 0 marks
     an ignore region, 1 a vehicle. The class is not used, because its numbers differ between tools;
-    neither is the visibility.
+    neither is the visibility. Several classes give a warning (logger "vdet"). Columns may also be
+    separated by spaces.
 
     Raises
     ------
@@ -38,12 +43,23 @@ def read_mot(path: Path, data: bytes) -> SavedTracks:
         A line has a wrong number of columns, or another one than the first line, a column is not a
         number, or a flag is neither 0 nor 1.
     """
-    counts = _TRUTH_COLUMNS, _RESULT_COLUMNS
-    labels = label_lines(path, data, _label, form="MOTChallenge", counts=counts, separator=",")
-    return SavedTracks(tuple(labels))
+    counts, classes = (_TRUTH_COLUMNS, _RESULT_COLUMNS), set[str]()
+    separator = "," if b"," in data.lstrip().partition(b"\n")[0] else None
+    parse = partial(_label, classes=classes)
+    labels = label_lines(path, data, parse, form="MOTChallenge", counts=counts, separator=separator)
+    saved = SavedTracks(tuple(labels))
+    if 1 < len(classes) <= _MAX_CLASSES:
+        numbers = ", ".join(sorted(classes, key=int))
+        _log.warning(
+            "%s: column 8 has the classes %s, which are all read as vehicles; keep only the rows "
+            "of vehicles",
+            path,
+            numbers,
+        )
+    return saved
 
 
-def _label(line: int, columns: Sequence[str]) -> Label:
+def _label(line: int, columns: Sequence[str], *, classes: set[str]) -> Label:
     frame, id_ = map(parse_whole, columns[:2])
     left, top, width, height, flag_or_score, *_ = map(parse_number, columns[2:])
     is_truth = len(columns) == _TRUTH_COLUMNS
@@ -52,6 +68,8 @@ def _label(line: int, columns: Sequence[str]) -> Label:
             f"with nine columns, column 7 must be a flag, 0 or 1, but is {flag_or_score:g}; a "
             "results file needs ten columns"
         )
+    if flag_or_score and columns[7].strip().isdecimal():
+        classes.add(columns[7].strip())
     return Label(
         position=line,
         box=from_size(left - 1, top - 1, width, height),

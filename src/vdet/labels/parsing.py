@@ -23,7 +23,7 @@ MAX_BYTES = 300_000_000
 MAX_PART = 1_000_000
 """Maximum size of a line, bytes."""
 
-_LAST_NUMBER = re.compile(r"([0-9]{1,8})$", re.ASCII)
+_LAST_NUMBER = re.compile(r"(?<![0-9])([0-9]{1,8})$", re.ASCII)
 _LATEST = 1e11
 """Maximum time in seconds, three thousand years of wall-clock time."""
 
