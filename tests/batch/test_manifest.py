@@ -27,6 +27,11 @@ def lines(path: Path) -> list[str]:
     return path.read_text().splitlines()
 
 
+def test_a_line_that_is_nested_too_deeply_is_skipped(tmp_path: Path) -> None:
+    (tmp_path / "manifest.jsonl").write_text("[" * 200_000 + "\n" + RECORD.line)
+    assert [record.input for record in read_batch(tmp_path)] == [RECORD.input]
+
+
 def test_a_record_is_there_as_soon_as_it_is_added(tmp_path: Path) -> None:
     path = tmp_path / "manifest.jsonl"
     with open_manifest(tmp_path) as add:

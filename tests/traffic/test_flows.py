@@ -218,7 +218,7 @@ class TestFiles:
     def test_the_table_of_flows_is_tidy_and_has_no_formulas(self, tmp_path: Path) -> None:
         self.write(flows_content, tmp_path / "f.csv", {"v": at(crossing())}, 900)
         assert rows_of(tmp_path / "f.csv")[-1] == {
-            "start": "2026-05-01 07:00:00+02:00", "end": "2026-05-01 07:15:00+02:00",
+            "start": "2026-05-01 07:00:00.000+02:00", "end": "2026-05-01 07:15:00.000+02:00",
             "from": "west", "to": "'=south", "class": "vehicle", "count": "1",
         }  # fmt: skip
         self.write(flows_content, tmp_path / "g.csv", {"v": crossing(EAST)})
@@ -278,12 +278,12 @@ class TestFiles:
             "interval": None,
             "flows": [
                 {
-                    "start": "2026-05-01 07:04:57+02:00", "end": "2026-05-01 07:05:07+02:00",
+                    "start": "2026-05-01 07:04:57.000+02:00", "end": "2026-05-01 07:05:07.000+02:00",
                     "from": "east", "to": None, "class": "vehicle", "count": 1,
                 },
             ],
             "matrix": {"east": {"east": 0, "(none)": 1}},
-            "begin": "2026-05-01 07:04:57+02:00",
+            "begin": "2026-05-01 07:04:57.000+02:00",
             "warnings": [],
         }  # fmt: skip
 

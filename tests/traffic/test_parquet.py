@@ -1,5 +1,6 @@
 """Records of vehicles as Parquet, and the questions of the page on batches, which run here."""
 
+import os
 import sys
 from pathlib import Path
 from typing import Any
@@ -39,6 +40,17 @@ def test_columns_keep_their_types_where_no_value_is_known(tmp_path: Path) -> Non
         "string", "int64", "string", "string", "double", "int64", "double",
     ]  # fmt: skip
     assert table.column("video").to_pylist() == ["a", "a", "b"]
+
+
+def test_types_do_not_depend_on_the_vehicles(tmp_path: Path) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet")
+    every, none = write_all(tmp_path), tmp_path / "none.parquet"
+    join_records({os.fsdecode(b"quiet\xff.mp4"): records_content([], none)}, none)
+    assert parquet.read_schema(none) == parquet.read_schema(every)
+    vehicles = summarize([frame(0, track(1, BOX))], WIDTH)
+    join_records({os.fsdecode(b"a\xff.mp4"): records_content(vehicles, none)}, none)
+    assert parquet.read_table(none).column("video").to_pylist() == ["a\\udcff.mp4"]
+    assert parquet.read_schema(none) == parquet.read_schema(every)
 
 
 def test_the_questions_of_the_page_on_batches_are_answered(

@@ -130,7 +130,7 @@ def read_records(*paths: Path) -> Iterator[Record]:
     for path in paths:
         with output_errors(path), suppress(FileNotFoundError), path.open("rb") as file:
             for line in file:
-                with suppress(ValueError, TypeError, KeyError):
+                with suppress(ValueError, TypeError, KeyError, RecursionError):
                     values = json.loads(line)
                     outputs = tuple(Written(**output) for output in values["outputs"])
                     yield Record(**{**values, "outputs": outputs})

@@ -62,6 +62,10 @@ def count(
       vdet count tracks.jsonl -c gate.yaml --flows flows.csv --interval 15min
       vdet count found/*.tracks.csv -c gate.yaml --counts counts.json
     """
+    from vdet.batch.manifest import MANIFEST
+
+    if len(tracks) > 1:  # by a pattern such as found/*.jsonl
+        tracks = tuple(path for path in tracks if path.name != MANIFEST)
     _reject_videos(tracks)
     settings = source.load()
     if classes:  # any class that TRACKS have

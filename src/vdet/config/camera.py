@@ -14,7 +14,7 @@ from vdet.config.section import Section
 from vdet.config.shapes import Coordinate, FramePoint, Shape, Size
 from vdet.errors import ConfigError
 
-_EARLIEST, _LATEST = 1990, 9000
+_EARLIEST, _LATEST = 1990, 2200
 """Years of recordings; cameras without a clock begin in 1904, 1970 or 1980."""
 _LENS_TOLERANCE = 0.005  # accepts 854×480 for 1280×720
 

@@ -16,6 +16,8 @@ VIDEO = "video"
 """The column with the name of the video."""
 _TEXTS = (VIDEO, "class", "clock", "motion")
 """Columns of text in Parquet."""
+_INTEGERS = ("id", "detected", "interpolated", "predicted", "x", "y", "width", "height", "lane")
+"""Columns of integers in Parquet; the others are floats."""
 
 _FORMULA = re.compile(r"[=+@\t\r-](?!\d*\.?\d*(e-?\d+)?$)")
 """Start of a text that a spreadsheet would run as a formula; numbers are excluded."""
@@ -31,10 +33,8 @@ def _plain_text(cell: Any) -> Any:
 
 
 def plain_time(value: Any) -> Any:
-    """Return a clock time as text, with its time zone; other values unchanged."""
-    if not isinstance(value, datetime):
-        return value
-    return value.isoformat(" ", "milliseconds" if value.microsecond else "seconds")
+    """Return a clock time as text, with milliseconds and its zone; other values unchanged."""
+    return value.isoformat(" ", "milliseconds") if isinstance(value, datetime) else value
 
 
 def check_table(path: Path) -> None:
@@ -45,15 +45,17 @@ def check_table(path: Path) -> None:
 
 
 def _write_parquet(path: Path, columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
-    """Write a table; an empty column has the type that it usually has."""
+    """Write a table; the type of a column depends only on its name."""
     import pyarrow as pa
     from pyarrow import parquet
 
     arrays = {}
     for number, name in enumerate(columns):
-        array = pa.array([row[number] for row in rows])
-        empty = pa.string() if name in _TEXTS else pa.float64()
-        arrays[name] = array.cast(empty) if pa.types.is_null(array.type) else array
+        column = [row[number] for row in rows]
+        if name in _TEXTS:  # the name of a video may be invalid text
+            column = [text and text.encode(errors="backslashreplace").decode() for text in column]
+        kind = pa.string() if name in _TEXTS else pa.int64() if name in _INTEGERS else pa.float64()
+        arrays[name] = pa.array(column, kind)
     parquet.write_table(pa.table(arrays), path)
 
 
