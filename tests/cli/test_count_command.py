@@ -190,8 +190,8 @@ def test_fractions_need_the_size_of_the_frames(run: Run, tmp_path: Path) -> None
         ),
         (
             ["t.csv", "t.csv", "-c", "l.yaml", "--begin", "2026-05-01 07:00"],
-            2,
-            "for several set a pattern of their names",
+            1,
+            "t.csv: has no clock, and the file before does not say how long its video is; use .jso",
         ),
         (["back.csv", "-c", "l.yaml"], 1, "back.csv:3: frame 1 is at 0.04 s; times must be"),
     ],
@@ -251,3 +251,13 @@ def test_a_command_that_looks_at_whole_frames_refuses_them(
     result = run(*command, "--set", f"regions=[{{name: a, {outline}}}]")
     assert result.code == 1
     assert "regions: this command uses whole frames" in result.err
+
+
+def test_the_manifest_of_a_batch_is_skipped(run: Run, tmp_path: Path) -> None:
+    write_tracks(tmp_path / "t.csv")
+    (tmp_path / "l.yaml").write_text(LINES)
+    (tmp_path / "manifest.jsonl").write_text("{}\n")
+    result = run(
+        "count", tmp_path / "manifest.jsonl", tmp_path / "t.csv", "-c", tmp_path / "l.yaml"
+    )
+    assert (result.code, result.err) == (0, "")

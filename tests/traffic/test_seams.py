@@ -7,6 +7,7 @@ from pathlib import Path as File
 import pytest
 
 from traffic.scenes import Path, frames, settings_for, through
+from vdet.config.schema import InputSettings
 from vdet.config.shapes import LineSettings, ZoneSettings
 from vdet.labels.formats import TrackWriter
 from vdet.labels.native import JSON_LINES
@@ -87,3 +88,13 @@ def test_the_same_id_in_the_next_file_elsewhere_is_another_vehicle(tmp_path: Fil
     jumps = through((0, 100, 400), (9.96, 600, 400), (10, 600, 250), (20, 1100, 250))
     rows = flow_table(count(write_halves(tmp_path, FOLLOWING, jumps)))
     assert [(row.origin, row.destination) for row in rows] == [("west", None), ("east", None)]
+
+
+@pytest.mark.parametrize("names", [("a.jsonl", "b.jsonl"), FOLLOWING])
+def test_a_begin_is_that_of_the_first_of_several_files(
+    tmp_path: File, names: Sequence[str]
+) -> None:
+    settings = SETTINGS.model_copy(update={"input": InputSettings(begin="2026-01-02 03:04Z")})
+    files = write_halves(tmp_path, names, GOES_EAST)
+    clocks = [str(counts.clock) for counts in count_files(files, settings).values()]
+    assert clocks == [f"2026-01-02 03:04:{second}+00:00 (as given)" for second in ("00", "10")]

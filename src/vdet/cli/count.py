@@ -73,7 +73,7 @@ def count(
     if not settings.traffic:
         raise click.UsageError("no lines or zones to count at; add a settings file with -c FILE")
     outputs = options.requested_outputs((), paths)
-    options.check_counting(settings, outputs, several=len(tracks) > 1)
+    options.check_counting(settings, outputs, several=False)
     from vdet.run.sinks.protocol import check_sinks
     from vdet.traffic.counting import count_files
     from vdet.traffic.output import counts_content, flows_content

@@ -284,8 +284,8 @@ def check_counting(settings: "Settings", outputs: Sequence[Output], *, several: 
         )
     if settings.input.begin and several:
         raise click.UsageError(
-            "input.begin is for one video; for several set a pattern of their names, "
-            "camera.clock.pattern"
+            "input.begin is for one video, or for vdet count; for several set a pattern of their "
+            "names, camera.clock.pattern"
         )
 
 

@@ -4,10 +4,12 @@ import math
 from bisect import bisect_right
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime, timedelta
 from pathlib import Path
 
 from vdet.config.schema import Settings
 from vdet.errors import ConfigError, TruthError
+from vdet.labels.label import SavedTracks
 from vdet.labels.reading import read_tracks
 from vdet.lanes.ground import ground_of
 from vdet.progress import Advance
@@ -62,6 +64,7 @@ def count_files(
     counted: dict[str, Counts] = {}
     group: _Group | None = None
     rate_is_used = rate is None
+    recording = _Recording(settings)
     for path in paths:
         saved = read_tracks(path)
         if not saved.has_times:
@@ -69,6 +72,8 @@ def count_files(
                 raise TruthError(f"{path}: has no times; pass the frame rate, as in --rate 25")
             saved, rate_is_used = saved.at_rate(rate), True
         clock = find_clock(path, settings, saved.times.get(0, 0.0), saved=saved)
+        if clock and settings.input.begin and len(paths) > 1:
+            clock = recording.next_clock(path, saved, clock)
         frame_size = _frame_size(settings, size or saved.size)
         first = min(saved.times.values(), default=None)
         if group is None or not group.precedes(frame_size, clock, first):
@@ -96,6 +101,39 @@ def _frame_size(settings: Settings, size: tuple[int, int] | None) -> tuple[int, 
     if size := size or settings.camera.size:
         return size
     raise ConfigError("the lines are fractions of the frame; pass --size, such as 1280x720")
+
+
+class _Recording:
+    """The files of one recording, of which `input.begin` is the start."""
+
+    def __init__(self, settings: Settings) -> None:
+        own_input = settings.input.model_copy(update={"begin": None})
+        self._settings = settings.model_copy(update={"input": own_input})
+        self._offset: timedelta | None = None
+        self._has_begun = False
+        self._end: datetime | None = None
+
+    def next_clock(self, path: Path, saved: SavedTracks, begin: Clock) -> Clock:
+        """Return the clock of the next file; `begin` is its clock if it is the first.
+
+        The clock of its own is set right as that of the first file; without one it begins at the
+        end of the file before. Raises `TruthError` if that is unknown.
+        """
+        own, clock = find_clock(path, self._settings, begin.first, saved=saved), begin
+        if own and not self._has_begun:
+            self._offset = begin.zero - own.zero
+        if own and self._offset is not None:
+            clock = replace(begin, zero=own.zero + self._offset)
+        elif self._has_begun:
+            if self._end is None:
+                fault = "the file before does not say how long its video is; use .jsonl tracks"
+                raise TruthError(f"{path}: has no clock, and {fault}")
+            clock = replace(begin, zero=begin.zero + (self._end - begin.at(begin.first)))
+        self._has_begun, self._end = True, None
+        if saved.covered:
+            first, last = saved.times[saved.covered[0]], saved.times[saved.covered[-1]]
+            self._end = clock.at(last + (last - first) / max(1, len(saved.covered) - 1))
+        return clock
 
 
 @dataclass(frozen=True, slots=True)
