@@ -228,6 +228,11 @@ def test_the_beginning_is_that_of_the_first_frame() -> None:
     assert found.at(86_410.0).isoformat() == "2026-05-01T07:00:10+02:00"
 
 
+def test_a_first_frame_centuries_after_the_start_is_refused() -> None:
+    with pytest.raises(ConfigError, match=r"a\.ts: its first frame is at 1e\+11 s; times must be"):
+        clock_of("a.ts", "2026-05-01 07:00+02:00", start=1e11)
+
+
 BERLIN = "Europe/Berlin"
 
 

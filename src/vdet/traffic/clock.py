@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 _log = logging.getLogger("vdet")
 _SAME = timedelta(minutes=1)
 """Maximum difference between the times in the name and the metadata without a warning."""
+_LATEST_START = 1e10
+"""Maximum time of the first frame, seconds: dates have no years before 1."""
 _CREATED = "its creation time"
 _EXPORTED = "its creation time, perhaps of an export"
 
@@ -97,7 +99,7 @@ def find_clock(
     Raises
     ------
     ConfigError
-        The name does not match the pattern.
+        The name does not match the pattern, or the first frame is centuries after time 0.
     """
     clock = settings.camera.clock
     zone: tzinfo | None = clock.zone
@@ -114,6 +116,8 @@ def find_clock(
         zone = zone or (begin.tzinfo if begin.utcoffset() else None)
     else:
         return None
+    if start > _LATEST_START:
+        raise ConfigError(f"{path}: its first frame is at {start:g} s; times must be in seconds")
     found_clock = Clock(_utc(begin, zone) - timedelta(seconds=start), source, zone, start)
     if found_clock.is_doubtful:
         _log.warning("%s: may not begin %s; --begin overrides it", path, found_clock)
