@@ -1,6 +1,7 @@
 """Files of tracks that follow one another: a vehicle on both sides of a seam counts once."""
 
 from collections.abc import Sequence
+from datetime import UTC, datetime, timedelta
 from itertools import groupby
 from pathlib import Path as File
 
@@ -11,6 +12,7 @@ from vdet.config.schema import InputSettings
 from vdet.config.shapes import LineSettings, ZoneSettings
 from vdet.labels.formats import TrackWriter
 from vdet.labels.native import JSON_LINES
+from vdet.track.track import FrameTracks
 from vdet.traffic.counting import count_files
 from vdet.traffic.counts import Counts, flow_table, zone_table
 
@@ -22,6 +24,26 @@ SETTINGS = settings_for(
 GOES_EAST = through((0, 100, 400), (20, 1100, 400))  # at 600 at the seam
 ON_THE_LINE = through((0, 100, 300), (10, 199, 300), (20, 300, 300))
 STANDS = through((2, 540, 600), (4, 600, 600), (18, 601, 600))
+
+
+CLOCK = datetime(2026, 5, 1, 7, tzinfo=UTC)
+
+
+def write_part(path: File, first: float, last: float, *paths: Path, clock: float = -1) -> File:
+    """Write a part of the tracks of 60 s into a file whose frames begin at 0.
+
+    `clock` is its start in the file itself, seconds after 7:00; -1: only the name has it.
+    """
+    path.parent.mkdir(exist_ok=True)
+    video = [f for f in frames(*paths, seconds=60) if first - 0.001 <= f.time < last - 0.001]
+    with path.open("wb") as file:
+        writer = TrackWriter(JSON_LINES, file)
+        for index, frame in enumerate(video):
+            time = index / 25
+            begins = (CLOCK + timedelta(seconds=clock + time)).isoformat()
+            facts = {"clock": begins} if clock >= 0 else {}
+            writer.write(FrameTracks(index, time, frame.tracks, facts))
+    return path
 
 
 def write_halves(folder: File, names: Sequence[str], *paths: Path) -> list[File]:
@@ -98,3 +120,86 @@ def test_a_begin_is_that_of_the_first_of_several_files(
     files = write_halves(tmp_path, names, GOES_EAST)
     clocks = [str(counts.clock) for counts in count_files(files, settings).values()]
     assert clocks == [f"2026-01-02 03:04:{second}+00:00 (as given)" for second in ("00", "10")]
+def test_ends_do_not_add_up_before_a_pause(tmp_path: File) -> None:
+    goes, other = through((0, 100, 400), (30, 600, 400)), through((35, 600, 400), (45, 1100, 400))
+    files = []
+    for second in range(0, 30, 2):  # each half a second longer than its slot
+        name = f"v_20260501_0700{second:02}.jsonl"
+        files.append(write_part(tmp_path / name, second, second + 2.5, goes))
+    files.append(write_part(tmp_path / "v_20260501_070035.jsonl", 35, 45, other))
+    rows = flow_table(count(files))
+    assert [(r.origin, r.destination) for r in rows] == [("west", None), ("east", None)]
+
+
+def test_exact_clocks_show_a_short_gap(tmp_path: File) -> None:
+    fast = through((0, 100, 400), (5.5, 1200, 400))
+    files = [
+        write_part(tmp_path / "a_0001.jsonl", 0, 2, fast, clock=0.001),
+        write_part(tmp_path / "a_0002.jsonl", 2.52, 6, fast, clock=2.521),
+    ]
+    (row,) = flow_table(count(files))
+    assert (row.origin, row.destination, row.count) == ("west", "east", 1)
+
+
+@pytest.mark.parametrize(
+    ("second", "is_joined"),
+    [
+        ("20260501_070010_000124NF", True),
+        ("20260501_070010_000124NR", False),
+        ("cam2_20260501_070010_000124NF", False),
+        ("rear/20260501_070010_000124NF", False),
+    ],
+)
+def test_only_files_of_one_camera_are_joined(tmp_path: File, second: str, is_joined: bool) -> None:
+    first = f"{'cam1_' * second.startswith('cam')}20260501_070000_000123NF.jsonl"
+    files = [
+        write_part(tmp_path / first, 0, 10, GOES_EAST),
+        write_part(tmp_path / f"{second}.jsonl", 10, 20, GOES_EAST),
+    ]
+    rows = flow_table(count(files))
+    assert [(r.origin, r.destination) for r in rows] == (
+        [("west", "east")] if is_joined else [("west", None), ("east", None)]
+    )
+
+
+@pytest.mark.parametrize("repeated", [1, 2, 3, 10, 12])
+def test_frames_that_the_next_file_repeats_count_once(
+    tmp_path: File, caplog: pytest.LogCaptureFixture, repeated: int
+) -> None:
+    cars = [through((t, 100, y), (t + 6, 1100, y)) for y, t in ((300, 4), (400, 13), (500, 18.5))]
+    files = [
+        write_part(tmp_path / "v_20260501_070000.jsonl", 0, 20, *cars),
+        write_part(tmp_path / f"v_20260501_0700{20 - repeated:02}.jsonl", 20 - repeated, 40, *cars),
+    ]
+    videos = count(files)
+    (row,) = flow_table(videos)
+    assert (row.origin, row.destination, row.count) == ("west", "east", 3)
+    assert videos[1].spans == ((repeated, repeated + 19.96),)
+    (message,) = caplog.messages
+    assert message == (
+        f"{files[1]}: begins {repeated}.0 s before the end of {files[0]}; these frames are not "
+        "counted again; if its clock is wrong, count it on its own"
+    )
+
+
+def test_a_file_within_another_counts_nothing(tmp_path: File) -> None:
+    names = ["GX010001.jsonl", "GX020001.jsonl", "GX030001.jsonl"]
+    parts = [(0, 20, 0), (0, 10, 0), (20, 30, 20)]
+    files = [
+        write_part(tmp_path / name, first, last, GOES_EAST, clock=clock)
+        for name, (first, last, clock) in zip(names, parts, strict=True)
+    ]
+    assert [len(video.events) for video in count(files)] == [2, 0, 0]
+
+
+@pytest.mark.parametrize("crossed_at", [9.9602, 9.98, 9.9999])
+def test_an_event_just_after_a_seam_has_frame_and_id_of_its_own_file(
+    tmp_path: File, crossed_at: float
+) -> None:
+    crosses = through((crossed_at - 2, 100, 400), (crossed_at + 2, 300, 400))
+    gone_by = through((0, 300, 690), (5, 400, 690))
+    first = write_part(tmp_path / FOLLOWING[0], 0, 10, gone_by, crosses)
+    second = write_part(tmp_path / FOLLOWING[1], 10, 20, crosses)
+    videos = count([first, second])
+    events = [(event.frame, event.id) for event in videos[1].events]
+    assert (len(videos[0].events), events) == (0, [(0, 1)])

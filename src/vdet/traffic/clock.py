@@ -64,6 +64,11 @@ class Clock:
         zero = self.at(0.0).replace(tzinfo=None)
         return (zero - zero.replace(hour=0, minute=0, second=0, microsecond=0)).total_seconds()
 
+    @property
+    def has_whole_seconds(self) -> bool:
+        """Whether its fractions of a second are unknown."""
+        return self.at(self.first).microsecond == 0
+
     def at(self, seconds: float) -> datetime:
         """Return the clock time of a time in the video, with the offset of the zone then."""
         return (self.zero + timedelta(seconds=seconds)).astimezone(self.zone)

@@ -1,10 +1,13 @@
 """Count in saved tracks of one video, or of several that may follow one another in time."""
 
+import logging
 import math
-from bisect import bisect_right
+import re
+from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
+from itertools import zip_longest
 from pathlib import Path
 
 from vdet.config.schema import Settings
@@ -19,12 +22,31 @@ from vdet.traffic.counter import VehicleCounter
 from vdet.traffic.counts import Counts, Event
 from vdet.traffic.speeds import SpeedMeter, with_speeds
 
-_SEAM = 2.0
-"""Maximum seconds between the end of a video and the start of the one that continues it: times in
-names and containers are whole seconds.
-"""
+_log = logging.getLogger("vdet")
+
+_SEAM = 1.0
+"""Maximum seconds between two videos that continue without a gap, if a clock has whole seconds."""
+_MIN_GAP = 0.1
+"""Minimum seconds between them by two clocks with fractions of a second."""
 _STEP = 0.04
-"""Assumed seconds from the last frame before a seam to the first one after it."""
+"""Assumed duration of the only frame of a video, seconds."""
+_REPEATED = 11.0
+"""Maximum seconds of a video that are looked for in the next one."""
+_SAME = 0.1
+"""Maximum distance of vehicles in the same frame of two videos, in heights of their boxes."""
+_DATE = re.compile(r"\d{4}|(\d{1,2}\D{1,2}){4}\d")
+"""Start of a time or a long counter in a name; the name of the camera precedes it."""
+_COUNTER = re.compile(r"(?<![a-zA-Z\d])\d+|(?<=\d[a-zA-Z])\d+|\d{4,}")
+"""Digits that differ between videos of one camera, unlike those of a word such as cam1."""
+
+
+def camera_of(path: Path) -> tuple[str, ...]:
+    """Return the parts of a path without times and counters; they are equal for one camera."""
+    dates = [(part, _DATE.search(part)) for part in path.parts]
+    return tuple(
+        part[: date.start()] + _COUNTER.sub("#", part[date.start() :]) if date else part
+        for part, date in dates
+    )
 
 
 def count_files(
@@ -37,8 +59,9 @@ def count_files(
 ) -> dict[str, Counts]:
     """Count the vehicles of files of tracks at the lines and in the zones of the settings.
 
-    A file that follows the previous one, by their clocks, is counted together with it: a vehicle in
-    both is one vehicle. Other files are counted separately.
+    A file that follows another of the same camera, by their names and clocks, is counted together
+    with it: a vehicle in both is one vehicle. Where they overlap, the frames of the earlier file
+    count, with a warning (logger "vdet"). Other files are counted separately.
 
     Parameters
     ----------
@@ -65,7 +88,7 @@ def count_files(
     group: _Group | None = None
     rate_is_used = rate is None
     recording = _Recording(settings)
-    for path in paths:
+    for path in sorted(dict.fromkeys(paths), key=camera_of):
         saved = read_tracks(path)
         if not saved.has_times:
             if rate is None:
@@ -76,14 +99,15 @@ def count_files(
             clock = recording.next_clock(path, saved, clock)
         frame_size = _frame_size(settings, size or saved.size)
         first = min(saved.times.values(), default=None)
-        if group is None or not group.precedes(frame_size, clock, first):
+        if group is None or not group.precedes(path, frame_size, clock, first):
             counted |= group.counts() if group else {}
             group = _Group(settings, frame_size, group.counter.linker.started if group else 0)
         group.add(str(path), clock, first or 0.0, saved)
         advance(1)
     if not rate_is_used:
         raise ConfigError("--rate changes nothing: the tracks have times; remove it")
-    return counted | (group.counts() if group else {})
+    counted |= group.counts() if group else {}
+    return {str(path): counted[str(path)] for path in paths}
 
 
 def count_frames(
@@ -140,23 +164,48 @@ class _Recording:
 class _Video:
     """A video of a group.
 
-    `spans` as in `Counts`; `shift` converts its times to those of the group.
+    `spans` as in `Counts`; `shift` and `frame_shift` convert its times and the numbers of its
+    frames to those of the group. `end` is the end of its last frame, seconds; `last_frames` are
+    those of its last seconds.
     """
 
     name: str
     clock: Clock | None
     spans: tuple[Span, ...]
+    end: float
     shift: float
+    frame_shift: int
     meter: SpeedMeter | None
+    last_frames: Sequence[FrameTracks]
 
-    @property
-    def end(self) -> float:
-        """When it ends in the group, seconds."""
-        return self.spans[-1][1] + self.shift
+    def repeated_seconds(self, first: float, frames: Iterable[FrameTracks]) -> float:
+        """Return the seconds at its end that the next video shows again; 0 if that is unclear.
+
+        `first` is the time of the first of its frames.
+        """
+        start = next((frame for frame in frames if frame.tracks), None)
+        if not (start and self.last_frames) or start.time - first > _SEAM:
+            return 0.0
+
+        def distance(frame: FrameTracks) -> float:
+            feet = [track.foot for track in frame.tracks]
+            nearest = (
+                min((math.dist(track.foot, foot) for foot in feet), default=math.inf)
+                / track.box.height
+                for track in start.tracks
+            )
+            return max(nearest)
+
+        same = min(reversed(self.last_frames), key=distance)
+        has_moved = distance(self.last_frames[-1]) > distance(same) + 2 * _SAME
+        if distance(same) > _SAME or not has_moved:
+            return 0.0
+        return self.end - same.time + start.time - first
 
     def unshifted(self, event: Event) -> Event:
-        """Return an event of the group at its time in this video."""
-        return replace(event, time=round(event.time - self.shift, 3))
+        """Return an event of the group at its time and frame in this video."""
+        time, frame = round(event.time - self.shift, 3), event.frame - self.frame_shift
+        return replace(event, time=time, frame=frame)
 
 
 class _Group:
@@ -167,65 +216,99 @@ class _Group:
         self._ground = ground_of(settings.camera, *size)
         self.counter = VehicleCounter(settings, *size, started)
         self._videos: list[_Video] = []
+        self._frame_count = 0  # number of the last frame in the group, and 1
 
-    def precedes(self, size: tuple[int, int], clock: Clock | None, first: float | None) -> bool:
+    def precedes(
+        self, path: Path, size: tuple[int, int], clock: Clock | None, first: float | None
+    ) -> bool:
         """Return whether a video follows the last one; `first` is the time of its first frame."""
         before = self._videos[-1]
         if not (clock and before.clock and first is not None and size == self._size):
             return False
-        gap = clock.at(first) - before.clock.at(before.spans[-1][1])
-        return gap.total_seconds() >= -_SEAM
+        is_later = clock.at(first) >= before.clock.at(before.spans[0][0])
+        return is_later and camera_of(path) == camera_of(Path(before.name))
 
     def add(
         self, name: str, clock: Clock | None, first: float, frames: Iterable[FrameTracks]
     ) -> None:
         """Count in the next video; `first` is the time of its first frame."""
-        shift = self._shift(clock, first)
+        gap = self._gap(clock, first, frames)
+        shift = self._videos[-1].end + self._videos[-1].shift + gap - first if self._videos else 0.0
+        start = first - gap if gap < 0 else -math.inf
+        if gap < 0:
+            _log.warning(
+                "%s: begins %.1f s before the end of %s; these frames are not counted again; if "
+                "its clock is wrong, count it on its own",
+                name,
+                -gap,
+                self._videos[-1].name,
+            )
         meter = SpeedMeter(self._ground, *self._size) if self._ground else None
         if self._videos:
             self.counter.start_video()
-        span_count, latest = len(self.counter.spans), -math.inf
+        span_count, latest, step = len(self.counter.spans), -math.inf, _STEP
+        frame_shift, last_frames = self._frame_count, deque[FrameTracks]()
         for frame in frames:
             if not latest <= frame.time < math.inf:
                 raise TruthError(
                     f"frame {frame.index}: {frame.time:g} s is before {latest:g} s; times must "
                     "increase"
                 )
+            step = frame.time - latest if latest > -math.inf else step
             latest = frame.time
-            self.counter.update(replace(frame, time=latest + shift) if shift else frame)
+            if latest < start:
+                continue
+            index = frame.index + frame_shift
+            self._frame_count = index + 1
+            self.counter.update(replace(frame, index=index, time=latest + shift))
             if meter:
                 meter.add(frame)
+            last_frames.append(frame)
+            while latest - last_frames[0].time > _REPEATED:
+                last_frames.popleft()
         new = self.counter.spans[span_count:] or [(first + shift, first + shift)]
         spans = tuple((round(begin - shift, 6), round(end - shift, 6)) for begin, end in new)
-        self._videos.append(_Video(name, clock, spans, shift, meter))
+        video = _Video(
+            name=name,
+            clock=clock,
+            spans=spans,
+            end=max(start, spans[-1][1] + min(step, _SEAM)),
+            shift=shift,
+            frame_shift=frame_shift,
+            meter=meter,
+            last_frames=last_frames,
+        )
+        self._videos.append(video)
 
-    def _shift(self, clock: Clock | None, first: float) -> float:
-        """Return the seconds from the times of the next video to those of the group."""
-        if not self._videos:
+    def _gap(self, clock: Clock | None, first: float, frames: Iterable[FrameTracks]) -> float:
+        """Return the seconds from the end of the last video to the next; negative if they overlap.
+
+        Clocks with whole seconds do not measure small gaps; vehicles show small overlaps.
+        """
+        before = self._videos[-1] if self._videos else None
+        if not (before and before.clock and clock):
             return 0.0
-        shift, begin, end = 0.0, self._videos[0].clock, self._videos[-1].end
-        if clock and begin:
-            shift = (clock.zero - begin.zero).total_seconds()
-        return shift if first + shift - end >= _SEAM else end + _STEP - first
+        gap = (clock.at(first) - before.clock.at(before.end)).total_seconds()
+        has_seconds = before.clock.has_whole_seconds or clock.has_whole_seconds
+        if has_seconds and gap < _SEAM and (repeated := before.repeated_seconds(first, frames)):
+            return -repeated
+        return 0.0 if abs(gap) <= (_SEAM + 1e-6 if has_seconds else _MIN_GAP) else gap
 
     def counts(self) -> dict[str, Counts]:
         """Return the counts of each video, with times in that video."""
         total = self.counter.counts()
-        times = [event.time for event in total.events]
         counts: dict[str, Counts] = {}
-        first = 0
-        for video in self._videos:
-            is_last = video is self._videos[-1]
-            end = len(times) if is_last else bisect_right(times, video.end)
+        for video, following in zip_longest(self._videos, self._videos[1:]):
+            end = following.frame_shift if following else math.inf
+            events = (e for e in total.events if video.frame_shift <= e.frame < end)
             counts[video.name] = with_speeds(
                 replace(
                     total,
-                    events=tuple(map(video.unshifted, total.events[first:end])),
+                    events=tuple(map(video.unshifted, events)),
                     spans=video.spans,
                     clock=video.clock,
                     warnings=() if counts else total.warnings,  # reported once
                 ),
                 video.meter,
             )
-            first = end
         return counts
