@@ -174,7 +174,7 @@ class SavedTracks:
             name: name and (our_name(name) or name)
             for name in {label.name for label in self.labels}
         }
-        for index in self._indices():
+        for index in sorted(self._indices()):
             labels = sorted(by_frame[index], key=attrgetter("id"))
             time = self.times.get(index, math.nan)
             tracks = [_track(label, names[label.name]) for label in labels]
