@@ -193,6 +193,11 @@ def add_frame(spans: list[Span], frame: FrameTracks, before: FrameTracks | None)
         spans.append((time, time))
 
 
+_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+_MAX_COUNT = 200_000
+"""Maximum number of intervals: two days of seconds."""
+
+
 @dataclass(frozen=True, slots=True)
 class Interval:
     """An interval of a table.
@@ -217,8 +222,9 @@ class Interval:
 class Intervals:
     """The numbered intervals of one or several videos that contain video.
 
-    With a clock, they begin at round times of the day. Internally, seconds are those of the video,
-    of the local clock time since 1970, or of several videos without clocks one after another.
+    With a clock, they begin at round local times of the day, also after a change of the offset. The
+    number of an interval is its start. Internally, seconds are those of the video, of the clock
+    since 1970, or of several videos without clocks one after another.
 
     Parameters
     ----------
@@ -235,7 +241,7 @@ class Intervals:
     Raises
     ------
     ConfigError
-        `length` is set, and one of several videos has no clock.
+        `length` is set, and one of several videos has no clock, or there are too many intervals.
     """
 
     def __init__(
@@ -243,14 +249,15 @@ class Intervals:
     ) -> None:
         self._length = length
         self._is_timed = len(videos) == 1
-        self._origin: datetime | None = None
         self._zone: tzinfo | None = None
         clocks = [clock for clock, _ in videos if clock]
-        if clocks and len(clocks) == len(videos):
-            first = clocks[0].at(clocks[0].first)
-            self._origin = datetime(1970, 1, 1, tzinfo=timezone(first.utcoffset() or timedelta()))
-            self._zone = clocks[0].zone
-            self._zeros = [(clock.zero - self._origin).total_seconds() for clock in clocks]
+        self._has_clock = 0 < len(clocks) == len(videos)
+        if self._has_clock:
+            begins = [clock.at(clock.first) for clock in clocks]
+            is_local = all(time.utcoffset() == time.astimezone().utcoffset() for time in begins)
+            have_one_zone = all(clock.zone == clocks[0].zone for clock in clocks)
+            self._zone = None if is_local and not have_one_zone else clocks[0].zone
+            self._zeros = [(clock.zero - _EPOCH).total_seconds() for clock in clocks]
         elif self._is_timed:
             self._zeros = [0.0]
         elif length is None:  # one after another
@@ -266,8 +273,18 @@ class Intervals:
         self._every = [span for spans in self._spans for span in spans]
         self._first = min(first for first, _ in self._every)
         self._last = max(last for _, last in self._every)
-        ranges = [range(self.number_at(a), self.number_at(b) + 1) for a, b in self._every]
-        self.periods = tuple(map(self._interval, sorted(set().union(*ranges))))
+        if length and sum((last - first) // length + 1 for first, last in self._every) > _MAX_COUNT:
+            raise ConfigError(
+                f"traffic.interval: {length} s makes more than {_MAX_COUNT:,} intervals; use a "
+                "longer one"
+            )
+        numbers: set[int] = set()
+        for first, last in self._every:
+            number = self.number_at(first)
+            numbers.add(number)
+            while length and (number := self._end(number)) <= last:
+                numbers.add(number)
+        self.periods = tuple(map(self._interval, sorted(numbers)))
 
     def seconds(self, index: int, time: float) -> float:
         """Convert a time in one of the videos to the seconds of the intervals.
@@ -283,13 +300,38 @@ class Intervals:
         return self.number_at(self.seconds(index, time))
 
     def number_at(self, seconds: float) -> int:
-        """Return the number of the interval of `seconds`."""
-        return 0 if self._length is None else int(seconds // self._length)
+        """Return the number of the interval of `seconds`: its start."""
+        if self._length is None:
+            return 0
+        if not self._has_clock:
+            return int(seconds // self._length) * self._length
+        time = (_EPOCH + timedelta(seconds=seconds)).astimezone(self._zone)
+        offset = (time.utcoffset() or timedelta()).total_seconds()
+        round_time = (seconds + offset) // self._length * self._length
+        start = round_time - offset
+        change = (_EPOCH + timedelta(seconds=start)).astimezone(self._zone).utcoffset()
+        return int(start) if change == time.utcoffset() else self._at_local(round_time)
+
+    def _end(self, number: int) -> int:
+        """Return the end of an interval, which is the number of the next one."""
+        assert self._length is not None
+        end = number + self._length
+        if not self._has_clock or self.number_at(end) == end:
+            return end
+        time = (_EPOCH + timedelta(seconds=number)).astimezone(self._zone)
+        offset = (time.utcoffset() or timedelta()).total_seconds()
+        round_time = (number + offset) // self._length * self._length
+        return self._at_local(round_time + self._length)
+
+    def _at_local(self, seconds: float) -> int:
+        """Return the first moment of a local time, both in seconds since 1970."""
+        time = datetime(1970, 1, 1) + timedelta(seconds=seconds)
+        time = time.replace(tzinfo=self._zone) if self._zone else time.astimezone()
+        return int((time - _EPOCH).total_seconds())
 
     def start_in(self, index: int, number: int) -> float:
         """Return the start of an interval of some length, in the time of one of the videos."""
-        assert self._length is not None
-        return round(number * self._length - self._zeros[index], 3)
+        return round(number - self._zeros[index], 3)
 
     def covered(self, period: Interval) -> float:
         """Return the seconds of video in an interval."""
@@ -298,7 +340,7 @@ class Intervals:
     def _interval(self, number: int) -> Interval:
         start, end = self._first, self._last
         if self._length is not None:
-            start, end = float(number * self._length), float((number + 1) * self._length)
+            start, end = float(number), float(self._end(number))
         return Interval(
             number=number,
             start=self._clock_time(start),
@@ -308,7 +350,7 @@ class Intervals:
         )
 
     def _clock_time(self, seconds: float) -> ClockTime:
-        if self._origin:
-            time = self._origin + timedelta(milliseconds=round(1000 * seconds))
+        if self._has_clock:
+            time = _EPOCH + timedelta(milliseconds=round(1000 * seconds))
             return time.astimezone(self._zone)
         return round(seconds, 3) if self._is_timed else None
