@@ -2,7 +2,7 @@
 
 import pytest
 
-from traffic.scenes import LINE, counts, frames, through
+from traffic.scenes import LINE, Path, counts, frames, through
 from vdet.config.shapes import LineSettings
 
 DOWN = through((1, 600, 300), (5, 600, 500))
@@ -60,3 +60,11 @@ def test_a_line_that_is_shorter_than_a_vehicle() -> None:
     assert warnings(DOWN, line=short) == (
         "line: this line is shorter than a vehicle; make it longer",
     )
+
+
+@pytest.mark.parametrize(("rate", "is_low"), [(1, True), (2, True), (4, True), (5, False)])
+@pytest.mark.parametrize("paths", [(), (DOWN,)])
+def test_a_low_frame_rate(paths: tuple[Path, ...], rate: float, is_low: bool) -> None:
+    expected = "fewer than 5 frames per second: vehicles are missed; record more"
+    found = counts(frames(*paths, rate=rate, seconds=60), LINE).warnings
+    assert (expected in found) == is_low

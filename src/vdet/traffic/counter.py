@@ -28,6 +28,8 @@ _NEAR_LINE = 0.5
 """Distance within which the end of a track is at a line, in heights of its box."""
 _FEW_WRONG = 0.05
 """Fraction of the crossings of a line up to which wrong tracks there cause no warning."""
+_LONG_STEP = 0.21
+"""Seconds between two frames that are too many to follow vehicles."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +74,7 @@ class VehicleCounter:
         self._borders: tuple[Border, ...] = (*self.lines, *self.zones)
         self.linker = TrackLinker(width, height, started)
         self._latest: FrameTracks | None = None
+        self._steps = self._long_steps = 0
         self._ended: list[_Passage] = []
         self._ended_counts: Counter[Direction] = Counter()
         self._running_counts: Counter[Direction] = Counter()
@@ -80,6 +83,9 @@ class VehicleCounter:
     def update(self, frame: FrameTracks) -> None:
         """Add the tracks of the next frame."""
         add_frame(self.spans, frame, self._latest)
+        if self._latest:
+            self._steps += 1
+            self._long_steps += frame.time - self._latest.time > _LONG_STEP
         self._latest = frame
         ended = self._passages(self.linker.add(frame))
         self._ended += ended
@@ -97,12 +103,15 @@ class VehicleCounter:
         events = [event for passage in passages for event in passage.events]
         events.sort(key=lambda event: (event.time, event.frame, event.id, event.name))
         directions = tuple((item.name, way) for item in self._borders for way in item.directions)
+        warnings = list(_line_warnings(self.lines, passages))
+        if 2 * self._long_steps > self._steps:
+            warnings.insert(0, "fewer than 5 frames per second: vehicles are missed; record more")
         return Counts(
             events=tuple(events),
             directions=directions,
             zones=tuple(zone.name for zone in self.zones),
             spans=tuple(self.spans) or ((0.0, 0.0),),
-            warnings=tuple(_line_warnings(self.lines, passages)),
+            warnings=tuple(warnings),
         )
 
     def so_far(self) -> Counter[Direction]:

@@ -152,7 +152,7 @@ class Counts:
     clock
         None if unknown.
     warnings
-        A sentence for each misplaced line.
+        A sentence for each misplaced line, and for a low frame rate.
     """
 
     events: tuple[Event, ...]
