@@ -5,10 +5,24 @@ from dataclasses import replace
 
 import pytest
 
-from traffic.scenes import counts, events, feet, frames, joined, numbered, through, track, ways
+from traffic.scenes import (
+    HEIGHT,
+    LINE,
+    WIDTH,
+    counts,
+    events,
+    feet,
+    frames,
+    joined,
+    numbered,
+    through,
+    track,
+    ways,
+)
 from vdet.config.shapes import LineSettings
 from vdet.errors import TruthError
 from vdet.track.track import FrameTracks
+from vdet.traffic.linking import link_tracks
 
 DOWN = through((0, 600, 300), (4, 600, 500))
 
@@ -105,3 +119,28 @@ def test_a_class_that_flips_on_the_line_does_not_split_the_history() -> None:
     ]
     (event,) = events(video)
     assert event.class_name == "car"
+
+
+@pytest.mark.parametrize(
+    ("last", "first"),
+    [
+        ((5, 1250, 300), (5.04, 30, 500)),  # leaves at the right, the next comes from the left
+        ((5, 1250, 300), (9, 30, 500)),
+        ((5, 600, 300), (5.04, 200, 500)),  # in the middle of the frame
+        ((5, 600, 300), (5.5, 1200, 700)),
+    ],
+)
+def test_an_id_that_jumps_is_two_vehicles(
+    last: tuple[float, float, float], first: tuple[float, float, float]
+) -> None:
+    seconds, x, y = first
+    one, other = through((0, 200, 300), last), through(first, (seconds + 3, x + 50, y))
+    video = joined(frames(one, seconds=13), numbered(frames(other, seconds=13), 1))
+    assert events(video, LINE) == ()
+    assert [path.vehicle for path in link_tracks(video, WIDTH, HEIGHT)] == [1, 2]
+
+
+@pytest.mark.parametrize("rate", [1, 2, 25])
+def test_a_fast_vehicle_of_one_id_is_one(rate: float) -> None:
+    (path,) = link_tracks(frames(through((0, 100, 150), (3, 1200, 690)), rate=rate), WIDTH, HEIGHT)
+    assert path.vehicle == 1

@@ -20,8 +20,8 @@ The counts of a video depend only on its tracks (`FrameTracks`), live or from a 
 8. A vehicle first seen within a second of another's last frame, near its last or expected
    position, is treated as the same vehicle: its tracks share one number. This does not apply to
    vehicles that leave at the edge of the frame. A track that was not shown for half a second and
-   then reverses direction continues as another vehicle. A moving vehicle that is lost and not
-   found again continues for 0.3 seconds.
+   then reverses direction continues as another vehicle, as does one that jumps farther than a
+   vehicle can. A moving vehicle that is lost and not found again continues for 0.3 seconds.
 9. Only events are stored. All totals, flows and stays are computed from them.
 
 `linking` joins the tracks of each vehicle to a path. `crossings` has the lines and zones in

@@ -29,6 +29,12 @@ _MAX_DISTANCE = 0.5
 """Maximum distance from the last or expected position of a lost vehicle to the start of the track
 that continues it, in heights of the larger box.
 """
+_REACH, _ACCELERATION, _FIRST_SPEED = 4.0, 1.5, 20.0
+"""What a vehicle can move in the image: heights of its box, these per second squared, and per
+second before its velocity is known.
+"""
+_BEHIND = 2.0
+"""Minimum distance behind a vehicle that leaves the frame to be another one, in heights."""
 _MAX_GROWTH = 2.0
 """Maximum ratio of the heights of the last box of a track and the first one of the next."""
 _EXTRAPOLATED = 0.2, 0.3
@@ -150,7 +156,11 @@ class TrackLinker:
         shown = {track.id for track in frame.tracks}
         lost = [] if shown <= self._vehicles.keys() else self._lost(shown)
         for track in frame.tracks:
-            vehicle = self._vehicles.get(track.id) or self._begin(track, lost)
+            vehicle = self._vehicles.get(track.id)
+            if vehicle and vehicle.is_jump(track, self._now, *self._size):
+                self._vehicles[-vehicle.number] = self._vehicles.pop(track.id)
+                vehicle = None
+            vehicle = vehicle or self._begin(track, lost)
             vehicle.add(track, self._now, frame.index)
             if vehicle.has_turned():
                 self.started += 1
@@ -248,6 +258,18 @@ class _Vehicle:
             if np.ptp(latest[:, 1:3], axis=0).max() <= _PARKED_EXTENT * latest[-1, 4]:
                 self.size = max(self.size, _max_size(latest))
                 del self.rows[(1 - _PARKED_ROWS) * _COLUMNS : -_COLUMNS]
+
+    def is_jump(self, track: Track, time: float, width: int, height: int) -> bool:
+        """Return whether a box with its id is too far away to be of this vehicle."""
+        size = max(self.box.height, track.box.height)
+        moved = complex(*track.foot) - complex(*self.rows[1 - _COLUMNS : 3 - _COLUMNS])
+        if abs(moved) <= _BEHIND * size:
+            return False
+        velocity, seconds = _velocity(self.rows), time - self.last_seen
+        if (moved * velocity.conjugate()).real < 0 and self.is_leaving(width, height):
+            return True
+        speed = 2 * abs(velocity) if len(self.rows) > _COLUMNS else _FIRST_SPEED * size
+        return abs(moved) > (_REACH + _ACCELERATION * seconds**2) * size + speed * seconds
 
     def has_turned(self) -> bool:
         """Return whether it moves backwards since it reappeared, and so is another vehicle."""
