@@ -142,18 +142,22 @@ def test_exact_clocks_show_a_short_gap(tmp_path: File) -> None:
 
 
 @pytest.mark.parametrize(
-    ("second", "is_joined"),
+    ("first", "second", "is_joined"),
     [
-        ("20260501_070010_000124NF", True),
-        ("20260501_070010_000124NR", False),
-        ("cam2_20260501_070010_000124NF", False),
-        ("rear/20260501_070010_000124NF", False),
+        ("20260501_070000_000123NF", "20260501_070010_000124NF", True),
+        ("20260501_070000_000123NF", "20260501_070010_000124NR", False),
+        ("cam1_20260501_070000", "cam2_20260501_070010", False),
+        ("1001_20260501_070000", "1002_20260501_070010", False),
+        ("20260501_070000_cam1", "20260501_070010_cam2", False),
+        ("20260501_070000", "rear/20260501_070010", False),
+        ("2026-05-01/20260501_070000", "2026-05-02/20260501_070010", True),
     ],
 )
-def test_only_files_of_one_camera_are_joined(tmp_path: File, second: str, is_joined: bool) -> None:
-    first = f"{'cam1_' * second.startswith('cam')}20260501_070000_000123NF.jsonl"
+def test_only_files_of_one_camera_are_joined(
+    tmp_path: File, first: str, second: str, is_joined: bool
+) -> None:
     files = [
-        write_part(tmp_path / first, 0, 10, GOES_EAST),
+        write_part(tmp_path / f"{first}.jsonl", 0, 10, GOES_EAST),
         write_part(tmp_path / f"{second}.jsonl", 10, 20, GOES_EAST),
     ]
     rows = flow_table(count(files))
@@ -180,6 +184,18 @@ def test_frames_that_the_next_file_repeats_count_once(
         f"{files[1]}: begins {repeated}.0 s before the end of {files[0]}; these frames are not "
         "counted again; if its clock is wrong, count it on its own"
     )
+
+
+def test_the_next_vehicle_in_a_lane_is_not_a_repeat(
+    tmp_path: File, caplog: pytest.LogCaptureFixture
+) -> None:
+    cars = [through((t, 100, 400), (t + 6, 1100, 400)) for t in (12, 20.5)]
+    files = [
+        write_part(tmp_path / "v_20260501_070000.jsonl", 0, 20, *cars),
+        write_part(tmp_path / "v_20260501_070020.jsonl", 20, 40, *cars),
+    ]
+    (row,) = flow_table(count(files))
+    assert (row.count, caplog.messages) == (2, [])
 
 
 def test_a_file_within_another_counts_nothing(tmp_path: File) -> None:

@@ -27,26 +27,30 @@ _log = logging.getLogger("vdet")
 _SEAM = 1.0
 """Maximum seconds between two videos that continue without a gap, if a clock has whole seconds."""
 _MIN_GAP = 0.1
-"""Minimum seconds between them by two clocks with fractions of a second."""
+"""Minimum seconds of a gap by two clocks with fractions of a second, and of an overlap."""
 _STEP = 0.04
 """Assumed duration of the only frame of a video, seconds."""
 _REPEATED = 11.0
-"""Maximum seconds of a video that are looked for in the next one."""
+"""Last seconds of a video that are looked for in the next one."""
 _SAME = 0.1
 """Maximum distance of vehicles in the same frame of two videos, in heights of their boxes."""
-_DATE = re.compile(r"\d{4}|(\d{1,2}\D{1,2}){4}\d")
-"""Start of a time or a long counter in a name; the name of the camera precedes it."""
+_DATES = tuple(
+    map(re.compile, (r"(19|20)\d\d[-_.]?[01]\d[-_.]?[0-3]\d", r"(\d{1,2}\D{1,2}){4}\d", r"\d{4}"))
+)
+"""Start of the time or counter in the name of a file; the name of the camera precedes it."""
 _COUNTER = re.compile(r"(?<![a-zA-Z\d])\d+|(?<=\d[a-zA-Z])\d+|\d{4,}")
 """Digits that differ between videos of one camera, unlike those of a word such as cam1."""
 
 
 def camera_of(path: Path) -> tuple[str, ...]:
     """Return the parts of a path without times and counters; they are equal for one camera."""
-    dates = [(part, _DATE.search(part)) for part in path.parts]
-    return tuple(
-        part[: date.start()] + _COUNTER.sub("#", part[date.start() :]) if date else part
-        for part, date in dates
-    )
+    folders = (_without_counters(folder, _DATES[:1]) for folder in path.parent.parts)
+    return *folders, _without_counters(path.name, _DATES)
+
+
+def _without_counters(name: str, dates: Iterable[re.Pattern[str]]) -> str:
+    date = next(filter(None, (date.search(name) for date in dates)), None)
+    return name[: date.start()] + _COUNTER.sub("#", name[date.start() :]) if date else name
 
 
 def count_files(
@@ -178,14 +182,18 @@ class _Video:
     meter: SpeedMeter | None
     last_frames: Sequence[FrameTracks]
 
-    def repeated_seconds(self, first: float, frames: Iterable[FrameTracks]) -> float:
+    def repeated_seconds(
+        self, first: float, frames: Iterable[FrameTracks], overlap: float
+    ) -> float:
         """Return the seconds at its end that the next video shows again; 0 if that is unclear.
 
-        `first` is the time of the first of its frames.
+        `first` is the time of the first of its frames, `overlap` that by the clocks.
         """
         start = next((frame for frame in frames if frame.tracks), None)
-        if not (start and self.last_frames) or start.time - first > _SEAM:
+        if not start or start.time - first > _SEAM:
             return 0.0
+        end = self.end + start.time - first
+        before = [f for f in self.last_frames if abs(end - f.time - overlap) <= _SEAM + 1e-6]
 
         def distance(frame: FrameTracks) -> float:
             feet = [track.foot for track in frame.tracks]
@@ -196,11 +204,11 @@ class _Video:
             )
             return max(nearest)
 
-        same = min(reversed(self.last_frames), key=distance)
-        has_moved = distance(self.last_frames[-1]) > distance(same) + 2 * _SAME
-        if distance(same) > _SAME or not has_moved:
+        same = min(reversed(before), key=distance, default=None)
+        if not same or distance(same) > _SAME:
             return 0.0
-        return self.end - same.time + start.time - first
+        has_moved = distance(self.last_frames[-1]) > distance(same) + 2 * _SAME
+        return end - same.time if has_moved else 0.0
 
     def unshifted(self, event: Event) -> Event:
         """Return an event of the group at its time and frame in this video."""
@@ -246,16 +254,17 @@ class _Group:
         meter = SpeedMeter(self._ground, *self._size) if self._ground else None
         if self._videos:
             self.counter.start_video()
-        span_count, latest, step = len(self.counter.spans), -math.inf, _STEP
-        frame_shift, last_frames = self._frame_count, deque[FrameTracks]()
+        span_count, latest, last_index = len(self.counter.spans), -math.inf, 0
+        frame_shift, last_frames, step = self._frame_count, deque[FrameTracks](), _STEP
         for frame in frames:
             if not latest <= frame.time < math.inf:
                 raise TruthError(
                     f"frame {frame.index}: {frame.time:g} s is before {latest:g} s; times must "
                     "increase"
                 )
-            step = frame.time - latest if latest > -math.inf else step
-            latest = frame.time
+            if latest > -math.inf:
+                step = (frame.time - latest) / max(1, frame.index - last_index)
+            latest, last_index = frame.time, frame.index
             if latest < start:
                 continue
             index = frame.index + frame_shift
@@ -290,7 +299,8 @@ class _Group:
             return 0.0
         gap = (clock.at(first) - before.clock.at(before.end)).total_seconds()
         has_seconds = before.clock.has_whole_seconds or clock.has_whole_seconds
-        if has_seconds and gap < _SEAM and (repeated := before.repeated_seconds(first, frames)):
+        repeated = before.repeated_seconds(first, frames, -gap) if has_seconds else 0.0
+        if repeated >= _MIN_GAP:
             return -repeated
         return 0.0 if abs(gap) <= (_SEAM + 1e-6 if has_seconds else _MIN_GAP) else gap
 
