@@ -10,7 +10,7 @@ import pytest
 
 from clips import joined, write_clip
 from vdet.media import Frame
-from vdet.media.decoder import Damage
+from vdet.media.decoder import Damage, Decoder
 from vdet.media.reader import VideoReader
 
 GOPS: dict[str, Any] = {"options": {"g": "10", "bf": "2"}, "count": 60}
@@ -100,6 +100,15 @@ def test_where_frames_cannot_be_counted_all_are_decoded(
     start = Fraction(2)
     assert_part(read(path, start), whole, start)
     assert len(decoded) >= 60
+
+
+@pytest.mark.parametrize("name", [*CLIPS, *NOT_SURE])
+def test_a_copy_must_begin_at_a_key_frame_that_is_shown(name: str, tmp_path: Path) -> None:
+    suffix, spec = (CLIPS | NOT_SURE)[name]
+    decoder = Decoder(write_clip(tmp_path / f"clip.{suffix}", **GOPS | spec), None)
+    has_times = suffix != "h264"
+    assert decoder.shows_key_frame() == (has_times and "intra refresh" not in name)
+    decoder.demuxer.close()
 
 
 def test_a_start_after_a_clock_that_restarts(tmp_path: Path) -> None:

@@ -309,7 +309,8 @@ class TestZone:
         os.environ["TZ"] = "EST5EDT,M3.2.0,M11.1.0"
         time.tzset()
         texts = "2026-03-07 12:00-05:00", "2026-03-10 12:00-04:00"
-        clocks = [find_clock(Path("a"), Settings(), None, 0.0, parse_date_time(t)) for t in texts]
+        saved = [SavedTracks((), begin=parse_date_time(text)) for text in texts]
+        clocks = [find_clock(Path("a"), Settings(), 0.0, saved=tracks) for tracks in saved]
         periods = Intervals([(clock, [(0.0, 60.0)]) for clock in clocks], 86_400).periods
         assert [str(period.start) for period in periods] == [
             "2026-03-07 00:00:00-05:00", "2026-03-10 00:00:00-04:00",

@@ -120,6 +120,8 @@ def test_a_begin_is_that_of_the_first_of_several_files(
     files = write_halves(tmp_path, names, GOES_EAST)
     clocks = [str(counts.clock) for counts in count_files(files, settings).values()]
     assert clocks == [f"2026-01-02 03:04:{second}+00:00 (as given)" for second in ("00", "10")]
+
+
 def test_ends_do_not_add_up_before_a_pause(tmp_path: File) -> None:
     goes, other = through((0, 100, 400), (30, 600, 400)), through((35, 600, 400), (45, 1100, 400))
     files = []

@@ -14,6 +14,7 @@ from av.stream import Stream
 
 from vdet.config.schema import Settings
 from vdet.errors import OutputError
+from vdet.media.decoder import Decoder
 from vdet.media.demux import Demuxer
 from vdet.media.images import is_image_name
 from vdet.media.reader import VideoReader
@@ -29,7 +30,7 @@ def copied_suffix(source: Path) -> str | None:
     """Return the suffix of copied parts of a video; None if they must be encoded.
 
     It is that of the source, or .mkv. Copies need a seekable file with times of its own, one clock,
-    and streams that the container supports.
+    streams that the container supports, and key frames that are shown.
     """
     if not source.is_file() or is_image_name(source):
         return None
@@ -48,7 +49,9 @@ def copied_suffix(source: Path) -> str | None:
                 trial.start_encoding()
         except (ValueError, OSError, av.FFmpegError):
             return None
-    return suffix
+    decoder = Decoder(source, None)
+    with closing(decoder.demuxer):
+        return suffix if decoder.shows_key_frame() else None
 
 
 def _ticks(demuxer: Demuxer, time: Fraction) -> int:

@@ -1,10 +1,10 @@
 """Decode a video stream from its first picture, or from a key frame, despite damage."""
 
+import itertools
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import chain
 from pathlib import Path
 
 import av
@@ -19,6 +19,7 @@ from vdet.media.images import ImageSequence, find_sequence, read_encoded
 _LONGEST_GROUP = 600  # maximum packets between key frames, which are kept in memory
 _COUNTABLE = ("av1", "h264", "hevc", "libdav1d", "mjpeg", "mpeg2video", "mpeg4", "png", "vp9")
 """Codecs with one picture per packet."""
+_LEADING = 17  # maximum pictures from a key packet to its picture, with those of an open group
 _MAX_LATE = 32  # periods; a later picture means that the clock was set back
 _FLAGGED = 2  # last packets of a part that seem incomplete where the next part begins
 
@@ -160,13 +161,26 @@ class Decoder:
             if packet.dts is not None and packet.dts > time:
                 break
         self.before = sum(first <= pts < key for pts in times)
-        following = chain(group, self._packets)
+        following = itertools.chain(group, self._packets)
         # Pictures before the key frame may need older ones.
         self._packets = (packet for packet in following if packet.pts is None or packet.pts >= key)
         return key
 
+    def shows_key_frame(self) -> bool:
+        """Decode from the second key frame, and return whether it is shown; True without one.
+
+        With intra refresh, it is not. The decoder is then unusable.
+        """
+        keys = (packet for packet in self._packets if packet.is_keyframe)
+        key = next(itertools.islice(keys, 1, None), None)
+        if key is None:
+            return True
+        self._packets = itertools.chain([key], self._packets)
+        shown = itertools.islice(self.pictures, _LEADING)
+        return key.pts is not None and any(picture.pts == key.pts for picture in shown)
+
     def _decode(self) -> Iterator[av.VideoFrame]:
-        for packet in chain(self._packets, (None,)):
+        for packet in itertools.chain(self._packets, (None,)):
             if packet and not packet.is_discard:  # otherwise the file marks it as hidden
                 self.damage.packets += 1
             try:
