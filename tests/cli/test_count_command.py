@@ -189,9 +189,9 @@ def test_fractions_need_the_size_of_the_frames(run: Run, tmp_path: Path) -> None
             "t.csv: its name does not match camera.clock.pattern",
         ),
         (
-            ["t.csv", "t.csv", "-c", "l.yaml", "--begin", "2026-05-01 07:00"],
+            ["t.csv", "u.csv", "-c", "l.yaml", "--begin", "2026-05-01 07:00"],
             1,
-            "t.csv: has no clock, and the file before does not say how long its video is; use .jso",
+            "u.csv: has no clock, and the file before does not say how long its video is; use .jso",
         ),
         (["back.csv", "-c", "l.yaml"], 1, "back.csv:3: frame 1 is at 0.04 s; times must be"),
     ],
@@ -206,6 +206,7 @@ def test_mistakes_are_refused(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     write_tracks(Path("t.csv"))
+    write_tracks(Path("u.csv"))
     Path("t.txt").write_text("1,1,1,1,40,40,1,-1,-1,-1\n")
     Path("l.yaml").write_text(LINES)
     Path("short.yaml").write_text(

@@ -67,8 +67,8 @@ def test_saved_tracks_are_counted_as_live(red_clip: Path, tmp_path: Path) -> Non
     ("assignments", "words"),
     [
         (
-            ["detector.classes=[car, bus]", "classes=[lorry]"],
-            "classes: lorry: unknown class; known: car, bus; detector.classes can have more",
+            ["detector.classes=[car, bus]", "classes=[tram]"],
+            "classes: tram: unknown class; known: car, bus; detector.classes can have more",
         ),
         (["detector.kind=svm", "classes=[car]"], "classes: has no effect"),
     ],
