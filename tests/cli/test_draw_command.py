@@ -1,4 +1,4 @@
-"""`vdet draw`: the page, proposals, and the picture for a report."""
+"""`vdet draw`: the page, and the picture for a report."""
 
 import json
 from pathlib import Path
@@ -11,7 +11,6 @@ import pytest
 from conftest import Run
 from pages.html import Elements
 from running import write_drive
-from vdet.config.loading import load_settings
 from writing import write_image
 
 LINES = """
@@ -70,23 +69,6 @@ def test_the_picture_shows_no_vehicle_that_moves(run: Run) -> None:
     assert not (red - np.maximum(blue, green) > 60).any()
 
 
-def test_proposed_lines_work_at_once_beside_what_a_file_has(run: Run) -> None:
-    tracks = ("--tracks-from", "tracks.csv")
-    result = run("draw", "frame.png", *tracks, "-c", "lines.yaml", "--propose", "new.yaml")
-    assert (result.code, result.out) == (0, "new.yaml: written, 6 vehicles\nright: 6 vehicles\n"), (
-        result.err
-    )
-    settings = load_settings([Path("new.yaml")])
-    assert [line.name for line in settings.traffic.lines] == ["gate", "right"]
-    assert settings.output.crf == 30
-    counted = run("count", "tracks.csv", "-c", "new.yaml")
-    rows = [line.split()[1:4] for line in counted.out.splitlines()]
-    assert ["right", "right", "6"] in rows
-    assert ["gate", "left", "6"] in rows
-    facing = run("draw", "frame.png", *tracks, "--facing", "n", "--propose", "east.yaml")
-    assert "eastbound: 6 vehicles" in facing.out
-
-
 @pytest.mark.parametrize("begins", [0, 100])
 @pytest.mark.parametrize(
     ("part", "vehicles"),
@@ -126,19 +108,16 @@ def test_the_picture_for_a_report_has_lines_flows_and_numbers(run: Run) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ((), "no output; use -o FILE"),
+        ((), "Missing option '-o'"),
         (("-o", "a.txt"), "pages must end in .html, .jpg, .png, .svg"),
-        (("--propose", "a.txt"), "settings must end in .yaml"),
         (("-o", "a.jpg"), "a.jpg: nothing to draw"),
         (("-o", "lines.html", "-c", "wide.yaml"), "whose aspect ratio"),
-        (("--propose", "a.yaml", "--tracks-from", "few.csv"), "no stream has enough vehicles"),
         (("-o", "frame.png", "-c", "lines.yaml", "--overwrite"), "frame.png"),
         (("-o", "a.html", "--tracks-from", "t.txt"), "t.txt: has no times"),
     ],
 )
 def test_wrong_use_is_refused(run: Run, arguments: tuple[str, ...], message: str) -> None:
     Path("wide.yaml").write_text(LINES.replace("240]", "100]").replace("220", "90"))
-    Path("few.csv").write_text("frame,time,id,x,y,width,height\n")
     Path("t.txt").write_text("1,1,10,10,20,20,1,-1,-1,-1\n")
     result = run("draw", "frame.png", *arguments)
     assert result.code in (1, 2)

@@ -217,15 +217,6 @@ def test_a_finger_draws_on_a_small_screen(tmp_path: Path) -> None:
         assert "left 0 · right 6" in window.text("#list")
 
 
-def test_a_proposed_line_is_taken_over_by_a_click(window: Browser, tmp_path: Path) -> None:
-    made = drawing(list(frames(*DOWN)))
-    [line] = made.proposals
-    window.open(written(tmp_path, made))
-    window.click(((line.start[0] + line.end[0]) / 2, (line.start[1] + line.end[1]) / 2))
-    assert window.text("#list") == "downdown 6 · up 0"
-    assert window.run("return document.querySelectorAll('.proposal').length") == 0
-
-
 def test_what_a_file_has_already_is_carried_through(window: Browser, tmp_path: Path) -> None:
     given = tmp_path / "given.yaml"
     given.write_text(

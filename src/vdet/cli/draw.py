@@ -13,24 +13,14 @@ from vdet.cli.messages import print_lines, progress_steps
 from vdet.errors import ConfigError, counted
 from vdet.files import OutputFiles, output_errors
 
-_DIRECTIONS = ("N", "NE", "E", "SE", "S", "SW", "W", "NW")
-
 
 @command()
 @click.argument("clip", type=options.INPUT, metavar="CLIP")
 @options.output_file(
     "-o",
     "--output",
+    required=True,
     help="Page to write, .html, or image of the scene for a report, .jpg, .png or .svg.",
-)
-@options.output_file(
-    "--propose", help="Propose a line across each main stream and write the settings, .yaml."
-)
-@click.option(
-    "--facing",
-    type=click.Choice(_DIRECTIONS, case_sensitive=False),
-    metavar="DIRECTION",
-    help="Direction of the camera, such as N or SW, for the names of proposed lines.",
 )
 @options.input_file(
     "--tracks-from", "tracks", help="Read the tracks from FILE instead of detecting vehicles."
@@ -42,9 +32,7 @@ _DIRECTIONS = ("N", "NE", "E", "SE", "S", "SW", "W", "NW")
 @options.overwrite_option
 def draw(
     clip: Path,
-    output: Path | None,
-    propose: Path | None,
-    facing: str | None,
+    output: Path,
     tracks: Path | None,
     start: Fraction | None,
     end: Fraction | None,
@@ -61,45 +49,28 @@ def draw(
     Examples:
       vdet draw in.mp4 -o gate.html
       vdet draw in.mp4 -c gate.yaml -o gate.html --tracks-from tracks.jsonl
-      vdet draw in.mp4 --propose gate.yaml
       vdet draw in.mp4 -c gate.yaml -o scene.jpg
     """
     from vdet.pages.drawing import Drawing
     from vdet.run.scene import read_scene
     from vdet.run.video import Run
 
-    outputs = [path for path in (output, propose) if path]
     settings = source.load()
-    if not outputs:
-        raise click.UsageError("no output; use -o FILE or --propose FILE")
     inputs = source.inputs(clip, *([tracks] if tracks else ()), settings=settings)
-    if output:
-        suffixes = (".html", ".jpg", ".png", ".svg")
-        options.check_file(output, *suffixes, noun="pages", overwrite=overwrite, inputs=inputs)
-        if output.suffix.lower() != ".html" and not settings.traffic:
-            raise ConfigError(f"{output}: nothing to draw; add lines or zones with -c FILE")
-    if propose:
-        options.check_file(
-            propose, ".yaml", ".yml", noun="settings", overwrite=overwrite, inputs=inputs
-        )
+    suffixes = (".html", ".jpg", ".png", ".svg")
+    options.check_file(output, *suffixes, noun="pages", overwrite=overwrite, inputs=inputs)
+    if output.suffix.lower() != ".html" and not settings.traffic:
+        raise ConfigError(f"{output}: nothing to draw; add lines or zones with -c FILE")
     with progress_steps(" frames") as steps:
         # Without regions, because the page shows their effect.
         whole_frames = settings.model_copy(update={"regions": ()})
         run = Run(clip, settings=whole_frames, start=start, end=end)
         image, frames = read_scene(run, tracks, steps)
-    drawing = Drawing(image, frames, settings, _user_values(source.configs), facing)
-    if propose and not drawing.proposals:
-        raise ConfigError(f"{clip}: no stream has enough vehicles; draw lines with -o gate.html")
-    with OutputFiles(overwrite=overwrite) as files:
-        for path in outputs:
-            with output_errors(path):
-                name = Path([path.name, *source.configs][-1]).with_suffix(".yaml").name
-                files.stage(path).write_bytes(drawing.output(path, name))
-    lines = drawing.proposals if propose else ()
-    print_lines(
-        *(f"{path}: written, {counted(len(drawing.paths), 'vehicle')}" for path in outputs),
-        *(f"{line.name}: {counted(line.vehicles, 'vehicle')}" for line in lines),
-    )
+    drawing = Drawing(image, frames, settings, _user_values(source.configs))
+    with OutputFiles(overwrite=overwrite) as files, output_errors(output):
+        name = Path([output.name, *source.configs][-1]).with_suffix(".yaml").name
+        files.stage(output).write_bytes(drawing.output(output, name))
+    print_lines(f"{output}: written, {counted(len(drawing.paths), 'vehicle')}")
 
 
 def _user_values(configs: Sequence[str]) -> dict[str, Any]:

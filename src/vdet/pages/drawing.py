@@ -1,9 +1,8 @@
-"""The outputs of `vdet draw`: the page, proposed settings, and an image of the traffic."""
+"""The outputs of `vdet draw`: the page, and an image of the traffic."""
 
 import base64
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +22,6 @@ from vdet.track.track import FrameTracks
 from vdet.traffic.counting import count_frames
 from vdet.traffic.crossings import lines_and_zones
 from vdet.traffic.linking import VehiclePath, link_tracks
-from vdet.traffic.proposals import ProposedLine, propose_lines
 
 _SECTIONS = {"ground": "camera", "regions": "other", "lines": "traffic", "zones": "traffic"}
 """The lists that the page edits, and their section in the settings file."""
@@ -40,15 +38,11 @@ class Drawing:
         The tracks of its vehicles.
     values
         Values of the settings files so far, as of `given_values`.
-    facing
-        As for `propose_lines`.
 
     Attributes
     ----------
     paths
         Paths of the vehicles that count, of the classes in the settings.
-    proposals
-        A line across each main stream.
     """
 
     def __init__(
@@ -57,7 +51,6 @@ class Drawing:
         frames: Sequence[FrameTracks],
         settings: Settings,
         values: Mapping[str, Any],
-        facing: str | None = None,
     ) -> None:
         height, width = image.shape[:2]
         self._image, self._frames, self._size = image, frames, (width, height)
@@ -68,18 +61,14 @@ class Drawing:
             for path in linked
             if path.seconds >= minimum and is_chosen(path.class_name, settings.classes)
         ]
-        self.proposals: tuple[ProposedLine, ...] = propose_lines(self.paths, width, height, facing)
 
     def output(self, path: Path, name: str) -> bytes:
-        """Return the content of a file by the suffix of `path`: a page, settings or an image.
+        """Return the content of a file by the suffix of `path`: a page or an image.
 
         `name` is the name of the settings file that the page saves. Raises `ConfigError`.
         """
-        match path.suffix.lower():
-            case ".html":
-                return self._page(name).encode("utf-8", "backslashreplace")
-            case ".yaml" | ".yml":
-                return self._proposed_settings().encode()
+        if path.suffix.lower() == ".html":
+            return self._page(name).encode("utf-8", "backslashreplace")
         marks = self._marks()
         if path.suffix.lower() == ".svg":
             width, height = self._size
@@ -100,19 +89,9 @@ class Drawing:
             "paths": pack_paths(self.paths),
             "places": shapes,
             "rest": other_settings,
-            "proposals": [asdict(proposal) for proposal in self.proposals],
         }
         script = Markup((TEMPLATES / "draw.js").read_text("utf-8"))
         return render("draw.html", data=data, name=name, script=script)
-
-    def _proposed_settings(self) -> str:
-        values = in_pixels(self._values, *self._size)
-        traffic = values["traffic"] = values.get("traffic") or {}
-        lines = [asdict(proposal) for proposal in self.proposals]
-        for line in lines:
-            del line["vehicles"]
-        traffic["lines"] = [*(traffic.get("lines") or []), *lines]
-        return "\n".join([_PROPOSED, *as_yaml(values), ""])
 
     def _marks(self) -> list[Mark]:
         counts = count_frames(self._frames, self._settings, self._size)
@@ -120,12 +99,6 @@ class Drawing:
         ground = ground_of(self._settings.camera, *self._size)
         paths = {key: path.points.tolist() for path in self.paths for _, key in path.tracks}
         return traffic_marks(self._size, (*lines, *zones), counts, paths, ground)
-
-
-_PROPOSED = """\
-# Lines across the main streams, proposed by vdet draw. A stream crosses its line to the left, seen
-# from start to end. Check and move the lines:
-# vdet draw CLIP -c THIS_FILE -o gate.html"""
 
 
 def split(

@@ -583,13 +583,8 @@ async function openPage(data) {
   }
 
   function drawMarks() {
-    const ground = fitGround(places.ground), isTaken = each => places.lines.some(line =>
-      String([line.start, line.end]) === String([each.start, each.end]));
-    marks.replaceChildren(...(ground ? gridOf(ground) : []), ...data.proposals.map((each, number) => {
-      const { start, end, name, vehicles } = each, middle = start.map((value, i) => (value + end[i]) / 2);
-      return isTaken(each) || tool !== "select" ? "" : el("g", { class: "proposal", "data-proposal": number },
-        ...segment([start, end]), label([middle[0], middle[1] - 8 * unit()], [`+ ${name}: ${vehicles}`]));
-    }));
+    const ground = fitGround(places.ground);
+    marks.replaceChildren(...(ground ? gridOf(ground) : []));
     for (const kind of ["regions", "zones", "lines", "ground"])
       marks.append(...places[kind].map((each, index) => drawItem(kind, each, index)));
     if (hovered)
@@ -787,13 +782,7 @@ async function openPage(data) {
     stage.setPointerCapture(event.pointerId);
     drag = { from: pointer, moved: false };
     if (tool !== "select") return showLens();
-    const target = event.target.closest("[data-kind], [data-proposal]"), point = event.target.dataset.point;
-    if (target?.dataset.proposal) {
-      const { name, start, end, left, right } = data.proposals[target.dataset.proposal];
-      const isUsed = places.lines.some(line => line.name === name);
-      drag = null;
-      return add("lines", { name: isUsed ? freeName(name) : name, start, end, left, right });
-    }
+    const target = event.target.closest("[data-kind]"), point = event.target.dataset.point;
     const { kind, index } = target?.dataset ?? {};
     selected = target && { kind, index: Number(index), point: point ? Number(point) : null };
     drag = selected && { ...drag, before: JSON.stringify(places) };
@@ -826,7 +815,7 @@ async function openPage(data) {
 
   /** Show when and what the path nearest to the pointer is. */
   function hover(event) {
-    const isOver = event.target.closest("[data-kind], [data-proposal]") || !get("paths").checked;
+    const isOver = event.target.closest("[data-kind]") || !get("paths").checked;
     let best = 8 * unit(), nearest = null;
     for (const path of isOver ? [] : every)
       for (let row = 0; row < path.seen; row++) {
