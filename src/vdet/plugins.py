@@ -48,7 +48,6 @@ _BUILT_IN: dict[str, dict[str, str]] = {
         "csv": "vdet.labels.native:CSV",
         "jsonl": "vdet.labels.native:JSON_LINES",
         "coco": "vdet.labels.coco:COCO",
-        "yolo": "vdet.labels.yolo:YOLO",
     },
 }
 """The plug-ins of vdet itself: where each name is defined. The first of a group is the default."""

@@ -1,7 +1,6 @@
 """`vdet detect-image`."""
 
 import json
-import zipfile
 from pathlib import Path
 
 import pytest
@@ -102,14 +101,11 @@ def test_labels_of_a_folder_and_those_below_are_read_by_eval_images(
     (folder / "north").mkdir(parents=True)
     for name in ("a.png", "north/a.png"):
         (folder / name).write_bytes(picture.read_bytes())
-    files = [tmp_path / "set" / f"boxes{ending}" for ending in (".coco.json", ".yolo.zip")]
-    options = [word for file in files for word in ("--labels", file)]
-    run("detect-image", folder, *options, "--model", model_path, *QUICK_OPTIONS, code=0)
-    zipfile.ZipFile(files[-1]).extractall(tmp_path / "set")
-    names = [folder / "a.png", folder / "north" / "a.png"]
-    for labels in (files[0], tmp_path / "set"):
-        found = read_labelled_images(labels).images
-        assert [item.path for item in found] == names
-        first, second = ([label.box for label in item.labels] for item in found)
-        assert first
-        assert first == second
+    labels = tmp_path / "set" / "boxes.coco.json"
+    options = ("--labels", labels, "--model", model_path, *QUICK_OPTIONS)
+    run("detect-image", folder, *options, code=0)
+    found = read_labelled_images(labels).images
+    assert [item.path for item in found] == [folder / "a.png", folder / "north" / "a.png"]
+    first, second = ([label.box for label in item.labels] for item in found)
+    assert first
+    assert first == second

@@ -10,9 +10,7 @@ from hostile.trials import try_files
 from labels.saving import car, frame, written
 from vdet.boxes import Box
 from vdet.errors import TruthError
-from vdet.evaluate.comparison import MAX_IDS, compare
-from vdet.labels import coco, label, native
-from vdet.labels.label import MAX_IN_FRAME
+from vdet.labels import coco, native
 from vdet.labels.mot import MOT
 from vdet.labels.reading import read_predictions, read_truth
 
@@ -63,11 +61,10 @@ def test_damaged_files_of_boxes_are_read_or_refused(tmp_path: Path) -> None:
 DEEP = 1_000_000
 CSV_HEAD = "frame,time,id,x,y,width,height,class\n"
 WICKED = {
-    "no number": ("t.txt", "1" * 200_000 + "x,1,1,1,1,1,1,1,1", "is not a number"),
-    "a long line": ("t.txt", "1," * 3_000_000, "t.txt:1: the line is longer than 1,000,000 bytes"),
+    "no number": ("t.txt", "1" * 200_000 + "x,1,1,1,1,1,1,1,1", "integer, exceeded maximum size"),
+    "a long line": ("t.txt", "1," * 3_000_000, "t.txt:1: .* this line has 3000001"),
     "a huge cell": ("t.csv", CSV_HEAD + "1," + "9" * 200_000, "t.csv:2: this line has 2 cells"),
     "an open quote": ("t.csv", CSV_HEAD + '"' + "\n" * 100_000, "unexpected end of data"),
-    "a long class": ("t.csv", CSV_HEAD + "0,0,1,1,1,9,9," + "x" * 1000, ":2: (the )?label"),
     "deep": ("t.jsonl", "[" * 900_000, ":1: .*recursion limit"),
     "a huge number": ("t.jsonl", '{"frame": ' + "9" * 100_000 + "}", ":1: "),
     "no end of tracks": ("t.jsonl", '{"frame": 0, "time": 0, "tracks": [' + "{}," * 99_999, ":1: "),
@@ -102,25 +99,3 @@ def test_wicked_files_are_refused_by_name(tmp_path: Path, name: str) -> None:
 def test_a_file_without_an_end_is_not_read_to_its_end() -> None:
     with pytest.raises(TruthError, match="/dev/zero: is larger than 300,000,000 bytes"):
         read_truth(Path("/dev/zero"))
-
-
-def test_too_many_boxes_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(label, "MAX_LABELS", 10)
-    path = tmp_path / "t.txt"
-    path.write_text("".join(f"{n},1,1,1,1,1,1,1,1\n" for n in range(1, 11)))
-    assert len(read_truth(path)) == 10
-    path.write_text(path.read_text() + "11,1,1,1,1,1,1,1,1\n")
-    with pytest.raises(TruthError, match=r"t\.txt: has more than 10 boxes; cut it into parts"):
-        read_truth(path)
-
-
-@pytest.mark.parametrize("many", ["ids", "in one frame"])
-def test_more_than_can_be_compared_is_refused_before_it_is(tmp_path: Path, many: str) -> None:
-    path = tmp_path / "t.txt"
-    if many == "ids":
-        path.write_text("".join(f"{n},{n},1,1,9,9,1,-1,-1,-1\n" for n in range(1, MAX_IDS + 2)))
-    else:
-        path.write_text("".join(f"1,{n},1,1,9,9,1,-1,-1,-1\n" for n in range(MAX_IN_FRAME + 1)))
-    boxes = read_predictions(path)
-    with pytest.raises(TruthError, match="are too many to compare; cut the video into parts"):
-        compare(boxes, boxes)

@@ -7,7 +7,6 @@ import pytest
 from labels.saving import car, frame, written
 from labels.writers import exported
 from vdet.errors import TruthError
-from vdet.labels import coco
 from vdet.labels.coco import COCO, read_coco
 
 FRAMES = [frame(4, car(3)), frame(5), frame(6, car(3), car(5, class_name="bus", state="predicted"))]
@@ -76,11 +75,3 @@ def test_what_does_not_fit_is_refused_with_its_place(data: bytes, message: str) 
     with pytest.raises(TruthError) as caught:
         read_coco(FILE, data)
     assert str(caught.value).startswith(f"a.json{message}")
-
-
-def test_a_document_of_too_many_values_is_rejected_before_it_is_parsed(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(coco, "MAX_VALUES", 50)
-    with pytest.raises(TruthError, match=r"a\.json: has more than 50 values; cut it into parts"):
-        read_coco(FILE, exported({0: [1, 2], 5: [1]}))

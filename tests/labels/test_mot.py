@@ -37,13 +37,11 @@ def test_truth_can_be_read_as_tracks_without_its_ignore_regions(tmp_path: Path) 
 @pytest.mark.parametrize(
     ("second", "message"),
     [
-        (
-            "2,7,1,1,20,10,1,3,1,1",
-            "MOTChallenge has 9 columns separated by commas; this line has 10",
-        ),
-        ("2,7,1,1,20,wide,1,3,1", "'wide' is not a number"),
-        ("2,7,nan,1,20,10,1,3,1", "'nan' is not a number"),
-        ("2.5,7,1,1,20,10,1,3,1", "'2.5' is not a whole number"),
+        ("2,7,1,1,20,10,1,3,1,1", "MOTChallenge has 9 columns; this line has 10"),
+        ("2,7,1,1,20,tall,1,3,1", "height: Input should be a valid number"),
+        ("2,7,nan,1,20,10,1,3,1", "left: Input should be a finite number"),
+        ("2,7,1e8,1,20,10,1,3,1", "left: Input should be less than or equal to 10000000"),
+        ("2.5,7,1,1,20,10,1,3,1", "frame: Input should be a valid integer"),
         (
             "2,7,1,1,20,10,0.9,3,1",
             "with nine columns, column 7 must be a flag, 0 or 1, but is 0.9; a results file",

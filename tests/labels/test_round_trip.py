@@ -1,7 +1,6 @@
 """Every format of the registry: what is written is read again, and what is damaged is refused."""
 
 import math
-import zipfile
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -23,7 +22,6 @@ from vdet.labels.images import LabelledImage
 from vdet.labels.label import SavedTracks
 from vdet.labels.mot import MOT
 from vdet.labels.native import CSV, JSON_LINES
-from vdet.labels.yolo import YOLO, read_yolo_images
 from vdet.track.track import FrameTracks, State, Track
 from writing import write_image
 
@@ -47,10 +45,7 @@ def boxes(draw: st.DrawFn) -> Box:
     return Box.sized(x, y, right - x, bottom - y)
 
 
-READERS: dict[Format, Callable[[Path], Iterator[LabelledImage]]] = {
-    COCO: read_coco_images,
-    YOLO: lambda path: read_yolo_images(path.parent / "images", path.parent / "labels"),
-}
+READERS: dict[Format, Callable[[Path], Iterator[LabelledImage]]] = {COCO: read_coco_images}
 """How the labels of pictures are read again."""
 
 CLASSES = st.sampled_from([None, *OUR_NAMES, "tractor", 'a <"b"> & c, d', "Überlandbus 🚌"])
@@ -179,9 +174,6 @@ def test_labels_of_pictures_are_read_again(form: Format, pictures: list[ImageTra
             write_image(images / picture.path, np.zeros((VIDEO.height, VIDEO.width, 3), np.uint8))
         with path.open("wb") as file:
             form.images(file, pictures)
-        if form is YOLO:
-            with zipfile.ZipFile(path) as archive:
-                archive.extractall(folder)
         found = list(READERS[form](path))
     expected = {
         images / picture.path: sorted(

@@ -73,20 +73,6 @@ def write_coco(folder: Path, pictures: Pictures) -> Path:
     return path
 
 
-def write_kitti(folder: Path, pictures: Pictures) -> Path:
-    write_pictures(folder / "image_2", pictures)
-    (folder / "label_2").mkdir(exist_ok=True)
-    types = dict(zip(NAMES, ("Car", "Truck", "Bus", "DontCare", "Cow"), strict=True))
-    for name, picture in pictures.items():
-        lines = [
-            f"{types[boxed.name]} 0.00 0 -1.57 {x} {y} {x + w} {y + h} 1 1 4 2 1 20 -1.6\n"
-            for boxed in picture.boxes
-            for x, y, w, h in [boxed.box]
-        ]
-        (folder / "label_2" / f"{name}.txt").write_text("".join(lines), encoding="utf-8")
-    return folder / "label_2" / f"{min(pictures)}.txt"
-
-
 def write_yolo(folder: Path, pictures: Pictures) -> Path:
     write_pictures(folder / "images", pictures)
     (folder / "labels").mkdir(exist_ok=True)
@@ -142,7 +128,6 @@ def exported(frames: Mapping[int, Sequence[int]], **known: object) -> bytes:
 
 WRITERS: dict[str, Callable[[Path, Pictures], Path]] = {
     "COCO": write_coco,
-    "KITTI": write_kitti,
     "YOLO": write_yolo,
 }
 """By the name of the form; each returns the label file of the first picture by name."""

@@ -8,14 +8,13 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from types import ModuleType
 from typing import Any
-from unittest.mock import Mock
 
 import pytest
 
 from running import rows_of
 from traffic.scenes import ZONE, counts, frames, joined, numbered, through
 from vdet.config.shapes import LineSettings
-from vdet.errors import ConfigError, PackageError
+from vdet.errors import ConfigError
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Clock
 from vdet.traffic.counts import Counts, count_table, flow_table, zone_table
@@ -99,7 +98,7 @@ def test_there_is_a_row_for_each_interval_direction_and_class() -> None:
     ]  # fmt: skip
 
 
-def test_counts_are_a_table_of_pandas_and_bars_of_matplotlib(
+def test_counts_are_a_table_of_pandas(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     car, bus = named(frames(GOES_EAST), "car"), named(numbered(frames(TURNS_BACK), 2), "bus")
@@ -111,24 +110,6 @@ def test_counts_are_a_table_of_pandas_and_bars_of_matplotlib(
         patch.setattr(Counts, "table", lambda *_: map(astuple, count_table([found], 5)))
         table: Any = found.to_pandas(5)
     assert table == [asdict(row) for row in found.table(5)]
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
-    with pytest.raises(PackageError, match=r"^matplotlib is not installed; pip install matplotlib"):
-        found.plot()
-    monkeypatch.setitem(sys.modules, "matplotlib", Mock())
-    ways, moments = ["west left", "west right"], ["0.0", "5.0", "10.0"]
-    for interval, bars in (
-        (None, [
-            (ways, [1, 1], {"bottom": [0, 0], "label": "bus"}),
-            (ways, [1, 0], {"bottom": [1, 1], "label": "car"}),
-        ]),
-        (5, [
-            (moments, [2, 0, 0], {"bottom": [0, 0, 0], "label": "west left"}),
-            (moments, [0, 1, 0], {"bottom": [2, 0, 0], "label": "west right"}),
-        ]),
-    ):  # fmt: skip
-        axes = Mock()
-        assert found.plot(interval, axes) is axes
-        assert [(*call.args, call.kwargs) for call in axes.bar.call_args_list] == bars
 
 
 def test_zones_have_entries_exits_and_occupancy_by_interval() -> None:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 @options.output_files("--json", help="Write the boxes to FILE. With -, to standard output.")
 @options.output_files(
     "--labels",
-    help="Write the boxes for labelling tools: .coco.json or .yolo.zip. Can be repeated.",
+    help="Write the boxes for labelling tools: .coco.json. Can be repeated.",
 )
 @options.sinks_option
 @options.classes_option

@@ -38,7 +38,7 @@ def images(
 ) -> None:
     """Measure detection in labelled images.
 
-    Each DATA is a folder in COCO, KITTI or YOLO format, or a COCO file. Each image is searched on
+    Each DATA is a folder in COCO or YOLO format, or a COCO file. Each image is searched on
     its own and compared with its labels.
 
     \b

@@ -138,7 +138,7 @@ def train_net(
 ) -> None:
     """Train a network on labelled images.
 
-    Each DATA is a set of labelled images in COCO, KITTI or YOLO format. The state is saved beside
+    Each DATA is a set of labelled images in COCO or YOLO format. The state is saved beside
     the network, as .ckpt; if training stops, run the same command to resume.
     Requires torch and onnx: pip install torch onnx
 

@@ -17,16 +17,10 @@ import numpy.typing as npt
 
 from vdet.boxes import BoolArray, Float64Array, Int64Array, coverage, iou_matrix
 from vdet.config.classes import UNKNOWN
-from vdet.errors import TruthError
-from vdet.labels.label import MAX_IN_FRAME, LabelledVideo
+from vdet.labels.label import LabelledVideo
 
 MATCH_IOU = 0.5
 """A prediction with at least this overlap finds a vehicle."""
-
-MAX_IDS = 10_000
-"""Maximum number of vehicles, and of tracks, in one video."""
-MAX_PAIRS = 25_000_000
-"""Maximum number of pairs of a vehicle and a track, and of their boxes over all frames."""
 
 UNMATCHED = -1
 """Partner of a vehicle without a track."""
@@ -128,17 +122,11 @@ def compare(prediction: LabelledVideo, truth: LabelledVideo) -> Comparison:
 
     Predictions in unlabelled frames are omitted. If the truth covers only a part of the video, cut
     the predictions with `until` first; otherwise all later ones are false alarms.
-
-    Raises
-    ------
-    TruthError
-        There are more than `MAX_IDS`, `MAX_IN_FRAME` or `MAX_PAIRS`, far more than on any road.
     """
     step = 1
     if truth.covered is not None:
         prediction = prediction.where(np.isin(prediction.frames, truth.covered))
         step = int(np.diff(truth.covered).min(initial=truth.last_frame or 1))
-    _check_size(prediction, truth)
     numbers = np.union1d(prediction.frames, truth.frames).tolist()
     kept = [_apply_regions(prediction.frame(number), truth.frame(number)) for number in numbers]
     vehicle_ids = np.unique(joined(vehicles.ids for vehicles, _ in kept))
@@ -233,23 +221,6 @@ def counts(indices: Iterable[Int64Array], length: int) -> Int64Array:
 def joined(arrays: Iterable[Int64Array]) -> Int64Array:
     """Return one-dimensional arrays as one; an empty one if there are none."""
     return np.concatenate([np.empty(0, np.int64), *arrays])
-
-
-def _check_size(prediction: LabelledVideo, truth: LabelledVideo) -> None:
-    """Raise `TruthError` for a comparison that would take hours and gigabytes."""
-    tracks, vehicles = len(np.unique(prediction.ids)), len(np.unique(truth.ids))
-    last = max(prediction.last_frame, truth.last_frame)
-    predicted_boxes = np.bincount(prediction.frames, minlength=last + 1)
-    true_boxes = np.bincount(truth.frames, minlength=last + 1)
-    if (
-        max(tracks, vehicles) > MAX_IDS
-        or max(predicted_boxes.max(), true_boxes.max()) > MAX_IN_FRAME
-        or max(tracks * vehicles, int(np.sum(predicted_boxes * true_boxes))) > MAX_PAIRS
-    ):
-        raise TruthError(
-            f"{tracks:,} tracks with {len(prediction):,} boxes and {vehicles:,} vehicles with "
-            f"{len(truth):,} are too many to compare; cut the video into parts"
-        )
 
 
 def _apply_regions(

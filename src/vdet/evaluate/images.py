@@ -14,10 +14,12 @@ from vdet.detect.protocol import DetectorModel
 from vdet.evaluate.comparison import Comparison, compare, pool
 from vdet.evaluate.scores import DetectionScores, RankedPredictions, rank_predictions, score_boxes
 from vdet.labels.images import LabelledImage, LabelledImages
-from vdet.labels.label import MAX_IN_FRAME, LabelledVideo
+from vdet.labels.label import LabelledVideo
 from vdet.progress import Progress, no_progress
 from vdet.run.images import ImageSearch
 from vdet.run.threads import map_ordered
+
+_MAX_DETECTIONS = 1000  # in an image, those of the highest scores
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +61,7 @@ class MeasuredImage:
         truth = _one_frame(image.boxes, np.ones(len(regions)), regions, image.classes)
         is_labelled = [name not in image.unlabelled for name in boxes.class_names]
         boxes = boxes[np.flatnonzero(is_labelled)]
-        boxes = boxes[np.argsort(-boxes.scores, kind="stable")[:MAX_IN_FRAME]]
+        boxes = boxes[np.argsort(-boxes.scores, kind="stable")[:_MAX_DETECTIONS]]
         narrow = _widths(boxes.sides) < minimum
         detected = _one_frame(boxes.sides, boxes.scores, narrow, boxes.class_names)
         shown = detected.where(boxes.scores >= counting.score)

@@ -28,7 +28,7 @@ from vdet.config.classes import UNKNOWN
 from vdet.errors import TruthError, printable
 from vdet.labels.formats import Format, ImageTracks, SourceVideo, last_classes
 from vdet.labels.images import LabelledImage, image_names, inside, log
-from vdet.labels.label import MAX_LABELS, NO_ID, Label, SavedTracks, Size, from_size, line_error
+from vdet.labels.label import NO_ID, Label, SavedTracks, Size, from_size, line_error
 from vdet.labels.parsing import (
     LIMIT,
     Index,
@@ -40,9 +40,6 @@ from vdet.labels.parsing import (
     read_bytes,
 )
 from vdet.track.track import FrameTracks
-
-MAX_VALUES = 30_000_000
-"""Maximum number of values in a document, which limits the memory for it."""
 
 _VIDEO = 1
 """Id of the only video."""
@@ -191,7 +188,7 @@ class _Info:
 
 
 _Entry = TypeVar("_Entry")
-_Entries = Annotated[list[_Entry], FailFast(), Field(max_length=MAX_LABELS)]
+_Entries = Annotated[list[_Entry], FailFast()]
 
 
 @_entry
@@ -210,10 +207,6 @@ _KEYS = {
 }
 
 
-_OTHERS = {b'"_via_': "VIA", b'"imagePath"': "LabelMe", b'"box2d"': "BDD100K"}
-"""Other formats of JSON, by a part of their text."""
-
-
 def _used_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """Return an object of JSON without what is not used, such as outlines: it takes most memory."""
     return {key: value for key, value in pairs if key in _KEYS}
@@ -221,8 +214,6 @@ def _used_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 def _read(path: Path, data: bytes) -> _Document:
     """Return the document. Raises `TruthError`."""
-    if sum(map(data.count, (b",", b"[", b"{"))) > MAX_VALUES:
-        raise TruthError(f"{path}: has more than {MAX_VALUES:,} values; cut it into parts")
     try:
         values = json.loads(data, object_pairs_hook=_used_keys)
     except RecursionError:
@@ -230,8 +221,7 @@ def _read(path: Path, data: bytes) -> _Document:
     except ValueError as error:
         raise TruthError(f"{path}: is not JSON: {printable(str(error))}") from error
     if not (isinstance(values, dict) and "images" in values):
-        name = next((name for mark, name in _OTHERS.items() if mark in data), "JSON without images")
-        raise TruthError(f"{path}: is {name}, not COCO; export or convert the labels to COCO")
+        raise TruthError(f"{path}: has no images as in COCO; export or convert the labels to COCO")
     try:
         document = _DOCUMENT.validate_python(values)
     except ValidationError as error:
@@ -266,7 +256,7 @@ def read_coco(path: Path, data: bytes) -> SavedTracks:
     Raises
     ------
     TruthError
-        The file is not in this format or is too large, an id of images or categories or a frame
+        The file is not in this format, an id of images or categories or a frame
         occurs twice, a time is wrong, or an annotation refers to a missing image or category.
     """
     document = _read(path, data)

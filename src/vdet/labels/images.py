@@ -11,18 +11,11 @@ from pathlib import Path, PurePosixPath
 
 import numpy as np
 
-from vdet.archives import is_hidden
 from vdet.boxes import BoolArray, Float64Array, Image
 from vdet.errors import ImageError, TruthError, counted, printable
-from vdet.labels.label import MAX_IN_FRAME, Corners, Label, Size, line_error, mistake_in_box
-from vdet.labels.roles import DEFAULT_ROLES, Roles, merge_riders
-from vdet.media.images import is_image_name, read_image
-
-MAX_IMAGES = 200_000
-"""Maximum number of images in one set."""
-
-MAX_BOXES = 2_000_000
-"""Maximum number of boxes in one set."""
+from vdet.labels.label import Corners, Label, Size, line_error, mistake_in_box
+from vdet.labels.roles import DEFAULT_ROLES, Roles
+from vdet.media.images import read_image
 
 _SLACK = 0.1
 """How far a box may extend beyond a side of the image, as a fraction of it."""
@@ -109,9 +102,8 @@ def checked_images(
     Raises
     ------
     TruthError
-        There is no image, an image is missing or appears twice, a box has no area, most boxes
-        cannot be pixels of their images, or there are more than `MAX_IMAGES`, more than
-        `MAX_BOXES` in total, or more than `MAX_IN_FRAME` in one image.
+        There is no image, an image is missing or appears twice, a box has no area, or most boxes
+        cannot be pixels of their images.
     """
     checked: dict[Path, LabelledImage] = {}
     others, ignored = Counter[str](), Counter[str]()
@@ -123,11 +115,6 @@ def checked_images(
         boxes += len(labels)
         repeated += len(image.labels) - len(labels)
         absurd += sum(_is_absurd(label.box, image.size) for label in labels)
-        if len(checked) == MAX_IMAGES or boxes > MAX_BOXES:
-            raise TruthError(
-                f"{name}: has more than {MAX_IMAGES:,} images or {MAX_BOXES:,} boxes; cut it into "
-                "parts"
-            )
         if image.path in checked:
             raise TruthError(f"{name}: has the image {printable(image.path.name)} twice")
         checked[image.path] = replace(
@@ -163,19 +150,14 @@ def _with_roles(
     """Yield the vehicles and ignore regions of an image, and count the other labels."""
     if not is_file(image.path):
         raise TruthError(f"{printable(str(image.path))}: not found, but {image.file} labels it")
-    count = 0
-    for label in merge_riders(image.labels):
+    for label in image.labels:
         name = label.name or ""
         role = roles.role_of(name)
         if role not in ("vehicle", "ignored"):
             others[name] += 1
             continue
-        mistake = mistake_in_box(label)
-        if count == MAX_IN_FRAME:
-            mistake = f"the image has more than {MAX_IN_FRAME:,} boxes"
-        if mistake:
+        if mistake := mistake_in_box(label):
             raise line_error(image.file, label.position, mistake)
-        count += 1
         ignored.update([name] if role == "ignored" and not label.ignored else [])
         is_ignored = label.ignored or role == "ignored"
         yield label._replace(name=roles.class_of(name) or "vehicle", ignored=is_ignored)
@@ -230,26 +212,3 @@ def image_folder(path: Path, name: str) -> Path:
         if folders:
             return folders[0]
     raise TruthError(f"{path}: its first image, {shown}, was not found beside it or below")
-
-
-def paired_files(images: Path, labels: Path) -> Iterator[tuple[Path, Path | None]]:
-    """Yield the images below a folder, with the label file of the same name below another.
-
-    Hidden files and files of the system or of label tools are skipped; an image may have no label
-    file. Raises `TruthError` at the end if a label file has no image of its name.
-    """
-    names = (file.relative_to(labels) for file in labels.rglob("*.txt"))
-    files = {
-        name.with_suffix(""): labels / name
-        for name in names
-        if (labels / name).is_file()  # a FIFO may never end
-        and not is_hidden(name)
-        and name.name != "classes.txt"
-    }
-    used = set()
-    for image in sorted(filter(is_image_name, images.rglob("*"))):
-        name = image.relative_to(images).with_suffix("")
-        yield image, files.get(name)
-        used.add(name)
-    if unused := files.keys() - used:
-        raise TruthError(f"{files[min(unused)]}: has no image of its name below {images}")

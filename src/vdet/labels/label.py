@@ -8,7 +8,6 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
-from itertools import islice
 from operator import attrgetter
 from pathlib import Path
 from typing import NamedTuple
@@ -20,16 +19,8 @@ from vdet.config.classes import our_name
 from vdet.errors import TruthError
 from vdet.track.track import FrameTracks, State, Track
 
-MAX_LABELS = 5_000_000
-"""Largest number of boxes in one file: four hours of video with fourteen vehicles in sight."""
-
-MAX_IN_FRAME = 1000
-"""Largest number of boxes of either kind, true or predicted, in one frame."""
-
 NO_ID = -1
 """Id of a box without an id; in video, only ignore regions may have it."""
-
-_MAX_NAME = 100  # characters
 
 Corners = tuple[float, float, float, float]
 """x1, y1, x2, y2 in pixels from 0; the far sides are exclusive."""
@@ -90,12 +81,10 @@ def checked_labels(path: Path, labels: Iterable[Label]) -> tuple[Label, ...]:
     Raises
     ------
     TruthError
-        More than `MAX_LABELS`, a frame before the first, a negative id of a vehicle, an id twice in
-        a frame, a box without area, or a name of more than 100 characters.
+        A frame before the first, a negative id of a vehicle, an id twice in a frame, or a box
+        without area.
     """
-    checked = tuple(islice(labels, MAX_LABELS + 1))
-    if len(checked) > MAX_LABELS:
-        raise TruthError(f"{path}: has more than {MAX_LABELS:,} boxes; cut it into parts")
+    checked = tuple(labels)
     keys: set[tuple[int, int]] = set()
     for label in checked:
         mistake = mistake_in_box(label)
@@ -113,13 +102,11 @@ def checked_labels(path: Path, labels: Iterable[Label]) -> tuple[Label, ...]:
 
 
 def mistake_in_box(label: Label) -> str | None:
-    """Return what is wrong with the box or the name of a label; None if nothing is."""
+    """Return what is wrong with the box of a label; None if nothing is."""
     x1, y1, x2, y2 = label.box
     width, height = x2 - x1, y2 - y1
     if width <= 0 or height <= 0 or width * height <= 0:
         return f"the box has no area: {width:g} wide, {height:g} high"
-    if len(label.name or "") > _MAX_NAME:
-        return f"the label must have at most {_MAX_NAME} characters"
     return None
 
 

@@ -4,18 +4,37 @@ Source: Milan et al., "MOT16: A Benchmark for Multi-Object Tracking", 2016, tabl
 """
 
 import logging
-from collections.abc import Iterator, Sequence
-from functools import partial
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Annotated, NamedTuple
+
+from pydantic import Field, TypeAdapter, ValidationError
 
 from vdet.labels.formats import Format
-from vdet.labels.label import Label, SavedTracks, from_size
-from vdet.labels.parsing import label_lines, parse_number, parse_whole
+from vdet.labels.label import Label, SavedTracks, from_size, line_error
+from vdet.labels.parsing import LIMIT, Number, numbered_lines
 from vdet.track.track import FrameTracks
 
 _log = logging.getLogger("vdet")
 _MAX_CLASSES = 100  # more are positions, in the eighth column of results
 _TRUTH_COLUMNS, _RESULT_COLUMNS = 9, 10
+
+_Whole = Annotated[int, Field(ge=-LIMIT, le=LIMIT)]
+
+
+class _Row(NamedTuple):
+    """The columns that are used."""
+
+    frame: _Whole
+    id: _Whole
+    left: Number
+    top: Number
+    width: Number
+    height: Number
+    score: Number  # in truth, a flag
+
+
+_ROW = TypeAdapter(_Row)
 
 
 def _lines(frame: FrameTracks) -> Iterator[str]:
@@ -43,11 +62,8 @@ def read_mot(path: Path, data: bytes) -> SavedTracks:
         A line has a wrong number of columns, or another one than the first line, a column is not a
         number, or a flag is neither 0 nor 1.
     """
-    counts, classes = (_TRUTH_COLUMNS, _RESULT_COLUMNS), set[str]()
-    separator = "," if b"," in data.lstrip().partition(b"\n")[0] else None
-    parse = partial(_label, classes=classes)
-    labels = label_lines(path, data, parse, form="MOTChallenge", counts=counts, separator=separator)
-    saved = SavedTracks(tuple(labels))
+    classes = set[str]()
+    saved = SavedTracks(tuple(_labels(path, data, classes)))
     if 1 < len(classes) <= _MAX_CLASSES:
         numbers = ", ".join(sorted(classes, key=int))
         _log.warning(
@@ -59,25 +75,37 @@ def read_mot(path: Path, data: bytes) -> SavedTracks:
     return saved
 
 
-def _label(line: int, columns: Sequence[str], *, classes: set[str]) -> Label:
-    frame, id_ = map(parse_whole, columns[:2])
-    left, top, width, height, flag_or_score, *_ = map(parse_number, columns[2:])
-    is_truth = len(columns) == _TRUTH_COLUMNS
-    if is_truth and flag_or_score not in {0, 1}:
-        raise ValueError(
-            f"with nine columns, column 7 must be a flag, 0 or 1, but is {flag_or_score:g}; a "
-            "results file needs ten columns"
+def _labels(path: Path, data: bytes, classes: set[str]) -> Iterator[Label]:
+    """Yield the label of each line, and put the classes of vehicles into `classes`."""
+    separator = "," if b"," in data.lstrip().partition(b"\n")[0] else None
+    counts: tuple[int, ...] = _TRUTH_COLUMNS, _RESULT_COLUMNS
+    for line, content in numbered_lines(path, data):
+        columns = content.split(separator)
+        if len(columns) not in counts:
+            numbers = " or ".join(map(str, counts))
+            message = f"MOTChallenge has {numbers} columns; this line has {len(columns)}"
+            raise line_error(path, line, message)
+        counts = (len(columns),)
+        is_truth = len(columns) == _TRUTH_COLUMNS
+        try:
+            row = _ROW.validate_python(columns[: len(_Row._fields)])
+        except ValidationError as error:
+            mistake = error.errors()[0]
+            column = _Row._fields[int(mistake["loc"][0])]
+            raise line_error(path, line, f"{column}: {mistake['msg']}") from error
+        if is_truth and row.score not in {0, 1}:
+            message = f"with nine columns, column 7 must be a flag, 0 or 1, but is {row.score:g}"
+            raise line_error(path, line, f"{message}; a results file needs ten columns")
+        if row.score and columns[7].strip().isdecimal():
+            classes.add(columns[7].strip())
+        yield Label(
+            position=line,
+            box=from_size(row.left - 1, row.top - 1, row.width, row.height),
+            frame=row.frame,
+            id=row.id,
+            score=1.0 if is_truth else row.score,
+            ignored=is_truth and row.score == 0,
         )
-    if flag_or_score and columns[7].strip().isdecimal():
-        classes.add(columns[7].strip())
-    return Label(
-        position=line,
-        box=from_size(left - 1, top - 1, width, height),
-        frame=frame,
-        id=id_,
-        score=1.0 if is_truth else flag_or_score,
-        ignored=is_truth and flag_or_score == 0,
-    )
 
 
 MOT = Format("MOTChallenge", ".txt", read_mot, _lines)

@@ -1,10 +1,9 @@
-"""The limits of all files of boxes, and parsers of their text, lines and numbers."""
+"""The limits of all files of boxes, and parsers of their lines, times and mistakes."""
 
 import codecs
 import io
-import math
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 from typing import Annotated
 
@@ -12,16 +11,13 @@ from pydantic import Field, ValidationError
 
 from vdet.errors import TruthError
 from vdet.files import read_whole
-from vdet.labels.label import MAX_LABELS, Label, line_error
+from vdet.labels.label import line_error
 
 LIMIT = 10_000_000
 """Maximum frame number, id or pixel coordinate. Larger numbers mean damage, and would overflow."""
 
 MAX_BYTES = 300_000_000
 """Maximum size of a file of boxes, unpacked."""
-
-MAX_PART = 1_000_000
-"""Maximum size of a line, bytes."""
 
 _LAST_NUMBER = re.compile(r"(?<![0-9])([0-9]{1,8})$", re.ASCII)
 _LATEST = 1e11
@@ -46,83 +42,14 @@ def numbered_lines(path: Path | str, data: bytes) -> Iterator[tuple[int, str]]:
     Raises
     ------
     TruthError
-        The content is not UTF-8, has more than `MAX_LABELS` lines, or one longer than `MAX_PART`.
+        The content is not UTF-8.
     """
     try:
         for number, line in enumerate(io.BytesIO(data.removeprefix(codecs.BOM_UTF8)), start=1):
-            if len(line) > MAX_PART:
-                raise line_error(path, number, f"the line is longer than {MAX_PART:,} bytes")
-            if number > MAX_LABELS:
-                raise TruthError(f"{path}: has more than {MAX_LABELS:,} lines; cut it into parts")
             if stripped := line.decode().strip():
                 yield number, stripped
     except UnicodeDecodeError as error:
         raise TruthError(f"{path}: is not text (UTF-8)") from error
-
-
-def label_lines(
-    path: Path | str,
-    data: bytes,
-    parse: Callable[[int, list[str]], Label],
-    *,
-    form: str,
-    counts: Sequence[int] | None,
-    separator: str | None = None,
-) -> Iterator[Label]:
-    """Yield the label of every line that is not blank.
-
-    Parameters
-    ----------
-    path
-        The file, for messages.
-    parse
-        Function that takes the number of a line and its columns, and returns the label. The text of
-        its `ValueError` becomes the message.
-    form
-        Name of the format, for messages.
-    counts
-        Allowed numbers of columns; all lines have as many as the first. None: `parse` checks.
-    separator
-        Separator of columns; None for spaces.
-
-    Raises
-    ------
-    TruthError
-        The content is not text, a line has another number of columns, or it cannot be parsed.
-    """
-    for line, content in numbered_lines(path, data):
-        columns = content.split(separator)
-        try:
-            if counts is not None and len(columns) not in counts:
-                numbers = " or ".join(map(str, counts))
-                raise ValueError(
-                    f"{form} has {numbers} columns separated by "
-                    f"{'commas' if separator else 'spaces'}; this line has {len(columns)}"
-                )
-            label = parse(line, columns)
-        except ValueError as error:
-            raise line_error(path, line, str(error)) from error
-        counts = counts and (len(columns),)
-        yield label
-
-
-def parse_number(text: str) -> float:
-    """Return the number in `text`. Raises `ValueError` if it is invalid or exceeds `LIMIT`."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not abs(value) <= LIMIT:
-        raise ValueError(f"{text.strip()!r:.40} is not a number of at most {LIMIT}")
-    return value
-
-
-def parse_whole(text: str) -> int:
-    """Return the whole number in `text`; `3` and `3.0` are both 3. Raises `ValueError`."""
-    value = parse_number(text)
-    if not value.is_integer():
-        raise ValueError(f"{text.strip()!r:.40} is not a whole number")
-    return int(value)
 
 
 def frame_number(name: str) -> int | None:

@@ -10,15 +10,11 @@ from vdet.errors import TruthError
 from vdet.labels.coco import read_coco_images
 from vdet.labels.formats import recognize, track_formats
 from vdet.labels.images import LabelledImage, LabelledImages, checked_images
-from vdet.labels.kitti import read_kitti_images
 from vdet.labels.label import Label, LabelledVideo, SavedTracks, checked_labels, line_error
 from vdet.labels.mot import MOT
 from vdet.labels.parsing import read_bytes
 from vdet.labels.roles import DEFAULT_ROLES, Roles, is_region
 from vdet.labels.yolo import read_yolo_images
-
-_FOLDERS = {("image_2", "label_2"): read_kitti_images, ("images", "labels"): read_yolo_images}
-"""Readers of sets with a label file for each image, by the names of both folders."""
 
 
 def read_tracks(path: Path, rate: float | None = None) -> SavedTracks:
@@ -125,10 +121,9 @@ def read_labelled_images(path: Path, roles: Roles = DEFAULT_ROLES) -> LabelledIm
 
 
 def _images(path: Path) -> Iterable[LabelledImage]:
-    for folders, read in _FOLDERS.items():
-        images, labels = (path / folder for folder in folders)
-        if images.is_dir() and labels.is_dir():
-            return read(images, labels)
+    images, labels = path / "images", path / "labels"
+    if images.is_dir() and labels.is_dir():
+        return read_yolo_images(images, labels)
     files = _coco_files(path)
     if len(files) == 1:
         return read_coco_images(files[0])
@@ -136,8 +131,8 @@ def _images(path: Path) -> Iterable[LabelledImage]:
         names = ", ".join(str(file.relative_to(path)) for file in files[:5])
         raise TruthError(f"{path}: contains several such files ({names}); pass the one with labels")
     raise TruthError(
-        f"{path}: labelled images not found; use a folder with one .json file (COCO), with image_2 "
-        "and label_2 (KITTI), or with images and labels (YOLO)"
+        f"{path}: labelled images not found; use a folder with one .json file (COCO), or with "
+        "images and labels (YOLO)"
     )
 
 

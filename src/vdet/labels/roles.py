@@ -1,23 +1,13 @@
-"""The role of a labelled box in evaluation and training: vehicle, ignore region, or neither.
-
-A rider and the vehicle are one object, as in most sets of traffic images.
-"""
+"""The role of a labelled box in evaluation and training: vehicle, ignore region, or neither."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 from typing import Self
 
-from vdet.boxes import Box
 from vdet.config.classes import OUR_NAMES, WORDS, letters, our_name
 from vdet.config.schema import Role, Settings
-from vdet.labels.label import Label
 
-RIDER = "rider"
-"""A person on a motorcycle or a bicycle, labelled separately."""
-
-_RIDDEN = ("motorcycle", "bicycle")
-_MIN_COVERED = 0.1  # fraction of a rider's box covered by the box of the vehicle
-_IGNORED = ("tram", "train", "misc", "trailer", "caravan", RIDER)
+_IGNORED = ("tram", "train", "misc", "trailer", "caravan", "rider")
 _REGIONS = ("ignore", "ignored", "ignore region", "ignored region", "ignored regions", "dont care")
 _REGION_LETTERS = tuple(dict.fromkeys(map(letters, _REGIONS)))
 _ANY_KIND = ("car", "truck", "bus")  # included in the class "vehicle" of a detector
@@ -99,26 +89,3 @@ DEFAULT_ROLES = Roles.from_settings(Settings())
 def is_region(label: str | None) -> bool:
     """Return whether a label marks a region, not a single object."""
     return label is not None and letters(label) in _REGION_LETTERS
-
-
-def merge_riders(labels: Sequence[Label]) -> list[Label]:
-    """Merge riders into their motorcycles or bicycles.
-
-    A rider belongs to the one that covers most of the rider's box. Riders without one are kept.
-    """
-    ridden = [row for row, label in enumerate(labels) if our_name(label.name or "") in _RIDDEN]
-    merged = dict(enumerate(labels))
-    for row, rider in enumerate(labels):
-        if ridden and letters(rider.name or "") == RIDER:
-            covered, vehicle = max((_covered(rider, labels[n]), n) for n in ridden)
-            if covered >= _MIN_COVERED:
-                union = Box.of(merged[vehicle].box).union(Box.of(rider.box))
-                merged[vehicle] = merged[vehicle]._replace(box=astuple(union))
-                del merged[row]
-    return list(merged.values())
-
-
-def _covered(rider: Label, vehicle: Label) -> float:
-    """Return the fraction of a rider's box that the box of a vehicle covers."""
-    box = Box.of(rider.box)
-    return box.intersection(Box.of(vehicle.box)).area / box.area if box.area else 0.0

@@ -16,7 +16,6 @@ from vdet.traffic.crossings import APPEAR, ENTER
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.axes import Axes
 
 Direction = tuple[str, str]
 """Name of a line or zone, and of a direction."""
@@ -186,40 +185,6 @@ class Counts:
 
         names = [column.name for column in fields(CountRow)]
         return pd.DataFrame(self.table(interval), columns=names)
-
-    def plot(self, interval: int | None = None, axes: "Axes | None" = None) -> "Axes":
-        """Draw the counts as bars; needs the package matplotlib.
-
-        There is a bar for each direction, stacked by class; or, with an interval in seconds, a bar
-        for each interval, stacked by direction.
-
-        Parameters
-        ----------
-        axes
-            The axes to draw on; None for the current axes of pyplot.
-
-        Raises
-        ------
-        PackageError
-            matplotlib is not installed.
-        """
-        with needing("notebook"):
-            from matplotlib import pyplot as plt
-        parts: dict[str, Counter[str]] = {}
-        for row in self.table(interval):
-            label = f"{row.name} {row.direction}"
-            part, bar = (label, str(row.start)[:16]) if interval else (row.class_name, label)
-            parts.setdefault(part, Counter())[bar] += row.count
-        axes = axes or plt.gca()
-        heights = Counter[str]()
-        for part, bars in parts.items():
-            bottom = [heights[bar] for bar in bars]
-            axes.bar(list(bars), list(bars.values()), bottom=bottom, label=part)
-            heights.update(bars)
-        axes.set_ylabel("vehicles")
-        axes.yaxis.get_major_locator().set_params(integer=True)
-        axes.legend()
-        return axes
 
 
 def direction_totals(videos: Sequence[Counts]) -> tuple[DirectionTotal, ...]:
