@@ -17,7 +17,7 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 ROOMS = (
     "__main__", "process", "cli", "demo", "testing", "api", "batch", "learn", "evaluate", "run",
     "pages", "conditions", "traffic", "labels", "lanes", "track", "detect", "synthetic", "draw",
-    "regions", "media", "config", "plugins", "workers", "archives", "files", "polygons", "boxes",
+    "regions", "media", "config", "plugins", "workers", "files", "polygons", "boxes",
     "errors", "progress", "system", "__init__", "version",
 )  # fmt: skip
 """From top to bottom: a room imports only what stands below it."""

@@ -15,7 +15,7 @@ import shutil
 import stat
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any, Self
 
 from vdet.errors import OutputError, VdetError
@@ -320,6 +320,11 @@ def output_errors(path: Path) -> Iterator[None]:
         raise
     except OSError as error:
         raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from error
+
+
+def is_hidden(name: PurePath) -> bool:
+    """Return whether a name is that of a hidden file, or one that macOS adds to zip files."""
+    return any(part.startswith((".", "__MACOSX")) for part in name.parts)
 
 
 def write_text(path: Path, text: str) -> None:

@@ -73,32 +73,22 @@ def many(name: str, data: bytes) -> Members:
     return [(f"vehicles/far/{name}{number}.png", data) for number in range(EACH - 1)]
 
 
-BAD_NAMES = {
-    "../vehicles/far/x.png": "has '..' in its name",
-    "vehicles/far/../../../x.png": "has '..' in its name",
-    "vehicles\\..\\x.png": "has '..' in its name",
-    "/vehicles/far/x.png": "has an absolute name",
-    "//host/vehicles/x.png": "has an absolute name",
-    "\\\\host\\vehicles\\x.png": "has an absolute name",
-    "C:\\vehicles\\x.png": "has an absolute name",
-    "vehicles/far/1.png": "occurs twice",
-}
-WICKED = BAD_NAMES | {
-    "a symbolic link": "its member vehicles/far/x.png is a symbolic link",
-    "a link to a folder": "its member vehicles/x is a symbolic link",
+BAD_NAMES = ("../vehicles/far/x.png", "/vehicles/far/x.png", "vehicles\\..\\x.png")
+WICKED = {
     "a set in a set": "no images in vehicles/",
     "nothing": "no images in vehicles/",
     "one class": "no images in non-vehicles/",
 }
 WICKED |= dict.fromkeys(
     [
-        *("encrypted", "wrong checksums", "unknown compression", "unpacked in one go"),
+        *("/vehicles/far/x.png", "a symbolic link"),
+        *("encrypted", "wrong checksums", "unknown compression"),
         *("other sizes than claimed", "bombs", "bombs that claim to be small"),
         *("pictures of 10¹⁰ pixels", "no pictures", "empty pictures"),
     ],
     ": is not a readable image",
 )
-"""What is refused, and the words that say why."""
+"""What is rejected, and the words that say why. Nothing is unpacked to a file."""
 
 
 def wicked_sets() -> dict[str, bytes]:
@@ -106,14 +96,11 @@ def wicked_sets() -> dict[str, bytes]:
     packed, stored = zipped(whole), zipped(whole, zipfile.ZIP_STORED)
     bombs = zipped([*whole, *many("bomb", bytes(17_000_000))])
     link = special("vehicles/far/x.png", stat.S_IFLNK | 0o777)
-    folder_link = special("vehicles/x", stat.S_IFLNK | 0o777)
     return {name: zipped([*whole, (name, b"")]) for name in BAD_NAMES} | {
         "a symbolic link": zipped([*whole, (link, b"/etc/passwd")]),
-        "a link to a folder": zipped([*whole, (folder_link, b"/")]),
         "encrypted": with_field(packed, 6, 8, "<H", 1),
         "wrong checksums": with_field(stored, 14, 16, "<I", 7),
         "unknown compression": with_field(packed, 8, 10, "<H", 99),
-        "unpacked in one go": zipped(whole, zipfile.ZIP_BZIP2),
         "other sizes than claimed": with_field(packed, 22, 24, "<I", 10),
         "bombs": bombs,
         "bombs that claim to be small": with_field(bombs, 22, 24, "<I", 100),

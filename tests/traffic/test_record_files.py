@@ -37,8 +37,8 @@ def test_json_is_a_list_of_vehicles(tmp_path: Path) -> None:
     assert item == {
         "id": 3, "class": "truck", "clock": None, "first": 0, "last": 0, "seconds": 0,
         "detected": 0, "interpolated": 0, "predicted": 1, "mean_score": 1, "best_score": 1,
-        "start_x": 16, "start_y": 42, "end_x": 16, "end_y": 42, "length": 0, "length_fraction": 0,
-        "x": 1, "y": 2, "width": 30, "height": 40,
+        "path": {"start": [16, 42], "end": [16, 42], "length": 0, "length_fraction": 0},
+        "largest": {"x": 1, "y": 2, "width": 30, "height": 40},
         **dict.fromkeys(("metres", "speed", "speed_85", "speed_sd", "motion", "distance", "lane")),
     }  # fmt: skip
     assert json.loads(written(tmp_path / "none.json")) == []

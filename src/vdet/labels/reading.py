@@ -5,8 +5,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
-from vdet.archives import is_hidden
 from vdet.errors import TruthError
+from vdet.files import is_hidden
 from vdet.labels.coco import read_coco_images
 from vdet.labels.formats import recognize, track_formats
 from vdet.labels.images import LabelledImage, LabelledImages, checked_images

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from vdet.archives import is_hidden
 from vdet.config.document import parse_document
 from vdet.errors import ConfigError, ImageError, TruthError
+from vdet.files import is_hidden
 from vdet.labels.images import LabelledImage
 from vdet.labels.label import Label, Size, line_error
 from vdet.labels.parsing import numbered_lines, read_bytes

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
-from vdet.archives import is_hidden
 from vdet.boxes import Boxes, Image
 from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel, stage_images_of
 from vdet.errors import ImageError
-from vdet.files import NO_FILES, FileIds, OutputFiles
+from vdet.files import NO_FILES, FileIds, OutputFiles, is_hidden
 from vdet.media import Frame, Picture
 from vdet.media.images import IMAGE_SUFFIXES, is_image_name, read_image
 from vdet.run.loop import named_errors

@@ -240,9 +240,8 @@ _COLUMNS: dict[str, Callable[[VehicleRecord], Any]] = {
     "distance": lambda record: None if record.distance is None else round(record.distance, 1),
     "lane": lambda record: record.lane,
 }
-"""The columns of a `.csv`, and the keys of a `.json`. `clock` is the clock time of `first`; x, y,
-width and height are the largest box; speeds are in km/h; `distance` is the minimum distance from
-the camera, metres.
+"""The columns of a `.csv`. `clock` is the clock time of `first`; x, y, width and height are the
+largest box; speeds are in km/h; `distance` is the minimum distance from the camera, metres.
 """
 
 
@@ -252,7 +251,7 @@ def records_content(
     """Return the content of the file `path`, for `write_content`."""
     rows = [_row(record, clock) for record in records]
     if is_json(path):
-        return rows
+        return [_item(row) for row in rows]
     return [tuple(_COLUMNS), *(list(row.values()) for row in rows)]
 
 
@@ -269,6 +268,21 @@ def _row(record: VehicleRecord, clock: Clock | None) -> dict[str, Any]:
     """Return the values of a record by column."""
     row = {name: value(record) for name, value in _COLUMNS.items()}
     return row | {"clock": plain_time(clock and clock.at(round(record.first, 3)))}
+
+
+def _item(row: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a row for JSON, with the path and the largest box as objects."""
+    path = {end: [row[f"{end}_x"], row[f"{end}_y"]] for end in ("start", "end")}
+    path |= {name: row[name] for name in ("length", "length_fraction")}
+    largest = {name: row[name] for name in ("x", "y", "width", "height")}
+    columns = list(row)
+    start, end = columns.index("start_x"), columns.index("metres")
+    return {
+        **{name: row[name] for name in columns[:start]},
+        "path": path,
+        "largest": largest,
+        **{name: row[name] for name in columns[end:]},
+    }
 
 
 _PADDING = 0.1  # margin around a vehicle, as a fraction of the width and height of its box

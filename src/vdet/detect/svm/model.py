@@ -14,9 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from vdet.archives import open_archive, read_member
 from vdet.boxes import Float32Array
 from vdet.config.detector import FeatureSettings
 from vdet.errors import ModelError
@@ -122,8 +120,8 @@ def load_model(path: Path, features: FeatureSettings | None = None) -> LinearMod
     """
     data = read_whole(path, limit=_MAX_BYTES, what="model", error=ModelError)
     try:
-        with open_archive(io.BytesIO(data)) as archive, warnings.catch_warnings(action="error"):
-            model = _read(archive)
+        with warnings.catch_warnings(action="error"):
+            model = _read(data)
     except ModelError as error:
         raise ModelError(f"{path}: {error}; train it again") from error
     except Exception as error:  # NumPy, json and pydantic raise a dozen kinds on damaged data
@@ -134,10 +132,12 @@ def load_model(path: Path, features: FeatureSettings | None = None) -> LinearMod
     return model
 
 
-def _read(archive: zipfile.ZipFile) -> LinearModel:
-    present = {name.removesuffix(".npy") for name in archive.namelist()}
-    names = [name for name in ("header", *_NAMES, *_BOX_NAMES) if name in present]
-    arrays = {name: _read_array(archive, name) for name in names}
+def _read(data: bytes) -> LinearModel:
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        if sum(member.file_size for member in archive.infolist()) > _MAX_BYTES:
+            raise ModelError("is too large")
+    with np.load(io.BytesIO(data), allow_pickle=False) as file:
+        arrays = {name: file[name] for name in ("header", *_NAMES, *_BOX_NAMES) if name in file}
     header = json.loads(arrays["header"].tobytes())
     if header["format"] != FORMAT or not isinstance(header["provenance"], dict):
         raise ValueError("not the header of a model")
@@ -152,16 +152,6 @@ def _read(archive: zipfile.ZipFile) -> LinearModel:
     )
     _check_arrays(model)
     return model
-
-
-def _read_array(archive: zipfile.ZipFile, name: str) -> npt.NDArray[Any]:
-    """Return an array of the file. Raises `ValueError` if its length is not the declared one."""
-    data = read_member(archive, f"{name}.npy", limit=_MAX_BYTES)
-    file = io.BytesIO(data)
-    np.lib.format.read_magic(file)
-    shape, is_fortran, dtype = np.lib.format.read_array_header_1_0(file)
-    values: npt.NDArray[Any] = np.frombuffer(file.read(), dtype)
-    return values.reshape(shape, order="F" if is_fortran else "C")
 
 
 def _check_arrays(model: LinearModel) -> None:

@@ -11,7 +11,7 @@ import io
 import math
 import re
 import zipfile
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import cache
@@ -19,10 +19,9 @@ from pathlib import Path, PurePosixPath
 
 import cv2
 
-from vdet.archives import ArchiveError, is_hidden, list_members, open_archive, read_member, store
 from vdet.boxes import Image
 from vdet.errors import DataError, escaped, printable
-from vdet.files import read_whole, staged
+from vdet.files import is_hidden, staged
 from vdet.media.images import IMAGE_SUFFIXES, decode_image
 
 CLASSES = {"vehicles": True, "non-vehicles": False}
@@ -69,9 +68,8 @@ def find_patches(sources: Sequence[Path]) -> list[PatchFile]:
     Raises
     ------
     DataError
-        A source cannot be read or has no patch, one of the two classes has no patch, a table of
-        boxes is damaged, or a zip file has a member that is a symbolic link, or whose name occurs
-        twice or leads out of the archive.
+        A source cannot be read or has no patch, one of the two classes has no patch, or a table of
+        boxes is damaged.
     """
     files = [file for source in dict.fromkeys(sources) for file in _find_in(source)]
     for name, vehicle in CLASSES.items():
@@ -84,10 +82,8 @@ def _find_in(source: Path) -> list[PatchFile]:
     if source.is_dir():  # only files: devices and pipes may be endless
         names = [p.relative_to(source).as_posix() for p in source.rglob("*") if p.is_file()]
     elif source.exists():
-        try:
-            names = list_members(source)
-        except ArchiveError as error:
-            raise DataError(f"{source}: {error}") from error
+        with _open_archive(source) as archive:
+            names = archive.namelist()
     else:
         raise DataError(f"{source}: folder or zip file not found")
     boxes = _read_table(source) if TABLE in names else {}
@@ -120,32 +116,39 @@ def _numeric(name: str) -> list[tuple[int, str]]:
     return [(len(part) if part.isdecimal() else 0, part) for part in parts]
 
 
+def _open_archive(path: Path) -> zipfile.ZipFile:
+    try:
+        return zipfile.ZipFile(path)
+    except Exception as error:  # zipfile raises a dozen kinds on damaged data
+        raise DataError(f"{path}: is not a folder or a readable zip file") from error
+
+
 def read_patches(files: Sequence[PatchFile]) -> Iterator[Image | None]:
-    """Yield the image of each patch, BGR uint8 of any size; None if it is unreadable."""
-    return map(decode_image, _contents((file.source, file.name) for file in files))
-
-
-def _contents(files: Iterable[tuple[Path, str]]) -> Iterator[bytes]:
-    """Yield the content of each file (folder or zip file, name); empty if it cannot be read.
+    """Yield the image of each patch, BGR uint8 of any size; None if it is unreadable.
 
     Each zip file is opened once.
     """
     with ExitStack() as stack:
-        opened = cache(lambda source: stack.enter_context(open_archive(source)))
-        for source, name in files:
-            try:
-                if source.is_dir():
-                    path = source / name
-                    yield read_whole(path, limit=MAX_PATCH_BYTES, what="patch", error=DataError)
-                else:
-                    yield read_member(opened(source), name, limit=MAX_PATCH_BYTES)
-            except (DataError, ArchiveError):
-                yield b""
+        archives = cache(lambda source: stack.enter_context(_open_archive(source)))
+        for file in files:
+            archive = None if file.source.is_dir() else archives(file.source)
+            yield decode_image(_content(file.source, file.name, archive))
+
+
+def _content(folder: Path, name: str, archive: zipfile.ZipFile | None) -> bytes:
+    """Return the content of a file of a folder, or of an archive; empty if it cannot be read."""
+    try:
+        with archive.open(name) if archive else (folder / name).open("rb") as file:
+            return file.read(MAX_PATCH_BYTES)  # a bomb is not unpacked any further
+    except Exception:  # zipfile and zlib raise a dozen kinds on damaged data
+        return b""
 
 
 def _read_table(source: Path) -> dict[str, Sides]:
     """Return the sides of each patch in the source's table."""
-    [table] = _contents([(source, TABLE)])
+    with ExitStack() as stack:
+        archive = None if source.is_dir() else stack.enter_context(_open_archive(source))
+        table = _content(source, TABLE, archive)
     try:
         rows = list(csv.reader(io.StringIO(table.decode("utf-8"), newline="")))
         if not rows or tuple(rows[0]) != COLUMNS:
@@ -177,11 +180,18 @@ def patch_archive(path: Path, *, overwrite: bool = False) -> Iterator[AddPatch]:
     with staged(path, overwrite=overwrite) as temporary, zipfile.ZipFile(temporary, "w") as file:
 
         def add(name: str, patch: Image, sides: Sides | None) -> None:
-            store(file, name, cv2.imencode(".png", patch)[1].tobytes())
+            _store(file, name, cv2.imencode(".png", patch)[1].tobytes())
             if sides is not None:
                 rows.writerow(
                     [name, *("" if math.isnan(side) else f"{side:.4f}" for side in sides)]
                 )
 
         yield add
-        store(file, TABLE, table.getvalue())
+        _store(file, TABLE, table.getvalue().encode())
+
+
+def _store(archive: zipfile.ZipFile, name: str, data: bytes) -> None:
+    """Write a member without time, so that the same data give the same file."""
+    info = zipfile.ZipInfo(name)  # of the earliest time
+    info.external_attr = 0o644 << 16
+    archive.writestr(info, data)
