@@ -1,6 +1,7 @@
 """The public API: docs/api.md runs as it stands, and `import vdet` does nothing else."""
 
 import json
+import math
 import pickle
 import shutil
 import subprocess
@@ -102,6 +103,7 @@ def test_importing_vdet_has_no_side_effect() -> None:
         np.zeros((90, 160), np.uint8),
         np.zeros((90, 160, 4), np.uint8),
         np.zeros((90, 160, 3), np.float32),
+        np.zeros((0, 160, 3), np.uint8),
     ],
 )
 def test_what_is_no_bgr_image_is_refused(image: Any) -> None:
@@ -173,6 +175,26 @@ def test_numbers_below_one_are_refused_by_name(clip_path: Path, number: dict[str
     (name,) = number
     with pytest.raises(vdet.VdetError, match=f"^{name}: is -?[01]; must be at least 1"):
         vdet.Run(clip_path, **number)
+
+
+@pytest.mark.parametrize("end", [math.inf, math.nan, -1.0])
+def test_a_time_outside_any_video_is_rejected(clip_path: Path, end: float) -> None:
+    with pytest.raises(vdet.VdetError, match="^start and end: must be seconds from 0, not "):
+        vdet.follow(clip_path, end=end)
+
+
+@pytest.mark.parametrize("interval", [0, -5])
+def test_an_interval_has_at_least_a_second(interval: int) -> None:
+    counts = vdet.Counts(events=(), directions=(), zones=())
+    for table in (counts.table, counts.flows, counts.zone_use):
+        with pytest.raises(vdet.VdetError, match="^interval: must be at least 1 second, not "):
+            table(interval)
+
+
+def test_results_that_are_left_open_at_exit_leave_no_traceback(clip_path: Path) -> None:
+    code = f"import gc, vdet; gc.disable(); r = vdet.follow({str(clip_path)!r}); next(r)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_a_run_has_its_own_part_and_settings(clip_path: Path) -> None:

@@ -154,7 +154,7 @@ class Detector:
         expected = "must be a path or an array, BGR uint8 (H, W, 3)"
         if not isinstance(image, np.ndarray):
             raise ArgumentTypeError(f"image: {expected}, not a {type(image).__name__}")
-        if image.dtype != "uint8" or image.ndim != 3 or image.shape[2] != 3:
+        if image.dtype != "uint8" or image.ndim != 3 or image.shape[2] != 3 or not image.size:
             raise ArgumentError(f"image: {expected}, not {image.dtype} {image.shape}")
         return ImageSearch(self._model, self._settings).detect(source, image).detections
 
@@ -457,4 +457,6 @@ def _listed(paths: Paths) -> Sequence[PathName]:
 
 
 def _exact(seconds: Seconds | None) -> Fraction | None:
+    if seconds is not None and not 0 <= seconds < math.inf:
+        raise ArgumentError(f"start and end: must be seconds from 0, not {seconds}")
     return None if seconds is None else Fraction(str(seconds))  # 0.04 means 1/25

@@ -31,6 +31,7 @@ def read_tracks(path: Path, rate: float | None = None) -> SavedTracks:
         The file cannot be read, or has a mistake; the message names its position.
     """
     data = read_bytes(path)
+    was_enabled = gc.isenabled()
     gc.disable()  # labels have no cycles, and looking for some takes a quarter of the time
     try:
         saved = recognize(path, data).read(path, data)
@@ -38,7 +39,8 @@ def read_tracks(path: Path, rate: float | None = None) -> SavedTracks:
         vehicles = [label for label in saved.labels if not (label.ignored or label.name in regions)]
         saved = replace(saved, labels=checked_labels(path, vehicles))
     finally:
-        gc.enable()
+        if was_enabled:
+            gc.enable()
     return saved if rate is None else saved.at_rate(rate)
 
 

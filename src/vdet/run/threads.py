@@ -9,7 +9,7 @@ import sys
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from typing import Any, TypeVar
 
 T = TypeVar("T")
@@ -41,8 +41,9 @@ class _Thread(SearchThreads):
         super().__init__(1, name)
 
     def __exit__(self, *_: object) -> None:
-        hangs = wait([self.submit(int)], JOIN_TIMEOUT).not_done
-        self.shutdown(wait=not hangs)
+        with suppress(RuntimeError):  # the interpreter exits, and its threads have ended
+            hangs = wait([self.submit(int)], JOIN_TIMEOUT).not_done
+            self.shutdown(wait=not hangs)
 
 
 @contextmanager
@@ -68,7 +69,8 @@ def read_async(source: AbstractContextManager[S]) -> Iterator[tuple[S, Iterator[
         finally:
             for future in ahead:
                 future.cancel()
-            thread.submit(source.__exit__, None, None, None)
+            with suppress(RuntimeError):  # the interpreter exits
+                thread.submit(source.__exit__, None, None, None)
 
 
 @contextmanager

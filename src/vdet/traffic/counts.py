@@ -10,7 +10,7 @@ from itertools import accumulate, pairwise, product
 from typing import TYPE_CHECKING, TypeVar
 
 from vdet.config.classes import UNKNOWN
-from vdet.errors import needing
+from vdet.errors import ArgumentError, needing
 from vdet.traffic.clock import Clock, ClockTime, Interval, Intervals, Span
 from vdet.traffic.crossings import APPEAR, ENTER
 
@@ -215,6 +215,8 @@ def count_table(videos: Sequence[Counts], interval: int | None = None) -> list[C
     ------
     ConfigError
         `interval` is set, and one of several videos has no clock.
+    ArgumentError
+        `interval` is less than 1.
     """
     intervals = _intervals(videos, interval)
     counts = Counter(
@@ -317,6 +319,8 @@ def _zone_row(
 
 
 def _intervals(videos: Sequence[Counts], interval: int | None) -> Intervals:
+    if interval is not None and interval < 1:
+        raise ArgumentError(f"interval: must be at least 1 second, not {interval}")
     return Intervals([(video.clock, video.spans) for video in videos], interval)
 
 
