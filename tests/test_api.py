@@ -179,7 +179,7 @@ def test_numbers_below_one_are_refused_by_name(clip_path: Path, number: dict[str
 
 @pytest.mark.parametrize("end", [math.inf, math.nan, -1.0])
 def test_a_time_outside_any_video_is_rejected(clip_path: Path, end: float) -> None:
-    with pytest.raises(vdet.VdetError, match="^start and end: must be seconds from 0, not "):
+    with pytest.raises(vdet.VdetError, match=r"^start and end: must be seconds from 0, not "):
         vdet.follow(clip_path, end=end)
 
 
@@ -187,7 +187,7 @@ def test_a_time_outside_any_video_is_rejected(clip_path: Path, end: float) -> No
 def test_an_interval_has_at_least_a_second(interval: int) -> None:
     counts = vdet.Counts(events=(), directions=(), zones=())
     for table in (counts.table, counts.flows, counts.zone_use):
-        with pytest.raises(vdet.VdetError, match="^interval: must be at least 1 second, not "):
+        with pytest.raises(vdet.VdetError, match=r"^interval: must be at least 1 second, not "):
             table(interval)
 
 
