@@ -63,7 +63,7 @@ def rows_of_road(seed: int, folder: Path) -> Iterator[tuple[str, Row]]:
         ("ByteTrack, 0.4", {"track_activation_threshold": 0.4, "high_conf_det_threshold": 0.4}),
     ):
         tracks = list(byte_tracks(results, float(scene.rate), **limits))
-        boxes = [vdet.Boxes.from_supervision(frame) for frame in tracks]
+        boxes = [vdet.Boxes(item.xyxy, item.confidence, ids=item.tracker_id) for item in tracks]
         count = crossings_of(tracks, scene, triggering_anchors=feet)
         yield name, (count, score(_labels(boxes), true))
 

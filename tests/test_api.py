@@ -8,11 +8,10 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
-from dataclasses import asdict, replace
+from dataclasses import replace
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import cv2
@@ -138,24 +137,6 @@ def test_a_notebook_shows_a_result_as_its_frame_with_the_vehicles() -> None:
     )
     assert np.array_equal(plain, frame.image)
     assert np.any(drawn != plain, axis=2)[120, 96:160].all()
-
-
-def test_tracks_are_handed_to_pandas_and_supervision(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name, kind in (("pandas", "DataFrame"), ("supervision", "Detections")):
-        module = ModuleType(name)
-        vars(module)[kind] = lambda *rows, **columns: (*rows, columns)
-        monkeypatch.setitem(sys.modules, name, module)
-    car = vdet.Track(4, vdet.Box(1, 2, 3, 5), 0.9, "detected", "car", (2.0, 5.0), 12.5, -1)
-    bus = vdet.Track(5, vdet.Box(0, 0, 9, 9), 0.8, "predicted", "bus")
-    frame = vdet.FrameTracks(7, 0.28, (car, bus))
-    (first, _), columns = frame.to_pandas()
-    expected = {"frame": 7, "time": 0.28, "x1": 1, "y1": 2, "x2": 3, "y2": 5} | asdict(car)
-    assert columns == {"columns": [name for name in expected if name != "box"]}
-    assert first == expected
-    (made,) = frame.to_supervision()
-    assert made["xyxy"].tolist() == [[1, 2, 3, 5], [0, 0, 9, 9]]
-    assert (made["tracker_id"].tolist(), made["confidence"].tolist()) == ([4, 5], [0.9, 0.8])
-    assert made["data"]["class_name"].tolist() == ["car", "bus"]
 
 
 def test_follow_gives_the_same_for_any_number_of_threads(clip_path: Path) -> None:

@@ -272,26 +272,6 @@ class Boxes:
             metadata={"class_names": self.names},
         )
 
-    @classmethod
-    def from_supervision(cls, detections: "supervision.Detections") -> "Boxes":
-        """Return boxes with copies of the columns of a `supervision.Detections`.
-
-        Classes are taken from the column `class_name`; other numeric columns become `data`. Without
-        confidences, scores are 1. Errors as for `Boxes`.
-        """
-        data = {name: np.asarray(column) for name, column in detections.data.items()}
-        labels, scores = data.pop("class_name", None), detections.confidence
-        names = list(detections.metadata.get("class_names", ()))
-        names += sorted({*([] if labels is None else labels.tolist())} - {*names})
-        return cls(
-            detections.xyxy,
-            np.ones(len(detections.xyxy)) if scores is None else scores,
-            classes=None if labels is None else [names.index(label) for label in labels],
-            names=names,
-            ids=detections.tracker_id,
-            data={name: column for name, column in data.items() if column.dtype.kind in "biuf"},
-        )
-
     def to_pandas(self) -> "pd.DataFrame":
         """Return a table with a row for each box; needs the package pandas.
 

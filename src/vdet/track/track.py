@@ -1,16 +1,11 @@
 """The protocol of all trackers, and the vehicles they show in a frame."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, astuple, dataclass, field, fields
-from typing import TYPE_CHECKING, Any, Literal, Protocol, runtime_checkable
+from dataclasses import astuple, dataclass, field
+from typing import Any, Literal, Protocol, runtime_checkable
 
 from vdet.boxes import Box, Boxes
-from vdet.errors import needing
 from vdet.media import Picture
-
-if TYPE_CHECKING:
-    import pandas as pd
-    import supervision
 
 State = Literal["detected", "interpolated", "predicted"]
 """Source of a box in a frame: see `Track`."""
@@ -102,23 +97,6 @@ class FrameTracks:
             names=names,
             ids=[track.id for track in self.tracks],
         )
-
-    def to_supervision(self) -> "supervision.Detections":
-        """Return a `supervision.Detections` with ids; needs the package supervision."""
-        return self.boxes.to_supervision()
-
-    def to_pandas(self) -> "pd.DataFrame":
-        """Return a table with a row for each vehicle; needs the package pandas.
-
-        Its columns are frame, time, x1, y1, x2, y2, and the other fields of `Track`.
-        """
-        with needing("notebook"):
-            import pandas as pd
-
-        frame = {"frame": self.index, "time": self.time}
-        rows = [frame | asdict(track.box) | asdict(track) for track in self.tracks]
-        names = [*frame, *("x1", "y1", "x2", "y2"), *(field.name for field in fields(Track))]
-        return pd.DataFrame(rows, columns=[name for name in names if name != "box"])
 
 
 class VideoTracker(Protocol):
