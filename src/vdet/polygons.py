@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from itertools import combinations
 
 Point = tuple[float, float]
 Segment = tuple[Point, Point]
@@ -36,24 +35,3 @@ def meeting(path: Segment, segment: Segment) -> float | None:
 def sides(corners: Sequence[Point]) -> list[Segment]:
     """Return the sides of a polygon; the last one leads back to the first corner."""
     return [(corners[i - 1], corner) for i, corner in enumerate(corners)]
-
-
-def crosses_itself(corners: Sequence[Point]) -> bool:
-    """Return whether sides of a polygon cross or touch, apart from neighbours at their corner.
-
-    A polygon without an area counts as one that does.
-    """
-    if len(set(corners)) < len(corners):
-        return True
-    pairs = [(side, corner) for side in sides(corners) for corner in corners if corner not in side]
-    return any(_lies_on(side, corner) for side, corner in pairs) or any(
-        meeting(first, second) is not None
-        for first, second in combinations(sides(corners), 2)
-        if not set(first) & set(second)
-    )
-
-
-def _lies_on(side: Segment, point: Point) -> bool:
-    (ax, ay), (bx, by), (x, y) = *side, point
-    is_between = (x - ax) * (x - bx) + (y - ay) * (y - by) <= 0
-    return is_between and (bx - ax) * (y - ay) == (by - ay) * (x - ax)

@@ -11,7 +11,7 @@ from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from vdet.config.section import Section
 from vdet.errors import ConfigError
-from vdet.polygons import Point, crosses_itself
+from vdet.polygons import Point
 
 Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
 FramePoint = tuple[Coordinate, Coordinate]
@@ -101,8 +101,6 @@ def _check_polygon(points: tuple[Point, ...]) -> tuple[Point, ...]:
     corners = points[:-1] if is_closed else points
     if len(corners) < 3:
         raise ValueError(f"has {len(corners)} corners; a polygon needs at least 3")
-    if crosses_itself(corners):
-        raise ValueError("crosses or touches itself; list the corners in order")
     return corners
 
 
