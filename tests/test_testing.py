@@ -6,7 +6,6 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from boxing import rounded
@@ -63,9 +62,6 @@ class Wrong:
     def detect(self, candidates: Any) -> Boxes:  # noqa: ARG002
         return Boxes([[1, 1, 9, 9]], [0.5])
 
-    def stage_images(self, image: Image, detections: Boxes) -> dict[str, Image]:  # noqa: ARG002
-        return {}
-
 
 class Paints(Wrong):
     def search(self, picture: Picture, index: int | None) -> None:  # noqa: ARG002
@@ -85,18 +81,12 @@ class Counts(Wrong):
         return Boxes([[1, 1, 9 + next(self.calls), 9]], [0.5])
 
 
-class FloatPictures(Wrong):
-    def stage_images(self, image: Image, detections: Boxes) -> dict[str, Any]:  # noqa: ARG002
-        return {"gray": image.astype(np.float32)}
-
-
 @pytest.mark.parametrize(
     ("detector", "message"),
     [
         (Paints(), "changed a frame"),
         (Outside(), "lies outside the frame"),
         (Counts(), "boxes differ"),
-        (FloatPictures(), "not uint8"),
     ],
 )
 def test_a_detector_that_breaks_a_rule_is_found(detector: Wrong, message: str) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 
 from vdet.boxes import NO_BOXES, Boxes, Image, clipped
 from vdet.config.schema import Settings
-from vdet.detect.protocol import DetectorModel, VideoDetector, stage_images_of
+from vdet.detect.protocol import DetectorModel, VideoDetector
 from vdet.files import OutputFiles
 from vdet.media import Frame, Picture, VideoInfo
 from vdet.run.result import FrameResult
@@ -22,10 +22,13 @@ from vdet.track.track import TimedTracker, Track, VideoTracker
 from vdet.traffic.live import LiveTraffic
 
 RATE = 25
-"""Frame rate of the scenes that the checks make."""
+"""Frame rate of the videos that the checks make."""
 
 WIDTH, HEIGHT = 640, 360
 """Size of their frames, pixels."""
+
+_IMAGE: Image = np.random.default_rng(1).integers(0, 256, (HEIGHT, WIDTH, 3), np.uint8)
+"""Their frames all show this noise."""
 
 
 def check_detector(model: DetectorModel, images: Sequence[Image]) -> None:
@@ -35,7 +38,6 @@ def check_detector(model: DetectorModel, images: Sequence[Image]) -> None:
     * A second detector finds the same in the same frames, also if frames are searched in threads:
       detectors share no state.
     * A single image can be searched.
-    * Stage images are BGR uint8.
     """
     height, width = images[0].shape[:2]
     frames = [image.copy() for image in images]
@@ -46,14 +48,10 @@ def check_detector(model: DetectorModel, images: Sequence[Image]) -> None:
         for a, b in zip(detections, map(second.detect, candidates), strict=True):
             is_same = len(a) == len(b) and np.allclose(a.sides, b.sides, atol=1e-4)
             assert is_same, "boxes differ between two detectors: they share something"
-    still = model.for_video(width, height, frames[:1])
-    in_still = _detect(still, frames[0], None)
-    for boxes in (*detections, in_still):
+    still = _detect(model.for_video(width, height, frames[:1]), frames[0], None)
+    for boxes in (*detections, still):
         inside = clipped(boxes.sides, (width, height))
         assert np.array_equal(inside, boxes.sides), "a box lies outside the frame"
-    for name, picture in stage_images_of(still)(frames[0], in_still).items():
-        is_image = picture.dtype == np.uint8 and picture.ndim == 3
-        assert is_image, f"stage image {name} is not uint8 of shape (H, W, 3)"
     assert np.array_equal(frames, images), "the detector changed a frame"
 
 
@@ -73,14 +71,13 @@ def check_tracker(make: Callable[[int, int], VideoTracker]) -> None:
     """
     first, second = make(WIDTH, HEIGHT), make(WIDTH, HEIGHT)
     ids: set[int] = set()
+    picture = Picture(_IMAGE.copy())
     for index in range(3 * RATE):
-        picture = Picture(_scene(index))
         detections, time = _detections(index), index / RATE
         tracks = first.update(detections, time, picture)
         _check_tracks(tracks)
         is_same = second.update(detections, time, picture) == tracks
         assert is_same, "two trackers differ: they share something"
-        assert (picture.image == _scene(index)).all(), "the tracker changed the frame"
         ids |= {track.id for track in tracks}
     assert len(tracks) == 2, f"{len(tracks)} of 2 vehicles are shown"
     assert len(ids) == 2, "a vehicle that is always detected changed its id"
@@ -91,8 +88,9 @@ def check_tracker(make: Callable[[int, int], VideoTracker]) -> None:
         assert {track.id for track in later} == ids, "a vehicle is lost a moment later"
         assert {track.state for track in later} == {"interpolated"}, "not called interpolated"
     for index in range(3 * RATE, 30 * RATE):
-        tracks = first.update(NO_BOXES, index / RATE, Picture(_scene(0) // 2))
+        tracks = first.update(NO_BOXES, index / RATE, picture)
     assert not tracks, "vehicles are shown long after the last detection"
+    assert (picture.image == _IMAGE).all(), "the tracker changed the frame"
 
 
 def _check_tracks(tracks: Sequence[Track]) -> None:
@@ -127,16 +125,20 @@ def check_sink(
 
 def _write(kind: SinkKind, path: Path, settings: Settings, *, still: bool, fails: bool) -> None:
     """Write an image or three frames through the sink; the run may end with an error."""
-    rate, traffic = Fraction(RATE), LiveTraffic(settings, WIDTH, HEIGHT)
-    info = None if still else VideoInfo(Path("check.mp4"), WIDTH, HEIGHT, rate, 1 / rate, frames=3)
+    video, rate, picture = Path("check.mp4"), Fraction(RATE), Picture(_IMAGE.copy())
+    info = None if still else VideoInfo(video, WIDTH, HEIGHT, rate, 1 / rate, frames=3)
+    traffic = LiveTraffic(settings, WIDTH, HEIGHT)
     with OutputFiles() as files:
         context = SinkContext(files, settings, info, traffic=traffic)
         with kind.open(path, context) as sink:
             for index in range(1 if still else 3):
-                result = _result(index)
+                frame, detections = Frame(index, index / rate, picture), _detections(index)
+                near, far = (detection.box for detection in detections)
+                tracks = Track(1, near, 0.9, "detected"), Track(2, far, 0.9, "predicted")
+                result = FrameResult(video, frame, detections, tracks)
                 traffic.add(result.frame_tracks)
                 sink.write(result)
-                assert (result.frame.image == _scene(index)).all(), "the sink changed the frame"
+            assert (picture.image == _IMAGE).all(), "the sink changed the frame"
             traffic.end()
             assert not _is_there(path), "the output exists before the run has ended"
             if fails:
@@ -155,20 +157,3 @@ def _detections(index: int) -> Boxes:
     near, far = 60 + 2 * index, 500 - 3 * index
     sides = [(near, 180, near + 90, 250), (far, 40, far + 80, 100)]
     return Boxes(sides, [0.9, 0.95], data={"strength": [9.0, 9.5]})
-
-
-def _scene(index: int) -> Image:
-    """Draw the vehicles, each with its texture, on a grey road."""
-    image = np.full((HEIGHT, WIDTH, 3), 90, np.uint8)
-    for number, detection in enumerate(_detections(index)):
-        part = detection.box.cut(image)
-        part[:] = np.random.default_rng(number).integers(0, 256, part.shape)
-    return image
-
-
-def _result(index: int) -> FrameResult:
-    frame = Frame(index, Fraction(index, RATE), Picture(_scene(index)))
-    detections = _detections(index)
-    near, far = (detection.box for detection in detections)
-    tracks = (Track(1, near, 0.9, "detected"), Track(2, far, 0.9, "predicted"))
-    return FrameResult(Path("check.mp4"), frame, detections, tracks)
