@@ -47,8 +47,8 @@ def test_drops_are_reported_while_they_are_on_the_lens() -> None:
     assert "on the lens from 0:05 to 0:09" in finding.text
 
 
-def found(settings: Settings, width: int = 640, unknown: tuple[str, ...] = ()) -> list[str]:
-    conditions = Conditions(settings, width, unknown)
+def found(settings: Settings, width: int = 640) -> list[str]:
+    conditions = Conditions(settings, width)
     image = np.full((90, width, 3), 90, np.uint8)
     for number in range(10):
         conditions.add(number / 2, Picture(image), NO_BOXES, ())
@@ -70,7 +70,6 @@ def test_every_search_of_an_empty_road_is_analysed(
 def test_what_the_settings_make_doubtful_is_said() -> None:
     lanes = load_settings((), ["lanes.enabled=true"])
     assert found(lanes) == ["lane-geometry"]
-    assert found(Settings(), unknown=("tram",)) == ["classes"]
     assert found(Settings(), width=300) == ["small-frames"]
     assert found(SETTINGS) == []
 
@@ -80,14 +79,14 @@ def test_a_camera_that_is_described_has_metres() -> None:
     assert found(described) == []
 
 
-@pytest.mark.parametrize("code", ["lane-geometry", "classes", "small-frames"])
+@pytest.mark.parametrize("code", ["lane-geometry", "small-frames"])
 def test_each_of_them_can_be_ignored(code: Code) -> None:
     lanes = load_settings((), ["lanes.enabled=true"])
     ignoring = lanes.model_copy(update={"conditions": ConditionSettings(ignore=(code,))})
-    every = found(lanes, width=300, unknown=("tram",))
-    assert every == ["lane-geometry", "classes", "small-frames"]
+    every = found(lanes, width=300)
+    assert every == ["lane-geometry", "small-frames"]
     rest = [item for item in every if item != code]
-    assert found(ignoring, width=300, unknown=("tram",)) == rest
+    assert found(ignoring, width=300) == rest
 
 
 def test_a_plane_is_the_same_from_a_decoder_and_from_an_image() -> None:

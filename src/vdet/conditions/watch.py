@@ -29,14 +29,11 @@ class Conditions:
     ----------
     width
         Width of the frames, pixels.
-    unknown
-        Classes in the settings that the network does not have.
     """
 
-    def __init__(self, settings: Settings, width: int, unknown: Sequence[str] = ()) -> None:
+    def __init__(self, settings: Settings, width: int) -> None:
         self._settings = settings
         self._width = width
-        self._unknown = unknown
         self._camera, self._motion = CameraWatch(), MotionWatch()
         self._times: list[float] = []
         self._measures: list[Float64Array] = []
@@ -62,9 +59,6 @@ class Conditions:
         findings = []
         if settings.lack_of_metres:
             findings.append(Finding("lane-geometry", settings.lack_of_metres))
-        if self._unknown:
-            text = f"detector.classes: the network does not have {', '.join(self._unknown)}"
-            findings.append(Finding("classes", text))
         if self._width < _NARROW:
             text = f"frames are {self._width} pixels wide; detectors were measured on wider ones"
             findings.append(Finding("small-frames", text, severity="note"))

@@ -63,7 +63,7 @@ Code = Literal[
     "camera-moves", "camera-moved", "unexplained-motion", "dark", "haze", "blur", "drops",
     "lane-geometry", "classes", "small-frames",
 ]  # fmt: skip
-"""What makes a result doubtful; docs/conditions.md explains each."""
+"""What makes a result doubtful; docs/conditions.md explains each. `classes` of 1.0.0 is unused."""
 
 
 class ConditionSettings(Section):
@@ -71,7 +71,7 @@ class ConditionSettings(Section):
 
     ignore: tuple[Code, ...] = Field((), max_length=100)
     """Codes of findings to suppress: camera-moves, camera-moved, unexplained-motion, dark, haze,
-    blur, drops, lane-geometry, classes, small-frames.
+    blur, drops, lane-geometry, small-frames.
     """
 
 

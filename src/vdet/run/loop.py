@@ -144,12 +144,10 @@ def build(parts: Parts, settings: Settings, video: VideoInfo, images: Sequence[I
     """
     width, height = video.width, video.height
     detector = parts.model.for_video(width, height, images)
-    missing_classes = getattr(detector, "unknown_classes", ())
-    context = StepContext(settings, width, height, video, missing_classes)
     return Pipeline(
         detector,
         timed(parts.tracker) if parts.tracker else make_tracker(settings, width, height),
-        steps=[*make_steps(context), *parts.steps],
+        steps=[*make_steps(StepContext(settings, width, height, video)), *parts.steps],
         rate=SearchRate(settings.detector.searches_per_second, settings.detector.stride),
         look_ahead=Fraction(settings.tracker.look_ahead),
     )

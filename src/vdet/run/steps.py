@@ -56,15 +56,12 @@ class StepContext:
         Size of the frames, pixels.
     video
         None for a single image.
-    unknown
-        Classes in the settings that the detector cannot find.
     """
 
     settings: Settings
     width: int
     height: int
     video: VideoInfo | None = None
-    unknown: Sequence[str] = ()
 
 
 def make_steps(context: StepContext) -> list[Step]:
@@ -82,7 +79,7 @@ def make_steps(context: StepContext) -> list[Step]:
     if context.video is not None:
         from vdet.conditions.watch import Conditions
 
-        steps.append(ConditionStep(Conditions(settings, width, context.unknown)))
+        steps.append(ConditionStep(Conditions(settings, width)))
     if settings.lanes.enabled:
         from vdet.lanes.road import RoadFinder
 

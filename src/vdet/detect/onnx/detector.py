@@ -1,6 +1,7 @@
 """A network in an ONNX file as a detector, of the kind `net`."""
 
 import contextlib
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +18,8 @@ from vdet.detect.onnx.session import Session
 from vdet.draw.boxes import GREEN, draw_box
 from vdet.errors import ModelError
 from vdet.media import Picture
+
+log = logging.getLogger("vdet")
 
 _LARGER = 2.0
 """Pixels of the larger input for a single image, as a multiple of those for a frame of a video."""
@@ -49,8 +52,11 @@ class NetworkModel:
         self._recognized = recognize(Session(path), settings.class_names or ())
         names = self._recognized.names
         self._numbers = np.array([*our_classes(names, combined_classes(settings)), -1], np.int32)
-        if not np.isin(np.arange(len(settings.classes)), self._numbers).any():
+        known = [name for number, name in enumerate(settings.classes) if number in self._numbers]
+        if not known:
             raise ModelError(f"{path}: has none of detector.classes, only {', '.join(names)}")
+        if missing := {*settings.classes} - {*known, *_USUAL}:
+            log.warning("%s: lacks detector.classes %s", path, ", ".join(sorted(missing)))
 
     def for_video(self, width: int, height: int, images: Sequence[Image]) -> "NetworkDetector":  # noqa: ARG002
         """Return a detector for frames of one size."""
@@ -74,15 +80,6 @@ class NetworkDetector:
     numbers: Int32Array
     settings: NetworkSettings
     is_stateless: ClassVar[bool] = True
-
-    @property
-    def unknown_classes(self) -> tuple[str, ...]:
-        """Classes in the settings that the network does not have, except the default ones."""
-        return tuple(
-            name
-            for number, name in enumerate(self.settings.classes)
-            if number not in self.numbers and name not in _USUAL
-        )
 
     def search(self, picture: Picture, index: int | None) -> Candidates:
         """Return the vehicles, in pixels of the frame.
