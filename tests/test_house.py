@@ -124,10 +124,6 @@ STARTS = {
     "config": "main(['config', '-c', 'seed'])",
     "a wrong option": "main(['eval', 'video', '--wrong'])",
     "wrong usage": "main(['detect-video', 'in.mp4', '--tracks', 'out.csv'])",
-    "completion": (
-        "from click.shell_completion import ShellComplete as C; from vdet.cli.main import cli; "
-        "C(cli, {}, 'vdet', '').get_completions(['train', '--set'], 'tracker.')"
-    ),
 }
 
 

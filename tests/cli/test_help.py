@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 import click
 import pytest
-from click.shell_completion import ShellComplete
 
 from conftest import Run
 from vdet.cli.main import cli
@@ -66,14 +65,6 @@ def test_the_help_shows_every_option_and_examples_that_can_be_run(
         command.make_context(example, words[1 + len(names) :])
 
 
-def test_the_many_options_of_detect_video_stand_under_headings(run: Run) -> None:
-    shown = run("detect-video", "--help").out
-    headings = re.findall(r"^(\w[\w ]*):$", shown, re.MULTILINE)
-    assert headings == [
-        *("Outputs", "Input", "Batch", "Parallel work", "Model and settings", "General")
-    ]
-
-
 @pytest.mark.parametrize(
     ("words", "meant"),
     [
@@ -98,19 +89,3 @@ def test_one_option_means_the_same_in_every_command() -> None:
     for _, option, text in OPTIONS:
         texts.setdefault(option, set()).add(text)
     assert {option for option, helps in texts.items() if len(helps) > 1} == differing
-
-
-@pytest.mark.parametrize(
-    ("words", "incomplete", "found"),
-    [
-        (["config", "-c"], "se", {"seed", "se"}),  # the second stands for files
-        (["detect-video", "--set"], "tracker.conf", {"tracker.confirm_seconds="}),
-        (["train", "--set"], "train.svm.a", {"train.svm.augmentation="}),
-        (["eval", "video", "--model"], "mod", {"mod"}),
-    ],
-)
-def test_the_shell_completes_configs_keys_and_files(
-    words: list[str], incomplete: str, found: set[str]
-) -> None:
-    completed = ShellComplete(cli, {}, "vdet", "_VDET_COMPLETE").get_completions(words, incomplete)
-    assert {item.value for item in completed} == found

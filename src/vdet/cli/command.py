@@ -1,7 +1,6 @@
-"""Commands with options under headings, and the program, which other packages extend."""
+"""Commands with `-q` and `-v`, and the program, which other packages extend."""
 
 import logging
-from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
@@ -12,29 +11,11 @@ from vdet.plugins import COMMANDS, built_in_names, load_plugin, plugin_names
 
 
 class Command(click.Command):
-    """A command of the program, with `-q` and `-v`.
+    """A command of the program, with `-q` and `-v`."""
 
-    `headings` divide the options in its help: each stands above the option with this name.
-    """
-
-    def __init__(
-        self, *names: Any, headings: Mapping[str, str] | None = None, **attributes: Any
-    ) -> None:
+    def __init__(self, *names: Any, **attributes: Any) -> None:
         super().__init__(*names, **attributes)
-        self.headings = headings or {}
         self.params += verbosity_options()
-
-    def format_options(self, context: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the options under their headings."""
-        heading, sections = "Options", dict[str, list[tuple[str, str]]]()
-        for parameter in self.get_params(context):
-            heading = self.headings.get(parameter.name or "", heading)
-            row = parameter.get_help_record(context)
-            if row and isinstance(parameter, click.Option):
-                sections.setdefault(heading, []).append(row)
-        for heading, rows in sections.items():
-            with formatter.section(heading):
-                formatter.write_dl(rows)
 
 
 command = partial(click.command, cls=Command)

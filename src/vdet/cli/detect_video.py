@@ -20,17 +20,7 @@ if TYPE_CHECKING:
     from vdet.run.video import Run
 
 
-_HEADINGS = {
-    "no_video": "Outputs",
-    "start": "Input",
-    "folder": "Batch",
-    "threads": "Parallel work",
-    "lanes": "Model and settings",
-    "quiet": "General",
-}
-
-
-@command(headings=_HEADINGS)
+@command()
 @click.argument("videos", nargs=-1, required=True, type=options.PATH, metavar="IN [OUT] | CLIP...")
 @click.option("--no-video", is_flag=True, help="Do not write a video, only other outputs.")
 @options.output_files(

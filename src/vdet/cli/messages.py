@@ -2,7 +2,6 @@
 
 import logging
 import sys
-import threading
 import warnings
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
@@ -19,7 +18,6 @@ if TYPE_CHECKING:
     from tqdm import tqdm
 
 LOG = logging.getLogger("vdet")
-REFRESH_INTERVAL = 1.0  # seconds
 
 
 def print_lines(*lines: str, err: bool = False) -> None:
@@ -73,50 +71,32 @@ def _shows_bars() -> bool:
     return not is_quiet() and sys.stderr.isatty()
 
 
+def progress_bar(**options: Any) -> "tqdm[Any]":
+    """Return a bar, disabled with `--quiet`, or if standard error is not a terminal."""
+    from tqdm import tqdm
+
+    return tqdm(disable=not _shows_bars(), dynamic_ncols=True, **options)
+
+
 @contextmanager
 def progress_steps(unit: str) -> Iterator[Steps]:
     """Yield a function that ends the bar of the previous step and starts a new one.
 
-    It takes the name of the step and its total. A step with a name and no total shows the elapsed
-    time, and disappears at its end. See `live_bar` for when there is no bar.
+    It takes the name of the step and its total. A step with a name and no total shows only its
+    name, and disappears at its end. See `progress_bar` for when there is no bar.
     """
     if not _shows_bars():
-        yield no_steps
+        yield no_steps  # without tqdm
         return
     with ExitStack() as stack:
 
         def start(step: str, total: int | None) -> Advance:
             stack.close()
-            is_timed = total is None and bool(step)
-            form = "{desc} [{elapsed}]" if is_timed else None
-            bar = live_bar(total=total, desc=step, unit=unit, leave=not is_timed, bar_format=form)
+            is_named_only = total is None and bool(step)
+            form = "{desc} …" if is_named_only else None
+            bar = progress_bar(
+                total=total, desc=step, unit=unit, leave=not is_named_only, bar_format=form
+            )
             return stack.enter_context(bar).update
 
         yield start
-
-
-@contextmanager
-def live_bar(**options: Any) -> "Iterator[tqdm[Any]]":
-    """Yield a bar that is redrawn at least every `REFRESH_INTERVAL`, to show that work goes on.
-
-    With `--quiet`, or if standard error is not a terminal, the bar is disabled.
-    """
-    from tqdm import tqdm
-
-    ended = threading.Event()
-    with tqdm(disable=not _shows_bars(), dynamic_ncols=True, **options) as bar:
-
-        def repeat() -> None:
-            while not ended.wait(REFRESH_INTERVAL):
-                bar.refresh()
-
-        if bar.disable:
-            yield bar
-            return
-        thread = threading.Thread(target=repeat, name="vdet-progress", daemon=True)
-        thread.start()
-        try:
-            yield bar
-        finally:
-            ended.set()
-            thread.join()

@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import partial, wraps
@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-from click.shell_completion import CompletionItem
 
 from vdet.errors import ConfigError, OutputError
 from vdet.files import NO_FILES, FileIds, check_output
@@ -60,28 +59,6 @@ def _parse_sink(text: str) -> Output:
     if not (name and path):
         raise click.BadParameter(f"{text}: expected NAME=FILE, as in tracks=out.csv")
     return Output(name, Path(path))
-
-
-def _complete_configs(_: click.Context, __: click.Parameter, start: str) -> list[CompletionItem]:
-    from vdet.config.loading import shipped_configs
-
-    names = [name for name in shipped_configs() if name.startswith(start)]
-    return [*map(CompletionItem, names), CompletionItem(start, type="file")]
-
-
-def _complete_keys(_: click.Context, __: click.Parameter, start: str) -> list[str]:
-    from vdet.config.schema import Settings
-
-    keys = _keys(Settings().model_dump(mode="json"))
-    return [f"{key}=" for key in keys if key.startswith(start)]
-
-
-def _keys(values: Mapping[str, Any], section: str = "") -> Iterator[str]:
-    for name, value in values.items():
-        if isinstance(value, dict):
-            yield from _keys(value, f"{section}{name}.")
-        else:
-            yield f"{section}{name}"
 
 
 input_file = partial(click.option, type=INPUT, metavar="FILE")
@@ -157,7 +134,6 @@ _configs_option = click.option(
     "configs",
     metavar="FILE",
     multiple=True,
-    shell_complete=_complete_configs,
     help="Read settings from a YAML file, or from a shipped one: default, svm, seed or "
     "project-camera. Can be repeated. Later files win.",
 )
@@ -166,7 +142,6 @@ _assignments_option = click.option(
     "assignments",
     metavar="KEY=VALUE",
     multiple=True,
-    shell_complete=_complete_keys,
     help="Change one setting, for example output.crf=18. Can be repeated.",
 )
 

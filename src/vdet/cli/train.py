@@ -7,7 +7,7 @@ import click
 
 from vdet.cli import options
 from vdet.cli.command import command
-from vdet.cli.messages import live_bar, print_lines, progress_steps
+from vdet.cli.messages import print_lines, progress_bar, progress_steps
 from vdet.cli.options import Paths, SettingsSource
 from vdet.errors import counted, needing
 from vdet.workers import limit_library_threads
@@ -163,7 +163,7 @@ def train_net(
     sources = [image_source(read_labelled_images(path, roles), settings) for path in data]
     sources += [clip_source(clip, truth, settings) for clip, truth in clips]
     print_lines(*(line for _, report in sources for line in report.lines()), "")
-    with live_bar(total=settings.train.net.steps, unit=" steps") as bar:
+    with progress_bar(total=settings.train.net.steps, unit=" steps") as bar:
 
         def advance(step: int, loss: float) -> None:
             bar.set_postfix_str(f"loss {loss:.3f}", refresh=False)
