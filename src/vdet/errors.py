@@ -109,27 +109,8 @@ def in_one_line(error: Exception) -> str:
         return f"{error.filename or 'reading or writing'}: {error.strerror or error}"
     if isinstance(error, MemoryError) or _NO_MEMORY in str(error):
         return "out of memory; close other programs, or raise the limit (ulimit -v)"
-    if fault := opencv_fault():
-        return fault
     text = " ".join(f"{type(error).__name__}: {error}".split())
     return f"internal error, please report it ({text}); VDET_DEBUG=1 shows more"
-
-
-def opencv_fault() -> str | None:
-    """Return what is wrong if another package has replaced or removed the OpenCV that vdet needs.
-
-    Both packages of OpenCV install into the same folder: the later one wins, and removing it breaks
-    both.
-    """
-    try:
-        from cv2 import HOGDescriptor  # noqa: F401  # OpenCV 5 has none
-    except ImportError:
-        return (
-            "opencv-python has replaced opencv-python-headless; run "
-            '"pip uninstall -y opencv-python opencv-python-headless" and then '
-            "\"pip install 'opencv-python-headless<5'\""
-        )
-    return None
 
 
 def escaped(text: str) -> str:

@@ -45,8 +45,6 @@ def contents(folder: Path) -> dict[Path, bytes]:
         "eval images set/annotations.json --json set/b.png",
         "eval images yset --json yset/data.yaml",
         "eval images yset --json yset/labels/a.txt",
-        "info frames/img_%04d.png --json frames/img_0001.png",
-        "info frames --json frames/img_0003.png",
         "detect-image frames --json frames/img_0002.png",
         "detect-image frames -o frames",
         "detect-image set/a.png -c settings.yaml --json link.png",

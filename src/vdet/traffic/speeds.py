@@ -24,7 +24,6 @@ from vdet.boxes import EDGE, Float64Array
 from vdet.lanes.ground import Ground
 from vdet.track.track import FrameTracks
 from vdet.traffic.counts import Counts
-from vdet.traffic.crossings import Line
 
 WINDOW = 1.0
 """Length of the part of a path that a velocity is fitted to, seconds."""
@@ -180,18 +179,6 @@ def with_speeds(counts: Counts, meter: SpeedMeter | None) -> Counts:
             )
             latest[event.id] = event.time
     return replace(counts, events=tuple(events))
-
-
-def precision_at(line: Line, ground: Ground, speed: float) -> tuple[float, float, float]:
-    """Return metres of road across and along in a pixel at the middle of a line, and an error.
-
-    The error is the standard deviation of a `speed`, m/s, as a fraction of it, for ground
-    points that are off by a pixel. All are NaN far from the points of the ground.
-    """
-    x, y = np.mean([line.start, line.end], axis=0)
-    here, beside, above = ground.metres(np.array([(x, y), (x + 1, y), (x, y - 1)]))
-    across, along = np.hypot(*(beside - here)), np.hypot(*(above - here))
-    return across, along, np.hypot(ground.scale_error, 2**0.5 * along / (WINDOW * speed))
 
 
 def _kmh(speed: float | None) -> float | None:
