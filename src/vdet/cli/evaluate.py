@@ -1,6 +1,5 @@
-"""`vdet eval`: measure detection, tracking or the classifier."""
+"""`vdet eval`: measure detection or tracking."""
 
-from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,18 +10,16 @@ from vdet.cli import options
 from vdet.cli.command import command
 from vdet.cli.messages import progress_steps
 from vdet.cli.options import SettingsSource
-from vdet.cli.results import ResultFiles, facts_options, results_options
+from vdet.cli.results import ResultFiles, results_options
 from vdet.workers import IMAGES, core_count, return_freed_memory
 
 if TYPE_CHECKING:
     from vdet.config.schema import Settings
     from vdet.evaluate.output import RunName
 
-_data = click.argument("data", nargs=-1, required=True, type=options.INPUT, metavar="DATA...")
-
 
 @command()
-@_data
+@click.argument("data", nargs=-1, required=True, type=options.INPUT, metavar="DATA...")
 @click.option(
     "--min-width",
     type=click.FloatRange(0, 1),
@@ -64,43 +61,6 @@ def images(
         progress = partial(steps, "")
         score = evaluate_images(sets, detector, counting, threads=core_count(), progress=progress)
     results.print_report(images_report(score, _run_name(settings, source)))
-
-
-_ON_LAST = "leak-free: a new model is tested on the last patches of each folder"
-_ON_ALL = "if the model was trained on some of these patches, the scores are too good"
-
-
-@command()
-@_data
-@options.model_option
-@options.settings_options(model="detector.model")
-@facts_options
-def patches(data: options.Paths, source: SettingsSource, results: ResultFiles) -> None:
-    """Measure the classifier on labelled patches.
-
-    Each DATA is a folder or a zip file, as for vdet train. With --model, that model is tested on
-    all of DATA. Otherwise a new model is trained, and tested on the last patches of each folder.
-
-    \b
-    Examples:
-      vdet eval patches vehicles.zip non-vehicles.zip --json scores.json
-    """
-    settings = source.load(detector="svm")
-    from vdet.detect.svm.detector import requested_features
-    from vdet.detect.svm.model import load_model
-    from vdet.learn.svm.dataset import find_patches
-    from vdet.learn.svm.training import evaluate_patches
-
-    path = Path(settings.svm.model) if settings.svm.model else None
-    svm = load_model(path, requested_features(settings.svm)) if path else None
-    results.check(source.inputs(*data, settings=settings))
-    files = find_patches(data)
-    with progress_steps("") as steps:
-        scores = evaluate_patches(files, settings, svm, steps=steps)
-    name = _run_name(settings, source)
-    meaning = _ON_ALL if svm else _ON_LAST
-    values = name.values | {"meaning": meaning, "test": asdict(scores)}
-    results.print([name.line, meaning, "", *scores.lines()], values)
 
 
 @command()
@@ -181,5 +141,5 @@ def _run_name(settings: "Settings", source: SettingsSource) -> "RunName":
     return RunName(detector.kind, model_file(detector), configs, source.changes)
 
 
-_HELP = "Measure detection, tracking or the classifier."
-eval_group = click.Group("eval", [images, patches, tracks, video], help=_HELP)
+_HELP = "Measure detection or tracking."
+eval_group = click.Group("eval", [images, tracks, video], help=_HELP)

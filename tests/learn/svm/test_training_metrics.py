@@ -1,4 +1,4 @@
-"""The metrics of `vdet train` and of `vdet eval patches`, as text."""
+"""The metrics of `vdet train`, as text."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Train a model on patch files, with metrics, and test models on patches."""
+"""Train a model on patch files, with metrics."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -135,8 +135,15 @@ def train(
     DataError
         Patches are unreadable, or too few.
     """
-    data, held, model = _fit_part(files, settings, jobs=jobs, steps=steps)
+    progress = steps("describing patches", len(files))
+    augmented = settings.train.svm.augmentation
+    data = extract(files, settings.svm.features, augmented=augmented, jobs=jobs, progress=progress)
+    held = hold_out(data.groups)
     learnt, tested = ~(held | data.is_boxed), held & ~data.is_boxed
+    if not tested.any():
+        raise DataError("no folder has two patches, so none can be held out; add more")
+    steps("fitting the classifier", None)
+    model = fit(data.of(learnt), settings)
     steps("fitting the sides of boxes", None)
     regression, box_error = fit_boxes(data, held, settings.svm.features.hog_length)
     metrics = TrainingMetrics(
@@ -150,45 +157,6 @@ def train(
     program = {"program": f"vdet {__version__}"}
     provenance = program | {"training": training, "report": asdict(metrics)}
     return replace(model, provenance=provenance, box_regression=regression), metrics
-
-
-def evaluate_patches(
-    files: Sequence[PatchFile],
-    settings: Settings,
-    model: LinearModel | None = None,
-    *,
-    steps: Steps = no_steps,
-) -> Classification:
-    """Test a given model on all patches, or train one and test it on the held-out patches.
-
-    Parameters and errors as for `train`.
-    """
-    files = [file for file in files if not file.is_boxed]
-    if model is None:
-        data, held, model = _fit_part(files, settings, steps=steps)
-        return _classify(model, data, held)
-    progress = steps("describing patches", len(files))
-    data = extract(files, model.features, augmented=False, progress=progress)
-    return _classify(model, data, np.ones(len(files), np.bool_))
-
-
-def _fit_part(
-    files: Sequence[PatchFile], settings: Settings, *, jobs: int | None = None, steps: Steps
-) -> tuple[LabelledVectors, BoolArray, LinearModel]:
-    """Compute features, and fit a model to the patches of both classes that are not held out.
-
-    Returns
-    -------
-    The patches, which of them are held out, bool `(patches,)`, and the model.
-    """
-    progress = steps("describing patches", len(files))
-    augmented = settings.train.svm.augmentation
-    data = extract(files, settings.svm.features, augmented=augmented, jobs=jobs, progress=progress)
-    held = hold_out(data.groups)
-    if not (held & ~data.is_boxed).any():
-        raise DataError("no folder has two patches, so none can be held out; add more")
-    steps("fitting the classifier", None)
-    return data, held, fit(data.of(~(held | data.is_boxed)), settings)
 
 
 def _classify(model: LinearModel, data: LabelledVectors, chosen: BoolArray) -> Classification:
