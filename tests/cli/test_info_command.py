@@ -44,7 +44,7 @@ def test_another_network_says_what_it_was_taken_for(run: Run, tmp_path: Path) ->
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("in.mp4", "in.mp4: is no .npz or .onnx; ffprobe describes videos and images"),
+        ("in.mp4", "in.mp4: must be .npz or .onnx; ffprobe describes videos and images"),
         ("none.onnx", "none.onnx: cannot be"),
     ],
 )
