@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from detect.onnx.graphs import write_endless
 from faults.conftest import Start
 from running import Gate, names, until
 
@@ -21,31 +20,6 @@ class Slow:
 
 sys.meta_path.insert(0, Slow)
 """
-
-
-SHOWS_THAT_A_NETWORK_RUNS = """
-from vdet.detect.onnx.session import Session
-
-run = Session.run
-
-def shown(session, values):
-    print("running", flush=True)
-    return run(session, values)
-
-Session.run = shown
-"""
-
-
-def test_while_a_network_does_not_end(launch: Start, long_clip: Path, tmp_path: Path) -> None:
-    (tmp_path / "sitecustomize.py").write_text(SHOWS_THAT_A_NETWORK_RUNS)
-    network, out = write_endless(tmp_path / "net.onnx"), tmp_path / "out.mp4"
-    running = launch("detect-video", long_clip, out, "--model", network, modules=tmp_path)
-    assert running.process.stdout is not None
-    assert running.process.stdout.readline() == "running\n"
-    running.send(signal.SIGINT)
-    result = running.finish(seconds=45)  # the network itself would get 60
-    assert result.code in (130, -signal.SIGALRM)
-    assert not out.exists()
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

@@ -47,21 +47,6 @@ def table(name: str) -> onnx.ValueInfoProto:
     return helper.make_tensor_value_info(name, TensorProto.FLOAT, None)
 
 
-def zeros_of(count: int) -> Write:
-    """Return what writes a network that makes `count` numbers while it runs."""
-
-    def write(path: Path) -> Path:
-        nodes = [
-            helper.make_node("ConstantOfShape", ["count"], ["zeros"]),
-            helper.make_node("ReduceMax", ["zeros"], ["most"], keepdims=0),
-            helper.make_node("Add", ["images", "most"], ["output0"]),
-        ]
-        constants = [numpy_helper.from_array(np.array([count]), "count")]
-        return write_graph(path, nodes, [picture((1, 3, 64, 64))], [table("output0")], constants)
-
-    return write
-
-
 ULTRALYTICS = np.zeros((1, 84, CELLS))
 NETWORKS: Mapping[str, tuple[Write, str]] = {
     "an input of 50,000×50,000": (constant(ULTRALYTICS, shape=(1, 3, 50_000, 50_000)), "pixels"),
@@ -77,11 +62,6 @@ NETWORKS: Mapping[str, tuple[Write, str]] = {
     "names that are a number": (constant(ULTRALYTICS, names="5"), "metadata cannot be read"),
     "names like a well": (constant(ULTRALYTICS, names="[" * 5000), "metadata cannot be read"),
     "names of many signs": (constant(ULTRALYTICS, names="-" * 100_000 + "1"), "cannot be read"),
-    "8 million names": (
-        constant(ULTRALYTICS, names=f"[{'1,' * 8_000_000}]"),
-        "metadata of more than 200,000 characters",
-    ),
-    "4 GB while it runs": (zeros_of(10**9), "takes too much memory"),
     "no rows": (constant(np.zeros((1, 0, 0))), "has an unknown form"),
     "a single number": (constant(0.0), "has an unknown form"),
     "no numbers": (constant(np.full((1, 84, CELLS), np.nan)), ""),

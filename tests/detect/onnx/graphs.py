@@ -119,39 +119,6 @@ def _constant(values: npt.NDArray[np.generic], name: str) -> onnx.TensorProto:
     return numpy_helper.from_array(values, name)
 
 
-def write_endless(path: Path) -> Path:
-    """Write a network whose loop has 2^62 rounds."""
-    value = helper.make_tensor_value_info
-    nodes = [
-        helper.make_node("Identity", ["go"], ["still"]),
-        helper.make_node("Identity", ["sum"], ["next"]),
-    ]
-    state = [value("go", TensorProto.BOOL, []), value("sum", TensorProto.FLOAT, [1])]
-    after = [value("still", TensorProto.BOOL, []), value("next", TensorProto.FLOAT, [1])]
-    body = helper.make_graph(nodes, "body", [value("n", TensorProto.INT64, []), *state], after)
-    constants = [
-        numpy_helper.from_array(np.array(2**62), "rounds"),
-        numpy_helper.from_array(np.array(True), "true"),
-        numpy_helper.from_array(np.zeros(1, np.float32), "zero"),
-    ]
-    loop = helper.make_node("Loop", ["rounds", "true", "zero"], ["end"], body=body)
-    add = helper.make_node("Add", ["images", "end"], ["output0"])
-    inputs = [value("images", TensorProto.FLOAT, [1, 3, 64, 64])]
-    return write_graph(
-        path, [loop, add], inputs, [value("output0", TensorProto.FLOAT, None)], constants
-    )
-
-
-def write_slow(path: Path) -> Path:
-    """Write a network of one operation that takes long, which onnxruntime cannot stop."""
-    weights = _constant(np.ones((3, 3, 127, 127), np.float32), "weights")
-    value, sides = helper.make_tensor_value_info, [1, 3, 700, 700]
-    nodes = [helper.make_node("Conv", ["images", "weights"], ["output0"])]
-    inputs = [value("images", TensorProto.FLOAT, sides)]
-    outputs = [value("output0", TensorProto.FLOAT, None)]
-    return write_graph(path, nodes, inputs, outputs, [weights])
-
-
 def write_with_weights_elsewhere(path: Path, location: str) -> Path:
     """Write a network whose weights lie in another file."""
     weights = TensorProto(name="weights", dims=[4], data_type=TensorProto.FLOAT)
