@@ -17,7 +17,6 @@ from run.red_runs import video_info
 from traffic.passing import HEIGHT, WIDTH, frame, passing, summarize, track
 from vdet.boxes import Box
 from vdet.conditions.finding import Finding
-from vdet.pages import charts
 from vdet.pages.batch import VehicleRow
 from vdet.pages.render import jpeg_uri, link_to
 from vdet.pages.video import Player, VideoPage
@@ -25,7 +24,6 @@ from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Clock
 from vdet.traffic.counts import Counts, Event
 from vdet.traffic.records import VehicleRecord
-from vdet.traffic.speeds import Speeds
 
 NASTY = "<img src=x onerror=alert(1)>&lt;\"'#?%41 javascript:.mp4"
 STILL = np.full((HEIGHT, WIDTH, 3), 90, np.uint8)
@@ -153,23 +151,9 @@ class TestVideoPage:
         assert "Flows" not in seen(page()).text
 
     def test_speeds_are_shown_where_they_are_known(self) -> None:
-        times = np.arange(5.0)
-        fast = Speeds(times, np.zeros((5, 2)), np.full(5, 10.0), np.full(5, 0.1), 0.01)
         counts = counted(("north", "in", 1, 1, 36.0), ("north", "in", 2, 2, 40.0))
-        made = seen(replace(page(), records=[replace(TWO[0], speeds=fast)], counts=counts))
-        assert "Vehicles by their median speed" in made.text
-        assert "35 to 40 km/h" in made.text
+        made = seen(replace(page(), counts=counts))
         assert re.search(r"north\s*in\s*2\s*38\s*39", made.text)
-        assert "median speed" not in seen(page()).text
-
-    def test_charts_are_made_once_and_not_for_each_vehicle(
-        self, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        made: list[int] = []
-        monkeypatch.setattr(charts, "histogram", lambda values, *_: made.append(len(values)))
-        slow = Speeds(np.arange(5.0), np.zeros((5, 2)), np.full(5, 10.0), np.full(5, 0.1), 0.01)
-        replace(page(), records=[replace(item, speeds=slow) for item in TWO]).html()
-        assert made == [2]
 
     def test_a_vehicle_that_was_lost_has_a_gap_in_its_bar(self) -> None:
         states = ("detected", "detected", "predicted", "predicted", "interpolated", "detected")

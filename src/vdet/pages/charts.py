@@ -12,18 +12,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from time import gmtime, strftime
 
-import numpy as np
-
 from vdet.draw.boxes import Color
 from vdet.errors import clock_text
-
-FILL, SOFT = "var(--fill)", "var(--soft)"
-"""Colours of the style sheet: for main and for secondary content."""
 
 _COLORS = ("#0f9d8a", "#d97706", "#6366f1", "#db2777", "#65a30d", "#0284c7", "#b45309", "#9333ea")
 _TICKS = 5  # maximum number of intervals on an axis
 _TIMES = (1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400, 21600, 43200)
-_STEPS = 160  # of a number over time
 _NOTHING = 1e-9  # length of an axis whose ends are equal
 
 
@@ -34,7 +28,6 @@ class Axis:
     low: float
     high: float
     ticks: Sequence[tuple[float, str]]
-    title: str = ""
 
     def at(self, value: float) -> float:
         """Return the position of a value on the axis, percent, limited to its ends."""
@@ -53,8 +46,8 @@ class Bar:
     right: float
     low: float
     high: float
-    color: str = FILL
-    title: str = ""
+    color: str
+    title: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,8 +57,8 @@ class Plot:
     title: str
     x: Axis
     y: Axis
-    bars: Sequence[Bar] = ()
-    legend: Sequence[tuple[str, str]] = ()
+    bars: Sequence[Bar]
+    legend: Sequence[tuple[str, str]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,37 +98,12 @@ def time_axis(start: float, end: float, zero: float | None = None) -> Axis:
     return Axis(start, end, [(time, time_text(time, zero)) for time in times])
 
 
-def number_axis(low: int, high: int, title: str = "") -> Axis:
-    """Return an axis of whole numbers with equal intervals and round ends."""
+def number_axis(high: int) -> Axis:
+    """Return an axis of whole numbers from 0, with equal intervals and a round end."""
     steps = (item * 10**power for power in itertools.count() for item in (1, 2, 5))
-    step = next(step for step in steps if high - low <= _TICKS * step)
-    numbers = range(low // step, max(low // step + 1, math.ceil(high / step)) + 1)
-    ticks = [(number * step, f"{number * step:g}") for number in numbers]
-    return Axis(ticks[0][0], ticks[-1][0], ticks, title)
-
-
-def level_plot(
-    spans: Sequence[tuple[float, float]], x: Axis, title: str, gaps: Sequence[tuple[float, float]]
-) -> Plot:
-    """Return a plot of the number of simultaneous spans, given by first and last time.
-
-    `gaps` are times without frames.
-    """
-    start, end = x.low, x.high
-    edges = np.linspace(start, end, _STEPS + 1)
-    middles = (edges[:-1] + edges[1:]) / 2
-    firsts, lasts = np.sort(np.array(spans, np.float64).reshape(-1, 2), axis=0).T
-    levels = np.searchsorted(firsts, middles, "right") - np.searchsorted(lasts, middles)
-    width = 1.2 * (end - start) / _STEPS  # gaps would show as thin lines
-    steps = zip(edges.tolist(), levels.tolist(), strict=False)
-    bars = [Bar(at, at + width, 0, level) for at, level in steps if level]
-    y = number_axis(0, max(1, levels.max().item()))
-    bars += [
-        Bar(first, last, 0, y.high, SOFT, f"no frames: {time_text(first)} to {time_text(last)}")
-        for first, last in gaps
-    ]
-    legend = [("no frames in the video", SOFT)] if gaps else []
-    return Plot(title, x, y, bars, legend=legend)
+    step = next(step for step in steps if high <= _TICKS * step)
+    numbers = range(0, high + step, step)
+    return Axis(0, numbers[-1], [(number, str(number)) for number in numbers])
 
 
 def interval_plot(
@@ -161,18 +129,7 @@ def interval_plot(
                 below += count
         highest = max(highest, below)
     legend = [(f"{name}: {counts.total()}", colors[name]) for name, counts in series.items()]
-    return Plot(title, x, number_axis(0, highest), bars, legend=legend)
-
-
-def histogram(values: Sequence[float], step: int, title: str, unit: str) -> Plot:
-    """Return a histogram of values with classes of width `step`."""
-    counts = Counter(int(value // step) for value in values)
-    bars = []
-    for number, count in sorted(counts.items()):
-        low, high = step * number, step * (number + 1)
-        bars.append(Bar(low, high, 0, count, title=f"{low:g} to {high:g} {unit}"))
-    x = number_axis(step * min(counts), step * (max(counts) + 1), unit)
-    return Plot(title, x, number_axis(0, max(counts.values())), bars)
+    return Plot(title, x, number_axis(highest), bars, legend)
 
 
 def pack_rows(spans: Iterable[tuple[float, float]]) -> list[int]:

@@ -14,7 +14,6 @@ from vdet.boxes import Image
 from vdet.config.classes import UNKNOWN, is_chosen
 from vdet.config.loading import in_pixels
 from vdet.config.schema import Settings
-from vdet.lanes.ground import ground_of
 from vdet.media.images import encode_image
 from vdet.pages.render import TEMPLATES, jpeg_uri, render
 from vdet.pages.traffic import Mark, traffic_marks, with_marks
@@ -96,9 +95,8 @@ class Drawing:
     def _marks(self) -> list[Mark]:
         counts = count_frames(self._frames, self._settings, self._size)
         lines, zones = lines_and_zones(self._settings.traffic, *self._size)
-        ground = ground_of(self._settings.camera, *self._size)
         paths = {key: path.points.tolist() for path in self.paths for _, key in path.tracks}
-        return traffic_marks(self._size, (*lines, *zones), counts, paths, ground)
+        return traffic_marks(self._size, (*lines, *zones), counts, paths)
 
 
 def split(

@@ -13,8 +13,6 @@ import numpy as np
 from vdet.boxes import Image
 from vdet.draw import boxes
 from vdet.draw.boxes import Color, Surface
-from vdet.lanes.ground import Ground
-from vdet.pages.charts import hex_color
 from vdet.pages.render import Table
 from vdet.polygons import Point
 from vdet.traffic.counts import Counts, Direction, Event, class_of, vehicle_flows
@@ -34,12 +32,6 @@ _TIP = 0.012
 """Minimum length of the tip of an arrow, as a fraction of the frame's width."""
 _SHADE = 0.18
 """Opacity of the colour over a zone."""
-_SCALES = (1, 2, 5, 10, 20, 50, 100)
-"""Possible lengths of the scale, metres."""
-_SCALE = 0.2
-"""Maximum length of the scale, as a fraction of the frame's width."""
-_LOWEST = 0.96
-"""Lowest row of the scale, as a fraction of the frame's height."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +61,6 @@ def traffic_marks(
     borders: Sequence[Border],
     counts: Counts,
     paths: Mapping[int, Sequence[Point]],
-    ground: Ground | None = None,
 ) -> list[Mark]:
     """Return the marks to draw on frames of this width and height, pixels.
 
@@ -93,7 +84,7 @@ def traffic_marks(
                 is_arrow=True,
             )
             marks.insert(0, arrow)
-    return [*marks, *(_scale(ground, size) if ground else ())]
+    return marks
 
 
 def path_marks(records: Iterable[VehicleRecord], size: tuple[int, int]) -> Iterator[Mark]:
@@ -137,20 +128,6 @@ def border_marks(border: Border, totals: Mapping[Direction, int], text: str = ""
         yield Mark((border.start, tip), boxes.LINE, width, label, tip, is_arrow=True)
 
 
-def _scale(ground: Ground, size: tuple[int, int]) -> Iterator[Mark]:
-    """Yield a scale across the nearest part of the calibrated area."""
-    columns, rows = size
-    pixels = ground.pixels(ground.area)
-    x = min(max(pixels[:, 0].mean().item(), _SCALE * columns), (1 - _SCALE) * columns)
-    y = min(pixels[:, 1].max().item(), _LOWEST * rows)
-    metres = math.dist(*ground.metres(np.array([(x, y), (x + 1, y)])))
-    if metres > 0:
-        lengths = [scale for scale in _SCALES if scale <= _SCALE * columns * metres]
-        length = max(lengths, default=_SCALES[0])
-        half = length / metres / 2
-        yield Mark(((x - half, y), (x + half, y)), boxes.WHITE, 3, f"{length} m", (x - half, y))
-
-
 def draw_marks(surface: Surface, marks: Iterable[Mark]) -> None:
     """Draw marks, their labels above all lines."""
     drawn = list(marks)
@@ -176,59 +153,39 @@ def with_marks(image: Image, marks: Iterable[Mark]) -> Image:
     return drawn
 
 
-@dataclass(frozen=True, slots=True)
-class TrafficPart:
-    """The counts of a video for its page.
-
-    `totals` has a row for each direction, with speeds if they are known. `flows` has a row for each
-    flow, the largest first, with its colour in `colors`, and `picture` an arrow for each flow.
-    """
-
-    totals: Table
-    flows: Table
-    colors: Sequence[str]
-    picture: Image | None
-
-
-def traffic_part(
-    counts: Counts,
-    records: Iterable[VehicleRecord],
-    frame: Image | None,
-    borders: Sequence[Border] = (),
-    ground: Ground | None = None,
-) -> TrafficPart:
-    """Return the counts for a page; lines, zones and flows are drawn on a copy of `frame`."""
-    classes = sorted(set(map(class_of, counts.events)))
-    several = classes if len(classes) > 1 else []
-    flows = flows_of(counts)
-    rows = [
-        (*flow, *_numbers([first for first, _ in trips], several)) for flow, trips in flows.items()
-    ]
-    colors = [hex_color(boxes.color_of(number)) for number in range(len(flows))]
-    picture = None
-    if frame is not None:
-        paths = {record.id: record.path for record in records}
-        size = frame.shape[1], frame.shape[0]
-        picture = with_marks(frame, traffic_marks(size, borders, counts, paths, ground))
-    table = ("from", "to", *several, "vehicles"), rows
-    return TrafficPart(_totals(counts, several), table, colors, picture)
-
-
-def _totals(counts: Counts, classes: Sequence[str]) -> Table:
-    headings = ("line or zone", "direction", *classes, "vehicles", "median km/h", "85 % km/h")
-    rows = []
-    for direction in counts.directions:
-        events = [event for event in counts.events if (event.name, event.direction) == direction]
-        speeds = [event.speed for event in events if event.speed is not None]
-        numbers = np.quantile(speeds, [0.5, 0.85]).tolist() if speeds else []
-        shown = [f"{number:.0f}" for number in numbers] or ["–", "–"]
-        rows.append((*direction, *_numbers(events, classes), *shown))
+def direction_table(counts: Counts) -> Table:
+    """Return a row for each direction, with speeds if they are known."""
+    events = {
+        direction: [event for event in counts.events if (event.name, event.direction) == direction]
+        for direction in counts.directions
+    }
+    headings, rows = _by_class(("line or zone", "direction"), events)
     if all(event.speed is None for event in counts.events):
-        return headings[:-2], [row[:-2] for row in rows]
-    return headings, rows
+        return headings, rows
+    with_speeds = [
+        (*row, *_speeds(group)) for row, group in zip(rows, events.values(), strict=True)
+    ]
+    return (*headings, "median km/h", "85 % km/h"), with_speeds
 
 
-def _numbers(events: Sequence[Event], classes: Sequence[str]) -> list[str]:
-    """Return the number of events of each class, and in total."""
-    numbers = Counter(map(class_of, events))
-    return [*(str(numbers[name]) for name in classes), str(len(events))]
+def flow_table(counts: Counts) -> Table:
+    """Return a row for each flow, the largest first."""
+    first_events = {flow: [first for first, _ in trips] for flow, trips in flows_of(counts).items()}
+    return _by_class(("from", "to"), first_events)
+
+
+def _by_class(headings: Sequence[str], groups: Mapping[tuple[str, str], Sequence[Event]]) -> Table:
+    """Return a row for each group of events: how many, by class if there are several classes."""
+    classes = sorted({class_of(event) for events in groups.values() for event in events})
+    columns = classes if len(classes) > 1 else []
+    rows = []
+    for names, events in groups.items():
+        numbers = Counter(map(class_of, events))
+        rows.append((*names, *(str(numbers[name]) for name in columns), str(len(events))))
+    return (*headings, *columns, "vehicles"), rows
+
+
+def _speeds(events: Sequence[Event]) -> Sequence[str]:
+    """Return the median and the 85 % quantile of speeds, as text."""
+    speeds = [event.speed for event in events if event.speed is not None]
+    return [f"{speed:.0f}" for speed in np.quantile(speeds, [0.5, 0.85])] if speeds else ("–", "–")

@@ -9,13 +9,18 @@ from vdet.conditions.finding import Finding
 from vdet.config.classes import UNKNOWN
 from vdet.draw.boxes import color_of, text_color
 from vdet.errors import named
-from vdet.lanes.ground import Ground
 from vdet.media import VideoInfo
 from vdet.pages import charts
 from vdet.pages.batch import NO_STILL, Part, VehicleRow, VideoFacts, table_json
 from vdet.pages.charts import Axis, Plot, TimelineBar, hex_color, interval_plot
 from vdet.pages.render import jpeg_uri, render
-from vdet.pages.traffic import path_marks, traffic_part, with_marks
+from vdet.pages.traffic import (
+    direction_table,
+    flow_table,
+    path_marks,
+    traffic_marks,
+    with_marks,
+)
 from vdet.traffic.clock import Clock, Intervals
 from vdet.traffic.counts import Counts
 from vdet.traffic.crossings import Border
@@ -23,7 +28,6 @@ from vdet.traffic.records import VehicleRecord
 from vdet.traffic.speeds import KMH
 
 _MAX_VEHICLES = 300  # in the timeline, and with pictures
-_SPEED_STEP = 5  # km/h, of the classes of speeds
 _DOUBT = "#f3d9a4", "#333"  # colours of the row with doubtful times
 _STOOD = {"standing": "standing", "unknown": "not seen moving"}
 _SMALL = 200  # longer side of the thumbnail on the page over many videos
@@ -80,8 +84,6 @@ class VideoPage:
         By id, the address of the image of a vehicle relative to the page, if the run writes one.
     borders
         The lines and zones at which vehicles were counted.
-    ground
-        The road plane; None if unknown.
     findings
         Reasons to doubt the results.
     """
@@ -101,7 +103,6 @@ class VideoPage:
     clock: Clock | None = None
     pictures: Mapping[int, str] = field(default_factory=dict)
     borders: Sequence[Border] = ()
-    ground: Ground | None = None
     findings: Sequence[Finding] = ()
 
     @property
@@ -164,21 +165,19 @@ class VideoPage:
         x = charts.time_axis(self.start, self.end, self.zero)
         ids = {record.id for record in shown}
         rows = self._rows({key: uri for key, (_, uri) in self.thumbnails.items() if key in ids})
-        speeds = [row.speed for row in rows if row.speed is not None]
-        title = "Vehicles by their median speed"
         page, start = ("", self.player.start) if self.player else (None, 0.0)
         return render(
             "video.html",
             page=self,
             figures=self._figures(),
             shown=shown,
-            level_plot=charts.level_plot(self._spans, x, "Number of vehicles at once", self.gaps),
             time_axis=x,
             timeline=_timeline(shown, self.findings),
             interval_plots=self._interval_plots(x),
-            speed_plot=charts.histogram(speeds, _SPEED_STEP, title, "km/h") if speeds else None,
-            traffic=self.counts
-            and traffic_part(self.counts, self.records, self.poster, self.borders, self.ground),
+            directions=self.counts and direction_table(self.counts),
+            flows=self.counts and flow_table(self.counts),
+            color_of=color_of,
+            traffic=self._traffic(),
             paths=self._paths(),
             table=table_json([Part("", page, start, rows)]),
         )
@@ -235,6 +234,15 @@ class VideoPage:
             counted[f"{event.name}: {event.direction}"][start] += 1
         plots = ("First seen", appeared), ("At lines and zones", counted)
         return [interval_plot(data, x, step, title, self.zero) for title, data in plots if data]
+
+    def _traffic(self) -> Image | None:
+        """Return the poster with lines, zones and flows."""
+        if self.poster is None or not self.counts:
+            return None
+        height, width = self.poster.shape[:2]
+        paths = {record.id: record.path for record in self.records}
+        marks = traffic_marks((width, height), self.borders, self.counts, paths)
+        return with_marks(self.poster, marks)
 
     def _paths(self) -> Image | None:
         """Return the poster with the paths of all vehicles."""

@@ -171,7 +171,7 @@ class PageSink(BaseSink):
 
     def _page(self) -> VideoPage:
         settings, traffic = self.context.settings, self.traffic
-        counter, speeds = traffic.counter, traffic.speeds
+        counter = traffic.counter
         return VideoPage(
             video=self.video,
             frames=self._frames,
@@ -188,7 +188,6 @@ class PageSink(BaseSink):
             clock=traffic.clock,
             pictures=self._pictures(),
             borders=(*counter.lines, *counter.zones) if counter else (),
-            ground=speeds.ground if speeds else None,
             findings=findings_in(self.context.facts).items,
         )
 
