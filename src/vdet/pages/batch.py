@@ -19,7 +19,7 @@ from vdet.pages.render import PAGE_NAME, link_to, render
 
 NO_STILL = "data:image/jpeg;base64,"
 """Thumbnail of a video without a frame."""
-_NUMBERS = ("id", "first", "seconds", "speed", "distance", "lane")
+_COLUMNS = ("id", "first", "seconds", "speed", "lines", "motion", "distance", "lane")
 _UNKNOWN = (None, "")  # empty values
 
 
@@ -110,21 +110,15 @@ class Part:
 def table_json(parts: Sequence[Part]) -> str:
     """Return the columns of the table for `vehicles.js`.
 
-    Empty columns are omitted. Text columns are indices into `texts`, which a browser reads twice as
-    fast for 100,000 rows. `counts` has the number of rows of each video, and clock times count from
-    `zero`.
+    Empty columns are omitted. `counts` has the number of rows of each video, and clock times count
+    from `zero`.
     """
     rows = [row for part in parts for row in part.rows]
     clocks = [_plain_seconds(row.clock) for row in rows]
     zero = min((clock for clock in clocks if clock is not None), default=0)
-    texts = {
-        "class": [row.class_name or UNKNOWN for row in rows],
-        "lines": [row.lines for row in rows],
-        "state": [row.motion for row in rows],
-    }
     columns: dict[str, list[Any]] = {
-        **{name: _numbered(values) for name, values in texts.items() if _is_known(values)},
-        **{name: [getattr(row, name) for row in rows] for name in _NUMBERS},
+        "class": [row.class_name or UNKNOWN for row in rows],
+        **{name: [getattr(row, name) for row in rows] for name in _COLUMNS},
         "clock": [clock if clock is None else clock - zero for clock in clocks],
         "picture": [
             row.picture and part.folder + row.picture for part in parts for row in part.rows
@@ -136,7 +130,6 @@ def table_json(parts: Sequence[Part]) -> str:
         "starts": [part.start for part in parts],
         "counts": [len(part.rows) for part in parts],
         "zero": zero,
-        "texts": {name: list(dict.fromkeys(values)) for name, values in texts.items()},
         **{name: values for name, values in columns.items() if _is_known(values)},
     }
     text = json.dumps(table, separators=(",", ":"), ensure_ascii=False)
@@ -146,12 +139,6 @@ def table_json(parts: Sequence[Part]) -> str:
 def _is_known(values: Sequence[Any]) -> bool:
     """Return whether a column has a value; without rows, all columns are kept."""
     return not values or any(value not in _UNKNOWN for value in values)
-
-
-def _numbered(values: Sequence[str]) -> list[int]:
-    """Return the index of each value in the list of distinct values."""
-    numbers = {value: number for number, value in enumerate(dict.fromkeys(values))}
-    return [numbers[value] for value in values]
 
 
 def _plain_seconds(clock: str | None) -> int | None:

@@ -13,22 +13,22 @@ data.counts.forEach((count, video) => {
 });
 const known = new Set(Object.keys(data));
 if (data.names.length < 2) known.delete("video");
-for (const name of ["lines", "state", "speed", "distance", "lane", "clock", "picture"]) {
+for (const name of ["lines", "motion", "speed", "distance", "lane", "clock", "picture"]) {
   data[name] ??= new Array(data.class.length).fill(null);
 }
 
 // Columns: heading, text of a cell, and what rows are sorted by (numbers sort with nulls last).
 const columns = [
   { name: "id", text: i => `#${data.id[i]}`, key: i => data.id[i] },
-  { name: "class", text: i => text("class", i), key: i => text("class", i) },
+  { name: "class", text: i => data.class[i], key: i => data.class[i] },
   { name: "video", text: i => data.names[data.video[i]], key: i => data.video[i], used: "video" },
   { name: "time", text: timeText, key: i => data.clock[i] ?? data.first[i], link: true },
   { name: "seconds", text: i => data.seconds[i].toFixed(1), key: i => data.seconds[i] },
   { name: "km/h", text: i => number(data.speed[i]), key: i => data.speed[i], used: "speed" },
-  { name: "lines", text: i => text("lines", i), key: i => text("lines", i), used: "lines" },
+  { name: "lines", text: i => data.lines[i], key: i => data.lines[i], used: "lines" },
   { name: "lane", text: i => data.lane[i] ?? "–", key: i => data.lane[i], used: "lane" },
   { name: "metres", text: i => number(data.distance[i]), key: i => data.distance[i], used: "distance" },
-  { name: "motion", text: i => text("state", i), key: i => text("state", i), used: "state" },
+  { name: "motion", text: i => data.motion[i], key: i => data.motion[i], used: "motion" },
 ].filter(column => !column.used || known.has(column.used));
 
 const form = document.getElementById("filters");
@@ -37,10 +37,6 @@ let rows = [];
 let limit = PER_PAGE;
 let page = 0;
 let sort = { column: null, descending: false };
-
-function text(name, i) {
-  return data.texts[name][data[name][i]];
-}
 
 function number(value) {
   return value === null ? "–" : value.toFixed(0);
@@ -69,14 +65,14 @@ function filtered() {
   const values = Object.fromEntries(new FormData(form));
   const tests = [];
   const choice = name => {
-    if (values[name]) tests.push(i => data[name][i] === Number(values[name]));
+    if (values[name]) tests.push(i => String(data[name][i]) === values[name]);
   };
   const limits = (column, low, high) => {
     if (low) tests.push(i => column[i] !== null && column[i] >= Number(low));
     if (high) tests.push(i => column[i] !== null && column[i] <= Number(high));
   };
   const moment = value => value && String(Date.parse(`${value}Z`) / 1000 - data.zero);
-  ["class", "lines", "state", "lane"].forEach(choice);
+  ["class", "lines", "motion", "lane"].forEach(choice);
   for (const name of ["seconds", "speed", "distance"]) {
     limits(data[name], values[`${name}-min`], values[`${name}-max`]);
   }
@@ -173,17 +169,17 @@ function heading(column) {
   return element;
 }
 
-function fill(name, values) {
+function fill(name) {
   const select = form.elements[name];
-  const used = values.map((value, number) => [value, number]).filter(([value]) => value);
-  select.append(...used.map(([value, number]) => new Option(value, number)));
+  const used = [...new Set(data[name])].filter(value => value);
+  select.append(...used.map(value => new Option(value)));
   select.closest("label").hidden = used.length < 2;
 }
 
 const head = document.querySelector("#found thead tr");
 if (known.has("picture")) head.append(document.createElement("th"));
 head.append(...columns.map(heading));
-for (const name of ["class", "lines", "state"]) fill(name, data.texts[name]);
+["class", "lines", "motion"].forEach(fill);
 const lanes = [...new Set(data.lane)].filter(lane => lane !== null).sort((a, b) => a - b);
 form.elements.lane.append(...lanes.map(lane => new Option(lane)));
 for (const element of form.querySelectorAll("[data-needs]")) {
