@@ -34,10 +34,10 @@ from vdet.evaluate.images import Counting, MeasuredImage, best_f1, evaluate_imag
 from vdet.evaluate.output import RunName, figure, table
 from vdet.evaluate.report import video_report
 from vdet.evaluate.scores import RankedPredictions
-from vdet.evaluate.video import evaluate_clip, open_clip
+from vdet.evaluate.video import evaluate_video
 from vdet.files import json_text, write_whole
 from vdet.labels.images import LabelledImage, LabelledImages
-from vdet.labels.reading import read_labelled_images
+from vdet.labels.reading import read_labelled_images, read_truth
 from vdet.labels.roles import Roles
 
 OURS = "trained without them"
@@ -280,7 +280,9 @@ def summary_lines(name: str, summary: dict[str, Any]) -> Iterator[str]:
 def video_lines(clip: tuple[Path, Path], network: Path, settings: Settings) -> list[str]:
     """Return how well a network finds and follows the vehicles of a video."""
     model = load_detector(NetworkSettings(model=str(network)))
-    found = evaluate_clip(open_clip(*clip), settings, model)
+    video, truth = clip
+    roles = Roles.from_settings(settings)
+    found = evaluate_video(video, read_truth(truth, roles), settings, model)
     return video_report([found], RunName("net", network, None)).lines
 
 

