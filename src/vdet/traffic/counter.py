@@ -92,11 +92,6 @@ class VehicleCounter:
         events = (event for passage in ended for event in passage.events)
         self._ended_counts.update((event.name, event.direction) for event in events)
 
-    def start_video(self) -> None:
-        """Treat the ids of the next frames as other tracks, because they are of another video."""
-        self._latest = None
-        self.linker.start_video()
-
     def counts(self) -> Counts:
         """Return all results, as if the video ended now."""
         passages = self._ended + self._passages(self.linker.open_paths())

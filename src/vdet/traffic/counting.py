@@ -5,9 +5,9 @@ import math
 import re
 from collections import deque
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
-from datetime import datetime, timedelta
-from itertools import zip_longest
+from dataclasses import dataclass, field, replace
+from datetime import timedelta
+from functools import partial
 from pathlib import Path
 
 from vdet.config.schema import Settings
@@ -17,9 +17,9 @@ from vdet.labels.reading import read_tracks
 from vdet.lanes.ground import ground_of
 from vdet.progress import Advance
 from vdet.track.track import FrameTracks
-from vdet.traffic.clock import Clock, Span, find_clock
+from vdet.traffic.clock import Clock, Span, add_frame, find_clock
 from vdet.traffic.counter import VehicleCounter
-from vdet.traffic.counts import Counts, Event
+from vdet.traffic.counts import Counts
 from vdet.traffic.speeds import SpeedMeter, with_speeds
 
 _log = logging.getLogger("vdet")
@@ -34,6 +34,7 @@ _REPEATED = 11.0
 """Last seconds of a video that are looked for in the next one."""
 _SAME = 0.1
 """Maximum distance of vehicles in the same frame of two videos, in heights of their boxes."""
+_ROUNDING = 1e-6
 _DATES = tuple(
     map(re.compile, (r"(19|20)\d\d[-_.]?[01]\d[-_.]?[0-3]\d", r"(\d{1,2}\D{1,2}){4}\d", r"\d{4}"))
 )
@@ -100,13 +101,14 @@ def count_files(
             saved, rate_is_used = saved.at_rate(rate), True
         clock = find_clock(path, settings, saved.times.get(0, 0.0), saved=saved)
         if clock and settings.input.begin and len(paths) > 1:
-            clock = recording.next_clock(path, saved, clock)
+            clock = recording.next_clock(path, saved, clock, group.last if group else None)
         frame_size = _frame_size(settings, size or saved.size)
-        first = min(saved.times.values(), default=None)
-        if group is None or not group.precedes(path, frame_size, clock, first):
+        first, is_complete = min(saved.times.values(), default=0.0), saved.covered is not None
+        video = _Video(str(path), clock, first, is_complete)
+        if group is None or not group.precedes(video, frame_size):
             counted |= group.counts() if group else {}
             group = _Group(settings, frame_size, group.counter.linker.started if group else 0)
-        group.add(str(path), clock, first or 0.0, saved)
+        group.add(video, saved)
         advance(1)
     if not rate_is_used:
         raise ConfigError("--rate changes nothing: the tracks have times; remove it")
@@ -119,7 +121,7 @@ def count_frames(
 ) -> Counts:
     """Count the vehicles in the tracks of each frame; arguments and errors as for `count_files`."""
     group = _Group(settings, _frame_size(settings, size))
-    group.add("", None, 0.0, frames)
+    group.add(_Video("", clock=None, first=0.0), frames)
     return group.counts()[""]
 
 
@@ -131,89 +133,115 @@ def _frame_size(settings: Settings, size: tuple[int, int] | None) -> tuple[int, 
     raise ConfigError("the lines are fractions of the frame; pass --size, such as 1280x720")
 
 
+@dataclass(slots=True)
+class _Video:
+    """A video of a group; times are seconds of its own.
+
+    Attributes
+    ----------
+    first, start
+        Times of its first frame, and of the first one that counts.
+    is_complete
+        Whether its last frame is known, also without a vehicle.
+    shift, frame_shift
+        What converts its times and the numbers of its frames to those of the group.
+    spans
+        As in `Counts`.
+    latest
+        Its latest frame.
+    step
+        Duration of that frame.
+    last_frames
+        The frames of its last seconds that count.
+    """
+
+    name: str
+    clock: Clock | None
+    first: float
+    is_complete: bool = True
+    meter: SpeedMeter | None = None
+    start: float = -math.inf
+    shift: float = 0.0
+    frame_shift: int = 0
+    spans: list[Span] = field(default_factory=list)
+    latest: FrameTracks | None = None
+    step: float = _STEP
+    last_frames: deque[FrameTracks] = field(default_factory=deque)
+
+    @property
+    def end(self) -> float:
+        """The end of its last frame."""
+        last = self.spans[-1][1] if self.spans else self.first
+        return max(self.start, last + min(self.step, _SEAM))
+
+    @property
+    def next_shift(self) -> int:
+        """The `frame_shift` of the video after it."""
+        return self.frame_shift + (self.latest.index + 1 if self.latest else 0)
+
+    def add(self, frame: FrameTracks) -> bool:
+        """Add the next frame; return whether it counts."""
+        latest = self.latest.time if self.latest else -math.inf
+        if not latest <= frame.time < math.inf:
+            raise TruthError(
+                f"frame {frame.index}: {frame.time:g} s is before {latest:g} s; times must increase"
+            )
+        if self.latest:
+            self.step = (frame.time - latest) / max(1, frame.index - self.latest.index)
+        self.latest = frame
+        if frame.time < self.start:
+            return False
+        add_frame(self.spans, frame, self.last_frames[-1] if self.last_frames else None)
+        if self.meter:
+            self.meter.add(frame)
+        self.last_frames.append(frame)
+        while frame.time - self.last_frames[0].time > _REPEATED:
+            self.last_frames.popleft()
+        return True
+
+    def counts(self, group: Counts) -> Counts:
+        """Return those of its group that are of this video, at its times and frames."""
+        events = (
+            replace(
+                event,
+                time=round(event.time - self.shift, 3),
+                frame=event.frame - self.frame_shift,
+            )
+            for event in group.events
+            if self.frame_shift <= event.frame < self.next_shift
+        )
+        spans = tuple(self.spans) or ((self.first, self.first),)
+        own = replace(group, events=tuple(events), spans=spans, clock=self.clock)
+        return with_speeds(own, self.meter)
+
+
 class _Recording:
-    """The files of one recording, of which `input.begin` is the start."""
+    """The clocks of the files of one recording, of which `input.begin` is the start."""
 
     def __init__(self, settings: Settings) -> None:
         own_input = settings.input.model_copy(update={"begin": None})
         self._settings = settings.model_copy(update={"input": own_input})
         self._offset: timedelta | None = None
-        self._has_begun = False
-        self._end: datetime | None = None
 
-    def next_clock(self, path: Path, saved: SavedTracks, begin: Clock) -> Clock:
-        """Return the clock of the next file; `begin` is its clock if it is the first.
+    def next_clock(
+        self, path: Path, saved: SavedTracks, begin: Clock, before: _Video | None
+    ) -> Clock:
+        """Return the clock of the file after `before`; `begin` is that of the first.
 
         The clock of its own is set right as that of the first file; without one it begins at the
         end of the file before. Raises `TruthError` if that is unknown.
         """
-        own, clock = find_clock(path, self._settings, begin.first, saved=saved), begin
-        if own and not self._has_begun:
-            self._offset = begin.zero - own.zero
+        own = find_clock(path, self._settings, begin.first, saved=saved)
+        if before is None or before.clock is None:
+            self._offset = begin.zero - own.zero if own else None
+            return begin
         if own and self._offset is not None:
-            clock = replace(begin, zero=own.zero + self._offset)
-        elif self._has_begun:
-            if self._end is None:
-                fault = "the file before does not say how long its video is; use .jsonl tracks"
-                raise TruthError(f"{path}: has no clock, and {fault}")
-            clock = replace(begin, zero=begin.zero + (self._end - begin.at(begin.first)))
-        self._has_begun, self._end = True, None
-        if saved.covered:
-            first, last = saved.times[saved.covered[0]], saved.times[saved.covered[-1]]
-            self._end = clock.at(last + (last - first) / max(1, len(saved.covered) - 1))
-        return clock
-
-
-@dataclass(frozen=True, slots=True)
-class _Video:
-    """A video of a group.
-
-    `spans` as in `Counts`; `shift` and `frame_shift` convert its times and the numbers of its
-    frames to those of the group. `end` is the end of its last frame, seconds; `last_frames` are
-    those of its last seconds.
-    """
-
-    name: str
-    clock: Clock | None
-    spans: tuple[Span, ...]
-    end: float
-    shift: float
-    frame_shift: int
-    meter: SpeedMeter | None
-    last_frames: Sequence[FrameTracks]
-
-    def repeated_seconds(
-        self, first: float, frames: Iterable[FrameTracks], overlap: float
-    ) -> float:
-        """Return the seconds at its end that the next video shows again; 0 if that is unclear.
-
-        `first` is the time of the first of its frames, `overlap` that by the clocks.
-        """
-        start = next((frame for frame in frames if frame.tracks), None)
-        if not start or start.time - first > _SEAM:
-            return 0.0
-        end = self.end + start.time - first
-        before = [f for f in self.last_frames if abs(end - f.time - overlap) <= _SEAM + 1e-6]
-
-        def distance(frame: FrameTracks) -> float:
-            feet = [track.foot for track in frame.tracks]
-            nearest = (
-                min((math.dist(track.foot, foot) for foot in feet), default=math.inf)
-                / track.box.height
-                for track in start.tracks
-            )
-            return max(nearest)
-
-        same = min(reversed(before), key=distance, default=None)
-        if not same or distance(same) > _SAME:
-            return 0.0
-        has_moved = distance(self.last_frames[-1]) > distance(same) + 2 * _SAME
-        return end - same.time if has_moved else 0.0
-
-    def unshifted(self, event: Event) -> Event:
-        """Return an event of the group at its time and frame in this video."""
-        time, frame = round(event.time - self.shift, 3), event.frame - self.frame_shift
-        return replace(event, time=time, frame=frame)
+            return replace(begin, zero=own.zero + self._offset)
+        if not before.is_complete:
+            fault = "the file before does not say how long its video is; use .jsonl tracks"
+            raise TruthError(f"{path}: has no clock, and {fault}")
+        later = before.clock.at(before.end) - begin.at(begin.first)
+        return replace(begin, zero=begin.zero + later)
 
 
 class _Group:
@@ -224,101 +252,100 @@ class _Group:
         self._ground = ground_of(settings.camera, *size)
         self.counter = VehicleCounter(settings, *size, started)
         self._videos: list[_Video] = []
-        self._frame_count = 0  # number of the last frame in the group, and 1
 
-    def precedes(
-        self, path: Path, size: tuple[int, int], clock: Clock | None, first: float | None
-    ) -> bool:
-        """Return whether a video follows the last one; `first` is the time of its first frame."""
-        before = self._videos[-1]
-        if not (clock and before.clock and first is not None and size == self._size):
+    @property
+    def last(self) -> _Video | None:
+        """Its last video."""
+        return self._videos[-1] if self._videos else None
+
+    def precedes(self, video: _Video, size: tuple[int, int]) -> bool:
+        """Return whether a video with frames of a size follows the last one of the group."""
+        before = self.last
+        if not (before and before.clock and video.clock) or size != self._size:
             return False
-        is_later = clock.at(first) >= before.clock.at(before.spans[0][0])
-        return is_later and camera_of(path) == camera_of(Path(before.name))
+        is_later = video.clock.at(video.first) >= before.clock.at(before.first)
+        return is_later and camera_of(Path(video.name)) == camera_of(Path(before.name))
 
-    def add(
-        self, name: str, clock: Clock | None, first: float, frames: Iterable[FrameTracks]
-    ) -> None:
-        """Count in the next video; `first` is the time of its first frame."""
-        gap = self._gap(clock, first, frames)
-        shift = self._videos[-1].end + self._videos[-1].shift + gap - first if self._videos else 0.0
-        start = first - gap if gap < 0 else -math.inf
+    def add(self, video: _Video, frames: Iterable[FrameTracks]) -> None:
+        """Count in the next video."""
+        if self._ground:
+            video.meter = SpeedMeter(self._ground, *self._size)
+        if self.last:
+            self._continue(self.last, video, frames)
+        self._videos.append(video)
+        for frame in frames:
+            if video.add(frame):
+                index, time = frame.index + video.frame_shift, frame.time + video.shift
+                self.counter.update(replace(frame, index=index, time=time))
+
+    def _continue(self, before: _Video, video: _Video, frames: Iterable[FrameTracks]) -> None:
+        """Let a video follow the one before."""
+        gap = _gap(before, video, frames)
         if gap < 0:
+            video.start = video.first - gap
             _log.warning(
                 "%s: begins %.1f s before the end of %s; these frames are not counted again; if "
                 "its clock is wrong, count it on its own",
-                name,
+                video.name,
                 -gap,
-                self._videos[-1].name,
+                before.name,
             )
-        meter = SpeedMeter(self._ground, *self._size) if self._ground else None
-        if self._videos:
-            self.counter.start_video()
-        span_count, latest, last_index = len(self.counter.spans), -math.inf, 0
-        frame_shift, last_frames, step = self._frame_count, deque[FrameTracks](), _STEP
-        for frame in frames:
-            if not latest <= frame.time < math.inf:
-                raise TruthError(
-                    f"frame {frame.index}: {frame.time:g} s is before {latest:g} s; times must "
-                    "increase"
-                )
-            if latest > -math.inf:
-                step = (frame.time - latest) / max(1, frame.index - last_index)
-            latest, last_index = frame.time, frame.index
-            if latest < start:
-                continue
-            index = frame.index + frame_shift
-            self._frame_count = index + 1
-            self.counter.update(replace(frame, index=index, time=latest + shift))
-            if meter:
-                meter.add(frame)
-            last_frames.append(frame)
-            while latest - last_frames[0].time > _REPEATED:
-                last_frames.popleft()
-        new = self.counter.spans[span_count:] or [(first + shift, first + shift)]
-        spans = tuple((round(begin - shift, 6), round(end - shift, 6)) for begin, end in new)
-        video = _Video(
-            name=name,
-            clock=clock,
-            spans=spans,
-            end=max(start, spans[-1][1] + min(step, _SEAM)),
-            shift=shift,
-            frame_shift=frame_shift,
-            meter=meter,
-            last_frames=last_frames,
-        )
-        self._videos.append(video)
-
-    def _gap(self, clock: Clock | None, first: float, frames: Iterable[FrameTracks]) -> float:
-        """Return the seconds from the end of the last video to the next; negative if they overlap.
-
-        Clocks with whole seconds do not measure small gaps; vehicles show small overlaps.
-        """
-        before = self._videos[-1] if self._videos else None
-        if not (before and before.clock and clock):
-            return 0.0
-        gap = (clock.at(first) - before.clock.at(before.end)).total_seconds()
-        has_seconds = before.clock.has_whole_seconds or clock.has_whole_seconds
-        repeated = before.repeated_seconds(first, frames, -gap) if has_seconds else 0.0
-        if repeated >= _MIN_GAP:
-            return -repeated
-        return 0.0 if abs(gap) <= (_SEAM + 1e-6 if has_seconds else _MIN_GAP) else gap
+        video.shift = before.shift + before.end + gap - video.first
+        video.frame_shift = before.next_shift
+        self.counter.linker.start_video()
 
     def counts(self) -> dict[str, Counts]:
         """Return the counts of each video, with times in that video."""
-        total = self.counter.counts()
-        counts: dict[str, Counts] = {}
-        for video, following in zip_longest(self._videos, self._videos[1:]):
-            end = following.frame_shift if following else math.inf
-            events = (e for e in total.events if video.frame_shift <= e.frame < end)
-            counts[video.name] = with_speeds(
-                replace(
-                    total,
-                    events=tuple(map(video.unshifted, events)),
-                    spans=video.spans,
-                    clock=video.clock,
-                    warnings=() if counts else total.warnings,  # reported once
-                ),
-                video.meter,
-            )
+        group = self.counter.counts()
+        counts = {video.name: video.counts(group) for video in self._videos}
+        for video in self._videos[1:]:  # the warnings are those of the group
+            counts[video.name] = replace(counts[video.name], warnings=())
         return counts
+
+
+def _gap(before: _Video, video: _Video, frames: Iterable[FrameTracks]) -> float:
+    """Return the seconds from the end of a video to the next; negative if they overlap.
+
+    Clocks with whole seconds do not measure small gaps; vehicles show small overlaps.
+    """
+    if not (before.clock and video.clock):
+        return 0.0
+    gap = (video.clock.at(video.first) - before.clock.at(before.end)).total_seconds()
+    if not (before.clock.has_whole_seconds or video.clock.has_whole_seconds):
+        return gap if abs(gap) > _MIN_GAP else 0.0
+    repeated = _repeated_seconds(before, video.first, frames, -gap)
+    if repeated >= _MIN_GAP:
+        return -repeated
+    return gap if abs(gap) > _SEAM + _ROUNDING else 0.0
+
+
+def _repeated_seconds(
+    before: _Video, first: float, frames: Iterable[FrameTracks], overlap: float
+) -> float:
+    """Return the seconds at the end of a video that the next one shows again; 0 if unclear.
+
+    `first` is the time of the first of its frames, `overlap` that by the clocks.
+    """
+    start = next((frame for frame in frames if frame.tracks), None)
+    if not start or start.time - first > _SEAM:
+        return 0.0
+    distance, end = partial(_distance, start), before.end + start.time - first
+    candidates = (
+        frame
+        for frame in reversed(before.last_frames)
+        if abs(end - frame.time - overlap) <= _SEAM + _ROUNDING
+    )
+    same = min(candidates, key=distance, default=None)
+    if not same or distance(same) > _SAME:
+        return 0.0
+    has_moved = distance(before.last_frames[-1]) > distance(same) + 2 * _SAME
+    return end - same.time if has_moved else 0.0
+
+
+def _distance(frame: FrameTracks, other: FrameTracks) -> float:
+    """Return the maximum distance of a vehicle to the nearest of another frame, in heights."""
+    return max(
+        min((math.dist(track.foot, near.foot) for near in other.tracks), default=math.inf)
+        / track.box.height
+        for track in frame.tracks
+    )
