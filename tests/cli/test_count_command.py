@@ -122,13 +122,6 @@ def test_classes_of_tracks_need_not_be_those_of_the_detector(
         assert result.err == warning
 
 
-def test_of_a_video_it_says_what_to_run_first(run: Run, folder: Path) -> None:
-    result = run("count", folder / "red.mp4", "-c", folder / "lines.yaml")
-    assert result.code == 2
-    first = f"vdet detect-video {folder / 'red.mp4'} --no-video --tracks red.jsonl"
-    assert result.err.endswith(f"red.mp4: is a video; run first: {first}\n")
-
-
 def test_a_line_in_the_wrong_place_is_reported(
     run: Run, folder: Path, tmp_path: Path, red: tuple[str, ...]
 ) -> None:

@@ -67,7 +67,7 @@ def test_blank_lines_count() -> None:
 
 @pytest.mark.parametrize("content", [b"\xff\xfe\x00", bytes(range(256))])
 def test_a_file_that_is_not_text_is_refused(content: bytes) -> None:
-    with pytest.raises(TruthError, match="gt: is not text"):
+    with pytest.raises(TruthError, match="gt: is not a text file"):
         list(numbered_lines(Path("gt"), content))
 
 

@@ -1,8 +1,6 @@
 """`vdet count`: count the vehicles of track files at lines and in zones."""
 
-import shlex
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -66,7 +64,6 @@ def count(
 
     if len(tracks) > 1:  # by a pattern such as found/*.jsonl
         tracks = tuple(path for path in tracks if path.name != MANIFEST)
-    _reject_videos(tracks)
     settings = source.load()
     if classes:  # any class that TRACKS have
         settings = settings.model_copy(update={"classes": our_names(classes)})
@@ -98,16 +95,6 @@ def count(
             with output_errors(output.path):
                 write_content(files.stage(output.path), content)
     print_lines(*_totals(videos), *_matrix(list(videos.values())))
-
-
-def _reject_videos(tracks: Sequence[Path]) -> None:
-    """Raise `click.UsageError` for a video, with the command that makes its tracks."""
-    from vdet.batch.inputs import VIDEO_INPUT_SUFFIXES
-
-    for path in tracks:
-        if path.suffix.lower() in VIDEO_INPUT_SUFFIXES:
-            arguments = shlex.join([str(path), "--no-video", "--tracks", f"{path.stem}.jsonl"])
-            raise click.UsageError(f"{path}: is a video; run first: vdet detect-video {arguments}")
 
 
 def _totals(videos: "Mapping[str, Counts]") -> list[str]:

@@ -49,7 +49,9 @@ def numbered_lines(path: Path | str, data: bytes) -> Iterator[tuple[int, str]]:
             if stripped := line.decode().strip():
                 yield number, stripped
     except UnicodeDecodeError as error:
-        raise TruthError(f"{path}: is not text (UTF-8)") from error
+        raise TruthError(
+            f"{path}: is not text (UTF-8); tracks and labels are text files"
+        ) from error
 
 
 def frame_number(name: str) -> int | None:

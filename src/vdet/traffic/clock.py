@@ -303,25 +303,26 @@ class Intervals:
         """Return the number of the interval of `seconds`: its start."""
         if self._length is None:
             return 0
-        if not self._has_clock:
-            return int(seconds // self._length) * self._length
-        time = (_EPOCH + timedelta(seconds=seconds)).astimezone(self._zone)
-        offset = (time.utcoffset() or timedelta()).total_seconds()
+        offset = self._offset(seconds)
         round_time = (seconds + offset) // self._length * self._length
-        start = round_time - offset
-        change = (_EPOCH + timedelta(seconds=start)).astimezone(self._zone).utcoffset()
-        return int(start) if change == time.utcoffset() else self._at_local(round_time)
+        start = int(round_time - offset)
+        return start if self._offset(start) == offset else self._at_local(round_time)
 
     def _end(self, number: int) -> int:
         """Return the end of an interval, which is the number of the next one."""
         assert self._length is not None
         end = number + self._length
-        if not self._has_clock or self.number_at(end) == end:
+        if self.number_at(end) == end:
             return end
-        time = (_EPOCH + timedelta(seconds=number)).astimezone(self._zone)
-        offset = (time.utcoffset() or timedelta()).total_seconds()
-        round_time = (number + offset) // self._length * self._length
+        round_time = (number + self._offset(number)) // self._length * self._length
         return self._at_local(round_time + self._length)
+
+    def _offset(self, seconds: float) -> float:
+        """Return the offset of local time from UTC at a moment, seconds; 0 without a clock."""
+        if not self._has_clock:
+            return 0.0
+        time = (_EPOCH + timedelta(seconds=seconds)).astimezone(self._zone)
+        return (time.utcoffset() or timedelta()).total_seconds()
 
     def _at_local(self, seconds: float) -> int:
         """Return the first moment of a local time, both in seconds since 1970."""
