@@ -1,6 +1,5 @@
-"""The videos of a batch, from files, folders and patterns."""
+"""The videos of a batch, from files and folders."""
 
-import glob
 import logging
 import os
 from collections.abc import Iterable, Iterator, Sequence
@@ -26,7 +25,7 @@ DRAWN = ".vdet"
 
 @dataclass(frozen=True, slots=True)
 class InputVideo:
-    """A video, and its path relative to the input folder or pattern."""
+    """A video, and its path relative to the input folder."""
 
     path: Path
     relative_path: Path
@@ -35,15 +34,11 @@ class InputVideo:
 def find_sources(clips: Sequence[Path]) -> list[InputVideo]:
     """Return the videos of `clips`, each once.
 
-    Each clip is one of these, and its videos are in the order of their names:
+    Each clip is one of these, and the videos of a folder are in the order of their names:
 
     * a file, or numbered images such as ``img_%04d.png``;
     * a folder: the videos in it, recursively, without hidden files and folders. A folder that has
-      numbered images and no videos is a video itself;
-    * a pattern with ``*``, ``?`` or ``[``, where ``**`` means any folders: the videos that match,
-      and those in the folders that match. Their paths are relative to the last folder of the
-      pattern that has no such character. If the pattern ends in a suffix, such as ``*.raw``, all
-      matching files are treated as videos.
+      numbered images and no videos is a video itself.
 
     Videos that vdet wrote beside their sources are skipped, unless they are passed by name.
     Images of several kinds are skipped with a warning (logger "vdet").
@@ -59,7 +54,7 @@ def find_sources(clips: Sequence[Path]) -> list[InputVideo]:
     for clip in clips:
         videos_of_clip = sorted(_videos_of(clip), key=lambda video: video.relative_path)
         if not videos_of_clip:
-            raise BatchError(f"{clip}: no video found; check the name")
+            raise BatchError(f"{clip}: no video found; check the name, without quoted patterns")
         for video in videos_of_clip:
             videos.setdefault((video.path.resolve(), video.relative_path), video)
     return list(videos.values())
@@ -70,23 +65,10 @@ def _videos_of(clip: Path) -> Iterable[InputVideo]:
         return _below(clip, clip)
     if clip.exists():
         return [InputVideo(clip, Path(clip.name))]
-    if glob.has_magic(str(clip)):
-        return _matching(clip)
     reject_address(clip)
     if find_sequence(clip):
         return [InputVideo(clip, Path(f"{clip.absolute().parent.name}{clip.suffix}"))]
     return []
-
-
-def _matching(pattern: Path) -> Iterator[InputVideo]:
-    plain = [parent for parent in pattern.parents if not glob.has_magic(str(parent))]
-    takes_all = bool(pattern.suffix) and not glob.has_magic(pattern.suffix)
-    for name in glob.glob(str(pattern), recursive=True):  # noqa: PTH207  # Path.glob cannot start at /
-        path = Path(name)
-        if path.is_dir():
-            yield from _below(path, plain[0])
-        elif _is_video(path) or (takes_all and not path.stem.endswith(DRAWN)):
-            yield InputVideo(path, path.relative_to(plain[0]))
 
 
 def _below(folder: Path, base: Path) -> Iterator[InputVideo]:

@@ -115,10 +115,9 @@ def detect_video(
     IN is a video. OUT is a copy of it with a box around each vehicle. Without any output, OUT is
     beside IN, named in.vdet.mp4.
 
-    With -d DIR, every CLIP is processed. A CLIP is a video, a folder (searched recursively), or a
-    quoted pattern such as 'day*/*.mp4'. The outputs go into DIR, with a record of each video in
-    manifest.jsonl. Options such as --tracks then take only the ending of the names, such as .csv,
-    or .crops for a folder.
+    With -d DIR, every CLIP is processed. A CLIP is a video, or a folder (searched recursively). The
+    outputs go into DIR, with a record of each video in manifest.jsonl. Options such as --tracks
+    then take only the ending of the names, such as .csv, or .crops for a folder.
 
     \b
     Examples:
