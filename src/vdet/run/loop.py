@@ -153,26 +153,13 @@ def build(parts: Parts, settings: Settings, video: VideoInfo, images: Sequence[I
     )
 
 
-class FirstImages(Sequence[Image]):
-    """The images of the first frames; each is converted to BGR when it is first used."""
-
-    def __init__(self, frames: Sequence[Frame]) -> None:
-        self._frames = frames
-
-    def __len__(self) -> int:
-        return len(self._frames)
-
-    def __getitem__(self, index: Any) -> Any:
-        frames = self._frames[index]
-        return frames.image if isinstance(frames, Frame) else FirstImages(frames)
-
-
 def peek(frames: Iterable[Frame]) -> tuple[Sequence[Image], Iterable[Frame]]:
     """Return the images for `DetectorModel.for_video`, and an iterable of all frames."""
     remaining = iter(frames)
     first = list(itertools.islice(remaining, FIRST_FRAMES))
+    images = [frame.image for frame in first]
     # The iterator has a list of its own, which it releases; the images can be released before.
-    return FirstImages(first), itertools.chain(iter([*first]), remaining)
+    return images, itertools.chain(iter([*first]), remaining)
 
 
 @contextmanager
