@@ -41,14 +41,14 @@ def find_sources(clips: Sequence[Path]) -> list[InputVideo]:
       numbered images and no videos is a video itself.
 
     Videos that vdet wrote beside their sources are skipped, unless they are passed by name.
-    Images of several kinds are skipped with a warning (logger "vdet").
+    Numbered images with a gap are skipped with a warning (logger "vdet").
 
     Raises
     ------
     BatchError
         One of `clips` has no video, or a folder cannot be read.
     VideoError
-        One of `clips` is an address, or a pattern of images with a gap.
+        One of `clips` is an address, or numbered images with a gap.
     """
     videos: dict[tuple[Path, Path], InputVideo] = {}
     for clip in clips:
@@ -85,12 +85,13 @@ def _below(folder: Path, base: Path) -> Iterator[InputVideo]:
 def _images_in(folder: Path, base: Path) -> Iterator[InputVideo]:
     """Yield the numbered images of a folder as one video, with the name of the folder."""
     try:
-        images = find_sequence(folder)
+        sequence = find_sequence(folder)
     except VideoError as error:
         _log.warning("%s; skipped", error)
         return
+    assert sequence is not None
     named = Path(folder.absolute().name) if folder == base else folder.relative_to(base)
-    suffix = images[0].suffix
+    suffix = sequence.files[0].suffix
     yield InputVideo(folder, named.with_name(f"{named.name}{suffix}"))
 
 

@@ -14,7 +14,7 @@ from av.stream import Stream
 from vdet.errors import ImageError
 from vdet.media import demux
 from vdet.media.demux import Demuxer
-from vdet.media.images import find_sequence, read_encoded
+from vdet.media.images import ImageSequence, find_sequence, read_encoded
 
 _LONGEST_GROUP = 600  # maximum packets between key frames, which are kept in memory
 _COUNTABLE = ("av1", "h264", "hevc", "libdav1d", "mjpeg", "mpeg2video", "mpeg4", "png", "vp9")
@@ -94,8 +94,8 @@ class Decoder:
     Parameters
     ----------
     frame_rate
-        Rate of numbered images or of a raw stream, per second; None: as the stream says, else
-        `ASSUMED_RATE`.
+        Rate of numbered images or of a raw stream, per second; None: as the names or the stream
+        say, else `ASSUMED_RATE`.
 
     Attributes
     ----------
@@ -107,8 +107,8 @@ class Decoder:
         The damage so far.
     demuxer
         The file.
-    images
-        The numbered images; empty for a file.
+    sequence
+        The numbered images; None for a file.
     is_countable
         Whether frames can be counted without decoding them.
 
@@ -120,8 +120,8 @@ class Decoder:
 
     def __init__(self, path: Path, frame_rate: float | None) -> None:
         self.before = 0
-        self.images = find_sequence(path)
-        self.demuxer = Demuxer(path, self.images, frame_rate)
+        self.sequence = find_sequence(path, frame_rate)
+        self.demuxer = Demuxer(path, self.sequence, frame_rate)
         self.stream = self.demuxer.video
         context = self.stream.codec_context
         context.options = {"max_pixels": str(demux.MAX_PIXELS)}
@@ -130,7 +130,7 @@ class Decoder:
         self._times = deque[int]()  # of the packets of an AVI file that wait for their pictures
         self._is_avi = self.demuxer.container.format.name == "avi"
         self.is_countable = context.name in _COUNTABLE and not (self._is_avi or demux.is_pipe(path))
-        self._packets = self._read_images() if self.images else self._read()
+        self._packets = self._read_images(self.sequence) if self.sequence else self._read()
         self.pictures = self._decode()
 
     def skip_to(self, time: int, first: int) -> int | None:
@@ -216,9 +216,9 @@ class Decoder:
             self.damage.restarts = self.demuxer.restarts
             yield packet
 
-    def _read_images(self) -> "Iterator[Packet[Stream]]":
+    def _read_images(self, sequence: ImageSequence) -> "Iterator[Packet[Stream]]":
         """Yield numbered images as packets."""
-        for number, file in enumerate(self.images):
+        for file, tick in zip(sequence.files, sequence.ticks, strict=True):
             try:
                 data = read_encoded(file)
             except ImageError:
@@ -228,7 +228,7 @@ class Decoder:
             else:
                 packet: Packet[Stream] = Packet(data)
                 packet.stream, packet.time_base = self.stream, demux.time_base_of(self.stream)
-                packet.pts = packet.dts = number
+                packet.pts = packet.dts = tick
                 packet.is_keyframe = True
                 yield packet
 

@@ -15,7 +15,7 @@ from av.video.stream import VideoStream
 
 from vdet.errors import VideoError
 from vdet.media.frame import Coding, ColorTags, Tags, VideoInfo
-from vdet.media.images import ASSUMED_RATE, Orientation, read_header
+from vdet.media.images import ASSUMED_RATE, ImageSequence, Orientation, read_header
 
 MAX_PIXELS = 8192 * 4608
 """Maximum for a frame. 8K video, in both widths, has fewer; a damaged header may claim more."""
@@ -34,12 +34,8 @@ SAFELY = {"format_whitelist": _FORMATS, "max_pixels": str(MAX_PIXELS)}
 """Options for opening any file: only these formats, and no larger frames when probing."""
 
 
-def open_input(
-    path: Path, images: Sequence[Path] = (), rate: Fraction = ASSUMED_RATE
-) -> InputContainer:
-    """Open a video file for reading, or the first of the images that `path` names.
-
-    `rate` is that of the images, per second.
+def open_input(path: Path, sequence: ImageSequence | None = None) -> InputContainer:
+    """Open a video file for reading, or the first image of a sequence with the name `path`.
 
     Raises
     ------
@@ -50,9 +46,9 @@ def open_input(
     file, options = path, SAFELY
     # FFmpeg may treat raw Motion JPEG as a pipe of images, which is not allowed.
     container_format = "mjpeg" if path.suffix.lower() in (".mjpeg", ".mjpg") else None
-    if images:
-        file, container_format = images[0], "image2"
-        options = {"framerate": str(rate), "pattern_type": "none"}
+    if sequence:
+        file, container_format = sequence.files[0], "image2"
+        options = {"framerate": str(sequence.rate or ASSUMED_RATE), "pattern_type": "none"}
     elif not os.path.exists(path):  # noqa: PTH110  # also False if it is not accessible
         raise VideoError(f"{path}: not found; check the name")
     elif path.is_file() and not path.stat().st_size:
@@ -125,20 +121,18 @@ def joined_videos(path: Path) -> int:
 
 
 def describe(
-    path: Path, demuxer: "Demuxer", first: av.VideoFrame, images: Sequence[Path]
+    path: Path, demuxer: "Demuxer", first: av.VideoFrame, sequence: ImageSequence | None
 ) -> VideoInfo:
     """Describe a video, of which the `first` picture has been decoded."""
     container, stream, rate = demuxer.container, demuxer.video, demuxer.rate
     time_base = time_base_of(stream)
     start = (first.pts or 0) * time_base
-    duration = len(images) / rate if images else None
-    if not (images or demuxer.is_raw):
-        duration = stated_duration(stream, start)
+    duration = None if demuxer.is_raw else stated_duration(stream, start)
     if duration is None and container.duration and not demuxer.is_raw:  # of the longest stream
         duration = Fraction(container.duration, av.time_base)
     orientation = Orientation.of_frame(first)
-    if images:
-        _, orientation = read_header(images[0])
+    if sequence:
+        _, orientation = read_header(sequence.files[0])
     is_hdr = first.color_trc in HDR_TRANSFERS
     colors = ColorTags(first.color_primaries, first.color_trc, first.colorspace)
     width, height, aspect = first.width, first.height, stream.sample_aspect_ratio or Fraction(1)
@@ -151,7 +145,7 @@ def describe(
         rate=rate,
         time_base=time_base,
         start=start,
-        frames=len(images) or stream.frames or (round(duration * rate) if duration else None),
+        frames=stream.frames or (round(duration * rate) if duration else None),
         duration=duration,
         orientation=orientation,
         pixel_aspect=aspect,
@@ -259,16 +253,16 @@ class Demuxer:
     """
 
     def __init__(
-        self, path: Path, images: Sequence[Path] = (), frame_rate: float | None = None
+        self, path: Path, sequence: ImageSequence | None = None, frame_rate: float | None = None
     ) -> None:
-        rate = Fraction(str(frame_rate)) if frame_rate else ASSUMED_RATE
-        self.container = open_input(path, images, rate)
+        self.container = open_input(path, sequence)
         self.video = video_stream(self.container, path)
         self.restarts = 0
         self.may_restart = bool(self.container.format.flags & _TS_DISCONT)
-        self.is_raw = not images and bool(self.container.format.flags & _NO_TIMES)
+        self.is_raw = not sequence and bool(self.container.format.flags & _NO_TIMES)
         stated = _stated_rate(self.video, is_raw=self.is_raw)
-        self.states_rate, self.rate = stated is not None, stated or rate
+        given = Fraction(str(frame_rate)) if frame_rate and self.is_raw else ASSUMED_RATE
+        self.states_rate, self.rate = stated is not None, stated or given
         self._period = 1 / self.rate
         self._offsets = [Fraction(0)]  # of each part, seconds; the first part keeps its clock
         self._part_of: dict[int, int] = {}  # the current part of each stream

@@ -4,12 +4,15 @@ import io
 import logging
 import math
 import re
-from collections.abc import Iterable, Iterator
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
+from statistics import median_low
 from typing import TYPE_CHECKING
 
 import cv2
@@ -19,6 +22,7 @@ from PIL import Image as pillow  # noqa: N813
 from PIL.ImageFile import ImageFile
 
 from vdet.boxes import Image
+from vdet.config.camera import ClockSettings
 from vdet.errors import ImageError, VideoError
 from vdet.files import read_whole
 
@@ -234,64 +238,156 @@ def to_ycrcb(image: Image) -> tuple[Image, Image, Image]:
 
 
 _PATTERN = re.compile(r"((?:[^%]|%%)*)%(?:0([1-9]\d*))?d((?:[^%]|%%)*)", re.ASCII)
-_NUMBER = re.compile(r"(\d+)", re.ASCII)
+_LAST_NUMBER = re.compile(r".*?(\d+)\D*\.\w+", re.ASCII | re.DOTALL)
+_UNIX_TIME = re.compile(r"(?<!\d)(1\d{9})[-_.]?(\d{3})?(?!\d)", re.ASCII)  # 2001 to 2033
+_MILLISECONDS = re.compile(r"\d\d[-_](\d{3})\.\w+$", re.ASCII)
 ASSUMED_RATE = Fraction(25)
-"""Images per second, if the settings do not say."""
+"""Images per second, if neither the settings nor the names determine it."""
 
 
-def find_sequence(path: Path) -> tuple[Path, ...]:
-    """Return the images of the pattern or folder `path`, in order; empty if it is neither.
+@dataclass(frozen=True, slots=True)
+class ImageSequence:
+    """Images that form a video.
 
-    The images of a folder are in the order of the numbers in their names. Those of a pattern such
-    as `img_%04d.png` have numbers that may begin anywhere, and increase by any constant step. A
-    per cent sign in the name of a folder is literal.
+    Attributes
+    ----------
+    files
+        The images, in order.
+    ticks
+        Time of each image after the first one, in periods of the rate.
+    rate
+        Images per second; None if it is unknown: `ASSUMED_RATE`.
+    """
+
+    files: tuple[Path, ...]
+    ticks: Sequence[int]
+    rate: Fraction | None = None
+
+    @property
+    def step(self) -> int:
+        """Usual time from one image to the next, in periods of the rate."""
+        return median_low([after - tick for tick, after in pairwise(self.ticks)] or [1])
+
+
+def find_sequence(path: Path, frame_rate: float | None = None) -> ImageSequence | None:
+    """Return the images of the pattern or folder `path`; None if it is neither.
+
+    Images whose names are different times are in the order of these. Otherwise they are in the
+    order of their numbers, which may begin anywhere, and increase by any constant step. In the name
+    of a folder, a per cent sign is literal.
+
+    Parameters
+    ----------
+    frame_rate
+        Images per second; None: as their names say.
 
     Raises
     ------
     VideoError
-        The folder cannot be read, contains no such image, one of a pattern is missing, or the names
-        of a folder differ not only in numbers.
+        The folder cannot be read, contains no such image, one is missing, or the images of a folder
+        are not one sequence.
     """
-    pattern = _PATTERN.fullmatch(path.name)
-    if not path.is_dir() and (not pattern or path.exists()):
-        return ()
-    folder = path if path.is_dir() else path.parent
-    try:
-        files = [file for file in folder.iterdir() if _NUMBER.search(file.name)]
-    except OSError as error:
-        raise VideoError(f"{path}: {folder} cannot be read: {error.strerror}") from error
-    if path.is_dir() or not pattern:
-        images = sorted(filter(is_image_name, files), key=lambda file: _number_parts(file.name))
-        if len({_NUMBER.sub("", file.name) for file in images}) > 1:
-            advice = "use a pattern, as in img_%04d.png"
-            raise VideoError(f"{path}: has several kinds of names; {advice}")
-    else:
-        images = _images_of_pattern(path, pattern, files)
-    if not images:
-        raise VideoError(f"{path}: no numbered images found; use a video, or -d DIR for a folder")
-    return tuple(images)
+    files = _numbered_files(path)
+    if not files:
+        return None
+    sequence = _ordered_by_time(files) or _ordered_by_number(files, path)
+    if frame_rate is None:
+        return sequence
+    return ImageSequence(sequence.files, range(len(files)), Fraction(str(frame_rate)))
 
 
 def video_files(path: Path) -> tuple[Path, ...]:
     """Return the files of a video: numbered images, or `path` itself. Raises `VideoError`."""
-    return find_sequence(path) or (path,)
+    sequence = find_sequence(path)
+    return sequence.files if sequence else (path,)
 
 
-def _number_parts(name: str) -> list[str | int]:
-    return [int(part) if part.isdecimal() else part for part in _NUMBER.split(name)]
+def _numbered_files(path: Path) -> dict[Path, int]:
+    """Return the images of a pattern or folder with their numbers; empty if it is neither."""
+    if path.is_dir():
+        folder, name_pattern = path, _LAST_NUMBER
+    elif (pattern := _PATTERN.fullmatch(path.name)) and not path.exists():
+        folder, name_pattern = path.parent, _name_pattern(pattern)
+    else:
+        return {}
+    try:
+        matches = {file: name_pattern.fullmatch(file.name) for file in folder.iterdir()}
+    except OSError as error:
+        raise VideoError(f"{path}: {folder} cannot be read: {error.strerror}") from error
+    takes_all = name_pattern is not _LAST_NUMBER
+    files = {
+        file: int(match[1])
+        for file, match in matches.items()
+        if match and (takes_all or is_image_name(file))
+    }
+    if not files:
+        raise VideoError(f"{path}: no numbered images found; use a video, or -d DIR for a folder")
+    return files
 
 
-def _images_of_pattern(path: Path, pattern: re.Match[str], files: Iterable[Path]) -> list[Path]:
-    """Return the files of a pattern by their numbers. Raises `VideoError` if one is missing."""
+def _name_pattern(pattern: re.Match[str]) -> re.Pattern[str]:
+    """Return a regular expression for the names that a pattern such as `img_%04d.png` means."""
     before, digits, after = pattern.groups()
     number = r"0|[1-9]\d*" if digits is None else rf"\d{{{digits}}}|[1-9]\d{{{digits},}}"
     before, after = (re.escape(part.replace("%%", "%")) for part in (before, after))
-    name = re.compile(f"{before}({number}){after}", re.ASCII | re.DOTALL)
-    numbered = sorted((int(m[1]), file) for file in files if (m := name.fullmatch(file.name)))
-    gaps = [later - earlier for (earlier, _), (later, _) in pairwise(numbered)]
-    step = min(gaps, default=1)
-    for (last, _), gap in zip(numbered, gaps, strict=False):
+    return re.compile(f"{before}({number}){after}", re.ASCII | re.DOTALL)
+
+
+def _ordered_by_time(files: Mapping[Path, int]) -> ImageSequence | None:
+    """Return the images if their names are times.
+
+    Images of the same second are spread over it, if their numbers begin again with each second.
+    """
+    numbers = set(files.values())
+    is_counter = len(numbers) > 1 and max(numbers) - min(numbers) < len(numbers)
+    groups: dict[datetime | None, list[Path]] = defaultdict(list)
+    for file in sorted(files, key=lambda file: (files[file], file)):
+        groups[_time_in(file.name, has_milliseconds=not is_counter)].append(file)
+    times = sorted(filter(None, groups))
+    if None in groups or len({time.tzinfo for time in times}) > 1:
+        return None
+    is_spread = len(times) < len(files)
+    if is_spread and (len(times) == 1 or len(numbers) == len(files)):
+        return None
+    offsets: dict[int, Path] = {}
+    for time in times:
+        start = (time - times[0]) // timedelta(milliseconds=1)
+        for place, file in enumerate(groups[time]):
+            offsets[start + 1000 * place // len(groups[time])] = file
+    has_pairs = any(len({files[file] for file in group}) < len(group) for group in groups.values())
+    if has_pairs or len(offsets) < len(files) or list(offsets) != sorted(offsets):
+        return None
+    tick = math.gcd(*offsets) or 1000
+    ticks = tuple(offset // tick for offset in offsets)
+    return ImageSequence(tuple(offsets.values()), ticks, Fraction(1000, tick))
+
+
+def _time_in(name: str, *, has_milliseconds: bool) -> datetime | None:
+    """Return the time in the name of an image, maybe a Unix time; None without one."""
+    if unix := _UNIX_TIME.search(name):
+        seconds, milliseconds = int(unix[1]), int(unix[2] or 0)
+        return datetime.fromtimestamp(seconds, UTC) + timedelta(milliseconds=milliseconds)
+    try:
+        time = ClockSettings().time_in(Path(name))
+    except ValueError:
+        return None
+    rest = _MILLISECONDS.search(name)
+    return (
+        time + timedelta(milliseconds=int(rest[1])) if time and rest and has_milliseconds else time
+    )
+
+
+def _ordered_by_number(files: Mapping[Path, int], path: Path) -> ImageSequence:
+    """Return the images if they are one sequence without a gap. Raises `VideoError`."""
+    ordered = sorted(files, key=lambda file: (files[file], file))
+    numbers = [files[file] for file in ordered]
+    steps = [following - number for number, following in pairwise(numbers)]
+    kinds = {re.sub(r"\d", "", file.name, flags=re.ASCII) for file in files}
+    if len(kinds) > 1 or 0 in steps:
+        raise VideoError(f"{path}: has several kinds of names; use a pattern, as in img_%04d.png")
+    step = min(steps, default=1)
+    for number, gap in zip(numbers, steps, strict=False):
         if gap != step:
-            fault = f"image {last + step} is missing; copy image {last} in its place"
+            fault = f"image {number + step} is missing; copy image {number} in its place"
             raise VideoError(f"{path}: {fault}")
-    return [file for _, file in numbered]
+    return ImageSequence(tuple(ordered), range(len(ordered)))

@@ -4,6 +4,7 @@ import itertools
 import logging
 import math
 from collections.abc import Generator, Iterator
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Self
@@ -92,11 +93,14 @@ class VideoReader:
             advice = f"use a file that plays, with frames of at most {limits}"
             raise VideoError(f"{path}: no frame can be decoded; {advice}")
         stream = self._decoder.stream
-        images = self._decoder.images
-        self.info: VideoInfo = demux.describe(path, self._decoder.demuxer, first, images)
+        sequence = self._decoder.sequence
+        self.info: VideoInfo = demux.describe(path, self._decoder.demuxer, first, sequence)
         self.length: Fraction | None = None
-        if images:
-            self.length = self.info.duration
+        if sequence:
+            self.length = (sequence.ticks[-1] + sequence.step) * self.info.time_base
+            rate = self.info.rate / sequence.step
+            frames = len(sequence.files)
+            self.info = replace(self.info, rate=rate, frames=frames, duration=self.length)
         elif not (self._decoder.demuxer.may_restart or self._decoder.demuxer.is_raw):
             self.length = demux.stated_duration(stream, self.info.start)
         self._to_standard_range = _standard_range_filter(first.color_trc, stream)
@@ -131,16 +135,16 @@ class VideoReader:
     def _check_rate(self, path: Path) -> None:
         """Raise `VideoError` if the settings have a rate, but the file has times or a rate."""
         demuxer, has_rate = self._decoder.demuxer, self._settings.frame_rate is not None
-        if has_rate and not self._decoder.images and (demuxer.states_rate or not demuxer.is_raw):
+        if has_rate and not self._decoder.sequence and (demuxer.states_rate or not demuxer.is_raw):
             demuxer.close()
             raise VideoError(f"{path}: has a frame rate of its own; remove input.frame_rate")
 
     def _assumptions(self) -> Iterator[str]:
         """Yield assumptions that the user should know."""
-        demuxer, images = self._decoder.demuxer, self._decoder.images
-        is_unknown = images or (demuxer.is_raw and not demuxer.states_rate)
+        demuxer, sequence = self._decoder.demuxer, self._decoder.sequence
+        is_unknown = not sequence.rate if sequence else demuxer.is_raw and not demuxer.states_rate
         if is_unknown and self._settings.frame_rate is None:
-            what = "images" if images else "frames"
+            what = "images" if sequence else "frames"
             yield f"{ASSUMED_RATE} {what} per second are assumed; set input.frame_rate"
         captured, shown = demux.capture_rate(demuxer.video) or 0, float(self.info.rate)
         if captured > _SLOW_MOTION * shown:
@@ -179,9 +183,10 @@ class VideoReader:
     def _selected(self, first: av.VideoFrame) -> Iterator[Frame]:
         info, period, time = self.info, 1 / self.info.rate, None
         pictures = itertools.chain([first], self._decoder.pictures)
+        sequence = self._decoder.sequence
+        numbers = {tick: index for index, tick in enumerate(sequence.ticks if sequence else ())}
         for count, picture in enumerate(pictures, self._decoder.before):
-            is_numbered = bool(self._decoder.images)
-            index = picture.pts if is_numbered and picture.pts is not None else count
+            index = count if picture.pts is None else numbers.get(picture.pts, count)
             stated = None if picture.pts is None else picture.pts * info.time_base
             time = next_time(time, stated, period)
             since = time - info.start

@@ -134,10 +134,10 @@ def _begin_by_name(
 ) -> tuple[datetime, str] | None:
     """Return the start time by the name and metadata of a video, and which of them it is from."""
     clock, zone = settings.camera.clock, settings.camera.clock.zone
-    images = find_sequence(path)
+    sequence = find_sequence(path)
     named = written = None
     try:
-        named = clock.time_in(images[0] if images else path)
+        named = clock.time_in(sequence.files[0] if sequence else path)
     except ValueError as error:
         _log.warning("%s: %s; set camera.clock.pattern, with %%z for a zone", path, error)
         return None
