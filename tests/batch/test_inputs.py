@@ -71,13 +71,13 @@ class TestPictures:
         os.chdir(folder)
         assert found(".") == [(".", f"{name}.png")]
 
-    def test_pictures_with_a_gap_are_left_out_with_a_warning(
+    def test_pictures_of_several_kinds_are_left_out_with_a_warning(
         self, caplog: pytest.LogCaptureFixture
     ) -> None:
-        pictures(Path("drives/one"), 0, 2, 3)
+        (pictures(Path("drives/one"), 0, 2, 3) / "front_0.png").touch()
         pictures(Path("drives/two"), 0, 1)
         assert [place for _, place in found("drives")] == ["two.png"]
-        assert "drives/one: image 1 is missing; copy image" in caplog.text
+        assert "drives/one: has several kinds of names" in caplog.text
 
     def test_a_pattern_of_numbered_pictures_is_a_video_with_the_name_of_the_folder(self) -> None:
         pictures(Path("frames"), 3, 4)

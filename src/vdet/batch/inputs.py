@@ -8,7 +8,7 @@ from pathlib import Path
 
 from vdet.errors import BatchError, VideoError
 from vdet.media.demux import reject_address
-from vdet.media.images import IMAGE_SUFFIXES, find_sequence
+from vdet.media.images import IMAGE_SUFFIXES, numbered_images
 
 _log = logging.getLogger("vdet")
 
@@ -41,7 +41,7 @@ def find_sources(clips: Sequence[Path]) -> list[InputVideo]:
       numbered images and no videos is a video itself.
 
     Videos that vdet wrote beside their sources are skipped, unless they are passed by name.
-    Numbered images with a gap are skipped with a warning (logger "vdet").
+    Folders of several kinds of images are skipped with a warning (logger "vdet").
 
     Raises
     ------
@@ -66,7 +66,7 @@ def _videos_of(clip: Path) -> Iterable[InputVideo]:
     if clip.exists():
         return [InputVideo(clip, Path(clip.name))]
     reject_address(clip)
-    if find_sequence(clip):
+    if numbered_images(clip):
         return [InputVideo(clip, Path(f"{clip.absolute().parent.name}{clip.suffix}"))]
     return []
 
@@ -85,14 +85,12 @@ def _below(folder: Path, base: Path) -> Iterator[InputVideo]:
 def _images_in(folder: Path, base: Path) -> Iterator[InputVideo]:
     """Yield the numbered images of a folder as one video, with the name of the folder."""
     try:
-        sequence = find_sequence(folder)
+        images = numbered_images(folder)
     except VideoError as error:
         _log.warning("%s; skipped", error)
         return
-    assert sequence is not None
     named = Path(folder.absolute().name) if folder == base else folder.relative_to(base)
-    suffix = sequence.files[0].suffix
-    yield InputVideo(folder, named.with_name(f"{named.name}{suffix}"))
+    yield InputVideo(folder, named.with_name(f"{named.name}{images[0].suffix}"))
 
 
 def _is_video(path: Path) -> bool:

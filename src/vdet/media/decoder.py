@@ -11,10 +11,8 @@ import av
 from av.packet import Packet
 from av.stream import Stream
 
-from vdet.errors import ImageError
 from vdet.media import demux
 from vdet.media.demux import Demuxer
-from vdet.media.images import ImageSequence, find_sequence, read_encoded
 
 _LONGEST_GROUP = 600  # maximum packets between key frames, which are kept in memory
 _COUNTABLE = ("av1", "h264", "hevc", "libdav1d", "mjpeg", "mpeg2video", "mpeg4", "png", "vp9")
@@ -94,8 +92,8 @@ class Decoder:
     Parameters
     ----------
     frame_rate
-        Rate of numbered images or of a raw stream, per second; None: as the names or the stream
-        say, else `ASSUMED_RATE`.
+        Rate of numbered images or of a raw stream, per second; None: as the stream says, else
+        `ASSUMED_RATE`.
 
     Attributes
     ----------
@@ -107,8 +105,6 @@ class Decoder:
         The damage so far.
     demuxer
         The file.
-    sequence
-        The numbered images; None for a file.
     is_countable
         Whether frames can be counted without decoding them.
 
@@ -120,8 +116,7 @@ class Decoder:
 
     def __init__(self, path: Path, frame_rate: float | None) -> None:
         self.before = 0
-        self.sequence = find_sequence(path, frame_rate)
-        self.demuxer = Demuxer(path, self.sequence, frame_rate)
+        self.demuxer = Demuxer(path, frame_rate)
         self.stream = self.demuxer.video
         context = self.stream.codec_context
         context.options = {"max_pixels": str(demux.MAX_PIXELS)}
@@ -130,7 +125,7 @@ class Decoder:
         self._times = deque[int]()  # of the packets of an AVI file that wait for their pictures
         self._is_avi = self.demuxer.container.format.name == "avi"
         self.is_countable = context.name in _COUNTABLE and not (self._is_avi or demux.is_pipe(path))
-        self._packets = self._read_images(self.sequence) if self.sequence else self._read()
+        self._packets = self._read()
         self.pictures = self._decode()
 
     def skip_to(self, time: int, first: int) -> int | None:
@@ -215,22 +210,6 @@ class Decoder:
             self.damage.corrupt_packets += packet.is_corrupt
             self.damage.restarts = self.demuxer.restarts
             yield packet
-
-    def _read_images(self, sequence: ImageSequence) -> "Iterator[Packet[Stream]]":
-        """Yield numbered images as packets."""
-        for file, tick in zip(sequence.files, sequence.ticks, strict=True):
-            try:
-                data = read_encoded(file)
-            except ImageError:
-                data = b""
-            if not data:  # an empty packet would end the decoder
-                self._fail()
-            else:
-                packet: Packet[Stream] = Packet(data)
-                packet.stream, packet.time_base = self.stream, demux.time_base_of(self.stream)
-                packet.pts = packet.dts = tick
-                packet.is_keyframe = True
-                yield packet
 
     def _fail(self) -> None:
         self.damage.errors += 1

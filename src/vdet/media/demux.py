@@ -13,9 +13,15 @@ from av.packet import Packet
 from av.stream import Discard, Disposition, Stream
 from av.video.stream import VideoStream
 
-from vdet.errors import VideoError
+from vdet.errors import ImageError, VideoError
 from vdet.media.frame import Coding, ColorTags, Tags, VideoInfo
-from vdet.media.images import ASSUMED_RATE, ImageSequence, Orientation, read_header
+from vdet.media.images import (
+    ASSUMED_RATE,
+    Orientation,
+    numbered_images,
+    read_encoded,
+    read_header,
+)
 
 MAX_PIXELS = 8192 * 4608
 """Maximum for a frame. 8K video, in both widths, has fewer; a damaged header may claim more."""
@@ -34,8 +40,8 @@ SAFELY = {"format_whitelist": _FORMATS, "max_pixels": str(MAX_PIXELS)}
 """Options for opening any file: only these formats, and no larger frames when probing."""
 
 
-def open_input(path: Path, sequence: ImageSequence | None = None) -> InputContainer:
-    """Open a video file for reading, or the first image of a sequence with the name `path`.
+def open_input(path: Path) -> InputContainer:
+    """Open a video file for reading.
 
     Raises
     ------
@@ -43,16 +49,19 @@ def open_input(path: Path, sequence: ImageSequence | None = None) -> InputContai
         The file does not exist, cannot be read, is not a video, or is an address.
     """
     reject_address(path)
-    file, options = path, SAFELY
     # FFmpeg may treat raw Motion JPEG as a pipe of images, which is not allowed.
     container_format = "mjpeg" if path.suffix.lower() in (".mjpeg", ".mjpg") else None
-    if sequence:
-        file, container_format = sequence.files[0], "image2"
-        options = {"framerate": str(sequence.rate or ASSUMED_RATE), "pattern_type": "none"}
-    elif not os.path.exists(path):  # noqa: PTH110  # also False if it is not accessible
+    if not os.path.exists(path):  # noqa: PTH110  # also False if it is not accessible
         raise VideoError(f"{path}: not found; check the name")
-    elif path.is_file() and not path.stat().st_size:
+    if path.is_file() and not path.stat().st_size:
         raise VideoError(f"{path}: is empty; use a file that plays")
+    return _open(path, path, container_format, SAFELY)
+
+
+def _open(
+    path: Path, file: Path, container_format: str | None, options: dict[str, str]
+) -> InputContainer:
+    """Open a file, which messages call `path`."""
     name = str(file.absolute())  # "a:b.mp4" would be treated as a protocol
     try:  # tags may have any encoding
         return av.open(name, "r", container_format, options, metadata_errors="replace")
@@ -120,9 +129,7 @@ def joined_videos(path: Path) -> int:
     return indexes
 
 
-def describe(
-    path: Path, demuxer: "Demuxer", first: av.VideoFrame, sequence: ImageSequence | None
-) -> VideoInfo:
+def describe(path: Path, demuxer: "Demuxer", first: av.VideoFrame) -> VideoInfo:
     """Describe a video, of which the `first` picture has been decoded."""
     container, stream, rate = demuxer.container, demuxer.video, demuxer.rate
     time_base = time_base_of(stream)
@@ -131,8 +138,9 @@ def describe(
     if duration is None and container.duration and not demuxer.is_raw:  # of the longest stream
         duration = Fraction(container.duration, av.time_base)
     orientation = Orientation.of_frame(first)
-    if sequence:
-        _, orientation = read_header(sequence.files[0])
+    if demuxer.images:
+        _, orientation = read_header(demuxer.images[0])
+        duration = len(demuxer.images) / rate
     is_hdr = first.color_trc in HDR_TRANSFERS
     colors = ColorTags(first.color_primaries, first.color_trc, first.colorspace)
     width, height, aspect = first.width, first.height, stream.sample_aspect_ratio or Fraction(1)
@@ -229,21 +237,25 @@ _MAX_FAILURES = 100  # in a row; a file with only errors must end too
 class Demuxer:
     """An open video file, whose packets are read in file order, on one continuous time line.
 
+    Numbered images are packets too; FFmpeg's own reader of them would end at an empty one.
+
     If its clock restarts, each stream enters the next part where its own clock jumps, because
     packets of both parts alternate near the joint. The first stream in a part determines its
-    offset. Parameters and errors are those of `open_input` and `video_stream`; `frame_rate` is that
-    of a raw stream which declares none.
+    offset. Errors are those of `numbered_images`, `open_input` and `video_stream`; `frame_rate` is
+    that of numbered images, or of a raw stream which declares none.
 
     Attributes
     ----------
+    images
+        The numbered images; empty for a file.
     container
-        The file.
+        The file, or the first image.
     video
         The video stream, whose restarts count.
     is_raw
         Whether packets have no times, as in a raw stream.
-    states_rate
-        Whether the file declares its frame rate.
+    has_own_rate
+        Whether the file declares its frame rate, or has times.
     rate
         Frames per second; `ASSUMED_RATE` if it is unknown.
     may_restart
@@ -252,17 +264,21 @@ class Demuxer:
         How often it has restarted.
     """
 
-    def __init__(
-        self, path: Path, sequence: ImageSequence | None = None, frame_rate: float | None = None
-    ) -> None:
-        self.container = open_input(path, sequence)
+    def __init__(self, path: Path, frame_rate: float | None = None) -> None:
+        assumed = Fraction(str(frame_rate)) if frame_rate else ASSUMED_RATE
+        self.images = numbered_images(path)
+        if self.images:
+            options = {"framerate": str(assumed), "pattern_type": "none"}
+            self.container = _open(path, self.images[0], "image2", options)
+        else:
+            self.container = open_input(path)
         self.video = video_stream(self.container, path)
         self.restarts = 0
         self.may_restart = bool(self.container.format.flags & _TS_DISCONT)
-        self.is_raw = not sequence and bool(self.container.format.flags & _NO_TIMES)
+        self.is_raw = not self.images and bool(self.container.format.flags & _NO_TIMES)
         stated = _stated_rate(self.video, is_raw=self.is_raw)
-        given = Fraction(str(frame_rate)) if frame_rate and self.is_raw else ASSUMED_RATE
-        self.states_rate, self.rate = stated is not None, stated or given
+        self.has_own_rate = not self.images and (stated is not None or not self.is_raw)
+        self.rate = stated or (assumed if self.is_raw else ASSUMED_RATE)
         self._period = 1 / self.rate
         self._offsets = [Fraction(0)]  # of each part, seconds; the first part keeps its clock
         self._part_of: dict[int, int] = {}  # the current part of each stream
@@ -279,6 +295,9 @@ class Demuxer:
 
         `on_error` is called for each part of the file that is skipped.
         """
+        if self.images:
+            yield from self._image_packets(on_error)
+            return
         selected = {stream.index for stream in streams}
         needed = [self.video, *self.container.streams.audio] if self.may_restart else streams
         for packet in self._readable({stream.index: stream for stream in needed}, on_error):
@@ -287,6 +306,20 @@ class Demuxer:
                 self._move(packet, ticks * packet.time_base)
             if packet.stream_index in selected:
                 yield packet
+
+    def _image_packets(self, on_error: Callable[[], None]) -> "Iterator[Packet[Stream]]":
+        for number, file in enumerate(self.images):
+            data = b""
+            with suppress(ImageError):
+                data = read_encoded(file)
+            if not data:  # an empty packet would end the decoder
+                on_error()
+                continue
+            packet: Packet[Stream] = Packet(data)
+            packet.stream, packet.time_base = self.video, time_base_of(self.video)
+            packet.pts = packet.dts = number
+            packet.is_keyframe = True
+            yield packet
 
     def _readable(
         self, needed: Mapping[int, Stream], on_error: Callable[[], None]

@@ -4,15 +4,12 @@ import io
 import logging
 import math
 import re
-from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
-from statistics import median_low
 from typing import TYPE_CHECKING
 
 import cv2
@@ -22,7 +19,6 @@ from PIL import Image as pillow  # noqa: N813
 from PIL.ImageFile import ImageFile
 
 from vdet.boxes import Image
-from vdet.config.camera import ClockSettings
 from vdet.errors import ImageError, VideoError
 from vdet.files import read_whole
 
@@ -237,157 +233,60 @@ def to_ycrcb(image: Image) -> tuple[Image, Image, Image]:
     return luma, red, blue
 
 
-_PATTERN = re.compile(r"((?:[^%]|%%)*)%(?:0([1-9]\d*))?d((?:[^%]|%%)*)", re.ASCII)
-_LAST_NUMBER = re.compile(r".*?(\d+)\D*\.\w+", re.ASCII | re.DOTALL)
-_UNIX_TIME = re.compile(r"(?<!\d)(1\d{9})[-_.]?(\d{3})?(?!\d)", re.ASCII)  # 2001 to 2033
-_MILLISECONDS = re.compile(r"\d\d[-_](\d{3})\.\w+$", re.ASCII)
+_PATTERN = re.compile(r"([^%]*)%(?:0([1-9]\d*))?d([^%]*)", re.ASCII)
+_NUMBERED = re.compile(r".*?(\d+)\D*\.\w+", re.ASCII | re.DOTALL)
+_DIGITS = re.compile(r"(\d+)", re.ASCII)
 ASSUMED_RATE = Fraction(25)
-"""Images per second, if neither the settings nor the names determine it."""
+"""Images per second, if the settings do not determine it."""
 
 
-@dataclass(frozen=True, slots=True)
-class ImageSequence:
-    """Images that form a video.
+def numbered_images(path: Path) -> tuple[Path, ...]:
+    """Return the images of the pattern or folder `path`, in order; empty if it is neither.
 
-    Attributes
-    ----------
-    files
-        The images, in order.
-    ticks
-        Time of each image after the first one, in periods of the rate.
-    rate
-        Images per second; None if it is unknown: `ASSUMED_RATE`.
-    """
-
-    files: tuple[Path, ...]
-    ticks: Sequence[int]
-    rate: Fraction | None = None
-
-    @property
-    def step(self) -> int:
-        """Usual time from one image to the next, in periods of the rate."""
-        return median_low([after - tick for tick, after in pairwise(self.ticks)] or [1])
-
-
-def find_sequence(path: Path, frame_rate: float | None = None) -> ImageSequence | None:
-    """Return the images of the pattern or folder `path`; None if it is neither.
-
-    Images whose names are different times are in the order of these. Otherwise they are in the
-    order of their numbers, which may begin anywhere, and increase by any constant step. In the name
-    of a folder, a per cent sign is literal.
-
-    Parameters
-    ----------
-    frame_rate
-        Images per second; None: as their names say.
+    They are in the order of their names, where numbers count as numbers: 9 is before 10. Those of a
+    folder differ in numbers alone; each is a frame. Those of a pattern may begin at any number, and
+    increase by any constant step. In the name of a folder, a per cent sign is literal.
 
     Raises
     ------
     VideoError
-        The folder cannot be read, contains no such image, one is missing, or the images of a folder
-        are not one sequence.
+        The folder cannot be read, contains no such image, or several kinds of them; or one of a
+        pattern is missing.
     """
-    files = _numbered_files(path)
-    if not files:
-        return None
-    sequence = _ordered_by_time(files) or _ordered_by_number(files, path)
-    if frame_rate is None:
-        return sequence
-    return ImageSequence(sequence.files, range(len(files)), Fraction(str(frame_rate)))
-
-
-def video_files(path: Path) -> tuple[Path, ...]:
-    """Return the files of a video: numbered images, or `path` itself. Raises `VideoError`."""
-    sequence = find_sequence(path)
-    return sequence.files if sequence else (path,)
-
-
-def _numbered_files(path: Path) -> dict[Path, int]:
-    """Return the images of a pattern or folder with their numbers; empty if it is neither."""
+    pattern = _PATTERN.fullmatch(path.name)
     if path.is_dir():
-        folder, name_pattern = path, _LAST_NUMBER
-    elif (pattern := _PATTERN.fullmatch(path.name)) and not path.exists():
-        folder, name_pattern = path.parent, _name_pattern(pattern)
+        folder, names = path, _NUMBERED
+    elif pattern and not path.exists():
+        folder, names = path.parent, _name_pattern(pattern)
     else:
-        return {}
+        return ()
     try:
-        matches = {file: name_pattern.fullmatch(file.name) for file in folder.iterdir()}
+        found = [file for file in folder.iterdir() if names.fullmatch(file.name)]
     except OSError as error:
         raise VideoError(f"{path}: {folder} cannot be read: {error.strerror}") from error
-    takes_all = name_pattern is not _LAST_NUMBER
-    files = {
-        file: int(match[1])
-        for file, match in matches.items()
-        if match and (takes_all or is_image_name(file))
-    }
-    if not files:
+    if names is _NUMBERED:
+        found = list(filter(is_image_name, found))
+    if not found:
         raise VideoError(f"{path}: no numbered images found; use a video, or -d DIR for a folder")
-    return files
+    if len({_DIGITS.sub("", file.name) for file in found}) > 1:
+        raise VideoError(f"{path}: has several kinds of names; use a pattern, as in img_%04d.png")
+    files = sorted(found, key=lambda file: [int(text) for text in _DIGITS.findall(file.name)])
+    if names is not _NUMBERED:
+        _reject_gaps(path, [int(names.sub(r"\1", file.name)) for file in files])
+    return tuple(files)
 
 
 def _name_pattern(pattern: re.Match[str]) -> re.Pattern[str]:
     """Return a regular expression for the names that a pattern such as `img_%04d.png` means."""
     before, digits, after = pattern.groups()
     number = r"0|[1-9]\d*" if digits is None else rf"\d{{{digits}}}|[1-9]\d{{{digits},}}"
-    before, after = (re.escape(part.replace("%%", "%")) for part in (before, after))
-    return re.compile(f"{before}({number}){after}", re.ASCII | re.DOTALL)
+    return re.compile(f"{re.escape(before)}({number}){re.escape(after)}", re.ASCII)
 
 
-def _ordered_by_time(files: Mapping[Path, int]) -> ImageSequence | None:
-    """Return the images if their names are times.
-
-    Images of the same second are spread over it, if their numbers begin again with each second.
-    """
-    numbers = set(files.values())
-    is_counter = len(numbers) > 1 and max(numbers) - min(numbers) < len(numbers)
-    groups: dict[datetime | None, list[Path]] = defaultdict(list)
-    for file in sorted(files, key=lambda file: (files[file], file)):
-        groups[_time_in(file.name, has_milliseconds=not is_counter)].append(file)
-    times = sorted(filter(None, groups))
-    if None in groups or len({time.tzinfo for time in times}) > 1:
-        return None
-    is_spread = len(times) < len(files)
-    if is_spread and (len(times) == 1 or len(numbers) == len(files)):
-        return None
-    offsets: dict[int, Path] = {}
-    for time in times:
-        start = (time - times[0]) // timedelta(milliseconds=1)
-        for place, file in enumerate(groups[time]):
-            offsets[start + 1000 * place // len(groups[time])] = file
-    has_pairs = any(len({files[file] for file in group}) < len(group) for group in groups.values())
-    if has_pairs or len(offsets) < len(files) or list(offsets) != sorted(offsets):
-        return None
-    tick = math.gcd(*offsets) or 1000
-    ticks = tuple(offset // tick for offset in offsets)
-    return ImageSequence(tuple(offsets.values()), ticks, Fraction(1000, tick))
-
-
-def _time_in(name: str, *, has_milliseconds: bool) -> datetime | None:
-    """Return the time in the name of an image, maybe a Unix time; None without one."""
-    if unix := _UNIX_TIME.search(name):
-        seconds, milliseconds = int(unix[1]), int(unix[2] or 0)
-        return datetime.fromtimestamp(seconds, UTC) + timedelta(milliseconds=milliseconds)
-    try:
-        time = ClockSettings().time_in(Path(name))
-    except ValueError:
-        return None
-    rest = _MILLISECONDS.search(name)
-    return (
-        time + timedelta(milliseconds=int(rest[1])) if time and rest and has_milliseconds else time
-    )
-
-
-def _ordered_by_number(files: Mapping[Path, int], path: Path) -> ImageSequence:
-    """Return the images if they are one sequence without a gap. Raises `VideoError`."""
-    ordered = sorted(files, key=lambda file: (files[file], file))
-    numbers = [files[file] for file in ordered]
+def _reject_gaps(path: Path, numbers: Sequence[int]) -> None:
+    """Raise `VideoError` unless the numbers increase by a constant step."""
     steps = [following - number for number, following in pairwise(numbers)]
-    kinds = {re.sub(r"\d", "", file.name, flags=re.ASCII) for file in files}
-    if len(kinds) > 1 or 0 in steps:
-        raise VideoError(f"{path}: has several kinds of names; use a pattern, as in img_%04d.png")
-    step = min(steps, default=1)
-    for number, gap in zip(numbers, steps, strict=False):
-        if gap != step:
-            fault = f"image {number + step} is missing; copy image {number} in its place"
+    for number, step in zip(numbers, steps, strict=False):
+        if step != min(steps):
+            fault = f"image {number + min(steps)} is missing; copy image {number} in its place"
             raise VideoError(f"{path}: {fault}")
-    return ImageSequence(tuple(ordered), range(len(ordered)))

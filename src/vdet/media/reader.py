@@ -4,7 +4,6 @@ import itertools
 import logging
 import math
 from collections.abc import Generator, Iterator
-from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Self
@@ -93,15 +92,12 @@ class VideoReader:
             advice = f"use a file that plays, with frames of at most {limits}"
             raise VideoError(f"{path}: no frame can be decoded; {advice}")
         stream = self._decoder.stream
-        sequence = self._decoder.sequence
-        self.info: VideoInfo = demux.describe(path, self._decoder.demuxer, first, sequence)
+        demuxer = self._decoder.demuxer
+        self.info: VideoInfo = demux.describe(path, demuxer, first)
         self.length: Fraction | None = None
-        if sequence:
-            self.length = (sequence.ticks[-1] + sequence.step) * self.info.time_base
-            rate = self.info.rate / sequence.step
-            frames = len(sequence.files)
-            self.info = replace(self.info, rate=rate, frames=frames, duration=self.length)
-        elif not (self._decoder.demuxer.may_restart or self._decoder.demuxer.is_raw):
+        if demuxer.images:
+            self.length = self.info.duration
+        elif not (demuxer.may_restart or demuxer.is_raw):
             self.length = demux.stated_duration(stream, self.info.start)
         self._to_standard_range = _standard_range_filter(first.color_trc, stream)
         self._faults += self._assumptions()
@@ -134,17 +130,15 @@ class VideoReader:
 
     def _check_rate(self, path: Path) -> None:
         """Raise `VideoError` if the settings have a rate, but the file has times or a rate."""
-        demuxer, has_rate = self._decoder.demuxer, self._settings.frame_rate is not None
-        if has_rate and not self._decoder.sequence and (demuxer.states_rate or not demuxer.is_raw):
-            demuxer.close()
+        if self._settings.frame_rate is not None and self._decoder.demuxer.has_own_rate:
+            self._decoder.demuxer.close()
             raise VideoError(f"{path}: has a frame rate of its own; remove input.frame_rate")
 
     def _assumptions(self) -> Iterator[str]:
         """Yield assumptions that the user should know."""
-        demuxer, sequence = self._decoder.demuxer, self._decoder.sequence
-        is_unknown = not sequence.rate if sequence else demuxer.is_raw and not demuxer.states_rate
-        if is_unknown and self._settings.frame_rate is None:
-            what = "images" if sequence else "frames"
+        demuxer = self._decoder.demuxer
+        if self._settings.frame_rate is None and not demuxer.has_own_rate:
+            what = "images" if demuxer.images else "frames"
             yield f"{ASSUMED_RATE} {what} per second are assumed; set input.frame_rate"
         captured, shown = demux.capture_rate(demuxer.video) or 0, float(self.info.rate)
         if captured > _SLOW_MOTION * shown:
@@ -183,10 +177,9 @@ class VideoReader:
     def _selected(self, first: av.VideoFrame) -> Iterator[Frame]:
         info, period, time = self.info, 1 / self.info.rate, None
         pictures = itertools.chain([first], self._decoder.pictures)
-        sequence = self._decoder.sequence
-        numbers = {tick: index for index, tick in enumerate(sequence.ticks if sequence else ())}
+        are_numbers = bool(self._decoder.demuxer.images)  # the times of images
         for count, picture in enumerate(pictures, self._decoder.before):
-            index = count if picture.pts is None else numbers.get(picture.pts, count)
+            index = picture.pts if are_numbers and picture.pts is not None else count
             stated = None if picture.pts is None else picture.pts * info.time_base
             time = next_time(time, stated, period)
             since = time - info.start

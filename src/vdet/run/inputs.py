@@ -4,7 +4,7 @@ from pathlib import Path
 
 from vdet.config.schema import Settings
 from vdet.files import FileIds, file_ids
-from vdet.media.images import IMAGE_SUFFIXES, video_files
+from vdet.media.images import IMAGE_SUFFIXES, numbered_images
 
 _DATA_SUFFIXES = IMAGE_SUFFIXES | {".csv", ".json", ".txt", ".yaml", ".yml"}
 
@@ -20,7 +20,7 @@ def input_files(*paths: Path, settings: Settings | None = None) -> FileIds:
         if path.is_dir():
             files += (file for file in path.rglob("*") if file.suffix.lower() in _DATA_SUFFIXES)
         else:
-            files += video_files(path)
+            files += numbered_images(path) or [path]
     if settings:
         named = [settings.detector.model, *(region.mask for region in settings.regions)]
         files += map(Path, filter(None, named))

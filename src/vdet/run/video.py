@@ -17,7 +17,6 @@ from vdet.detect.protocol import VideoDetector, stage_images_of
 from vdet.errors import ConfigError, FrameSizeError, VideoError
 from vdet.files import FileIds, OutputFiles
 from vdet.media.demux import is_pipe
-from vdet.media.images import video_files
 from vdet.media.reader import VideoReader
 from vdet.progress import Progress, no_progress
 from vdet.run.inputs import input_files
@@ -86,7 +85,7 @@ class Run:
     @property
     def inputs(self) -> FileIds:
         """The files that the run reads, which no output replaces. Raises `VideoError`."""
-        return input_files(*video_files(self.source), *self.settings_files, settings=self.settings)
+        return input_files(self.source, *self.settings_files, settings=self.settings)
 
 
 @dataclass(frozen=True, slots=True)

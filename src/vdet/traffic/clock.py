@@ -14,7 +14,7 @@ from vdet.config.camera import parse_date_time
 from vdet.config.schema import Settings
 from vdet.errors import ConfigError
 from vdet.media.frame import Tags
-from vdet.media.images import find_sequence
+from vdet.media.images import numbered_images
 from vdet.track.track import FrameTracks
 
 if TYPE_CHECKING:
@@ -134,10 +134,10 @@ def _begin_by_name(
 ) -> tuple[datetime, str] | None:
     """Return the start time by the name and metadata of a video, and which of them it is from."""
     clock, zone = settings.camera.clock, settings.camera.clock.zone
-    sequence = find_sequence(path)
+    images = numbered_images(path)
     named = written = None
     try:
-        named = clock.time_in(sequence.files[0] if sequence else path)
+        named = clock.time_in(images[0] if images else path)
     except ValueError as error:
         _log.warning("%s: %s; set camera.clock.pattern, with %%z for a zone", path, error)
         return None
