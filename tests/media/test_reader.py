@@ -314,16 +314,6 @@ class TestFaults:
             assert reader.length == 2
         assert warnings() == []
 
-    @pytest.mark.parametrize("kind", ["mp4", "mov"])
-    def test_of_videos_that_were_joined_byte_by_byte_the_first_is_read_with_a_warning(
-        self, kind: str, tmp_path: Path, warnings: Warnings
-    ) -> None:
-        part = write_clip(tmp_path / f"part.{kind}", count=12)
-        path = joined(tmp_path / f"in.{kind}", part, part, part)
-        with VideoReader(path) as reader:
-            assert [read_number(frame.image) for frame in reader] == list(range(12))
-        assert warnings() == [f"{path}: 3 videos are joined in one file; only the first is read"]
-
     @pytest.mark.parametrize("name", ["clip.mp4", "clip.mov"])
     def test_a_raw_stream_may_be_named_as_another_format(
         self, name: str, tmp_path: Path, warnings: Warnings

@@ -26,8 +26,6 @@ from vdet.media.images import (
 MAX_PIXELS = 8192 * 4608
 """Maximum for a frame. 8K video, in both widths, has fewer; a damaged header may claim more."""
 
-_MAX_BOXES = 200_000  # maximum number of boxes of an MP4 file to read
-
 _STREAM = re.compile(r"[a-z][a-z0-9+.-]+:/|-$", re.IGNORECASE)  # "rtsp://…" as a path, or "-"
 
 # Formats that contain their pictures: not formats that refer to other files or addresses (such as
@@ -108,25 +106,6 @@ def moving_streams(container: InputContainer) -> list[VideoStream]:
     """Return the video streams, without covers and thumbnails."""
     stills = Disposition.attached_pic | Disposition.timed_thumbnails
     return [stream for stream in container.streams.video if not stream.disposition & stills]
-
-
-def joined_videos(path: Path) -> int:
-    """Return how many MP4 or MOV videos, each with an index, were joined byte by byte."""
-    if not path.is_file() or path.suffix.lower() not in {".mp4", ".mov", ".m4v"}:
-        return 1
-    position, indexes, size = 0, 0, path.stat().st_size
-    with path.open("rb") as file:
-        for _ in range(_MAX_BOXES):
-            file.seek(position)
-            header = file.read(16)
-            indexes += header[4:8] == b"moov"
-            length = int.from_bytes(header[:4])
-            if length == 1:  # it follows, in 64 bits
-                length = int.from_bytes(header[8:])
-            if length < 8 or position + length >= size:  # also if it is no MP4 file
-                break
-            position += length
-    return indexes
 
 
 def describe(path: Path, demuxer: "Demuxer", first: av.VideoFrame) -> VideoInfo:

@@ -229,8 +229,6 @@ class VideoReader:
             raise VideoError(f"{self.info.path}: {self._faults[0]}, {limit}")
         if restarts := self._decoder.demuxer.restarts:
             self._faults.append(f"its clock restarts {restarts}×; the parts follow one another")
-        if (videos := demux.joined_videos(self.info.path)) > 1:
-            self._faults.append(f"{videos} videos are joined in one file; only the first is read")
         if self._is_scaled:
             self._faults.append("frames of other sizes are scaled to the first")
         if self._faults:
