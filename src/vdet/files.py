@@ -14,7 +14,7 @@ import re
 import shutil
 import stat
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from pathlib import Path, PurePath
 from typing import Any, Self
 
@@ -180,53 +180,35 @@ class OutputFiles:
         try:
             with self._cleanup:
                 if kind is None:
-                    files = self._synced_files()
-                    if self._overwrite:
-                        self._check_older(files)
-                    self._swap(files)
+                    self._publish()
                     self._new_folders.clear()
         finally:
             for folder in reversed(self._new_folders):
                 with contextlib.suppress(OSError):  # another run may have written into it
                     folder.rmdir()
 
-    def _synced_files(self) -> dict[Path, Path]:
-        """Sync the staged files to disk, and return them by their final paths."""
-        files = {
+    def _publish(self) -> None:
+        """Sync the staged files to disk, and give them their names instead of older files."""
+        staged_files = {
             folder / file.name: file
             for folder, temporary in self._folders.items()
             for file in sorted(temporary.iterdir())
             if not file.is_dir()
         }
-        for path, file in files.items():
-            with output_errors(path), file.open("rb+") as written:
-                os.fsync(written.fileno())
-        return files
-
-    def _check_older(self, files: Mapping[Path, Path]) -> None:
-        """Check the files to be replaced, and give their permissions to the new ones."""
-        for path, file in files.items():
-            if os.path.lexists(path):
-                _check_replaceable(path, self._inputs)
-                if not path.is_symlink():
-                    with output_errors(path):
+        older = self._left_over(staged_files) if self._overwrite else []
+        for path, file in staged_files.items():
+            with output_errors(path):
+                with file.open("rb+") as written:
+                    os.fsync(written.fileno())
+                if self._overwrite and os.path.lexists(path):
+                    _check_replaceable(path, self._inputs)
+                    older.append(path)
+                    if not path.is_symlink():
                         file.chmod(stat.S_IMODE(path.stat().st_mode))
+        asides = {path: self._folders[path.parent] / _ASIDE / path.name for path in older}
+        _swap(staged_files, asides)
 
-    def _swap(self, files: Mapping[Path, Path]) -> None:
-        """Give new files their final names instead of older ones; undo all if one fails."""
-        # An interrupt may come at any time, so the undo is registered before each step.
-        with contextlib.ExitStack() as undo:
-            for path, file in files.items():
-                with output_errors(path):
-                    if self._overwrite and os.path.lexists(path):
-                        self._set_aside(path, undo)
-                    _add_name(path, file, undo)
-            for path in self._left_over(files) if self._overwrite else ():
-                with contextlib.suppress(OSError):
-                    self._set_aside(path, undo)
-            undo.pop_all()
-
-    def _left_over(self, files: Mapping[Path, Path]) -> list[Path]:
+    def _left_over(self, files: Container[Path]) -> list[Path]:
         """Return the files of earlier runs that this run did not write again."""
         return [
             file
@@ -236,37 +218,43 @@ class OutputFiles:
             if _id(file) not in self._inputs and is_earlier(file)
         ]
 
-    def _set_aside(self, path: Path, undo: contextlib.ExitStack) -> None:
-        """Move the existing file into the temporary folder, which is removed at the end."""
-        aside = self._folders[path.parent] / _ASIDE / path.name
-        aside.parent.mkdir(exist_ok=True)
-        undo.callback(_put_back, aside, path)
-        path.replace(aside)
+
+def _swap(files: Mapping[Path, Path], older: Mapping[Path, Path]) -> None:
+    """Move older files aside, and give new ones their names; undo all if a step fails.
+
+    `files` are new files, and `older` the places for older ones, by their final names. An interrupt
+    may come at any time, so the undo looks at what has been done.
+    """
+    try:
+        for path, aside in older.items():
+            with output_errors(path):
+                aside.parent.mkdir(exist_ok=True)
+                path.replace(aside)
+        for path, file in files.items():
+            with output_errors(path):
+                _add_name(path, file)
+    except BaseException:
+        for path, file in files.items():
+            is_renamed = not file.exists()
+            if is_renamed or (path.exists() and path.samefile(file)):
+                path.unlink(missing_ok=True)
+        for path, aside in older.items():
+            if os.path.lexists(aside):
+                aside.replace(path)
+        raise
 
 
-def _put_back(aside: Path, path: Path) -> None:
-    if os.path.lexists(aside):
-        aside.replace(path)
-
-
-def _add_name(path: Path, file: Path, undo: contextlib.ExitStack) -> None:
+def _add_name(path: Path, file: Path) -> None:
     """Give a file its final name, atomically where the file system has hard links.
 
     Raises `OutputError` if another file has this name.
     """
-    undo.callback(_remove_if_same, path, file.stat())
     try:
         os.link(file, path)
     except OSError:
         if os.path.lexists(path):
             raise OutputError(f"{path}: appeared during the run; use another output") from None
         file.replace(path)  # a file system without hard links
-
-
-def _remove_if_same(path: Path, status: os.stat_result) -> None:
-    with contextlib.suppress(OSError):
-        if os.path.samestat(path.lstat(), status):
-            path.unlink()
 
 
 def _make_temporary(parent: Path, cleanup: contextlib.ExitStack) -> Path:

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from clips import ODD, joined, read_number, write_clip
+from clips import ODD, read_number, write_clip
 from vdet.config.schema import InputSettings
 from vdet.errors import VideoError
 from vdet.media import Frame
