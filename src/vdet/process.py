@@ -56,8 +56,7 @@ def open_streams() -> None:
 
 def _interrupt(*_: object) -> NoReturn:
     _ignore_signals()  # a second signal must not interrupt the clean-up
-    if hasattr(signal, "alarm"):
-        signal.alarm(CLEANUP_TIMEOUT)  # ends the process even if a thread hangs in a library
+    signal.alarm(CLEANUP_TIMEOUT)  # ends the process even if a thread hangs in a library
     raise KeyboardInterrupt
 
 
