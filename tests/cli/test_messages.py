@@ -67,13 +67,10 @@ class TestNamesThatControlATerminal:
         write_drive(tmp_path / "in" / FORGED, 2)
         (tmp_path / "in" / f"b{FORGED}").touch()
         arguments = ("detect-video", tmp_path / "in", "-d", tmp_path / "out", "--jobs", "1")
-        planned = run(*arguments, "--dry-run").out.splitlines()
-        assert len(planned) == 2
-        assert SHOWN in planned[0]
         done = run(*arguments).err.splitlines()
         assert len(done) == 3
         assert sum(SHOWN in line for line in done) == 2
-        assert all(line.isprintable() for line in (*planned, *done))
+        assert all(line.isprintable() for line in done)
 
     def test_a_name_that_is_no_utf_8(self, run: Run, tmp_path: Path) -> None:
         result = run("detect-video", tmp_path / "\udcff.mp4", tmp_path / "out.mp4")

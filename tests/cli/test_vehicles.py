@@ -38,9 +38,6 @@ def test_many_videos_have_their_own_and_a_table_and_a_page_over_all(
     run: Run, clips: Path, tmp_path: Path, red: tuple[str, ...]
 ) -> None:
     command = ("detect-video", clips, "-d", "found", *ENDS, "--jobs", "1", *red)
-    listed = run(*command, "--dry-run")
-    assert "day/a.crops" in listed.out
-    assert not Path("found").exists(), "listing makes no folder"
     run(*command, code=0)
     found = names(tmp_path / "found")
     crops = [name for name in found if ".crops/" in name]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from vdet.cli.messages import LOG, announce, print_lines, progress_steps
+from vdet.cli.messages import LOG, announce, progress_steps
 from vdet.errors import counted, failure_code
 from vdet.run.sinks import Output
 from vdet.workers import DaskCluster, LocalProcesses, Workers, core_count
@@ -30,7 +30,6 @@ def process_videos(
     *,
     no_video: bool,
     skip_existing: bool,
-    dry_run: bool,
     jobs: int | None,
     scheduler: str | None,
 ) -> tuple[int, bool]:
@@ -55,9 +54,6 @@ def process_videos(
         outputs = [Output("video", Path()), *outputs]
     common = replace(common, outputs=tuple(outputs))
     plan = make_plan(clips, folder, common, skip_existing=skip_existing)
-    if dry_run:
-        _print_plan(plan)
-        return 0, False
     records = _run_plan(plan, jobs, scheduler)
     failed = sum(record.error is not None for record in records)
     skipped = f"{len(plan.skipped)} skipped, " if plan.skipped else ""
@@ -79,17 +75,6 @@ def _checked_ending(output: Output) -> Output:
         allowed = ", ".join(kind.endings) or f"as in .{sink if kind.folder_pattern else 'txt'}"
         raise click.UsageError(f"{sink}: with -d, pass only the ending of the names: {allowed}")
     return Output(sink, Path(ending))
-
-
-def _print_plan(plan: "Plan") -> None:
-    for run in plan.skipped:
-        print_lines(f"{run.source}: {_paths(run)} up to date")
-    for run in plan.runs:
-        print_lines(f"{run.source} → {_paths(run)}")
-
-
-def _paths(run: "Run") -> str:
-    return ", ".join(str(output.path) for output in run.outputs)
 
 
 def _run_plan(plan: "Plan", jobs: int | None, scheduler: str | None) -> "list[Record]":

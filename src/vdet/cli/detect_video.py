@@ -66,7 +66,6 @@ if TYPE_CHECKING:
 @click.option(
     "--skip-existing", is_flag=True, help="With -d: skip videos whose outputs are all up to date."
 )
-@click.option("--dry-run", is_flag=True, help="With -d: list what would be written, and stop.")
 @options.number_option(
     "--threads",
     type=options.PROCESSES,
@@ -103,7 +102,6 @@ def detect_video(
     strict: bool,
     folder: Path | None,
     skip_existing: bool,
-    dry_run: bool,
     threads: int | None,
     jobs: int | None,
     scheduler: str | None,
@@ -135,8 +133,8 @@ def detect_video(
     if start is not None and end is not None and end <= start:
         raise click.UsageError("--end must be later than --start")
     if folder is None:
-        if jobs or skip_existing or dry_run or scheduler:
-            raise click.UsageError("--jobs, --skip-existing, --dry-run and --scheduler require -d")
+        if jobs or skip_existing or scheduler:
+            raise click.UsageError("--jobs, --skip-existing and --scheduler require -d")
         outputs = _with_video(videos, outputs, no_video=no_video)
     settings = source.load()
     options.check_counting(settings, outputs, several=folder is not None)
@@ -165,7 +163,6 @@ def detect_video(
             run,
             no_video=no_video,
             skip_existing=skip_existing,
-            dry_run=dry_run,
             jobs=jobs,
             scheduler=scheduler,
         )
