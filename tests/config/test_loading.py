@@ -83,7 +83,7 @@ def test_all_errors_are_given_at_once(path: Path) -> None:
         ),
         (
             "tracker: {kind: rules, histroy: 3}",
-            "1:24: tracker.histroy: unknown setting; did you mean history?",
+            "1:24: tracker.histroy: unknown setting of tracker.kind: rules; did you mean history?",
         ),
         ("'': 1", "1:1: : unknown setting; known settings: detector, tracker, "),
         ("draw: {label: score}", "1:8: draw.label: must be a list (got"),
@@ -101,7 +101,7 @@ def test_a_mistake_is_explained_in_one_line(path: Path, text: str, message: str)
     [
         ("detector.heat.frames" + ".a" * 5000 + "=3", "detector.heat.frames: must be a valid int"),
         ("detector.search.windows.0.size=64", "detector.search.windows: must be a list (got"),
-        ("tracker.0=3", "tracker.0: unknown setting; known settings: kind, look_ahead, "),
+        ("tracker.0=3", "tracker.0: unknown setting of tracker.kind: motion; known settings: kind"),
         ("9" * 5000 + "=3", "9999"),
     ],
 )

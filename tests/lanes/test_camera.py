@@ -99,8 +99,6 @@ def test_a_camera_is_read_with_all_its_digits(path: Path) -> None:
     [
         ("size", ["wide", 480], "camera.yaml:4:7: camera.lens.size[0]: must be a valid integer"),
         ("matrix", [[1, 2], [3, 4]], "camera.yaml:7:7: camera.lens.matrix[0][2]: is required"),
-        ("matrix", [[1, 0, 322], [0, 558, 236], [0, 0, 1]], "with focal lengths of 0.1 to 100 t"),
-        ("matrix", [[560, 0, 322], [0, 558, 500], [0, 0, 1]], "the principal point in the frame"),
         ("distortion", [0, 0, 0, 0, float("nan")], "distortion[4]: must be a finite number"),
         ("colour", "red", "camera.lens.colour: unknown setting"),
     ],

@@ -8,7 +8,6 @@ from typing import Annotated, ClassVar
 from zoneinfo import ZoneInfo
 
 from pydantic import Field, field_validator
-from pydantic_core.core_schema import ValidationInfo
 
 from vdet.config.section import Section
 from vdet.config.shapes import Coordinate, FramePoint, Shape, Size
@@ -35,23 +34,6 @@ class LensSettings(Section):
     """Focal lengths and principal point: `((fx, 0, cx), (0, fy, cy), (0, 0, 1))`."""
     distortion: tuple[_Coefficient, _Coefficient, _Coefficient, _Coefficient, _Coefficient]
     """k1, k2, p1, p2, k3."""
-
-    @field_validator("matrix")
-    @classmethod
-    def _check_matrix(
-        cls, matrix: tuple[_Row, _Row, _Row], info: ValidationInfo
-    ) -> tuple[_Row, _Row, _Row]:
-        (fx, skew, x), (zero, fy, y), last = matrix
-        if size := info.data.get("size"):  # else it is wrong itself
-            width, height = size
-            is_real = 0.1 * width <= min(fx, fy) and max(fx, fy) <= 100 * width
-            in_frame = 0 <= x < width and 0 <= y < height
-            if not (is_real and in_frame and (skew, zero, last) == (0, 0, (0, 0, 1))):
-                raise ValueError(
-                    "must be [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], with focal lengths of 0.1 to "
-                    "100 times the width, and the principal point in the frame"
-                )
-        return matrix
 
     def matrix_for(self, width: int, height: int) -> tuple[_Row, _Row, _Row]:
         """Return the camera matrix for frames of another size, but the same aspect ratio.

@@ -11,9 +11,7 @@ from pkgutil import resolve_name
 from typing import Any
 
 from vdet.config.detector import DetectorSettings, NetworkSettings, SvmSettings
-from vdet.config.section import Section
 from vdet.config.tracker import MotionTrackerSettings, RulesTrackerSettings, TrackerSettings
-from vdet.errors import ConfigError
 from vdet.plugins import DETECTORS, TRACKERS, built_in_names, load_plugin
 
 GROUPS = {"detector": DETECTORS, "tracker": TRACKERS}
@@ -92,28 +90,12 @@ def default_kind(section: str) -> str:
     return built_in_names(GROUPS[section])[0]
 
 
-def kind_settings(section: str, name: str) -> type[Section]:
-    """Return the class of the settings of a kind.
-
-    Raises
-    ------
-    ConfigError
-        There is no such kind, it cannot be loaded, or it has no settings of this name.
-    """
-    settings = getattr(load_plugin(GROUPS[section], name), "settings", None)
-    if isinstance(settings, type) and issubclass(settings, Section):
-        kind = settings.model_fields.get("kind")
-        if kind and kind.default == name:
-            return settings
-    raise ConfigError(f'{name}: has no settings of kind = "{name}"; repair that package')
-
-
 def with_kind(section: str, values: Any) -> Any:
     """Validate the values of a section as the settings of their kind."""
     if values is not None and not isinstance(values, dict):
         return values
     kind = (values or {}).get("kind", default_kind(section))
-    return kind_settings(section, str(kind)).model_validate(values)
+    return load_plugin(GROUPS[section], str(kind)).settings.model_validate(values)
 
 
 def kind_of_model(path: Path) -> str | None:

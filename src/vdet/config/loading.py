@@ -1,10 +1,9 @@
 """Layers of settings → one `Settings`: the defaults, then YAML files, then assignments."""
 
-import contextlib
 import copy
 import difflib
 import reprlib
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import reduce
 from pathlib import Path
 from typing import Any
@@ -15,11 +14,10 @@ from pydantic_core import ErrorDetails
 from vdet.config import document
 from vdet.config.camera import GroundPoint
 from vdet.config.document import Document, Key
-from vdet.config.kinds import GROUPS, default_kind, kind_of_model, kind_settings
+from vdet.config.kinds import GROUPS, default_kind, kind_of_model
 from vdet.config.schema import LaneSettings, Section, Settings
 from vdet.config.shapes import FRACTIONS, LineSettings, RegionSettings, Shape, ZoneSettings
 from vdet.errors import ConfigError
-from vdet.plugins import plugin_names
 
 MAX_MISTAKES = 20
 """Maximum number of mistakes that are shown; the others are counted."""
@@ -217,19 +215,11 @@ def _expected(mistake: ErrorDetails, key: Key) -> str:
 
 
 def _unknown(key: Key, section: type[Section]) -> str:
-    """Return a hint: the kind that has this key, the key probably meant, or all keys."""
-    name, group, keys = str(key[-1]), str(key[0]), list(section.model_fields)
-    if len(key) == 2 and group in GROUPS:
-        owners = [kind for kind in plugin_names(GROUPS[group]) if name in _keys_of(group, kind)]
-        if owners:
-            words = f"belongs to {group}.kind: {' or '.join(owners)}, and has no effect with"
-            return f"{words} {section.model_fields['kind'].default}"
-    if close := difflib.get_close_matches(name, keys, n=1):
-        return f"unknown setting; did you mean {close[0]}?"
-    return f"unknown setting; known settings: {', '.join(keys)}"
-
-
-def _keys_of(group: str, kind: str) -> Collection[str]:
-    with contextlib.suppress(ConfigError):  # another package's kind that cannot be loaded
-        return kind_settings(group, kind).model_fields
-    return ()
+    """Return a hint: the key of a section that is probably meant, or all keys."""
+    keys = section.model_fields
+    problem = "unknown setting"
+    if "kind" in keys:
+        problem += f" of {key[0]}.kind: {keys['kind'].default}"
+    if close := difflib.get_close_matches(str(key[-1]), keys, n=1):
+        return f"{problem}; did you mean {close[0]}?"
+    return f"{problem}; known settings: {', '.join(keys)}"
