@@ -26,8 +26,6 @@ def test_a_page_and_numbers_that_cannot_be_written_are_refused_before_any_work(
         ResultFiles(str(target), overwrite=True).check(file_ids([target]))
     with pytest.raises(OutputError, match=r"the folder .*page\.html is not a folder"):
         ResultFiles(None, page=folder / "page.html", overwrite=True).check(NO_FILES)
-    with pytest.raises(OutputError, match="is used for two outputs"):
-        ResultFiles(str(folder / "page.html"), page=folder, overwrite=True).check(NO_FILES)
 
 
 def test_numbers_may_lie_in_the_new_folder_of_the_page(tmp_path: Path) -> None:

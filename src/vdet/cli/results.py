@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from vdet.cli.messages import print_lines, progress_steps
+from vdet.cli.messages import print_lines
 from vdet.cli.options import Function, output_folder, overwrite_option
-from vdet.errors import OutputError
 from vdet.files import OutputFiles, check_output, json_text, output_errors, print_now, write_text
 
 if TYPE_CHECKING:
@@ -32,13 +31,9 @@ class ResultFiles:
         Raises
         ------
         OutputError
-            A file already exists (without `overwrite`), is an input, or cannot be written, or both
-            outputs are the same file.
+            A file already exists (without `overwrite`), is an input, or cannot be written.
         """
-        paths = list(self._files.values())
-        if len({path.resolve() for path in paths}) < len(paths):
-            raise OutputError(f"{paths[0]}: is used for two outputs; rename one")
-        for path in paths:
+        for path in self._files.values():
             makes_folder = self.page is not None and self.page.is_relative_to(path.parent)
             check_output(path, overwrite=self.overwrite, makes_folder=makes_folder, inputs=inputs)
 
@@ -65,8 +60,7 @@ class ResultFiles:
         print_lines(*lines, err=to_stderr)
         with OutputFiles(overwrite=self.overwrite) as files:
             for kind, path in self._files.items():
-                with progress_steps("") as steps, output_errors(path):
-                    steps(f"writing the {kind}", None)
+                with output_errors(path):
                     text = make_page() if kind == "page" else json_text(values)
                     write_text(files.stage_folder(path.parent) / path.name, text)
             if to_stderr:
