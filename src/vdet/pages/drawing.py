@@ -109,17 +109,15 @@ def split(
     shapes = {kind: sections[name].pop(kind, None) or [] for kind, name in _SECTIONS.items()}
     del sections["camera"]["size"]
     other_settings = {
-        name: [line if name == "other" else f"  {line}" for line in as_yaml(section)]
+        name: [line if name == "other" else f"  {line}" for line in _yaml_lines(section)]
         for name, section in sections.items()
     }
     return shapes, other_settings
 
 
-def as_yaml(values: Mapping[str, Any]) -> list[str]:
-    """Return settings as lines of YAML."""
-    if not values:
-        return []
-    return yaml.dump(dict(values), Dumper=_Dumper, sort_keys=False, allow_unicode=True).splitlines()
+def _yaml_lines(values: Mapping[str, Any]) -> list[str]:
+    text = yaml.dump(dict(values), Dumper=_Dumper, sort_keys=False, allow_unicode=True)
+    return text.splitlines() if values else []
 
 
 class _Dumper(yaml.SafeDumper):
@@ -131,17 +129,16 @@ class _Dumper(yaml.SafeDumper):
 
 
 def pack_paths(paths: Sequence[VehiclePath]) -> dict[str, Any]:
-    """Return paths as values for JSON: second differences of rows, in byte planes, deflated.
+    """Return paths as values for JSON: four rows of int32, each number minus the one before it.
 
-    Times are µs since the first row, ground points are hundredths of a pixel; the page restores
-    them exactly.
+    They are deflated. Times are µs since the first row, ground points are hundredths of a pixel.
     """
-    columns = [np.empty((4, 0))]
+    changes = [np.empty((4, 0))]
     for path in paths:
         times = 1e6 * (path.times - path.times[0])
         rows = np.rint(np.vstack([times, 100 * path.points.T, path.heights]))
-        columns.append(np.diff(np.diff(rows, prepend=0), prepend=0))
-    planes = np.hstack(columns).astype("<i4").view(np.uint8).reshape(-1, 4).T
+        changes.append(np.diff(rows, prepend=0))
+    numbers = np.hstack(changes).astype("<i4")
     vehicles = [
         (
             path.vehicle,
@@ -153,5 +150,5 @@ def pack_paths(paths: Sequence[VehiclePath]) -> dict[str, Any]:
         )
         for path in paths
     ]
-    data = base64.b64encode(zlib.compress(planes.tobytes())).decode("ascii")
+    data = base64.b64encode(zlib.compress(numbers.tobytes())).decode("ascii")
     return {"vehicles": vehicles, "data": data}

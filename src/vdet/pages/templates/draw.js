@@ -423,20 +423,16 @@ function crossesItself(corners) {
 }
 
 // ---------------------------------------------------------------- the linked paths
-/** Return the paths that Python packs: second differences in four planes of bytes, deflated. */
+/** Return the paths that Python packs: four rows of the changes of numbers, deflated. */
 async function readPaths(packed) {
   const bytes = Uint8Array.from(atob(packed.data), char => char.charCodeAt(0));
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
-  const planes = new Uint8Array(await new Response(stream).arrayBuffer()), count = planes.length / 4;
+  const numbers = new Int32Array(await new Response(stream).arrayBuffer()), count = numbers.length / 4;
   let first = 0;
   return packed.vehicles.map(([vehicle, kind, largest, start, seen, length]) => {
-    const [times, xs, ys, heights] = [0, 1, 2, 3].map(column => {
-      let at = column * count / 4 + first, step = 0, value = 0;
-      return Array.from({ length }, () => {
-        step += planes[at] | planes[count + at] << 8 | planes[2 * count + at] << 16 | planes[3 * count + at] << 24;
-        at++;
-        return value += step;
-      });
+    const [times, xs, ys, heights] = [0, 1, 2, 3].map(row => {
+      let value = 0;
+      return Array.from({ length }, (_, at) => value += numbers[row * count + first + at]);
     });
     first += length;
     return withBoxes({ vehicle, kind, largest, seen, heights, times: times.map(time => Math.round(1e6 * start + time) / 1e6),
@@ -725,11 +721,9 @@ async function openPage(data) {
     const speeds = visits.flatMap(([path, some]) => some.filter(each => each.direction === direction)
       .map(each => speedAt(path, each.time, ground)).filter(speed => speed !== null));
     if (!speeds.length) return "";
-    const bars = Array.from({ length: 16 }, (_, i) => speeds.filter(speed => Math.min(15, Math.floor(speed / 10)) === i).length);
     const [middle, most] = [0.5, 0.85].map(fraction => quantile(speeds, fraction).toFixed(0));
     return el("div", { class: "speed" }, el("b", {}, `${border.name}: ${direction}`),
-      el("span", {}, `median ${middle} km/h, 85 % ${most} km/h`), el("div", { class: "bars", title: "0 to 160 km/h" },
-        ...bars.map(count => el("i", { style: `height: ${100 * count / Math.max(...bars)}%` }))));
+      el("span", {}, `median ${middle} km/h, 85 % ${most} km/h`));
   }
 
   function setTool(name) {
