@@ -31,7 +31,6 @@ def test_places_on_the_road_have_their_metres() -> None:
     places = np.array([(0.0, 20.0), (-4.0, 45.0), (3.0, 15.0)])
     ground = fitted()
     assert ground.metres(seen(places) + EDGE) == pytest.approx(places, abs=1e-3)
-    assert ground.pixels(places) == pytest.approx(seen(places) + EDGE, abs=1e-3)
 
 
 def test_a_place_above_the_horizon_is_not_known() -> None:

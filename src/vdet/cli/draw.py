@@ -10,8 +10,8 @@ import click
 from vdet.cli import options
 from vdet.cli.command import command
 from vdet.cli.messages import print_lines, progress_steps
-from vdet.errors import ConfigError, counted
-from vdet.files import OutputFiles, output_errors
+from vdet.errors import counted
+from vdet.files import staged
 
 
 @command()
@@ -59,8 +59,6 @@ def draw(
     inputs = source.inputs(clip, *([tracks] if tracks else ()), settings=settings)
     suffixes = (".html", ".jpg", ".png", ".svg")
     options.check_file(output, *suffixes, noun="pages", overwrite=overwrite, inputs=inputs)
-    if output.suffix.lower() != ".html" and not settings.traffic:
-        raise ConfigError(f"{output}: nothing to draw; add lines or zones with -c FILE")
     with progress_steps(" frames") as steps:
         # Without regions, because the page shows their effect.
         whole_frames = settings.model_copy(update={"regions": ()})

@@ -66,11 +66,6 @@ class Ground:
         beyond = outside.sum(axis=2).max(axis=1)
         return np.where((beyond <= self.length)[:, None], metres, np.nan)
 
-    def pixels(self, metres: Float64Array) -> Float64Array:
-        """Return where in the frame places `(n, 2)` are; NaN for those behind the camera."""
-        back = np.asarray(np.linalg.inv(self.to_metres), np.float64)
-        return self.undistorter.distorted(_mapped(back, metres)) + 0.5
-
 
 def ground_of(camera: CameraSettings, width: int, height: int) -> Ground | None:
     """Fit the road plane of a camera for frames of `width` × `height` pixels; None without points.
