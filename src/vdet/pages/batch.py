@@ -110,16 +110,13 @@ class Part:
 def table_json(parts: Sequence[Part]) -> str:
     """Return the columns of the table for `vehicles.js`.
 
-    Empty columns are omitted. `counts` has the number of rows of each video, and clock times count
-    from `zero`.
+    Empty columns are omitted. `counts` has the number of rows of each video.
     """
     rows = [row for part in parts for row in part.rows]
-    clocks = [_plain_seconds(row.clock) for row in rows]
-    zero = min((clock for clock in clocks if clock is not None), default=0)
     columns: dict[str, list[Any]] = {
         "class": [row.class_name or UNKNOWN for row in rows],
         **{name: [getattr(row, name) for row in rows] for name in _COLUMNS},
-        "clock": [clock if clock is None else clock - zero for clock in clocks],
+        "clock": [_plain_seconds(row.clock) for row in rows],
         "picture": [
             row.picture and part.folder + row.picture for part in parts for row in part.rows
         ],
@@ -129,7 +126,6 @@ def table_json(parts: Sequence[Part]) -> str:
         "pages": [part.page for part in parts],
         "starts": [part.start for part in parts],
         "counts": [len(part.rows) for part in parts],
-        "zero": zero,
         **{name: values for name, values in columns.items() if _is_known(values)},
     }
     text = json.dumps(table, separators=(",", ":"), ensure_ascii=False)

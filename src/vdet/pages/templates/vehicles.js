@@ -53,7 +53,7 @@ function thousands(value) {
 function timeText(i) {
   if (data.clock[i] !== null) {
     // The clock is in seconds as the camera shows them: it is printed without a shift.
-    const moment = new Date(1000 * (data.zero + data.clock[i]));
+    const moment = new Date(1000 * data.clock[i]);
     return moment.toISOString().slice(0, 19).replace("T", " ");
   }
   const seconds = Math.floor(data.first[i]);
@@ -71,7 +71,7 @@ function filtered() {
     if (low) tests.push(i => column[i] !== null && column[i] >= Number(low));
     if (high) tests.push(i => column[i] !== null && column[i] <= Number(high));
   };
-  const moment = value => value && String(Date.parse(`${value}Z`) / 1000 - data.zero);
+  const moment = value => value && String(Date.parse(`${value}Z`) / 1000);
   ["class", "lines", "motion", "lane"].forEach(choice);
   for (const name of ["seconds", "speed", "distance"]) {
     limits(data[name], values[`${name}-min`], values[`${name}-max`]);
