@@ -1,8 +1,9 @@
 """Trackers of any kind, made from settings."""
 
-from collections.abc import Sequence
 from dataclasses import astuple, replace
 from math import inf
+
+import numpy as np
 
 from vdet.boxes import Box, Boxes
 from vdet.config.kinds import TrackerKind
@@ -65,11 +66,7 @@ class InterpolatingTracker:
 
 def _moved(track: Track, end: Track, fraction: float) -> Track:
     """Return a track that has done this fraction of its way to `end`."""
-
-    def between(first: Sequence[float], last: Sequence[float]) -> list[float]:
-        return [a + (b - a) * fraction for a, b in zip(first, last, strict=True)]
-
-    foot_x, foot_y = between(track.foot, end.foot)
-    x1, y1, x2, y2 = between(astuple(track.box), astuple(end.box))
+    first, last = (np.array([*astuple(item.box), *item.foot]) for item in (track, end))
+    x1, y1, x2, y2, foot_x, foot_y = (first + (last - first) * fraction).tolist()
     state: State = "predicted" if track.state == "predicted" else "interpolated"
     return replace(track, box=Box(x1, y1, x2, y2), whole_foot=(foot_x, foot_y), state=state)

@@ -8,7 +8,6 @@ two would be in the same place.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import Enum, auto
 
 import numpy as np
 
@@ -127,34 +126,13 @@ def take_over_ids(vehicles: Sequence[Vehicle]) -> list[Vehicle]:
     return remaining
 
 
-class Case(Enum):
-    """Relation of a track to another one of higher rank."""
-
-    APART = auto()
-    """Each shows its own vehicle."""
-    DUPLICATE = auto()
-    """Both show one vehicle: they become one track."""
-    PART = auto()
-    """It is not confirmed, and shows the other's vehicle or a part of it: it is dropped."""
-    EMERGING = auto()
-    """It may be a hidden vehicle that emerges, or one of two that the other box spans."""
-    HIDDEN = auto()
-    """It was apart, and now shows the vehicle that hides its own: it is lost."""
-
-
 @dataclass(frozen=True, slots=True)
 class _Overlap:
     """How the box of a track overlaps that of another one.
 
-    Attributes
-    ----------
-    inside
-        Fraction of it that is inside the other box.
-    same
-        How much the two show one vehicle: the fraction of the smaller box inside the other if they
-        are level, 1 if they are alike, else 0.
-    alike
-        Whether their intersection over union is high.
+    `inside` is the fraction of it that is inside the other box. `same` says how much the two show
+    one vehicle: the fraction of the smaller box inside the other if they are level, 1 if they are
+    alike, else 0. `alike` says whether their intersection over union is high.
     """
 
     inside: float
@@ -193,37 +171,37 @@ def without_duplicates(vehicles: Sequence[Vehicle], boxes: Float64Array) -> list
             if higher.unseen or not higher.confirmed:
                 continue
             overlap = _Overlap(inside[row, at], same[row, at], alike[row, at])
-            match _case(vehicle, higher, overlap, hidden):
-                case Case.DUPLICATE:
-                    higher.merge(vehicle)
-                    break
-                case Case.PART:
-                    break
-                case Case.HIDDEN:
-                    vehicle.lose()
-                    kept.append(row)
-                    break
-        else:  # apart from all of them, or emerging
+            if not _show_one_vehicle(vehicle, higher, overlap, hidden):
+                continue
+            if vehicle.confirmed and min(vehicle.age, higher.age) > _APART:
+                vehicle.lose()  # it was apart, and now shows the vehicle that hides its own
+                kept.append(row)
+            elif vehicle.confirmed:
+                higher.merge(vehicle)
+            break
+        else:  # apart from all of them
             kept.append(row)
     return [vehicles[row] for row in sorted(kept)]
 
 
-def _case(vehicle: Vehicle, higher: Vehicle, overlap: _Overlap, hidden: Sequence[Vehicle]) -> Case:
-    """Return the relation of a track to an overlapping one of higher rank; both are detected."""
+def _show_one_vehicle(
+    vehicle: Vehicle, higher: Vehicle, overlap: _Overlap, hidden: Sequence[Vehicle]
+) -> bool:
+    """Return whether a track shows the vehicle of an overlapping one of higher rank, or a part.
+
+    Both are detected. An unconfirmed track inside the other box may also be one of the `hidden`
+    vehicles that emerges, or one of two vehicles that this box spans.
+    """
     if min(vehicle.age, higher.age) > _APART:
-        if not overlap.alike:
-            return Case.APART
-        return Case.HIDDEN if vehicle.confirmed else Case.PART
+        return overlap.alike
     if vehicle.confirmed:
         fraction = PART if max(vehicle.age, higher.age) > _APART else _LEVEL_OVERLAP
-        return Case.DUPLICATE if overlap.same > fraction else Case.APART
+        return overlap.same > fraction
     if vehicle.scores.value <= higher.scores.value and overlap.same > _LEVEL_OVERLAP:
-        return Case.PART
-    if overlap.inside > PART:
-        is_doubted = higher.detection_scores.value < _DOUBTED * vehicle.detection_scores.value
-        is_whole = is_doubted or _comes_out(vehicle, higher, hidden)
-        return Case.EMERGING if is_whole else Case.PART
-    return Case.APART
+        return True
+    is_doubted = higher.detection_scores.value < _DOUBTED * vehicle.detection_scores.value
+    is_inside = overlap.inside > PART
+    return is_inside and not (is_doubted or _comes_out(vehicle, higher, hidden))
 
 
 def _comes_out(vehicle: Vehicle, nearer: Vehicle, hidden: Sequence[Vehicle]) -> bool:
