@@ -18,7 +18,7 @@ from vdet.files import OutputFiles
 from vdet.media import Frame, Picture, VideoInfo
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import SinkContext, SinkKind
-from vdet.track.track import TimedTracker, Track, VideoTracker
+from vdet.track.track import Track, VideoTracker
 from vdet.traffic.live import LiveTraffic
 
 RATE = 25
@@ -67,7 +67,6 @@ def check_tracker(make: Callable[[int, int], VideoTracker]) -> None:
     * The frame is not changed.
     * A second tracker shows the same: trackers share no state.
     * Nothing is shown some seconds after the last detection.
-    * `at`, if the tracker has it, shows the same vehicles a moment later, between detections.
     """
     first, second = make(WIDTH, HEIGHT), make(WIDTH, HEIGHT)
     ids: set[int] = set()
@@ -82,11 +81,6 @@ def check_tracker(make: Callable[[int, int], VideoTracker]) -> None:
     assert len(tracks) == 2, f"{len(tracks)} of 2 vehicles are shown"
     assert len(ids) == 2, "a vehicle that is always detected changed its id"
     assert {track.state for track in tracks} == {"detected"}, "not called detected"
-    if isinstance(second, TimedTracker):
-        later = second.at(3.0)
-        _check_tracks(later)
-        assert {track.id for track in later} == ids, "a vehicle is lost a moment later"
-        assert {track.state for track in later} == {"interpolated"}, "not called interpolated"
     for index in range(3 * RATE, 30 * RATE):
         tracks = first.update(NO_BOXES, index / RATE, picture)
     assert not tracks, "vehicles are shown long after the last detection"

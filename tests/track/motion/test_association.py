@@ -6,6 +6,7 @@ import pytest
 from vdet.boxes import Float64Array
 from vdet.config.schema import MotionTrackerSettings
 from vdet.track.motion.association import take_over_ids, without_duplicates
+from vdet.track.motion.state import whole_box
 from vdet.track.motion.vehicle import Observation, SearchedFrame, Vehicle
 
 SIZE = (1000, 500)
@@ -64,8 +65,12 @@ def test_of_two_lost_vehicles_the_nearest_is_taken_and_only_by_one() -> None:
     assert [item.id for item in new] == [8, 7]
 
 
+def boxes_of(*vehicles: Vehicle) -> Float64Array:
+    return whole_box(np.array([vehicle.state.mean[:, 0] for vehicle in vehicles]))
+
+
 def without(*vehicles: Vehicle) -> list[Vehicle]:
-    return without_duplicates(vehicles, np.array([vehicle.state.box for vehicle in vehicles]))
+    return without_duplicates(vehicles, boxes_of(*vehicles))
 
 
 @pytest.mark.parametrize(("first", "second", "kept"), [(1, 2, 1), (2, 1, 1), (3, None, 3)])
@@ -103,5 +108,5 @@ def test_a_clear_vehicle_in_the_box_of_a_weak_one_is_not_a_part_of_it(
 ) -> None:
     both = vehicle(np.array([300.0, 150.0, 510.0, 300.0]), score=score)
     clear = vehicle(score=0.95, confirmed=False)
-    boxes = np.array([both.state.box, clear.state.box])
+    boxes = boxes_of(both, clear)
     assert len(without_duplicates([both, clear], boxes)) == kept

@@ -66,11 +66,6 @@ class MotionState:
         return cls(mean, covariance, ways_in=_ways_in(box, size))
 
     @property
-    def box(self) -> Float64Array:
-        """The vehicle's x1, y1, x2, y2 in full-frame pixels, float64 `(4,)`; not clipped."""
-        return whole_box(self.mean[:, 0])
-
-    @property
     def velocity(self) -> Float64Array:
         """Velocity of the centre, x and y in sizes of the vehicle per second, `(2,)`."""
         return np.asarray(self.mean[:2, 1] / np.exp(self.mean[2:, 0]))
