@@ -10,14 +10,13 @@ Source: the treatment of DontCare by the KITTI tracking benchmark, and of crowds
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from vdet.boxes import BoolArray, Float64Array, Int64Array, coverage, iou_matrix
 from vdet.config.classes import UNKNOWN
 from vdet.labels.label import LabelledVideo
+from vdet.track.motion.pairing import assign
 
 MATCH_IOU = 0.5
 """A prediction with at least this overlap finds a vehicle."""
@@ -181,25 +180,6 @@ def pool(comparisons: Sequence[Comparison]) -> Comparison:
         vehicle_names=tuple(name for video in comparisons for name in video.vehicle_names),
         track_names=tuple(name for video in comparisons for name in video.track_names),
     )
-
-
-def assign(weights: npt.NDArray[Any]) -> tuple[Int64Array, Int64Array]:
-    """Pair rows with columns, each at most once, to maximize the sum of the weights.
-
-    Parameters
-    ----------
-    weights
-        Shape `(n, m)`.
-
-    Returns
-    -------
-    Rows and columns of the pairs with a weight above 0, rows ascending.
-    """
-    from scipy.optimize import linear_sum_assignment
-
-    rows, columns = linear_sum_assignment(weights, maximize=True)
-    paired = weights[rows, columns] > np.finfo(np.float64).eps
-    return rows[paired], columns[paired]
 
 
 def at_least(overlaps: Float64Array, threshold: float) -> BoolArray:

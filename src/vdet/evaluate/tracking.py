@@ -9,7 +9,8 @@ Tracking", 2016; Luiten et al., "HOTA: A Higher Order Metric for Evaluating Mult
 import numpy as np
 
 from vdet.boxes import Float64Array, Int64Array
-from vdet.evaluate.comparison import MATCH_IOU, UNMATCHED, Comparison, assign, at_least
+from vdet.evaluate.comparison import MATCH_IOU, UNMATCHED, Comparison, at_least
+from vdet.track.motion.pairing import assign
 
 ALPHAS = np.arange(0.05, 0.99, 0.05)
 """The overlap thresholds of HOTA, 0.05 … 0.95; the metrics are the mean over them."""

@@ -7,11 +7,13 @@ Easier by Buffering the Matching Space", 2023.
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
-from vdet.boxes import Float64Array, Image, iou
+from vdet.boxes import Float64Array, Image, Int64Array, iou
 from vdet.media import Picture
 
 WIDEST_BUFFER = 0.25
@@ -117,13 +119,14 @@ def pair(values: Float64Array, rounds: Sequence[Sequence[int]]) -> dict[int, int
     remaining = values.copy()
     pairs: dict[int, int] = {}
     for rows in rounds:
-        pairs |= {rows[row]: column for row, column in assign(remaining[list(rows)])}
+        paired, columns = assign(remaining[list(rows)])
+        pairs |= {rows[row]: column for row, column in zip(paired, columns.tolist(), strict=True)}
         remaining[:, list(pairs.values())] = 0
     return pairs
 
 
-def assign(values: Float64Array) -> list[tuple[int, int]]:
-    """Return the pairs of row and column, each used at most once, with the largest sum.
+def assign(values: npt.NDArray[Any]) -> tuple[Int64Array, Int64Array]:
+    """Pair rows with columns, each at most once, to maximize the sum of the values.
 
     Same as `scipy.optimize.linear_sum_assignment`, whose import would cost every run about 50 MB
     and startup time. Source: Jonker and Volgenant, "A Shortest Augmenting Path Algorithm for Dense
@@ -132,11 +135,17 @@ def assign(values: Float64Array) -> list[tuple[int, int]]:
     Parameters
     ----------
     values
-        Float64 `(n, m)`, at least 0; pairs of value 0 are omitted.
+        Shape `(n, m)`, at least 0.
+
+    Returns
+    -------
+    Rows and columns of the pairs with a value above 0, rows ascending.
     """
     rows, columns = values.shape
     if rows > columns:
-        return sorted((row, column) for column, row in assign(values.T))
+        paired_columns, paired_rows = assign(values.T)
+        order = np.argsort(paired_rows)
+        return paired_rows[order], paired_columns[order]
     costs, row_of = -values, np.full(columns, _FREE)
     of_rows, of_columns = np.zeros(rows), np.zeros(columns)  # the dual variables
     for row in range(rows):
@@ -161,5 +170,7 @@ def assign(values: Float64Array) -> list[tuple[int, int]]:
             before = int(previous[column])
             row_of[column] = row if before == _FREE else row_of[before]
             column = before
-    pairs = ((int(row), column) for column, row in enumerate(row_of) if row != _FREE)
-    return sorted((row, column) for row, column in pairs if values[row, column] > 0)
+    column_of, used = np.empty(rows, np.int64), np.flatnonzero(row_of != _FREE)
+    column_of[row_of[used]] = used
+    paired = np.flatnonzero(values[np.arange(rows), column_of] > 0)
+    return paired, column_of[paired]
