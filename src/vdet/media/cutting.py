@@ -1,6 +1,5 @@
 """Cut parts out of a video: copy whole key-frame intervals, or encode exact frames."""
 
-import io
 import math
 from collections.abc import Iterable, Iterator
 from contextlib import closing
@@ -8,7 +7,6 @@ from fractions import Fraction
 from pathlib import Path
 
 import av
-from av.container import OutputContainer
 from av.packet import Packet
 from av.stream import Stream
 
@@ -21,48 +19,25 @@ from vdet.media.reader import VideoReader
 from vdet.media.writer import MARK, VIDEO_SUFFIXES, VideoWriter
 
 _AUDIO_LAG = 1  # seconds of video after the end in which audio of the part may still follow
-_NO_TIMES = 0x0080  # FFmpeg's flag of raw streams: AVFMT_NOTIMESTAMPS
 _MOST_REORDERED = 17  # frames in H.264 and H.265, and one
-_FORMATS = {".mkv": "matroska"}
 
 
 def copied_suffix(source: Path) -> str | None:
     """Return the suffix of copied parts of a video; None if they must be encoded.
 
-    It is that of the source, or .mkv. Copies need a seekable file with times of its own, one clock,
-    streams that the container supports, and key frames that are shown.
+    It is that of the source, or .mkv. Copies need a file with times of its own, one clock, and key
+    frames that are shown.
     """
     if not source.is_file() or is_image_name(source):
         return None
-    suffix = source.suffix.lower() if source.suffix.lower() in VIDEO_SUFFIXES else ".mkv"
-    with closing(Demuxer(source)) as demuxer:
-        container, context = demuxer.container, demuxer.video.codec_context
-        has_no_times = container.format.flags & _NO_TIMES or (
-            container.format.name == "avi" and context.has_b_frames
-        )
-        if demuxer.may_restart or has_no_times:
-            return None
-        try:
-            container.seek(_ticks(demuxer, Fraction(0)))
-            with av.open(io.BytesIO(), "w", format=_FORMATS.get(suffix, suffix[1:])) as trial:
-                _add_streams(demuxer, trial)
-                trial.start_encoding()
-        except (ValueError, OSError, av.FFmpegError):
-            return None
     decoder = Decoder(source, None)
-    with closing(decoder.demuxer):
-        return suffix if decoder.shows_key_frame() else None
-
-
-def _ticks(demuxer: Demuxer, time: Fraction) -> int:
-    """Return a time to seek to, not before the start of the file."""
-    return max(int(time * av.time_base), demuxer.container.start_time or 0)
-
-
-def _add_streams(demuxer: Demuxer, written: OutputContainer) -> dict[int, Stream]:
-    """Add the video and the audio streams, by their index in the source."""
-    streams: list[Stream] = [demuxer.video, *demuxer.container.streams.audio]
-    return {item.index: written.add_stream_from_template(item, opaque=True) for item in streams}
+    with closing(decoder.demuxer) as demuxer:
+        if demuxer.may_restart or demuxer.is_raw or decoder.lacks_shown_times:
+            return None
+        if not decoder.shows_key_frame():
+            return None
+    suffix = source.suffix.lower()
+    return suffix if suffix in VIDEO_SUFFIXES else ".mkv"
 
 
 def copy_part(source: Path, start: Fraction, end: Fraction, target: Path) -> None:
@@ -86,9 +61,15 @@ def copy_part(source: Path, start: Fraction, end: Fraction, target: Path) -> Non
     with closing(Demuxer(source)) as demuxer, av.open(str(target.absolute()), "w") as written:
         written.metadata["comment"] = MARK
         try:
-            targets = _add_streams(demuxer, written)
-            demuxer.container.seek(_ticks(demuxer, start))
-            streams = [demuxer.container.streams[index] for index in targets]
+            streams: list[Stream] = [demuxer.video, *demuxer.container.streams.audio]
+            targets = {
+                stream.index: written.add_stream_from_template(stream, opaque=True)
+                for stream in streams
+            }
+            # Not before the start of the file.
+            demuxer.container.seek(
+                max(int(start * av.time_base), demuxer.container.start_time or 0)
+            )
             for packet in _moved_to_zero(demuxer.packets(streams), demuxer.video, end):
                 packet.stream = targets[packet.stream_index]
                 written.mux(packet)

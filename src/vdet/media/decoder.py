@@ -128,6 +128,11 @@ class Decoder:
         self._packets = self._read()
         self.pictures = self._decode()
 
+    @property
+    def lacks_shown_times(self) -> bool:
+        """Whether the packets have no presentation times: in AVI files with B-frames."""
+        return self._is_avi and self.stream.codec_context.has_b_frames
+
     def skip_to(self, time: int, first: int) -> int | None:
         """Begin at the last key frame at or before a time, and count the frames before it.
 
@@ -195,14 +200,14 @@ class Decoder:
         AVI counts its empty packets too.
         """
         for picture in pictures:
-            if self._is_avi and self.stream.codec_context.has_b_frames:
+            if self.lacks_shown_times:
                 picture.pts = self._times.popleft() if self._times else None
             yield picture
 
     def _read(self) -> "Iterator[Packet[Stream]]":
         """Yield the packets of the pictures."""
         for packet in self.demuxer.packets([self.stream], self._fail):
-            if self._is_avi and self.stream.codec_context.has_b_frames:
+            if self.lacks_shown_times:
                 packet.pts = packet.dts
                 self._times += [] if packet.dts is None else [packet.dts]
             if self.demuxer.is_raw:
