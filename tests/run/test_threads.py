@@ -8,7 +8,7 @@ from itertools import islice
 import pytest
 
 from running import SOON
-from vdet.run.threads import map_ordered, read_async, write_async
+from vdet.run.threads import SearchThreads, read_async, write_async
 
 PLACES = ("source", "function", "taker")
 Errors = pytest.mark.parametrize("kind", [ValueError, KeyboardInterrupt, SystemExit])
@@ -91,12 +91,14 @@ class TestMapOrdered:
             ended[item].set()
             return item**2
 
-        with map_ordered(odd_ones_end_first, range(10), threads) as pairs:
-            assert list(pairs) == [(item, item**2) for item in range(10)]
+        with SearchThreads(threads) as pool:
+            pairs = list(pool.map_ordered(odd_ones_end_first, range(10)))
+            assert pairs == [(item, item**2) for item in range(10)]
 
     def test_few_items_are_taken_ahead(self) -> None:
         seen: list[int] = []
-        with map_ordered(str, recording(range(1, 100), seen), 2) as pairs:
+        with SearchThreads(2) as pool:
+            pairs = pool.map_ordered(str, recording(range(1, 100), seen))
             assert next(pairs) == (1, "1")
         assert len(seen) == 3
 
@@ -111,7 +113,8 @@ class TestAllTogether:
         with ExitStack() as stack:
             hand_over = stack.enter_context(write_async(take, within=nullcontext()))
             _, items = stack.enter_context(read_async(nullcontext(source)))
-            for _, result in stack.enter_context(map_ordered(function, items, threads=2)):
+            pool = stack.enter_context(SearchThreads(2))
+            for _, result in pool.map_ordered(function, items):
                 hand_over(result)
 
     @Errors

@@ -17,7 +17,7 @@ from vdet.labels.images import LabelledImage, LabelledImages
 from vdet.labels.label import LabelledVideo
 from vdet.progress import Progress, no_progress
 from vdet.run.images import ImageSearch
-from vdet.run.threads import map_ordered
+from vdet.run.threads import SearchThreads
 
 _MAX_DETECTIONS = 1000  # in an image, those of the highest scores
 
@@ -173,8 +173,8 @@ def evaluate_images(
     sources = []
     for labelled in sets:
         measured = []
-        with map_ordered(search, labelled.images, threads) as results:
-            for _, result in results:
+        with SearchThreads(threads) as pool:
+            for _, result in pool.map_ordered(search, labelled.images):
                 measured.append(result)
                 advance(1)
         sources.append(score_source(labelled, measured))

@@ -19,7 +19,7 @@ from vdet.run.result import FrameResult
 from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import SinkContext, Sinks, check_sinks, open_sinks
 from vdet.run.steps import ParallelStep, StepContext, make_steps
-from vdet.run.threads import map_ordered
+from vdet.run.threads import SearchThreads
 from vdet.track.track import Track
 
 
@@ -180,9 +180,9 @@ def run_images(
     with (
         files,
         search.open_sinks(shared, names, files) as shared_sinks,
-        map_ordered(detect, jobs, threads) as results,
+        SearchThreads(threads) as pool,
     ):
-        for job, result in results:
+        for job, result in pool.map_ordered(detect, jobs):
             if isinstance(result, FrameResult):
                 for folder in folders:
                     files.stage_folder(folder)

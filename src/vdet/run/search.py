@@ -7,10 +7,10 @@ if these differ.
 
 import math
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
-from functools import partial
+from itertools import chain
 from statistics import fmean
 from typing import Any
 
@@ -167,7 +167,7 @@ class FrameSearch:
         Those of the video: the parallel ones prepare all frames.
     threads
         Number of frames searched at once. The results do not depend on it. At most this number of
-        segments, and one more, are in memory.
+        segments, and two more, are in memory.
     """
 
     def __init__(
@@ -176,8 +176,6 @@ class FrameSearch:
         self._detector, self._rate, self._threads = detector, rate, threads
         self._steps = [step for step in steps if isinstance(step, ParallelStep)]
         self._is_stateless = getattr(detector, "is_stateless", False)
-        self._first_phase: deque[tuple[Segment, Future[SearchedFrame]]] = deque()
-        self._second_phase: deque[list[Callable[[], SearchedFrame]]] = deque()
         self._key_before: Boxes | None = None
 
     def search(self, frames: Iterable[Frame]) -> Generator[SearchedFrame]:
@@ -187,35 +185,26 @@ class FrameSearch:
         """
         may_skip = self._is_stateless and self._rate.searches and self._rate.stride is None
         parts = segments(self._rate.choose(frames), MAX_KEY_INTERVAL if may_skip else 0)
+        finished: Iterable[SearchedFrame] = ()
         with SearchThreads(self._threads) as pool:
-            for segment in parts:
-                self._first_phase.append((segment, pool.submit(self._search_last, segment)))
-                if len(self._first_phase) + len(self._second_phase) > self._threads:
-                    yield from self._finish_segment(pool)
-            while self._first_phase or self._second_phase:
-                yield from self._finish_segment(pool)
+            for segment, last in pool.map_ordered(self._search_last, parts):
+                between = self._search_between(pool, segment, last)
+                # Threads stay busy while the caller uses the frames of the segment before.
+                yield from finished
+                finished = chain((future.result() for future in between), [last])
+            yield from finished
 
-    def _finish_segment(self, pool: SearchThreads) -> list[SearchedFrame]:
-        self._begin_second_phases(pool)
-        finished = [result() for result in self._second_phase[0]]
-        self._begin_second_phases(pool)  # threads stay busy while the caller uses the frames
-        self._second_phase.popleft()
-        return finished
-
-    def _begin_second_phases(self, pool: SearchThreads) -> None:
-        """Begin the second phase of segments after their first one; wait for at least one."""
-        while self._first_phase and (self._first_phase[0][1].done() or not self._second_phase):
-            segment, last = self._first_phase.popleft()
-            key, before = last.result().detections if segment.has_key else None, self._key_before
-            is_still = before is not None and key is not None and shows_same(before, key)
-            self._key_before = key
-            between = [
-                pool.submit(self._search, frame).result
-                if is_chosen and not is_still
-                else partial(SearchedFrame, frame)
-                for frame, is_chosen in segment.frames[:-1]
-            ]
-            self._second_phase.append([*between, last.result])
+    def _search_between(
+        self, pool: SearchThreads, segment: Segment, last: SearchedFrame
+    ) -> list[Future[SearchedFrame]]:
+        """Begin the second phase of a segment, of which the `last` frame has been searched."""
+        key, before = last.detections if segment.has_key else None, self._key_before
+        is_still = before is not None and key is not None and shows_same(before, key)
+        self._key_before = key
+        return [
+            pool.submit(self._search, frame, is_chosen and not is_still)
+            for frame, is_chosen in segment.frames[:-1]
+        ]
 
     def _search_last(self, segment: Segment) -> SearchedFrame:
         """Do the first phase: prepare all frames, and search the last one if it is chosen."""
@@ -223,9 +212,11 @@ class FrameSearch:
             for frame, _ in segment.frames:
                 step.prepare(frame)
         frame, is_chosen = segment.frames[-1]
-        return self._search(frame) if is_chosen else SearchedFrame(frame)
+        return self._search(frame, is_chosen)
 
-    def _search(self, frame: Frame) -> SearchedFrame:
+    def _search(self, frame: Frame, is_due: bool) -> SearchedFrame:
+        if not is_due:
+            return SearchedFrame(frame)
         candidates = self._detector.search(frame.picture, frame.index)
         if self._is_stateless:
             return SearchedFrame(frame, True, detections=self._detector.detect(candidates))

@@ -1,13 +1,13 @@
 """Threads that read, search and write in parallel: items keep their order, one error ends all.
 
-Each function is a context manager. When its block ends, its threads have ended, with one exception:
+Each is a context manager. When its block ends, its threads have ended, with one exception:
 a thread that hangs in a read or write (for example on a network disk that is gone) is abandoned
 after `JOIN_TIMEOUT`, with the files that only it has open.
 """
 
 import sys
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import AbstractContextManager, contextmanager, suppress
 from typing import Any, TypeVar
@@ -26,9 +26,24 @@ class SearchThreads(ThreadPoolExecutor):
 
     def __init__(self, count: int, name: str = "vdet-search") -> None:
         super().__init__(count, thread_name_prefix=name)
+        self._count = count
 
     def __exit__(self, *_: object) -> None:
         self.shutdown(cancel_futures=True)
+
+    def map_ordered(self, function: Callable[[T], R], items: Iterable[T]) -> Generator[tuple[T, R]]:
+        """Yield items with the results of `function`, in order.
+
+        Items are taken ahead until every thread has one, and one more.
+        """
+        running: deque[tuple[T, Future[R]]] = deque()
+        for item in items:
+            running.append((item, self.submit(function, item)))
+            if len(running) > self._count:
+                first, future = running.popleft()
+                yield first, future.result()
+        for item, future in running:
+            yield item, future.result()
 
 
 class _Thread(SearchThreads):
@@ -98,26 +113,3 @@ def write_async(
             thread.submit(within.__exit__, *sys.exc_info())
             raise
         thread.submit(within.__exit__, None, None, None).result()
-
-
-@contextmanager
-def map_ordered(
-    function: Callable[[T], R], items: Iterable[T], threads: int
-) -> Iterator[Iterator[tuple[T, R]]]:
-    """Yield an iterator of items with the results of `function`, computed in threads, in order.
-
-    Items are taken ahead until every thread has one, and one more.
-    """
-    running: deque[tuple[T, Future[R]]] = deque()
-    with SearchThreads(threads) as pool:
-
-        def pairs() -> Iterator[tuple[T, R]]:
-            for item in items:
-                running.append((item, pool.submit(function, item)))
-                if len(running) > threads:
-                    first, future = running.popleft()
-                    yield first, future.result()
-            for item, future in running:
-                yield item, future.result()
-
-        yield pairs()

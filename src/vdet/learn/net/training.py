@@ -22,7 +22,7 @@ from vdet.learn.net.augmentation import Drawing, SampleDrawer
 from vdet.learn.net.export import export_network, start_from
 from vdet.learn.net.network import Batch, Network, Vehicles, class_weights, loss_of
 from vdet.learn.net.sources import NetSample, NetSource, Source, join
-from vdet.run.threads import map_ordered
+from vdet.run.threads import SearchThreads
 from vdet.version import __version__
 from vdet.workers import core_count
 
@@ -172,8 +172,8 @@ def train_network(
             training.start_from(base, batches.draw(0))
         workers = 1 if target.type == "cpu" else core_count()
         remaining_steps = range(training.step, settings.steps)
-        with map_ordered(batches.draw, remaining_steps, workers) as drawn:
-            for _, batch in drawn:
+        with SearchThreads(workers) as pool:
+            for _, batch in pool.map_ordered(batches.draw, remaining_steps):
                 loss = training.learn(batch)
                 progress(training.step, loss)
                 if training.step % CHECKPOINT == 0 or training.step == settings.steps:
