@@ -17,6 +17,7 @@ from vdet.detect.factory import load_detector, model_file
 from vdet.detect.protocol import DetectorModel
 from vdet.errors import BatchError, in_one_line
 from vdet.files import OutputFiles, write_whole
+from vdet.media.images import numbered_images
 from vdet.run.loop import Parts
 from vdet.run.sinks.protocol import output_state
 from vdet.run.video import Run, write_outputs
@@ -30,15 +31,16 @@ WrittenByPath = Mapping[str, Sequence[Written]]
 def result_digest(run: Run) -> str:
     """Return a digest of everything that the outputs of a run depend on.
 
-    This is the program, the model and mask files, the settings, the part, the time zone of this
-    computer, and the size and time of the input; for numbered images, of all files in their folder.
+    This is the program, the model, the settings, the part, the time zone of this computer, and the
+    name, size and time of the input, of all numbered images, and of the masks.
     """
     settings = run.settings
-    files = model_file(settings.detector), *(region.mask for region in settings.regions)
+    masks = (Path(region.mask) for region in settings.regions if region.mask)
+    files = filter(Path.exists, (*(numbered_images(run.source) or [run.source]), *masks))
     parts = (
         *(f"vdet {__version__}", run.start, run.end, run.frames, time.timezone, time.tzname),
-        *(_sha256(file) for file in files),
-        *_file_states(run.source),
+        _sha256(model_file(settings.detector)),
+        *((file.name, file.stat().st_size, file.stat().st_mtime_ns) for file in files),
         settings.with_paths(lambda _: "").model_dump_json(
             exclude={"train": True, "labels": True, "detector": {"model"}}
         ),
@@ -46,27 +48,18 @@ def result_digest(run: Run) -> str:
     return hashlib.sha256("\0".join(map(repr, parts)).encode()).hexdigest()
 
 
-def _file_states(source: Path) -> list[tuple[str, int, int]]:
-    """Return name, size and modification time of the input, or of all files in its folder."""
-    folder = source if source.is_dir() else source.parent
-    with suppress(OSError):  # the input does not exist; reading it will fail
-        files = [source] if source.is_file() else sorted(folder.iterdir())
-        return [(file.name, file.stat().st_size, file.stat().st_mtime_ns) for file in files]
-    return []
-
-
-def _sha256(path: Path | str | None) -> str | None:
+def _sha256(path: Path | None) -> str | None:
     """Return the SHA-256 of a file; None if it does not exist."""
     with suppress(OSError):
         if path:
-            state = Path(path).stat()
-            return _cached_sha256(str(path), state.st_ino, state.st_mtime_ns, state.st_size)
+            state = path.stat()
+            return _cached_sha256(path, state.st_ino, state.st_mtime_ns, state.st_size)
     return None
 
 
 @lru_cache(maxsize=16)
-def _cached_sha256(path: str, *_state: int) -> str:
-    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+def _cached_sha256(path: Path, *_state: int) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def outputs_by_path(records: Iterable[Record]) -> WrittenByPath:

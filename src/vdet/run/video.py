@@ -16,7 +16,6 @@ from vdet.detect.factory import as_model
 from vdet.detect.protocol import VideoDetector, stage_images_of
 from vdet.errors import ConfigError, FrameSizeError, VideoError
 from vdet.files import FileIds, OutputFiles
-from vdet.media.demux import is_pipe
 from vdet.media.reader import VideoReader
 from vdet.progress import Progress, no_progress
 from vdet.run.inputs import input_files
@@ -146,7 +145,6 @@ def open_video(run: Run, parts: Parts, *, with_traffic: bool = True) -> Iterator
     Reading and searching run in threads. Without `with_traffic`, nothing is counted or recorded.
     """
     with named_errors(run.source, VideoError), read_async(_opened(run)) as (reader, read):
-        _check_times(run, reader)
         images, frames = peek(read)
         settings, info = run.settings, reader.info
         try:
@@ -288,7 +286,7 @@ def write_outputs(
                 frames += 1
                 advance(1)
             if not frames:
-                raise _no_frame(run, "no frames at these times", video.reader)
+                raise _no_frame(run, video.reader)
         counts = video.traffic.counts()
         fact_lines = [line for fact in video.facts.values() for line in str(fact).splitlines()]
         for warning in (*(counts.warnings if counts else ()), *fact_lines):
@@ -305,20 +303,11 @@ def write_outputs(
     )
 
 
-def _check_times(run: Run, reader: VideoReader) -> None:
-    """Raise `VideoError` if the first time that is needed is beyond the end of the video.
-
-    A declared length may be wrong: it is only a reason to look.
-    """
-    first_time = max(run.start or Fraction(0), run.at)
-    if reader.length is None or first_time < reader.length or is_pipe(run.source):
-        return
-    with VideoReader(run.source, start=first_time, frames=1, settings=run.settings.input) as later:
-        if next(iter(later), None) is None:
-            raise _no_frame(run, f"{float(first_time):.2f} s is beyond its end", later)
-
-
-def _no_frame(run: Run, words: str, reader: VideoReader) -> VideoError:
-    """Return the error for a time without a frame."""
-    end = "check them" if reader.length is None else f"it ends at {float(reader.length):.2f} s"
-    return VideoError(f"{run.source}: {words}; {end}")
+def _no_frame(run: Run, reader: VideoReader) -> VideoError:
+    """Return the error for times without a frame."""
+    first, words = max(run.start or Fraction(0), run.at), "no frames at these times"
+    if reader.length is None:
+        return VideoError(f"{run.source}: {words}; check them")
+    if first >= reader.length:
+        words = f"{float(first):.2f} s is beyond its end"
+    return VideoError(f"{run.source}: {words}; it ends at {float(reader.length):.2f} s")
