@@ -56,7 +56,7 @@ def changed(name: str, number: int, **values: object) -> bytes:
 @pytest.mark.parametrize(
     ("data", "message"),
     [
-        (b"{", ": is not JSON: Expecting property name"),
+        (b"{", ": is not COCO: Invalid JSON: EOF while parsing an object"),
         (changed("images", 1, id=1), ": is not COCO: an id of images or categories occurs twice"),
         (changed("images", 1, frame_index=4), ": a frame_index occurs twice; use one file"),
         (changed("images", 1, time=0.15), ":images.1: frame 5 is at 0.15 s; times must"),

@@ -45,7 +45,7 @@ def test_the_content_tells_the_format_where_the_name_leaves_it_open(
         ("gt.txt", "1;1;10;20;30;40", "are separated by semicolons; they must be separated by c"),
         ("gt.csv", "frame\ttime\tid", "are separated by tabs; they must be separated by commas"),
         ("gt.txt", "1 2 3", "MOTChallenge has 9 or 10 columns; this line has"),
-        ("a.json", "{}", "has no images as in COCO; export or convert the labels"),
+        ("a.json", "{}", "is not COCO: images: Field required"),
         ("0000.txt", "0 3 Car 0 2 -1.57", "KITTI tracks are no longer read"),
         ("t.xml", "<annotations>", r"t\.xml: XML is not supported; export the labels as COCO"),
     ],

@@ -13,6 +13,7 @@ of CVAT, `dataset_manager/bindings.py`.
 """
 
 import json
+from codecs import BOM_UTF8
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
@@ -25,7 +26,7 @@ from pydantic.dataclasses import dataclass
 
 from vdet.boxes import Box
 from vdet.config.classes import UNKNOWN
-from vdet.errors import TruthError, printable
+from vdet.errors import TruthError
 from vdet.labels.formats import Format, ImageTracks, SourceVideo, last_classes
 from vdet.labels.images import LabelledImage, image_names, inside, log
 from vdet.labels.label import NO_ID, Label, SavedTracks, Size, from_size, line_error
@@ -193,37 +194,19 @@ _Entries = Annotated[list[_Entry], FailFast()]
 
 @_entry
 class _Document:
-    images: _Entries[_Image] = Field(default_factory=list)
+    images: _Entries[_Image]
     categories: _Entries[_Category] = Field(default_factory=list)
     annotations: _Entries[_Annotation] = Field(default_factory=list)
     info: _Info | None = None
 
 
 _DOCUMENT = TypeAdapter(_Document)
-_KEYS = {
-    name
-    for kind in (_Document, _Info, _Image, _Category, _Annotation, _Attributes)
-    for name in kind.__annotations__
-}
-
-
-def _used_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Return an object of JSON without what is not used, such as outlines: it takes most memory."""
-    return {key: value for key, value in pairs if key in _KEYS}
 
 
 def _read(path: Path, data: bytes) -> _Document:
     """Return the document. Raises `TruthError`."""
     try:
-        values = json.loads(data, object_pairs_hook=_used_keys)
-    except RecursionError:
-        raise TruthError(f"{path}: is not JSON: nested too deeply") from None
-    except ValueError as error:
-        raise TruthError(f"{path}: is not JSON: {printable(str(error))}") from error
-    if not (isinstance(values, dict) and "images" in values):
-        raise TruthError(f"{path}: has no images as in COCO; export or convert the labels to COCO")
-    try:
-        document = _DOCUMENT.validate_python(values)
+        document = _DOCUMENT.validate_json(data.removeprefix(BOM_UTF8))
     except ValidationError as error:
         raise TruthError(f"{path}: is not COCO: {first_mistake(error)}") from error
     for entries in (document.images, document.categories):

@@ -49,9 +49,7 @@ def numbered_lines(path: Path | str, data: bytes) -> Iterator[tuple[int, str]]:
             if stripped := line.decode().strip():
                 yield number, stripped
     except UnicodeDecodeError as error:
-        raise TruthError(
-            f"{path}: is not text (UTF-8); tracks and labels are text files"
-        ) from error
+        raise TruthError(f"{path}: is not a text file (UTF-8) of tracks or labels") from error
 
 
 def frame_number(name: str) -> int | None:
