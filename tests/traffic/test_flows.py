@@ -18,7 +18,7 @@ from vdet.errors import ConfigError
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Clock
 from vdet.traffic.counts import Counts, count_table, flow_table, zone_table
-from vdet.traffic.output import counts_content, flows_content, join_counts
+from vdet.traffic.output import counts_content, flows_content
 from vdet.traffic.tables import write_content
 
 WEST = LineSettings(name="west", start=(200, 200), end=(200, 600))
@@ -233,23 +233,6 @@ class TestFiles:
             '"west: right, car","west: right, truck","west: right, all",all\n'
             "0.0,10.0,1,1,2,0,1,1,3\n"
             "all,,1,1,2,0,1,1,3\n"
-        )
-
-    def test_wide_tables_of_many_videos_have_the_classes_of_all(self, tmp_path: Path) -> None:
-        content = {
-            name: counts_content(
-                Path("c.wide.csv"), {"v": counts(named(frames(GOES_EAST), name), WEST)}
-            )
-            for name in ("car", "truck")
-        }
-        join_counts(content, tmp_path / "all.wide.csv")
-        assert (tmp_path / "all.wide.csv").read_text() == (
-            'video,start,end,"west: left, car","west: left, truck","west: left, all",'
-            '"west: right, car","west: right, truck","west: right, all",all\n'
-            "car,0.0,10.0,1,0,1,0,0,0,1\n"
-            "car,all,,1,0,1,0,0,0,1\n"
-            "truck,0.0,10.0,0,1,1,0,0,0,1\n"
-            "truck,all,,0,1,1,0,0,0,1\n"
         )
 
     def test_json_has_flows_matrix_and_the_beginning(self, tmp_path: Path) -> None:

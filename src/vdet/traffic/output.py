@@ -7,13 +7,12 @@ interval; events have the name of their video.
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import astuple, fields
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 from vdet.traffic import counts as tables
 from vdet.traffic.counts import CountRow, Counts, Event, FlowRow, ZoneRow
-from vdet.traffic.tables import VIDEO, is_json, join_tables, plain_time, write_content
+from vdet.traffic.tables import VIDEO, is_json, plain_time
 
 _HEADINGS = {"class_name": "class", "origin": "from", "destination": "to"}
 
@@ -117,26 +116,6 @@ def flow_matrix(videos: Sequence[Counts]) -> dict[str, dict[str, int]]:
     )
     names = dict.fromkeys(name for video in videos for name, _ in video.directions)
     return {origin: {end: flows[origin, end] for end in (*names, NOWHERE)} for origin in names}
-
-
-def _join(table: str, videos: Mapping[str, Any], path: Path) -> None:
-    """Write one file over the videos of a batch, from the content of each.
-
-    Rows have the name of their video; JSON has the sums of a table over all videos and intervals,
-    and the JSON of each video.
-    """
-    if not is_json(path):
-        write_content(path, join_tables(videos, missing=0))
-        return
-    sums: Counter[tuple[tuple[str, Any], ...]] = Counter()
-    for row in (row for video in videos.values() for row in video[table]):
-        names = tuple(row.items())[2:-1]  # without the interval and the count
-        sums[names] += row["count"]
-    rows = [dict(names) | {"count": count} for names, count in sums.items()]
-    write_content(path, {table: rows, "videos": videos})
-
-
-join_counts, join_flows = partial(_join, "totals"), partial(_join, "flows")
 
 
 def _json(

@@ -16,7 +16,7 @@ from vdet.track.track import FrameTracks, State, Track
 from vdet.traffic.clock import Clock
 from vdet.traffic.linking import has_moved
 from vdet.traffic.speeds import KMH, SpeedMeter, Speeds
-from vdet.traffic.tables import VIDEO, is_json, join_tables, plain_time, write_content
+from vdet.traffic.tables import VIDEO, is_json, plain_time, write_content
 
 PATH_STEP = 0.01
 """Minimum distance between points of a path, as a fraction of the frame's width.
@@ -261,7 +261,8 @@ def join_records(videos: Mapping[str, list[Any]], target: Path) -> None:
         items = [{VIDEO: name, **item} for name, items in videos.items() for item in items]
         write_content(target, items)
     else:
-        write_content(target, join_tables(videos))
+        rows = [[name, *row] for name, (_, *body) in videos.items() for row in body]
+        write_content(target, [[VIDEO, *_COLUMNS], *rows])
 
 
 def _row(record: VehicleRecord, clock: Clock | None) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 import csv
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -73,27 +73,3 @@ def write_content(path: Path, content: Any) -> None:
             with path.open("w", encoding="utf-8", errors="backslashreplace", newline="") as file:
                 rows = (map(_plain_text, row) for row in content)
                 csv.writer(file, lineterminator="\n").writerows(rows)
-
-
-def join_tables(
-    tables: Mapping[str, Sequence[Sequence[Any]]], missing: Any = None
-) -> list[Sequence[Any]]:
-    """Join the tables of many videos, given by name, with the name in each row.
-
-    The result has the columns of all tables, in their order; `missing` fills columns that a table
-    lacks.
-    """
-    columns: list[str] = []
-    for heading, *_ in tables.values():
-        position = len(columns)
-        for column in reversed(heading):
-            if column in columns:
-                position = columns.index(column)
-            else:
-                columns.insert(position, column)
-    rows = (
-        [name, *(cells.get(column, missing) for column in columns)]
-        for name, (heading, *body) in tables.items()
-        for cells in (dict(zip(heading, row, strict=True)) for row in body)
-    )
-    return [[VIDEO, *columns], *rows]

@@ -15,7 +15,6 @@ from vdet.config.shapes import LineSettings, TrafficSettings, ZoneSettings
 from vdet.errors import OutputError
 from vdet.pages.render import PAGE_NAME
 from vdet.run.sinks import Output
-from vdet.run.sinks.data import COUNTS
 from vdet.run.video import Run
 
 GATE, YARD = 100 / 320, 110 / 320
@@ -78,17 +77,6 @@ def test_running_counts_are_drawn_if_asked_for(red_clip: Path, tmp_path: Path) -
 def test_without_lines_there_is_nothing_to_count_at(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="no lines or zones to count at"):
         write(Output("counts", tmp_path / "c.csv"), [result_of(Box.sized(1, 1, 9, 9))])
-
-
-def test_a_batch_has_a_file_over_all_videos(red_clip: Path, tmp_path: Path) -> None:
-    path = tmp_path / "a.json"
-    totals = run_red(Run(red_clip, outputs(counts=path)), with_counts())
-    assert COUNTS.total
-    COUNTS.total.write(dict.fromkeys("ab", totals.summaries[path]), tmp_path / "all.json")
-    whole = json.loads((tmp_path / "all.json").read_text())
-    assert whole["videos"]["b"] == json.loads(path.read_text())
-    gate = {"name": "gate", "direction": "out", "class": "vehicle", "count": 2}
-    assert whole["totals"][0] == gate
 
 
 def test_a_page_shows_the_counts(red_clip: Path, tmp_path: Path) -> None:

@@ -197,10 +197,9 @@ def _count_sink(make: MakeContent, path: Path, context: SinkContext) -> TableSin
     return TableSink(content, path, context)
 
 
-COUNTS, FLOWS = (
-    SinkKind(partial(_count_sink, make), ends, what, takes="videos", total=BatchTotal("all", join))
-    for what, make, ends, join in (
-        ("counts", output.counts_content, output.COUNT_SUFFIXES, output.join_counts),
-        ("flows", output.flows_content, output.FLOW_SUFFIXES, output.join_flows),
-    )
+COUNTS = SinkKind(
+    partial(_count_sink, output.counts_content), output.COUNT_SUFFIXES, "counts", takes="videos"
+)
+FLOWS = SinkKind(
+    partial(_count_sink, output.flows_content), output.FLOW_SUFFIXES, "flows", takes="videos"
 )
