@@ -28,10 +28,9 @@ Scene = tuple[list[Row], list[Row]]  # truth, prediction
 
 TRACKEVAL = {
     "matches": "CLR_TP", "false_positives": "CLR_FP", "misses": "CLR_FN",
-    "precision": "CLR_Pr", "recall": "CLR_Re", "f1": "CLR_F1", "mota": "MOTA", "motp": "MOTP",
+    "precision": "CLR_Pr", "recall": "CLR_Re", "f1": "CLR_F1", "mota": "MOTA", "mean_iou": "MOTP",
     "id_switches": "IDSW", "fragmentations": "Frag",
-    "mostly_tracked": "MT", "partly_tracked": "PT", "mostly_lost": "ML",
-    "idf1": "IDF1", "idp": "IDP", "idr": "IDR", "hota": "HOTA", "deta": "DetA", "assa": "AssA",
+    "idf1": "IDF1", "hota": "HOTA", "deta": "DetA", "assa": "AssA",
 }  # fmt: skip
 """Our names of metrics, and those of trackeval; a metric with several thresholds is their mean."""
 

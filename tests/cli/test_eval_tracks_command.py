@@ -29,7 +29,7 @@ def test_prints_a_table_and_writes_numbers_and_a_page(
     assert result.out.splitlines()[3].split()[5:10] == ["1.000", "0", "2", "0.800", "0.889"]
     values = json.loads((tmp_path / "a.json").read_text())
     assert (values["precision"], values["recall"]) == (1, 0.8)
-    keys = "f1 ap50 ap50_95 mean_iou mota motp idf1 hota deta assa id_switches fragmentations"
+    keys = "f1 ap50 ap50_95 mean_iou mota idf1 hota deta assa id_switches fragmentations"
     assert set(keys.split()) <= set(values)
     html = (tmp_path / "page" / "page.html").read_text()
     assert "frames 1–10 compared" in html

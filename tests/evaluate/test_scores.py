@@ -13,7 +13,7 @@ from vdet.labels.label import LabelledVideo
 
 def test_a_loose_box_lowers_the_overlap_of_the_matches_only() -> None:
     scores = score(video(drive(1, TEN, width=80)), video(drive(1, TEN)))
-    assert (scores.mean_iou, scores.motp) == pytest.approx((0.8, 0.8))
+    assert scores.mean_iou == pytest.approx(0.8)
     assert (scores.f1, scores.mota, scores.idf1) == (1, 1, 1)
 
 
@@ -52,5 +52,3 @@ def test_ratios_are_within_their_bounds(found: LabelledVideo, truth: LabelledVid
     assert scores["mota"] <= 1
     assert scores["matches"] + scores["misses"] == scores["vehicle_boxes"]
     assert scores["matches"] + scores["false_positives"] == scores["track_boxes"]
-    kinds = ("mostly_tracked", "partly_tracked", "mostly_lost")
-    assert sum(scores[name] for name in kinds) == scores["vehicles"]

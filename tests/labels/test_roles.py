@@ -21,11 +21,6 @@ def test_labels_mean_the_same_in_any_spelling(labels: tuple[str, ...], role: str
     assert {DEFAULT_ROLES.role_of(label) for label in labels} == {role}
 
 
-def test_known_words_are_listed_in_one_order() -> None:
-    ends = ["rider", *("ignore", "ignored", "ignoreregion", "ignoredregion", "ignoredregions")]
-    assert DEFAULT_ROLES.known_words.split(", ")[-7:] == [*ends, "dontcare"]
-
-
 def test_settings_give_words_another_role_and_add_new_ones() -> None:
     changes = ("pedestrian=vehicle", "tram=other", "cow=ignored")
     roles = Roles.from_settings(load_settings((), [f"labels.roles.{change}" for change in changes]))

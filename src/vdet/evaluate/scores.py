@@ -10,15 +10,12 @@ import numpy as np
 from vdet.boxes import BoolArray, Float64Array
 from vdet.config.classes import OUR_NAMES, UNKNOWN
 from vdet.evaluate import tracking
-from vdet.evaluate.comparison import ComparedFrame, Comparison, compare, counts
+from vdet.evaluate.comparison import ComparedFrame, Comparison, compare
 from vdet.labels.label import LabelledVideo
 
 IOU_THRESHOLDS = np.linspace(0.5, 0.95, 10)
 
 _RECALLS = np.linspace(0, 1, 101)
-
-_MOSTLY_TRACKED = 0.8
-_MOSTLY_LOST = 0.2
 
 
 @dataclass(frozen=True)
@@ -51,16 +48,12 @@ class Scores(DetectionScores):
     mota
         1 - (misses + false positives + id switches) / true boxes; negative if there are more
         mistakes than true boxes.
-    motp
-        Mean IoU of the matches, as `mean_iou`.
     id_switches
         Matches of a vehicle by another track than in its last match, however long ago.
     fragmentations
         How often a vehicle is found again after it was missed or absent.
-    mostly_tracked, partly_tracked, mostly_lost
-        Vehicles found in more than 80 %, in 20 to 80 %, in less than 20 % of their boxes.
-    idf1, idp, idr
-        F1, precision and recall of boxes if every vehicle has at most one track, 0 to 1.
+    idf1
+        F1 of boxes if every vehicle has at most one track, 0 to 1.
     hota, deta, assa
         HOTA and its two factors, detection accuracy and association accuracy, 0 to 1.
     vehicles, vehicle_boxes, tracks, track_boxes
@@ -76,15 +69,9 @@ class Scores(DetectionScores):
     ap50: float
     ap50_95: float
     mota: float
-    motp: float
     id_switches: int
     fragmentations: int
-    mostly_tracked: int
-    partly_tracked: int
-    mostly_lost: int
     idf1: float
-    idp: float
-    idr: float
     hota: float
     deta: float
     assa: float
@@ -124,11 +111,8 @@ def score_comparison(comparison: Comparison) -> Scores:
     """Score a comparison: one video, or several that `pool` has joined."""
     detection, delays = score_boxes(comparison), tracking.delays(comparison)
     of_found = [delay for delay in delays if delay is not None]
-    lengths, shown = comparison.vehicle_lengths(), int(comparison.track_lengths().sum())
-    boxes, vehicles = int(lengths.sum()), len(lengths)
-    matches = counts((frame.paired_vehicles for frame in comparison.frames), vehicles)
-    tracked = int(np.sum(matches / lengths > _MOSTLY_TRACKED))
-    lost = int(np.sum(matches / lengths < _MOSTLY_LOST))
+    boxes = detection.matches + detection.misses
+    shown = detection.matches + detection.false_positives
     switches, agreeing = tracking.id_switches(comparison), tracking.identity_matches(comparison)
     right = detection.matches - detection.false_positives - switches
     ap50, ap50_95 = rank_predictions(comparison).average_precisions()
@@ -138,19 +122,13 @@ def score_comparison(comparison: Comparison) -> Scores:
         ap50=ap50,
         ap50_95=ap50_95,
         mota=ratio(right, boxes),
-        motp=detection.mean_iou,
         id_switches=switches,
         fragmentations=tracking.fragmentations(comparison),
-        mostly_tracked=tracked,
-        partly_tracked=vehicles - tracked - lost,
-        mostly_lost=lost,
         idf1=ratio(2 * agreeing, boxes + shown),
-        idp=ratio(agreeing, shown),
-        idr=ratio(agreeing, boxes),
         hota=hota,
         deta=deta,
         assa=assa,
-        vehicles=vehicles,
+        vehicles=len(comparison.vehicle_ids),
         vehicle_boxes=boxes,
         tracks=len(comparison.track_ids),
         track_boxes=shown,

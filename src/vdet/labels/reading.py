@@ -96,8 +96,8 @@ def _with_roles(path: Path, labels: Iterable[Label], roles: Roles) -> Iterator[L
     for label in labels:
         role = "vehicle" if label.name is None else roles.role_of(label.name)
         if role is None:
-            message = f"label {label.name!r:.40} is unknown; set its role in labels.roles, or use "
-            raise line_error(path, label.position, f"{message}one of: {roles.known_words}")
+            message = f"label {label.name!r:.40} is unknown; set its role in labels.roles"
+            raise line_error(path, label.position, message)
         if role != "other":
             name = label.name and (roles.class_of(label.name) or "vehicle")
             ignored = label.ignored or role == "ignored"

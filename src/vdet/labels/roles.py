@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Self
 
-from vdet.config.classes import OUR_NAMES, WORDS, letters, our_name
+from vdet.config.classes import OUR_NAMES, letters, our_name
 from vdet.config.schema import Role, Settings
 
 _IGNORED = ("tram", "train", "misc", "trailer", "caravan", "rider")
@@ -75,11 +75,6 @@ class Roles:
     def class_of(self, label: str) -> str | None:
         """Return the class of a label; None if it has none."""
         return self.classes.get(letters(label)) or our_name(label)
-
-    @property
-    def known_words(self) -> str:
-        """All words with a role, for messages."""
-        return ", ".join(", ".join(WORDS.get(word, (word,))) for word in self.words)
 
 
 DEFAULT_ROLES = Roles.from_settings(Settings())
