@@ -20,7 +20,7 @@ from vdet.config.shapes import FRACTIONS, LineSettings, RegionSettings, Shape, Z
 from vdet.errors import ConfigError
 
 MAX_MISTAKES = 20
-"""Maximum number of mistakes that are shown; the others are counted."""
+"""Maximum number of mistakes that are shown."""
 
 _PACKAGE = Path(__file__).parents[1]
 # In a wheel the configs lie in the package; in a work tree beside `src`.
@@ -79,11 +79,8 @@ def load_settings(
     try:
         return Settings.model_validate(merged.values)
     except ValidationError as error:
-        mistakes = error.errors()
-        lines = [_describe(mistake, merged) for mistake in mistakes[:MAX_MISTAKES]]
-        if len(mistakes) > MAX_MISTAKES:
-            lines.append(f"… and {len(mistakes) - MAX_MISTAKES} more mistakes")
-        raise ConfigError(*lines) from error
+        mistakes = error.errors()[:MAX_MISTAKES]
+        raise ConfigError(*(_describe(mistake, merged) for mistake in mistakes)) from error
 
 
 def given_values(paths: Sequence[Path]) -> dict[str, Any]:
