@@ -26,24 +26,13 @@ def demo(folder: Path, seed: int, overwrite: bool) -> None:
       vdet demo
       vdet demo folder --seed 2 --overwrite
     """
-    from vdet.demo import MODEL, TRUTH, run_demo
+    from vdet.demo import run_demo
 
     with progress_steps("") as steps:
         lines = run_demo(folder, seed=seed, overwrite=overwrite, announce=announce, steps=steps)
-    files = {
-        "found.mp4": "the road with the vehicles that the network found",
-        "found.csv": f"their tracks; {folder / TRUTH} has the ground truth",
-        "counted.mp4": "the road from the pole, with lines and counts",
-        "page/page.html": f"its page; {folder / 'flows.csv'} has the flows",
-        "stages": "every stage of the linear model in one frame",
-        MODEL: "the linear model; vdet info FILE --json - prints its metrics",
-    }
-    paths = {str(folder / name): text for name, text in files.items()}
-    width = max(map(len, paths))
     print_lines(
         *lines,
         "",
-        "Results:",
-        *(f"  {path:{width}}  {text}" for path, text in paths.items()),
+        f"All files are in {folder}: found.mp4 and page/page.html are worth a look.",
         "Next, try your own video:  vdet detect-video in.mp4",
     )
