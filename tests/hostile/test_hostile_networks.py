@@ -49,16 +49,7 @@ def table(name: str) -> onnx.ValueInfoProto:
 
 ULTRALYTICS = np.zeros((1, 84, CELLS))
 NETWORKS: Mapping[str, tuple[Write, str]] = {
-    "an input of 50,000×50,000": (constant(ULTRALYTICS, shape=(1, 3, 50_000, 50_000)), "pixels"),
-    "imgsz of 50,000×50,000": (
-        constant(ULTRALYTICS, shape=(1, 3, "H", "W"), imgsz="[50000, 50000]"),
-        "pixels",
-    ),
     "an infinite imgsz": (constant(ULTRALYTICS, imgsz="[1e999, 64]"), "metadata cannot be read"),
-    "an imgsz of 10,000 digits": (
-        constant(ULTRALYTICS, shape=(1, 3, "H", "W"), imgsz=f"[0x{'f' * 10_000}, 64]"),
-        "pixels",
-    ),
     "names that are a number": (constant(ULTRALYTICS, names="5"), "metadata cannot be read"),
     "names like a well": (constant(ULTRALYTICS, names="[" * 5000), "metadata cannot be read"),
     "names of many signs": (constant(ULTRALYTICS, names="-" * 100_000 + "1"), "cannot be read"),

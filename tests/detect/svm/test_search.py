@@ -17,7 +17,7 @@ from vdet.config.section import scale_lengths
 from vdet.detect.svm.detector import SvmDetector
 from vdet.detect.svm.model import BoxRegression, LinearModel
 from vdet.detect.svm.windows import Windows, window_grids
-from vdet.errors import FrameSizeError, ImageError
+from vdet.errors import FrameSizeError
 from vdet.media import Picture
 
 Sides = tuple[float, float, float, float]
@@ -139,11 +139,3 @@ class TestVehicles:
 def test_a_frame_without_room_for_any_window_is_refused(width: int, height: int) -> None:
     with pytest.raises(FrameSizeError, match=rf"no search window fits .* {width}×{height} pixels"):
         SvmDetector(model_of(COLOUR), SEED.svm, width, height)
-
-
-def test_a_frame_with_too_many_windows_is_refused() -> None:
-    settings = SvmSettings(search=fixed(WindowSettings(size=8, overlap=0.8, top=0, bottom=720)))
-    with pytest.raises(ImageError, match=r"^907,649 windows in 1280×720") as error:
-        SvmDetector(model_of(COLOUR), settings, 1280, 720)
-    assert not isinstance(error.value, FrameSizeError)
-    assert "use larger steps" in str(error.value)

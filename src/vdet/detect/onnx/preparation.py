@@ -24,9 +24,9 @@ class InputForm:
     width, height
         Size of the input, pixels.
     dtype
-        uint8, for our own networks: `(1, height, width, 3)`, BGR, filled by the frame. Float32 or
-        float16, for others: `(1, 3, height, width)`, RGB from 0 to 1; the frame keeps its aspect
-        ratio and lies in the middle, with grey around it.
+        uint8, for our own networks: `(1, height, width, 3)`, BGR, filled by the frame. Float32, for
+        others: `(1, 3, height, width)`, RGB from 0 to 1; the frame keeps its aspect ratio and lies
+        in the middle, with grey around it.
     """
 
     width: int
@@ -38,7 +38,7 @@ class InputForm:
         image, placement = self.scaled(picture)
         if self.dtype is np.uint8:
             return image[np.newaxis], placement
-        return cv2.dnn.blobFromImage(image, 1 / 255, swapRB=True).astype(self.dtype), placement
+        return cv2.dnn.blobFromImage(image, 1 / 255, swapRB=True), placement
 
     def scaled(self, picture: Picture) -> tuple[Image, "Placement"]:
         """Return the input as an image, BGR uint8, and the placement of the frame in it."""

@@ -25,13 +25,9 @@ from vdet.detect.onnx.session import Array, Session
 from vdet.errors import ModelError
 from vdet.media import Picture
 
-_MAX_SIDE = 16_384
-_MAX_PIXELS = 16_000_000
 _MAX_FINAL_ROWS = 1000
 _NORMALISED = 2.0  # pixels of the input: boxes that all end nearer to the corner are fractions
 _USUAL_SIZE = 640, 640  # for exports with a dynamic input size
-_TYPES: dict[str, type[np.generic]] = {"tensor(float)": np.float32, "tensor(float16)": np.float16}
-"""Names of input types in onnxruntime."""
 
 COCO = tuple(Path(__file__).with_name("coco.txt").read_text("utf-8").splitlines())
 """The 80 classes of the COCO data set, in the order used by detectors."""
@@ -56,7 +52,7 @@ class Header(Section):
 
     format: Literal[1] = 1
     classes: tuple[str, ...] = Field(min_length=1, max_length=1000)
-    pixels: int = Field(147_456, ge=1024, le=_MAX_PIXELS)
+    pixels: int = Field(147_456, ge=1024, le=16_000_000)
     """Pixels of the scaled video frame."""
     calibration: Calibration = Calibration()
     by_class: dict[str, Calibration] = Field({}, max_length=1000)
@@ -99,8 +95,8 @@ class Recognized:
         """
         if self.header is None:
             return self
-        pixels = min(_MAX_PIXELS, self.header.pixels * scale)
-        return _ours(self.session, self.header, size_of_area(width, height, pixels))
+        size = size_of_area(width, height, self.header.pixels * scale)
+        return _ours(self.session, self.header, size)
 
     def find(self, picture: Picture, minimum: float) -> RawBoxes:
         """Return the boxes in pixels of the picture, with scores of at least `minimum`.
@@ -174,7 +170,7 @@ def _foreign(session: Session, names: tuple[str, ...]) -> Recognized:
     names_in_file, size = _ultralytics_metadata(session)
     names = names or names_in_file
     form = _letterbox(session, size)
-    outputs = session.run(np.zeros((1, 3, form.height, form.width), form.dtype))
+    outputs = session.run(np.zeros((1, 3, form.height, form.width), np.float32))
     cells = len(cell_centers(form.width, form.height)[1])
     match outputs[0].shape:
         case (1, rows, 6) if rows <= _MAX_FINAL_ROWS:
@@ -213,13 +209,9 @@ def _letterbox(session: Session, usual: tuple[int, int]) -> InputForm:
     if len(sides) != 4 or sides[0] not in (1, None) or sides[1] not in (3, None):
         seen = str(slot.shape).replace("None", "any")
         raise _unknown(session, f"its input is {seen:.100}, not [1, 3, height, width]")
-    if slot.type not in _TYPES:
+    if slot.type != "tensor(float)":
         raise _unknown(session, f"its input is a {slot.type}, not a tensor(float)")
-    width, height = sides[3] or usual[0], sides[2] or usual[1]
-    if not (0 < width <= _MAX_SIDE and 0 < height <= _MAX_SIDE and width * height <= _MAX_PIXELS):
-        limits = f"{_MAX_PIXELS:,} pixels, or a side of more than {_MAX_SIDE:,}"
-        raise _unknown(session, f"its input has no pixels, more than {limits}")
-    return InputForm(width, height, _TYPES[slot.type])
+    return InputForm(sides[3] or usual[0], sides[2] or usual[1], np.float32)
 
 
 def _shapes(outputs: Sequence[Array]) -> str:

@@ -21,7 +21,7 @@ from vdet.detect.svm.search import DenseSearch, vehicle_boxes
 from vdet.detect.svm.votes import Votes, split_regions
 from vdet.detect.svm.windows import WindowGrid, Windows, window_grids
 from vdet.draw.boxes import GREEN, WHITE, color_of, draw_box, draw_label
-from vdet.errors import FrameSizeError, ImageError, ModelError
+from vdet.errors import FrameSizeError, ModelError
 from vdet.media import Picture
 
 log = logging.getLogger("vdet")
@@ -58,8 +58,6 @@ class SvmModel:
         ------
         FrameSizeError
             No search window fits into such a frame.
-        ImageError
-            Too many windows fit into such a frame.
         """
         horizon = self._horizon(images)
         return SvmDetector(self.model, self.settings, width, height, horizon=horizon)
@@ -79,9 +77,6 @@ class SvmModel:
         log.info("the horizon is at %.2f of the height", horizon)
         return horizon
 
-
-MAX_WINDOWS = 100_000
-"""Maximum number of windows in a frame; more take minutes. Shipped settings have about 2,700."""
 
 _ALIGNMENT = 16
 """The searched part begins at a multiple of this many pixels, so that it can be halved like its
@@ -110,8 +105,6 @@ class SvmDetector:
     ------
     FrameSizeError
         No window fits into such a frame.
-    ImageError
-        More than `MAX_WINDOWS` windows fit.
     """
 
     def __init__(
@@ -129,9 +122,6 @@ class SvmDetector:
         self.grids = tuple(window_grids(settings, model.features, width, height, horizon=horizon))
         if not self.grids:
             raise FrameSizeError(f"no search window fits into {width}×{height} pixels")
-        if (count := sum(map(len, self.grids))) > MAX_WINDOWS:
-            many = f"{count:,} windows in {width}×{height} pixels are too many"
-            raise ImageError(f"{many}; use larger steps")
         self._searches = [engine(model, grid) for grid in self.grids]
         self._boxes = np.concatenate([grid.boxes for grid in self.grids])
         weights = np.array([grid.weight for grid in self.grids], np.float32)
