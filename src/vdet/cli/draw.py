@@ -65,9 +65,9 @@ def draw(
         run = Run(clip, settings=whole_frames, start=start, end=end)
         image, frames = read_scene(run, tracks, steps)
     drawing = Drawing(image, frames, settings, _user_values(source.configs))
-    with OutputFiles(overwrite=overwrite) as files, output_errors(output):
-        name = Path([output.name, *source.configs][-1]).with_suffix(".yaml").name
-        files.stage(output).write_bytes(drawing.output(output, name))
+    name = Path([output.name, *source.configs][-1]).with_suffix(".yaml").name
+    with staged(output, overwrite=overwrite) as temporary:
+        temporary.write_bytes(drawing.output(output, name))
     print_lines(f"{output}: written, {counted(len(drawing.paths), 'vehicle')}")
 
 
