@@ -25,8 +25,8 @@ from vdet.config.classes import OUR_NAMES, UNKNOWN
 from vdet.config.loading import load_settings
 from vdet.config.schema import NetworkSettings, Settings
 from vdet.detect.factory import load_detector
-from vdet.detect.onnx.detector import NetworkDetector, trained_on
-from vdet.detect.onnx.recognition import Calibration, read_header
+from vdet.detect.onnx.detector import NetworkDetector
+from vdet.detect.onnx.recognition import Calibration, Header, read_header
 from vdet.detect.onnx.session import Session
 from vdet.detect.protocol import DetectorModel
 from vdet.evaluate.comparison import MATCH_IOU, ComparedFrame
@@ -349,6 +349,15 @@ def _those(pictures: Sequence[LabelledImage], flags: BoolArray) -> tuple[Labelle
     return tuple(pictures[number] for number in np.flatnonzero(flags).tolist())
 
 
+def trained_on(header: Header | None) -> list[str]:
+    """Return the names of the sets that one of our networks and its bases were trained on."""
+    names, provenance = [], header.provenance if header else {}
+    while provenance:
+        names += [source["name"] for source in provenance["report"]["sources"]]
+        provenance = provenance.get("base")
+    return list(dict.fromkeys(names))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("roads", type=Path, help="folder of sets of labelled pictures")
@@ -385,8 +394,8 @@ def main() -> None:
             results[name] |= calibrate(frames, header.calibration)
         print("\n".join(summary_lines(name, results[name])))
     for model in arguments.model:
-        seen = trained_on(model)
-        print(f"{model} has seen: {', '.join(seen) or 'not known'}")
+        header = read_header(Session(model))
+        print(f"{model} has seen: {', '.join(trained_on(header)) or 'not known'}")
     write_whole(arguments.work / "results.json", json_text(results), overwrite=True)
     if arguments.steps:
         print("\n".join(video_lines(unseen.clip, networks[OURS], unseen.settings)))

@@ -20,14 +20,11 @@ MODELS = Path(__file__).parents[2] / "src" / "vdet" / "models"
         ("net.onnx", ("form: vdet", "input for 1280x720: 640x352", "classes: car; truck; bus")),
     ],
 )
-def test_a_shipped_model_says_what_it_was_trained_on(
-    run: Run, name: str, lines: tuple[str, ...]
-) -> None:
+def test_a_shipped_model_is_described(run: Run, name: str, lines: tuple[str, ...]) -> None:
     result = run("info", MODELS / name, "--json", "-")
     values = json.loads(result.out)
     assert values["file"] == str(MODELS / name)
     assert values["provenance"]["program"].startswith("vdet ")
-    assert values["trained_on"]
     for line in lines:
         assert line in result.err
 

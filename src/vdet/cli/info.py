@@ -106,7 +106,6 @@ def _text(value: Any) -> str:
 
 
 def _linear_model(path: Path) -> Facts:
-    from vdet.detect.svm.detector import trained_on
     from vdet.detect.svm.model import load_model
 
     model = load_model(path)
@@ -115,14 +114,12 @@ def _linear_model(path: Path) -> Facts:
         "features": model.weights.shape[1],
         "patch": model.features.patch,
         "learnt_boxes": model.box_regression is not None,
-        "trained_on": list(trained_on(path)),
         "provenance": model.provenance,
     }
 
 
 def _network(path: Path) -> Facts:
     from vdet.config.classes import our_name
-    from vdet.detect.onnx.detector import trained_on
     from vdet.detect.onnx.recognition import recognize
     from vdet.detect.onnx.session import Session
 
@@ -133,7 +130,6 @@ def _network(path: Path) -> Facts:
         "input_for_1280x720": f"{network.form.width}x{network.form.height}",
         "classes": [name for name in network.names if our_name(name)],
         "other_classes": [name for name in network.names if not our_name(name)],
-        "trained_on": list(trained_on(path)),
         "provenance": network.header.provenance if network.header else {},
     }
 

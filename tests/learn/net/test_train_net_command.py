@@ -7,7 +7,6 @@ import pytest
 
 from conftest import Run
 from labels.writers import WRITERS, Boxed, Labelled, write_coco
-from vdet.detect.onnx.detector import trained_on
 from vdet.detect.onnx.recognition import read_header
 from vdet.detect.onnx.session import Session
 
@@ -34,7 +33,6 @@ def test_it_learns_from_pictures_labelled_in_each_form(run: Run, tmp_path: Path,
     folder, output = write_set(tmp_path / "my_set", form), tmp_path / "net.onnx"
     result = run("train-net", folder, "-o", output, *QUICK, code=0)
     assert result.out.splitlines()[0] == "my_set: 2 images; 2 car"
-    assert trained_on(output) == ("my_set",)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["my_set", "net.onnx"]
     picture = next(folder.rglob("a.png"))
     run("detect-image", picture, "-c", "net", "--model", output, "--json", "-", code=0)
@@ -75,7 +73,10 @@ def test_a_network_has_learnt_from_the_sets_of_its_base_too(run: Run, tmp_path: 
     run("train-net", write_set(tmp_path / "one"), "-o", base, *QUICK, code=0)
     command = ("train-net", write_set(tmp_path / "two"), "-o", output, *QUICK)
     run(*command, "--base", base, code=0)
-    assert trained_on(output) == ("two", "one")
+    header = read_header(Session(output))
+    assert header is not None
+    assert header.provenance["report"]["sources"][0]["name"] == "two"
+    assert header.provenance["base"]["report"]["sources"][0]["name"] == "one"
 
 
 def test_a_base_that_is_not_there_is_said_before_the_training(run: Run, tmp_path: Path) -> None:

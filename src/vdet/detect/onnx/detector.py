@@ -1,11 +1,10 @@
 """A network in an ONNX file as a detector, of the kind `net`."""
 
-import contextlib
 import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from vdet.boxes import Boxes, Image, Int32Array, clipped
 from vdet.config.classes import our_name
 from vdet.config.schema import NetworkSettings
 from vdet.detect.onnx.merging import combine, suppress
-from vdet.detect.onnx.recognition import Recognized, read_header, recognize
+from vdet.detect.onnx.recognition import Recognized, recognize
 from vdet.detect.onnx.session import Session
 from vdet.draw.boxes import GREEN, draw_box
 from vdet.errors import ModelError
@@ -152,21 +151,6 @@ def our_classes(names: Sequence[str], chosen: Sequence[str]) -> list[int]:
     """Return the index in `chosen` of each class of a network, -1 if it is missing."""
     numbers = {name: number for number, name in enumerate(chosen)}
     return [numbers.get(our_name(name) or name.strip().lower(), -1) for name in names]
-
-
-def trained_on(path: Path) -> tuple[str, ...]:
-    """Return the names of the sets that our network and its bases were trained on.
-
-    Other networks have no such names.
-    """
-    header = read_header(Session(path))
-    provenance: Any = header.provenance if header else None
-    names: list[str] = []
-    with contextlib.suppress(LookupError, TypeError, AttributeError):  # written by another program
-        while provenance:
-            names += (str(source["name"]) for source in provenance["report"]["sources"])
-            provenance = provenance.get("base")
-    return tuple(dict.fromkeys(names))
 
 
 def load_network(settings: NetworkSettings, path: Path | None) -> NetworkModel:

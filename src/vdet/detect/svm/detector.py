@@ -230,15 +230,6 @@ def requested_features(settings: SvmSettings) -> FeatureSettings | None:
     return settings.features if "features" in settings.model_fields_set else None
 
 
-def trained_on(path: Path) -> tuple[str, ...]:
-    """Return the names of the groups of patches that a linear model was trained on."""
-    try:
-        groups = load_model(path).provenance["report"]["groups"]
-        return tuple(dict.fromkeys(str(group).rpartition("/")[2] for group in groups))
-    except (LookupError, TypeError):
-        return ()
-
-
 def blend_heat(image: Image, heat: Heat) -> Image:
     """Return the darkened image with the heat over it: black, red, white at the peak."""
     scale = 255 / heat.peak if heat.peak > 0 else 0
