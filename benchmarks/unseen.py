@@ -351,7 +351,8 @@ def _those(pictures: Sequence[LabelledImage], flags: BoolArray) -> tuple[Labelle
 
 def trained_on(header: Header | None) -> list[str]:
     """Return the names of the sets that one of our networks and its bases were trained on."""
-    names, provenance = [], header.provenance if header else {}
+    names: list[str] = []
+    provenance: dict[str, Any] | None = header.provenance if header else None
     while provenance:
         names += [source["name"] for source in provenance["report"]["sources"]]
         provenance = provenance.get("base")
