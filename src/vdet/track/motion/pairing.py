@@ -141,12 +141,9 @@ def assign(values: npt.NDArray[Any]) -> tuple[Int64Array, Int64Array]:
     -------
     Rows and columns of the pairs with a value above 0, rows ascending.
     """
-    rows, columns = values.shape
-    if rows > columns:
-        paired_columns, paired_rows = assign(values.T)
-        order = np.argsort(paired_rows)
-        return paired_rows[order], paired_columns[order]
-    costs, row_of = -values, np.full(columns, _FREE)
+    rows, columns = len(values), max(values.shape)  # each row gets a column, perhaps an added one
+    costs, row_of = np.zeros((rows, columns)), np.full(columns, _FREE)
+    costs[:, : values.shape[1]] -= values
     of_rows, of_columns = np.zeros(rows), np.zeros(columns)  # the dual variables
     for row in range(rows):
         # Search the cheapest path from this row to a free column.
@@ -172,5 +169,5 @@ def assign(values: npt.NDArray[Any]) -> tuple[Int64Array, Int64Array]:
             column = before
     column_of, used = np.empty(rows, np.int64), np.flatnonzero(row_of != _FREE)
     column_of[row_of[used]] = used
-    paired = np.flatnonzero(values[np.arange(rows), column_of] > 0)
+    paired = np.flatnonzero(costs[np.arange(rows), column_of] < 0)
     return paired, column_of[paired]
