@@ -1,7 +1,6 @@
 """Every format of the registry: what is written is read again, and what is damaged is refused."""
 
 import math
-from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -16,9 +15,8 @@ from labels.saving import VIDEO, car, frame, read_back, written
 from vdet.boxes import Box
 from vdet.config.classes import OUR_NAMES, UNKNOWN
 from vdet.errors import TruthError
-from vdet.labels.coco import COCO, read_coco_images
-from vdet.labels.formats import Format, ImageTracks, image_suffixes, track_formats
-from vdet.labels.images import LabelledImage
+from vdet.labels.coco import COCO, read_coco_images, write_coco_images
+from vdet.labels.formats import Format, ImageTracks, track_formats
 from vdet.labels.label import SavedTracks
 from vdet.labels.mot import MOT
 from vdet.labels.native import CSV, JSON_LINES
@@ -44,9 +42,6 @@ def boxes(draw: st.DrawFn) -> Box:
     right, bottom = draw(st.integers(x + 1, VIDEO.width)), draw(st.integers(y + 1, VIDEO.height))
     return Box.sized(x, y, right - x, bottom - y)
 
-
-READERS: dict[Format, Callable[[Path], Iterator[LabelledImage]]] = {COCO: read_coco_images}
-"""How the labels of pictures are read again."""
 
 CLASSES = st.sampled_from([None, *OUR_NAMES, "tractor", 'a <"b"> & c, d', "Überlandbus 🚌"])
 PLACES = st.floats(-3000, 3000).map(lambda value: round(value, 2))
@@ -157,24 +152,18 @@ def labelled(draw: st.DrawFn) -> list[ImageTracks]:
     ]
 
 
-def test_every_format_that_pictures_are_written_in_is_read() -> None:
-    assert set(image_suffixes()) == {form.suffix for form in READERS}
-
-
-@pytest.mark.parametrize("form", READERS, ids=lambda form: form.name)
 @settings(max_examples=20)
 @given(pictures=labelled())
-def test_labels_of_pictures_are_read_again(form: Format, pictures: list[ImageTracks]) -> None:
-    assert form.images is not None
+def test_labels_of_pictures_are_read_again(pictures: list[ImageTracks]) -> None:
     with TemporaryDirectory() as name:
         folder = Path(name)
-        path, images = folder / f"set{form.suffix}", folder / "images"
+        path, images = folder / "set.coco.json", folder / "images"
         for picture in pictures:
             (images / picture.path).parent.mkdir(parents=True, exist_ok=True)
             write_image(images / picture.path, np.zeros((VIDEO.height, VIDEO.width, 3), np.uint8))
         with path.open("wb") as file:
-            form.images(file, pictures)
-        found = list(READERS[form](path))
+            write_coco_images(file, pictures)
+        found = list(read_coco_images(path))
     expected = {
         images / picture.path: sorted(
             (track.box.pixels, track.class_name or UNKNOWN) for track in picture.tracks

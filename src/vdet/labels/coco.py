@@ -105,7 +105,8 @@ def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) ->
     writer.end(file)
 
 
-def _write_images(file: BinaryIO, images: Sequence[ImageTracks]) -> None:
+def write_coco_images(file: BinaryIO, images: Sequence[ImageTracks]) -> None:
+    """Write the vehicles in images; their paths are their names in the file."""
     writer = _Writer("images")
     for number, image in enumerate(images, start=1):
         (width, height), name = image.size, image.path.as_posix()
@@ -264,7 +265,7 @@ def read_coco(path: Path, data: bytes) -> SavedTracks:
     return SavedTracks(labels, tuple(sorted(images)), checked_times(path, times), size)
 
 
-COCO = Format("COCO", ".coco.json", read_coco, whole=_write, images=_write_images)
+COCO = Format("COCO", ".coco.json", read_coco, whole=_write)
 
 
 def read_coco_images(path: Path) -> Iterator[LabelledImage]:

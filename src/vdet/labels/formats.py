@@ -60,9 +60,6 @@ class Format:
         the first line of the file.
     whole
         For a format that is written at the end: function that writes all frames of a video.
-    images
-        For a format that also stores labels of images: function that writes them. Their paths are
-        their names in the file.
     """
 
     name: str
@@ -71,7 +68,6 @@ class Format:
     lines: Callable[[FrameTracks], Iterable[str]] | None = None
     heading: str = ""
     whole: Callable[[BinaryIO, SourceVideo, Sequence[FrameTracks]], None] | None = None
-    images: Callable[[BinaryIO, Sequence[ImageTracks]], None] | None = None
 
 
 class TrackWriter:
@@ -103,7 +99,7 @@ def last_classes(frames: Iterable[FrameTracks]) -> dict[int, str]:
 
 def track_formats() -> list[Format]:
     """Return all formats of tracks, those of vdet first. Raises `ConfigError`."""
-    return [form for form in _formats() if form.lines or form.whole]
+    return [load_plugin(FORMATS, name) for name in plugin_names(FORMATS)]
 
 
 def track_suffixes() -> list[str]:
@@ -111,18 +107,9 @@ def track_suffixes() -> list[str]:
     return [form.suffix for form in track_formats()]
 
 
-def image_suffixes() -> list[str]:
-    """Return the endings of files with labels of images."""
-    return [form.suffix for form in _formats() if form.images]
-
-
-def _formats() -> list[Format]:
-    return [load_plugin(FORMATS, name) for name in plugin_names(FORMATS)]
-
-
 def format_for(path: Path) -> Format | None:
     """Return the format by the ending of a name; None if it is unknown."""
-    matching = [form for form in _formats() if path.name.lower().endswith(form.suffix)]
+    matching = [form for form in track_formats() if path.name.lower().endswith(form.suffix)]
     return max(matching, key=lambda form: len(form.suffix), default=None)
 
 

@@ -6,13 +6,14 @@ Source: Milan et al., "MOT16: A Benchmark for Multi-Object Tracking", 2016, tabl
 import logging
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 from pydantic import Field, TypeAdapter, ValidationError
+from pydantic.dataclasses import dataclass
 
 from vdet.labels.formats import Format
 from vdet.labels.label import Label, SavedTracks, from_size, line_error
-from vdet.labels.parsing import LIMIT, Number, numbered_lines
+from vdet.labels.parsing import LIMIT, Number, first_mistake, numbered_lines
 from vdet.track.track import FrameTracks
 
 _log = logging.getLogger("vdet")
@@ -22,7 +23,8 @@ _TRUTH_COLUMNS, _RESULT_COLUMNS = 9, 10
 _Whole = Annotated[int, Field(ge=-LIMIT, le=LIMIT)]
 
 
-class _Row(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class _Row:
     """The columns that are used."""
 
     frame: _Whole
@@ -35,6 +37,7 @@ class _Row(NamedTuple):
 
 
 _ROW = TypeAdapter(_Row)
+_NAMES = tuple(_Row.__annotations__)
 
 
 def _lines(frame: FrameTracks) -> Iterator[str]:
@@ -88,11 +91,9 @@ def _labels(path: Path, data: bytes, classes: set[str]) -> Iterator[Label]:
         counts = (len(columns),)
         is_truth = len(columns) == _TRUTH_COLUMNS
         try:
-            row = _ROW.validate_python(columns[: len(_Row._fields)])
+            row = _ROW.validate_python(dict(zip(_NAMES, columns, strict=False)))
         except ValidationError as error:
-            mistake = error.errors()[0]
-            column = _Row._fields[int(mistake["loc"][0])]
-            raise line_error(path, line, f"{column}: {mistake['msg']}") from error
+            raise line_error(path, line, first_mistake(error)) from error
         if is_truth and row.score not in {0, 1}:
             message = f"with nine columns, column 7 must be a flag, 0 or 1, but is {row.score:g}"
             raise line_error(path, line, f"{message}; a results file needs ten columns")

@@ -12,13 +12,13 @@ from typing import Any, BinaryIO, Self
 
 from vdet.errors import OutputError
 from vdet.files import json_text, print_now, write_text
+from vdet.labels.coco import COCO, write_coco_images
 from vdet.labels.formats import (
     ImageTracks,
     SourceVideo,
     TrackWriter,
     check_track_name,
     format_for,
-    image_suffixes,
     track_suffixes,
 )
 from vdet.labels.native import CLOCK, CLOCK_SOURCE, JSON_LINES, track_record
@@ -87,9 +87,9 @@ TRACKS = SinkKind(
 
 
 class LabelSink(BaseSink):
-    """Collects the boxes of images, and writes them at the end in a format for label tools.
+    """Collects the boxes of images, and writes them at the end as COCO, for label tools.
 
-    The ending of the name selects the format. An image is named by its path below the input folder.
+    An image is named by its path below the input folder.
     """
 
     def __init__(self, path: Path, context: SinkContext) -> None:
@@ -98,11 +98,8 @@ class LabelSink(BaseSink):
 
     def finish(self) -> None:
         """Write the file."""
-        form = format_for(self.path)
-        assert form is not None  # the suffixes of the kind say so
-        assert form.images is not None
         with self.context.files.stage(self.path).open("wb") as file:
-            form.images(file, self._images)
+            write_coco_images(file, self._images)
 
     def write(self, result: FrameResult) -> None:
         """Add an image."""
@@ -111,7 +108,7 @@ class LabelSink(BaseSink):
         self._images.append(ImageTracks(name, size, result.tracks))
 
 
-LABELS = SinkKind(LabelSink, image_suffixes, "labels of images", takes="images")
+LABELS = SinkKind(LabelSink, (COCO.suffix,), "labels of images", takes="images")
 
 
 class JsonSink(BaseSink):
