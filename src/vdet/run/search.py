@@ -167,7 +167,7 @@ class FrameSearch:
         Those of the video: the parallel ones prepare all frames.
     threads
         Number of frames searched at once. The results do not depend on it. At most this number of
-        segments, and two more, are in memory.
+        segments, and one more, are in memory.
     """
 
     def __init__(
@@ -187,7 +187,8 @@ class FrameSearch:
         parts = segments(self._rate.choose(frames), MAX_KEY_INTERVAL if may_skip else 0)
         finished: Iterable[SearchedFrame] = ()
         with SearchThreads(self._threads) as pool:
-            for segment, last in pool.map_ordered(self._search_last, parts):
+            ahead = max(1, self._threads - 1)  # and the one whose second phase has begun
+            for segment, last in pool.map_ordered(self._search_last, parts, ahead):
                 between = self._search_between(pool, segment, last)
                 # Threads stay busy while the caller uses the frames of the segment before.
                 yield from finished

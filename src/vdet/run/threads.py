@@ -31,15 +31,18 @@ class SearchThreads(ThreadPoolExecutor):
     def __exit__(self, *_: object) -> None:
         self.shutdown(cancel_futures=True)
 
-    def map_ordered(self, function: Callable[[T], R], items: Iterable[T]) -> Generator[tuple[T, R]]:
+    def map_ordered(
+        self, function: Callable[[T], R], items: Iterable[T], ahead: int | None = None
+    ) -> Generator[tuple[T, R]]:
         """Yield items with the results of `function`, in order.
 
-        Items are taken ahead until every thread has one, and one more.
+        `ahead` items are in work while the caller uses a result; None: one for every thread.
         """
+        ahead = self._count if ahead is None else ahead
         running: deque[tuple[T, Future[R]]] = deque()
         for item in items:
             running.append((item, self.submit(function, item)))
-            if len(running) > self._count:
+            if len(running) > ahead:
                 first, future = running.popleft()
                 yield first, future.result()
         for item, future in running:
