@@ -307,7 +307,7 @@ class Unseen:
         output: Path = self._work / f"without_{fold}.onnx"
         if output.exists():
             return output
-        from vdet.learn.net.sources import NetSource, clip_source, image_source
+        from vdet.learn.net.sources import clip_source, image_source
         from vdet.learn.net.training import train_to_file
 
         if not self._sources:
@@ -315,11 +315,11 @@ class Unseen:
             sets = [read_labelled_images(path, roles) for path in self._paths]
             self._sources = [image_source(labelled, self.settings) for labelled in sets]
         sources = []
-        for (source, report), folds in zip(self._sources, self._dealt, strict=True):
+        for source, folds in zip(self._sources, self._dealt, strict=True):
             kept = np.flatnonzero(folds != fold).tolist()
-            part = NetSource(source.name, [source.samples[number] for number in kept])
             if kept:
-                sources.append((part, replace(report, images=len(kept))))
+                samples = [source.samples[number] for number in kept]
+                sources.append(replace(source, samples=samples))
         if fold < self._folds - 1:
             sources.append(clip_source(*self.clip, self.settings))
 

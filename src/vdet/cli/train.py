@@ -162,14 +162,14 @@ def train_net(
     roles = Roles.for_training(settings)
     sources = [image_source(read_labelled_images(path, roles), settings) for path in data]
     sources += [clip_source(clip, truth, settings) for clip, truth in clips]
-    print_lines(*(line for _, report in sources for line in report.lines()), "")
+    print_lines(*(line for source in sources for line in source.lines()), "")
     with progress_bar(total=settings.train.net.steps, unit=" steps") as bar:
 
         def advance(step: int, loss: float) -> None:
             bar.set_postfix_str(f"loss {loss:.3f}", refresh=False)
             bar.update(step - bar.n)
 
-        summary = train_to_file(
+        train_to_file(
             sources,
             settings.train.net,
             output,
@@ -178,4 +178,4 @@ def train_net(
             overwrite=overwrite,
             progress=advance,
         )
-    print_lines(summary, f"{output}: written")
+    print_lines(f"{output}: written")

@@ -20,7 +20,7 @@ def test_a_damaged_video_is_learnt_from_as_far_as_the_settings_tolerate(tmp_path
     for number in (5, 6):
         (tmp_path / f"{number}.png").write_text("no picture")
     tolerant = Settings(input=InputSettings(max_damaged=0.2))
-    assert clip_source(clip, truth, tolerant)[1].vehicles == {"car": 2}
+    assert clip_source(clip, truth, tolerant).vehicles == {"car": 2}
     with pytest.raises(VideoError, match=r"2 of 12 frames .* more than input\.max_damaged"):
         clip_source(clip, truth, Settings())
 
@@ -36,12 +36,12 @@ def test_vehicles_of_a_labelled_video_keep_their_classes(tmp_path: Path) -> None
     header = "frame,time,id,x,y,width,height,score,state,class"
     truth.write_text("\n".join([header, *(f"3,0.1,{row}" for row in rows)]))
     settings = Settings()
-    source, report = clip_source(clip, truth, settings)
+    source = clip_source(clip, truth, settings)
     (sample,) = source.samples
     classes = settings.train.net.classes
     truck, car = classes.index("truck"), classes.index("car")
     assert sample.classes.tolist() == [truck, UNKNOWN, car, UNKNOWN]
-    assert report.ignored == {"vehicle": 1}
+    assert source.ignored == {"vehicle": 1}
 
 
 def test_a_class_without_labels_makes_the_picture_an_ignore_region_for_it(tmp_path: Path) -> None:
@@ -54,7 +54,7 @@ def test_a_class_without_labels_makes_the_picture_an_ignore_region_for_it(tmp_pa
     labels.write_text(json.dumps(document), encoding="utf-8")
     settings = Settings()
     labelled = read_labelled_images(tmp_path, Roles.for_training(settings))
-    source, _ = image_source(labelled, settings)
+    source = image_source(labelled, settings)
     (sample,) = source.samples
     person = settings.train.net.classes.index("person")
     assert sample.boxes.tolist() == [[20, 30, 80, 70], [0, 0, 9, 9], [0, 0, 160, 96]]

@@ -103,12 +103,12 @@ def test_it_says_what_becomes_of_each_label(run: Run, tmp_path: Path) -> None:
     labels.write_text(json.dumps(document), encoding="utf-8")
     classes = ("--set", 'train.net.classes=["car","bicycle","bus"]')
     result = run("train-net", pictures, "-o", tmp_path / "net.onnx", *QUICK, *classes, code=0)
-    assert result.out.splitlines()[:4] == [
+    assert result.out.splitlines()[:2] == [
         "set: 1 image; 2 car, 1 bus, 1 vehicle",
-        "  not labelled, so not background: bicycle",
-        "  ignored: 1 person",
         "  background, as their label is unknown: 1 cow",
     ]
     header = read_header(Session(tmp_path / "net.onnx"))
     assert header is not None
     assert header.classes == ("car", "bicycle", "bus")
+    (source,) = header.provenance["report"]["sources"]
+    assert (source["unlabelled"], source["ignored"]) == (["bicycle"], {"person": 1})

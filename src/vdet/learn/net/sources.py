@@ -2,8 +2,9 @@
 
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -81,24 +82,18 @@ def join(samples: Sequence[NetSample], image: Image) -> NetSample:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class NetSource:
-    """The samples of one camera or collection; settings use its `name`."""
-
-    name: str
-    samples: Sequence[NetSample]
-
-
 Counts = dict[str, int]
 """The number of boxes by label or class."""
 
 
 @dataclass(frozen=True, slots=True)
-class SourceReport:
-    """What is learnt from a source.
+class NetSource:
+    """The samples of one camera or collection, and what is learnt from its labels.
 
     Attributes
     ----------
+    name
+        Name of the source in the settings.
     vehicles
         The objects to learn by class; "vehicle" are those of unknown kind.
     ignored, background
@@ -108,20 +103,28 @@ class SourceReport:
     """
 
     name: str
-    images: int
-    vehicles: Counts
-    ignored: Counts
-    background: Counts
-    unlabelled: tuple[str, ...]
+    samples: Sequence[NetSample]
+    vehicles: Counts = field(default_factory=dict)
+    ignored: Counts = field(default_factory=dict)
+    background: Counts = field(default_factory=dict)
+    unlabelled: tuple[str, ...] = ()
+
+    @property
+    def report(self) -> dict[str, Any]:
+        """What is learnt, as values for JSON."""
+        return {
+            "name": self.name,
+            "images": len(self.samples),
+            "vehicles": self.vehicles,
+            "ignored": self.ignored,
+            "background": self.background,
+            "unlabelled": self.unlabelled,
+        }
 
     def lines(self) -> Iterator[str]:
-        """Yield as lines of text what is learnt, and what not."""
+        """Yield as lines of text what is learnt, and which labels are not known."""
         learnt = _listed(self.vehicles) or "nothing to learn"
-        yield f"{self.name}: {counted(self.images, 'image')}; {learnt}"
-        if self.unlabelled:
-            yield f"  not labelled, so not background: {', '.join(self.unlabelled)}"
-        if self.ignored:
-            yield f"  ignored: {_listed(self.ignored)}"
+        yield f"{self.name}: {counted(len(self.samples), 'image')}; {learnt}"
         if self.background:
             yield f"  background, as their label is unknown: {_listed(self.background)}"
 
@@ -130,11 +133,7 @@ def _listed(counts: Counts) -> str:
     return ", ".join(f"{count:,} {printable(name)}" for name, count in counts.items())
 
 
-Source = tuple[NetSource, SourceReport]
-"""A source, and what is learnt from it."""
-
-
-def image_source(labelled: LabelledImages, settings: Settings) -> Source:
+def image_source(labelled: LabelledImages, settings: Settings) -> NetSource:
     """Read a set of labelled images into memory; `settings` has the classes to learn.
 
     Raises `ImageError` where an image cannot be read.
@@ -143,7 +142,7 @@ def image_source(labelled: LabelledImages, settings: Settings) -> Source:
     return _source(Path(labelled.name).resolve().name, images, labelled, settings)
 
 
-def clip_source(video: Path, truth: Path, settings: Settings) -> Source:
+def clip_source(video: Path, truth: Path, settings: Settings) -> NetSource:
     """Read every `EVERY`-th frame of a labelled video into memory; vehicles without label are cars.
 
     `settings` has the classes to learn, the roles of labels, and how much damage is tolerated.
@@ -183,7 +182,7 @@ _Frames = Iterator[tuple[Image, LabelledImage]]
 """Images, each with its labels."""
 
 
-def _source(name: str, frames: _Frames, labelled: LabelledImages, settings: Settings) -> Source:
+def _source(name: str, frames: _Frames, labelled: LabelledImages, settings: Settings) -> NetSource:
     """Read the samples of a source, and count what is learnt and what is not."""
     classes = settings.train.net.classes
     samples = [_sample(image, labels, classes) for image, labels in frames]
@@ -191,15 +190,14 @@ def _source(name: str, frames: _Frames, labelled: LabelledImages, settings: Sett
     for sample in samples:
         vehicles.update(names[class_] for class_ in sample.classes[~sample.ignored].tolist())
     unlabelled = {name for image in labelled.images for name in image.unlabelled}
-    report = SourceReport(
+    return NetSource(
         name=name,
-        images=len(samples),
+        samples=samples,
         vehicles={name: vehicles[name] for name in names if vehicles[name]},
         ignored=dict(labelled.ignored),
         background=dict(labelled.others),
         unlabelled=tuple(name for name in classes if name in unlabelled),
     )
-    return NetSource(name, samples), report
 
 
 def _sample(image: Image, labelled: LabelledImage, classes: Sequence[str]) -> NetSample:

@@ -2,10 +2,8 @@
 
 import copy
 import math
-import time
-from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +19,7 @@ from vdet.files import staged
 from vdet.learn.net.augmentation import Drawing, SampleDrawer
 from vdet.learn.net.export import export_network, start_from
 from vdet.learn.net.network import Batch, Network, Vehicles, class_weights, loss_of
-from vdet.learn.net.sources import NetSample, NetSource, Source, join
+from vdet.learn.net.sources import NetSample, NetSource, join
 from vdet.run.threads import SearchThreads
 from vdet.version import __version__
 from vdet.workers import core_count
@@ -45,14 +43,13 @@ _LONGEST_GRADIENT = 10.0
 _AVERAGE = 0.998
 """Fraction that the moving average of the weights keeps at each step."""
 _MAGNIFIED = 1.4  # scale of the small images, whose vehicles would be too small
-_REPORTED = 100  # last steps whose mean loss is reported
 
 StepProgress = Callable[[int, float], object]
 """Called after each step, with the number of steps so far and the loss."""
 
 
 def train_to_file(
-    sources: Sequence[Source],
+    sources: Sequence[NetSource],
     settings: NetworkTrainingSettings,
     output: Path,
     *,
@@ -60,7 +57,7 @@ def train_to_file(
     device: str = "auto",
     overwrite: bool = False,
     progress: StepProgress = lambda *_: None,
-) -> str:
+) -> None:
     """Train a network, write it, and remove the checkpoint, a file beside it that ends in .ckpt.
 
     Parameters
@@ -69,10 +66,6 @@ def train_to_file(
         See `train_network`.
     overwrite
         Replace an earlier network.
-
-    Returns
-    -------
-    The size of the network, the duration since the last start, and the last loss, as a line.
 
     Raises
     ------
@@ -83,36 +76,21 @@ def train_to_file(
     OutputError
         A file cannot be written.
     """
-    began, losses = time.monotonic(), deque[float](maxlen=_REPORTED)
     checkpoint = output.with_suffix(".ckpt")
     before = read_header(Session(base)) if base else None
-
-    def advance(step: int, loss: float) -> None:
-        losses.append(loss)
-        progress(step, loss)
-
     network = train_network(
-        [source for source, _ in sources],
-        settings,
-        checkpoint,
-        base=base,
-        device=device,
-        progress=advance,
+        sources, settings, checkpoint, base=base, device=device, progress=progress
     )
     provenance = {
         "program": f"vdet {__version__}",
         "training": settings.model_dump(mode="json"),
-        "report": {"sources": [asdict(report) for _, report in sources]},
+        "report": {"sources": [source.report for source in sources]},
         **({"base": before.provenance} if before else {}),
     }
     pixels = settings.size[0] * settings.size[1]
     header = Header(classes=settings.classes, pixels=pixels, provenance=provenance)
     export_network(network, header, output, overwrite=overwrite)
     checkpoint.unlink(missing_ok=True)
-    size = sum(parameter.numel() for parameter in network.parameters())
-    minutes = (time.monotonic() - began) / 60
-    loss = f"; loss at the end {sum(losses) / len(losses):.3f}" if losses else ""
-    return f"{size:,} parameters after {settings.steps:,} steps, {minutes:.1f} minutes{loss}"
 
 
 def train_network(
@@ -160,27 +138,22 @@ def train_network(
         **settings.model_dump(),
     }
     target = _device(device)
-    threads = torch.get_num_threads()
     torch.set_num_threads(core_count())
     torch.set_flush_denormal(True)
-    batches = _Batches(sources, settings)
-    try:
-        training = _Training(sources, settings, learnt_with, target)
-        if checkpoint.exists():
-            training.restore(checkpoint)
-        elif base is not None:
-            training.start_from(base, batches.draw(0))
-        workers = 1 if target.type == "cpu" else core_count()
-        remaining_steps = range(training.step, settings.steps)
-        with SearchThreads(workers) as pool:
-            for _, batch in pool.map_ordered(batches.draw, remaining_steps):
-                loss = training.learn(batch)
-                progress(training.step, loss)
-                if training.step % CHECKPOINT == 0 or training.step == settings.steps:
-                    training.save(checkpoint)
-    finally:
-        torch.set_flush_denormal(False)
-        torch.set_num_threads(threads)
+    draw = partial(_draw_batch, SampleDrawer(sources, settings), settings)
+    training = _Training(sources, settings, learnt_with, target)
+    if checkpoint.exists():
+        training.restore(checkpoint)
+    elif base is not None:
+        training.start_from(base, draw(0))
+    workers = 1 if target.type == "cpu" else core_count()
+    remaining_steps = range(training.step, settings.steps)
+    with SearchThreads(workers) as pool:
+        for _, batch in pool.map_ordered(draw, remaining_steps):
+            loss = training.learn(batch)
+            progress(training.step, loss)
+            if training.step % CHECKPOINT == 0 or training.step == settings.steps:
+                training.save(checkpoint)
     return training.averaged.cpu().eval()
 
 
@@ -192,18 +165,13 @@ def _device(name: str) -> torch.device:
     return torch.device("cuda" if has_gpu and name != "cpu" else "cpu")
 
 
-class _Batches:
-    """The batches of a training; each depends on the step and the seed alone."""
+def _draw_batch(drawer: SampleDrawer, settings: NetworkTrainingSettings, step: int) -> Batch:
+    """Draw the images of a step, which depend on the step and the seed alone.
 
-    def __init__(self, sources: Sequence[NetSource], settings: NetworkTrainingSettings) -> None:
-        self._drawer = SampleDrawer(sources, settings)
-        self._settings = settings
-
-    def draw(self, step: int) -> Batch:
-        """Draw the images of a step; several threads may call this at once."""
-        rng = np.random.default_rng((_SEED, step))
-        drawing = _drawing(self._settings, step)
-        return _to_batch([self._drawer.draw(rng, drawing) for _ in range(self._settings.batch)])
+    Several threads may call this at once.
+    """
+    rng, drawing = np.random.default_rng((_SEED, step)), _drawing(settings, step)
+    return _to_batch([drawer.draw(rng, drawing) for _ in range(settings.batch)])
 
 
 def _drawing(settings: NetworkTrainingSettings, step: int) -> Drawing:
