@@ -139,21 +139,24 @@ def train_network(
     }
     target = _device(device)
     torch.set_num_threads(core_count())
-    torch.set_flush_denormal(True)
     draw = partial(_draw_batch, SampleDrawer(sources, settings), settings)
-    training = _Training(sources, settings, learnt_with, target)
-    if checkpoint.exists():
-        training.restore(checkpoint)
-    elif base is not None:
-        training.start_from(base, draw(0))
-    workers = 1 if target.type == "cpu" else core_count()
-    remaining_steps = range(training.step, settings.steps)
-    with SearchThreads(workers) as pool:
-        for _, batch in pool.map_ordered(draw, remaining_steps):
-            loss = training.learn(batch)
-            progress(training.step, loss)
-            if training.step % CHECKPOINT == 0 or training.step == settings.steps:
-                training.save(checkpoint)
+    torch.set_flush_denormal(True)
+    try:
+        training = _Training(sources, settings, learnt_with, target)
+        if checkpoint.exists():
+            training.restore(checkpoint)
+        elif base is not None:
+            training.start_from(base, draw(0))
+        workers = 1 if target.type == "cpu" else core_count()
+        remaining_steps = range(training.step, settings.steps)
+        with SearchThreads(workers) as pool:
+            for _, batch in pool.map_ordered(draw, remaining_steps):
+                loss = training.learn(batch)
+                progress(training.step, loss)
+                if training.step % CHECKPOINT == 0 or training.step == settings.steps:
+                    training.save(checkpoint)
+    finally:
+        torch.set_flush_denormal(False)
     return training.averaged.cpu().eval()
 
 
