@@ -45,8 +45,8 @@ def our_cells(
     offset of each class.
     """
     (table,), (centers, strides) = output, cells
-    if len(table) != len(strides):
-        raise ValueError("not one row per cell")
+    if table.shape != (len(strides), 5 + len(calibration)):
+        raise ValueError("not one row per cell, or not one column per class")
     best = table[:, 5:].argmax(axis=1)
     slopes, offsets = calibration[best].T
     logits = slopes * table[:, 0] + offsets

@@ -24,8 +24,6 @@ class Session:
     ----------
     inputs
         Each has a `name`, a `shape` and a `type`, such as `tensor(float)`.
-    output_shapes
-        Declared shapes; lengths that depend on the input are names.
 
     Raises
     ------
@@ -55,7 +53,6 @@ class Session:
             )
             self.metadata: Mapping[str, str] = self._session.get_modelmeta().custom_metadata_map
             self.inputs = self._session.get_inputs()
-            self.output_shapes = [output.shape for output in self._session.get_outputs()]
         except Exception as error:  # onnxruntime raises its own kinds, and built-in ones
             raise ModelError(f"{path}: onnxruntime cannot load it: {_in_words(error)}") from error
 

@@ -2,10 +2,9 @@
 
 import logging
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import astuple, dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
@@ -93,8 +92,6 @@ class SvmDetector:
         Size of the frames, pixels.
     horizon
         Row of the horizon, fraction of the frames' height, for the perspective sets.
-    engine
-        Makes the search of a grid.
 
     Attributes
     ----------
@@ -115,14 +112,13 @@ class SvmDetector:
         height: int,
         *,
         horizon: float = DEFAULT_HORIZON,
-        engine: Callable[[LinearModel, WindowGrid], Any] = DenseSearch,
     ) -> None:
         self._settings, self._features, self._size = settings, model.features, (width, height)
         self._recent: deque[Windows] = deque(maxlen=settings.heat.frames)
         self.grids = tuple(window_grids(settings, model.features, width, height, horizon=horizon))
         if not self.grids:
             raise FrameSizeError(f"no search window fits into {width}×{height} pixels")
-        self._searches = [engine(model, grid) for grid in self.grids]
+        self._searches = [DenseSearch(model, grid) for grid in self.grids]
         self._boxes = np.concatenate([grid.boxes for grid in self.grids])
         weights = np.array([grid.weight for grid in self.grids], np.float32)
         self._weights = np.repeat(weights, list(map(len, self.grids)))
