@@ -150,8 +150,13 @@ def _fit(
         [board] * len(photos), corners, size, np.eye(3), np.zeros(5)
     )
     normals = np.array([cv2.Rodrigues(np.asarray(rotation))[0][:, 2] for rotation in rotations])
+    (fx, _, x), (_, fy, y), _ = matrix.tolist()
+    width, height = size
+    is_real = 0.1 * width <= min(fx, fy) and max(fx, fy) <= 100 * width
+    in_frame = 0 <= x < width and 0 <= y < height
+    has_angles = np.clip(normals @ normals.T, -1, 1).min() <= math.cos(math.radians(MIN_ANGLE))
     camera = None
-    if np.clip(normals @ normals.T, -1, 1).min() <= math.cos(math.radians(MIN_ANGLE)):
+    if has_angles and is_real and in_frame:
         k1, k2, p1, p2, k3 = np.ravel(distortion).tolist()
         with suppress(ValidationError):  # no real camera has such values
             camera = LensSettings(
