@@ -3,6 +3,7 @@
 import itertools
 from collections.abc import Sequence
 from pathlib import Path
+from unittest.mock import patch
 
 import av
 import cv2
@@ -51,7 +52,8 @@ def search_times(
 def _search(config: ShippedConfig, pictures: Sequence[Picture], engine: type = DenseSearch) -> Task:
     """Search the pictures."""
     width, height = pictures[0].width, pictures[0].height
-    search = SvmDetector(config.model, config.settings.svm, width, height, engine=engine)
+    with patch("vdet.detect.svm.detector.DenseSearch", engine):
+        search = SvmDetector(config.model, config.settings.svm, width, height)
 
     def run() -> None:
         for picture in pictures:
