@@ -8,6 +8,7 @@ import numpy as np
 from benchmarks.rounds import seconds_of
 from vdet.boxes import Box
 from vdet.labels.formats import TrackWriter, format_for
+from vdet.labels.label import SourceVideo
 from vdet.track.track import FrameTracks, Track
 
 RATE, SECONDS, BOXES = 25, 3600, 1_200_000
@@ -60,9 +61,10 @@ def write_hour(path: Path, seed: int = 0) -> None:
     form = format_for(path)
     assert form is not None
     with path.open("wb") as file:
-        writer = TrackWriter(form, file)
+        writer = TrackWriter(form, file, SourceVideo("hour.mp4", WIDTH, HEIGHT))
         for index, shown in enumerate(tracks):
             writer.write(FrameTracks(index, index / RATE, tuple(shown)))
+        writer.end()
 
 
 if __name__ == "__main__":

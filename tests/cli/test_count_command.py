@@ -51,6 +51,25 @@ def test_counting_a_file_of_tracks_gives_what_the_run_gave(
         assert "--rate changes nothing: the tracks have times; remove it" in result.err
 
 
+def test_doubts_and_the_size_of_the_frames_are_those_of_the_tracks(
+    run: Run, folder: Path, tmp_path: Path
+) -> None:
+    size = {"name": "in.mp4", "width": 320, "height": 240}
+    finding = {"code": "camera-moves", "severity": "warning", "text": "the camera moves"}
+    record = {"video": size, "frame": 0, "time": 0, "tracks": [], "findings": [finding]}
+    tracks = tmp_path / "t.jsonl"
+    tracks.write_text(json.dumps(record))
+    result = run("count", tracks, "-c", folder / "lines.yaml")
+    doubt = f"vdet: warning: {tracks}: the camera moves [camera-moves]\n"
+    assert (result.code, result.err) == (0, doubt)
+    assert run("count", tracks, "-c", folder / "lines.yaml", "--strict").code == 4
+    result = run("count", tracks, "-c", folder / "lines.yaml", "--size", "640x480", code=1)
+    assert result.err.endswith(f"{tracks}: is of 320×240 frames; remove --size\n")
+    tracks.write_text(json.dumps(record | {"video": size | {"width": 800}}))
+    result = run("count", tracks, "-c", folder / "lines.yaml", code=1)
+    assert "for frames of 320×240, whose aspect ratio differs from 800×240" in result.err
+
+
 @pytest.mark.parametrize("form", ["csv", "jsonl"])
 def test_flows_have_clock_times_live_and_from_tracks(
     run: Run, folder: Path, tmp_path: Path, red: tuple[str, ...], form: str
@@ -69,7 +88,7 @@ def test_flows_have_clock_times_live_and_from_tracks(
         else:
             result = run("count", tracks, *asked)
         assert result.code == 0, result.err
-        known = {"live": "from its name", "again": "from the file"}[name]
+        known = "from the file" if (name, form) == ("again", "csv") else "from its name"
         assert re.search(rf"begins 2026-05-01 06:59:59.* \({known}\)", result.err)
         found[name] = out.read_text(), json.loads(out.with_suffix(".json").read_text())
         if form == "csv":  # it lacks the frames before the first box

@@ -84,6 +84,18 @@ def test_a_part_of_saved_tracks_is_used(
     assert (result.code, result.out.splitlines()[:1]) == (0, [said])
 
 
+def test_saved_tracks_must_be_of_frames_of_this_size(run: Run, red: tuple[str, ...]) -> None:
+    write_drive(Path("in.mp4"), 50)
+    run("detect-video", "in.mp4", *red, "--no-video", "--tracks", "t.jsonl", code=0)
+    Path("in.mp4").rename("moved.mp4")
+    result = run("draw", "moved.mp4", "--tracks-from", "t.jsonl", "-o", "gate.html", code=0)
+    assert result.err == "vdet: warning: t.jsonl: is of in.mp4, not moved.mp4\n"
+    text = Path("t.jsonl").read_text().replace('"width": 320', '"width": 640', 1)
+    Path("t.jsonl").write_text(text)
+    result = run("draw", "moved.mp4", "--tracks-from", "t.jsonl", "-o", "other.html", code=1)
+    assert result.err == "vdet: t.jsonl: is of 640×240 frames, not 320×240\n"
+
+
 def test_the_page_has_only_the_classes_that_are_counted(run: Run) -> None:
     for name, vehicles in (("vehicle", 6), ("truck", 0)):
         output = f"{name}.html"

@@ -6,8 +6,15 @@ from pathlib import Path
 from typing import Any
 
 from vdet.boxes import Box
-from vdet.labels.formats import Format, SourceVideo, TrackWriter
-from vdet.labels.label import Label, LabelledVideo, SavedTracks, checked_labels, from_size
+from vdet.labels.formats import Format, TrackWriter
+from vdet.labels.label import (
+    Label,
+    LabelledVideo,
+    SavedTracks,
+    SourceVideo,
+    checked_labels,
+    from_size,
+)
 from vdet.labels.reading import read_tracks
 from vdet.track.track import FrameTracks, Track
 

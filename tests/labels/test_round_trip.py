@@ -106,7 +106,8 @@ def test_what_is_written_is_read_again(
         seconds = item.index / 25 if form in TIMED else math.nan
         assert item.time == pytest.approx(seconds, nan_ok=True)
     if any(saved):
-        assert saved.size == ((1280, 720) if form is COCO else None)
+        assert saved.video == (VIDEO if form in LISTING else None)
+        assert saved.size == ((1280, 720) if form in LISTING else None)
 
 
 @every_format

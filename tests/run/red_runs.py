@@ -8,6 +8,7 @@ from typing import Any
 
 from red_cars import CAR, HEIGHT, SETTINGS, WIDTH, red_finder, road
 from vdet.boxes import NO_BOXES, Box, Boxes, Image
+from vdet.conditions.finding import Findings
 from vdet.config.schema import Settings
 from vdet.detect.protocol import StageImages
 from vdet.detect.svm.detector import SvmModel
@@ -17,11 +18,12 @@ from vdet.media import Frame, Picture, VideoInfo
 from vdet.media.reader import VideoReader
 from vdet.progress import Progress, no_progress
 from vdet.run.loop import Parts, build, peek
-from vdet.run.result import FrameResult
+from vdet.run.result import CONDITIONS, FrameResult
 from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import SinkContext, open_sinks
 from vdet.run.video import Run, RunTotals, run_video
 from vdet.track.track import Track
+from vdet.traffic.clock import Clock
 from vdet.traffic.live import LiveTraffic
 
 COUNT = 60
@@ -101,16 +103,19 @@ def write(
     video: VideoInfo | None = VIDEO,
     at: Fraction = Fraction(0),
     stage_images: StageImages = stages_of_trace,
+    clock: Clock | None = None,
+    findings: Findings | None = None,
 ) -> None:
     """Give results to a sink of its own run.
 
     Without a `video` they are those of pictures. `at` is the moment that is asked for.
     """
     with OutputFiles(overwrite=True) as files:
-        traffic = LiveTraffic(settings, video.width, video.height) if video else None
+        traffic = LiveTraffic(settings, video.width, video.height, clock) if video else None
         context = SinkContext(
             files, settings, video, at=at, traffic=traffic, stage_images=stage_images
         )
+        context.facts[CONDITIONS] = findings or Findings()
         with open_sinks([output], context) as sinks:
             for result in results:
                 if traffic:

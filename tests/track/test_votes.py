@@ -11,7 +11,8 @@ from vdet.boxes import NO_BOXES, Box, Boxes
 from vdet.config.schema import MotionTrackerSettings, Settings
 from vdet.config.shapes import LineSettings, TrafficSettings
 from vdet.config.tracker import RulesTrackerSettings
-from vdet.labels.formats import SourceVideo, TrackWriter, last_classes, track_formats
+from vdet.labels.formats import TrackWriter, last_classes, track_formats
+from vdet.labels.label import SourceVideo
 from vdet.media import Picture
 from vdet.track.motion.tracker import MotionTracker
 from vdet.track.rules.tracker import RulesTracker

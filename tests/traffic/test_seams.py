@@ -11,6 +11,7 @@ from traffic.scenes import Path, frames, settings_for, through
 from vdet.config.schema import InputSettings
 from vdet.config.shapes import LineSettings, ZoneSettings
 from vdet.labels.formats import TrackWriter
+from vdet.labels.label import SourceVideo
 from vdet.labels.native import JSON_LINES
 from vdet.track.track import FrameTracks
 from vdet.traffic.counting import count_files
@@ -37,12 +38,13 @@ def write_part(path: File, first: float, last: float, *paths: Path, clock: float
     path.parent.mkdir(exist_ok=True)
     video = [f for f in frames(*paths, seconds=60) if first - 0.001 <= f.time < last - 0.001]
     with path.open("wb") as file:
-        writer = TrackWriter(JSON_LINES, file)
+        writer = TrackWriter(JSON_LINES, file, SourceVideo("v.mp4", 1280, 720))
         for index, frame in enumerate(video):
             time = index / 25
             begins = (CLOCK + timedelta(seconds=clock + time)).isoformat()
             facts = {"clock": begins} if clock >= 0 else {}
             writer.write(FrameTracks(index, time, frame.tracks, facts))
+        writer.end()
     return path
 
 
@@ -53,9 +55,10 @@ def write_halves(folder: File, names: Sequence[str], *paths: Path) -> list[File]
     for name, (_, half) in zip(names, halves, strict=True):
         path = folder / name
         with path.open("wb") as file:
-            writer = TrackWriter(JSON_LINES, file)
+            writer = TrackWriter(JSON_LINES, file, SourceVideo("v.mp4", 1280, 720))
             for index, frame in enumerate(half):
                 writer.write(type(frame)(index, index / 25, frame.tracks))
+            writer.end()
         files.append(path)
     return files
 

@@ -9,7 +9,7 @@ from vdet.cli import options
 from vdet.cli.command import command
 from vdet.cli.messages import LOG, announce, print_lines, progress_steps
 from vdet.config.classes import OUR_NAMES, our_names
-from vdet.errors import counted
+from vdet.errors import DOUBTFUL, counted
 from vdet.files import OutputFiles, output_errors
 
 if TYPE_CHECKING:
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     help="Frame rate of the video, for TRACKS without times.",
 )
 @options.classes_option
+@options.strict_option
 @options.settings_options(interval="traffic.interval", begin="input.begin")
 @options.overwrite_option
 def count(
@@ -46,8 +47,9 @@ def count(
     source: options.SettingsSource,
     overwrite: bool,
     classes: tuple[str, ...],
+    strict: bool,
     **paths: options.Paths,
-) -> None:
+) -> int:
     """Count the vehicles of track files at lines and in zones.
 
     TRACKS are files of vdet detect-video --tracks. Vehicles are not detected again, and the counts
@@ -95,6 +97,8 @@ def count(
             with output_errors(output.path):
                 write_content(files.stage(output.path), content)
     print_lines(*_totals(videos), *_matrix(list(videos.values())))
+    is_doubtful = any(result.doubts for result in videos.values())
+    return DOUBTFUL if strict and is_doubtful else 0
 
 
 def _totals(videos: "Mapping[str, Counts]") -> list[str]:

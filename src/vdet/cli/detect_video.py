@@ -59,7 +59,7 @@ if TYPE_CHECKING:
     "--stride", type=click.IntRange(1, 100), help="Search every N-th frame (`detector.stride`)."
 )
 @options.begin_option
-@click.option("--strict", is_flag=True, help="Exit with code 4 if a result is doubtful.")
+@options.strict_option
 @options.output_folder(
     "-d", "--directory", "folder", help="Process every CLIP, and write the outputs into DIR."
 )

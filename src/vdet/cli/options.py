@@ -105,6 +105,9 @@ classes_option = click.option(
     multiple=True,
     help="Keep only vehicles of this class, such as truck. Can be repeated (`classes`).",
 )
+strict_option = click.option(
+    "--strict", is_flag=True, help="Exit with code 4 if a result is doubtful."
+)
 overwrite_option = click.option("--overwrite", is_flag=True, help="Replace existing outputs.")
 start_option = time_option("--start", help="Start at this time, such as 90, 1:30 or 0:01:30.5.")
 end_option = time_option("--end", help="Stop before this time.")

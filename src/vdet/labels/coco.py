@@ -27,9 +27,9 @@ from pydantic.dataclasses import dataclass
 from vdet.boxes import Box
 from vdet.config.classes import UNKNOWN
 from vdet.errors import TruthError
-from vdet.labels.formats import Format, ImageTracks, SourceVideo, last_classes
+from vdet.labels.formats import Format, ImageTracks, last_classes
 from vdet.labels.images import LabelledImage, image_names, inside, log
-from vdet.labels.label import NO_ID, Label, SavedTracks, Size, from_size, line_error
+from vdet.labels.label import NO_ID, Label, SavedTracks, Size, SourceVideo, from_size, line_error
 from vdet.labels.parsing import (
     LIMIT,
     Index,
@@ -89,7 +89,7 @@ def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) ->
     """
     size = {"width": video.width, "height": video.height}
     classes, writer = last_classes(frames), _Writer("videos", "images", "tracks")
-    writer.add("videos", id=_VIDEO, name=video.name, **size)
+    writer.add("videos", id=_VIDEO, name=video.name, **size, vdet=video.record())
     for number, frame in enumerate(frames, start=1):
         name, time = f"frame_{frame.index:06}.png", round(frame.time, 6)
         image = {"id": number, "video_id": _VIDEO, "frame_index": frame.index, "file_name": name}
@@ -189,6 +189,12 @@ class _Info:
     """A key of our own: classes that the images may show without a label."""
 
 
+@_entry
+class _Video:
+    vdet: SourceVideo | None = None
+    """A key of our own."""
+
+
 _Entry = TypeVar("_Entry")
 _Entries = Annotated[list[_Entry], FailFast()]
 
@@ -198,6 +204,7 @@ class _Document:
     images: _Entries[_Image]
     categories: _Entries[_Category] = Field(default_factory=list)
     annotations: _Entries[_Annotation] = Field(default_factory=list)
+    videos: list[_Video] = Field(default_factory=list)
     info: _Info | None = None
 
 
@@ -262,7 +269,9 @@ def read_coco(path: Path, data: bytes) -> SavedTracks:
         if image.time is not None
     }
     size = document.images[0].size if images else None
-    return SavedTracks(labels, tuple(sorted(images)), checked_times(path, times), size)
+    saved = SavedTracks(labels, tuple(sorted(images)), checked_times(path, times), size)
+    video = document.videos[0].vdet if document.videos else None
+    return saved.of_video(video) if video else saved
 
 
 COCO = Format("COCO", ".coco.json", read_coco, whole=_write)

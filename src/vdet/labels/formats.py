@@ -4,30 +4,17 @@ Formats are registered in the group `vdet.formats`: see `vdet.plugins`.
 """
 
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 from vdet.config.classes import UNKNOWN
 from vdet.errors import OutputError, TruthError
-from vdet.labels.label import SavedTracks, Size
+from vdet.labels.label import SavedFinding, SavedTracks, Size, SourceVideo
 from vdet.labels.parsing import numbered_lines
 from vdet.plugins import FORMATS, load_plugin, plugin_names
 from vdet.track.track import FrameTracks, Track
-
-
-@dataclass(frozen=True, slots=True)
-class SourceVideo:
-    """Facts about a video for files of tracks.
-
-    `name` is the file name without folder; `width` and `height` are the size of the upright frames,
-    pixels.
-    """
-
-    name: str
-    width: int
-    height: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,25 +57,43 @@ class Format:
     whole: Callable[[BinaryIO, SourceVideo, Sequence[FrameTracks]], None] | None = None
 
 
-class TrackWriter:
-    """Writes the tracks of a video into a binary file."""
+VIDEO, FINDINGS = "video", "findings"
+"""Names of the facts about a video, of its first frame, and of its findings, of its last."""
 
-    def __init__(self, form: Format, file: BinaryIO, video: SourceVideo | None = None) -> None:
+
+class TrackWriter:
+    """Writes the tracks of a video into a binary file, each frame when the next one is known."""
+
+    def __init__(self, form: Format, file: BinaryIO, video: SourceVideo) -> None:
         self._form, self._file, self._video = form, file, video
         self._kept: list[FrameTracks] = []
+        self._last: FrameTracks | None = None
         self._file.write(form.heading.encode())
 
     def write(self, frame: FrameTracks) -> None:
         """Add a frame."""
-        if self._form.lines:
-            self._file.writelines(line.encode() for line in self._form.lines(frame))
-        else:
+        if not self._form.lines:
             self._kept.append(replace(frame, facts={}))
+            return
+        if self._last:
+            self._write_lines(self._last)
+        else:
+            values = self._video.record()
+            frame = replace(frame, facts={VIDEO: values, **frame.facts})
+        self._last = frame
 
-    def end(self) -> None:
-        """Write everything that is left. Not called after an error."""
-        if self._form.whole and self._video:
-            self._form.whole(self._file, self._video, self._kept)
+    def end(self, findings: Sequence[Mapping[str, Any]] = ()) -> None:
+        """Write everything that is left, with the findings. Not called after an error."""
+        if self._form.whole:
+            found = tuple(SavedFinding(**finding) for finding in findings)
+            self._form.whole(self._file, replace(self._video, findings=found), self._kept)
+        elif self._last:
+            facts = {**self._last.facts, FINDINGS: findings} if findings else self._last.facts
+            self._write_lines(replace(self._last, facts=facts))
+
+    def _write_lines(self, frame: FrameTracks) -> None:
+        assert self._form.lines
+        self._file.writelines(line.encode() for line in self._form.lines(frame))
 
 
 def last_classes(frames: Iterable[FrameTracks]) -> dict[int, str]:

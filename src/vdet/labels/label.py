@@ -10,9 +10,11 @@ from dataclasses import dataclass, field, replace
 from datetime import datetime
 from operator import attrgetter
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
+import pydantic
+from pydantic import AwareDatetime, Field, TypeAdapter
 
 from vdet.boxes import BoolArray, Box, Float64Array, Int64Array
 from vdet.config.classes import our_name
@@ -110,6 +112,62 @@ def mistake_in_box(label: Label) -> str | None:
     return None
 
 
+@pydantic.dataclasses.dataclass(frozen=True, slots=True)
+class SavedFinding:
+    """A reason to doubt tracks: see `vdet.conditions.finding.Finding`."""
+
+    code: str
+    severity: Literal["warning", "note"]
+    text: str
+    times: tuple[tuple[float, float], ...] = ()
+    value: float | None = None
+
+
+@pydantic.dataclasses.dataclass(frozen=True, slots=True)
+class SourceVideo:
+    """What a file of tracks says of its video.
+
+    Attributes
+    ----------
+    name
+        The file name without folder.
+    width, height
+        Size of the upright frames, pixels.
+    rate
+        Frames per second, on average.
+    start, end
+        The part that was processed, seconds from the first frame; None: no limit.
+    begin, begin_source
+        The moment of time 0, and where that is from; None if unknown.
+    classes
+        The classes of vehicles that were kept; empty for all.
+    program, settings
+        What wrote the file, and its settings apart from the defaults.
+    findings
+        The reasons to doubt the tracks.
+    """
+
+    name: str
+    width: int = Field(ge=1, le=100_000)
+    height: int = Field(ge=1, le=100_000)
+    rate: float | None = None
+    start: float | None = None
+    end: float | None = None
+    begin: AwareDatetime | None = None
+    begin_source: str | None = None
+    classes: tuple[str, ...] = ()
+    program: str = ""
+    settings: dict[str, Any] = Field(default_factory=dict)
+    findings: tuple[SavedFinding, ...] = ()
+
+    def record(self) -> dict[str, Any]:
+        """Return it as values for JSON, without what is unknown."""
+        values: dict[str, Any] = TypeAdapter(SourceVideo).dump_python(
+            self, mode="json", exclude_defaults=True
+        )
+        return values
+
+
 @dataclass(frozen=True, slots=True)
 class SavedTracks:
     """The tracks of a video, read from a file.
@@ -129,6 +187,8 @@ class SavedTracks:
         The moment of time 0, if the file has it.
     begin_source
         Where that is from.
+    video
+        What the file says of its video; None for formats that cannot hold it.
     """
 
     labels: tuple[Label, ...]
@@ -137,11 +197,28 @@ class SavedTracks:
     size: tuple[int, int] | None = None
     begin: datetime | None = None
     begin_source: str = "from the file"
+    video: SourceVideo | None = None
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """A sentence for each reason to doubt the tracks."""
+        findings = self.video.findings if self.video else ()
+        return tuple(f"{f.text} [{f.code}]" for f in findings if f.severity == "warning")
 
     @property
     def has_times(self) -> bool:
         """Whether every frame has a time; if not, pass a rate to `at_rate`."""
         return self._indices() <= self.times.keys()
+
+    def of_video(self, video: SourceVideo) -> "SavedTracks":
+        """Return the same tracks with what the file says of their video."""
+        return replace(
+            self,
+            video=video,
+            size=(video.width, video.height),
+            begin=self.begin or video.begin,
+            begin_source=video.begin_source or self.begin_source,
+        )
 
     def at_rate(self, rate: float) -> "SavedTracks":
         """Return the same tracks; frames without a time get that of `rate` frames per second."""

@@ -19,8 +19,15 @@ from typing_extensions import TypedDict
 
 from vdet.config.camera import parse_date_time
 from vdet.errors import TruthError
-from vdet.labels.formats import Format
-from vdet.labels.label import Label, SavedTracks, from_size, line_error
+from vdet.labels.formats import VIDEO, Format
+from vdet.labels.label import (
+    Label,
+    SavedFinding,
+    SavedTracks,
+    SourceVideo,
+    from_size,
+    line_error,
+)
 from vdet.labels.parsing import (
     LIMIT,
     Index,
@@ -34,9 +41,6 @@ from vdet.track.track import FrameTracks, State, Track
 
 CLOCK = "clock"
 """Name of the fact and the column with the clock time of a frame, ISO 8601."""
-
-CLOCK_SOURCE = "clock_source"
-"""Name of the fact that says why a clock may be wrong."""
 
 _COLUMNS = (
     *("frame", "time", "id", "x", "y", "width", "height"),
@@ -81,7 +85,8 @@ class _Record(TypedDict):
     time: float
     tracks: Annotated[list[dict[str, Any]], FailFast()]
     clock: NotRequired[str]
-    clock_source: NotRequired[Annotated[str, Field(max_length=100)]]
+    video: NotRequired[SourceVideo]  # of the first frame
+    findings: NotRequired[tuple[SavedFinding, ...]]  # of the last frame
 
 
 _RECORD = TypeAdapter(_Record)
@@ -113,7 +118,8 @@ def _json_lines(frame: FrameTracks) -> Iterator[str]:
     """Yield a record: `frame`, `time`, `tracks`, and the facts about the frame."""
     tracks = [track_record(track) for track in frame.tracks]
     record = {"frame": frame.index, "time": round(frame.time, 6), "tracks": tracks}
-    yield json.dumps({**record, **frame.facts}) + "\n"
+    video = {VIDEO: frame.facts[VIDEO]} if VIDEO in frame.facts else {}  # at the start of the file
+    yield json.dumps({**video, **record, **frame.facts}) + "\n"
 
 
 def _csv_lines(frame: FrameTracks) -> Iterator[str]:
@@ -150,8 +156,10 @@ def read_json_lines(path: Path, data: bytes) -> SavedTracks:
     record = _RECORD.validate_json(first)
     begin = _begin(path, line, record.get("clock"), record["time"])
     saved = SavedTracks(labels, tuple(seconds), seconds, begin=begin)
-    source = record.get("clock_source")
-    return replace(saved, begin_source=source) if source else saved
+    if (video := record.get("video")) is None:
+        return saved
+    last = _RECORD.validate_json(data.rstrip().rpartition(b"\n")[2])
+    return saved.of_video(replace(video, findings=last.get("findings", ())))
 
 
 def _json_rows(path: Path, data: bytes, times: Times) -> Iterator[_Rows]:

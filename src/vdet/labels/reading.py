@@ -1,6 +1,7 @@
 """Readers of tracks, predictions, ground truth and labelled images in any format."""
 
 import gc
+import logging
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -16,9 +17,13 @@ from vdet.labels.parsing import read_bytes
 from vdet.labels.roles import DEFAULT_ROLES, Roles, is_region
 from vdet.labels.yolo import read_yolo_images
 
+_log = logging.getLogger("vdet")
+
 
 def read_tracks(path: Path, rate: float | None = None) -> SavedTracks:
     """Read the tracks of a video from a file in any format; ignore regions are omitted.
+
+    There is a warning (logger "vdet") for each reason to doubt them that the file has.
 
     Parameters
     ----------
@@ -41,6 +46,8 @@ def read_tracks(path: Path, rate: float | None = None) -> SavedTracks:
     finally:
         if was_enabled:
             gc.enable()
+    for doubt in saved.doubts:
+        _log.warning("%s: %s", path, doubt)
     return saved if rate is None else saved.at_rate(rate)
 
 

@@ -15,7 +15,7 @@ from vdet.media.images import is_image_file, read_image
 from vdet.media.reader import VideoReader
 from vdet.progress import Steps
 from vdet.run.loop import Parts
-from vdet.run.video import Run, open_video
+from vdet.run.video import Run, log, open_video
 from vdet.track.track import FrameTracks
 
 _MAX_SAMPLES = 20
@@ -94,6 +94,13 @@ def _saved(tracks: Path, run: Run, video: VideoInfo | None = None) -> list[Frame
     Without a video, the first frame of the file is the first one of the video.
     """
     saved = read_tracks(tracks, float(video.rate) if video else None)
+    if video and saved.video:
+        size = saved.video.width, saved.video.height
+        if size != (video.width, video.height):
+            fault = f"is of {size[0]}×{size[1]} frames, not {video.width}×{video.height}"
+            raise TruthError(f"{tracks}: {fault}")
+        if saved.video.name != run.source.name:
+            log.warning("%s: is of %s, not %s", tracks, saved.video.name, run.source.name)
     if not saved.has_times:
         raise TruthError(f"{tracks}: has no times; CLIP must be the video")
     frames = list(saved)

@@ -272,6 +272,8 @@ def write_outputs(
             run.settings,
             info,
             is_part=run.is_part,
+            start=run.start,
+            end=run.end,
             at=run.at,
             outputs=run.outputs,
             traffic=video.traffic,

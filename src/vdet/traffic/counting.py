@@ -102,9 +102,12 @@ def count_files(
         clock = find_clock(path, settings, saved.times.get(0, 0.0), saved=saved)
         if clock and settings.input.begin and len(paths) > 1:
             clock = recording.next_clock(path, saved, clock, group.last if group else None)
+        if size and saved.video and size != saved.size:
+            width, height = saved.video.width, saved.video.height
+            raise ConfigError(f"{path}: is of {width}×{height} frames; remove --size")
         frame_size = _frame_size(settings, size or saved.size)
         first, is_complete = min(saved.times.values(), default=0.0), saved.covered is not None
-        video = _Video(str(path), clock, first, is_complete)
+        video = _Video(str(path), clock, first, is_complete, saved.doubts)
         if group is None or not group.precedes(video, frame_size):
             counted |= group.counts() if group else {}
             group = _Group(settings, frame_size, group.counter.linker.started if group else 0)
@@ -143,6 +146,8 @@ class _Video:
         Times of its first frame, and of the first one that counts.
     is_complete
         Whether its last frame is known, also without a vehicle.
+    doubts
+        As in `Counts`.
     shift, frame_shift
         What converts its times and the numbers of its frames to those of the group.
     spans
@@ -159,6 +164,7 @@ class _Video:
     clock: Clock | None
     first: float
     is_complete: bool = True
+    doubts: tuple[str, ...] = ()
     meter: SpeedMeter | None = None
     start: float = -math.inf
     shift: float = 0.0
@@ -211,7 +217,9 @@ class _Video:
             if self.frame_shift <= event.frame < self.next_shift
         )
         spans = tuple(self.spans) or ((self.first, self.first),)
-        own = replace(group, events=tuple(events), spans=spans, clock=self.clock)
+        own = replace(
+            group, events=tuple(events), spans=spans, clock=self.clock, doubts=self.doubts
+        )
         return with_speeds(own, self.meter)
 
 

@@ -152,6 +152,8 @@ class Counts:
         None if unknown.
     warnings
         A sentence for each misplaced line, and for a low frame rate.
+    doubts
+        A sentence for each reason to doubt saved tracks.
     """
 
     events: tuple[Event, ...]
@@ -160,6 +162,7 @@ class Counts:
     spans: tuple[Span, ...] = ((0.0, 0.0),)
     clock: Clock | None = None
     warnings: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
 
     @property
     def totals(self) -> tuple[DirectionTotal, ...]:

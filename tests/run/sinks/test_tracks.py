@@ -4,20 +4,26 @@ import io
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from datetime import UTC, datetime
 from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from red_cars import SETTINGS
 from run.red_runs import result_of, write
 from vdet.boxes import Box
+from vdet.conditions.finding import Finding, Findings
 from vdet.config.schema import LaneSettings
+from vdet.labels.reading import read_tracks
 from vdet.lanes.road import Lane, RoadFinder
 from vdet.media import Picture
 from vdet.run.result import FrameResult
 from vdet.run.sinks import Output
 from vdet.track.track import Track
+from vdet.traffic.clock import Clock
+from vdet.version import __version__
 
 RESULTS = (
     result_of(
@@ -33,6 +39,7 @@ RESULTS = (
         time=Fraction(6, 25),
     ),
 )
+BEGIN = datetime(2026, 5, 1, 7, tzinfo=UTC)
 HEADING = "frame,time,id,x,y,width,height,score,state,class,foot_x,foot_y,distance,lane,clock\n"
 LANE = Lane(
     curvature=-0.001,
@@ -67,8 +74,10 @@ def test_csv_has_a_heading_and_counts_from_0(tmp_path: Path) -> None:
 
 
 def test_json_lines_have_a_record_for_every_frame(tmp_path: Path) -> None:
-    assert written(tmp_path / "tracks.jsonl") == (
-        '{"frame": 4, "time": 0.16, "tracks": [{"id": 1, "x": 10, "y": 20, "width": 30, '
+    video, end, records = written(tmp_path / "tracks.jsonl").partition(', "frame": 4,')
+    assert json.loads(f"{video}}}")["video"]["name"] == "red.mp4"
+    assert end + records == (
+        ', "frame": 4, "time": 0.16, "tracks": [{"id": 1, "x": 10, "y": 20, "width": 30, '
         '"height": 40, "score": 0.9877, "state": "detected", "class": "car", "foot": [25.0, 60.0], '
         '"distance": null, "lane": null}]}\n'
         '{"frame": 5, "time": 0.333333, "tracks": []}\n'
@@ -80,7 +89,7 @@ def test_json_lines_have_a_record_for_every_frame(tmp_path: Path) -> None:
     )
 
 
-def test_standard_output_gets_each_frame_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_standard_output_gets_a_frame_with_the_next_one(monkeypatch: pytest.MonkeyPatch) -> None:
     pipe = io.BytesIO()
     monkeypatch.setattr("sys.stdout", io.TextIOWrapper(io.BufferedWriter(pipe)))
     lines: list[int] = []
@@ -91,7 +100,8 @@ def test_standard_output_gets_each_frame_at_once(monkeypatch: pytest.MonkeyPatch
             lines.append(pipe.getvalue().count(b"\n"))
 
     write(Output("tracks", Path("-")), results())
-    assert lines == [1, 2, 3]
+    assert lines == [0, 1, 2]
+    assert pipe.getvalue().count(b"\n") == 3
 
 
 def test_json_lines_tell_the_lane_where_it_was_looked_for(tmp_path: Path) -> None:
@@ -113,4 +123,29 @@ def test_json_lines_tell_the_lane_where_it_was_looked_for(tmp_path: Path) -> Non
 
 def test_the_video_is_described_by_its_name_and_size(tmp_path: Path) -> None:
     text = written(tmp_path / "a.coco.json")
-    assert '{"id": 1, "name": "red.mp4", "width": 320, "height": 240}' in text
+    (video,) = json.loads(text)["videos"]
+    assert video.pop("vdet")["program"] == f"vdet {__version__}"
+    assert video == {"id": 1, "name": "red.mp4", "width": 320, "height": 240}
+
+
+@pytest.mark.parametrize("ending", [".jsonl", ".coco.json"])
+def test_tracks_know_their_video_its_clock_and_why_they_may_be_wrong(
+    tmp_path: Path, ending: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    findings = Findings(
+        (
+            Finding("camera-moves", "the camera moves", ((0.0, 2.0),), value=0.1),
+            Finding("lane-geometry", "no values in metres", severity="note"),
+        )
+    )
+    path, clock = tmp_path / f"tracks{ending}", Clock(BEGIN, "its creation time")
+    settings = SETTINGS.model_copy(update={"classes": ("car",)})
+    write(Output("tracks", path), RESULTS[:2], settings=settings, clock=clock, findings=findings)
+    saved = read_tracks(path)
+    assert saved.video is not None
+    assert (saved.video.name, saved.size, saved.video.rate) == ("red.mp4", (320, 240), 25)
+    assert (saved.begin, saved.begin_source) == (BEGIN, "its creation time")
+    assert saved.video.classes == ("car",)
+    assert saved.video.settings["tracker"]["kind"] == SETTINGS.tracker.kind
+    assert [finding.code for finding in saved.video.findings] == ["camera-moves", "lane-geometry"]
+    assert caplog.messages == [f"{path}: the camera moves [camera-moves]"]

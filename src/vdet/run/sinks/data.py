@@ -5,6 +5,7 @@ Times are in seconds of the input. Pixels are those of the input frame, counted 
 
 import sys
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -15,18 +16,19 @@ from vdet.files import json_text, print_now, write_text
 from vdet.labels.coco import COCO, write_coco_images
 from vdet.labels.formats import (
     ImageTracks,
-    SourceVideo,
     TrackWriter,
     check_track_name,
     format_for,
     track_suffixes,
 )
-from vdet.labels.native import CLOCK, CLOCK_SOURCE, JSON_LINES, track_record
+from vdet.labels.label import SourceVideo
+from vdet.labels.native import CLOCK, JSON_LINES, track_record
 from vdet.run.result import FrameResult, findings_in
 from vdet.run.sinks.protocol import STANDARD_OUTPUT, BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.traffic import output
 from vdet.traffic.records import join_records, records_content
 from vdet.traffic.tables import SUFFIXES, check_table, write_content
+from vdet.version import __version__
 
 MakeContent = Callable[[Path, output.Videos, int | None], Any]
 
@@ -35,7 +37,8 @@ class TrackSink(BaseSink):
     """Writes the tracks of each frame; the ending of the name selects the format.
 
     The formats are those of `vdet.labels.formats`. The path `-` stands for standard output, as
-    `.jsonl`, frame by frame. In `.jsonl` and `.csv` a frame has its time of day in `clock`, if
+    `.jsonl`, frame by frame. `.jsonl` and `.coco.json` say what the video is (`SourceVideo`), and
+    why the tracks may be wrong. In `.jsonl` and `.csv` a frame has its time of day in `clock`, if
     known. In `.jsonl` it has `lane` if lane finding is enabled: null if no lane is shown, else an
     object with `radius` (metres, null on a straight road), `offset` (of the camera from the middle
     of the lane, metres, positive to the right), `width` (metres), `left` and `right`: each line as
@@ -48,29 +51,47 @@ class TrackSink(BaseSink):
 
     def __enter__(self) -> Self:
         if self.path == STANDARD_OUTPUT:
-            self._writer = TrackWriter(JSON_LINES, sys.stdout.buffer)
+            self._writer = TrackWriter(JSON_LINES, sys.stdout.buffer, self._source())
             return self
         form = format_for(self.path)
         assert form is not None  # the suffixes of the kind say so
-        source = SourceVideo(self.video.path.name, self.video.width, self.video.height)
         self._file = self.context.files.stage(self.path).open("wb")
-        self._writer = TrackWriter(form, self._file, source)
+        self._writer = TrackWriter(form, self._file, self._source())
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        if self._file is None:
-            return
-        with self._file:
+        with self._file or nullcontext():
             if kind is None:
-                self._writer.end()
+                self._writer.end(findings_in(self.context.facts).record())
+        if self._file is None:
+            sys.stdout.flush()
+
+    def _source(self) -> SourceVideo:
+        video, clock, context = self.video, self.traffic.clock, self.context
+        settings = context.settings.with_paths(lambda path: Path(path).name)
+        values = settings.model_dump(mode="json", exclude_defaults=True)
+        for name, section in (("detector", settings.detector), ("tracker", settings.tracker)):
+            values[name] = {"kind": section.kind, **values.get(name, {})}
+        return SourceVideo(
+            name=video.path.name,
+            width=video.width,
+            height=video.height,
+            rate=round(float(video.rate), 6),
+            start=None if context.start is None else float(context.start),
+            end=None if context.end is None else float(context.end),
+            begin=clock.at(0.0) if clock else None,
+            begin_source=clock.source if clock else None,
+            classes=settings.classes,
+            program=f"vdet {__version__}",
+            settings=values,
+        )
 
     def write(self, result: FrameResult) -> None:
         """Add the tracks of a frame."""
         frame, clock = result.frame_tracks, self.traffic.clock
         if clock:
             clock_time = clock.at(frame.time).isoformat(" ", "microseconds")
-            doubt = {CLOCK_SOURCE: clock.source} if clock.is_doubtful else {}
-            frame = replace(frame, facts={CLOCK: clock_time, **doubt, **frame.facts})
+            frame = replace(frame, facts={CLOCK: clock_time, **frame.facts})
         self._writer.write(frame)
         if self._file is None:
             sys.stdout.flush()

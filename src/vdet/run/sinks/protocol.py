@@ -47,6 +47,8 @@ class SinkContext:
         The video that is read; None for single images.
     is_part
         Whether only a part of the video is read.
+    start, end
+        That part, seconds from the first frame; None: no limit.
     at
         The option `--at`: seconds from the first frame.
     outputs
@@ -67,6 +69,8 @@ class SinkContext:
     settings: Settings
     video: VideoInfo | None = None
     is_part: bool = False
+    start: Fraction | None = None
+    end: Fraction | None = None
     at: Fraction = Fraction(0)
     outputs: tuple[Output, ...] = ()
     traffic: "LiveTraffic | None" = None
