@@ -202,6 +202,18 @@ def test_no_file_that_is_read_is_overwritten(clip_path: Path, tmp_path: Path) ->
         vdet.detect_video(clip_path, tracks=mask, settings=settings, overwrite=True)
 
 
+def test_messages_name_parameters(clip_path: Path, tmp_path: Path) -> None:
+    (taken := tmp_path / "a.csv").touch()
+    with pytest.raises(vdet.VdetError, match=r"already exists; use overwrite=True to replace it"):
+        vdet.detect_video(clip_path, tracks=taken, detector=red_boxes)
+    with pytest.raises(vdet.VdetError, match=r"^assignments: output.crf: must be less than"):
+        vdet.load_settings(assignments=["output.crf=99"])
+    line = "traffic.lines=[{name: a, start: [0, 0], end: [1, 1]}]"
+    settings = vdet.load_settings(assignments=[line])
+    with pytest.raises(vdet.VdetError, match=r"pass size, such as size=\(1280, 720\)"):
+        vdet.count([vdet.FrameTracks(0, 0.0, ())], settings)
+
+
 def test_a_tracker_knows_its_vehicles_in_frames_in_which_nobody_looked() -> None:
     tracker = vdet.Tracker(1280, 720)
     found = vdet.Boxes([[600, 400, 700, 480]], [0.9])
@@ -336,8 +348,7 @@ def test_follow_and_files_have_the_same_counts_vehicles_and_findings(
     assert records_content(results.vehicles, outputs["vehicles"]) == in_files["vehicles"]
     assert results.findings
     assert [finding.record() for finding in results.findings] == in_files["conditions"]
-    with pytest.warns(DeprecationWarning, match="use the vehicles of vdet.follow"):
-        assert vdet.vehicles(red_clip, **given) == results.vehicles
+    assert vdet.vehicles(red_clip, **given) == results.vehicles
 
 
 def test_tracks_are_compared_with_the_truth(red_clip: Path, tmp_path: Path) -> None:

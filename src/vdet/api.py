@@ -16,14 +16,13 @@ A name is that of a kind of detector or tracker, from vdet or another package, o
 
 import math
 import os
-import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from fractions import Fraction
 from itertools import chain
 from os import PathLike
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -75,6 +74,31 @@ AnyTracker = str | VideoTracker
 Seconds = float | Fraction
 
 
+_PARAMETERS = {
+    "--set": "assignments",
+    "use --overwrite": "use overwrite=True",
+    "--size, such as 1280x720": "size, such as size=(1280, 720)",
+    "--rate 25": "rate=25",
+    "--rate": "rate",
+    "--model": "detector=FILE",
+    "--begin": "the setting input.begin",
+    "an earlier --at": "an earlier Run.at",
+}
+"""Options of the command line in messages, and the parameters that take their place in Python."""
+
+
+@contextmanager
+def _named_for_python() -> Iterator[None]:
+    """Raise errors with the names of parameters in place of those of command line options."""
+    try:
+        yield
+    except VdetError as error:
+        for option, parameter in _PARAMETERS.items():
+            error.args = tuple(str(line).replace(option, parameter) for line in error.args)
+        raise
+
+
+@_named_for_python()
 def load_settings(config: Paths = (), assignments: Sequence[str] = ()) -> Settings:
     """Read settings.
 
@@ -220,16 +244,38 @@ def follow(
     return Results(open_video(run, parts))
 
 
-def vehicles(source: PathName | Run, **arguments: Any) -> tuple[VehicleRecord, ...]:
-    """Return the `vehicles` of `follow` after its last frame. Deprecated."""
-    message = "vdet.vehicles is deprecated; use the vehicles of vdet.follow after its last frame"
-    warnings.warn(message, DeprecationWarning, stacklevel=2)
-    results = follow(source, **arguments)
+@_named_for_python()
+def vehicles(
+    source: PathName | Run,
+    *,
+    settings: Settings | None = None,
+    detector: AnyDetector | None = None,
+    tracker: AnyTracker | None = None,
+    steps: Sequence[Step] = (),
+    start: Seconds | None = None,
+    end: Seconds | None = None,
+    frames: int | None = None,
+) -> tuple[VehicleRecord, ...]:
+    """Return a record of each vehicle of a video, by id: its times, class and path.
+
+    Parameters and errors as for `follow`.
+    """
+    results = follow(
+        source,
+        settings=settings,
+        detector=detector,
+        tracker=tracker,
+        steps=steps,
+        start=start,
+        end=end,
+        frames=frames,
+    )
     for _ in results:
         pass
     return results.vehicles
 
 
+@_named_for_python()
 def detect_video(
     source: PathName | Run,
     video: PathName | None = None,
@@ -272,6 +318,7 @@ def detect_video(
     return run_video(run, parts, progress=reporting(progress) if progress else no_progress)
 
 
+@_named_for_python()
 def detect_image(
     source: PathName,
     image: PathName | None = None,
@@ -297,6 +344,7 @@ def detect_image(
     return result.detections
 
 
+@_named_for_python()
 def count(
     tracks: PathName | Iterable[FrameTracks | FrameResult],
     settings: Settings,
@@ -365,6 +413,7 @@ def _prepare(
     return replace(run, settings=effective), replace(parts, steps=steps)
 
 
+@_named_for_python()
 def _choose(
     settings: Settings | None, detector: AnyDetector | None, tracker: AnyTracker | None = None
 ) -> tuple[Settings, Parts]:
