@@ -168,7 +168,8 @@ def open_video(run: Run, parts: Parts, *, with_traffic: bool = True) -> Iterator
                     yield result.of_classes(settings.classes)
             facts.update(pipeline.facts())
             if with_traffic:
-                traffic.end(is_still=findings_in(facts).is_still)
+                findings = findings_in(facts)
+                traffic.end(is_still=findings.is_still, doubts=tuple(str(findings).splitlines()))
 
         with closing(results()) as every_result:
             yield OpenVideo(reader, pipeline.detector, every_result, traffic, facts)

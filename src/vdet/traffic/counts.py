@@ -153,7 +153,7 @@ class Counts:
     warnings
         A sentence for each misplaced line, and for a low frame rate.
     doubts
-        A sentence for each reason to doubt saved tracks.
+        A sentence for each reason to doubt the tracks.
     """
 
     events: tuple[Event, ...]

@@ -63,9 +63,13 @@ class LiveTraffic:
             return self._final
         return with_speeds(replace(self.counter.counts(), clock=self.clock), self.speeds)
 
-    def end(self, *, is_still: bool = False) -> None:
-        """Make records and counts, after the last frame; `is_still` as for `VehicleRecords.end`."""
-        self._final = self.counts()
+    def end(self, *, is_still: bool = False, doubts: tuple[str, ...] = ()) -> None:
+        """Make records and counts, after the last frame.
+
+        `is_still` as for `VehicleRecords.end`, `doubts` as in `Counts`.
+        """
+        if counts := self.counts():
+            self._final = replace(counts, doubts=doubts)
         records = self._records.end(self.speeds, is_still=is_still)
         chosen = (record for record in records if is_chosen(record.class_name, self._classes))
         self.vehicles = tuple(chosen)
