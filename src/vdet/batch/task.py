@@ -19,7 +19,7 @@ from vdet.errors import BatchError, in_one_line
 from vdet.files import OutputFiles, write_whole
 from vdet.media.images import numbered_images
 from vdet.run.loop import Parts
-from vdet.run.sinks.protocol import output_state
+from vdet.run.sinks.protocol import output_state, sink_kind
 from vdet.run.video import Run, write_outputs
 from vdet.version import __version__
 from vdet.workers import limit_library_threads
@@ -133,7 +133,8 @@ def _written(run: Run, record: Record, files: OutputFiles) -> Record:
     written = []
     for output in run.outputs:
         size, changed = output_state(output, files.staged_path(output.path)) or (0, 0)
-        path, summary = str(output.path.absolute()), totals.summaries[output.path]
+        path = str(output.path.absolute())
+        summary = totals.summaries[output.path] if sink_kind(output.sink).total else None
         written.append(Written(output.sink, path, size, changed, digest, summary))
     return replace(
         record,
