@@ -73,8 +73,10 @@ def test_a_warning_is_printed_once_and_not_with_quiet(
     run: Run, clips: Path, tmp_path: Path
 ) -> None:
     data = (clips / "a.mp4").read_bytes()
-    (clips / "a.mp4").write_bytes(data + data)
-    options = ("--no-video", "--tracks", ".csv", "--jobs", "1")
+    middle = data.index(b"mdat") + 1000
+    (clips / "a.mp4").write_bytes(data[:middle] + bytes(1000) + data[middle + 1000 :])
+    damaged = ("--set", "input.max_damaged=1")
+    options = ("--no-video", "--tracks", ".csv", "--jobs", "1", *damaged)
     loud = run("detect-video", clips, "-d", tmp_path / "loud", *options)
     name = f"{clips}/a.mp4: "
     assert loud.code == 0
