@@ -1,11 +1,10 @@
-"""Damaged and wicked zip files of patches through `vdet train`."""
+"""Damaged and wicked zip files of patches through `vdet train`; nothing is unpacked to a file."""
 
 import io
 import stat
 import struct
 import warnings
 import zipfile
-import zlib
 
 import cv2
 import numpy as np
@@ -35,10 +34,10 @@ def patches() -> Members:
     ]
 
 
-def zipped(members: Members, compression: int = zipfile.ZIP_DEFLATED) -> bytes:
+def zipped(members: Members) -> bytes:
     file = io.BytesIO()
     with (
-        zipfile.ZipFile(file, "w", compression) as archive,
+        zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive,
         warnings.catch_warnings(action="ignore"),  # a name that is there twice
     ):
         for name, data in members:
@@ -46,86 +45,46 @@ def zipped(members: Members, compression: int = zipfile.ZIP_DEFLATED) -> bytes:
     return file.getvalue()
 
 
-def with_field(data: bytes, local: int, central: int, kind: str, value: int) -> bytes:
+def with_field(data: bytes, local: int, central: int, value: int) -> bytes:
     """Set a field in the headers of all members."""
     changed = bytearray(data)
     for mark, offset in ((b"PK\x03\x04", local), (b"PK\x01\x02", central)):
         at = changed.find(mark)
         while at >= 0:
-            struct.pack_into(kind, changed, at + offset, value)
+            struct.pack_into("<H", changed, at + offset, value)
             at = changed.find(mark, at + 4)
     return bytes(changed)
 
 
-def huge_picture() -> bytes:
-    png = picture(0, 0)
-    header = b"IHDR" + struct.pack(">II", 100_000, 100_000) + png[24:29]
-    return png[:12] + header + struct.pack(">I", zlib.crc32(header)) + png[33:]
+UNREADABLE = ": is not a readable image"
 
 
-def special(name: str, mode: int) -> zipfile.ZipInfo:
-    info = zipfile.ZipInfo(name)
-    info.external_attr = mode << 16
-    return info
-
-
-def many(name: str, data: bytes) -> Members:
-    return [(f"vehicles/far/{name}{number}.png", data) for number in range(EACH - 1)]
-
-
-BAD_NAMES = ("../vehicles/far/x.png", "/vehicles/far/x.png", "vehicles\\..\\x.png")
-WICKED = {
-    "a set in a set": "no images in vehicles/",
-    "nothing": "no images in vehicles/",
-    "one class": "no images in non-vehicles/",
-}
-WICKED |= dict.fromkeys(
-    [
-        *("/vehicles/far/x.png", "a symbolic link"),
-        *("encrypted", "wrong checksums", "unknown compression"),
-        *("other sizes than claimed", "bombs", "bombs that claim to be small"),
-        *("pictures of 10¹⁰ pixels", "no pictures", "empty pictures"),
-    ],
-    ": is not a readable image",
-)
-"""What is rejected, and the words that say why. Nothing is unpacked to a file."""
-
-
-def wicked_sets() -> dict[str, bytes]:
-    whole = patches()
-    packed, stored = zipped(whole), zipped(whole, zipfile.ZIP_STORED)
-    bombs = zipped([*whole, *many("bomb", bytes(17_000_000))])
-    link = special("vehicles/far/x.png", stat.S_IFLNK | 0o777)
-    return {name: zipped([*whole, (name, b"")]) for name in BAD_NAMES} | {
-        "a symbolic link": zipped([*whole, (link, b"/etc/passwd")]),
-        "encrypted": with_field(packed, 6, 8, "<H", 1),
-        "wrong checksums": with_field(stored, 14, 16, "<I", 7),
-        "unknown compression": with_field(packed, 8, 10, "<H", 99),
-        "other sizes than claimed": with_field(packed, 22, 24, "<I", 10),
-        "bombs": bombs,
-        "bombs that claim to be small": with_field(bombs, 22, 24, "<I", 100),
-        "pictures of 10¹⁰ pixels": zipped([*whole, *many("huge", huge_picture())]),
-        "no pictures": zipped([*whole, *many("text", b"text")]),
-        "empty pictures": zipped([(name, b"") for name, _ in whole]),
-        "a set in a set": zipped([("vehicles/set.zip", packed)]),
-        "nothing": zipped([]),
-        "one class": zipped(whole[:EACH]),
+def wicked_sets() -> dict[str, tuple[bytes, str]]:
+    """Give sets by their names, and the words that say why each is rejected."""
+    whole, link = patches(), zipfile.ZipInfo("vehicles/far/x.png")
+    link.external_attr = (stat.S_IFLNK | 0o777) << 16
+    bombs: Members = [(f"vehicles/far/bomb{n}.png", bytes(17_000_000)) for n in range(EACH - 1)]
+    return {
+        "an absolute name": (zipped([*whole, ("/vehicles/far/x.png", b"")]), UNREADABLE),
+        "a symbolic link": (zipped([*whole, (link, b"/etc/passwd")]), UNREADABLE),
+        "encrypted": (with_field(zipped(whole), 6, 8, 1), UNREADABLE),
+        "unknown compression": (with_field(zipped(whole), 8, 10, 99), UNREADABLE),
+        "bombs": (zipped([*whole, *bombs]), UNREADABLE),
+        "empty pictures": (zipped([(name, b"") for name, _ in whole]), UNREADABLE),
+        "a set in a set": (zipped([("vehicles/set.zip", zipped(whole))]), "no images in vehicles/"),
+        "nothing": (zipped([]), "no images in vehicles/"),
+        "one class": (zipped(whole[:EACH]), "no images in non-vehicles/"),
     }
 
 
-def bad_sets() -> dict[str, bytes]:
-    """Give 50 sets: a whole one, wicked and damaged ones."""
-    sets = {"whole": zipped(patches())} | wicked_sets()
-    for compression in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-        count = (50 - len(sets)) // (1 + (compression == zipfile.ZIP_STORED))
-        damaged = mutated(zipped(patches(), compression), seed=compression, count=count)
-        sets |= {f"damaged {compression}-{number}": data for number, data in enumerate(damaged)}
-    return sets
+WICKED = wicked_sets()
 
 
 @pytest.fixture(scope="module")
 def trials(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Trial]:
-    sets, folder = bad_sets(), tmp_path_factory.mktemp("sets")
+    sets, folder = {"whole": zipped(patches())}, tmp_path_factory.mktemp("sets")
+    sets |= {name: data for name, (data, _) in WICKED.items()}
+    sets |= {f"damaged {n}": d for n, d in enumerate(mutated(sets["whole"], seed=8, count=30))}
     done = try_files(
         folder / "a",
         {f"{number}.zip": data for number, data in enumerate(sets.values())},
@@ -136,12 +95,11 @@ def trials(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Trial]:
     return dict(zip(sets, done, strict=True))
 
 
-def test_bad_sets_are_trained_on_or_refused(trials: dict[str, Trial]) -> None:
-    assert len(trials) == 50
+def test_a_whole_set_is_trained_on(trials: dict[str, Trial]) -> None:
     assert trials["whole"].code == 0
 
 
 @pytest.mark.parametrize("name", WICKED)
-def test_a_wicked_set_is_refused_by_name(trials: dict[str, Trial], name: str) -> None:
+def test_a_wicked_set_is_rejected_by_name(trials: dict[str, Trial], name: str) -> None:
     assert trials[name].code == 1
-    assert WICKED[name] in trials[name].err
+    assert WICKED[name][1] in trials[name].err
