@@ -150,7 +150,9 @@ def video_page(vehicles: int = 1200, length: float = 3600.0) -> str:
         first, seconds = float(rng.random() * (length - 8)), float(2 + 5 * rng.random())
         x, y = np.linspace(300, 900, 40), np.linspace(300, 650, 40)
         times, places = first + np.linspace(0, seconds, 40), np.stack([x, y], axis=1) / 30
-        speeds = Speeds(times, places, np.full(40, 8 + 6 * rng.random()), np.full(40, 0.2), 0.01)
+        speeds = Speeds(
+            times, places, np.full(40, 8 + 6 * rng.random()), np.full(40, 0.2), 0.01, 4.5
+        )
         box = Box.sized(860, 560, 80, 60)
         states: Counter[State] = Counter({"detected": int(25 * seconds)})
         records.append(

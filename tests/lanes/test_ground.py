@@ -7,7 +7,7 @@ import pytest
 
 from lanes.poles import CORNERS, HEIGHT, WIDTH, ground_text, seen
 from vdet.boxes import Float64Array
-from vdet.config.camera import CameraSettings, LensSettings
+from vdet.config.camera import CameraSettings, GroundPoint, LensSettings
 from vdet.config.loading import load_settings
 from vdet.errors import ConfigError
 from vdet.lanes.camera import Undistorter
@@ -33,6 +33,13 @@ def test_places_on_the_road_have_their_metres() -> None:
     assert ground.metres(seen(places) + EDGE) == pytest.approx(places, abs=1e-3)
 
 
+def test_metres_may_have_any_origin() -> None:
+    utm = np.array([391_000.0, 5_820_000.0])
+    steps = fitted(CORNERS + utm, seen(CORNERS)).metres(seen(CORNERS) + EDGE)
+    assert steps - steps[0] == pytest.approx(CORNERS - CORNERS[0], abs=1e-3)
+    assert GroundPoint(pixel=(0, 0), metres=(391_000, 5_820_000)).metres == (391_000, 5_820_000)
+
+
 def test_a_place_above_the_horizon_is_not_known() -> None:
     assert np.isnan(fitted().metres(np.array([(640.0, 20.0)]))).all()
 
@@ -53,6 +60,7 @@ def test_a_place_is_known_up_to_one_length_beyond_the_area(beyond: float, known:
         (np.array([(0, 14), (0, 20), (0, 30), (5, 30)]), None, "or all but one, are on a line"),
         (CORNERS * (0, 1), seen(CORNERS), "are on a line (metres)"),
         (CORNERS, seen(CORNERS)[[0, 2, 1, 3]], "the horizon is between the points"),
+        (CORNERS / 111_000, seen(CORNERS), "metres are expected, not degrees"),
     ],
 )
 def test_points_that_fix_no_plane_are_refused_in_words(

@@ -10,7 +10,8 @@ from vdet.boxes import Box, Float64Array
 from vdet.lanes.camera import Undistorter
 from vdet.lanes.ground import fit_ground
 from vdet.track.track import FrameTracks, State, Track
-from vdet.traffic.speeds import SpeedMeter, Speeds
+from vdet.traffic.counts import Counts, Event
+from vdet.traffic.speeds import SpeedMeter, Speeds, with_speeds
 
 GROUND = fit_ground(seen(CORNERS), CORNERS, Undistorter(None, WIDTH, HEIGHT))
 RATE = 25
@@ -137,3 +138,26 @@ def test_a_vehicle_that_comes_back_after_long_keeps_its_speed() -> None:
         box = Box(x - 20, y - 40, x + 20, y)
         meter.add(FrameTracks(round(25 * time), time, (Track(1, box, 0.9, "detected"),)))
     assert meter.speeds()[1].quantile(0.5) == pytest.approx(10.0, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("scale", "warnings"),
+    [
+        (1.0, ()),
+        (4.0, ("camera.ground: cars are 18.0 m long by these points; check their metres",)),
+    ],
+)
+def test_cars_that_are_too_long_show_that_points_are_wrong(
+    scale: float, warnings: tuple[str, ...]
+) -> None:
+    ground = fit_ground(seen(CORNERS), scale * CORNERS, Undistorter(None, WIDTH, HEIGHT))
+    meter, events = SpeedMeter(ground, WIDTH, HEIGHT), []
+    for number in range(5):
+        events.append(Event(9.0, 225, "gate", "in", number, number, "car", 0.9))
+        for index, (x, y) in enumerate(driving(12.0, 14.0 + number).tolist()):
+            left, right = seen(np.array([(x - 0.9, y), (x + 0.9, y)])) + 0.5
+            box = Box(left[0], left[1] - 60, right[0], left[1])
+            frame = FrameTracks(index, index / RATE, (Track(number, box, 0.9, "detected", "car"),))
+            meter.add(frame)
+    counts = Counts(events=tuple(events), directions=(("gate", "in"),), zones=())
+    assert with_speeds(counts, meter).warnings == warnings

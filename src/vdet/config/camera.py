@@ -10,7 +10,7 @@ from zoneinfo import ZoneInfo
 from pydantic import Field, field_validator
 
 from vdet.config.section import Section
-from vdet.config.shapes import Coordinate, FramePoint, Shape, Size
+from vdet.config.shapes import FramePoint, Shape, Size
 from vdet.errors import ConfigError
 
 _EARLIEST, _LATEST = 1990, 2200
@@ -19,6 +19,7 @@ _LENS_TOLERANCE = 0.005  # accepts 854×480 for 1280×720
 
 _Coefficient = Annotated[float, Field(ge=-1000, le=1000)]
 _Row = tuple[float, float, float]
+_Metres = Annotated[float, Field(ge=-1e8, le=1e8)]
 
 
 class LensSettings(Section):
@@ -60,7 +61,7 @@ class GroundPoint(Shape):
 
     pixel: FramePoint
     """Position in the frame, x and y; whole numbers are the centres of pixels."""
-    metres: tuple[Coordinate, Coordinate]
+    metres: tuple[_Metres, _Metres]
     """Position on the road, x and y in metres at right angles, from any origin."""
 
 

@@ -16,6 +16,8 @@ from vdet.lanes.camera import Undistorter
 
 _THIN = 0.01
 """Width of points that count as one line, as a fraction of their length."""
+_MIN_LENGTH = 1.0
+"""Minimum length of the area, metres."""
 _MAX_ERROR = 0.03
 """Largest error of the fit, as a fraction of the length of the area."""
 
@@ -94,6 +96,12 @@ def fit_ground(pixels: Float64Array, metres: Float64Array, undistorter: Undistor
     """
     if len(pixels) < 4:
         raise ConfigError(f"camera.ground: has {len(pixels)} points; must be at least four")
+    if (length := _length(metres)) < _MIN_LENGTH:
+        fault = f"all points are within {length:.2g} m; metres are expected, not degrees"
+        raise ConfigError(f"camera.ground: {fault}")
+    metres = metres - np.round(
+        metres.mean(axis=0), -3
+    )  # origins may be thousands of kilometres away
     straight = undistorter.points(pixels)
     for points, unit in ((straight, "pixel"), (metres, "metres")):
         if any(_is_thin(np.delete(points, row, axis=0)) for row in range(len(points))):

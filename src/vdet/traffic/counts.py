@@ -151,7 +151,7 @@ class Counts:
     clock
         None if unknown.
     warnings
-        A sentence for each misplaced line, and for a low frame rate.
+        A sentence for each misplaced line, a low frame rate, and impossible lengths of cars.
     doubts
         A sentence for each reason to doubt the tracks.
     """

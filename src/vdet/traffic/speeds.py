@@ -16,7 +16,9 @@
 
 import math
 from array import array
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from statistics import median
 
 import numpy as np
 
@@ -36,6 +38,10 @@ _SLIMNESS = 0.4
 """Width of a vehicle as a fraction of its length."""
 _LENGTHS = 1.5, 20.0
 """Lengths of vehicles, metres."""
+_CAR_LENGTHS = 2.5, 8.0
+"""Median lengths of cars that are possible, with the error of boxes, metres."""
+_MIN_CARS = 5
+"""Minimum number of cars for a median."""
 _OUTLIERS = 0.1, 4.0
 """Maximum distance of a position from the line: in heights of the box, or in median distances; the
 larger one applies.
@@ -70,6 +76,8 @@ class Speeds:
         Smoothed speeds, and their standard deviations from the scatter of the positions, m/s.
     common
         Relative standard deviation that all speeds of the vehicle share.
+    length
+        Length of the vehicle by the width of its box, metres; NaN if it never moves.
     """
 
     times: Float64Array
@@ -77,6 +85,7 @@ class Speeds:
     speeds: Float64Array
     deviations: Float64Array
     common: float
+    length: float
 
     @property
     def metres(self) -> float:
@@ -178,7 +187,17 @@ def with_speeds(counts: Counts, meter: SpeedMeter | None) -> Counts:
                 event, speed=_kmh(speed), speed_sd=_kmh(deviation), mean_speed=_kmh(mean)
             )
             latest[event.id] = event.time
-    return replace(counts, events=tuple(events))
+    cars = {event.id for event in counts.events if event.class_name == "car"} & by_track.keys()
+    warnings = *counts.warnings, *_length_warnings([by_track[number].length for number in cars])
+    return replace(counts, events=tuple(events), warnings=warnings)
+
+
+def _length_warnings(lengths: Sequence[float]) -> Iterator[str]:
+    """Yield a sentence if cars cannot have these lengths, metres: the points are wrong."""
+    moved = [length for length in lengths if not math.isnan(length)]
+    low, high = _CAR_LENGTHS
+    if len(moved) >= _MIN_CARS and not low <= (length := median(moved)) <= high:
+        yield f"camera.ground: cars are {length:.1f} m long by these points; check their metres"
 
 
 def _kmh(speed: float | None) -> float | None:
@@ -204,8 +223,14 @@ def measure(ground: Ground, rows: Float64Array) -> Speeds | None:
     speeds, times = np.hypot(*velocities.T), clean.times
     at = np.arange(times[0], times[-1] + _SPACING, _SPACING)
     kept = np.unique(np.minimum(np.searchsorted(times, at), len(times) - 1))
-    common = _common(ground, rows)
-    return Speeds(times[kept], middles[kept], speeds[kept], deviations[kept], common)
+    return Speeds(
+        times=times[kept],
+        positions=middles[kept],
+        speeds=speeds[kept],
+        deviations=deviations[kept],
+        common=_common(ground, rows),
+        length=clean.length(rough),
+    )
 
 
 def _common(ground: Ground, rows: Float64Array) -> float:
@@ -252,21 +277,33 @@ class _Geometry:
         return cls(rows[:, 0], positions, depth, away, pixel * rows[:, 3], weights)
 
     def middles(self, velocities: Float64Array) -> Float64Array:
-        """Return the vehicle's centres on the road, metres, `(n, 2)`.
+        """Return the vehicle's centres on the road, metres, `(n, 2)`."""
+        along = self._along(velocities)
+        if along is None:
+            return self.positions
+        length = np.clip(self.length(velocities), *_LENGTHS)
+        extent = length * (along + _SLIMNESS * np.sqrt(np.maximum(0, 1 - along**2)))
+        return np.asarray(self.positions + self.away * extent[:, None] / 2)
+
+    def length(self, velocities: Float64Array) -> float:
+        """Return the vehicle's length by the widths of its box, metres; NaN if it never moves."""
+        along = self._along(velocities)
+        if along is None:
+            return math.nan
+        across = np.sqrt(np.maximum(0, 1 - along**2))
+        return float(np.median(self.widths / (across + _SLIMNESS * along)))
+
+    def _along(self, velocities: Float64Array) -> Float64Array | None:
+        """Return how much of its heading is away from the camera, 0 to 1 `(n,)`; None if unknown.
 
         While it stands, its heading is interpolated between those before and after.
         """
         speeds = np.hypot(*velocities.T)
         moves = speeds >= _MOVES
         if not moves.any():
-            return self.positions
+            return None
         along = np.abs(np.sum(velocities * self.depth, axis=1))[moves] / speeds[moves]
-        along = np.interp(self.times, self.times[moves], along)
-        across = np.sqrt(np.maximum(0, 1 - along**2))
-        lengths = self.widths / (across + _SLIMNESS * along)
-        length = np.clip(np.median(lengths), *_LENGTHS)
-        extent = length * (along + _SLIMNESS * across)
-        return np.asarray(self.positions + self.away * extent[:, None] / 2)
+        return np.asarray(np.interp(self.times, self.times[moves], along))
 
     def lines(self, positions: Float64Array) -> tuple[Float64Array, Float64Array, Float64Array]:
         """Fit a straight line to the positions of the window around each time.
