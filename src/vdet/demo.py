@@ -8,6 +8,7 @@ import numpy as np
 
 from vdet.config.loading import load_settings
 from vdet.config.schema import Settings
+from vdet.config.shapes import NOWHERE
 from vdet.detect.factory import load_detector
 from vdet.detect.svm.detector import load_svm
 from vdet.detect.svm.model import save_model
@@ -27,7 +28,6 @@ from vdet.synthetic.render import write_clip
 from vdet.synthetic.scene import Scene, busy_road, demo_scene, pole_scene
 from vdet.synthetic.truth import write_truth
 from vdet.traffic.counting import count_files
-from vdet.traffic.output import NOWHERE
 
 ROADS = 6
 """Number of synthetic roads to train the linear model on."""

@@ -4,6 +4,7 @@ Points keep the size that they are given for, and `Shape.for_frames` scales them
 frames at hand.
 """
 
+from collections import Counter
 from collections.abc import Iterable
 from typing import Annotated, Any, ClassVar, Literal, Self
 
@@ -175,6 +176,12 @@ INTERVALS = {"s": 1, "min": 60, "h": 3600}
 _DAY = 24 * 3600
 
 
+ZONE_DIRECTIONS = "enter", "exit", "appear", "vanish"
+"""Directions of a zone: across its border, or first and last seen inside."""
+NOWHERE = "(none)"
+"""In tables, the destination of a flow that ends at its first line or zone."""
+
+
 class TrafficSettings(Section):
     """Lines and zones at which vehicles are counted (`vdet.traffic` explains the rule)."""
 
@@ -213,6 +220,13 @@ class TrafficSettings(Section):
     @model_validator(mode="after")
     def _lie_in_the_frame(self) -> "TrafficSettings":
         check_shapes((*self.lines, *self.zones))
+        columns = [f"{line.name}: {way}" for line in self.lines for way in (line.left, line.right)]
+        columns += [f"{zone.name}: {way}" for zone in self.zones for way in ZONE_DIRECTIONS]
+        if NOWHERE in {line.name for line in self.lines} | {zone.name for zone in self.zones}:
+            raise ValueError(f"{NOWHERE}: is reserved for flows without a destination; rename it")
+        for column, number in Counter(columns).items():
+            if number > 1:
+                raise ValueError(f"{column}: would be two columns of a table; rename one")
         for line in self.lines:
             (ax, ay), (bx, by), (width, height) = line.start, line.end, line.size
             if max(abs(ax - bx) / width, abs(ay - by) / height) < SHORTEST_LINE:

@@ -12,12 +12,11 @@ from itertools import pairwise
 import numpy as np
 
 from vdet.boxes import BoolArray, Float64Array
-from vdet.config.shapes import TrafficSettings
+from vdet.config.shapes import ZONE_DIRECTIONS, TrafficSettings
 from vdet.polygons import Point, Segment, meeting, side_of, sides
 from vdet.traffic.linking import DURATION_DIGITS, VehiclePath
 
-ENTER, EXIT, APPEAR, VANISH = "enter", "exit", "appear", "vanish"
-"""Directions of a zone: across its border, or first and last seen inside."""
+ENTER, EXIT, APPEAR, VANISH = ZONE_DIRECTIONS
 
 _AT_EDGE = 0.002
 """A point within this fraction of the frame's side (or one pixel) of the frame's edge lies on it.
@@ -101,7 +100,7 @@ class Zone:
     corners: tuple[Point, ...]
     size: _Size
 
-    directions = ENTER, EXIT, APPEAR, VANISH
+    directions = ZONE_DIRECTIONS
 
     @property
     def inner_sides(self) -> list[Segment]:

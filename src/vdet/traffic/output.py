@@ -10,6 +10,7 @@ from dataclasses import astuple, fields
 from pathlib import Path
 from typing import Any
 
+from vdet.config.shapes import NOWHERE
 from vdet.traffic import counts as tables
 from vdet.traffic.counts import CountRow, Counts, Event, FlowRow, ZoneRow
 from vdet.traffic.tables import VIDEO, is_json, plain_time
@@ -23,9 +24,6 @@ def _columns(row: type[Any]) -> tuple[str, ...]:
 
 _TOTALS, _ZONES, _FLOWS = map(_columns, (CountRow, ZoneRow, FlowRow))
 _EVENTS = ("time", "clock", *_columns(Event)[1:])
-
-NOWHERE = "(none)"
-"""In tables, the destination of a flow that ends at its first line or zone."""
 
 ALL = "all"
 """In wide tables, the name of a sum."""
