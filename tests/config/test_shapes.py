@@ -71,11 +71,11 @@ def test_a_name_can_be_given_once() -> None:
 
 
 def test_names_give_each_column_of_a_table_once() -> None:
-    for names in (("(none)",), ("a: b", "a")):
-        lines = [line(name=name, left="b: left" if name == "a" else "left") for name in names]
-        message = r"\(none\): is reserved|a: b: left: would be two columns"
-        with pytest.raises(ValidationError, match=message):
-            TrafficSettings(lines=tuple(lines))
+    with pytest.raises(ValidationError, match=r"\(none\): is reserved"):
+        line(name="(none)")
+    lines = [line(name="a: b", left="c").lines[0], line(name="a", left="b: c").lines[0]]
+    with pytest.raises(ValidationError, match="a: b: c: would be two columns"):
+        TrafficSettings(lines=tuple(lines))
 
 
 def test_a_closed_polygon_is_the_same_as_an_unclosed_one() -> None:
