@@ -121,7 +121,7 @@ def test_the_picture_for_a_report_has_lines_flows_and_numbers(run: Run) -> None:
     ("arguments", "message"),
     [
         ((), "Missing option '-o'"),
-        (("-o", "a.txt"), "pages must end in .html"),
+        (("-o", "a.txt"), "a.txt: outputs must end in .html, .jpg, .png, .svg"),
         (("-o", "a.jpg"), "no lines or zones to count at; add them to the settings"),
         (("-o", "lines.html", "-c", "wide.yaml"), "whose aspect ratio"),
         (("-o", "frame.png", "-c", "lines.yaml", "--overwrite"), "frame.png"),

@@ -58,7 +58,7 @@ def draw(
     settings = source.load()
     inputs = source.inputs(clip, *([tracks] if tracks else ()), settings=settings)
     suffixes = (".html", ".jpg", ".png", ".svg")
-    options.check_file(output, *suffixes, noun="pages", overwrite=overwrite, inputs=inputs)
+    options.check_file(output, *suffixes, noun="outputs", overwrite=overwrite, inputs=inputs)
     with progress_steps(" frames") as steps:
         # Without regions, because the page shows their effect.
         whole_frames = settings.model_copy(update={"regions": ()})
