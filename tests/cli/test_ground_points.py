@@ -51,6 +51,12 @@ def test_a_file_is_checked_with_the_fit_of_its_points(run: Run) -> None:
         "ground: 4 points, off by 0.00 m (0.0 px, root mean square), over 38 m",
     ):
         assert text in result.out
+    Path("gate.yaml").write_text(
+        ground_text(seen(CORNERS) / (WIDTH, HEIGHT), CORNERS).replace(
+            f"[{WIDTH}, {HEIGHT}]", "null"
+        )
+    )
+    assert "px" not in run("info", "-c", "gate.yaml", code=0).out
 
 
 def test_bad_points_are_refused_in_words(run: Run) -> None:

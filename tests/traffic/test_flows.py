@@ -235,6 +235,12 @@ class TestFiles:
             "all,,1,1,2,0,1,1,3\n"
         )
 
+    def test_a_class_that_is_called_all_is_not_a_sum(self, tmp_path: Path) -> None:
+        counted = {"v": counts(named(frames(GOES_EAST), "all"), WEST)}
+        self.write(counts_content, tmp_path / "c.wide.csv", counted)
+        *_, sums = (tmp_path / "c.wide.csv").read_text().splitlines()
+        assert sums == "all,,1,1,0,0,1"
+
     def test_json_has_flows_matrix_and_the_beginning(self, tmp_path: Path) -> None:
         self.write(flows_content, tmp_path / "f.json", {"v": at(crossing(EAST))})
         whole = json.loads((tmp_path / "f.json").read_text())

@@ -90,9 +90,10 @@ def _camera(settings: "Settings") -> Facts:
         "ground": None,
     }
     if ground := ground_of(settings.camera, *size):
+        pixels = f"{ground.pixel_error:.1f} px, " if settings.camera.size else ""
         facts["ground"] = (
             f"{counted(len(settings.camera.ground), 'point')}, off by {ground.error:.2f} m "
-            f"({ground.pixel_error:.1f} px, root mean square), over {ground.length:.0f} m"
+            f"({pixels}root mean square), over {ground.length:.0f} m"
         )
     return facts
 

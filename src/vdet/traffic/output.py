@@ -94,13 +94,13 @@ def wide_table(rows: Sequence[CountRow | FlowRow], between: str) -> list[Sequenc
     cells = [_cells(row) for row in rows]
     for start, end, *pair, name, count in cells:
         for interval in ((start, end), (ALL, "")):
-            for column in ((*pair, name), (*pair, ALL), (ALL,)):
+            for column in ((*pair, name), (*pair, None), ()):  # a class may be called all
                 sums[*interval, *column] += count
     intervals = dict.fromkeys(tuple(row[:2]) for row in cells)
     classes = dict.fromkeys(row[4] for row in cells)
     pairs = dict.fromkeys(tuple(row[2:4]) for row in cells)
-    columns = [*((*pair, name) for pair in pairs for name in (*classes, ALL)), (ALL,)]
-    heading = (*(f"{between.join(pair)}, {name}" for *pair, name in columns[:-1]), ALL)
+    columns = [*((*pair, name) for pair in pairs for name in (*classes, None)), ()]
+    heading = (*(f"{between.join(pair)}, {name or ALL}" for *pair, name in columns[:-1]), ALL)
     times = (*intervals, (ALL, ""))
     body = ((*time, *(sums[*time, *column] for column in columns)) for time in times)
     return [("start", "end", *heading), *body]

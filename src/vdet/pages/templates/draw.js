@@ -408,6 +408,7 @@ function problemsOf({ lines, zones, regions, ground }, size) {
   return [
     ...say([...lines, ...zones].filter(isTwice), "the name is used twice"),
     ...say(regions.filter(isTwice), "the name is used twice"),
+    ...say([...lines, ...zones].filter(each => each.name === "(none)"), "choose another name"),
     ...say(lines.filter(isShort), "is shorter than 1 % of the frame"),
     ...say(lines.filter(line => line.left === line.right), "both sides have the same name"),
     ...say([...zones, ...regions].filter(each => each.points && crossesItself(each.points)), "crosses or touches itself"),
