@@ -4,6 +4,7 @@ Points keep the size that they are given for, and `Shape.for_frames` scales them
 frames at hand.
 """
 
+import re
 from collections import Counter
 from collections.abc import Iterable
 from typing import Annotated, Any, ClassVar, Literal, Self
@@ -171,6 +172,7 @@ class ZoneSettings(Shape):
     """Corners in order, x and y. The last corner is joined to the first."""
 
 
+_INTERVAL = re.compile("[1-9][0-9]{0,4} ?(s|min|h)", re.ASCII)
 INTERVALS = {"s": 1, "min": 60, "h": 3600}
 """Seconds of each unit of an interval."""
 _DAY = 24 * 3600
@@ -189,7 +191,7 @@ class TrafficSettings(Section):
     """Lines."""
     zones: tuple[ZoneSettings, ...] = Field((), max_length=MAX_SHAPES)
     """Zones."""
-    interval: str | None = Field(None, pattern=r"^[1-9][0-9]{0,4} ?(s|min|h)$")
+    interval: str | None = None
     """Interval of tables and charts, such as 5min, 15min or 1h. null: the whole video; 1min in
     charts.
     """
@@ -212,6 +214,8 @@ class TrafficSettings(Section):
     @field_validator("interval")
     @classmethod
     def _divides_a_day(cls, interval: str | None) -> str | None:
+        if interval is not None and not _INTERVAL.fullmatch(interval):
+            raise ValueError(f"{interval!r} is not an interval; try 30s, 5min, 15min or 1h")
         seconds = cls.model_construct(interval=interval).seconds
         if seconds and _DAY % seconds:
             raise ValueError(f"{interval} does not divide a day; try 30s, 5min, 15min or 1h")

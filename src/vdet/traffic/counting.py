@@ -102,8 +102,8 @@ def count_files(
         clock = find_clock(path, settings, saved.times.get(0, 0.0), saved=saved)
         if clock and settings.input.begin and len(paths) > 1:
             clock = recording.next_clock(path, saved, clock, group.last if group else None)
-        if size and saved.video and size != saved.size:
-            width, height = saved.video.width, saved.video.height
+        if size and saved.size and size != saved.size:
+            width, height = saved.size
             raise ConfigError(f"{path}: is of {width}×{height} frames; remove --size")
         frame_size = _frame_size(settings, size or saved.size)
         first, is_complete = min(saved.times.values(), default=0.0), saved.covered is not None
