@@ -4,9 +4,12 @@ import numpy as np
 import pytest
 
 from traffic.scenes import HEIGHT, WIDTH, Path, frames, through
-from vdet.boxes import Image
-from vdet.pages.traffic import direction_color, draw_marks, path_marks
+from vdet.boxes import Image, coverage
+from vdet.config.shapes import LineSettings, TrafficSettings
+from vdet.draw.boxes import draw_label
+from vdet.pages.traffic import border_marks, direction_color, draw_marks, path_marks
 from vdet.polygons import Point
+from vdet.traffic.crossings import lines_and_zones
 from vdet.traffic.records import VehicleRecords
 
 GREY = 90
@@ -43,3 +46,16 @@ def test_vehicles_that_stand_have_no_path(image: Image) -> None:
     paths_drawn(empty)
     paths_drawn(image, through((0, 600, 300), (5, 610, 300)))
     assert (image == empty).all()
+
+
+@pytest.mark.parametrize("end", [(0.5, 0.9), (0.52, 0.1), (0.9, 0.5), (0.1, 0.45), (0.8, 0.8)])
+def test_the_labels_of_a_line_do_not_overlap(image: Image, end: Point) -> None:
+    line = LineSettings(name="gate", start=(0.5, 0.5), end=end, left="left", right="right")
+    [placed], _ = lines_and_zones(TrafficSettings(lines=(line,)), WIDTH, HEIGHT)
+    labels = [
+        (mark.label, draw_label(image, mark.label, mark.at, mark.color))
+        for mark in border_marks(placed, {("gate", "left"): 14})
+    ]
+    assert [text for text, _ in labels] == ["gate", "left 14", "right 0"]
+    boxes = np.array([(tag.x1, tag.y1, tag.x2, tag.y2) for _, tag in labels])
+    assert (coverage(boxes, boxes) == np.eye(3)).all()

@@ -230,9 +230,9 @@ class TestFiles:
         self.write(counts_content, tmp_path / "c.wide.csv", counted)
         assert (tmp_path / "c.wide.csv").read_text() == (
             'start,end,"west: left, car","west: left, truck","west: left, all",'
-            '"west: right, car","west: right, truck","west: right, all",all\n'
-            "0.0,10.0,1,1,2,0,1,1,3\n"
-            "all,,1,1,2,0,1,1,3\n"
+            '"west: right, car","west: right, truck","west: right, all"\n'
+            "0.0,10.0,1,1,2,0,1,1\n"
+            "all,,1,1,2,0,1,1\n"
         )
 
     def test_a_class_that_is_called_all_is_not_a_sum(self, tmp_path: Path) -> None:

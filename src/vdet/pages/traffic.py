@@ -110,7 +110,8 @@ def direction_color(start: Point, end: Point) -> Color:
 def border_marks(border: Border, totals: Mapping[Direction, int], text: str = "") -> Iterator[Mark]:
     """Yield the marks of a zone with its name and a text, or of a line with its name and counts.
 
-    The arrows to both sides are at the start of a line, beside the traffic.
+    The arrow to the left is at the start of a line, that to the right at its end: beside the
+    traffic, and without labels over one another.
     """
     height = border.size[1]
     width = boxes.line_width(np.empty((int(height), 0), np.uint8))
@@ -122,10 +123,11 @@ def border_marks(border: Border, totals: Mapping[Direction, int], text: str = ""
     middle = (ax + bx) / 2, (ay + by) / 2
     yield Mark((border.start, border.end), boxes.LINE, width, border.name, middle)
     left = (by - ay) / border.length, (ax - bx) / border.length
-    for reach, direction in zip((_SIDE, -_SIDE), border.directions, strict=True):
-        tip = ax + reach * height * left[0], ay + reach * height * left[1]
+    ends, reaches = (border.start, border.end), (_SIDE * height, -_SIDE * height)
+    for (x, y), reach, direction in zip(ends, reaches, border.directions, strict=True):
+        tip = x + reach * left[0], y + reach * left[1]
         label = f"{direction} {totals.get((border.name, direction), 0)}"
-        yield Mark((border.start, tip), boxes.LINE, width, label, tip, is_arrow=True)
+        yield Mark(((x, y), tip), boxes.LINE, width, label, tip, is_arrow=True)
 
 
 def draw_marks(surface: Surface, marks: Iterable[Mark]) -> None:

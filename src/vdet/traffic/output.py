@@ -58,7 +58,7 @@ def counts_content(path: Path, videos: Videos, interval: int | None = None) -> A
     if _is_table(path, ".totals"):
         return [_TOTALS, *map(_cells, tables.count_table(every, interval))]
     if _is_table(path, ".wide"):
-        return wide_table(tables.count_table(every, interval), ": ")
+        return wide_table(tables.count_table(every, interval), ": ", has_total=False)
     if _is_table(path, ".zones"):
         return [_ZONES, *map(_cells, tables.zone_table(every, interval))]
     events = {name: [_event(video, e) for e in video.events] for name, video in videos.items()}
@@ -78,17 +78,20 @@ def flows_content(path: Path, videos: Videos, interval: int | None = None) -> An
         content = {"flows": _items(_FLOWS, rows), "matrix": matrix}
         return _json(videos, interval, content, events=False)
     if _is_table(path, ".wide"):
-        return wide_table(rows, " to ")
+        return wide_table(rows, " to ", has_total=True)
     if _is_table(path, ".matrix"):
         body = ((origin, *row.values()) for origin, row in matrix.items())
         return [("from", *matrix, NOWHERE), *body]
     return [_FLOWS, *map(_cells, rows)]
 
 
-def wide_table(rows: Sequence[CountRow | FlowRow], between: str) -> list[Sequence[Any]]:
+def wide_table(
+    rows: Sequence[CountRow | FlowRow], between: str, *, has_total: bool
+) -> list[Sequence[Any]]:
     """Return a table with a row for each interval, a column for each pair and class, and sums.
 
-    `between` is the text between the two names of a pair.
+    `between` is the text between the two names of a pair. With `has_total`, the last column is the
+    sum of all pairs.
     """
     sums: Counter[tuple[Any, ...]] = Counter()
     cells = [_cells(row) for row in rows]
@@ -99,8 +102,11 @@ def wide_table(rows: Sequence[CountRow | FlowRow], between: str) -> list[Sequenc
     intervals = dict.fromkeys(tuple(row[:2]) for row in cells)
     classes = dict.fromkeys(row[4] for row in cells)
     pairs = dict.fromkeys(tuple(row[2:4]) for row in cells)
-    columns = [*((*pair, name) for pair in pairs for name in (*classes, None)), ()]
-    heading = (*(f"{between.join(pair)}, {name or ALL}" for *pair, name in columns[:-1]), ALL)
+    columns = [(*pair, name) for pair in pairs for name in (*classes, None)]
+    heading = [f"{between.join(pair)}, {name or ALL}" for *pair, name in columns]
+    if has_total:
+        columns.append(())
+        heading.append(ALL)
     times = (*intervals, (ALL, ""))
     body = ((*time, *(sums[*time, *column] for column in columns)) for time in times)
     return [("start", "end", *heading), *body]

@@ -618,14 +618,14 @@ async function openPage(data) {
 
   /** Return the arrow to a side of a line, with what goes there; `way` has length 1. */
   function sideOf(name, way, [start, end], index) {
-    const { total, classes } = countOf(found[index], name), middle = start.map((value, i) => (value + end[i]) / 2);
+    const { total } = countOf(found[index], name), middle = start.map((value, i) => (value + end[i]) / 2);
     const tip = middle.map((value, i) => value + 26 * unit() * way[i]);
     const wing = sign => tip.map((value, i) => value - 7 * unit() * (way[i] + (i ? sign : -sign) * way[1 - i] / 2));
-    const down = way[1] > 0.3 ? 16 : way[1] > -0.3 ? 4 : classes ? -22 : -7;
+    const down = way[1] > 0.3 ? 16 : way[1] > -0.3 ? 4 : -7;
     const at = [tip[0] + 10 * unit() * way[0], clamp(tip[1] + down * unit(), 14 * unit(), height - 4 * unit())];
     const anchor = way[0] > 0.5 ? "start" : way[0] < -0.5 ? "end" : "middle";
     return [el("polyline", { points: [middle, tip, wing(1), tip, wing(-1)].join(" ") }),
-      label(at, [`${name} ${total}`, classes], anchor, "count")];
+      label(at, [`${name} ${total}`], anchor, "count")];
   }
 
   function gridOf(ground) {
