@@ -33,7 +33,18 @@ def test_a_folder_with_a_bad_file_from_the_first_run_to_the_last(
     run: Run, clips: Path, tmp_path: Path
 ) -> None:
     out = tmp_path / "out"
-    arguments = ("detect-video", clips, "-d", out, "--jobs", "2", "--tracks", ".csv")
+    arguments = (
+        "detect-video",
+        clips,
+        "-d",
+        out,
+        "--jobs",
+        "2",
+        "--tracks",
+        ".csv",
+        "--page",
+        ".page",
+    )
     (clips / "bad.mp4").write_bytes(b"no video")
 
     first = run(*arguments)
@@ -42,8 +53,10 @@ def test_a_folder_with_a_bad_file_from_the_first_run_to_the_last(
     assert f"vdet: {clips}/bad.mp4: cannot be opened, is not a video" in first.err
     assert first.err.count("bad.mp4") == 1, "an error is printed once"
     assert first.err.splitlines()[-1] == f"{out}: 2 files done, 1 failed"
-    made = ["a.csv", "a.mp4", "day2/b.csv", "day2/b.mp4", "manifest.jsonl"]
-    assert names(out) == made
+    made = ["a.csv", "a.mp4", "a.page/page.html", "day2/b.csv", "day2/b.mp4"]
+    assert names(out) == [*made, "day2/b.page/page.html", "index.html", "manifest.jsonl"]
+    error = f"<p><b>bad</b>: {clips}/bad.mp4: cannot be opened, is not a video"
+    assert error in (out / "index.html").read_text()
     assert (frames_of(out / "a.mp4"), frames_of(out / "day2" / "b.mp4")) == (12, 6)
     model = model_file(NetworkSettings())
     assert model is not None
@@ -66,6 +79,7 @@ def test_a_folder_with_a_bad_file_from_the_first_run_to_the_last(
 
     nothing = run(*arguments, "--skip-existing", code=0)
     assert nothing.err == f"{out}: 0 files done, 3 skipped, 0 failed\n"
+    assert "failed" not in (out / "index.html").read_text()
     assert len(records_of(out)) == 4
 
 

@@ -36,13 +36,14 @@ VIDEOS = {
 }
 
 
-def index(folder: Path, videos: dict[str, VideoFacts]) -> str:
+def index(folder: Path, videos: dict[str, VideoFacts], **failed: str) -> str:
     """Write the page over these videos, and return it."""
     summaries = {
         name: {"folder": f"{Path(name).name}.page", **found.model_dump()}
         for name, found in videos.items()
     }
-    write_index(summaries, folder / "index.html")
+    errors = {name: {"error": error} for name, error in failed.items()}
+    write_index(summaries | errors, folder / "index.html")
     return (folder / "index.html").read_text(encoding="utf-8")
 
 
@@ -88,6 +89,25 @@ def test_columns_in_which_nothing_is_known_are_left_out(tmp_path: Path) -> None:
     }  # fmt: skip
 
 
+def test_a_video_that_failed_is_named_with_its_error(tmp_path: Path) -> None:
+    made = Elements(index(tmp_path, VIDEOS, c="in/c.mp4: cannot be read"))
+    assert "2 videos, 1 failed" in made.text
+    assert "Failed\nc: in/c.mp4: cannot be read\n" in made.text
+
+
+@needs_chromium
+def test_a_long_finding_is_inside_the_window(tmp_path: Path) -> None:
+    doubt = "the view shifts by 3 % of the width from 0:05 to 0:32; speeds are wrong; " * 5
+    counts = {f"line {number}: to the north": number for number in range(9)}
+    found = VIDEOS["a"].model_copy(update={"conditions": (doubt,), "counts": counts})
+    acts = """
+const cells = [...document.querySelectorAll(".text")];
+const seen = [cells.map(cell => cell.textContent.length),
+  cells.every(cell => cell.getBoundingClientRect().right < innerWidth)];
+"""
+    assert seen(index(tmp_path, {"a": found}), acts, tmp_path) == [[8, len(doubt)], True]
+
+
 def test_of_no_video_it_says_so(tmp_path: Path) -> None:
     assert "No video was processed." in Elements(index(tmp_path, {})).text
 
@@ -119,6 +139,7 @@ seen.both = shownRows().map(row => row[3]);
 form.reset();
 change("from", "2026-05-01T07:00");
 seen.since = shownRows().map(row => row[4]);
+seen.range = document.getElementById("range").textContent;
 form.reset();
 change("lane", "-1");
 seen.left = shownRows().map(row => row[1]);
@@ -137,6 +158,7 @@ seen.near = shownRows();
         "cars": ["a", "day/b #1"],
         "both": ["day/b #1"],
         "since": ["page.html#t=0.000"],
+        "range": "1–1 of 1 (4 without filters); 3 without such a value",
         "left": ["#1"],
         "near": [],
     }  # fmt: skip

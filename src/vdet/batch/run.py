@@ -1,7 +1,7 @@
 """Plan and run a batch: process every file, and write its record when it is done."""
 
 import os
-from collections.abc import Generator, Iterable, Sequence
+from collections.abc import Generator, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
@@ -181,7 +181,7 @@ def run_batch(
     """
     make_folder(plan.folder)
     runs = [replace(run, threads=run.threads or threads) for run in plan.runs]
-    function = partial(process_file, folder=plan.folder)
+    function, errors = partial(process_file, folder=plan.folder), {}
     try:
         with (
             open_manifest(plan.folder) as add,
@@ -190,16 +190,20 @@ def run_batch(
             for run, result in results:
                 record = result or replace(new_record(run), error=_KILLED.format(run.source))
                 add(record)
+                errors[run.outputs[0].path] = record.error
                 yield run, record
-            _write_totals(plan)
+            _write_totals(plan, errors)
     finally:
         paths = [output.path for run in runs for output in run.outputs]
         for folder in {path.parent for path in paths} | set(filter(os.path.isdir, paths)):
             remove_stale(folder)
 
 
-def _write_totals(plan: Plan) -> None:
-    """Write the files over all videos, from the records of existing outputs."""
+def _write_totals(plan: Plan, errors: Mapping[Path, str | None]) -> None:
+    """Write the files over all videos, from the records of existing outputs.
+
+    `errors` are those of this batch, by the first output of each run.
+    """
     if not plan.totals:
         return
     written = outputs_by_path(read_batch(plan.folder))
@@ -207,10 +211,12 @@ def _write_totals(plan: Plan) -> None:
     for total in plan.totals:
         summaries = {}
         for run in runs:
-            path = run.outputs[total.output_number].path
+            path, error = run.outputs[total.output_number].path, errors.get(run.outputs[0].path)
+            name = path.relative_to(plan.folder).as_posix().removesuffix(total.ending)
             versions = written.get(os.path.realpath(path))
-            if versions and os.path.exists(path):  # noqa: PTH110  # too long a name
-                name = path.relative_to(plan.folder).as_posix()
-                summaries[name.removesuffix(total.ending)] = versions[-1].summary
+            if error and total.kind.of_failed:
+                summaries[name] = total.kind.of_failed(error)
+            elif versions and os.path.exists(path):  # noqa: PTH110  # too long a name
+                summaries[name] = versions[-1].summary
         with OutputFiles(overwrite=True) as files, output_errors(total.path):
             total.kind.write(summaries, files.stage(total.path))

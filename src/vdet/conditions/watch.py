@@ -58,7 +58,7 @@ class Conditions:
         settings, detector = self._settings, self._settings.detector
         findings = []
         if settings.lack_of_metres:
-            findings.append(Finding("lane-geometry", settings.lack_of_metres))
+            findings.append(Finding("lane-geometry", settings.lack_of_metres, severity="note"))
         if self._width < _NARROW:
             text = f"frames are {self._width} pixels wide; detectors were measured on wider ones"
             findings.append(Finding("small-frames", text, severity="note"))

@@ -145,12 +145,20 @@ def _plain_seconds(clock: str | None) -> int | None:
 
 
 def write_index(videos: Mapping[str, Mapping[str, Any]], target: Path) -> None:
-    """Write the page over many videos, from the folder of each page and its `VideoFacts`."""
-    linked = []
+    """Write the page over many videos, from the folder of each page and its `VideoFacts`.
+
+    A video that failed has its `error` instead.
+    """
+    failed, linked = {}, []
     for name, values in videos.items():
+        if "error" in values:
+            failed[name] = values["error"]
+            continue
         page = Path(name).parent / values["folder"] / PAGE_NAME
         linked.append((name, link_to(page, Path()), VideoFacts(**values)))
     counts = sum((Counter(facts.counts) for _, _, facts in linked), Counter[str]())
     parts = [Part(name, page, facts.start, facts.rows) for name, page, facts in linked]
-    html = render("index.html", videos=linked, counts=counts, table=table_json(parts))
+    html = render(
+        "index.html", videos=linked, failed=failed, counts=counts, table=table_json(parts)
+    )
     write_text(target, html)

@@ -34,6 +34,7 @@ const columns = [
 const form = document.getElementById("filters");
 const body = document.querySelector("#found tbody");
 let rows = [];
+let unknown = 0; // rows that pass no filter of a value that they lack, and pass all others
 let limit = PER_PAGE;
 let page = 0;
 let sort = { column: null, descending: false };
@@ -68,8 +69,8 @@ function filtered() {
     if (values[name]) tests.push(i => String(data[name][i]) === values[name]);
   };
   const limits = (column, low, high) => {
-    if (low) tests.push(i => column[i] !== null && column[i] >= Number(low));
-    if (high) tests.push(i => column[i] !== null && column[i] <= Number(high));
+    if (low) tests.push(i => column[i] === null ? null : column[i] >= Number(low));
+    if (high) tests.push(i => column[i] === null ? null : column[i] <= Number(high));
   };
   const moment = value => value && String(Date.parse(`${value}Z`) / 1000);
   ["class", "lines", "motion", "lane"].forEach(choice);
@@ -83,8 +84,10 @@ function filtered() {
     tests.push(i => named[data.video[i]]);
   }
   const found = [];
+  unknown = 0;
   for (let i = 0; i < data.class.length; i += 1) {
     if (tests.every(test => test(i))) found.push(i);
+    else if (tests.every(test => test(i) !== false)) unknown += 1;
   }
   return found;
 }
@@ -141,6 +144,7 @@ function show() {
   document.getElementById("range").textContent = !rows.length ? "No vehicle matches the filters."
     : `${thousands(first + 1)}–${thousands(first + shown.length)} of ${thousands(rows.length)}`
       + (rows.length < all ? ` (${thousands(all)} without filters)` : "");
+  if (unknown) document.getElementById("range").append(`; ${thousands(unknown)} without such a value`);
   document.getElementById("previous").disabled = page === 0;
   document.getElementById("next").disabled = page === last;
 }

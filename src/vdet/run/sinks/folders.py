@@ -215,7 +215,7 @@ class PageSink(BaseSink):
         return [output.path for output in self.context.outputs if output.sink == sink]
 
 
-_INDEX = BatchTotal("index", write_index, suffix=".html")
+_INDEX = BatchTotal("index", write_index, ".html", of_failed=lambda error: {"error": error})
 PAGE = SinkKind(PageSink, what="pages", folder_pattern=PAGE_NAME, takes="videos", total=_INDEX)
 
 

@@ -133,11 +133,15 @@ class BatchTotal:
         path in the folder of the batch, without suffix), and the file to write.
     suffix
         Suffix of the file; None: the suffix of the outputs.
+    of_failed
+        Function that returns the `summary` of a video that failed, from its error; None: such a
+        video is left out.
     """
 
     name: str
     write: Callable[[Mapping[str, Any], Path], None]
     suffix: str | None = None
+    of_failed: Callable[[str], Any] | None = None
 
 
 @dataclass(frozen=True, slots=True)
