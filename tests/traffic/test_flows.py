@@ -239,7 +239,7 @@ class TestFiles:
         counted = {"v": counts(named(frames(GOES_EAST), "all"), WEST)}
         self.write(counts_content, tmp_path / "c.wide.csv", counted)
         *_, sums = (tmp_path / "c.wide.csv").read_text().splitlines()
-        assert sums == "all,,1,1,0,0,1"
+        assert sums == "all,,1,1,0,0"
 
     def test_json_has_flows_matrix_and_the_beginning(self, tmp_path: Path) -> None:
         self.write(flows_content, tmp_path / "f.json", {"v": at(crossing(EAST))})

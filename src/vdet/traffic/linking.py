@@ -261,8 +261,11 @@ class _Vehicle:
 
     def is_jump(self, track: Track, time: float, width: int, height: int) -> bool:
         """Return whether a box with its id is too far away to be of this vehicle."""
+        x, y = track.foot
+        moved = complex(x - self.rows[1 - _COLUMNS], y - self.rows[2 - _COLUMNS])
+        if abs(moved) <= self.box.y2 - self.box.y1:  # nearly always, and fast
+            return False
         size = max(self.box.height, track.box.height)
-        moved = complex(*track.foot) - complex(*self.rows[1 - _COLUMNS : 3 - _COLUMNS])
         if abs(moved) <= _BEHIND * size:
             return False
         velocity, seconds = _velocity(self.rows), time - self.last_seen
