@@ -29,6 +29,7 @@ _BUILT_IN: dict[str, dict[str, str]] = {
         "eval": "vdet.cli.evaluate:eval_group",
         "info": "vdet.cli.info:info",
         "mine": "vdet.cli.train:mine",
+        "review": "vdet.cli.review:review",
         "train": "vdet.cli.train:train",
         "train-net": "vdet.cli.train:train_net",
     },
@@ -40,6 +41,7 @@ _BUILT_IN: dict[str, dict[str, str]] = {
             "drawn": ("video", "image"),
             "data": ("tracks", "json", "labels", "vehicles", "counts", "flows", "conditions"),
             "folders": ("stages", "crops", "clips", "page"),
+            "review": ("review",),
         }.items()
         for name in names
     },

@@ -32,6 +32,9 @@ if TYPE_CHECKING:
 @options.output_folders("--crops", help="Write the best image of each vehicle into DIR.")
 @options.output_folders("--page", help="Write a report about the vehicles, page.html, into DIR.")
 @options.output_folders(
+    "--review", help="Write a page for checking the counts, review.html, into DIR."
+)
+@options.output_folders(
     "--clips",
     help="Write a clip of each time span with vehicles into DIR. With lines or zones, only counted "
     "vehicles have clips.",

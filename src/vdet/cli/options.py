@@ -255,7 +255,7 @@ def requested_outputs(sinks: Sequence[Output], paths: Mapping[str, Paths]) -> li
 
 def check_counting(settings: "Settings", outputs: Sequence[Output], *, several: bool) -> None:
     """Raise `click.UsageError` if the settings do not fit the outputs, or several videos."""
-    tables = {output.sink for output in outputs} & {"counts", "flows"}
+    tables = {output.sink for output in outputs} & {"counts", "flows", "review"}
     if tables and not settings.traffic:
         raise click.UsageError(
             f"--{min(tables)} needs lines or zones; add a settings file with -c FILE"

@@ -40,7 +40,7 @@ def read_scene(run: Run, tracks: Path | None, steps: Steps) -> tuple[Image, list
         The source or the file of tracks cannot be used.
     """
     if is_image_file(run.source):
-        return read_image(run.source), _saved(tracks, run) if tracks else []
+        return read_image(run.source), saved_frames(tracks, run) if tracks else []
     images, shown = (
         _with_saved_tracks(run, tracks, steps) if tracks else _with_detection(run, steps)
     )
@@ -56,7 +56,7 @@ def _with_saved_tracks(
     with VideoReader(
         run.source, start=run.start, end=run.end, frames=_STILL_FRAMES, settings=run.settings.input
     ) as reader:
-        saved = _saved(tracks, run, reader.info)
+        saved = saved_frames(tracks, run, reader.info)
         steps("reading the scene", None)
         return _spread(reader), saved
 
@@ -88,7 +88,7 @@ def _spread(frames: Iterable[Frame]) -> list[Image]:
     return images
 
 
-def _saved(tracks: Path, run: Run, video: VideoInfo | None = None) -> list[FrameTracks]:
+def saved_frames(tracks: Path, run: Run, video: VideoInfo | None = None) -> list[FrameTracks]:
     """Return the frames of a file of tracks in the part of a run. Raises `TruthError`.
 
     Without a video, the first frame of the file is the first one of the video.

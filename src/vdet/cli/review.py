@@ -1,0 +1,58 @@
+"""`vdet review`: the strips of lines, from a video and its saved tracks."""
+
+from fractions import Fraction
+from pathlib import Path
+
+import click
+
+from vdet.cli import options
+from vdet.cli.command import command
+from vdet.cli.messages import print_lines, progress_steps
+from vdet.run.sinks import Output
+
+
+@command()
+@click.argument("source_path", type=options.INPUT, metavar="IN")
+@options.input_file("--tracks-from", "tracks", required=True, help="Tracks of IN, from --tracks.")
+@options.output_folder("-o", "--output", required=True, help="Folder for the page, review.html.")
+@options.start_option
+@options.end_option
+@options.begin_option
+@options.settings_options(begin="input.begin")
+@options.overwrite_option
+def review(
+    source_path: Path,
+    output: Path,
+    tracks: Path,
+    start: Fraction | None,
+    end: Fraction | None,
+    source: options.SettingsSource,
+    overwrite: bool,
+) -> None:
+    """Write a page for checking the counts of a video.
+
+    IN is a video, read again but not searched. The page has a strip of each line, which shows
+    everything that crossed it, with a mark for each counted vehicle. It saves corrections.
+
+    \b
+    Examples:
+      vdet review in.mp4 --tracks-from tracks.jsonl -c gate.yaml -o review
+    """
+    from vdet.run.review import write_saved_review
+    from vdet.run.video import Run
+
+    settings = source.load()
+    if not settings.traffic:
+        raise click.UsageError("no lines or zones to review; add a settings file with -c FILE")
+    run = Run(
+        source_path,
+        outputs=(Output("review", output),),
+        settings=settings,
+        start=start,
+        end=end,
+        overwrite=overwrite,
+        settings_files=(*source.files, tracks),
+    )
+    with progress_steps(" frames") as steps:
+        write_saved_review(run, tracks, steps)
+    print_lines(f"{output}: written")

@@ -1,0 +1,54 @@
+"""Reviews of saved tracks: the video is read again, but not searched."""
+
+from pathlib import Path
+
+from vdet.boxes import NO_BOXES
+from vdet.config.classes import is_chosen
+from vdet.errors import VideoError
+from vdet.files import OutputFiles
+from vdet.media.reader import VideoReader
+from vdet.progress import Steps
+from vdet.regions import Regions
+from vdet.run.result import FrameResult
+from vdet.run.scene import saved_frames
+from vdet.run.sinks.protocol import SinkContext, check_sinks, open_sinks
+from vdet.run.video import Run
+from vdet.track.track import FrameTracks
+from vdet.traffic.live import LiveTraffic
+
+
+def write_saved_review(run: Run, tracks: Path, steps: Steps) -> None:
+    """Write the outputs of a run from the file `tracks`, without detecting vehicles.
+
+    Raises `VdetError` if the video or the tracks cannot be used, or an output cannot be written.
+    """
+    settings = run.settings
+    check_sinks(run.outputs, overwrite=run.overwrite, inputs=run.inputs)
+    with (
+        VideoReader(run.source, start=run.start, end=run.end, settings=settings.input) as reader,
+        OutputFiles(overwrite=run.overwrite, inputs=run.inputs) as files,
+    ):
+        info = reader.info
+        frames = {frame.index: frame for frame in saved_frames(tracks, run, info)}
+        traffic = LiveTraffic(settings, info.width, info.height)
+        regions = Regions(settings.regions, info.width, info.height) if settings.regions else None
+        context = SinkContext(files, settings, info, is_part=run.is_part, traffic=traffic)
+        advance = steps("", reader.expected)
+        count = 0
+        with open_sinks(run.outputs, context) as sinks:
+            for frame in reader:
+                saved = frames.get(frame.index, FrameTracks(frame.index, float(frame.time), ()))
+                shown = tuple(
+                    track
+                    for track in saved.tracks
+                    if is_chosen(track.class_name, settings.classes)
+                    and (regions is None or regions.contains(track.foot))
+                )
+                result = FrameResult(run.source, frame, NO_BOXES, shown, searched=False)
+                traffic.add(result.frame_tracks)
+                sinks.write(result)
+                advance(1)
+                count += 1
+            if not count:
+                raise VideoError(f"{run.source}: no frames at these times; check them")
+            traffic.end()

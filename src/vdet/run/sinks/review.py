@@ -1,0 +1,192 @@
+"""The sink `review`: strips of all lines with the counted crossings, in one page."""
+
+import tempfile
+from base64 import b64encode
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from vdet.boxes import Image
+from vdet.errors import OutputError
+from vdet.media import Picture
+from vdet.pages.review import PAGE_NAME, Mark, Review, StripPicture, write_picture, write_review
+from vdet.run.result import FrameResult
+from vdet.run.sinks.protocol import BaseSink, SinkContext, SinkKind
+from vdet.traffic.counts import Counts
+from vdet.traffic.strips import (
+    Band,
+    Passage,
+    Passages,
+    Sampling,
+    bands_of,
+    sampling_of,
+    surroundings,
+)
+
+_MINUTE = 60
+_ENOUGH = 12
+"""Number of passages after which the sampling of a band is final."""
+_WAITING_BYTES = 48_000_000
+"""Maximum memory of the frames of one band that wait for its sampling."""
+_COLUMN_ROWS = 800
+"""Approximate height of the columns that a strip is cut into, pixels."""
+_QUALITY = 60
+_SAME = 1.0
+"""Maximum seconds between a counted crossing and the passage that gives its place."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Waiting:
+    """The surroundings of a band in a frame: BGR `(h, w, 3)`, seconds into its minute."""
+
+    seconds: float
+    picture: Picture
+    origin: tuple[int, int]
+
+
+@dataclass(slots=True)
+class _Strip:
+    """The strip of a band in the current minute; frames wait until its sampling is known."""
+
+    band: Band
+    sampling: Sampling | None = None
+    is_final: bool = False
+    rows: list[tuple[float, Image]] = field(default_factory=list)
+    waiting: list[_Waiting] = field(default_factory=list)
+    waiting_bytes: int = 0
+
+    def add(self, seconds: float, picture: Picture, passages: list[Passage]) -> None:
+        """Add a frame, `seconds` into its minute."""
+        if self.sampling is None:
+            self._wait(seconds, picture)
+            if len(passages) >= _ENOUGH or self.waiting_bytes > _WAITING_BYTES:
+                self.decide(passages)
+        else:
+            self.rows.append((seconds, self.sampling.cut(picture)))
+
+    def _wait(self, seconds: float, picture: Picture) -> None:
+        width, height = picture.width, picture.height
+        ends = self.band.start, self.band.end
+        down, across = surroundings(ends, width, height, margin=height / 12)
+        part: Image
+        if planes := picture.planes:
+            half_down, half_across = (
+                slice(side.start // 2, (side.stop + 1) // 2) for side in (down, across)
+            )
+            blue, red = (layer[half_down, half_across] for layer in (planes.blue, planes.red))
+            part = planes.coding.to_bgr((planes.luma[down, across], blue, red))
+        else:
+            part = picture.image[down, across].copy()
+        self.waiting.append(_Waiting(seconds, Picture(part), (across.start, down.start)))
+        self.waiting_bytes += part.nbytes
+
+    def decide(self, passages: list[Passage]) -> None:
+        """Choose the sampling by the passages so far, and sample the frames that wait."""
+        self.sampling = sampling_of(self.band, passages)
+        self.is_final = len(passages) >= _ENOUGH
+        self.rows += [(w.seconds, self.sampling.cut(w.picture, w.origin)) for w in self.waiting]
+        self.waiting, self.waiting_bytes = [], 0
+
+
+class ReviewSink(BaseSink):
+    """Writes the strips minute by minute while the video is read, and the page at the end."""
+
+    def __init__(self, path: Path, context: SinkContext) -> None:
+        super().__init__(path, context)
+        if not context.settings.traffic:
+            raise OutputError(f"{path}: no lines or zones to review; add them to the settings")
+        counter = self.traffic.counter
+        assert counter  # the settings have lines or zones
+        self._file = context.files.stage_folder(path) / PAGE_NAME
+        bands = bands_of((*counter.lines, *counter.zones))
+        self._strips = [_Strip(band) for band in bands]
+        self._passages = Passages(bands)
+        self._written = tempfile.TemporaryFile("w+", encoding="ascii")  # noqa: SIM115  # closed at the end
+        self._pictures: list[StripPicture] = []
+        self._minute = 0
+        self._start = float(self.video.start)
+
+    def __exit__(self, kind: object, *_: object) -> None:
+        with self._written:
+            if kind is None:
+                self.finish()
+
+    def write(self, result: FrameResult) -> None:
+        """Add a frame to all strips."""
+        seconds = max(0.0, float(result.frame.time) - self._start)
+        if (minute := int(seconds // _MINUTE)) != self._minute:
+            self._end_minute()
+            self._minute = minute
+        self._passages.add(result.frame_tracks)
+        for strip, found in zip(self._strips, self._passages.found, strict=True):
+            strip.add(seconds - _MINUTE * minute, result.frame.picture, found)
+
+    def _end_minute(self) -> None:
+        for number, (strip, found) in enumerate(
+            zip(self._strips, self._passages.found, strict=True)
+        ):
+            if strip.waiting:
+                strip.decide(found)
+            if strip.rows and strip.sampling:
+                self._write_minute(number, strip, strip.sampling)
+            strip.rows = []
+            if not strip.is_final:
+                strip.sampling = None
+
+    def _write_minute(self, number: int, strip: _Strip, sampling: Sampling) -> None:
+        rate = sampling.rows * float(self.video.rate)  # rows a second
+        seconds = max(1, round(_COLUMN_ROWS / rate))
+        last = strip.rows[-1][0]
+        columns, height = int(last // seconds) + 1, int(np.ceil(seconds * rate))
+        image = np.zeros((height, columns, strip.band.samples, 3), np.uint8)
+        for time, rows in strip.rows:
+            column, top = int(time // seconds), round(time % seconds * rate)
+            part = rows[: height - top]
+            image[top : top + len(part), column] = part
+        flat = image.reshape(height, -1, 3)
+        _, data = cv2.imencode(".webp", flat, [cv2.IMWRITE_WEBP_QUALITY, _QUALITY])
+        self._pictures.append(
+            StripPicture(number, self._minute, columns, seconds, height, sampling.is_upward)
+        )
+        write_picture(self._written, self._pictures[-1], b64encode(data.tobytes()).decode("ascii"))
+
+    def finish(self) -> None:
+        """Write the page."""
+        self._end_minute()
+        counts = self.traffic.counts()
+        assert counts
+        review = Review(
+            video=self.video,
+            traffic=self.context.settings.traffic,
+            bands=[strip.band for strip in self._strips],
+            pictures=self._pictures,
+            marks=self._marks(counts),
+        )
+        with self._file.open("w", encoding="utf-8", errors="backslashreplace") as file:
+            self._written.seek(0)
+            write_review(file, review, self._written)
+
+    def _marks(self, counts: Counts) -> list[Mark]:
+        """Return where the counted crossings are; those of zones without a side are left out."""
+        marks = []
+        for event in counts.events:
+            near = [
+                (abs(passage.time - event.time), number, passage.place)
+                for number, strip in enumerate(self._strips)
+                if strip.band.name == event.name and event.direction in strip.band.directions
+                for passage in (
+                    *self._passages.found[number],
+                    Passage(event.id, event.time + _SAME, 0.5, (0, 0)),  # if there is none
+                )
+                if passage.id == event.id
+            ]
+            if near:
+                _, band, place = min(near)
+                seconds = event.time - self._start
+                marks.append(Mark(band, round(seconds, 3), round(place, 3), event))
+        return marks
+
+
+REVIEW = SinkKind(ReviewSink, what="reviews", folder_pattern=PAGE_NAME, takes="videos")
