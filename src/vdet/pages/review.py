@@ -82,7 +82,7 @@ class Review:
             }
             for mark in self.marks
         ]
-        others = {mark["class"] for mark in marks} - set(OUR_NAMES)
+        others = {class_of(mark.event) for mark in self.marks} - set(OUR_NAMES)
         return {
             "video": video.path.name,
             "size": [video.width, video.height],

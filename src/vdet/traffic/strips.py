@@ -24,6 +24,8 @@ _SAMPLES = 200, 260
 """Minimum and maximum number of samples along a line."""
 _MAX_ROWS = 12
 """Maximum number of rows of a frame."""
+_LONG = 1.8
+"""How much longer than wide vehicles may be in a strip: on long lines they have few pixels."""
 _NEAR = 0.06
 """Distance along a line, as a fraction of its length, at which a passage has little weight."""
 _HISTORY = 0.4
@@ -150,11 +152,10 @@ class Sampling:
         """
         x, y = self.x - np.float32(origin[0]), self.y - np.float32(origin[1])
         if planes := picture.planes:
-            halves = (x - 0.5) / 2, (y - 0.5) / 2
             luma = _sampled(planes.luma, x, y)
-            return planes.coding.to_bgr(
-                (luma, _sampled(planes.blue, *halves), _sampled(planes.red, *halves))
-            )
+            x, y = ((values - np.float32(0.5)) / 2 for values in (x, y))
+            blue, red = (_sampled(layer, x, y) for layer in (planes.blue, planes.red))
+            return planes.coding.to_bgr((luma, blue, red))
         return _sampled(picture.image, x, y)
 
 
@@ -167,15 +168,15 @@ def sampling_of(band: Band, passages: Sequence[Passage]) -> Sampling:
     """Return where the pixels of a band lie, for the traffic that passed it.
 
     At each place the band follows the mean way of the traffic there, of the direction that most
-    take, and is as wide as that moves in a frame. Its rows are as many as make vehicles as long as
-    they are wide.
+    take, and is as wide as that moves in a frame. It has a row for each pixel of that, or fewer on
+    long lines, where vehicles would be too long.
     """
     count, along = band.samples, np.subtract(band.end, band.start)
     places = (np.arange(count) + 0.5) / count
     velocities = _velocities(places, passages, along)
     points = np.array(band.start) + places[:, np.newaxis] * along
     speeds = [float(np.hypot(*passage.velocity)) for passage in passages] or [2 * _SLOW]
-    rows = int(np.clip(round(median(speeds) * count / band.length), 1, _MAX_ROWS))
+    rows = int(np.clip(round(median(speeds) * min(1, _LONG * count / band.length)), 1, _MAX_ROWS))
     offsets = 0.5 - (np.arange(rows) + 0.5) / rows  # what is ahead has passed earlier
     x, y = np.moveaxis(points + offsets[:, np.newaxis, np.newaxis] * velocities, 2, 0)
     is_upward = bool(np.median(velocities[:, 1]) > 0)

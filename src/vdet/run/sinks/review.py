@@ -137,8 +137,8 @@ class ReviewSink(BaseSink):
 
     def _write_minute(self, number: int, strip: _Strip, sampling: Sampling) -> None:
         rate = sampling.rows * float(self.video.rate)  # rows a second
-        seconds = max(1, round(_COLUMN_ROWS / rate))
         last = strip.rows[-1][0]
+        seconds = min(max(1, round(_COLUMN_ROWS / rate)), int(last) + 1)
         columns, height = int(last // seconds) + 1, int(np.ceil(seconds * rate))
         image = np.zeros((height, columns, strip.band.samples, 3), np.uint8)
         for time, rows in strip.rows:

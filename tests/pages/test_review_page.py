@@ -1,0 +1,111 @@
+"""The page of reviews in a real browser: check, correct, save, reload."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from browser import ENTER, Browser, browser, downloaded
+from conftest import Run
+from review_roads import Car, draw_road
+
+CARS = [Car(3, 80), Car(5, 240, goes_up=False), Car(8, 100), Car(64, 80)]
+TAB = "\ue004"
+
+
+@pytest.fixture
+def window(tmp_path: Path, run: Run) -> Iterator[Browser]:
+    """The page of a minute with three cars, of which the last was missed, and another minute."""
+    road = draw_road(tmp_path, CARS, missed=2, seconds=70)
+    output = tmp_path / "review"
+    run(
+        "review",
+        road.video,
+        "--tracks-from",
+        road.tracks,
+        "-c",
+        road.settings,
+        "-o",
+        output,
+        code=0,
+    )
+    with browser(tmp_path) as opened:
+        opened.open(output / "review.html")
+        yield opened
+
+
+def click_at(window: Browser, seconds: float, place: float) -> None:
+    """Click on the strip at a time of this minute."""
+    window.run(
+        "const [seconds, place] = arguments, item = data.pictures.find(p => p.minute === minute);"
+        "const number = Math.floor((seconds % 60) / item.seconds);"
+        "const column = document.querySelectorAll('.column')[number];"
+        "const box = column.getBoundingClientRect();"
+        "let y = (seconds % 60) / item.seconds - number; if (item.is_upward) y = 1 - y;"
+        "column.dispatchEvent(new MouseEvent('click', { bubbles: true,"
+        " clientX: box.left + place * box.width, clientY: box.top + y * box.height }));",
+        seconds,
+        place,
+    )
+
+
+def saved(window: Browser) -> dict[str, Any]:
+    window.type("s")
+    path = downloaded(window.folder, "corrections.yaml")
+    values: dict[str, Any] = yaml.safe_load(path.read_text("utf-8"))
+    path.unlink()
+    return values
+
+
+def test_a_minute_without_errors_takes_one_key(window: Browser) -> None:
+    window.type(ENTER)
+    assert window.text("#minute") == "1:00 to 2:00"
+    values = saved(window)
+    assert values["checked"] == [{"line": "gate", "start": 0, "end": 60}]
+    assert values["events"] == []
+    window.type(ENTER)
+    assert saved(window)["checked"] == [{"line": "gate", "start": 0, "end": 120}]
+
+
+def test_every_error_takes_two_actions(window: Browser) -> None:
+    window.type(TAB, "x")  # no vehicle
+    window.type(TAB, "3")  # another class
+    click_at(window, 8, 0.29)
+    window.type("2")
+    window.type(ENTER)
+    window.type(TAB, "d")  # another direction
+    values = saved(window)
+    assert values["video"] == "in.mp4"
+    assert values["size"] == [320, 240]
+    gate = {"name": "gate", "start": [20, 120], "end": [300, 120], "left": "away", "right": "here"}
+    assert values["lines"] == [gate]
+    classes = window.run("return data.classes")
+    false, wrong, missed, turned = values["events"]
+    assert (false["id"], false["error"]) == (1, "false")
+    assert (wrong["id"], wrong["error"], wrong["correct"]) == (2, "class", classes[2])
+    assert missed.pop("time") == pytest.approx(8, abs=0.05)
+    assert missed == {"line": "gate", "direction": "away", "class": classes[1], "error": "missed"}
+    assert (turned["id"], turned["error"], turned["correct"]) == (4, "direction", "here")
+
+
+def test_undo_and_reload_keep_what_was_checked(window: Browser) -> None:
+    window.type(TAB, "x")
+    click_at(window, 8, 0.29)
+    window.type("z")
+    window.type(ENTER)
+    window.run("location.reload()")
+    window.wait("return document.body.dataset.ready === 'yes'")
+    assert window.text("#minute") == "1:00 to 2:00"
+    values = saved(window)
+    assert [event["error"] for event in values["events"]] == ["false"]
+    assert [item["end"] for item in values["checked"]] == [60]
+
+
+def test_marks_lie_on_the_strip_and_the_table_counts_errors(window: Browser) -> None:
+    assert window.run("return document.querySelectorAll('.mark').length") == 2
+    click_at(window, 8, 0.29)
+    window.type(TAB, "x")
+    rows = window.run("return totals().filter(row => row[1] === 'all')")
+    assert rows == [["gate", "all", 3, 0, 1, 1, 0, 0]]

@@ -1,0 +1,75 @@
+"""Strips: each vehicle leaves one streak, with its mark at the right time and place."""
+
+from pathlib import Path
+
+import pytest
+
+from conftest import Run
+from review_roads import Car, draw_road, read_page
+
+CARS = [Car(3, 80), Car(5, 240, goes_up=False), Car(8, 100), Car(64, 80), Car(66, 240, False)]
+
+
+def reviewed(run: Run, folder: Path, missed: int | None = None) -> Path:
+    road = draw_road(folder, CARS, missed=missed, seconds=70)
+    output = folder / "review"
+    run(
+        "review",
+        road.video,
+        "--tracks-from",
+        road.tracks,
+        "-c",
+        road.settings,
+        "-o",
+        output,
+        code=0,
+    )
+    return output / "review.html"
+
+
+def test_each_vehicle_leaves_one_streak_with_its_mark(tmp_path: Path, run: Run) -> None:
+    page = read_page(reviewed(run, tmp_path))
+    streaks = [streak for minute in (0, 1) for streak in page.streaks(minute)]
+    assert len(streaks) == len(CARS) == len(page.data["marks"])
+    for car, mark, (seconds, place) in zip(CARS, page.data["marks"], streaks, strict=True):
+        assert mark["direction"] == ("away" if car.goes_up else "here")
+        assert mark["seconds"] == pytest.approx(car.time, abs=0.05)
+        assert mark["place"] == pytest.approx((car.x - 20) / 280, abs=0.01)
+        assert place == pytest.approx(mark["place"], abs=0.02)
+        # The body passes before the foot of a car that goes away, and after that of one that comes.
+        assert seconds == pytest.approx(car.time + (-0.15 if car.goes_up else 0.15), abs=0.1)
+
+
+def test_a_missed_vehicle_is_a_streak_without_a_mark(tmp_path: Path, run: Run) -> None:
+    page = read_page(reviewed(run, tmp_path, missed=2))
+    assert len(page.streaks(0)) == 3
+    assert [mark["id"] for mark in page.data["marks"] if mark["seconds"] < 60] == [1, 2]
+
+
+def test_a_review_needs_a_line(tmp_path: Path, run: Run) -> None:
+    road = draw_road(tmp_path, CARS[:1], seconds=2)
+    output = tmp_path / "review"
+    ended = run("review", road.video, "--tracks-from", road.tracks, "-o", output, code=2)
+    assert "no lines or zones to review" in ended.err
+    assert not output.exists()
+
+
+def test_the_live_review_equals_that_of_saved_tracks(tmp_path: Path, run: Run) -> None:
+    road = draw_road(tmp_path, CARS[:2], seconds=9)
+    shared = ["-c", road.settings]
+    tracks, live, later = (tmp_path / name for name in ("own.jsonl", "live", "later"))
+    run(
+        "detect-video",
+        road.video,
+        "--no-video",
+        *shared,
+        "--tracks",
+        tracks,
+        "--review",
+        live,
+        code=0,
+    )
+    run("review", road.video, "--tracks-from", tracks, *shared, "-o", later, code=0)
+    pages = [read_page(folder / "review.html") for folder in (live, later)]
+    assert pages[0].data["marks"] == pages[1].data["marks"]
+    assert (pages[0].pictures[0] == pages[1].pictures[0]).all()
