@@ -22,9 +22,7 @@ from vdet.files import staged
     required=True,
     help="Page to write, .html, or image of the scene for a report, .jpg, .png or .svg.",
 )
-@options.input_file(
-    "--tracks-from", "tracks", help="Read the tracks from FILE instead of detecting vehicles."
-)
+@options.tracks_from_option()
 @options.start_option
 @options.end_option
 @options.model_option

@@ -98,6 +98,12 @@ sinks_option = output_files(
     metavar="NAME=FILE",
     help="Write another output with the sink NAME. Can be repeated.",
 )
+tracks_from_option = partial(
+    input_file,
+    "--tracks-from",
+    "tracks",
+    help="Read the tracks from FILE instead of detecting vehicles.",
+)
 classes_option = click.option(
     "--class",
     "classes",

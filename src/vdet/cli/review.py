@@ -13,7 +13,7 @@ from vdet.run.sinks import Output
 
 @command()
 @click.argument("source_path", type=options.INPUT, metavar="IN")
-@options.input_file("--tracks-from", "tracks", required=True, help="Tracks of IN, from --tracks.")
+@options.tracks_from_option(required=True)
 @options.output_folder("-o", "--output", required=True, help="Folder for the page, review.html.")
 @options.start_option
 @options.end_option

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from vdet.boxes import Float64Array, Image
 from vdet.media import Picture
-from vdet.polygons import Point, Segment, meeting
+from vdet.polygons import Point, meeting
 from vdet.track.track import FrameTracks
 from vdet.traffic.crossings import Border, Line
 
@@ -145,23 +145,36 @@ class Sampling:
         """Number of rows of a frame."""
         return len(self.x)
 
-    def cut(self, picture: Picture, origin: Point = (0, 0)) -> Image:
-        """Return the band of a frame, BGR uint8 `(rows, samples, 3)`.
+    def cut(self, layers: Sequence[Image], origin: Point = (0, 0)) -> Image:
+        """Return the band of a frame, uint8 `(rows, samples, 3)`.
 
-        `origin` is the corner of the frame that the picture shows; even pixels.
+        Parameters
+        ----------
+        layers
+            The frame, BGR, or its luma, blue and red: so they are the channels of the band.
+        origin
+            The pixel of the frame at which the layers begin; even numbers.
         """
         x, y = self.x - np.float32(origin[0]), self.y - np.float32(origin[1])
-        if planes := picture.planes:
-            luma = _sampled(planes.luma, x, y)
-            x, y = ((values - np.float32(0.5)) / 2 for values in (x, y))
-            blue, red = (_sampled(layer, x, y) for layer in (planes.blue, planes.red))
-            return planes.coding.to_bgr((luma, blue, red))
-        return _sampled(picture.image, x, y)
+        luma, *chroma = layers
+        cut = _sampled(luma, x, y)
+        if not chroma:
+            return cut
+        x, y = x * _HALF - _HALF / 2, y * _HALF - _HALF / 2
+        return np.dstack([cut, *(_sampled(layer, x, y) for layer in chroma)])
+
+
+_HALF = np.float32(0.5)
 
 
 def _sampled(image: Image, x: npt.NDArray[np.float32], y: npt.NDArray[np.float32]) -> Image:
     edge = cv2.BORDER_REPLICATE
     return np.asarray(cv2.remap(image, x, y, cv2.INTER_LINEAR, borderMode=edge), np.uint8)
+
+
+def layers_of(picture: Picture) -> tuple[Image, ...]:
+    """Return luma, blue and red of a picture that consists of planes, else its BGR image."""
+    return picture.planes.layers if picture.planes else (picture.image,)
 
 
 def sampling_of(band: Band, passages: Sequence[Passage]) -> Sampling:
@@ -201,11 +214,26 @@ def _velocities(
     return np.asarray(np.where(speeds < _SLOW, most * _SLOW * normal, means))
 
 
-def surroundings(segment: Segment, width: int, height: int, margin: float) -> tuple[slice, slice]:
-    """Return the rows and columns around a segment; they begin at even pixels."""
-    (left, right), (top, bottom) = (sorted(values) for values in zip(*segment, strict=True))
+@dataclass(frozen=True, slots=True, eq=False)
+class Surroundings:
+    """The part of a frame around a band, as layers for `Sampling.cut`, and their origin."""
 
-    def part(first: float, last: float, length: int) -> slice:
-        return slice(max(0, int(first - margin)) // 2 * 2, min(length, int(last + margin) + 2))
+    layers: tuple[Image, ...]
+    origin: Point
 
-    return part(top, bottom, height), part(left, right, width)
+    @classmethod
+    def of(cls, band: Band, picture: Picture) -> "Surroundings":
+        """Copy what lies within a twelfth of the frame's height of a band."""
+        margin = picture.height / 12
+        xs, ys = (sorted(values) for values in zip(band.start, band.end, strict=True))
+        left, top = (max(0, int(values[0] - margin)) // 2 * 2 for values in (xs, ys))
+        right, bottom = (int(values[1] + margin) + 2 for values in (xs, ys))
+        full, *half = layers_of(picture)
+        parts = [full[top:bottom, left:right]]
+        parts += [layer[top // 2 : bottom // 2 + 1, left // 2 : right // 2 + 1] for layer in half]
+        return cls(tuple(part.copy() for part in parts), (left, top))
+
+    @property
+    def nbytes(self) -> int:
+        """Size of the layers, bytes."""
+        return sum(layer.nbytes for layer in self.layers)

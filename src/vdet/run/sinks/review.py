@@ -11,6 +11,7 @@ import numpy as np
 from vdet.boxes import Image
 from vdet.errors import OutputError
 from vdet.media import Picture
+from vdet.media.frame import Coding
 from vdet.pages.review import PAGE_NAME, Mark, Review, StripPicture, write_picture, write_review
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import BaseSink, SinkContext, SinkKind
@@ -20,9 +21,10 @@ from vdet.traffic.strips import (
     Passage,
     Passages,
     Sampling,
+    Surroundings,
     bands_of,
+    layers_of,
     sampling_of,
-    surroundings,
 )
 
 _MINUTE = 60
@@ -37,56 +39,36 @@ _SAME = 1.0
 """Maximum seconds between a counted crossing and the passage that gives its place."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Waiting:
-    """The surroundings of a band in a frame: BGR `(h, w, 3)`, seconds into its minute."""
-
-    seconds: float
-    picture: Picture
-    origin: tuple[int, int]
-
-
 @dataclass(slots=True)
 class _Strip:
-    """The strip of a band in the current minute; frames wait until its sampling is known."""
+    """The strip of a band in the current minute; frames wait until its sampling is known.
+
+    Frames have their seconds in the minute.
+    """
 
     band: Band
     sampling: Sampling | None = None
     is_final: bool = False
     rows: list[tuple[float, Image]] = field(default_factory=list)
-    waiting: list[_Waiting] = field(default_factory=list)
+    waiting: list[tuple[float, Surroundings]] = field(default_factory=list)
     waiting_bytes: int = 0
 
     def add(self, seconds: float, picture: Picture, passages: list[Passage]) -> None:
-        """Add a frame, `seconds` into its minute."""
-        if self.sampling is None:
-            self._wait(seconds, picture)
-            if len(passages) >= _ENOUGH or self.waiting_bytes > _WAITING_BYTES:
-                self.decide(passages)
-        else:
-            self.rows.append((seconds, self.sampling.cut(picture)))
-
-    def _wait(self, seconds: float, picture: Picture) -> None:
-        width, height = picture.width, picture.height
-        ends = self.band.start, self.band.end
-        down, across = surroundings(ends, width, height, margin=height / 12)
-        part: Image
-        if planes := picture.planes:
-            half_down, half_across = (
-                slice(side.start // 2, (side.stop + 1) // 2) for side in (down, across)
-            )
-            blue, red = (layer[half_down, half_across] for layer in (planes.blue, planes.red))
-            part = planes.coding.to_bgr((planes.luma[down, across], blue, red))
-        else:
-            part = picture.image[down, across].copy()
-        self.waiting.append(_Waiting(seconds, Picture(part), (across.start, down.start)))
-        self.waiting_bytes += part.nbytes
+        """Add a frame."""
+        if self.sampling:
+            self.rows.append((seconds, self.sampling.cut(layers_of(picture))))
+            return
+        self.waiting.append((seconds, Surroundings.of(self.band, picture)))
+        self.waiting_bytes += self.waiting[-1][1].nbytes
+        if len(passages) >= _ENOUGH or self.waiting_bytes > _WAITING_BYTES:
+            self.decide(passages)
 
     def decide(self, passages: list[Passage]) -> None:
         """Choose the sampling by the passages so far, and sample the frames that wait."""
         self.sampling = sampling_of(self.band, passages)
         self.is_final = len(passages) >= _ENOUGH
-        self.rows += [(w.seconds, self.sampling.cut(w.picture, w.origin)) for w in self.waiting]
+        cut = self.sampling.cut
+        self.rows += [(seconds, cut(part.layers, part.origin)) for seconds, part in self.waiting]
         self.waiting, self.waiting_bytes = [], 0
 
 
@@ -106,6 +88,7 @@ class ReviewSink(BaseSink):
         self._written = tempfile.TemporaryFile("w+", encoding="ascii")  # noqa: SIM115  # closed at the end
         self._pictures: list[StripPicture] = []
         self._minute = 0
+        self._coding: Coding | None = None
         self._start = float(self.video.start)
 
     def __exit__(self, kind: object, *_: object) -> None:
@@ -119,9 +102,10 @@ class ReviewSink(BaseSink):
         if (minute := int(seconds // _MINUTE)) != self._minute:
             self._end_minute()
             self._minute = minute
+        self._coding = picture.planes.coding if (picture := result.frame.picture).planes else None
         self._passages.add(result.frame_tracks)
         for strip, found in zip(self._strips, self._passages.found, strict=True):
-            strip.add(seconds - _MINUTE * minute, result.frame.picture, found)
+            strip.add(seconds - _MINUTE * minute, picture, found)
 
     def _end_minute(self) -> None:
         for number, (strip, found) in enumerate(
@@ -140,12 +124,15 @@ class ReviewSink(BaseSink):
         last = strip.rows[-1][0]
         seconds = min(max(1, round(_COLUMN_ROWS / rate)), int(last) + 1)
         columns, height = int(last // seconds) + 1, int(np.ceil(seconds * rate))
-        image = np.zeros((height, columns, strip.band.samples, 3), np.uint8)
+        image = np.full((height, columns, strip.band.samples, 3), 128, np.uint8)
         for time, rows in strip.rows:
             column, top = int(time // seconds), round(time % seconds * rate)
             part = rows[: height - top]
             image[top : top + len(part), column] = part
         flat = image.reshape(height, -1, 3)
+        if self._coding:
+            luma, blue, red = (np.ascontiguousarray(layer) for layer in np.moveaxis(flat, 2, 0))
+            flat = self._coding.to_bgr((luma, blue, red))
         _, data = cv2.imencode(".webp", flat, [cv2.IMWRITE_WEBP_QUALITY, _QUALITY])
         self._pictures.append(
             StripPicture(number, self._minute, columns, seconds, height, sampling.is_upward)
