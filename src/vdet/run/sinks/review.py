@@ -28,7 +28,7 @@ from vdet.traffic.strips import (
 )
 
 _MINUTE = 60
-_ENOUGH = 12
+_ENOUGH = 6
 """Number of passages after which the sampling of a band is final."""
 _WAITING_BYTES = 48_000_000
 """Maximum memory of the frames of one band that wait for its sampling."""
