@@ -129,23 +129,49 @@ class Passages:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sampling:
-    """Where the pixels of a band lie: float32 `(rows, samples)` each, pixels of the frame.
+class _Map:
+    """Where pixels lie in a layer, in the form that `cv2.remap` reads fastest."""
 
-    `rows` belong to one frame, the earliest first. `is_upward` says whether time should run up the
-    strip, so that vehicles which come nearer stand upright.
+    pixels: npt.NDArray[np.int16]
+    fractions: npt.NDArray[np.uint16]
+
+    @classmethod
+    def of(cls, x: Float64Array, y: Float64Array) -> "_Map":
+        maps = cv2.convertMaps(x.astype(np.float32), y.astype(np.float32), cv2.CV_16SC2)
+        return cls(np.asarray(maps[0], np.int16), np.asarray(maps[1], np.uint16))
+
+    def cut(self, layer: Image, origin: tuple[int, int]) -> Image:
+        """Return the pixels of a layer that begins at `origin`."""
+        pixels = self.pixels - np.array(origin, np.int16) if any(origin) else self.pixels
+        edge = cv2.BORDER_REPLICATE
+        cut = cv2.remap(layer, pixels, self.fractions, cv2.INTER_LINEAR, borderMode=edge)
+        return np.asarray(cut, np.uint8)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sampling:
+    """Where the pixels of a band lie in a frame.
+
+    Attributes
+    ----------
+    rows
+        Number of rows of a frame, the earliest first.
+    is_upward
+        Whether time should run up the strip, so that vehicles which come nearer stand upright.
     """
 
-    x: npt.NDArray[np.float32]
-    y: npt.NDArray[np.float32]
+    rows: int
     is_upward: bool
+    _full: _Map
+    _half: _Map
 
-    @property
-    def rows(self) -> int:
-        """Number of rows of a frame."""
-        return len(self.x)
+    @classmethod
+    def of(cls, x: Float64Array, y: Float64Array, *, is_upward: bool) -> "Sampling":
+        """Sample at x and y, `(rows, samples)` each, pixels of the frame."""
+        half = _Map.of((x - 0.5) / 2, (y - 0.5) / 2)
+        return cls(len(x), is_upward, _Map.of(x, y), half)
 
-    def cut(self, layers: Sequence[Image], origin: Point = (0, 0)) -> Image:
+    def cut(self, layers: Sequence[Image], origin: tuple[int, int] = (0, 0)) -> Image:
         """Return the band of a frame, uint8 `(rows, samples, 3)`.
 
         Parameters
@@ -155,21 +181,13 @@ class Sampling:
         origin
             The pixel of the frame at which the layers begin; even numbers.
         """
-        x, y = self.x - np.float32(origin[0]), self.y - np.float32(origin[1])
-        luma, *chroma = layers
-        cut = _sampled(luma, x, y)
+        first, *chroma = layers
+        cut = self._full.cut(first, origin)
         if not chroma:
             return cut
-        x, y = x * _HALF - _HALF / 2, y * _HALF - _HALF / 2
-        return np.dstack([cut, *(_sampled(layer, x, y) for layer in chroma)])
-
-
-_HALF = np.float32(0.5)
-
-
-def _sampled(image: Image, x: npt.NDArray[np.float32], y: npt.NDArray[np.float32]) -> Image:
-    edge = cv2.BORDER_REPLICATE
-    return np.asarray(cv2.remap(image, x, y, cv2.INTER_LINEAR, borderMode=edge), np.uint8)
+        half = origin[0] // 2, origin[1] // 2
+        merged = cv2.merge([cut, *(self._half.cut(layer, half) for layer in chroma)])
+        return np.asarray(merged, np.uint8)
 
 
 def layers_of(picture: Picture) -> tuple[Image, ...]:
@@ -193,7 +211,7 @@ def sampling_of(band: Band, passages: Sequence[Passage]) -> Sampling:
     offsets = 0.5 - (np.arange(rows) + 0.5) / rows  # what is ahead has passed earlier
     x, y = np.moveaxis(points + offsets[:, np.newaxis, np.newaxis] * velocities, 2, 0)
     is_upward = bool(np.median(velocities[:, 1]) > 0)
-    return Sampling(x.astype(np.float32), y.astype(np.float32), is_upward)
+    return Sampling.of(x, y, is_upward=is_upward)
 
 
 def _velocities(
@@ -219,7 +237,7 @@ class Surroundings:
     """The part of a frame around a band, as layers for `Sampling.cut`, and their origin."""
 
     layers: tuple[Image, ...]
-    origin: Point
+    origin: tuple[int, int]
 
     @classmethod
     def of(cls, band: Band, picture: Picture) -> "Surroundings":
