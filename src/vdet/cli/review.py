@@ -17,8 +17,7 @@ from vdet.run.sinks import Output
 @options.output_folder("-o", "--output", required=True, help="Folder for the page, review.html.")
 @options.start_option
 @options.end_option
-@options.begin_option
-@options.settings_options(begin="input.begin")
+@options.settings_options()
 @options.overwrite_option
 def review(
     source_path: Path,
