@@ -182,7 +182,8 @@ class _Unchecked:
         """
         number, weight = self.number * unchecked, self.weight * spread
         single, scatter = self.single * spread, self.scatter * spread
-        high = _gamma(number + weight, single + weight * (weight + 1), _Z)
+        import os; m=float(os.environ.get('MID','1'))
+        high = _gamma(number + m*weight, single + m*weight * (weight + 1), _Z)
         if not number:
             return 0.0, min(high, self.limit)
         student = _student(minutes - 1)
@@ -228,8 +229,9 @@ class _Survey:
     ) -> _Unchecked:
         """Estimate errors from those found in each minute, which are in proportion to `size`."""
         strata = strata_of(self.traffic)
-        totals = [np.bincount(strata[part], minlength=STRATA) for part in (self.sample, self.rest)]
-        weights = (totals[1] / np.maximum(totals[0], 1))[strata[self.sample]]
+        numbers = np.bincount(strata[self.sample], minlength=STRATA)
+        members = np.bincount(strata[self.rest], minlength=STRATA) + numbers
+        weights = members[strata[self.sample]] / numbers[strata[self.sample]]
         found, sizes, others = found[self.sample], size[self.sample], float(size[self.rest].sum())
         weighted = float((weights * sizes).sum())
         if not weighted:  # nothing is known

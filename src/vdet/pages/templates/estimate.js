@@ -1,0 +1,90 @@
+// The estimate of vdet.traffic.estimate, with the same numbers; see there for the method and its sources.
+
+/** Return a quantile of the gamma distribution; z is that of the normal distribution. */
+function gammaQuantile(mean, variance, z) {
+  if (variance === 0) return mean;
+  const part = variance / (9 * mean * mean);
+  return mean * Math.max(0, 1 - part + z * Math.sqrt(part)) ** 3;
+}
+
+/** Return the quantile of Student's t whose counterpart of the normal distribution is z. */
+function studentQuantile(n, z) {
+  const second = (5 * z ** 5 + 16 * z ** 3 + 3 * z) / 96;
+  return z + (z ** 3 + z) / 4 / n + second / n ** 2 + (3 * z ** 7 + 19 * z ** 5 + 17 * z ** 3 - 15 * z) / 384 / n ** 3;
+}
+
+/** Estimate the errors of one kind in unchecked minutes from those found in each minute. */
+function uncheckedErrors({ found, size, strata, sample, rest, limit }) {
+  const sum = (minutes, value) => minutes.reduce((total, minute) => total + value(minute), 0);
+  const inStratum = (minutes, minute) => minutes.filter(other => strata[other] === strata[minute]).length;
+  const weights = new Map(sample.map(minute => [minute, 1 + inStratum(rest, minute) / inStratum(sample, minute)]));
+  const others = sum(rest, minute => size[minute]), weighted = sum(sample, minute => weights.get(minute) * size[minute]);
+  if (weighted === 0) return { number: 0, single: 0, scatter: 0, weight: limit, limit };
+  const weight = minute => weights.get(minute) * others / weighted;
+  const variance = minute => weight(minute) * (weight(minute) + 1);
+  const number = sum(sample, minute => weight(minute) * found[minute]);
+  const left = minute => others && found[minute] - number / others * size[minute];
+  return {
+    number, limit,
+    single: sum(sample, minute => variance(minute) * found[minute]),
+    scatter: sum(sample, minute => variance(minute) * left(minute) ** 2) * sample.length / (sample.length - 1),
+    weight: others / sum(sample, minute => size[minute]),
+  };
+}
+
+/** Return the interval of errors in unchecked minutes: for the fraction of them still unchecked, of a sample of n. */
+function errorBounds(errors, n, unchecked, spread) {
+  const z = 1.959964, number = errors.number * unchecked, weight = errors.weight * spread;
+  const single = errors.single * spread, scatter = errors.scatter * spread;
+  const high = gammaQuantile(number + weight, single + weight * (weight + 1), z);
+  if (number === 0) return [0, Math.min(high, errors.limit)];
+  const t = studentQuantile(n - 1, z);
+  const low = Math.min(gammaQuantile(number, single, -z), gammaQuantile(number, scatter, -t));
+  return [Math.max(low, 0), Math.min(Math.max(high, gammaQuantile(number, scatter, t)), errors.limit)];
+}
+
+/** Return the parts of the interval below and above the estimate after more minutes. */
+function intervalWidths(gains, losses, sample, rest, more) {
+  const n = sample + more, unchecked = 1 - more / rest, spread = unchecked * sample / n;
+  const [low, high] = errorBounds(gains, n, unchecked, spread);
+  const [least, most] = errorBounds(losses, n, unchecked, spread);
+  const gained = gains.number * unchecked, lost = losses.number * unchecked;
+  return [Math.hypot(gained - low, most - lost), Math.hypot(high - gained, lost - least)];
+}
+
+/**
+ * Estimate the true number of all vehicles (group null), then of each class.
+ *
+ * counted: { class: [vehicles in each minute] }; strata: the stratum of each minute; errors: [{ minute, counted, true }],
+ * classes or null; checked, drawn: sets of minutes. Returns [{ group, counted, true, low, high, more }], empty if minutes
+ * are left and fewer than 3 drawn ones are checked.
+ */
+function estimateCounts({ counted, strata, errors, checked, drawn }) {
+  const minutes = strata.map((_, minute) => minute), rest = minutes.filter(minute => !checked.has(minute));
+  const sample = minutes.filter(minute => checked.has(minute) && drawn.has(minute));
+  if (rest.length > 0 && sample.length < 3) return [];
+  const traffic = minutes.map(minute => Object.values(counted).reduce((sum, numbers) => sum + numbers[minute], 0));
+  const classes = new Set([...Object.keys(counted), ...errors.map(error => error.true).filter(name => name !== null)]);
+  return [null, ...[...classes].sort()].map(group => {
+    const own = group === null ? traffic : counted[group] ?? minutes.map(() => 0);
+    const isIn = name => name !== null && (group === null || group === name);
+    const foundIn = test => {
+      const numbers = minutes.map(() => 0);
+      errors.filter(test).forEach(error => numbers[error.minute]++);
+      return numbers;
+    };
+    const added = foundIn(error => isIn(error.true) && !isIn(error.counted));
+    const removed = foundIn(error => isIn(error.counted) && !isIn(error.true));
+    const sum = numbers => numbers.reduce((total, number) => total + number, 0);
+    const known = sum(own) + sum(added) - sum(removed), total = { group, counted: sum(own) };
+    if (rest.length === 0) return { ...total, true: known, low: known, high: known, more: 0 };
+    const size = traffic.map(number => number + 1), limit = sum(rest.map(minute => own[minute]));
+    const gains = uncheckedErrors({ found: added, size, strata, sample, rest, limit: Infinity });
+    const losses = uncheckedErrors({ found: removed, size: own, strata, sample, rest, limit });
+    const value = known + gains.number - losses.number;
+    const [below, above] = intervalWidths(gains, losses, sample.length, rest.length, 0);
+    let more = 0;
+    while (more < rest.length && sum(intervalWidths(gains, losses, sample.length, rest.length, more)) > 0.04 * value) more++;
+    return { ...total, true: value, low: value - below, high: value + above, more };
+  });
+}
