@@ -128,10 +128,9 @@ def main() -> None:
             error = np.mean([abs(result.made.true - result.true) for result in results]) / true
             more = np.mean([result.made.more for result in results])
             held = np.mean([result.holds for result in results])
-            low = np.mean([result.true < result.made.low for result in results])
             print(
                 f"| {name}: {group} | {situation.checked} of {situation.minutes} | {true:.0f} | "
-                f"{held:.1%} | {half:.1%} | {error:.1%} | {more:.0f} | {low:.1%}",
+                f"{held:.1%} | {half:.1%} | {error:.1%} | {more:.0f} |",
                 flush=True,
             )
 

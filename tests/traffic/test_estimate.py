@@ -41,7 +41,7 @@ def test_minutes_of_equal_traffic_are_drawn_equally_often() -> None:
 
 def test_a_sample_has_minutes_of_little_and_of_much_traffic() -> None:
     strata = strata_of(TRAFFIC)
-    assert np.all(np.diff(strata) >= 0) or set(strata) == {0, 1, 2, 3}
+    assert set(strata) == {0, 1, 2, 3}
     for seed in range(20):
         drawn = [strata[minute] for minute in draw_minutes(TRAFFIC, seed)[:8]]
         assert set(drawn) == set(strata)
@@ -68,8 +68,8 @@ def test_errors_in_the_sample_stand_for_those_in_other_minutes() -> None:
 def test_a_sample_without_errors_does_not_say_that_there_are_none() -> None:
     [whole, _] = estimate(CARS, [], checked=range(12), drawn=range(12))
     assert whole.true == 600
-    assert 588 < whole.low < 592  # mid-P: up to 3.0 in the sample, and 4 times as many elsewhere
-    assert 608 < whole.high < 616
+    # Up to 2.7 errors may go unseen in the sample; four times as many minutes are not checked.
+    assert (whole.low, whole.high) == pytest.approx((600 - 4 * 2.74, 600 + 4 * 2.74), abs=2)
 
 
 def test_minutes_that_were_not_drawn_say_nothing_about_others() -> None:

@@ -1,28 +1,28 @@
 """How right a count is: which minutes to check, and what they say about the others.
 
 Some minutes of a video are drawn and checked by a person. Minutes are grouped into strata of
-similar traffic, and drawn at random without replacement in each. The true count is what was counted,
-plus the vehicles missed, minus those counted wrongly: known in checked minutes, estimated in the
-others. Both kinds of errors are estimated by the combined ratio estimator of stratified sampling,
-with the traffic of a minute as auxiliary variable (Cochran, Sampling Techniques, 3rd ed., 1977,
-chapters 5 and 6).
+similar traffic, and drawn at random without replacement in each. The true count is what was
+counted, plus the vehicles missed, minus those counted wrongly: known in checked minutes, estimated
+in the others. Both kinds of errors are estimated by the combined ratio estimator of stratified
+sampling (Cochran, Sampling Techniques, 3rd ed., 1977, chapters 5 and 6), in proportion to the
+vehicles counted in a minute.
 
 Each kind has two intervals of 95 %, and the wider limits hold: one for errors that come
 independently, also where none was seen (Garwood 1936, for weighted sums as in Fay and Feuer,
 Statistics in Medicine 16, 1997), and one from the scatter between minutes (Student's t), for errors
 that come together. The interval of the difference follows from those of both kinds (Zou and Donner,
-Statistics in Medicine 27, 2008). Quantiles are approximated as in `estimate.js`, so that a page and a
-table show the same numbers: chi-square by Wilson and Hilferty, t by Cornish and Fisher.
+Statistics in Medicine 27, 2008). Quantiles are approximated as in `estimate.js`, so that a page and
+a table show the same numbers: chi-square by Wilson and Hilferty, t by Cornish and Fisher.
 """
 
+from bisect import bisect_left
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from bisect import bisect_left
 from math import hypot, inf, sqrt
 
 import numpy as np
 
-from vdet.boxes import Float64Array, Int64Array
+from vdet.boxes import Int64Array
 
 STRATA = 4
 MIN_CHECKED = 3
@@ -31,6 +31,9 @@ PRECISION = 0.02
 """Half of the width of an interval that is precise enough, as a fraction of the true count."""
 _Z = 1.959964
 """Quantile of the normal distribution for 95 %, two-sided."""
+_ADDED = 0.6
+"""Errors added for the upper limit. With 1 (Garwood) it is too high: it holds 97.5 % at least. With
+0.6, no error is seen in at most 6.5 % of the samples where the limit for none is too low."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,11 +82,11 @@ class Estimate:
     more: int
 
 
-def strata_of(traffic: Sequence[int]) -> Int64Array:
+def strata_of(traffic: Sequence[int] | Int64Array) -> Int64Array:
     """Return the stratum of each minute, from 0 with the least traffic: (minutes,) int64.
 
     Strata have about equal sums of the square root of the traffic, as the errors scatter (Cochran,
-    5A.7). `traffic` is the number of vehicles counted in each minute. Equal numbers share a stratum.
+    5A.7); equal numbers share one. `traffic` is the number of vehicles counted in each minute.
     """
     weights = np.sqrt(np.asarray(traffic, np.float64) + 1)
     order = np.argsort(traffic, kind="stable")
@@ -182,8 +185,8 @@ class _Unchecked:
         """
         number, weight = self.number * unchecked, self.weight * spread
         single, scatter = self.single * spread, self.scatter * spread
-        import os; m=float(os.environ.get('MID','1'))
-        high = _gamma(number + m*weight, single + m*weight * (weight + 1), _Z)
+        added = _ADDED * weight
+        high = _gamma(number + added, single + added * (weight + 1), _Z)
         if not number:
             return 0.0, min(high, self.limit)
         student = _student(minutes - 1)
@@ -202,31 +205,27 @@ class _Survey:
 
     def estimate(self, group: str | None, own: Int64Array) -> Estimate:
         """Return the estimate of a class; `own` are its vehicles in each minute."""
-        counted, size = int(own.sum()), self.traffic + 1.0  # empty minutes may hide vehicles too
-        added, removed = np.zeros(len(own)), np.zeros(len(own))
+        counted = int(own.sum())
+        added, removed = np.zeros(len(own), np.int64), np.zeros(len(own), np.int64)
         for error in self.errors:
             is_true, is_counted = (
                 name is not None and group in (None, name) for name in (error.true, error.counted)
             )
             added[error.minute] += is_true and not is_counted
             removed[error.minute] += is_counted and not is_true
-        known = counted + float((added - removed).sum())
+        known = counted + int(added.sum() - removed.sum())
         if not len(self.rest):
             return Estimate(group, counted, known, known, known, 0)
-        gains = self._unchecked(added, size, inf)
+        gains = self._unchecked(added, self.traffic + 1, inf)  # empty minutes have errors too
         losses = self._unchecked(removed, own, float(own[self.rest].sum()))
         true = known + gains.number - losses.number
         below, above = self._widths(gains, losses, 0)
-        more = bisect_left(
-            range(len(self.rest)),
-            True,
-            key=lambda more: sum(self._widths(gains, losses, more)) <= 2 * PRECISION * true,
-        )
+        wanted, rest = 2 * PRECISION * true, range(len(self.rest))
+        widths = (-sum(self._widths(gains, losses, more)) for more in rest)
+        more = bisect_left(list(widths), -wanted)
         return Estimate(group, counted, true, true - below, true + above, more)
 
-    def _unchecked(
-        self, found: Float64Array, size: Float64Array | Int64Array, limit: float
-    ) -> _Unchecked:
+    def _unchecked(self, found: Int64Array, size: Int64Array, limit: float) -> _Unchecked:
         """Estimate errors from those found in each minute, which are in proportion to `size`."""
         strata = strata_of(self.traffic)
         numbers = np.bincount(strata[self.sample], minlength=STRATA)
@@ -242,7 +241,7 @@ class _Survey:
         minutes = len(self.sample)
         return _Unchecked(
             number=number,
-            single=float((variances * found).sum()),
+            single=float((variances * found).sum()) * max(0.0, 1 - number / (limit or 1)),
             scatter=float(scatter.sum()) * minutes / (minutes - 1),
             weight=others / float(sizes.sum()),
             limit=limit,
@@ -269,6 +268,5 @@ def _gamma(mean: float, variance: float, z: float) -> float:
 def _student(freedom: int) -> float:
     """Return the quantile of Student's t for 95 %, two-sided."""
     z, n = _Z, freedom
-    first, second = (z**3 + z) / 4, (5 * z**5 + 16 * z**3 + 3 * z) / 96
-    third = (3 * z**7 + 19 * z**5 + 17 * z**3 - 15 * z) / 384
-    return z + first / n + second / n**2 + third / n**3
+    second, third = 5 * z**5 + 16 * z**3 + 3 * z, 3 * z**7 + 19 * z**5 + 17 * z**3 - 15 * z
+    return z + (z**3 + z) / 4 / n + second / 96 / n**2 + third / 384 / n**3

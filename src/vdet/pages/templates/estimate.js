@@ -26,7 +26,7 @@ function uncheckedErrors({ found, size, strata, sample, rest, limit }) {
   const left = minute => others && found[minute] - number / others * size[minute];
   return {
     number, limit,
-    single: sum(sample, minute => variance(minute) * found[minute]),
+    single: sum(sample, minute => variance(minute) * found[minute]) * Math.max(0, 1 - number / (limit || 1)),
     scatter: sum(sample, minute => variance(minute) * left(minute) ** 2) * sample.length / (sample.length - 1),
     weight: others / sum(sample, minute => size[minute]),
   };
@@ -36,7 +36,7 @@ function uncheckedErrors({ found, size, strata, sample, rest, limit }) {
 function errorBounds(errors, n, unchecked, spread) {
   const z = 1.959964, number = errors.number * unchecked, weight = errors.weight * spread;
   const single = errors.single * spread, scatter = errors.scatter * spread;
-  const high = gammaQuantile(number + weight, single + weight * (weight + 1), z);
+  const added = 0.6 * weight, high = gammaQuantile(number + added, single + added * (weight + 1), z);
   if (number === 0) return [0, Math.min(high, errors.limit)];
   const t = studentQuantile(n - 1, z);
   const low = Math.min(gammaQuantile(number, single, -z), gammaQuantile(number, scatter, -t));
