@@ -91,10 +91,8 @@ def strata_of(traffic: Sequence[int] | Int64Array) -> Int64Array:
     weights = np.sqrt(np.asarray(traffic, np.float64) + 1)
     order = np.argsort(traffic, kind="stable")
     middle = np.cumsum(weights[order]) - weights[order] / 2
-    values = np.asarray(traffic)[order]
-    first = np.searchsorted(values, values)  # of equal numbers
-    strata = np.empty(len(order), np.int64)
-    strata[order] = np.floor(STRATA * middle / weights.sum())[first]
+    first = np.searchsorted(np.asarray(traffic)[order], traffic)  # of equal numbers
+    strata: Int64Array = (STRATA * middle / weights.sum()).astype(np.int64)[first]
     return strata
 
 
@@ -114,8 +112,8 @@ def draw_minutes(traffic: Sequence[int], seed: int) -> list[int]:
     strata, turns = strata_of(traffic), np.empty(len(traffic))
     weights, random = np.sqrt(np.asarray(traffic) + 1.0), np.random.Generator(np.random.PCG64(seed))
     for stratum in np.unique(strata):
-        [members] = np.nonzero(strata == stratum)
-        ranks = random.permutation(len(members)) + 0.5
+        members = strata == stratum
+        ranks = random.permutation(np.count_nonzero(members)) + 0.5
         turns[members] = ranks / weights[members].sum()
     return [int(minute) for minute in np.argsort(turns, kind="stable")]
 
@@ -220,9 +218,8 @@ class _Survey:
         losses = self._unchecked(removed, own, float(own[self.rest].sum()))
         true = known + gains.number - losses.number
         below, above = self._widths(gains, losses, 0)
-        wanted, rest = 2 * PRECISION * true, range(len(self.rest))
-        widths = (-sum(self._widths(gains, losses, more)) for more in rest)
-        more = bisect_left(list(widths), -wanted)
+        widths = [-sum(self._widths(gains, losses, more)) for more in range(len(self.rest))]
+        more = bisect_left(widths, -2 * PRECISION * true)
         return Estimate(group, counted, true, true - below, true + above, more)
 
     def _unchecked(self, found: Int64Array, size: Int64Array, limit: float) -> _Unchecked:
@@ -238,11 +235,10 @@ class _Survey:
         weights *= others / weighted
         number, variances = float((weights * found).sum()), weights * (weights + 1)
         scatter = variances * (found - number / others * sizes) ** 2 if others else variances
-        minutes = len(self.sample)
         return _Unchecked(
             number=number,
             single=float((variances * found).sum()) * max(0.0, 1 - number / (limit or 1)),
-            scatter=float(scatter.sum()) * minutes / (minutes - 1),
+            scatter=float(scatter.sum()) * len(sizes) / (len(sizes) - 1),
             weight=others / float(sizes.sum()),
             limit=limit,
         )
