@@ -53,6 +53,7 @@ from vdet.run.steps import Step, StepContext
 from vdet.run.video import Results, Run, RunTotals, open_video, run_video
 from vdet.track.factory import make_tracker
 from vdet.track.track import FrameTracks, Track, VideoTracker
+from vdet.traffic.corrections import read_corrections
 from vdet.traffic.counting import count_files, count_frames
 from vdet.traffic.counts import Counts, Event
 from vdet.traffic.records import VehicleRecord
@@ -351,6 +352,7 @@ def count(
     *,
     size: tuple[int, int] | None = None,
     rate: float | None = None,
+    corrections: Paths = (),
 ) -> Counts:
     """Count the vehicles of a video at the lines and in the zones of the settings.
 
@@ -362,16 +364,21 @@ def count(
         Width and height of the frames, pixels; None: from the tracks or `camera.size`.
     rate
         Frames per second, for a file of tracks without times.
+    corrections
+        A file of corrections that a reviewer saved, or several, which are merged.
     """
+    review = read_corrections([Path(path) for path in _listed(corrections)])
     if isinstance(tracks, str | PathLike):
-        return count_files([Path(tracks)], settings, size, rate)[str(Path(tracks))]
+        path = Path(tracks)
+        return count_files([path], settings, size, rate, corrections=review)[str(path)]
     frames = iter(tracks)
     first = next(frames, None)
     if isinstance(first, FrameResult):
         size = size or (first.frame.picture.width, first.frame.picture.height)
     items = frames if first is None else chain([first], frames)
     shown = (item.frame_tracks if isinstance(item, FrameResult) else item for item in items)
-    return count_frames(shown, settings, size)
+    name = first.source.name if isinstance(first, FrameResult) else None
+    return count_frames(shown, settings, size, corrections=review, name=name)
 
 
 def evaluate_tracks(tracks: PathName, truth: PathName, *, until: int | None = None) -> Scores:

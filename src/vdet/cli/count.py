@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 @options.counts_option
 @options.flows_option
 @options.interval_option
+@options.corrections_option
 @options.begin_option
 @click.option(
     "--size",
@@ -44,6 +45,7 @@ def count(
     tracks: options.Paths,
     size: tuple[int, int] | None,
     rate: float | None,
+    corrections: options.Paths,
     source: options.SettingsSource,
     overwrite: bool,
     classes: tuple[str, ...],
@@ -73,15 +75,19 @@ def count(
         raise click.UsageError("no lines or zones to count at; add a settings file with -c FILE")
     outputs = options.requested_outputs((), paths)
     options.check_counting(settings, outputs, several=False)
+    if corrections and len(tracks) > 1:
+        raise click.UsageError("--corrections is for one file of tracks; count each on its own")
     from vdet.run.sinks.protocol import check_sinks
+    from vdet.traffic.corrections import read_corrections
     from vdet.traffic.counting import count_files
     from vdet.traffic.output import counts_content, flows_content
     from vdet.traffic.tables import write_content
 
-    check_sinks(outputs, overwrite=overwrite, inputs=source.inputs(*tracks))
+    check_sinks(outputs, overwrite=overwrite, inputs=source.inputs(*tracks, *corrections))
+    review = read_corrections(corrections)
     with progress_steps(" files") as steps:
         advance = steps("", len(tracks) if len(tracks) > 1 else None)
-        videos = count_files(tracks, settings, size, rate, advance=advance)
+        videos = count_files(tracks, settings, size, rate, corrections=review, advance=advance)
     for name, result in videos.items():
         if result.clock:
             announce(f"{name}: begins {result.clock}")
@@ -97,6 +103,7 @@ def count(
             with output_errors(output.path):
                 write_content(files.stage(output.path), content)
     print_lines(*_totals(videos), *_matrix(list(videos.values())))
+    print_lines(*(str(result.corrected) for result in videos.values() if result.corrected))
     is_doubtful = any(result.doubts for result in videos.values())
     return DOUBTFUL if strict and is_doubtful else 0
 

@@ -48,6 +48,7 @@ if TYPE_CHECKING:
 @options.counts_option
 @options.flows_option
 @options.interval_option
+@options.corrections_option
 @options.sinks_option
 @options.output_folders(
     "--stages", help="Write an image of every stage of one frame into DIR. Requires --at."
@@ -96,6 +97,7 @@ if TYPE_CHECKING:
 def detect_video(
     videos: options.Paths,
     no_video: bool,
+    corrections: options.Paths,
     sinks: tuple[Output, ...],
     at: Fraction | None,
     overwrite: bool,
@@ -139,6 +141,8 @@ def detect_video(
         if jobs or skip_existing or scheduler:
             raise click.UsageError("--jobs, --skip-existing and --scheduler require -d")
         outputs = _with_video(videos, outputs, no_video=no_video)
+    elif corrections:
+        raise click.UsageError("--corrections is for one video, without -d")
     settings = source.load()
     options.check_counting(settings, outputs, several=folder is not None)
     if settings.lack_of_metres and "lane-geometry" not in settings.conditions.ignore:
@@ -158,6 +162,7 @@ def detect_video(
         overwrite=overwrite,
         threads=threads,
         settings_files=source.files,
+        corrections=corrections,
     )
     if folder is None:
         code, is_doubtful = 0, _process_video(run)
@@ -230,4 +235,6 @@ def _process_video(run: "Run") -> bool:
     announce(*(f"{path}: written" for path in paths))
     if totals.clock and run.settings.traffic:
         announce(f"{run.source}: begins {totals.clock}")
+    if totals.corrected:
+        announce(f"{run.source}: {totals.corrected}")
     return findings_in(totals.facts).is_doubtful

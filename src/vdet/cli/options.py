@@ -91,6 +91,12 @@ begin_option = click.option(
     metavar="TIME",
     help="Start time of the video, such as '2026-05-01 07:00+02:00' (`input.begin`).",
 )
+corrections_option = input_file(
+    "--corrections",
+    "corrections",
+    multiple=True,
+    help="Correct the counts by a file that a reviewer saved. Repeat for several reviewers.",
+)
 sinks_option = output_files(
     "--sink",
     "sinks",

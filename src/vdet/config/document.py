@@ -104,15 +104,15 @@ _Loader.add_implicit_resolver(
 )
 
 
-def read_document(path: Path) -> Document:
-    """Read a YAML file of settings.
+def read_document(path: Path, *, limit: int = MAX_BYTES, what: str = "settings file") -> Document:
+    """Read a YAML file of settings, or of something else, of at most `limit` bytes.
 
     Raises
     ------
     ConfigError
         The file cannot be read, is not YAML, or gives a key twice.
     """
-    data = read_whole(path, limit=MAX_BYTES, what="settings file", error=ConfigError)
+    data = read_whole(path, limit=limit, what=what, error=ConfigError)
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

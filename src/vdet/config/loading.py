@@ -16,6 +16,7 @@ from vdet.config.camera import GroundPoint
 from vdet.config.document import Document, Key
 from vdet.config.kinds import GROUPS, default_kind, kind_of_model
 from vdet.config.schema import LaneSettings, Section, Settings
+from vdet.config.section import S
 from vdet.config.shapes import FRACTIONS, LineSettings, RegionSettings, Shape, ZoneSettings
 from vdet.errors import ConfigError
 
@@ -75,12 +76,16 @@ def load_settings(
     is_set = any(inside(layer.values, "tracker", "look_ahead") is not None for layer in layers)
     if [kind for kind in kinds if kind][-1:] == ["svm"] and not is_set:  # its tracker differs
         default.values["tracker"] = document.read_document(find_config("svm")).values["tracker"]
-    merged = reduce(_with_kinds_over, layers, default)
+    return validated(Settings, reduce(_with_kinds_over, layers, default))
+
+
+def validated(kind: type[S], read: Document) -> S:
+    """Return the values of a document as a section of this kind; errors as `load_settings`."""
     try:
-        return Settings.model_validate(merged.values)
+        return kind.model_validate(read.values)
     except ValidationError as error:
         mistakes = error.errors()[:MAX_MISTAKES]
-        raise ConfigError(*(_describe(mistake, merged) for mistake in mistakes)) from error
+        raise ConfigError(*(_describe(mistake, read) for mistake in mistakes)) from error
 
 
 def given_values(paths: Sequence[Path]) -> dict[str, Any]:
@@ -213,10 +218,10 @@ def _expected(mistake: ErrorDetails, key: Key) -> str:
 
 def _unknown(key: Key, section: type[Section]) -> str:
     """Return a hint: the key of a section that is probably meant, or all keys."""
-    keys = section.model_fields
+    keys = section.keys()
     problem = "unknown setting"
     if "kind" in keys:
-        problem += f" of {key[0]}.kind: {keys['kind'].default}"
+        problem += f" of {key[0]}.kind: {section.model_fields['kind'].default}"
     if close := difflib.get_close_matches(str(key[-1]), keys, n=1):
         return f"{problem}; did you mean {close[0]}?"
     return f"{problem}; known settings: {', '.join(keys)}"

@@ -25,7 +25,7 @@ from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import SinkContext, check_sinks, open_sinks, sink_kind
 from vdet.run.threads import read_async
 from vdet.traffic.clock import Clock, find_clock
-from vdet.traffic.counts import Counts
+from vdet.traffic.counts import Corrected, Counts
 from vdet.traffic.live import LiveTraffic
 from vdet.traffic.records import VehicleRecord
 from vdet.workers import core_count, return_freed_memory
@@ -57,6 +57,8 @@ class Run:
         Number of threads for the search; None for one per core.
     settings_files
         The files that the settings were read from; no output replaces them.
+    corrections
+        Files of corrections of its counts.
     """
 
     source: Path
@@ -69,6 +71,7 @@ class Run:
     overwrite: bool = False
     threads: int | None = None
     settings_files: tuple[Path, ...] = ()
+    corrections: tuple[Path, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "source", Path(self.source))  # notebooks pass text
@@ -84,7 +87,8 @@ class Run:
     @property
     def inputs(self) -> FileIds:
         """The files that the run reads, which no output replaces. Raises `VideoError`."""
-        return input_files(self.source, *self.settings_files, settings=self.settings)
+        files = (*self.settings_files, *self.corrections)
+        return input_files(self.source, *files, settings=self.settings)
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +105,8 @@ class RunTotals:
         Wall time.
     clock
         When the video was recorded; None if unknown.
+    corrected
+        How its counts were corrected; None if they were not.
     facts
         Results of steps about the whole video, by name.
     summaries
@@ -113,6 +119,7 @@ class RunTotals:
     tracks: int
     seconds: float
     clock: Clock | None = None
+    corrected: Corrected | None = None
     facts: Facts = field(default_factory=dict)
     summaries: Mapping[Path, Any] = field(default_factory=dict)
 
@@ -144,6 +151,11 @@ def open_video(run: Run, parts: Parts, *, with_traffic: bool = True) -> Iterator
 
     Reading and searching run in threads. Without `with_traffic`, nothing is counted or recorded.
     """
+    corrections = None
+    if run.corrections:  # most runs have none, and load nothing for them
+        from vdet.traffic.corrections import read_corrections
+
+        corrections = read_corrections(run.corrections)
     with named_errors(run.source, VideoError), read_async(_opened(run)) as (reader, read):
         images, frames = peek(read)
         settings, info = run.settings, reader.info
@@ -156,7 +168,14 @@ def open_video(run: Run, parts: Parts, *, with_traffic: bool = True) -> Iterator
         clock = find_clock(
             run.source, settings, float(info.start), tags=info.tags, length=info.duration
         )
-        traffic = LiveTraffic(settings, info.width, info.height, clock)
+        traffic = LiveTraffic(
+            settings,
+            info.width,
+            info.height,
+            clock,
+            corrections=corrections,
+            name=run.source.name,
+        )
         facts: dict[str, Fact] = {}
 
         def results() -> Generator[FrameResult]:
@@ -301,6 +320,7 @@ def write_outputs(
         tracks=len(ids),
         seconds=time.perf_counter() - start_time,
         clock=video.traffic.clock,
+        corrected=counts.corrected if counts else None,
         facts=video.facts,
         summaries=sinks.summaries,
     )

@@ -54,7 +54,7 @@ class VehicleCounter:
 
     Attributes
     ----------
-    lines, zones
+    lines, zones, borders
         In pixels of its frames.
     spans
         The parts with video, seconds.
@@ -71,7 +71,7 @@ class VehicleCounter:
         self._settings = settings
         self.lines, self.zones = lines_and_zones(settings.traffic, width, height)
         self.spans: list[Span] = []
-        self._borders: tuple[Border, ...] = (*self.lines, *self.zones)
+        self.borders: tuple[Border, ...] = (*self.lines, *self.zones)
         self.linker = TrackLinker(width, height, started)
         self._latest: FrameTracks | None = None
         self._steps = self._long_steps = 0
@@ -97,7 +97,7 @@ class VehicleCounter:
         passages = self._ended + self._passages(self.linker.open_paths())
         events = [event for passage in passages for event in passage.events]
         events.sort(key=lambda event: (event.time, event.frame, event.id, event.name))
-        directions = tuple((item.name, way) for item in self._borders for way in item.directions)
+        directions = tuple((item.name, way) for item in self.borders for way in item.directions)
         warnings = list(_line_warnings(self.lines, passages))
         if 2 * self._long_steps > self._steps:
             warnings.insert(0, "fewer than 5 frames per second: vehicles are missed; record more")
@@ -133,7 +133,7 @@ class VehicleCounter:
 
     def _passage(self, path: VehiclePath) -> _Passage:
         events, heights = list[Event](), {}
-        for border in self._borders:
+        for border in self.borders:
             crossed = crossings(path, border)
             events += [_event(path, border.name, crossing) for crossing in crossed]
             heights[border.name] = path.heights[[crossing.row for crossing in crossed]].tolist()

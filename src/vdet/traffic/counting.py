@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from datetime import timedelta
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from vdet.config.schema import Settings
 from vdet.errors import ConfigError, TruthError
@@ -21,6 +22,9 @@ from vdet.traffic.clock import Clock, Span, add_frame, find_clock
 from vdet.traffic.counter import VehicleCounter
 from vdet.traffic.counts import Counts
 from vdet.traffic.speeds import SpeedMeter, with_speeds
+
+if TYPE_CHECKING:
+    from vdet.traffic.corrections import Corrections
 
 _log = logging.getLogger("vdet")
 
@@ -60,6 +64,7 @@ def count_files(
     size: tuple[int, int] | None = None,
     rate: float | None = None,
     *,
+    corrections: "Corrections | None" = None,
     advance: Advance = lambda _: None,
 ) -> dict[str, Counts]:
     """Count the vehicles of files of tracks at the lines and in the zones of the settings.
@@ -74,6 +79,8 @@ def count_files(
         Width and height of the frames, pixels; None: from the file, else from `camera.size`.
     rate
         Frames per second, for a file without times.
+    corrections
+        Those of a single file.
     advance
         Called after each file with 1.
 
@@ -87,8 +94,10 @@ def count_files(
         A file cannot be used, or its times are missing or wrong.
     ConfigError
         The lines do not fit the frames, the size of the frames is unknown, a name does not match
-        the pattern of the clock, or no file needs the `rate`.
+        the pattern of the clock, or no file needs the `rate`; the corrections do not fit.
     """
+    if corrections and len(set(paths)) > 1:
+        raise ConfigError("corrections are for a single file of tracks; count it alone")
     counted: dict[str, Counts] = {}
     group: _Group | None = None
     rate_is_used = rate is None
@@ -111,21 +120,38 @@ def count_files(
         if group is None or not group.precedes(video, frame_size):
             counted |= group.counts() if group else {}
             group = _Group(settings, frame_size, group.counter.linker.started if group else 0)
+        if corrections:
+            name = saved.video.name if saved.video else None
+            corrections.check(group.counter.borders, frame_size, name)
         group.add(video, saved)
         advance(1)
     if not rate_is_used:
         raise ConfigError("--rate changes nothing: the tracks have times; remove it")
     counted |= group.counts() if group else {}
+    if corrections:
+        counted = {name: corrections.apply(counts) for name, counts in counted.items()}
     return {str(path): counted[str(path)] for path in paths}
 
 
 def count_frames(
-    frames: Iterable[FrameTracks], settings: Settings, size: tuple[int, int] | None = None
+    frames: Iterable[FrameTracks],
+    settings: Settings,
+    size: tuple[int, int] | None = None,
+    *,
+    corrections: "Corrections | None" = None,
+    name: str | None = None,
 ) -> Counts:
-    """Count the vehicles in the tracks of each frame; arguments and errors as for `count_files`."""
-    group = _Group(settings, _frame_size(settings, size))
+    """Count the vehicles in the tracks of each frame; arguments and errors as for `count_files`.
+
+    `name` is that of the video, for the corrections; None if unknown.
+    """
+    frame_size = _frame_size(settings, size)
+    group = _Group(settings, frame_size)
+    if corrections:
+        corrections.check(group.counter.borders, frame_size, name)
     group.add(_Video("", clock=None, first=0.0), frames)
-    return group.counts()[""]
+    counts = group.counts()[""]
+    return corrections.apply(counts) if corrections else counts
 
 
 def _frame_size(settings: Settings, size: tuple[int, int] | None) -> tuple[int, int]:

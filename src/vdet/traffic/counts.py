@@ -4,13 +4,13 @@ Tables cover the whole video or intervals of it. Several videos have one table.
 """
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, fields
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields
 from itertools import accumulate, pairwise, product
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from vdet.config.classes import UNKNOWN
-from vdet.errors import ArgumentError, needing
+from vdet.errors import ArgumentError, counted, needing
 from vdet.traffic.clock import Clock, ClockTime, Interval, Intervals, Span
 from vdet.traffic.crossings import APPEAR, ENTER
 
@@ -137,6 +137,36 @@ class ZoneRow:
 
 
 @dataclass(frozen=True, slots=True)
+class Checked:
+    """A part of a video that a reviewer checked at a line or zone; seconds in the video."""
+
+    line: str
+    start: float
+    end: float
+
+
+@dataclass(frozen=True, slots=True)
+class Corrected:
+    """How counts were corrected: how many events, by which files, and what was checked.
+
+    `classes` has the correct class by the id of a track.
+    """
+
+    events: int
+    files: tuple[str, ...]
+    checked: tuple[Checked, ...] = ()
+    classes: Mapping[int, str] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        return f"corrected: {counted(self.events, 'event')}, by {', '.join(self.files)}"
+
+    def record(self) -> dict[str, Any]:
+        """Return it as values for JSON."""
+        checked = [asdict(span) for span in self.checked]
+        return {"events": self.events, "files": list(self.files), "checked": checked}
+
+
+@dataclass(frozen=True, slots=True)
 class Counts:
     """All results of one video.
 
@@ -154,6 +184,8 @@ class Counts:
         A sentence for each misplaced line, a low frame rate, and impossible lengths of cars.
     doubts
         A sentence for each reason to doubt the tracks.
+    corrected
+        What a reviewer corrected; None if nothing was.
     """
 
     events: tuple[Event, ...]
@@ -163,6 +195,7 @@ class Counts:
     clock: Clock | None = None
     warnings: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
+    corrected: Corrected | None = None
 
     @property
     def totals(self) -> tuple[DirectionTotal, ...]:

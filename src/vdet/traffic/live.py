@@ -1,6 +1,7 @@
 """Records, counts and speeds of a video while it is processed."""
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from vdet.config.classes import is_chosen
 from vdet.config.schema import Settings
@@ -11,6 +12,9 @@ from vdet.traffic.counter import VehicleCounter
 from vdet.traffic.counts import Counts
 from vdet.traffic.records import VehicleRecord, VehicleRecords
 from vdet.traffic.speeds import SpeedMeter, with_speeds
+
+if TYPE_CHECKING:
+    from vdet.traffic.corrections import Corrections
 
 
 class LiveTraffic:
@@ -30,7 +34,8 @@ class LiveTraffic:
     Raises
     ------
     ConfigError
-        The ground does not fit the frames, `width` × `height` pixels.
+        The ground, or the corrections, do not fit the frames, `width` × `height` pixels, or the
+        `name` of the video.
     """
 
     counter: VehicleCounter | None = None
@@ -39,13 +44,24 @@ class LiveTraffic:
     _final: Counts | None = None
 
     def __init__(
-        self, settings: Settings, width: int, height: int, clock: Clock | None = None
+        self,
+        settings: Settings,
+        width: int,
+        height: int,
+        clock: Clock | None = None,
+        *,
+        corrections: "Corrections | None" = None,
+        name: str | None = None,
     ) -> None:
         self.clock = clock
+        self._corrections = corrections
         self._records = VehicleRecords(width)
         self._classes = settings.classes
         if settings.traffic:
             self.counter = VehicleCounter(settings, width, height)
+        if corrections:
+            borders = self.counter.borders if self.counter else ()
+            corrections.check(borders, (width, height), name)
         if ground := ground_of(settings.camera, width, height):
             self.speeds = SpeedMeter(ground, width, height)
 
@@ -69,7 +85,11 @@ class LiveTraffic:
         `is_still` as for `VehicleRecords.end`, `doubts` as in `Counts`.
         """
         if counts := self.counts():
-            self._final = replace(counts, doubts=doubts)
+            counts = replace(counts, doubts=doubts)
+            self._final = self._corrections.apply(counts) if self._corrections else counts
         records = self._records.end(self.speeds, is_still=is_still)
+        corrected = self._final.corrected if self._final else None
+        for record in records if corrected else ():
+            record.class_name = corrected.classes.get(record.id, record.class_name)
         chosen = (record for record in records if is_chosen(record.class_name, self._classes))
         self.vehicles = tuple(chosen)

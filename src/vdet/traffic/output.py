@@ -129,6 +129,8 @@ def _json(
     for name, video in videos.items():
         begin = plain_time(video.clock and video.clock.at(video.spans[0][0]))
         by_video[name] = {"begin": begin, "warnings": list(video.warnings)}
+        if video.corrected:
+            by_video[name]["corrected"] = video.corrected.record()
         if events:
             rows = (_event(video, event) for event in video.events)
             by_video[name]["events"] = [dict(zip(_EVENTS, row, strict=True)) for row in rows]
