@@ -1,4 +1,4 @@
-"""`vdet eval`: measure detection or tracking."""
+"""`vdet eval`: measure detection, tracking or counts."""
 
 from functools import partial
 from pathlib import Path
@@ -10,7 +10,7 @@ from vdet.cli import options
 from vdet.cli.command import command
 from vdet.cli.messages import progress_steps
 from vdet.cli.options import SettingsSource
-from vdet.cli.results import ResultFiles, results_options
+from vdet.cli.results import ResultFiles, facts_options, results_options
 from vdet.workers import IMAGES, core_count, return_freed_memory
 
 if TYPE_CHECKING:
@@ -140,6 +140,30 @@ def video(
     results.print_report(video_report(scores, _run_name(settings, source)))
 
 
+@command()
+@click.argument("events", type=options.INPUT, metavar="OUT")
+@click.argument("truth", type=options.INPUT, metavar="TRUTH")
+@facts_options
+def counts(events: Path, truth: Path, results: ResultFiles) -> None:
+    """Measure counts against counts that were checked and corrected.
+
+    OUT is a table of events, .csv or .json, that --counts wrote, also with other settings or
+    another network. TRUTH is the .json that --counts wrote with --corrections, for the same video.
+    Only the minutes that were checked are compared.
+
+    \b
+    Examples:
+      vdet count tracks.jsonl -c gate.yaml --corrections corrections.yaml --counts corrected.json
+      vdet eval counts counts.csv corrected.json
+    """
+    from vdet.evaluate.counts import count_lines, score_counts
+    from vdet.run.inputs import input_files
+
+    results.check(input_files(events, truth))
+    scores = score_counts(events, truth)
+    results.print(count_lines(scores), {"counts": [score.record for score in scores]})
+
+
 def _run_name(settings: "Settings", source: SettingsSource) -> "RunName":
     """Return a description of the detector that is measured."""
     from vdet.detect.factory import model_file
@@ -149,5 +173,5 @@ def _run_name(settings: "Settings", source: SettingsSource) -> "RunName":
     return RunName(detector.kind, model_file(detector), configs, source.changes)
 
 
-_HELP = "Measure detection or tracking."
-eval_group = click.Group("eval", [images, tracks, video], help=_HELP)
+_HELP = "Measure detection, tracking or counts."
+eval_group = click.Group("eval", [counts, images, tracks, video], help=_HELP)

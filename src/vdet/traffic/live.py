@@ -88,8 +88,9 @@ class LiveTraffic:
             counts = replace(counts, doubts=doubts)
             self._final = self._corrections.apply(counts) if self._corrections else counts
         records = self._records.end(self.speeds, is_still=is_still)
-        corrected = self._final.corrected if self._final else None
-        for record in records if corrected else ():
-            record.class_name = corrected.classes.get(record.id, record.class_name)
+        if self._final and self._final.corrected:
+            for record in records:
+                classes = self._final.corrected.classes
+                record.class_name = classes.get(record.id, record.class_name)
         chosen = (record for record in records if is_chosen(record.class_name, self._classes))
         self.vehicles = tuple(chosen)
