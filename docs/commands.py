@@ -13,7 +13,7 @@ PAGE = Path(__file__).with_name("commands.md")
 _INTRODUCTION = """# Commands
 
 The help of every command, written by `make commands`. All commands also have `-q`, `-v` and `-h`,
-and all but `calibrate` and `demo` have `-c` and `--set`: see `vdet config`.
+and all but `calibrate`, `demo` and `eval counts` have `-c` and `--set`: see `vdet config`.
 """
 
 _WITH_ALL_OPTIONS = ("vdet", "vdet config")
