@@ -4,6 +4,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from typing import Any, TextIO
+from zlib import crc32
 
 from markupsafe import Markup
 
@@ -12,6 +13,7 @@ from vdet.config.shapes import TrafficSettings
 from vdet.media import VideoInfo
 from vdet.pages.render import TEMPLATES, render
 from vdet.traffic.counts import Event, class_of
+from vdet.traffic.estimate import draw_minutes, strata_of
 from vdet.traffic.strips import Band
 
 PAGE_NAME = "review.html"
@@ -94,7 +96,24 @@ class Review:
             "pictures": [asdict(picture) for picture in self.pictures],
             "marks": marks,
             "classes": [*OUR_NAMES, *sorted(others)],
+            **self._sampling(),
         }
+
+    def _sampling(self) -> dict[str, Any]:
+        """Return what the page needs to draw minutes, and to estimate the true count.
+
+        The seed follows from the name of the video, so nobody can draw until it looks good.
+        """
+        minutes = sorted({picture.minute for picture in self.pictures})
+        counted = {class_of(mark.event): [0] * len(minutes) for mark in self.marks}
+        for mark in self.marks:
+            counted[class_of(mark.event)][minutes.index(int(mark.seconds // 60))] += 1
+        traffic = [sum(numbers) for numbers in zip(*counted.values(), strict=True)]
+        traffic = traffic or [0] * len(minutes)
+        seed = crc32(self.video.path.name.encode("utf-8", "surrogateescape"))
+        order = [minutes[index] for index in draw_minutes(traffic, seed)] if minutes else []
+        strata = strata_of(traffic).tolist() if minutes else []
+        return {"counted": counted, "strata": strata, "order": order, "seed": seed}
 
 
 def write_picture(file: TextIO, picture: StripPicture, data: str) -> None:
@@ -105,7 +124,8 @@ def write_picture(file: TextIO, picture: StripPicture, data: str) -> None:
 
 def write_review(file: TextIO, review: Review, pictures: Iterable[str]) -> None:
     """Write the page; `pictures` are the lines of `write_picture`, passed on one by one."""
-    script = Markup((TEMPLATES / "review.js").read_text("utf-8"))
+    names = "review.js", "estimate.js"
+    script = Markup("".join((TEMPLATES / name).read_text("utf-8") for name in names))
     page = render("review.html", data=review.data(), script=script, name=review.video.path.name)
     before, _, after = page.partition(_PLACE)
     file.write(before)

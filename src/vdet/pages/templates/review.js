@@ -6,7 +6,8 @@ const data = JSON.parse(document.getElementById("data").textContent);
 const get = id => document.getElementById(id);
 const key = `vdet review ${data.video} ${data.made}`;
 const minutes = [...new Set(data.pictures.map(picture => picture.minute))].sort((a, b) => a - b);
-let state = { edits: {}, added: [], checked: [], reviewer: "" };
+const minuteOf = mark => Math.floor(mark.seconds / MINUTE);
+let state = { edits: {}, added: [], checked: [], reviewer: "", sample: null };
 let undone = []; // earlier states, as JSON
 let minute = minutes[0] ?? 0, selected = null, lastClass = mostFrequent(data.marks.map(mark => mark.class)) ?? data.classes[0];
 
@@ -88,8 +89,18 @@ function undo() {
   refresh();
 }
 
+/** Return the minutes to check: all, or those of the sample in the order in which they were drawn. */
+const planned = () => state.sample?.minutes ?? minutes;
+
+function draw() {
+  const count = Math.min(minutes.length, Number(get("count").value));
+  change(() => { state.sample = count >= 1 ? { seed: data.seed, minutes: data.order.slice(0, count) } : null; });
+  if (!planned().includes(minute)) [minute, selected] = [planned()[0], null];
+  refresh();
+}
+
 function go(steps, isChecked) {
-  const next = minutes[minutes.indexOf(minute) + steps];
+  const next = planned()[planned().indexOf(minute) + steps];
   if (isChecked && !state.checked.includes(minute)) change(() => state.checked.push(minute));
   if (next === undefined) return refresh();
   [minute, selected] = [next, null];
@@ -140,7 +151,7 @@ function drawStrips() {
   get("strips").replaceChildren(...strips);
 }
 
-const inMinute = () => allMarks().filter(mark => Math.floor(mark.seconds / MINUTE) === minute)
+const inMinute = () => allMarks().filter(mark => minuteOf(mark) === minute)
   .sort((a, b) => a.band - b.band || a.seconds - b.seconds);
 
 function labelOf(mark) {
@@ -194,7 +205,7 @@ function totals() {
       const row = rows.get(name.join("\t")) ?? rows.set(name.join("\t"), Object.fromEntries(columns.map(item => [item, 0])))
         .get(name.join("\t"));
       if (mark.error !== "missed") row.counted++;
-      if (mark.error !== "missed" && state.checked.includes(Math.floor(mark.seconds / MINUTE))) row.checked++;
+      if (mark.error !== "missed" && state.checked.includes(minuteOf(mark))) row.checked++;
       if (mark.error) row[mark.error]++;
     }
   }
@@ -210,25 +221,40 @@ function drawSummary() {
     for (const value of values) row.append(element("td", "", value));
     table.append(row);
   }
-  get("summary").replaceChildren(element("p", "", `${state.checked.length} of ${minutes.length} minutes checked`), table);
+  const done = planned().filter(item => state.checked.includes(item)).length;
+  get("summary").replaceChildren(element("p", "", `${done} of ${planned().length} minutes checked`), table);
 }
 
-/** Show the state, and keep it for a reload. Other scripts of the page hear of it as the event "reviewed". */
+/** Show the estimate of the true count by the checked minutes of the sample. */
+function drawEstimate() {
+  const errors = allMarks().filter(mark => mark.error && mark.error !== "direction" && state.checked.includes(minuteOf(mark)))
+    .map(mark => ({ minute: minutes.indexOf(minuteOf(mark)), counted: mark.error === "missed" ? null : mark.class,
+      true: mark.error === "false" ? null : mark.correct ?? mark.class }));
+  const indices = list => new Set(list.map(item => minutes.indexOf(item)));
+  const rows = estimateCounts({ counted: data.counted, strata: data.strata, errors, checked: indices(state.checked),
+    drawn: indices(state.sample?.minutes ?? []) });
+  const text = row => `${row.group ?? "all"}: ${row.counted} counted, ${Math.round(row.true)} true ` +
+    `(${Math.round(row.low)} to ${Math.round(row.high)})` + (row.more ? `; ${row.more} more minutes for ± 2 %` : "");
+  const words = state.sample ? "The estimate needs three checked minutes of the sample." : "Draw a sample for an estimate of the true count.";
+  get("estimate").replaceChildren(...(rows.length ? rows.map(row => element("p", "", text(row))) : [element("p", "", words)]));
+}
+
+/** Show the state, and keep it for a reload. */
 function refresh(isNew = false) {
   if (isNew || get("strips").dataset.minute !== String(minute)) drawStrips();
   get("strips").dataset.minute = minute;
   get("minute").textContent = `${clock(MINUTE * minute)} to ${clock(MINUTE * minute + MINUTE)}${state.checked.includes(minute) ? " ✓" : ""}`;
-  get("back").disabled = minute === minutes[0];
+  get("back").disabled = minute === planned()[0];
   get("undo").disabled = !undone.length;
   drawMarks();
   drawDetails();
   drawSummary();
+  drawEstimate();
   try {
     localStorage.setItem(key, JSON.stringify({ state, minute }));
   } catch {
     get("hint").textContent = "This browser keeps nothing; save before you close the page.";
   }
-  document.dispatchEvent(new CustomEvent("reviewed", { detail: { state, marks: allMarks(), minutes } }));
 }
 
 // ---------------------------------------------------------------- the file
@@ -264,7 +290,7 @@ function list(name, items) {
   return items.length ? [`${name}:`, ...items] : [`${name}: []`];
 }
 
-/** Return corrections.yaml. A script that draws a sample sets `state.sample` to its seed and minutes. */
+/** Return corrections.yaml. */
 function corrections() {
   const lines = data.lines.map(line => `  - {name: ${quoted(line.name)}, start: ${pair(line.start)}, end: ${pair(line.end)}, ` +
     `left: ${quoted(line.left)}, right: ${quoted(line.right)}}`);
@@ -312,6 +338,7 @@ get("next").onclick = actions.Enter;
 get("back").onclick = actions.ArrowLeft;
 get("undo").onclick = undo;
 get("save").onclick = save;
+get("draw").onclick = draw;
 get("size").oninput = () => refresh(true);
 get("reviewer").onchange = event => change(() => { state.reviewer = event.target.value.trim(); });
 
