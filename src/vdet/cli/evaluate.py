@@ -153,7 +153,6 @@ def counts(events: Path, truth: Path, results: ResultFiles) -> None:
 
     \b
     Examples:
-      vdet count tracks.jsonl -c gate.yaml --corrections corrections.yaml --counts corrected.json
       vdet eval counts counts.csv corrected.json
     """
     from vdet.evaluate.counts import count_lines, score_counts
