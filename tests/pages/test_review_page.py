@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+from zlib import crc32
 
 import pytest
 import yaml
@@ -109,3 +110,18 @@ def test_marks_lie_on_the_strip_and_the_table_counts_errors(window: Browser) -> 
     window.type(TAB, "x")
     rows = window.run("return totals().filter(row => row[1] === 'all')")
     assert rows == [["gate", "all", 3, 0, 1, 1, 0, 0]]
+
+
+def test_a_sample_is_drawn_and_gives_an_estimate_of_the_true_count(window: Browser) -> None:
+    assert window.text("#estimate") == "Draw a sample for an estimate of the true count."
+    window.run("document.getElementById('draw').click()")  # 10 minutes, of which there are 2
+    assert window.text("#estimate") == "The estimate needs three checked minutes of the sample."
+    first, second = window.run("return state.sample.minutes")
+    assert sorted((first, second)) == [0, 1]
+    window.run("minute = 0; refresh()")
+    click_at(window, 8, 0.29)
+    window.run(f"minute = {first}; refresh()")
+    window.type(ENTER, ENTER)
+    assert window.text("#estimate").split("car:")[0] == "all: 3 counted, 4 true (4 to 4)"
+    values = saved(window)
+    assert values["sample"] == {"seed": crc32(b"in.mp4"), "minutes": [first, second]}
