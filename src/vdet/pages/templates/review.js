@@ -268,7 +268,7 @@ function now() {
   return `${day} ${time}${offset < 0 ? "-" : "+"}${pad(Math.trunc(offset / 60))}:${pad(offset % 60)}`;
 }
 
-/** Return the checked spans in seconds, joined where they touch. */
+/** Return the checked spans in seconds from the first frame, joined where they touch. */
 function spans() {
   const joined = [];
   for (const number of [...state.checked].sort((a, b) => a - b)) {
@@ -296,7 +296,7 @@ function corrections() {
     `left: ${quoted(line.left)}, right: ${quoted(line.right)}}`);
   const zones = data.zones.map(zone => `  - {name: ${quoted(zone.name)}, points: [${zone.points.map(pair).join(", ")}]}`);
   const names = [...new Set(data.bands.map(band => band.name))];
-  const checked = names.flatMap(name => spans().map(([start, end]) => `  - {line: ${quoted(name)}, start: ${start}, end: ${end}}`));
+  const checked = names.flatMap(name => spans().map(([start, end]) => `  - {line: ${quoted(name)}, start: ${start + data.start}, end: ${end + data.start}}`));
   const events = allMarks().filter(mark => mark.error).sort((a, b) => a.time - b.time).map(eventText);
   const sample = state.sample ? `{seed: ${state.sample.seed}, minutes: [${state.sample.minutes.join(", ")}]}` : "null";
   return [`video: ${quoted(data.video)}`, `size: [${data.size.join(", ")}]`, ...list("lines", lines), ...list("zones", zones),
