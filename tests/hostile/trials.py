@@ -90,7 +90,7 @@ def broken_promises(trials: Sequence[Trial], *, lines: int = 1) -> list[str]:
 
 
 def _complaint(trial: Trial, lines: int) -> str | None:
-    harmless = ("vdet: warning: ", *_OF_LIBTIFF)
+    harmless = ("vdet: warning: ", "vdet: note: ", *_OF_LIBTIFF)
     said = [line for line in trial.err.splitlines() if not line.startswith(harmless)]
     if trial.code is None:
         return f"did not end in {trial.seconds:.0f} s of processor time"

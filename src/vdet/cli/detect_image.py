@@ -62,7 +62,7 @@ def detect_image(
     """
     settings = source.load()
     if settings.lack_of_metres:
-        announce(f"note: {settings.lack_of_metres}")
+        announce(f"vdet: note: {settings.lack_of_metres}")
     from vdet.detect.factory import load_detector
     from vdet.regions import check_masks
     from vdet.run.images import ImageSearch, find_images, plan_images, run_images

@@ -146,7 +146,7 @@ def detect_video(
     settings = source.load()
     options.check_counting(settings, outputs, several=folder is not None)
     if settings.lack_of_metres and "lane-geometry" not in settings.conditions.ignore:
-        announce(f"note: {settings.lack_of_metres}")
+        announce(f"vdet: note: {settings.lack_of_metres}")
     from vdet.regions import check_masks
     from vdet.run.video import Run
 
