@@ -29,7 +29,10 @@ def write_saved_review(run: Run, tracks: Path, steps: Steps) -> None:
         OutputFiles(overwrite=run.overwrite, inputs=run.inputs) as files,
     ):
         info = reader.info
-        frames = {frame.index: frame for frame in saved_frames(tracks, run, info)}
+        frames = {
+            frame.index: frame
+            for frame in saved_frames(tracks, run, (info.width, info.height), info)
+        }
         traffic = LiveTraffic(settings, info.width, info.height)
         regions = Regions(settings.regions, info.width, info.height) if settings.regions else None
         context = SinkContext(files, settings, info, is_part=run.is_part, traffic=traffic)

@@ -9,6 +9,7 @@ import numpy as np
 from vdet.boxes import Image
 from vdet.detect.factory import load_detector
 from vdet.errors import TruthError, VideoError
+from vdet.labels.label import Size
 from vdet.labels.reading import read_tracks
 from vdet.media import Frame, VideoInfo
 from vdet.media.images import is_image_file, read_image
@@ -40,7 +41,9 @@ def read_scene(run: Run, tracks: Path | None, steps: Steps) -> tuple[Image, list
         The source or the file of tracks cannot be used.
     """
     if is_image_file(run.source):
-        return read_image(run.source), saved_frames(tracks, run) if tracks else []
+        image = read_image(run.source)
+        height, width = image.shape[:2]
+        return image, saved_frames(tracks, run, (width, height)) if tracks else []
     images, shown = (
         _with_saved_tracks(run, tracks, steps) if tracks else _with_detection(run, steps)
     )
@@ -56,7 +59,8 @@ def _with_saved_tracks(
     with VideoReader(
         run.source, start=run.start, end=run.end, frames=_STILL_FRAMES, settings=run.settings.input
     ) as reader:
-        saved = saved_frames(tracks, run, reader.info)
+        size = reader.info.width, reader.info.height
+        saved = saved_frames(tracks, run, size, reader.info)
         steps("reading the scene", None)
         return _spread(reader), saved
 
@@ -88,19 +92,21 @@ def _spread(frames: Iterable[Frame]) -> list[Image]:
     return images
 
 
-def saved_frames(tracks: Path, run: Run, video: VideoInfo | None = None) -> list[FrameTracks]:
-    """Return the frames of a file of tracks in the part of a run. Raises `TruthError`.
+def saved_frames(
+    tracks: Path, run: Run, size: Size, video: VideoInfo | None = None
+) -> list[FrameTracks]:
+    """Return the frames of a file of tracks in the part of a run.
 
-    Without a video, the first frame of the file is the first one of the video.
+    `size` is that of the frames, pixels. Without a video, the first frame of the file is the first
+    one of the video. Raises `TruthError`, also if the tracks are of frames of another size.
     """
     saved = read_tracks(tracks, float(video.rate) if video else None)
-    if video and saved.video:
-        size = saved.video.width, saved.video.height
-        if size != (video.width, video.height):
-            fault = f"is of {size[0]}×{size[1]} frames, not {video.width}×{video.height}"
-            raise TruthError(f"{tracks}: {fault}")
-        if saved.video.name != run.source.name:
-            log.warning("%s: is of %s, not %s", tracks, saved.video.name, run.source.name)
+    if saved.size and saved.size != size:
+        (width, height), (expected_width, expected_height) = saved.size, size
+        fault = f"is of {width}×{height} frames, not {expected_width}×{expected_height}"
+        raise TruthError(f"{tracks}: {fault}")
+    if video and saved.video and saved.video.name != run.source.name:
+        log.warning("%s: is of %s, not %s", tracks, saved.video.name, run.source.name)
     if not saved.has_times:
         raise TruthError(f"{tracks}: has no times; CLIP must be the video")
     frames = list(saved)
