@@ -2,6 +2,7 @@
 
 import tempfile
 from base64 import b64encode
+from collections import defaultdict
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -158,16 +159,19 @@ class ReviewSink(BaseSink):
     def _marks(self, counts: Counts) -> list[Mark]:
         """Return where the counted crossings are; those of zones without a side are left out."""
         marks = []
+        by_strip_and_id: dict[tuple[int, int], list[Passage]] = defaultdict(list)
+        for number, passages in enumerate(self._passages.found):
+            for passage in passages:
+                by_strip_and_id[number, passage.id].append(passage)
         for event in counts.events:
             near = [
                 (abs(passage.time - event.time), number, passage.place)
                 for number, strip in enumerate(self._strips)
                 if strip.band.name == event.name and event.direction in strip.band.directions
                 for passage in (
-                    *self._passages.found[number],
+                    *by_strip_and_id.get((number, event.id), ()),
                     Passage(event.id, event.time + _SAME, 0.5, (0, 0)),  # if there is none
                 )
-                if passage.id == event.id
             ]
             if near:
                 _, band, place = min(near)
