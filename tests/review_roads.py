@@ -13,6 +13,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from conftest import Run
+
 SIZE = WIDTH, HEIGHT = 320, 240
 RATE = 10
 SPEED = 8  # pixels a frame
@@ -69,6 +71,13 @@ def draw_road(folder: Path, cars: list[Car], *, missed: int | None = None, secon
         container.mux(stream.encode(None))
     road.tracks.write_text("\n".join(rows) + "\n")
     return road
+
+
+def write_review(run: Run, folder: Path, road: Road) -> Path:
+    """Write the page of a road by `vdet review`, and return its path."""
+    output, saved = folder / "review", ("--tracks-from", road.tracks)
+    run("review", road.video, *saved, "-c", road.settings, "-o", output, code=0)
+    return output / "review.html"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

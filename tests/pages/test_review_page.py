@@ -10,7 +10,7 @@ import yaml
 
 from browser import ENTER, Browser, browser, downloaded
 from conftest import Run
-from review_roads import Car, draw_road
+from review_roads import Car, draw_road, write_review
 
 CARS = [Car(3, 80), Car(5, 240, goes_up=False), Car(8, 100), Car(64, 80)]
 TAB = "\ue004"
@@ -20,20 +20,9 @@ TAB = "\ue004"
 def window(tmp_path: Path, run: Run) -> Iterator[Browser]:
     """The page of a minute with three cars, of which the last was missed, and another minute."""
     road = draw_road(tmp_path, CARS, missed=2, seconds=70)
-    output = tmp_path / "review"
-    run(
-        "review",
-        road.video,
-        "--tracks-from",
-        road.tracks,
-        "-c",
-        road.settings,
-        "-o",
-        output,
-        code=0,
-    )
+    page = write_review(run, tmp_path, road)
     with browser(tmp_path) as opened:
-        opened.open(output / "review.html")
+        opened.open(page)
         yield opened
 
 

@@ -5,26 +5,13 @@ from pathlib import Path
 import pytest
 
 from conftest import Run
-from review_roads import Car, draw_road, read_page
+from review_roads import Car, draw_road, read_page, write_review
 
 CARS = [Car(3, 80), Car(5, 240, goes_up=False), Car(8, 100), Car(64, 80), Car(66, 240, False)]
 
 
 def reviewed(run: Run, folder: Path, missed: int | None = None) -> Path:
-    road = draw_road(folder, CARS, missed=missed, seconds=70)
-    output = folder / "review"
-    run(
-        "review",
-        road.video,
-        "--tracks-from",
-        road.tracks,
-        "-c",
-        road.settings,
-        "-o",
-        output,
-        code=0,
-    )
-    return output / "review.html"
+    return write_review(run, folder, draw_road(folder, CARS, missed=missed, seconds=70))
 
 
 def test_each_vehicle_leaves_one_streak_with_its_mark(tmp_path: Path, run: Run) -> None:
