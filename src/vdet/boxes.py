@@ -249,6 +249,14 @@ class Boxes:
             return [None] * len(self)
         return [self.names[number] for number in self.classes.tolist()]
 
+    def reach(self, minimum: float, by_class: Mapping[str, float]) -> BoolArray:
+        """Return for each box, `(n,)`, whether its score is at least the minimum of its class.
+
+        That is `minimum` for a class without one in `by_class`.
+        """
+        minima = [by_class.get(name or "", minimum) for name in self.class_names]
+        return np.asarray(self.scores >= np.array(minima))
+
     @property
     def likely_classes(self) -> list[dict[str, float]]:
         """For each box the probability of each class, 0 to 1; empty if classes are unknown."""

@@ -56,7 +56,8 @@ def images(
     sets = [read_labelled_images(path, roles) for path in data]
     images_read = (image.path for labelled in sets for image in labelled.images)
     results.check(source.inputs(*data, *images_read, settings=settings))
-    counting = Counting(settings.detector.min_score_still, min_width)
+    minimum = settings.detector
+    counting = Counting(minimum.min_score_still, min_width, minimum.min_scores_still)
     with progress_steps(" images") as steps:
         progress = partial(steps, "")
         score = evaluate_images(sets, detector, counting, threads=core_count(), progress=progress)

@@ -26,6 +26,8 @@ class DetectorSettings(Section):
     """Search every N-th frame. Overrides searches_per_second."""
     min_score_still: Ratio = 0.0
     """Minimum score of a vehicle in a single image. In video, the tracker decides."""
+    min_scores_still: dict[str, Ratio] = Field({}, max_length=100)
+    """Minimum scores of single classes in an image, instead of min_score_still."""
 
     @property
     def vehicle_classes(self) -> tuple[str, ...]:
@@ -39,7 +41,7 @@ class DetectorSettings(Section):
 
     def showing_all(self) -> Self:
         """Return settings with which a single image shows detections of every score."""
-        return self.model_copy(update={"min_score_still": 0.0})
+        return self.model_copy(update={"min_score_still": 0.0, "min_scores_still": {}})
 
 
 class NetworkSettings(DetectorSettings):
@@ -52,6 +54,9 @@ class NetworkSettings(DetectorSettings):
     moves; the tracker estimates the vehicles in the others. null: search all frames.
     """
     min_score_still: Ratio = 0.4
+    min_scores_still: dict[str, Ratio] = Field(
+        {"truck": 0.55, "bus": 0.55, "bicycle": 0.3, "person": 0.2}, max_length=100
+    )
     min_score: float = Field(0.03, gt=0, lt=1)
     """Ignore boxes with a lower score. Of the others, a video shows what reaches tracker.min_score,
     and an image what reaches min_score_still.

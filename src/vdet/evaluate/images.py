@@ -1,7 +1,7 @@
 """Scores of a detector in labelled images: at one score threshold and at all."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
 from statistics import fmean
 from typing import Any, Self
 
@@ -33,10 +33,13 @@ class Counting:
     min_width
         Vehicles narrower than this fraction of the image's width are ignore regions, and narrower
         detections count only if they match a vehicle.
+    scores
+        The minimum scores of classes for which it is not `score`.
     """
 
     score: float
     min_width: float
+    scores: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,7 +67,7 @@ class MeasuredImage:
         boxes = boxes[np.argsort(-boxes.scores, kind="stable")[:_MAX_DETECTIONS]]
         narrow = _widths(boxes.sides) < minimum
         detected = _one_frame(boxes.sides, boxes.scores, narrow, boxes.class_names)
-        shown = detected.where(boxes.scores >= counting.score)
+        shown = detected.where(boxes.reach(counting.score, counting.scores))
         return cls(image, compare(detected, truth), compare(shown, truth))
 
 
@@ -127,7 +130,7 @@ class ImagesResult:
         scores = [source.scores for source in self.sources]
         with_vehicles = [score for score in scores if score.vehicles] or scores
         means: dict[str, Any] = {}
-        for name in (field.name for field in fields(ImageScores)):
+        for name in (column.name for column in fields(ImageScores)):
             total = sum(getattr(score, name) for score in scores)
             ratios = [getattr(score, name) for score in with_vehicles]
             means[name] = total if isinstance(total, int) else fmean(ratios)

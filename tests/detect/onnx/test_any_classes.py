@@ -8,7 +8,8 @@ import pytest
 
 from conftest import Run
 from detect.onnx.graphs import RedBox, ultralytics, write_network
-from vdet.config.schema import OutputSettings
+from vdet.config.schema import NetworkSettings, OutputSettings
+from vdet.detect.onnx.detector import NetworkModel
 from vdet.labels.reading import read_predictions
 from vdet.media import Frame, Picture, VideoInfo
 from vdet.media.writer import VideoWriter
@@ -53,3 +54,26 @@ def test_a_vehicle_of_any_class_is_in_every_output(
         assert len(read_predictions(path).boxes), path
     assert names[-1] in (tmp_path / "vehicles.csv").read_text(encoding="utf-8")
     assert names[-1] in (tmp_path / "page" / "page.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "is_shown"),
+    [
+        ("car", (16, 28), True),  # 0.45 is enough for a car, but not for a truck
+        ("truck", (16, 16), False),
+        ("motorcycle", (14, 30), True),
+        ("car", (14, 30), False),  # more than 1.8 times as high as wide: a sign
+    ],
+)
+def test_the_minimum_score_of_an_image_and_the_maximum_height_depend_on_the_class(
+    tmp_path: Path, name: str, size: tuple[int, int], is_shown: bool
+) -> None:
+    names = NetworkSettings().classes
+    form = ultralytics((128, 64), RedBox(64, 32, *size, names.index(name)), len(names))
+    metadata = {"task": "detect", "names": str(dict(enumerate(names))), "imgsz": "[64, 128]"}
+    network = write_network(tmp_path / "net.onnx", form, (128, 64), (64, 32), metadata=metadata)
+    image = np.zeros((64, 128, 3), np.uint8)
+    image[:, :, 2] = round(0.45 * 255)
+    detector = NetworkModel(network, NetworkSettings()).for_video(128, 64, [])
+    boxes = detector.detect(detector.search(Picture(image), None))
+    assert boxes.class_names == [name] * is_shown

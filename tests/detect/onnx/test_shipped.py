@@ -48,7 +48,7 @@ def test_a_still_picture_is_also_searched_mirrored_with_a_larger_input() -> None
     boxes = [astuple(item.box) for item in true_boxes(scene, FRAME) if must_be_found(item, height)]
     candidates = detector.search(Picture(Renderer(scene).image(FRAME)), None)
     assert len(candidates.searches) == 2
-    assert candidates.min_score == NetworkSettings().min_score_still
+    assert candidates.is_still
     for found in candidates.searches:
         overlap = iou_matrix(np.array(boxes), found.sides)
         assert (overlap.max(axis=1) > 0.7).all()

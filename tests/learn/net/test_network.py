@@ -188,7 +188,9 @@ def test_what_was_learnt_is_found_again(
     network, _ = trained
     path = tmp_path / "net.onnx"
     export_network(network, Header(classes=CLASSES, pixels=256 * 128), path)
-    model = NetworkModel(path, NetworkSettings(min_score=0.05, min_score_still=0.2))
+    model = NetworkModel(
+        path, NetworkSettings(min_score=0.05, min_score_still=0.2, min_scores_still={})
+    )
     found = wanted = right_class = 0
     for seed in range(100, 120):
         sample = block_picture(seed)

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from vdet.boxes import Boxes, Image, Int32Array, clipped
+from vdet.boxes import BoolArray, Boxes, Float64Array, Image, Int32Array, clipped
 from vdet.config.classes import our_name
 from vdet.config.schema import NetworkSettings
 from vdet.detect.onnx.merging import combine, suppress
@@ -26,11 +26,17 @@ _LARGER = 2.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Candidates:
-    """The boxes of each search before suppression, and the minimum score of a detection."""
+    """The boxes of each search before suppression, and whether it was of a single image."""
 
     searches: Sequence[Boxes]
-    min_score: float
+    is_still: bool
 
+
+_FOUR_WHEELED = "car", "truck", "bus", "vehicle"
+_MAX_HEIGHT = 1.8
+"""Maximum height of a vehicle with four wheels, in widths; what is higher is a sign or a post."""
+_EDGE = 0.01
+"""Distance from the left or right edge, as a fraction of the width, at which a box may be cut."""
 
 _USUAL = NetworkSettings().classes
 
@@ -87,13 +93,12 @@ class NetworkDetector:
         removed when both are combined.
         """
         settings, is_still = self.settings, index is None
-        min_score = max(settings.min_score, settings.min_score_still if is_still else 0)
         if not is_still or self.larger is self.network:
-            return Candidates([self._find(self.network, picture, settings.classes)], min_score)
+            return Candidates([self._find(self.network, picture, settings.classes)], is_still)
         names = combined_classes(settings)
         image = Picture(np.ascontiguousarray(picture.image[:, ::-1]))
         searches = self._find(self.network, picture, names), self._find(self.larger, image, names)
-        return Candidates([searches[0], _mirrored(searches[1], picture.width)], min_score)
+        return Candidates([searches[0], _mirrored(searches[1], picture.width)], is_still)
 
     def _find(self, network: Recognized, picture: Picture, names: Sequence[str]) -> Boxes:
         """Return the boxes of the named classes, the first of `combined_classes`, unsuppressed."""
@@ -102,6 +107,10 @@ class NetworkDetector:
         numbers = self.numbers[raw.classes.clip(-1, len(self.numbers) - 1)]
         rows = (numbers >= 0) & (numbers < len(names))
         rows &= (sides[:, 2:] - sides[:, :2] >= 1).all(axis=1)  # not with a NaN
+        has_four_wheels = np.isin(
+            numbers, [n for n, name in enumerate(names) if name in _FOUR_WHEELED]
+        )
+        rows &= ~(has_four_wheels & _are_too_high(sides, picture.width))
         data = {}
         if raw.class_scores is not None:
             means_name = self.numbers[:-1, np.newaxis] == np.arange(len(names))
@@ -110,12 +119,15 @@ class NetworkDetector:
 
     def detect(self, candidates: Candidates) -> Boxes:
         """Return one box for each vehicle."""
-        overlap, names = self.settings.nms_iou, self.settings.classes
+        settings, names = self.settings, self.settings.classes
+        overlap = settings.nms_iou
         boxes, *second = (suppress(boxes, overlap) for boxes in candidates.searches)
         if second:
             boxes = combine(boxes, second[0], overlap)
         assert boxes.classes is not None
-        rows = (boxes.scores >= candidates.min_score) & (boxes.classes < len(names))
+        rows = (boxes.scores >= settings.min_score) & (boxes.classes < len(names))
+        if candidates.is_still:
+            rows &= boxes.reach(settings.min_score_still, settings.min_scores_still)
         return Boxes(
             boxes.sides[rows],
             boxes.scores[rows],
@@ -133,6 +145,17 @@ class NetworkDetector:
                 draw_box(candidates, candidate.box, GREEN, f"{candidate.score:.2f}")
         scaled, _ = self.network.form.scaled(Picture(image))
         return {"input": scaled, "candidates": candidates}
+
+
+def _are_too_high(sides: Float64Array, width: int) -> BoolArray:
+    """Return for each box, `(n, 4)`, whether it is too high for a vehicle with four wheels.
+
+    The left or right edge of the picture, `width` pixels wide, may cut off a part of a vehicle.
+    """
+    margin = _EDGE * width
+    is_whole = (sides[:, 0] >= margin) & (sides[:, 2] <= width - margin)
+    too_high = sides[:, 3] - sides[:, 1] > _MAX_HEIGHT * (sides[:, 2] - sides[:, 0])
+    return np.asarray(is_whole & too_high)
 
 
 def _mirrored(boxes: Boxes, width: int) -> Boxes:
