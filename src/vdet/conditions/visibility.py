@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from vdet.boxes import Float64Array, Image
+from vdet.boxes import BoolArray, Float64Array, Image
 from vdet.conditions.finding import Finding, Severity, joined, when
 from vdet.config.schema import Code
 
@@ -101,12 +101,15 @@ def dim(measures: Float64Array, factor: float | Float64Array = 1.0) -> Codes:
     return np.select((is_dark, is_hazy, is_blurred), ("dark", "haze", "blur"), "")
 
 
-def reasons(measures: Float64Array) -> Codes:
-    """Return the reasons for poor visibility in frames; `measures` are `(n, 9)`."""
+def reasons(measures: Float64Array, wet: BoolArray | bool = False) -> Codes:
+    """Return the reasons for poor visibility in frames.
+
+    `measures` are `(n, 9)`; `wet` `(n,)` says where sharp drops were recognized on the glass.
+    """
     recall = probability(read_weights()["recall"], measures)
     codes = dim(measures, np.where(recall < _DOUBTED, _WIDER, 1.0))
     has_water = probability(read_weights()["drops"], measures[:, :PLAIN]) > LIKELY
-    codes = np.where((codes == "") & has_water, "drops", codes)
+    codes = np.where(wet | (codes == "") & has_water, "drops", codes)
     return np.where(measures[:, 1] < np.log(_EMPTY), "", codes)
 
 
@@ -122,16 +125,22 @@ def probability(weights: Sequence[float], measures: Float64Array) -> Float64Arra
     return np.asarray(1 / (1 + np.exp(-(measures @ weights[:-1] + weights[-1]))))
 
 
-def findings(times: Float64Array, measures: Float64Array, *, is_shipped: bool) -> list[Finding]:
+def findings(
+    times: Float64Array,
+    measures: Float64Array,
+    wet: BoolArray | bool = False,
+    *,
+    is_shipped: bool,
+) -> list[Finding]:
     """Return when visibility is poor, for each reason.
 
-    `times` are `(n,)` and `measures` `(n, 9)`. `is_shipped` says whether the shipped network is
-    used, whose recall is known.
+    `times` are `(n,)`; see `reasons` for the measures. `is_shipped` says whether the shipped
+    network is used, whose recall is known.
     """
     reported: list[Finding] = []
     if len(times) < _AROUND:
         return reported
-    codes, recall = reasons(measures), probability(read_weights()["recall"], measures)
+    codes, recall = reasons(measures, wet), probability(read_weights()["recall"], measures)
     nearby = [np.convolve(codes == code, np.ones(_AROUND), "same") for code in ("", *WORDS)]
     usual = np.array(["", *WORDS])[np.argmax(nearby, axis=0)]
     for code, words in WORDS.items():

@@ -11,6 +11,7 @@ from vdet.conditions.camera import CameraWatch
 from vdet.conditions.finding import Finding, Findings
 from vdet.conditions.motion import MotionWatch
 from vdet.config.schema import Settings
+from vdet.detect.onnx.water import is_wet
 from vdet.media import Picture
 from vdet.track.track import Track
 
@@ -37,6 +38,7 @@ class Conditions:
         self._camera, self._motion = CameraWatch(), MotionWatch()
         self._times: list[float] = []
         self._measures: list[Float64Array] = []
+        self._wet: list[bool] = []
 
     def add(
         self, time: float, picture: Picture, detections: Boxes, tracks: Sequence[Track]
@@ -49,7 +51,8 @@ class Conditions:
         boxes = {track.id: _enlarged(track.box, scale) for track in tracks}
         self._times.append(time)
         self._measures.append(visibility.measure(fine_plane, plane, detections.scores))
-        is_clear = not visibility.reasons(self._measures[-1][np.newaxis])[0]
+        self._wet.append(is_wet(fine_plane))
+        is_clear = not visibility.reasons(self._measures[-1][np.newaxis], self._wet[-1])[0]
         stood = self._camera.add(time, plane, boxes.values(), is_clear=is_clear)
         self._motion.add(time, plane, boxes, stood=stood)
 
@@ -69,7 +72,8 @@ class Conditions:
             if self._camera.is_still:
                 findings += self._motion.findings()
             is_shipped = detector.kind == "net" and detector.model is None
-            findings += visibility.findings(times, measures, is_shipped=is_shipped)
+            wet = np.array(self._wet)
+            findings += visibility.findings(times, measures, wet, is_shipped=is_shipped)
         ignored = settings.conditions.ignore
         chosen = tuple(item for item in findings if item.code not in ignored)
         return Findings(chosen, self._camera.is_still)

@@ -1,7 +1,7 @@
 """Output layouts: functions that convert the output of a network to boxes."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +30,14 @@ class RawBoxes:
     scores: Float32Array
     classes: Int32Array
     class_scores: Float32Array | None = None
+
+
+def joined(parts: Sequence[RawBoxes]) -> RawBoxes:
+    """Return the boxes of several searches of one picture."""
+    if len(parts) == 1:
+        return parts[0]
+    columns = ([getattr(part, name) for part in parts] for name in RawBoxes.__slots__)
+    return RawBoxes(*map(np.concatenate, columns))
 
 
 OutputLayout = Callable[[Array, float], RawBoxes]

@@ -18,10 +18,12 @@ from vdet.detect.onnx.layouts import (
     cell_centers,
     center_columns,
     final_rows,
+    joined,
     our_cells,
 )
 from vdet.detect.onnx.preparation import InputForm, size_of_area
 from vdet.detect.onnx.session import Array, Session
+from vdet.detect.onnx.water import without_drops
 from vdet.errors import ModelError
 from vdet.media import Picture
 
@@ -101,7 +103,8 @@ class Recognized:
     def find(self, picture: Picture, minimum: float) -> RawBoxes:
         """Return the boxes in pixels of the picture, with scores of at least `minimum`.
 
-        Several threads may call this at once.
+        Our networks also search what lies behind water on the windscreen. Several threads may call
+        this at once.
 
         Raises
         ------
@@ -109,10 +112,12 @@ class Recognized:
             The network does not run, or its output is not what its form says.
         """
         values, placement = self.form.prepare(picture)
-        outputs = self.session.run(values)
+        dry = without_drops(values[0]) if self.header else None
+        inputs = [values] if dry is None else [values, dry[np.newaxis]]
+        outputs = [self.session.run(item)[0] for item in inputs]
         try:
             with np.errstate(all="ignore"):  # numbers of any size
-                raw = self.layout(outputs[0], minimum)
+                raw = joined([self.layout(output, minimum) for output in outputs])
                 boxes = replace(raw, sides=placement.to_frame(raw.sides))
         except (ValueError, TypeError, IndexError) as error:
             raise _unknown(self.session, f"its output is {_shapes(outputs)}") from error
