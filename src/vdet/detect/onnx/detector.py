@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from vdet.boxes import BoolArray, Boxes, Float64Array, Image, Int32Array, clipped
+from vdet.boxes import BoolArray, Boxes, Float64Array, Image, Int32Array, are_nested, clipped
 from vdet.config.classes import our_name
 from vdet.config.schema import NetworkSettings
 from vdet.detect.onnx.merging import combine, suppress
@@ -107,10 +107,7 @@ class NetworkDetector:
         numbers = self.numbers[raw.classes.clip(-1, len(self.numbers) - 1)]
         rows = (numbers >= 0) & (numbers < len(names))
         rows &= (sides[:, 2:] - sides[:, :2] >= 1).all(axis=1)  # not with a NaN
-        has_four_wheels = np.isin(
-            numbers, [n for n, name in enumerate(names) if name in _FOUR_WHEELED]
-        )
-        rows &= ~(has_four_wheels & _are_too_high(sides, picture.width))
+        rows &= ~(_have_four_wheels(numbers, names) & _are_too_high(sides, picture.width))
         data = {}
         if raw.class_scores is not None:
             means_name = self.numbers[:-1, np.newaxis] == np.arange(len(names))
@@ -128,6 +125,9 @@ class NetworkDetector:
         rows = (boxes.scores >= settings.min_score) & (boxes.classes < len(names))
         if candidates.is_still:
             rows &= boxes.reach(settings.min_score_still, settings.min_scores_still)
+            large = np.flatnonzero(rows & _have_four_wheels(boxes.classes, names))
+            nested = are_nested(boxes.sides[large], boxes.scores[large])
+            rows[large[nested]] = False  # a lorry and its body
         return Boxes(
             boxes.sides[rows],
             boxes.scores[rows],
@@ -145,6 +145,11 @@ class NetworkDetector:
                 draw_box(candidates, candidate.box, GREEN, f"{candidate.score:.2f}")
         scaled, _ = self.network.form.scaled(Picture(image))
         return {"input": scaled, "candidates": candidates}
+
+
+def _have_four_wheels(classes: Int32Array, names: Sequence[str]) -> BoolArray:
+    """Return for each index in `names`, `(n,)`, whether such vehicles have four wheels."""
+    return np.isin(classes, [n for n, name in enumerate(names) if name in _FOUR_WHEELED])
 
 
 def _are_too_high(sides: Float64Array, width: int) -> BoolArray:
