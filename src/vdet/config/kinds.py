@@ -71,7 +71,7 @@ def _imported(name: str) -> Callable[..., Any]:
 
 NET = DetectorKind(
     NetworkSettings,
-    load=_imported("vdet.detect.onnx.detector:load_network"),
+    load=_imported("vdet.detect.onnx.detector:NetworkModel"),
     shipped=_imported("vdet.detect.onnx.detector:shipped_network"),
     model_suffix=".onnx",
 )

@@ -74,6 +74,6 @@ def test_the_minimum_score_of_an_image_and_the_maximum_height_depend_on_the_clas
     network = write_network(tmp_path / "net.onnx", form, (128, 64), (64, 32), metadata=metadata)
     image = np.zeros((64, 128, 3), np.uint8)
     image[:, :, 2] = round(0.45 * 255)
-    detector = NetworkModel(network, NetworkSettings()).for_video(128, 64, [])
+    detector = NetworkModel(NetworkSettings(), network).for_video(128, 64, [])
     boxes = detector.detect(detector.search(Picture(image), None))
     assert boxes.class_names == [name] * is_shown

@@ -8,10 +8,14 @@ import pytest
 
 from vdet.boxes import Boxes
 from vdet.config.schema import NetworkSettings
-from vdet.detect.onnx.detector import NetworkDetector, combined_classes, our_classes
-from vdet.detect.onnx.layouts import RawBoxes
-from vdet.detect.onnx.merging import combine, suppress
-from vdet.detect.onnx.recognition import Recognized
+from vdet.detect.onnx.detector import (
+    NetworkDetector,
+    combine,
+    combined_classes,
+    our_classes,
+    suppress,
+)
+from vdet.detect.onnx.recognition import RawBoxes, Recognized
 from vdet.media import Picture
 
 

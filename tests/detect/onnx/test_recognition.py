@@ -14,8 +14,7 @@ from detect.onnx.graphs import Form, RedBox, final, ultralytics, write_graph, wr
 from vdet.boxes import Boxes, Image
 from vdet.config.schema import NetworkSettings
 from vdet.detect.onnx.detector import NetworkModel
-from vdet.detect.onnx.layouts import cell_centers, our_cells
-from vdet.detect.onnx.recognition import COCO, recognize
+from vdet.detect.onnx.recognition import COCO, cell_centers, our_cells, recognize
 from vdet.detect.onnx.session import Session
 from vdet.errors import ModelError
 from vdet.media import Picture
@@ -42,7 +41,7 @@ def frame_with_red(x: int, y: int) -> Image:
 
 
 def detect(path: Path, image: Image, **settings: object) -> Boxes:
-    model = NetworkModel(path, NetworkSettings.model_validate(settings))
+    model = NetworkModel(NetworkSettings.model_validate(settings), path)
     detector = model.for_video(image.shape[1], image.shape[0], [image])
     return detector.detect(detector.search(Picture(image), 0))
 

@@ -14,8 +14,10 @@ from torch import Tensor  # noqa: E402
 from learn.net.blocks import block_picture, block_source  # noqa: E402
 from vdet.config.schema import NetworkSettings, NetworkTrainingSettings  # noqa: E402
 from vdet.detect.onnx.detector import NetworkModel  # noqa: E402
-from vdet.detect.onnx.layouts import cell_centers  # noqa: E402
-from vdet.detect.onnx.recognition import Header  # noqa: E402
+from vdet.detect.onnx.recognition import (  # noqa: E402
+    Header,
+    cell_centers,
+)
 from vdet.errors import DataError  # noqa: E402
 from vdet.learn.net.export import export_network, start_from  # noqa: E402
 from vdet.learn.net.network import (  # noqa: E402
@@ -189,7 +191,7 @@ def test_what_was_learnt_is_found_again(
     path = tmp_path / "net.onnx"
     export_network(network, Header(classes=CLASSES, pixels=256 * 128), path)
     model = NetworkModel(
-        path, NetworkSettings(min_score=0.05, min_score_still=0.2, min_scores_still={})
+        NetworkSettings(min_score=0.05, min_score_still=0.2, min_scores_still={}), path
     )
     found = wanted = right_class = 0
     for seed in range(100, 120):
