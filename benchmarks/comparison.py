@@ -20,7 +20,7 @@ from vdet.config.detector import NetworkSettings
 from vdet.config.schema import Settings
 from vdet.config.shapes import LineSettings, TrafficSettings
 from vdet.evaluate.scores import Scores, score
-from vdet.labels.label import Label, LabelledVideo
+from vdet.labels.label import Label, SavedTracks
 from vdet.labels.reading import read_truth
 from vdet.run.result import FrameResult
 from vdet.synthetic.render import write_clip
@@ -96,11 +96,13 @@ def crossings_of(tracks: Sequence[Any], scene: Scene, **options: Any) -> int:
     return count
 
 
-def _labels(frames: Sequence[vdet.Boxes]) -> LabelledVideo:
-    return LabelledVideo.of(
-        Label(0, astuple(box.box), frame=number, id=box.id or 0, score=box.score)
-        for number, boxes in enumerate(frames, start=1)
-        for box in boxes
+def _labels(frames: Sequence[vdet.Boxes]) -> SavedTracks:
+    return SavedTracks(
+        tuple(
+            Label(0, astuple(box.box), frame=number, id=box.id or 0, score=box.score)
+            for number, boxes in enumerate(frames, start=1)
+            for box in boxes
+        )
     )
 
 

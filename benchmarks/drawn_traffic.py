@@ -10,7 +10,7 @@ import numpy as np
 from vdet.boxes import Box
 from vdet.config.schema import LaneSettings, Settings
 from vdet.detect.protocol import DetectorModel
-from vdet.labels.label import Label, LabelledVideo
+from vdet.labels.label import Label, SavedTracks
 from vdet.media import Frame, Picture, Planes, VideoInfo
 from vdet.media.frame import Coding
 from vdet.run.loop import Parts, build, peek
@@ -93,26 +93,30 @@ def follow(
     return build(Parts(model, steps=steps), settings, video, images).follow(every)
 
 
-def shown_labels(results: Iterable[FrameResult]) -> LabelledVideo:
+def shown_labels(results: Iterable[FrameResult]) -> SavedTracks:
     """Return the boxes that are shown."""
-    return LabelledVideo.of(
-        _label(result.frame.index, track.id, track.box)
-        for result in results
-        for track in result.tracks
+    return SavedTracks(
+        tuple(
+            _label(result.frame.index, track.id, track.box)
+            for result in results
+            for track in result.tracks
+        )
     )
 
 
-def true_labels(scene: Scene, indices: Iterable[int]) -> LabelledVideo:
+def true_labels(scene: Scene, indices: Iterable[int]) -> SavedTracks:
     """Return the true boxes of frames; vehicles that do not count are ignore regions."""
-    return LabelledVideo.of(
-        _label(
-            index,
-            true_box.id,
-            true_box.box,
-            ignored=not must_be_found(true_box, scene.camera.height),
+    return SavedTracks(
+        tuple(
+            _label(
+                index,
+                true_box.id,
+                true_box.box,
+                ignored=not must_be_found(true_box, scene.camera.height),
+            )
+            for index in indices
+            for true_box in true_boxes(scene, index)
         )
-        for index in indices
-        for true_box in true_boxes(scene, index)
     )
 
 

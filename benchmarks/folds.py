@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from itertools import compress
 from pathlib import Path
 
 import joblib
@@ -24,7 +25,7 @@ from vdet.detect.svm.detector import Candidates, SvmDetector, SvmModel
 from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.windows import Windows
 from vdet.evaluate.scores import score
-from vdet.labels.label import LabelledVideo
+from vdet.labels.label import SavedTracks
 from vdet.labels.reading import read_truth
 from vdet.learn.svm.dataset import PatchFile, find_patches
 from vdet.learn.svm.extraction import extract
@@ -170,7 +171,7 @@ def _sweep(
     values: Sequence[float],
     searched: SearchedVideo,
     model: LinearModel,
-    truth: LabelledVideo,
+    truth: SavedTracks,
 ) -> Iterator[str]:
     """Yield the lines of a table: the F1 of each value, over all blocks and by block."""
     variants = [load_settings((), [f"{key}={value}"], detector="svm") for value in values]
@@ -191,7 +192,7 @@ def _sweep(
     yield f"  chosen without each block: {picks}; F1 on the one left out {held:.3f}"
 
 
-def _tracks(searched: SearchedVideo, model: LinearModel, settings: Settings) -> LabelledVideo:
+def _tracks(searched: SearchedVideo, model: LinearModel, settings: Settings) -> SavedTracks:
     """Detect and follow vehicles in windows that were searched before; any model will do."""
     size = searched.width, searched.height
     detector = SvmDetector(model, settings.svm, *size)
@@ -202,13 +203,14 @@ def _tracks(searched: SearchedVideo, model: LinearModel, settings: Settings) -> 
     return shown_labels(Pipeline(found, tracker, rate=searched.searches).follow(frames))
 
 
-def _f1_by_block(found: LabelledVideo, truth: LabelledVideo) -> list[float]:
+def _f1_by_block(found: SavedTracks, truth: SavedTracks) -> list[float]:
     last = truth.last_frame
-    parts = [
-        [item.where(_block_of(item.frames, last) == block) for item in (found, truth)]
-        for block in range(BLOCKS)
-    ]
-    return [score(prediction, part).f1 for prediction, part in parts]
+
+    def part(tracks: SavedTracks, block: int) -> SavedTracks:
+        blocks = _block_of(np.array([label.frame for label in tracks.labels]), last)
+        return replace(tracks, labels=tuple(compress(tracks.labels, blocks == block)))
+
+    return [score(part(found, block), part(truth, block)).f1 for block in range(BLOCKS)]
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ from vdet.errors import OutputError
 from vdet.evaluate.output import table
 from vdet.evaluate.scores import score
 from vdet.files import make_folder, write_whole
-from vdet.labels.reading import read_predictions, read_truth
+from vdet.labels.reading import read_tracks, read_truth
 from vdet.learn.svm.dataset import find_patches
 from vdet.learn.svm.mining import MiningLimits, VideoSource, mine
 from vdet.learn.svm.training import train
@@ -118,7 +118,7 @@ def run_demo(
     find(ROAD, _BY_MODEL, linear.model_copy(update={"detector": chosen}))
     truth, scores = read_truth(folder / TRUTH), []
     for name, outputs in (("network", _BY_NETWORK), (f"linear model {MODEL}", _BY_MODEL)):
-        metrics = score(read_predictions(folder / outputs["tracks"]), truth)
+        metrics = score(read_tracks(folder / outputs["tracks"]), truth)
         ratios = (metrics.precision, metrics.recall, metrics.f1, metrics.idf1)
         scores.append([name, *(f"{ratio:.2f}" for ratio in ratios), str(metrics.id_switches)])
     compared = table(("", "precision", "recall", "F1", "IDF1", "id switches"), scores)

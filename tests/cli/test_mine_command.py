@@ -13,6 +13,7 @@ import pytest
 from conftest import Run
 from labels.writers import exported
 from vdet.detect.svm.model import load_model
+from vdet.labels.label import boxes_of
 from vdet.labels.reading import read_truth
 from vdet.learn.svm.dataset import find_patches, read_patches
 from vdet.media.reader import VideoReader
@@ -85,7 +86,7 @@ def test_a_patch_is_its_window_and_its_box_is_that_of_the_truth(
     run("mine", clip_path, "--truth", truth_path, "-o", target, *options, code=0)
     with VideoReader(clip_path) as reader:
         frames = [frame.image for frame in reader]
-    truth = read_truth(truth_path)
+    labels = read_truth(truth_path).by_frame()
     seen = set()
     files = find_patches([target])
     for file, image in zip(files, read_patches(files), strict=True):
@@ -97,8 +98,7 @@ def test_a_patch_is_its_window_and_its_box_is_that_of_the_truth(
         expected = cv2.resize(crop, (64, 64), interpolation=cv2.INTER_LINEAR)
         np.testing.assert_array_equal(image, expected)
         if file.sides is not None:
-            here = truth.frame(number)
-            corners = here.boxes[~here.ignored]
+            corners = boxes_of(label for label in labels[number] if not label.ignored)
             middle = np.array([x, y, x, y]) + side / 2
             told = np.array(file.sides, float) * side + middle
             misses = np.nanmax(abs(corners - told), axis=1)

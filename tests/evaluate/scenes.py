@@ -1,7 +1,7 @@
 """Small scenes of boxes for the tests of the metrics."""
 
 from labels.saving import checked_video, row
-from vdet.labels.label import Label, LabelledVideo
+from vdet.labels.label import Label, SavedTracks
 
 TEN = range(1, 11)
 
@@ -11,6 +11,6 @@ def drive(id_: int, frames: range, x: float = 0, width: float = 100) -> list[Lab
     return [row(0, frame, id_, x, 0, width, 100) for frame in frames]
 
 
-def video(*tracks: list[Label]) -> LabelledVideo:
+def video(*tracks: list[Label]) -> SavedTracks:
     """Return the rows of all tracks as a video."""
     return checked_video([row for track in tracks for row in track])

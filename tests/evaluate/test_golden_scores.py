@@ -10,7 +10,7 @@ import pytest
 from labels.saving import checked_video, row
 from vdet.evaluate.comparison import compare, pool
 from vdet.evaluate.scores import score, score_comparison
-from vdet.labels.label import LabelledVideo
+from vdet.labels.label import SavedTracks
 
 CASES = sorted(Path(__file__).parent.glob("golden/*.json"))
 
@@ -20,7 +20,7 @@ def load(path: Path) -> dict[str, Any]:
     return case
 
 
-def truth_of(case: dict[str, Any]) -> LabelledVideo:
+def truth_of(case: dict[str, Any]) -> SavedTracks:
     rows = [
         row(0, frame, id_, x, y, width, height, ignored=ignored == 1)
         for frame, id_, x, y, width, height, ignored in case["truth"]
@@ -28,7 +28,7 @@ def truth_of(case: dict[str, Any]) -> LabelledVideo:
     return checked_video(rows)
 
 
-def prediction_of(case: dict[str, Any]) -> LabelledVideo:
+def prediction_of(case: dict[str, Any]) -> SavedTracks:
     return checked_video([row(0, *values) for values in case["prediction"]])
 
 

@@ -15,7 +15,6 @@ from vdet.evaluate.images import (
     ImagesResult,
     MeasuredImage,
     MeasuredSet,
-    score_source,
 )
 from vdet.labels.images import LabelledImage, LabelledImages
 from vdet.labels.label import Label
@@ -52,7 +51,7 @@ class Searched:
 def source(*pictures: Searched, counting: Counting = PLAIN) -> MeasuredSet:
     measured = [picture.measured(counting) for picture in pictures]
     labelled = LabelledImages("set", tuple(item.labelled for item in measured))
-    return score_source(labelled, measured)
+    return MeasuredSet(labelled, measured)
 
 
 def scores(*pictures: Searched, counting: Counting = PLAIN) -> ImageScores:

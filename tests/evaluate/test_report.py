@@ -10,7 +10,7 @@ from labels.writers import Boxed, Labelled, write_coco
 from pages.html import Elements
 from vdet.boxes import Boxes
 from vdet.evaluate.comparison import compare
-from vdet.evaluate.images import Counting, ImagesResult, MeasuredImage, score_source
+from vdet.evaluate.images import Counting, ImagesResult, MeasuredImage, MeasuredSet
 from vdet.evaluate.output import RunName
 from vdet.evaluate.report import (
     DETECTED,
@@ -103,7 +103,7 @@ class TestPictures:
         images = [
             MeasuredImage.of(picture, 100, shown, self.COUNTING) for picture in labelled.images
         ]
-        return ImagesResult(self.COUNTING, (score_source(labelled, images),))
+        return ImagesResult(self.COUNTING, (MeasuredSet(labelled, images),))
 
     def test_the_page_names_detector_source_and_labels_left_out(self, tmp_path: Path) -> None:
         result = self.result(tmp_path / "a_$x_{$ set", self.CAR.box)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from evaluate.scenes import TEN, drive, video
 from vdet.evaluate.scores import score
-from vdet.labels.label import LabelledVideo
+from vdet.labels.label import SavedTracks
 
 
 def test_a_loose_box_lowers_the_overlap_of_the_matches_only() -> None:
@@ -45,7 +45,7 @@ SCENES = st.dictionaries(st.tuples(st.integers(1, 6), st.integers(1, 4)), PLACES
 
 
 @given(SCENES, SCENES)
-def test_ratios_are_within_their_bounds(found: LabelledVideo, truth: LabelledVideo) -> None:
+def test_ratios_are_within_their_bounds(found: SavedTracks, truth: SavedTracks) -> None:
     scores = asdict(score(found, truth))
     ratios = ("precision", "recall", "f1", "ap50", "ap50_95", "idf1", "hota", "deta", "assa")
     assert all(0 <= scores[name] <= 1 + 1e-9 for name in ratios)

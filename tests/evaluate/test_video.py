@@ -28,7 +28,7 @@ def evaluate(clip_path: Path, model_path: Path) -> Evaluate:
     def call(truth: Path, *assignments: str, progress: Progress = no_progress) -> ClipResult:
         settings = load_settings((), (*QUICK, model_setting, *assignments))
         model = load_detector(settings.detector)
-        return evaluate_video(clip_path, read_truth(truth), settings, model, progress)
+        return evaluate_video(clip_path, read_truth(truth), settings, model, progress=progress)
 
     return call
 

@@ -12,7 +12,7 @@ from vdet.boxes import Box
 from vdet.errors import TruthError
 from vdet.labels import coco, native
 from vdet.labels.mot import MOT
-from vdet.labels.reading import read_predictions, read_truth
+from vdet.labels.reading import read_tracks, read_truth
 
 BOXES = [(frame, id_) for frame, id_ in product(range(6), (1, 2)) if (frame, id_) != (2, 1)]
 GT = "".join(f"{f + 1},{i},{90 * i + 3 * f},40.5,60,50,1,3,0.75\n" for f, i in BOXES)
@@ -97,7 +97,7 @@ def test_wicked_files_are_refused_by_name(tmp_path: Path, name: str) -> None:
     file, text, words = WICKED[name]
     path = tmp_path / file
     path.write_text(text, encoding="utf-8")
-    for read in (read_truth, read_predictions):
+    for read in (read_truth, read_tracks):
         with pytest.raises(TruthError, match=words) as error:
             read(path)
         assert str(error.value).isprintable()

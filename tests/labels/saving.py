@@ -9,7 +9,6 @@ from vdet.boxes import Box
 from vdet.labels.formats import Format, TrackWriter
 from vdet.labels.label import (
     Label,
-    LabelledVideo,
     SavedTracks,
     SourceVideo,
     checked_labels,
@@ -38,9 +37,9 @@ def row(
     return Label(place, box, frame=number, id=id_, score=score, **known)
 
 
-def checked_video(rows: Iterable[Label], path: Path = Path("scene")) -> LabelledVideo:
+def checked_video(rows: Iterable[Label], path: Path = Path("scene")) -> SavedTracks:
     """Return checked labels as a video."""
-    return LabelledVideo.of(checked_labels(path, rows))
+    return SavedTracks(checked_labels(path, rows))
 
 
 def frame(index: int, *tracks: Track) -> FrameTracks:

@@ -14,8 +14,8 @@ from vdet.labels.parsing import numbered_lines
 def test_until_keeps_the_frames_up_to_the_last() -> None:
     rows = [row(0, frame, id_, 10 * id_, 0, 5, 5) for frame in (2, 3, 5) for id_ in (1, 2)]
     part = checked_video(rows).until(4)
-    assert part.frames.tolist() == [2, 2, 3, 3]
-    assert part.last_frame == 4
+    assert [label.frame for label in part.labels] == [2, 2, 3, 3]
+    assert part.last_frame == 3
 
 
 FILE = Path("gt.txt")
@@ -42,7 +42,7 @@ def test_an_impossible_row_is_refused_with_its_line(wrong: Label, message: str) 
 
 def test_a_frame_may_have_many_ignore_regions_without_an_id() -> None:
     rows = [row(line, 1, NO_ID, 0, 0, 5, 5, ignored=True) for line in (1, 2, 3)]
-    assert checked_video(rows, FILE).ignored.tolist() == [True] * 3
+    assert checked_video(rows, FILE).labels == tuple(rows)
 
 
 def test_words_for_a_class_become_ours_and_others_stay() -> None:

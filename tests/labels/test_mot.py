@@ -11,7 +11,7 @@ from vdet.labels.reading import read_tracks, read_truth
 def test_truth_of_the_older_form_has_ten_columns_and_a_flag(tmp_path: Path) -> None:
     path = tmp_path / "gt.txt"
     path.write_text("4, 7, 11.5, 21, 20, 10, 1, -1, -1, -1\n4,8,1,1,9,9,0,-1,-1,-1")
-    assert read_truth(path).ignored.tolist() == [False, True]
+    assert [label.ignored for label in read_truth(path).labels] == [False, True]
 
 
 def test_truth_with_spaces_is_read_and_several_classes_are_named(
@@ -19,7 +19,8 @@ def test_truth_with_spaces_is_read_and_several_classes_are_named(
 ) -> None:
     path = tmp_path / "gt.txt"
     path.write_text("1 7 11 21 20 10 1 4 0 0\n1 8 1 1 9 9 1 1 0 0\n1 9 1 1 9 9 0 0 0 0\n")
-    assert read_truth(path).boxes.tolist() == [[10, 20, 30, 30], [0, 0, 9, 9], [0, 0, 9, 9]]
+    boxes = [label.box for label in read_truth(path).labels]
+    assert boxes == [(10, 20, 30, 30), (0, 0, 9, 9), (0, 0, 9, 9)]
     text = "column 8 has the classes 1, 4, which are all read as vehicles"
     assert caplog.messages == [f"{path}: {text}; keep only the rows of vehicles"]
 

@@ -4,8 +4,8 @@ from pathlib import Path
 import pytest
 
 from vdet.errors import TruthError
-from vdet.labels.label import LabelledVideo
-from vdet.labels.reading import read_predictions
+from vdet.labels.label import SavedTracks
+from vdet.labels.reading import read_tracks
 
 HEADER = "frame,time,id,x,y,width,height,state\n"
 SCORED = "frame,time,id,x,y,width,height,score\n0,0.0,1,10,20,30,40,{}\n"
@@ -14,20 +14,20 @@ CSV = f"{HEADER}0,0.0,1,10,20,30,40,detected\n2,0.08,1,11,20,30,40,predicted\n"
 JSONL = "".join(f'{{"frame": {n}, "time": {n / 25}, "tracks": []}}\n' for n in range(4))
 
 
-def read(folder: Path, suffix: str, content: str) -> LabelledVideo:
+def read(folder: Path, suffix: str, content: str) -> SavedTracks:
     path = folder / f"tracks.{suffix}"
     path.write_text(content, encoding="utf-8", newline="")
-    return read_predictions(path)
+    return read_tracks(path)
 
 
 @pytest.mark.parametrize(("suffix", "content"), [("txt", ""), ("csv", HEADER)])
 def test_an_empty_file_is_a_video_without_boxes(tmp_path: Path, suffix: str, content: str) -> None:
-    assert len(read(tmp_path, suffix, content)) == 0
+    assert read(tmp_path, suffix, content).labels == ()
 
 
 def test_times_may_be_those_of_a_wall_clock(tmp_path: Path) -> None:
     rows = "".join(f"{n},{1.7e9 + n / 25:.6f},1,1,1,9,9,detected\n" for n in range(3))
-    assert len(read(tmp_path, "csv", HEADER + rows)) == 3
+    assert len(read(tmp_path, "csv", HEADER + rows).labels) == 3
 
 
 def record(**changes: object) -> str:

@@ -131,12 +131,11 @@ def video(
     results.check(source.inputs(*videos, *truths, settings=settings))
     roles = Roles.from_settings(settings)
     pairs = [(path, read_truth(truth, roles)) for path, truth in labelled]
-    if until:
-        pairs = [(path, truth.until(until)) for path, truth in pairs]
     with progress_steps(" frames") as steps:
         progress = partial(steps, "")
         scores = [
-            evaluate_video(path, truth, settings, detector, progress) for path, truth in pairs
+            evaluate_video(path, truth, settings, detector, progress=progress, until=until)
+            for path, truth in pairs
         ]
     results.print_report(video_report(scores, _run_name(settings, source)))
 

@@ -8,14 +8,15 @@ or if it is `ignored` itself. The ignore regions are dropped too: they need not 
 Source: the treatment of DontCare by the KITTI tracking benchmark, and of crowds by COCO at IoU 0.5.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain, compress
 
 import numpy as np
 
 from vdet.boxes import BoolArray, Float64Array, Int64Array, coverage, iou_matrix
 from vdet.config.classes import UNKNOWN
-from vdet.labels.label import LabelledVideo
+from vdet.labels.label import Label, SavedTracks, boxes_of
 from vdet.track.motion.pairing import assign
 
 MATCH_IOU = 0.5
@@ -107,8 +108,23 @@ class Comparison:
         return np.flatnonzero(2 * right < self.track_lengths())
 
 
-def compare(prediction: LabelledVideo, truth: LabelledVideo) -> Comparison:
-    """Compare predictions with the truth of the same video: apply ignore regions and pair boxes.
+Frames = Mapping[int, Sequence[Label]]
+"""The labels of each frame by its number, from 1."""
+
+
+def compare(prediction: SavedTracks, truth: SavedTracks) -> Comparison:
+    """Compare predictions with the truth of the same video, as `compare_frames` does.
+
+    Predictions in frames that the truth does not cover are omitted. If it covers only the beginning
+    of the video, cut the predictions with `until` first; otherwise all later ones are false alarms.
+    """
+    return compare_frames(prediction.by_frame(), truth.by_frame(), truth.covered)
+
+
+def compare_frames(
+    prediction: Frames, truth: Frames, covered: Sequence[int] | None = None
+) -> Comparison:
+    """Compare predictions with the truth: apply ignore regions and pair boxes.
 
     Boxes are paired at IoU 0.5 and above. A pair of the previous frame stays together if it still
     overlaps enough; the others are paired to maximize the sum of IoU. As in TrackEval, a frame
@@ -116,22 +132,24 @@ def compare(prediction: LabelledVideo, truth: LabelledVideo) -> Comparison:
     Source: Bernardin and Stiefelhagen, "Evaluating Multiple Object Tracking Performance: The CLEAR
     MOT Metrics", 2008.
 
-    Predictions in unlabelled frames are omitted. If the truth covers only a part of the video, cut
-    the predictions with `until` first; otherwise all later ones are false alarms.
+    Parameters
+    ----------
+    covered
+        The frames that the truth covers, from 0; None: all.
     """
-    if truth.covered is not None:
-        prediction = prediction.where(np.isin(prediction.frames, truth.covered))
-    numbers = np.union1d(prediction.frames, truth.frames).tolist()
-    kept = [_apply_regions(prediction.frame(number), truth.frame(number)) for number in numbers]
-    vehicle_ids = np.unique(joined(vehicles.ids for vehicles, _ in kept))
-    track_ids = np.unique(joined(tracks.ids for _, tracks in kept))
+    labelled = prediction.keys() if covered is None else {index + 1 for index in covered}
+    numbers = sorted((prediction.keys() & labelled) | truth.keys())
+    counting = [_counting(prediction.get(n, ()), truth.get(n, ())) for n in numbers]
+    vehicle_ids = _ids(vehicle for vehicles, _ in counting for vehicle in vehicles)
+    track_ids = _ids(track for _, tracks in counting for track in tracks)
     partners = np.full(len(vehicle_ids), UNMATCHED)
     frames = []
-    for number, (vehicles, tracks) in zip(numbers, kept, strict=True):
-        if len(vehicles) or len(tracks):
-            of_vehicles = np.searchsorted(vehicle_ids, vehicles.ids)
-            of_tracks = np.searchsorted(track_ids, tracks.ids)
-            iou = iou_matrix(vehicles.boxes, tracks.boxes)
+    for number, (vehicles, tracks) in zip(numbers, counting, strict=True):
+        if vehicles or tracks:
+            of_vehicles = np.searchsorted(vehicle_ids, [vehicle.id for vehicle in vehicles])
+            of_tracks = np.searchsorted(track_ids, [track.id for track in tracks])
+            vehicle_boxes, track_boxes = boxes_of(vehicles), boxes_of(tracks)
+            iou = iou_matrix(vehicle_boxes, track_boxes)
             together = partners[of_vehicles][:, np.newaxis] == of_tracks
             weights = np.where(at_least(iou, MATCH_IOU), iou + _KEEP_BONUS * together, 0)
             rows, columns = assign(weights)
@@ -139,9 +157,9 @@ def compare(prediction: LabelledVideo, truth: LabelledVideo) -> Comparison:
                 number=number,
                 vehicles=of_vehicles,
                 tracks=of_tracks,
-                vehicle_boxes=vehicles.boxes,
-                track_boxes=tracks.boxes,
-                scores=tracks.scores,
+                vehicle_boxes=vehicle_boxes,
+                track_boxes=track_boxes,
+                scores=np.array([track.score for track in tracks], np.float64),
                 iou=iou,
                 rows=rows,
                 columns=columns,
@@ -150,12 +168,13 @@ def compare(prediction: LabelledVideo, truth: LabelledVideo) -> Comparison:
             if iou.size:
                 partners[:] = UNMATCHED
                 partners[frame.paired_vehicles] = frame.pairing_tracks
+    true_labels = (label for labels in truth.values() for label in labels if not label.ignored)
     return Comparison(
         frames=tuple(frames),
         vehicle_ids=vehicle_ids,
         track_ids=track_ids,
-        vehicle_names=tuple(truth.classes.get(id_, UNKNOWN) for id_ in vehicle_ids.tolist()),
-        track_names=tuple(prediction.classes.get(id_, UNKNOWN) for id_ in track_ids.tolist()),
+        vehicle_names=_names(vehicle_ids, true_labels),
+        track_names=_names(track_ids, chain.from_iterable(prediction.values())),
     )
 
 
@@ -197,14 +216,24 @@ def joined(arrays: Iterable[Int64Array]) -> Int64Array:
     return np.concatenate([np.empty(0, np.int64), *arrays])
 
 
-def _apply_regions(
-    tracks: LabelledVideo, truth: LabelledVideo
-) -> tuple[LabelledVideo, LabelledVideo]:
+def _counting(tracks: Sequence[Label], truth: Sequence[Label]) -> tuple[list[Label], list[Label]]:
     """Return the vehicles and the predictions of a frame that count."""
-    vehicles, regions = truth.where(~truth.ignored), truth.where(truth.ignored)
-    iou = iou_matrix(vehicles.boxes, tracks.boxes)
+    vehicles = [label for label in truth if not label.ignored]
+    regions, boxes = boxes_of(label for label in truth if label.ignored), boxes_of(tracks)
+    iou = iou_matrix(boxes_of(vehicles), boxes)
     _, paired = assign(np.where(at_least(iou, MATCH_IOU), iou, 0))
-    covered = at_least(coverage(tracks.boxes, regions.boxes), _IGNORED_FRACTION)
-    dropped = np.asarray(covered.any(axis=1) | tracks.ignored)
-    dropped[paired] = False
-    return vehicles, tracks.where(~dropped)
+    counts = np.array([not track.ignored for track in tracks], np.bool_)
+    counts &= ~at_least(coverage(boxes, regions), _IGNORED_FRACTION).any(axis=1)
+    counts[paired] = True
+    return vehicles, list(compress(tracks, counts))
+
+
+def _ids(labels: Iterable[Label]) -> Int64Array:
+    """Return the ids of labels, each once, ascending."""
+    return np.unique(np.array([label.id for label in labels], np.int64))
+
+
+def _names(ids: Int64Array, labels: Iterable[Label]) -> tuple[str, ...]:
+    """Return the last class of each id in the labels."""
+    names = {label.id: label.name for label in labels if label.name}
+    return tuple(names.get(id_, UNKNOWN) for id_ in ids.tolist())

@@ -1,20 +1,20 @@
 """Scores of a detector in labelled images: at one score threshold and at all."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import astuple, dataclass, field, fields
+from functools import cached_property
 from statistics import fmean
 from typing import Any, Self
 
 import numpy as np
 
-from vdet.boxes import BoolArray, Boxes, Float64Array
-from vdet.config.classes import UNKNOWN
+from vdet.boxes import Boxes
 from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel
-from vdet.evaluate.comparison import Comparison, compare, pool
+from vdet.evaluate.comparison import Comparison, compare_frames, pool
 from vdet.evaluate.scores import DetectionScores, RankedPredictions, rank_predictions, score_boxes
 from vdet.labels.images import LabelledImage, LabelledImages
-from vdet.labels.label import LabelledVideo
+from vdet.labels.label import Label
 from vdet.progress import Progress, no_progress
 from vdet.run.images import ImageSearch
 from vdet.run.threads import SearchThreads
@@ -41,6 +41,10 @@ class Counting:
     min_width: float
     scores: Mapping[str, float] = field(default_factory=dict)
 
+    def minimum(self, class_name: str | None) -> float:
+        """Return the minimum score of a class."""
+        return self.scores.get(class_name or "", self.score)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasuredImage:
@@ -60,26 +64,25 @@ class MeasuredImage:
     def of(cls, image: LabelledImage, width: int, boxes: Boxes, counting: Counting) -> Self:
         """Compare the detections with the labels of an image, `width` pixels wide."""
         minimum = counting.min_width * width
-        regions = image.ignored | (_widths(image.boxes) < minimum)
-        truth = _one_frame(image.boxes, np.ones(len(regions)), regions, image.classes)
+        truth = [
+            label._replace(id=number, ignored=label.ignored or _width(label) < minimum)
+            for number, label in enumerate(image.labels)
+        ]
         is_labelled = [name not in image.unlabelled for name in boxes.class_names]
         boxes = boxes[np.flatnonzero(is_labelled)]
         boxes = boxes[np.argsort(-boxes.scores, kind="stable")[:_MAX_DETECTIONS]]
-        narrow = _widths(boxes.sides) < minimum
-        detected = _one_frame(boxes.sides, boxes.scores, narrow, boxes.class_names)
-        shown = detected.where(boxes.reach(counting.score, counting.scores))
-        return cls(image, compare(detected, truth), compare(shown, truth))
+        detected = [
+            Label(number, astuple(box.box), box.class_name, id=number, score=box.score)
+            for number, box in enumerate(boxes)
+        ]
+        detected = [label._replace(ignored=_width(label) < minimum) for label in detected]
+        shown = [label for label in detected if label.score >= counting.minimum(label.class_name)]
+        every, counted = (compare_frames({1: labels}, {1: truth}) for labels in (detected, shown))
+        return cls(image, every, counted)
 
 
-def _one_frame(
-    boxes: Float64Array, scores: Float64Array, ignored: BoolArray, names: Sequence[str | None]
-) -> LabelledVideo:
-    ids, classes = np.arange(len(boxes)), dict(enumerate(name or UNKNOWN for name in names))
-    return LabelledVideo(np.ones_like(ids), ids, boxes, scores, ignored, 1, classes=classes)
-
-
-def _widths(boxes: Float64Array) -> Float64Array:
-    return np.asarray(boxes[:, 2] - boxes[:, 0])
+def _width(label: Label) -> float:
+    return label.box[2] - label.box[0]
 
 
 @dataclass(frozen=True)
@@ -107,14 +110,33 @@ class ImageScores(DetectionScores):
     best_score: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class MeasuredSet:
-    """The images of one source, labelled and measured, all detections, and the scores."""
+    """The images of one source, labelled and measured."""
 
     labelled: LabelledImages
-    images: tuple[MeasuredImage, ...]
-    ranked: RankedPredictions
-    scores: ImageScores
+    images: Sequence[MeasuredImage]
+
+    @cached_property
+    def ranked(self) -> RankedPredictions:
+        """The detections of every score."""
+        return rank_predictions(pool([image.every for image in self.images]))
+
+    @cached_property
+    def scores(self) -> ImageScores:
+        """The scores of the source."""
+        detection = score_boxes(pool([image.shown for image in self.images]))
+        ap50, ap50_95 = self.ranked.average_precisions()
+        best, at_score = best_f1([self.ranked])
+        return ImageScores(
+            **vars(detection),
+            images=len(self.images),
+            vehicles=self.ranked.vehicles,
+            ap50=ap50,
+            ap50_95=ap50_95,
+            best_f1=best,
+            best_score=at_score,
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -180,26 +202,8 @@ def evaluate_images(
             for _, result in pool.map_ordered(search, labelled.images):
                 measured.append(result)
                 advance(1)
-        sources.append(score_source(labelled, measured))
+        sources.append(MeasuredSet(labelled, measured))
     return ImagesResult(counting, tuple(sources))
-
-
-def score_source(labelled: LabelledImages, images: Sequence[MeasuredImage]) -> MeasuredSet:
-    """Return the scores of one source."""
-    detection = score_boxes(pool([image.shown for image in images]))
-    ranked = rank_predictions(pool([image.every for image in images]))
-    ap50, ap50_95 = ranked.average_precisions()
-    best, at_score = best_f1([ranked])
-    scores = ImageScores(
-        **vars(detection),
-        images=len(images),
-        vehicles=ranked.vehicles,
-        ap50=ap50,
-        ap50_95=ap50_95,
-        best_f1=best,
-        best_score=at_score,
-    )
-    return MeasuredSet(labelled, tuple(images), ranked, scores)
 
 
 def best_f1(sources: Sequence[RankedPredictions]) -> tuple[float, float]:

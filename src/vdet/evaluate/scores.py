@@ -11,7 +11,7 @@ from vdet.boxes import BoolArray, Float64Array
 from vdet.config.classes import OUR_NAMES, UNKNOWN
 from vdet.evaluate import tracking
 from vdet.evaluate.comparison import ComparedFrame, Comparison, compare
-from vdet.labels.label import LabelledVideo
+from vdet.labels.label import SavedTracks
 
 IOU_THRESHOLDS = np.linspace(0.5, 0.95, 10)
 
@@ -84,7 +84,7 @@ class Scores(DetectionScores):
     false_tracks: int
 
 
-def score(prediction: LabelledVideo, truth: LabelledVideo) -> Scores:
+def score(prediction: SavedTracks, truth: SavedTracks) -> Scores:
     """Score the predictions for a video against its ground truth."""
     return score_comparison(compare(prediction, truth))
 

@@ -5,15 +5,13 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
-import numpy as np
-
 from vdet.boxes import Box
 from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel
 from vdet.evaluate.comparison import Comparison, compare, pool
 from vdet.evaluate.scores import Scores, score_comparison
-from vdet.labels.label import Label, LabelledVideo
-from vdet.labels.reading import read_predictions, read_truth
+from vdet.labels.label import Label, SavedTracks
+from vdet.labels.reading import read_tracks, read_truth
 from vdet.labels.roles import Roles
 from vdet.progress import Progress, no_progress
 from vdet.regions import Regions
@@ -64,7 +62,7 @@ def score_files(
     TruthError
         A file cannot be used.
     """
-    tracks = read_predictions(prediction)
+    tracks = read_tracks(prediction)
     truth = read_truth(truth_path, Roles.from_settings(settings))
     last = until or truth.last_frame
     return ClipResult(str(prediction), compare(tracks.until(last), truth.until(last)), last)
@@ -72,10 +70,12 @@ def score_files(
 
 def evaluate_video(
     video: Path,
-    truth: LabelledVideo,
+    truth: SavedTracks,
     settings: Settings,
     model: DetectorModel,
+    *,
     progress: Progress = no_progress,
+    until: int | None = None,
 ) -> ClipResult:
     """Find the vehicles in a video with `vdet.run.video.open_video`, and score them.
 
@@ -90,6 +90,8 @@ def evaluate_video(
     progress
         Called with the expected number of frames, None if unknown; the function it returns is
         called with the number of frames done since the last call.
+    until
+        Number of the last frame to use, from 1; None: the last that the truth covers.
 
     Raises
     ------
@@ -99,8 +101,9 @@ def evaluate_video(
         The truth covers frames beyond the end of the video.
     """
     all_classes = settings.model_copy(update={"classes": ()})
-    run = Run(video, settings=all_classes, frames=truth.last_frame or None)
+    run = Run(video, settings=all_classes, frames=until or truth.last_frame or None)
     labels, frames = list[Label](), 0
+    truth = truth.until(until) if until else truth
     with open_video(run, Parts(model), with_traffic=False) as opened:
         advance, info = progress(opened.reader.expected), opened.reader.info
         for result in opened.results:
@@ -115,7 +118,9 @@ def evaluate_video(
     truth = truth.until(frames)
     if settings.regions:
         regions = Regions(settings.regions, info.width, info.height)
-        outside = [not regions.contains(Box.of(sides).foot) for sides in truth.boxes.tolist()]
-        truth = replace(truth, ignored=truth.ignored | np.array(outside, np.bool_))
-    comparison = compare(LabelledVideo.of(labels), truth)
+        outside = [not regions.contains(Box.of(label.box).foot) for label in truth.labels]
+        flagged = zip(truth.labels, outside, strict=True)
+        true_labels = [label._replace(ignored=label.ignored or out) for label, out in flagged]
+        truth = replace(truth, labels=tuple(true_labels))
+    comparison = compare(SavedTracks(tuple(labels)), truth)
     return ClipResult(str(video), comparison, frames, video)

@@ -13,7 +13,7 @@ import numpy as np
 
 from vdet.boxes import BoolArray, Float64Array, Image
 from vdet.errors import ImageError, TruthError, counted, printable
-from vdet.labels.label import Corners, Label, Size, line_error, mistake_in_box
+from vdet.labels.label import Corners, Label, Size, boxes_of, line_error, mistake_in_box
 from vdet.labels.roles import DEFAULT_ROLES, Roles
 from vdet.media.images import read_image
 
@@ -49,7 +49,7 @@ class LabelledImage:
     @property
     def boxes(self) -> Float64Array:
         """float64 `(n, 4)`: x1, y1, x2, y2 of each label, pixels from 0."""
-        return np.array([label.box for label in self.labels], np.float64).reshape(-1, 4)
+        return boxes_of(self.labels)
 
     @property
     def classes(self) -> tuple[str, ...]:

@@ -1,10 +1,9 @@
-"""Labelled boxes: one as it stands in a file, and those of a video, as read and as columns.
+"""Labelled boxes: one as it stands in a file, and those of a video.
 
 The checks that apply to every format are here too.
 """
 
 import math
-from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
@@ -16,7 +15,7 @@ import numpy as np
 import pydantic
 from pydantic import AwareDatetime, Field, TypeAdapter
 
-from vdet.boxes import BoolArray, Box, Float64Array, Int64Array
+from vdet.boxes import Box, Float64Array
 from vdet.config.classes import our_name
 from vdet.errors import TruthError
 from vdet.track.track import FrameTracks, State, Track
@@ -70,6 +69,11 @@ class Label(NamedTuple):
 def from_size(x: float, y: float, width: float, height: float) -> Corners:
     """Return the corners of a box from its top-left corner and its size."""
     return x, y, x + width, y + height
+
+
+def boxes_of(labels: Iterable[Label]) -> Float64Array:
+    """Return x1, y1, x2, y2 of labels in pixels from 0, float64 `(n, 4)`."""
+    return np.array([label.box for label in labels], np.float64).reshape(-1, 4)
 
 
 def line_error(path: Path | str, position: int | str, message: str) -> TruthError:
@@ -231,141 +235,68 @@ class SavedTracks:
         Boxes are rounded to whole pixels, and scores lie between 0 and 1. A class is one of
         `OUR_NAMES` if the label means one, else the label. An unknown time is NaN: see `has_times`.
         """
-        by_frame: dict[int, list[Label]] = defaultdict(list)
-        for label in self.labels:
-            by_frame[label.frame - 1].append(label)
+        frames = self.by_frame()
+        for index in sorted(self._indices()):
+            labels = sorted(frames.get(index + 1, ()), key=attrgetter("id"))
+            yield FrameTracks(index, self.times.get(index, math.nan), tuple(map(_track, labels)))
+
+    def by_frame(self) -> dict[int, list[Label]]:
+        """Return the labels by the number of their frame, from 1, ascending.
+
+        A name is one of `OUR_NAMES` if it means one. The labels of a frame keep their order.
+        """
         names = {
             name: name and (our_name(name) or name)
             for name in {label.name for label in self.labels}
         }
-        for index in sorted(self._indices()):
-            labels = sorted(by_frame[index], key=attrgetter("id"))
-            time = self.times.get(index, math.nan)
-            tracks = [_track(label, names[label.name]) for label in labels]
-            yield FrameTracks(index, time, tuple(tracks))
+        frames: dict[int, list[Label]] = {}
+        for label in sorted(self.labels, key=attrgetter("frame")):
+            name = names[label.name]
+            named = label if name == label.name else label._replace(name=name)
+            frames.setdefault(label.frame, []).append(named)
+        return frames
+
+    @property
+    def last_frame(self) -> int:
+        """Number of the last frame that is covered or has a box, from 1; 0 if there is none."""
+        return max(self._indices(), default=-1) + 1
+
+    def until(self, last: int) -> "SavedTracks":
+        """Return the frames 1 to `last`."""
+        labels = tuple(label for label in self.labels if label.frame <= last)
+        covered = None if self.covered is None else [at for at in self.covered if at < last]
+        return replace(self, labels=labels, covered=covered)
+
+    def spread(self, every: int, first: int, last: int) -> set[int]:
+        """Return numbers of covered frames from `first` to `last`, each `every` or more apart."""
+        chosen, earliest = set(), first
+        for index in range(last) if self.covered is None else self.covered:
+            if earliest <= index + 1 <= last:
+                chosen.add(index + 1)
+                earliest = index + 1 + every
+        return chosen
+
+    def check_end(self, video: Path, frames: int) -> None:
+        """Raise `TruthError` if there is a box beyond the last frame of the file `video`."""
+        last = max((label.frame for label in self.labels), default=0)
+        if last > frames:
+            raise TruthError(
+                f"{video}: has {frames} frames, but its ground truth has a box in frame {last}"
+            )
 
     def _indices(self) -> set[int]:
         return {label.frame - 1 for label in self.labels}.union(self.covered or ())
 
 
-def _track(label: Label, class_name: str | None) -> Track:
+def _track(label: Label) -> Track:
     x1, y1, x2, y2 = [math.floor(side + 0.5) for side in label.box]  # as `Box.xywh`, but faster
     return Track(
         id=label.id,
         box=Box(x1, y1, max(x1 + 1, x2), max(y1 + 1, y2)),
         score=min(max(label.score, 0.0), 1.0),
         state=label.state,
-        class_name=class_name,
+        class_name=label.name,
         whole_foot=label.foot,
         distance=label.distance,
         lane=label.lane,
     )
-
-
-def spread_frames(covered: Iterable[int] | None, every: int, first: int, last: int) -> set[int]:
-    """Return numbers of frames from `first` to `last`, each at least `every` after the one before.
-
-    Only `covered` frames are used, which ascend; None: any.
-    """
-    chosen, earliest = set(), first
-    for number in range(first, last + 1) if covered is None else covered:
-        if earliest <= number <= last:
-            chosen.add(number)
-            earliest = number + every
-    return chosen
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class LabelledVideo:
-    """The boxes of a video, one row each, ordered by frame.
-
-    Attributes
-    ----------
-    frames
-        int64 `(n,)`: number of the frame, from 1, ascending.
-    ids
-        int64 `(n,)`: id of the vehicle. No id occurs twice in a frame, except `NO_ID`.
-    boxes
-        float64 `(n, 4)`: x1, y1, x2, y2 in full-frame pixels from 0, each with an area.
-    scores
-        float64 `(n,)`: confidence of a prediction, higher is better; 1 for truth.
-    ignored
-        bool `(n,)`. In truth: the row is an ignore region, not a vehicle to be found. In
-        predictions: the row counts only if it finds a vehicle.
-    frame_count
-        Number of frames of the video, None if it is not known.
-    covered
-        int64: numbers of the frames that the labels cover, ascending; nothing is known about the
-        others. None: all frames.
-    classes
-        The last class of each vehicle by its id; vehicles without a class are missing.
-    """
-
-    frames: Int64Array
-    ids: Int64Array
-    boxes: Float64Array
-    scores: Float64Array
-    ignored: BoolArray
-    frame_count: int | None = None
-    covered: Int64Array | None = None
-    classes: Mapping[int, str] = field(default_factory=dict)
-
-    @staticmethod
-    def of(labels: Iterable[Label], covered: Sequence[int] | None = None) -> "LabelledVideo":
-        """Order labels by frame, without checks; those of one frame keep their order.
-
-        `covered` are the frames that they cover, from 0.
-        """
-        ordered = sorted(labels, key=lambda label: label.frame)
-        return LabelledVideo(
-            frames=np.array([label.frame for label in ordered], np.int64),
-            ids=np.array([label.id for label in ordered], np.int64),
-            boxes=np.array([label.box for label in ordered], np.float64).reshape(-1, 4),
-            scores=np.array([label.score for label in ordered], np.float64),
-            ignored=np.array([label.ignored for label in ordered], np.bool_),
-            covered=None if covered is None else np.array(covered, np.int64) + 1,
-            classes={
-                label.id: our_name(label.name) or label.name
-                for label in ordered
-                if label.name and not label.ignored
-            },
-        )
-
-    def __len__(self) -> int:
-        return len(self.frames)
-
-    @property
-    def last_frame(self) -> int:
-        """Number of the last frame that is known, also without a box; 0 if there is none."""
-        covered = self.frames if self.covered is None else self.covered
-        last = [int(numbers.max(initial=0)) for numbers in (self.frames, covered)]
-        return max(self.frame_count or 0, *last)
-
-    def check_end(self, video: Path, frames: int) -> None:
-        """Raise `TruthError` if it has a box beyond the last frame of the file `video`."""
-        last = int(self.frames.max(initial=0))
-        if last > frames:
-            raise TruthError(
-                f"{video}: has {frames} frames, but its ground truth has a box in frame {last}"
-            )
-
-    def frame(self, number: int) -> "LabelledVideo":
-        """Return the rows of one frame, counted from 1, in their order."""
-        first, end = np.searchsorted(self.frames, [number, number + 1])
-        return self.where(slice(int(first), int(end)))
-
-    def until(self, last: int) -> "LabelledVideo":
-        """Return the frames 1 to `last` as a video of that many frames."""
-        covered = None if self.covered is None else self.covered[self.covered <= last]
-        return replace(self.where(self.frames <= last), frame_count=last, covered=covered)
-
-    def where(self, rows: slice | BoolArray) -> "LabelledVideo":
-        """Return only these rows, in their order."""
-        return replace(
-            self,
-            frames=self.frames[rows],
-            ids=self.ids[rows],
-            boxes=self.boxes[rows],
-            scores=self.scores[rows],
-            ignored=self.ignored[rows],
-        )

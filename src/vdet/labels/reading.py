@@ -11,7 +11,7 @@ from vdet.files import is_hidden
 from vdet.labels.coco import read_coco_images
 from vdet.labels.formats import recognize, track_formats
 from vdet.labels.images import LabelledImage, LabelledImages, checked_images
-from vdet.labels.label import Label, LabelledVideo, SavedTracks, checked_labels, line_error
+from vdet.labels.label import Label, SavedTracks, checked_labels, line_error
 from vdet.labels.mot import MOT
 from vdet.labels.parsing import read_bytes
 from vdet.labels.roles import DEFAULT_ROLES, Roles, is_region
@@ -23,7 +23,8 @@ _log = logging.getLogger("vdet")
 def read_tracks(path: Path, rate: float | None = None) -> SavedTracks:
     """Read the tracks of a video from a file in any format; ignore regions are omitted.
 
-    There is a warning (logger "vdet") for each reason to doubt them that the file has.
+    There is a warning (logger "vdet") for each reason to doubt them that the file has. Tracks
+    without a score have score 1. An empty `.txt` has no tracks.
 
     Parameters
     ----------
@@ -51,26 +52,7 @@ def read_tracks(path: Path, rate: float | None = None) -> SavedTracks:
     return saved if rate is None else saved.at_rate(rate)
 
 
-def read_predictions(path: Path) -> LabelledVideo:
-    """Read the tracks of a video as predictions, from any format.
-
-    Tracks without a score have score 1. An empty `.txt` means that nothing was found.
-
-    Raises
-    ------
-    TruthError
-        As `read_tracks`.
-    """
-    return LabelledVideo.of(read_tracks(path).labels)
-
-
-def read_truth(path: Path, roles: Roles = DEFAULT_ROLES) -> LabelledVideo:
-    """Read the ground truth of a video from any format of tracks, as `read_true_labels` does."""
-    saved = read_true_labels(path, roles)
-    return LabelledVideo.of(saved.labels, saved.covered)
-
-
-def read_true_labels(path: Path, roles: Roles) -> SavedTracks:
+def read_truth(path: Path, roles: Roles = DEFAULT_ROLES) -> SavedTracks:
     """Read the vehicles and ignore regions of a video from any format of tracks.
 
     Boxes without a label are vehicles. In MOTChallenge, flag 0 marks an ignore region, also in the

@@ -1,6 +1,6 @@
 """Which windows become patches, what they show of a vehicle, and what cannot be mined."""
 
-from dataclasses import replace
+from dataclasses import astuple, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +12,7 @@ from vdet.config.schema import Settings, SvmSettings
 from vdet.detect.svm.detector import load_svm
 from vdet.detect.svm.windows import Windows
 from vdet.errors import DataError
+from vdet.labels.label import Label
 from vdet.learn.svm.mining import (
     ChosenWindow,
     MiningLimits,
@@ -30,12 +31,11 @@ OTHER = Box.sized(700, 300, 100, 70)
 GENEROUS = MiningLimits(per_vehicle=1000, false_alarms=1000, parts=1000, probability=0.2)
 
 
-Truth = tuple[npt.NDArray[np.float64], npt.NDArray[np.bool_]]
-
-
-def truth(*vehicles: Box, ignored: tuple[Box, ...] = ()) -> Truth:
-    boxes = [(box.x1, box.y1, box.x2, box.y2) for box in (*vehicles, *ignored)]
-    return np.array(boxes, np.float64), np.arange(len(boxes)) >= len(vehicles)
+def truth(*vehicles: Box, ignored: tuple[Box, ...] = ()) -> list[Label]:
+    return [
+        Label(0, astuple(box), ignored=number >= len(vehicles))
+        for number, box in enumerate((*vehicles, *ignored))
+    ]
 
 
 def about(x: float, side: int = 100) -> Box:
@@ -51,9 +51,11 @@ def windows(*boxes: Box) -> Windows:
     return Windows(table, ones.copy(), ones, table.astype(np.float32))
 
 
-def chosen(found: Windows, labels: Truth, limits: MiningLimits = GENEROUS) -> list[ChosenWindow]:
+def chosen(
+    found: Windows, labels: list[Label], limits: MiningLimits = GENEROUS
+) -> list[ChosenWindow]:
     rng = np.random.default_rng(0)
-    return list(choose_windows(found, *labels, WIDTH, rng, limits=limits))
+    return list(choose_windows(found, labels, WIDTH, rng, limits=limits))
 
 
 def kinds(choices: list[ChosenWindow]) -> dict[Box, str]:

@@ -13,7 +13,7 @@ from track.motion.scenes import HEIGHT, WIDTH
 from vdet.boxes import Boxes, Float64Array, coverage
 from vdet.config.schema import MotionTrackerSettings
 from vdet.evaluate.scores import Scores, score
-from vdet.labels.label import NO_ID, Label, LabelledVideo
+from vdet.labels.label import NO_ID, Label, SavedTracks
 from vdet.track.motion.tracker import MotionTracker
 
 _FOCAL = 1150.0
@@ -160,5 +160,5 @@ def track_scores(
             box = track.box
             corners = box.x1, box.y1, box.x2, box.y2
             shown.append(Label(0, corners, frame=number, id=track.id, score=track.score))
-    videos = [LabelledVideo.of(rows) for rows in (shown, true)]
+    videos = [SavedTracks(tuple(rows)) for rows in (shown, true)]
     return score(*videos)

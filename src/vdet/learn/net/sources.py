@@ -13,8 +13,8 @@ from vdet.boxes import BoolArray, Float32Array, Image, Int64Array
 from vdet.config.schema import Settings
 from vdet.errors import counted, printable
 from vdet.labels.images import LabelledImage, LabelledImages
-from vdet.labels.label import Label, spread_frames
-from vdet.labels.reading import read_true_labels
+from vdet.labels.label import Label
+from vdet.labels.reading import read_truth
 from vdet.labels.roles import Roles
 from vdet.media.reader import VideoReader
 
@@ -155,10 +155,9 @@ def clip_source(video: Path, truth: Path, settings: Settings) -> NetSource:
         The video cannot be read, or is too damaged.
     """
     roles = Roles.for_training(settings)
-    saved = read_true_labels(truth, roles)
-    labelled_frames = None if saved.covered is None else [index + 1 for index in saved.covered]
-    last = max((*(label.frame for label in saved.labels), *(labelled_frames or ())), default=0)
-    used = spread_frames(labelled_frames, EVERY, EVERY, last)
+    saved = read_truth(truth, roles)
+    last = saved.last_frame
+    used = saved.spread(EVERY, EVERY, last)
     labels: dict[int, list[Label]] = defaultdict(list)
     for label in saved.labels:
         if label.frame in used:

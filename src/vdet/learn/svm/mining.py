@@ -10,9 +10,10 @@ Detection", 1998; for HOG and linear SVM, Dalal & Triggs, 2005, section 4.
 """
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, Literal
 
@@ -24,7 +25,7 @@ from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.features import cut_window, to_patch
 from vdet.detect.svm.windows import Windows
 from vdet.errors import DataError, TruthError, VideoError
-from vdet.labels.label import LabelledVideo, spread_frames
+from vdet.labels.label import Label, boxes_of
 from vdet.labels.reading import read_truth
 from vdet.labels.roles import Roles
 from vdet.learn.svm.dataset import Sides, patch_archive
@@ -75,8 +76,7 @@ class ChosenWindow:
 
 def choose_windows(
     windows: Windows,
-    labelled: Float64Array,
-    ignored: BoolArray,
+    labels: Sequence[Label],
     frame_width: int,
     rng: np.random.Generator,
     *,
@@ -88,19 +88,18 @@ def choose_windows(
     ----------
     windows
         All windows of the frame, with the probabilities of the model to improve.
-    labelled, ignored
-        float64 `(n, 4)`: x1, y1, x2, y2, pixels, of the true vehicles and the ignore regions of the
-        frame; bool `(n,)`: which are ignore regions.
+    labels
+        The true vehicles and the ignore regions of the frame.
     frame_width
         Width of the frame, pixels.
     """
     _, first = np.unique(windows.boxes, axis=0, return_index=True)
-    boxes, vehicles = from_xywh(windows.boxes[first]), labelled[~ignored]
+    boxes, vehicles = from_xywh(windows.boxes[first]), _vehicles(labels)
     is_hit = windows.probabilities[first] >= limits.probability
     comparisons = [compare_windows(boxes, vehicle, frame_width) for vehicle in vehicles]
     of_none = np.full(len(boxes), np.inf)
     nearest = np.argmin([of_none, *(item.distances for item in comparisons)], axis=0) - 1
-    is_covered = coverage(boxes, np.concatenate([vehicles, labelled[ignored]])) > _MAX_COVERED
+    is_covered = coverage(boxes, boxes_of(sorted(labels, key=attrgetter("ignored")))) > _MAX_COVERED
     is_alarm = is_hit & (nearest < 0) & ~is_covered.any(axis=1)
     is_part = np.zeros(len(boxes), np.bool_)
 
@@ -119,6 +118,10 @@ def choose_windows(
         yield from some("box", comparison.shows & is_nearest, limits.per_vehicle, comparison.sides)
     yield from some("false alarm", is_alarm, limits.false_alarms)
     yield from some("part", is_part, limits.parts)
+
+
+def _vehicles(labels: Iterable[Label]) -> Float64Array:
+    return boxes_of(label for label in labels if not label.ignored)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -226,7 +229,7 @@ class VideoSource:
 
     def frames(
         self, model: SvmModel, settings: Settings, progress: Progress
-    ) -> Iterator[tuple[Frame, Windows, LabelledVideo]]:
+    ) -> Iterator[tuple[Frame, Windows, list[Label]]]:
         """Yield the frames to use, with their windows and their labels.
 
         `progress` receives the number of frames read.
@@ -238,13 +241,11 @@ class VideoSource:
         VideoError
             The video cannot be read or searched.
         """
-        roles = Roles.from_settings(settings)
-        truth = read_truth(self.truth, roles)
+        truth = read_truth(self.truth, Roles.from_settings(settings))
         last = min(self.last or truth.last_frame, truth.last_frame)
         if last < self.first:
             raise TruthError(f"{self.truth}: ends at frame {truth.last_frame}; begin earlier")
-        labelled_frames = None if truth.covered is None else truth.covered.tolist()
-        regular = spread_frames(labelled_frames, self.every, self.first, last)
+        regular, labels_by_frame = truth.spread(self.every, self.first, last), truth.by_frame()
         number = 0
         with VideoReader(self.path, frames=last, settings=settings.input) as reader:
             info, advance = reader.info, progress(last)
@@ -253,9 +254,8 @@ class VideoSource:
                 detector = model.for_video(info.width, info.height, images)
             for frame in frames:
                 number = frame.index + 1
-                labels = truth.frame(number)
-                vehicles = labels.boxes[~labels.ignored]
-                cuts_off = any(cut_sides(box, info.width).any() for box in vehicles)
+                labels = labels_by_frame.get(number, [])
+                cuts_off = any(cut_sides(box, info.width).any() for box in _vehicles(labels))
                 if number in regular or (number >= self.first and cuts_off):
                     windows, _ = detector.search(Picture(frame.image), None)
                     yield frame, windows, labels
@@ -317,9 +317,7 @@ def mine(
             for frame, windows, labels in source.frames(model, settings, progress):
                 searched += 1
                 rng, width = np.random.default_rng(frame.index), frame.picture.width
-                for chosen in choose_windows(
-                    windows, labels.boxes, labels.ignored, width, rng, limits=limits
-                ):
+                for chosen in choose_windows(windows, labels, width, rng, limits=limits):
                     x, y, side, _ = chosen.box.xywh
                     patch = to_patch(cut_window(frame.image, x, y, side, side), PATCH)
                     folder = _FOLDERS[chosen.kind].format(stem)
