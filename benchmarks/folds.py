@@ -29,7 +29,7 @@ from vdet.labels.label import SavedTracks
 from vdet.labels.reading import read_truth
 from vdet.learn.svm.dataset import PatchFile, find_patches
 from vdet.learn.svm.extraction import extract
-from vdet.learn.svm.fitting import fit, fit_boxes
+from vdet.learn.svm.training import fit, fit_boxes
 from vdet.media import Frame, Picture
 from vdet.media.reader import VideoReader
 from vdet.run.loop import Pipeline, peek

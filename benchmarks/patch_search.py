@@ -8,7 +8,7 @@ import numpy as np
 from vdet.boxes import Float32Array
 from vdet.detect.svm.features import FeatureExtractor
 from vdet.detect.svm.model import LinearModel
-from vdet.detect.svm.pyramid import FramePyramid
+from vdet.detect.svm.search import FramePyramid
 from vdet.detect.svm.windows import WINDOW_SIDES, Strip, WindowGrid
 
 

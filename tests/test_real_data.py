@@ -18,7 +18,7 @@ from seed import SEED
 from vdet.boxes import Box
 from vdet.config.schema import SvmSettings
 from vdet.detect.svm.detector import SvmModel, shipped_model
-from vdet.detect.svm.features import FeatureExtractor, to_patch
+from vdet.detect.svm.features import FeatureExtractor, resize
 from vdet.detect.svm.model import LinearModel, load_model
 from vdet.learn.svm.dataset import find_patches, read_patches
 from vdet.learn.svm.extraction import hold_out
@@ -80,7 +80,9 @@ def test_the_shipped_model_classifies_the_last_patches_of_every_folder(
     extractor = FeatureExtractor(shipped.model.features)
     side = shipped.model.features.patch
     patches = read_patches(chosen)
-    vectors = np.stack([extractor.describe(to_patch(p, side)) for p in patches if p is not None])
+    vectors = np.stack(
+        [extractor.describe(resize(p, side, side)) for p in patches if p is not None]
+    )
     assert len(vectors) == len(chosen) > 300
     predicted = shipped.model.probabilities(vectors) >= 0.5
     assert np.mean(predicted == [file.vehicle for file in chosen]) >= 0.95

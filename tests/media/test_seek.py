@@ -10,7 +10,7 @@ import pytest
 
 from clips import joined, write_clip
 from vdet.media import Frame
-from vdet.media.decoder import Damage, Decoder
+from vdet.media.demux import Damage, Decoder
 from vdet.media.reader import VideoReader
 
 GOPS: dict[str, Any] = {"options": {"g": "10", "bf": "2"}, "count": 60}

@@ -24,7 +24,7 @@ def load_detector(settings: DetectorSettings) -> DetectorModel:
     ModelError
         The model file cannot be used.
     """
-    kind = _kind(settings)
+    kind: DetectorKind = load_plugin(DETECTORS, settings.kind)
     path = Path(settings.model) if settings.model else None
     of_model = kind_of_model(path) if path and kind.model_suffix else None
     if of_model not in (None, settings.kind):
@@ -36,12 +36,8 @@ def load_detector(settings: DetectorSettings) -> DetectorModel:
 
 def model_file(settings: DetectorSettings) -> Path | None:
     """Return the model file that `load_detector` would read; None for a detector without one."""
-    return Path(settings.model) if settings.model else _kind(settings).shipped(settings)
-
-
-def _kind(settings: DetectorSettings) -> DetectorKind:
     kind: DetectorKind = load_plugin(DETECTORS, settings.kind)
-    return kind
+    return Path(settings.model) if settings.model else kind.shipped(settings)
 
 
 DetectorObject = DetectorModel | VideoDetector | Callable[[Image], Boxes]

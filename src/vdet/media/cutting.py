@@ -12,8 +12,7 @@ from av.stream import Stream
 
 from vdet.config.schema import Settings
 from vdet.errors import OutputError
-from vdet.media.decoder import Decoder
-from vdet.media.demux import Demuxer
+from vdet.media.demux import Decoder, Demuxer
 from vdet.media.images import is_image_name
 from vdet.media.reader import VideoReader
 from vdet.media.writer import MARK, VIDEO_SUFFIXES, VideoWriter

@@ -4,7 +4,7 @@ import io
 import logging
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from fractions import Fraction
@@ -261,18 +261,23 @@ def numbered_images(path: Path) -> tuple[Path, ...]:
     else:
         return ()
     try:
-        found = [file for file in folder.iterdir() if names.fullmatch(file.name)]
+        images = [file for file in folder.iterdir() if names.fullmatch(file.name)]
     except OSError as error:
         raise VideoError(f"{path}: {folder} cannot be read: {error.strerror}") from error
     if names is _NUMBERED:
-        found = list(filter(is_image_name, found))
-    if not found:
+        images = list(filter(is_image_name, images))
+    if not images:
         raise VideoError(f"{path}: no numbered images found; use a video, or -d DIR for a folder")
-    if len({_DIGITS.sub("", file.name) for file in found}) > 1:
+    if len({_DIGITS.sub("", file.name) for file in images}) > 1:
         raise VideoError(f"{path}: has several kinds of names; use a pattern, as in img_%04d.png")
-    files = sorted(found, key=lambda file: [int(text) for text in _DIGITS.findall(file.name)])
+    files = sorted(images, key=lambda file: [int(text) for text in _DIGITS.findall(file.name)])
     if names is not _NUMBERED:
-        _reject_gaps(path, [int(names.sub(r"\1", file.name)) for file in files])
+        numbers = [int(names.sub(r"\1", file.name)) for file in files]
+        step = min((later - number for number, later in pairwise(numbers)), default=1)
+        for number, expected in zip(numbers, range(numbers[0], numbers[-1], step), strict=False):
+            if number != expected:
+                fault = f"image {expected} is missing; copy image {expected - step} in its place"
+                raise VideoError(f"{path}: {fault}")
     return tuple(files)
 
 
@@ -281,12 +286,3 @@ def _name_pattern(pattern: re.Match[str]) -> re.Pattern[str]:
     before, digits, after = pattern.groups()
     number = r"0|[1-9]\d*" if digits is None else rf"\d{{{digits}}}|[1-9]\d{{{digits},}}"
     return re.compile(f"{re.escape(before)}({number}){re.escape(after)}", re.ASCII)
-
-
-def _reject_gaps(path: Path, numbers: Sequence[int]) -> None:
-    """Raise `VideoError` unless the numbers increase by a constant step."""
-    steps = [following - number for number, following in pairwise(numbers)]
-    for number, step in zip(numbers, steps, strict=False):
-        if step != min(steps):
-            fault = f"image {number + min(steps)} is missing; copy image {number} in its place"
-            raise VideoError(f"{path}: {fault}")

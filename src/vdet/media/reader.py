@@ -18,7 +18,7 @@ from vdet.boxes import Image
 from vdet.config.schema import InputSettings
 from vdet.errors import VideoError
 from vdet.media import demux
-from vdet.media.decoder import Decoder
+from vdet.media.demux import Decoder
 from vdet.media.frame import Coding, Frame, Picture, Planes, VideoInfo, bgr_of
 from vdet.media.images import ASSUMED_RATE, Orientation, upright
 
@@ -85,7 +85,9 @@ class VideoReader:
         self._faults: list[str] = []
         self._is_scaled = False
         self._decoder = Decoder(path, settings.frame_rate)
-        self._check_rate(path)
+        if settings.frame_rate is not None and self._decoder.demuxer.has_own_rate:
+            self._decoder.demuxer.close()
+            raise VideoError(f"{path}: has a frame rate of its own; remove input.frame_rate")
         first = next(self._decoder.pictures, None)
         if first is None or max(first.width, first.height) > _MAX_SIDE:
             limits = f"{demux.MAX_PIXELS // 10**6} million pixels and sides of {_MAX_SIDE}"
@@ -128,18 +130,12 @@ class VideoReader:
         self._frames.close()
         self._decoder.demuxer.close()
 
-    def _check_rate(self, path: Path) -> None:
-        """Raise `VideoError` if the settings have a rate, but the file has times or a rate."""
-        if self._settings.frame_rate is not None and self._decoder.demuxer.has_own_rate:
-            self._decoder.demuxer.close()
-            raise VideoError(f"{path}: has a frame rate of its own; remove input.frame_rate")
-
     def _assumptions(self) -> Iterator[str]:
         """Yield assumptions that the user should know."""
         demuxer = self._decoder.demuxer
         if self._settings.frame_rate is None and not demuxer.has_own_rate:
-            what = "images" if demuxer.images else "frames"
-            yield f"{ASSUMED_RATE} {what} per second are assumed; set input.frame_rate"
+            noun = "images" if demuxer.images else "frames"
+            yield f"{ASSUMED_RATE} {noun} per second are assumed; set input.frame_rate"
         captured, shown = demux.capture_rate(demuxer.video) or 0, float(self.info.rate)
         if captured > _SLOW_MOTION * shown:
             rates = f"recorded at {captured:g} frames per second, shown at {shown:.3g}"

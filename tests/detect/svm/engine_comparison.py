@@ -11,10 +11,9 @@ from drawn_patches import draw_patches
 from seed import SEED
 from vdet.boxes import Float32Array, Image
 from vdet.config.detector import FeatureSettings, WindowSettings
-from vdet.detect.svm.features import FeatureExtractor, to_patch
+from vdet.detect.svm.features import FeatureExtractor, resize
 from vdet.detect.svm.model import LinearModel
-from vdet.detect.svm.pyramid import FramePyramid
-from vdet.detect.svm.search import DenseSearch
+from vdet.detect.svm.search import DenseSearch, FramePyramid
 from vdet.detect.svm.windows import WindowGrid, band_grid
 from vdet.media import Picture, Planes
 from vdet.synthetic.render import Renderer
@@ -69,7 +68,9 @@ def fitted(features: FeatureSettings, members: int = 1) -> LinearModel:
     """Fit a model by ridge regression, each member on other patches."""
     patches, labels = _patches()
     extractor = FeatureExtractor(features)
-    vectors = np.stack([extractor.describe(to_patch(patch, features.patch)) for patch in patches])
+    vectors = np.stack(
+        [extractor.describe(resize(patch, features.patch, features.patch)) for patch in patches]
+    )
     parts = [np.arange(len(labels)) % (members + 1) != i for i in range(members)]
     fits = [_ridge(vectors[part].astype(np.float64), labels[part]) for part in parts]
     weights, biases = (np.array(item, np.float32) for item in zip(*fits, strict=True))

@@ -11,8 +11,7 @@ from vdet.boxes import Image
 from vdet.config.detector import FeatureSettings, HogSettings
 from vdet.detect.svm.features import FeatureExtractor, split
 from vdet.detect.svm.model import BoxRegression, LinearModel
-from vdet.detect.svm.pyramid import FramePyramid
-from vdet.detect.svm.search import Blocks, DenseSearch, Gradients, table_sums
+from vdet.detect.svm.search import Blocks, DenseSearch, FramePyramid, Gradients, table_sums
 from vdet.detect.svm.windows import WINDOW_SIDES, WindowGrid
 from vdet.media import Picture
 

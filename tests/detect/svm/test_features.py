@@ -4,7 +4,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from seed import SEED
-from vdet.detect.svm.features import FeatureExtractor, cut_window, halve, histogram, split, to_patch
+from vdet.detect.svm.features import FeatureExtractor, cut_window, halve, histogram, resize, split
 
 PATCH = np.random.default_rng(0).integers(0, 256, (64, 64, 3), dtype=np.uint8)
 FEATURES = SEED.svm.features
@@ -36,15 +36,15 @@ def test_a_halved_channel_is_described_at_half_its_size() -> None:
 def test_a_crop_twice_too_large_is_halved_each_pixel_the_mean_of_four() -> None:
     means = PATCH.reshape(32, 2, 32, 2, 3).mean(axis=(1, 3))
     np.testing.assert_allclose(halve(PATCH), means, atol=0.5)
-    np.testing.assert_array_equal(to_patch(PATCH, 32), halve(PATCH))
-    np.testing.assert_array_equal(to_patch(PATCH, 16), halve(halve(PATCH)))
+    np.testing.assert_array_equal(resize(PATCH, 32, 32), halve(PATCH))
+    np.testing.assert_array_equal(resize(PATCH, 16, 16), halve(halve(PATCH)))
 
 
 def test_every_pixel_counts_however_small_the_patch() -> None:
     for size in (64, 60, 50, 37):
         crop = np.zeros((size, size, 3), np.uint8)
         crop[:, ::2] = 200  # on average, stripes of one pixel are an even grey
-        assert np.abs(to_patch(crop, 8).astype(int) - 100).max() <= 20
+        assert np.abs(resize(crop, 8, 8).astype(int) - 100).max() <= 20
 
 
 PIXELS = st.integers(1, 40)

@@ -9,7 +9,7 @@ from vdet.config.detector import FeatureSettings
 from vdet.config.loading import find_config, load_settings
 from vdet.config.schema import SvmSettings
 from vdet.detect.factory import load_detector, model_file
-from vdet.detect.svm.detector import requested_features, shipped_model
+from vdet.detect.svm.detector import shipped_model
 from vdet.detect.svm.model import load_model, save_model
 from vdet.errors import ModelError
 
@@ -35,16 +35,6 @@ def test_every_shipped_config_has_a_shipped_model(name: str, length: int) -> Non
 def test_features_that_no_shipped_model_has_are_refused_with_advice() -> None:
     with pytest.raises(ModelError, match=r"no shipped model .* pass --model, or train one"):
         shipped_model(SvmSettings(features=OTHER))
-
-
-def test_features_are_asked_for_where_they_are_given() -> None:
-    same = FeatureSettings()
-    assert requested_features(SvmSettings(features=OTHER)) == OTHER
-    assert requested_features(SvmSettings(features=same)) == same
-    given = load_settings((), ["detector.features.patch=32"], detector="svm").svm
-    assert requested_features(given) == same
-    assert requested_features(SvmSettings()) is None
-    assert requested_features(load_settings((), ["detector.kind=svm"]).svm) is None
 
 
 def test_a_model_file_brings_its_own_features_but_not_others_than_are_asked_for() -> None:

@@ -4,7 +4,7 @@ from hypothesis import strategies as st
 
 from vdet.config.detector import FeatureSettings
 from vdet.detect.svm.features import resize, split
-from vdet.detect.svm.pyramid import FramePyramid
+from vdet.detect.svm.search import FramePyramid
 from vdet.detect.svm.windows import Strip
 from vdet.media import Picture
 

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 from boxing import moved_to
 from vdet.boxes import Box, from_xywh
-from vdet.detect.svm.heat import HotRegion
-from vdet.detect.svm.votes import MAX_VOTES, Votes, split_regions
+from vdet.detect.svm.heat import MAX_VOTES, HotRegion, Votes, split_regions
 from vdet.detect.svm.windows import Windows
 
 Vote = tuple[float, float, float, float, float]

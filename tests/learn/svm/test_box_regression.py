@@ -3,7 +3,7 @@ import pytest
 
 from vdet.boxes import Float32Array
 from vdet.detect.svm.model import BoxRegression
-from vdet.learn.svm.fitting import fit_sides
+from vdet.learn.svm.training import fit_sides
 
 TRUE = BoxRegression(
     np.random.default_rng(1).normal(size=(4, 12)).astype(np.float32),
@@ -20,7 +20,7 @@ def scene(count: int = 400) -> tuple[Float32Array, Float32Array]:
 
 def fit(hogs: Float32Array, sides: Float32Array, penalty: float) -> BoxRegression:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("vdet.learn.svm.fitting.PENALTY", penalty)
+        patch.setattr("vdet.learn.svm.training.PENALTY", penalty)
         return fit_sides(hogs.copy(), sides)
 
 

@@ -19,7 +19,7 @@ from vdet.detect.svm.model import LinearModel
 from vdet.errors import DataError
 from vdet.learn.svm.dataset import PatchFile
 from vdet.learn.svm.extraction import LabelledVectors, RowNumbers
-from vdet.learn.svm.fitting import fit as fit_rows
+from vdet.learn.svm.training import fit as fit_rows
 
 FEATURES = FeatureSettings()
 
@@ -88,7 +88,7 @@ def test_too_few_patches_of_a_class_for_the_folds_are_an_error(vehicles: int, ot
 def test_an_svm_that_has_not_converged_is_reported_by_a_warning(
     caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch, most: int
 ) -> None:
-    monkeypatch.setattr("vdet.learn.svm.fitting.MAX_ITERATIONS", most)
+    monkeypatch.setattr("vdet.learn.svm.training.MAX_ITERATIONS", most)
     with caplog.at_level(logging.WARNING, "vdet"):
         fit(*clouds(), penalty=1e6 if most == 1 else 0.01)
     warning = "the SVM has not converged; lower train.svm.C"
@@ -118,7 +118,7 @@ def peak_memory(call: Callable[[], object]) -> int:
 
 
 def test_a_fit_has_the_training_part_in_memory_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("vdet.learn.svm.fitting.MAX_ITERATIONS", 5)
+    monkeypatch.setattr("vdet.learn.svm.training.MAX_ITERATIONS", 5)
     rng = np.random.default_rng(0)
     origins = np.concatenate([np.arange(3000), rng.integers(0, 3000, 4500)])
     vectors = rng.normal(size=(7500, 768)).astype(np.float32)

@@ -148,7 +148,7 @@ def test_a_trained_model_has_its_provenance_and_can_be_saved(
 def test_with_boxes_a_model_finds_the_sides_of_vehicles(
     mined: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("vdet.learn.svm.fitting.PENALTY", 1e-3)  # the patches are few
+    monkeypatch.setattr("vdet.learn.svm.training.PENALTY", 1e-3)  # the patches are few
     files = find_patches([mined])
     model, report = train(files, SETTINGS, jobs=1)
     assert model.box_regression is not None

@@ -10,15 +10,12 @@ import cv2
 import numpy as np
 
 from vdet.boxes import Box, Boxes, Image, are_nested, from_xywh
-from vdet.config.detector import FeatureSettings
 from vdet.config.schema import SvmSettings
-from vdet.detect.svm.heat import Heat, HotRegion, find_regions, sum_heat
+from vdet.detect.svm.heat import Heat, HotRegion, Votes, find_regions, split_regions, sum_heat
 from vdet.detect.svm.horizon import DEFAULT_HORIZON, find_horizon
 from vdet.detect.svm.model import LinearModel, load_model
-from vdet.detect.svm.pyramid import FramePyramid
-from vdet.detect.svm.search import DenseSearch, vehicle_boxes
-from vdet.detect.svm.votes import Votes, split_regions
-from vdet.detect.svm.windows import WindowGrid, Windows, window_grids
+from vdet.detect.svm.search import DenseSearch, FramePyramid, vehicle_boxes
+from vdet.detect.svm.windows import Windows, window_grids
 from vdet.draw.boxes import GREEN, WHITE, color_of, draw_box, draw_label
 from vdet.errors import FrameSizeError, ModelError
 from vdet.media import Picture
@@ -35,12 +32,11 @@ class Trace:
     """Data for the stage images of a frame.
 
     `hits` are the windows with at least `detector.search.probability`, `heat` is the heatmap of the
-    last frames, `grids` are the window sets.
+    last frames.
     """
 
     hits: Windows
     heat: Heat
-    grids: tuple[WindowGrid, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -154,7 +150,7 @@ class SvmDetector:
                 "centroid": np.reshape([region.centroid for region in regions], (-1, 2)),
                 "strength": [region.strength for region in regions],
             },
-            trace=Trace(hits, heat, self.grids),
+            trace=Trace(hits, heat),
         )
         return self._shown_in_still(boxes) if is_still else boxes
 
@@ -162,10 +158,10 @@ class SvmDetector:
         """Return three images of a frame, BGR uint8 `(H, W, 3)`: windows, hits, heat."""
         trace = detections.trace
         windows, hits = (image * 0.6).astype(np.uint8), image.copy()
-        for number, grid in enumerate(trace.grids):
+        for number, grid in enumerate(self.grids):
             boxes, color = list(map(Box.of, from_xywh(grid.boxes).tolist())), color_of(number)
             draw_box(windows, boxes[0].union(boxes[-1]), color)
-            example = boxes[number * grid.columns // len(trace.grids)]
+            example = boxes[number * grid.columns // len(self.grids)]
             draw_box(windows, example, color, f"{grid.size} px: {len(grid)} windows")
         hit_boxes = list(map(Box.of, from_xywh(trace.hits.boxes).tolist()))
         for row in np.argsort(trace.hits.probabilities).tolist():  # the most likely is on top
@@ -217,13 +213,9 @@ def load_svm(settings: SvmSettings, path: Path | None) -> SvmModel:
     ModelError
         The file cannot be used, or the model was trained with other features.
     """
-    model = load_model(path or shipped_model(settings), requested_features(settings))
+    requested = settings.features if "features" in settings.model_fields_set else None
+    model = load_model(path or shipped_model(settings), requested)
     return SvmModel(model, settings)
-
-
-def requested_features(settings: SvmSettings) -> FeatureSettings | None:
-    """Return the features that a model must have; None if the settings have none."""
-    return settings.features if "features" in settings.model_fields_set else None
 
 
 def blend_heat(image: Image, heat: Heat) -> Image:

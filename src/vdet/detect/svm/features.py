@@ -83,11 +83,6 @@ def cut_window(image: Image, x: int, y: int, width: int, height: int) -> Image:
     return np.asarray(image[rows[:, np.newaxis], columns])
 
 
-def to_patch(image: Image, side: int) -> Image:
-    """Resize a crop (BGR uint8) to a square patch of `side` pixels."""
-    return resize(image, side, side)
-
-
 def resize(image: Image, width: int, height: int) -> Image:
     """Resize an image so that each of its pixels counts.
 

@@ -14,7 +14,6 @@ from vdet.boxes import Float64Array, Image
 DEFAULT_HORIZON = 0.58
 """Usual horizon of dashboard cameras, fraction of the height; used if none is found."""
 
-_MAX_ASPECT = 4  # maximum height over width of an image of a road
 _WIDTH = 640  # pixels of the image in which segments are detected
 _MIN_LENGTH = 0.02  # of a segment, fraction of the width
 _SLOPES = (12.0, 75.0)  # degrees from the horizontal; vehicles are flatter, poles are steeper
@@ -36,9 +35,7 @@ def find_horizon(images: Sequence[Image]) -> float | None:
     -------
     0.30 to 0.74 in steps of 0.01; None if too few lines run along the road.
     """
-    height, width = images[0].shape[:2] if images else (1, 0)
-    if height > _MAX_ASPECT * width:
-        return None
+    height, width = images[0].shape[:2]
     ends = np.concatenate([_segment_ends(image) for image in images])
     directions = ends[:, 2:] - ends[:, :2]
     falling = directions[:, 0] * directions[:, 1] > 0

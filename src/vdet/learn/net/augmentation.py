@@ -10,9 +10,8 @@ import numpy.typing as npt
 from vdet.boxes import Float32Array, Float64Array, Image, area, coverage, iou_matrix
 from vdet.config.schema import NetworkTrainingSettings
 from vdet.detect.onnx.preparation import GREY
-from vdet.learn.net.signs import draw_sign
 from vdet.learn.net.sources import NetSample, NetSource, join
-from vdet.learn.net.weather import blended, with_weather
+from vdet.learn.net.weather import blended, draw_sign, with_weather
 
 MIN_SIDE = 8.0
 """Minimum longer side of a vehicle, pixels; smaller vehicles are ignored."""

@@ -12,9 +12,8 @@ import math
 import re
 import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path, PurePosixPath
 
 import cv2
@@ -79,14 +78,12 @@ def find_patches(sources: Sequence[Path]) -> list[PatchFile]:
 
 
 def _find_in(source: Path) -> list[PatchFile]:
-    if source.is_dir():  # only files: devices and pipes may be endless
-        names = [p.relative_to(source).as_posix() for p in source.rglob("*") if p.is_file()]
-    elif source.exists():
-        with _open_archive(source) as archive:
-            names = archive.namelist()
+    root = _root_of(source)
+    if isinstance(root, Path):  # only files: devices and pipes may be endless
+        names = [p.relative_to(root).as_posix() for p in root.rglob("*") if p.is_file()]
     else:
-        raise DataError(f"{source}: folder or zip file not found")
-    boxes = _read_table(source) if TABLE in names else {}
+        names = root.root.namelist()
+    boxes = _read_table(root) if TABLE in names else {}
     files = [file for name in names if (file := _patch_file(source, name, boxes))]
     if not files:
         raise DataError(
@@ -116,11 +113,20 @@ def _numeric(name: str) -> list[tuple[int, str]]:
     return [(len(part) if part.isdecimal() else 0, part) for part in parts]
 
 
-def _open_archive(path: Path) -> zipfile.ZipFile:
+_Root = Path | zipfile.Path
+"""A folder, or the top of a zip file."""
+
+
+def _root_of(source: Path) -> _Root:
+    """Return a folder or the top of a zip file."""
+    if source.is_dir():
+        return source
+    if not source.exists():
+        raise DataError(f"{source}: folder or zip file not found")
     try:
-        return zipfile.ZipFile(path)
+        return zipfile.Path(source)
     except Exception as error:  # zipfile raises a dozen kinds on damaged data
-        raise DataError(f"{path}: is not a folder or a readable zip file") from error
+        raise DataError(f"{source}: is not a folder or a readable zip file") from error
 
 
 def read_patches(files: Sequence[PatchFile]) -> Iterator[Image | None]:
@@ -128,34 +134,30 @@ def read_patches(files: Sequence[PatchFile]) -> Iterator[Image | None]:
 
     Each zip file is opened once.
     """
-    with ExitStack() as stack:
-        archives = cache(lambda source: stack.enter_context(_open_archive(source)))
-        for file in files:
-            archive = None if file.source.is_dir() else archives(file.source)
-            yield decode_image(_content(file.source, file.name, archive))
+    roots = {source: _root_of(source) for source in {file.source for file in files}}
+    for file in files:
+        yield decode_image(_content(roots[file.source], file.name))
 
 
-def _content(folder: Path, name: str, archive: zipfile.ZipFile | None) -> bytes:
-    """Return the content of a file of a folder, or of an archive; empty if it cannot be read."""
+def _content(root: _Root, name: str) -> bytes:
+    """Return the content of a file; empty if it cannot be read."""
     try:
-        with archive.open(name) if archive else (folder / name).open("rb") as file:
+        with root.joinpath(name).open("rb") as file:
             return file.read(MAX_PATCH_BYTES)  # a bomb is not unpacked any further
     except Exception:  # zipfile and zlib raise a dozen kinds on damaged data
         return b""
 
 
-def _read_table(source: Path) -> dict[str, Sides]:
-    """Return the sides of each patch in the source's table."""
-    with ExitStack() as stack:
-        archive = None if source.is_dir() else stack.enter_context(_open_archive(source))
-        table = _content(source, TABLE, archive)
+def _read_table(root: _Root) -> dict[str, Sides]:
+    """Return the sides of each patch in the table of a folder or zip file."""
     try:
-        rows = list(csv.reader(io.StringIO(table.decode("utf-8"), newline="")))
+        text = _content(root, TABLE).decode("utf-8")
+        rows = list(csv.reader(io.StringIO(text, newline="")))
         if not rows or tuple(rows[0]) != COLUMNS:
             raise ValueError(f"its first line is not {','.join(COLUMNS)}")
         return {name: _sides(values) for name, *values in rows[1:]}
     except (ValueError, csv.Error) as error:
-        raise DataError(f"{source}: {TABLE} is damaged ({error}); mine it again") from error
+        raise DataError(f"{root}: {TABLE} is damaged ({error}); mine it again") from error
 
 
 def _sides(values: Sequence[str]) -> Sides:

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from vdet.boxes import BoolArray, Float32Array, Image
 from vdet.config.detector import FeatureSettings
-from vdet.detect.svm.features import FeatureExtractor, to_patch
+from vdet.detect.svm.features import FeatureExtractor, resize
 from vdet.errors import DataError
 from vdet.learn.svm.dataset import UNKNOWN, PatchFile, read_patches
 from vdet.workers import core_count
@@ -112,7 +112,7 @@ def extract(
             yield [whole, *(augment(whole, rng) if augmented else ())]
 
     def describe(samples: Sequence[PatchSample]) -> tuple[Sequence[PatchSample], Float32Array]:
-        patches = [to_patch(sample.image, features.patch) for sample in samples]
+        patches = [resize(sample.image, features.patch, features.patch) for sample in samples]
         return samples, np.stack([extractor.describe(patch) for patch in patches])
 
     in_threads = Parallel(jobs or core_count(), backend="threading", return_as="generator")

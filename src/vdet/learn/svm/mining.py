@@ -22,7 +22,7 @@ import numpy as np
 from vdet.boxes import BoolArray, Box, Float64Array, coverage, from_xywh
 from vdet.config.schema import Settings
 from vdet.detect.svm.detector import SvmModel
-from vdet.detect.svm.features import cut_window, to_patch
+from vdet.detect.svm.features import cut_window, resize
 from vdet.detect.svm.windows import Windows
 from vdet.errors import DataError, TruthError, VideoError
 from vdet.labels.label import Label, boxes_of
@@ -319,7 +319,7 @@ def mine(
                 rng, width = np.random.default_rng(frame.index), frame.picture.width
                 for chosen in choose_windows(windows, labels, width, rng, limits=limits):
                     x, y, side, _ = chosen.box.xywh
-                    patch = to_patch(cut_window(frame.image, x, y, side, side), PATCH)
+                    patch = resize(cut_window(frame.image, x, y, side, side), PATCH, PATCH)
                     folder = _FOLDERS[chosen.kind].format(stem)
                     name = f"{folder}/frame{frame.index + 1:06}_x{x:04}_y{y:04}_s{side:04}.png"
                     add(name, patch, chosen.sides)

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from vdet.boxes import BoolArray, Float64Array, coverage, iou_matrix
-from vdet.track.motion.history import carried
 from vdet.track.motion.pairing import differences
+from vdet.track.motion.state import carried
 from vdet.track.motion.vehicle import Vehicle
 
 _REACH = 0.75

@@ -10,9 +10,8 @@ from vdet.boxes import BoolArray, Box, Boxes, Float64Array, are_nested, clipped
 from vdet.config.schema import MotionTrackerSettings
 from vdet.media import Picture
 from vdet.track.motion.association import are_hidden, are_parts, take_over_ids, without_duplicates
-from vdet.track.motion.history import Position
 from vdet.track.motion.pairing import appearances, buffered_iou, differences, pair
-from vdet.track.motion.state import whole_box
+from vdet.track.motion.state import Position, whole_box
 from vdet.track.motion.vehicle import Observation, SearchedFrame, Vehicle
 from vdet.track.track import Track
 

@@ -13,8 +13,7 @@ import numpy as np
 
 from vdet.boxes import Float64Array
 from vdet.config.schema import MotionTrackerSettings
-from vdet.track.motion.history import SCORE_TIME, Estimate, History
-from vdet.track.motion.state import MotionState
+from vdet.track.motion.state import SCORE_TIME, Estimate, History, MotionState
 from vdet.track.votes import ClassVotes, vote_weight
 
 _MAX_EVIDENCE_SECONDS = 0.1
