@@ -46,9 +46,9 @@ _BUILT_IN: dict[str, dict[str, str]] = {
         for name in names
     },
     FORMATS: {
-        "mot": "vdet.labels.mot:MOT",
-        "csv": "vdet.labels.native:CSV",
-        "jsonl": "vdet.labels.native:JSON_LINES",
+        "mot": "vdet.labels.lines:MOT",
+        "csv": "vdet.labels.lines:CSV",
+        "jsonl": "vdet.labels.lines:JSON_LINES",
         "coco": "vdet.labels.coco:COCO",
     },
 }

@@ -11,7 +11,7 @@ from labels.saving import car, frame, written
 from vdet.boxes import Box
 from vdet.errors import TruthError
 from vdet.labels import coco, native
-from vdet.labels.mot import MOT
+from vdet.labels.lines import MOT
 from vdet.labels.reading import read_tracks, read_truth
 
 BOXES = [(frame, id_) for frame, id_ in product(range(6), (1, 2)) if (frame, id_) != (2, 1)]

@@ -4,7 +4,7 @@ import pytest
 
 from labels.saving import car, frame, written
 from vdet.errors import TruthError
-from vdet.labels.mot import MOT, read_mot
+from vdet.labels.lines import MOT, read_mot
 from vdet.labels.reading import read_tracks, read_truth
 
 

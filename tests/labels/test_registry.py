@@ -12,7 +12,7 @@ from vdet.labels.formats import (
     track_formats,
     track_suffixes,
 )
-from vdet.labels.mot import MOT
+from vdet.labels.lines import MOT
 from vdet.labels.reading import read_tracks
 
 

@@ -18,8 +18,7 @@ from vdet.errors import TruthError
 from vdet.labels.coco import COCO, read_coco_images, write_coco_images
 from vdet.labels.formats import Format, ImageTracks, track_formats
 from vdet.labels.label import SavedTracks
-from vdet.labels.mot import MOT
-from vdet.labels.native import CSV, JSON_LINES
+from vdet.labels.lines import CSV, JSON_LINES, MOT
 from vdet.track.track import FrameTracks, State, Track
 from writing import write_image
 

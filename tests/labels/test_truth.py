@@ -7,8 +7,8 @@ from labels.writers import exported
 from vdet.errors import TruthError
 from vdet.evaluate.comparison import compare
 from vdet.evaluate.video import score_files
-from vdet.labels import mot
 from vdet.labels.formats import Format, track_formats
+from vdet.labels.lines import MOT as MOT_FORMAT
 from vdet.labels.reading import read_truth
 
 MOT = "1,7,11,21,30,40,1,3,1\n2,7,11,21,30,40,1,3,1\n"
@@ -42,7 +42,7 @@ def test_an_unknown_label_is_refused_with_its_line(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "form", [track_format for track_format in track_formats() if track_format is not mot.MOT]
+    "form", [track_format for track_format in track_formats() if track_format is not MOT_FORMAT]
 )
 def test_tracks_of_every_format_can_be_truth(tmp_path: Path, form: Format) -> None:
     path = tmp_path / f"truth{form.suffix}"

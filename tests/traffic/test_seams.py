@@ -12,7 +12,7 @@ from vdet.config.schema import InputSettings
 from vdet.config.shapes import LineSettings, ZoneSettings
 from vdet.labels.formats import TrackWriter
 from vdet.labels.label import SourceVideo
-from vdet.labels.native import JSON_LINES
+from vdet.labels.lines import JSON_LINES
 from vdet.track.track import FrameTracks
 from vdet.traffic.counting import count_files
 from vdet.traffic.counts import Counts, flow_table, zone_table

@@ -173,7 +173,7 @@ def images_report(result: ImagesResult, name: RunName) -> Report:
     counting, mean, classes = result.counting, result.mean, class_results(result.comparison)
     rows = [(source.labelled.name, source.scores) for source in result.sources]
     sources = [
-        {"source": title, **asdict(scores), "not_vehicles": dict(source.labelled.others)}
+        {"source": title, **asdict(scores), "not_vehicles": dict(source.labelled.omitted)}
         for source, (title, scores) in zip(result.sources, rows, strict=True)
     ]
     if len(rows) > 1:
@@ -184,7 +184,7 @@ def images_report(result: ImagesResult, name: RunName) -> Report:
         [name.line, f"boxes from score {counting.score:.2f}{width}"],
         _score_table("source", _OF_IMAGES, rows),
         _class_table(classes),
-        [_others(source) for source in result.sources if source.labelled.others],
+        [_omitted(source) for source in result.sources if source.labelled.omitted],
     )
     values = {"mean": asdict(mean), "sources": sources, "classes": list(map(asdict, classes))}
     sheets = [(source.labelled.name, worst_tiles(source)) for source in result.sources]
@@ -234,9 +234,9 @@ def _class_table(classes: Iterable[ClassResult]) -> list[str]:
     return _score_table("class", _OF_CLASSES, [(class_.name, class_) for class_ in classes])
 
 
-def _others(source: MeasuredSet) -> str:
+def _omitted(source: MeasuredSet) -> str:
     """Return the labels that are not vehicles, as a line."""
     named = ", ".join(
-        f"{printable(name)} ({count})" for name, count in source.labelled.others.items()
+        f"{printable(name)} ({count})" for name, count in source.labelled.omitted.items()
     )
     return f"not vehicles in {source.labelled.name}: {named}"

@@ -85,8 +85,8 @@ class TrackWriter:
     def end(self, findings: Sequence[Mapping[str, Any]] = ()) -> None:
         """Write everything that is left, with the findings. Not called after an error."""
         if self._form.whole:
-            found = tuple(SavedFinding(**finding) for finding in findings)
-            self._form.whole(self._file, replace(self._video, findings=found), self._kept)
+            saved = tuple(SavedFinding(**finding) for finding in findings)
+            self._form.whole(self._file, replace(self._video, findings=saved), self._kept)
         elif self._last:
             facts = {**self._last.facts, FINDINGS: findings} if findings else self._last.facts
             self._write_lines(replace(self._last, facts=facts))

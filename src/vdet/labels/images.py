@@ -9,11 +9,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 
-import numpy as np
-
-from vdet.boxes import BoolArray, Float64Array, Image
+from vdet.boxes import Image
 from vdet.errors import ImageError, TruthError, counted, printable
-from vdet.labels.label import Corners, Label, Size, boxes_of, line_error, mistake_in_box
+from vdet.labels.label import Corners, Label, Size, line_error, mistake_in_box
 from vdet.labels.roles import DEFAULT_ROLES, Roles
 from vdet.media.images import read_image
 
@@ -46,21 +44,6 @@ class LabelledImage:
     size: Size | None = None
     unlabelled: tuple[str, ...] = ()
 
-    @property
-    def boxes(self) -> Float64Array:
-        """float64 `(n, 4)`: x1, y1, x2, y2 of each label, pixels from 0."""
-        return boxes_of(self.labels)
-
-    @property
-    def classes(self) -> tuple[str, ...]:
-        """The name of each label."""
-        return tuple(label.name or "" for label in self.labels)
-
-    @property
-    def ignored(self) -> BoolArray:
-        """Bool `(n,)`: whether each label is an ignore region, not a vehicle to be found."""
-        return np.array([label.ignored for label in self.labels], np.bool_)
-
     def read(self) -> Image:
         """Read the image, BGR uint8 `(H, W, 3)`.
 
@@ -81,14 +64,14 @@ class LabelledImage:
 class LabelledImages:
     """Labelled images of one source.
 
-    `name` is shown in tables. `others` are the labels that are neither vehicles nor ignore regions,
+    `name` is shown in tables. `omitted` are the labels that are neither vehicles nor ignore regions,
     whose boxes are omitted; `ignored` are the labels of ignore regions. Both have the number of
     boxes of each label, the most frequent first.
     """
 
     name: str
     images: tuple[LabelledImage, ...]
-    others: Mapping[str, int] = field(default_factory=dict)
+    omitted: Mapping[str, int] = field(default_factory=dict)
     ignored: Mapping[str, int] = field(default_factory=dict)
 
 
@@ -106,7 +89,7 @@ def checked_images(
         cannot be pixels of their images.
     """
     checked: dict[Path, LabelledImage] = {}
-    others, ignored = Counter[str](), Counter[str]()
+    omitted, ignored = Counter[str](), Counter[str]()
     boxes = repeated = absurd = 0
     for image in images:
         labels = tuple(
@@ -119,7 +102,7 @@ def checked_images(
             raise TruthError(f"{name}: has the image {printable(image.path.name)} twice")
         checked[image.path] = replace(
             image,
-            labels=tuple(_with_roles(replace(image, labels=labels), roles, others, ignored)),
+            labels=tuple(_with_roles(replace(image, labels=labels), roles, omitted, ignored)),
             unlabelled=tuple(filter(None, map(roles.class_of, image.unlabelled))),
         )
     if not checked:
@@ -133,7 +116,7 @@ def checked_images(
         duplicates = counted(repeated, "label")
         log.warning("%s: has %s twice in the same image; each counts once", name, duplicates)
     return LabelledImages(
-        name, tuple(checked.values()), dict(others.most_common()), dict(ignored.most_common())
+        name, tuple(checked.values()), dict(omitted.most_common()), dict(ignored.most_common())
     )
 
 
@@ -145,7 +128,7 @@ def _is_absurd(box: Corners, size: Size | None) -> bool:
 
 
 def _with_roles(
-    image: LabelledImage, roles: Roles, others: Counter[str], ignored: Counter[str]
+    image: LabelledImage, roles: Roles, omitted: Counter[str], ignored: Counter[str]
 ) -> Iterator[Label]:
     """Yield the vehicles and ignore regions of an image, and count the other labels."""
     if not is_file(image.path):
@@ -154,7 +137,7 @@ def _with_roles(
         name = label.name or ""
         role = roles.role_of(name)
         if role not in ("vehicle", "ignored"):
-            others[name] += 1
+            omitted[name] += 1
             continue
         if mistake := mistake_in_box(label):
             raise line_error(image.file, label.position, mistake)

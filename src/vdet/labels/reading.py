@@ -12,7 +12,7 @@ from vdet.labels.coco import read_coco_images
 from vdet.labels.formats import recognize, track_formats
 from vdet.labels.images import LabelledImage, LabelledImages, checked_images
 from vdet.labels.label import Label, SavedTracks, checked_labels, line_error
-from vdet.labels.mot import MOT
+from vdet.labels.lines import MOT
 from vdet.labels.parsing import read_bytes
 from vdet.labels.roles import DEFAULT_ROLES, Roles, is_region
 from vdet.labels.yolo import read_yolo_images

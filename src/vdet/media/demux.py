@@ -175,8 +175,8 @@ def _stated_rate(stream: VideoStream, *, is_raw: bool) -> Fraction | None:
     FFmpeg's average of a raw stream is an assumption.
     """
     if is_raw:
-        own = stream.codec_context.framerate
-        return own if own and own <= _MAX_RATE else None
+        declared = stream.codec_context.framerate
+        return declared if declared and declared <= _MAX_RATE else None
     rate = stream.average_rate or stream.guessed_rate
     return (rate and rate.limit_denominator(_MAX_TERM)) or None
 

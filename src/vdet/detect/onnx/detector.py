@@ -75,10 +75,12 @@ class NetworkModel:
         self._recognized = recognize(Session(path), settings.class_names or ())
         names = self._recognized.names
         self._numbers = np.array([*our_classes(names, combined_classes(settings)), -1], np.int32)
-        known = [name for number, name in enumerate(settings.classes) if number in self._numbers]
-        if not known:
+        detectable = [
+            name for number, name in enumerate(settings.classes) if number in self._numbers
+        ]
+        if not detectable:
             raise ModelError(f"{path}: has none of detector.classes, only {', '.join(names)}")
-        if missing := {*settings.classes} - {*known, *_USUAL}:
+        if missing := {*settings.classes} - {*detectable, *_USUAL}:
             log.warning("%s: lacks detector.classes %s", path, ", ".join(sorted(missing)))
 
     def for_video(self, width: int, height: int, images: Sequence[Image]) -> "NetworkDetector":  # noqa: ARG002

@@ -194,7 +194,7 @@ def _source(name: str, frames: _Frames, labelled: LabelledImages, settings: Sett
         samples=samples,
         vehicles={name: vehicles[name] for name in names if vehicles[name]},
         ignored=dict(labelled.ignored),
-        background=dict(labelled.others),
+        background=dict(labelled.omitted),
         unlabelled=tuple(name for name in classes if name in unlabelled),
     )
 
@@ -204,8 +204,8 @@ def _sample(image: Image, labelled: LabelledImage, classes: Sequence[str]) -> Ne
     height, width = image.shape[:2]
     number = {name: index for index, name in enumerate(classes)}
     unlabelled = [number[name] for name in labelled.unlabelled if name in number]
-    named = [number.get(name, UNKNOWN) for name in labelled.classes]
-    boxes = [*labelled.boxes.tolist(), *[(0, 0, width, height)] * len(unlabelled)]
+    named = [number.get(label.name or "", UNKNOWN) for label in labelled.labels]
+    boxes = [*(label.box for label in labelled.labels), *[(0, 0, width, height)] * len(unlabelled)]
     is_whole = np.repeat([False, True], [len(named), len(unlabelled)])
     sample = NetSample(
         image,
@@ -213,5 +213,5 @@ def _sample(image: Image, labelled: LabelledImage, classes: Sequence[str]) -> Ne
         np.array([*named, *unlabelled], np.int64),
         is_whole,
     )
-    ignored = np.append(labelled.ignored, np.zeros(len(unlabelled), np.bool_))
-    return sample.ignoring(ignored).shrunk()
+    ignored = [*(label.ignored for label in labelled.labels), *[False] * len(unlabelled)]
+    return sample.ignoring(np.array(ignored, np.bool_)).shrunk()

@@ -22,7 +22,7 @@ from vdet.labels.formats import (
     track_suffixes,
 )
 from vdet.labels.label import SourceVideo
-from vdet.labels.native import CLOCK, JSON_LINES, track_record
+from vdet.labels.lines import CLOCK, JSON_LINES, track_record
 from vdet.run.result import FrameResult, findings_in
 from vdet.run.sinks.protocol import STANDARD_OUTPUT, BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.traffic import output

@@ -1,16 +1,20 @@
-"""The formats of vdet itself, JSON lines and CSV; frames and pixels count from 0.
+"""The formats of lines: JSON lines, CSV and MOTChallenge.
 
-JSON lines have a record for each frame, even without a box. CSV has a row for each box.
+JSON lines have a record for each frame, even without a box. CSV and MOTChallenge have a row for
+each box. Frames and pixels count from 0, in MOTChallenge from 1.
+
+Source: Milan et al., "MOT16: A Benchmark for Multi-Object Tracking", 2016, tables 3 and 4.
 """
 
 import csv
 import io
 import json
-from collections.abc import Iterator
+import logging
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 from pydantic import FailFast, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
@@ -37,6 +41,8 @@ from vdet.labels.parsing import (
 )
 from vdet.track.track import FrameTracks, State, Track
 
+_T = TypeVar("_T")
+
 CLOCK = "clock"
 """Name of the fact and the column with the clock time of a frame, ISO 8601."""
 
@@ -45,6 +51,8 @@ _COLUMNS = (
     *("score", "state", "class", "foot_x", "foot_y", "distance", "lane", CLOCK),
 )
 _NEEDED = _COLUMNS[:7]
+
+_Whole = Annotated[int, Field(ge=-LIMIT, le=LIMIT)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,7 +69,7 @@ class _Box:
     class_name: str | None = Field(None, alias="class")
     foot: tuple[Number, Number] | None = None
     distance: Number | None = None
-    lane: Annotated[int, Field(ge=-LIMIT, le=LIMIT)] | None = None
+    lane: _Whole | None = None
 
     def label(self, line: int, frame: int) -> Label:
         """Return the box as a label of a frame, counted from 0."""
@@ -101,6 +109,14 @@ class _Record:
 
 
 _ROW, _RECORD = TypeAdapter(_Row), TypeAdapter(_Record)
+
+
+def _checked(path: Path, line: int, validate: Callable[[Any], _T], values: Any) -> _T:
+    """Return the validated values of a line. Raises `TruthError`."""
+    try:
+        return validate(values)
+    except ValidationError as error:
+        raise line_error(path, line, first_mistake(error)) from error
 
 
 def track_record(track: Track) -> dict[str, Any]:
@@ -154,10 +170,7 @@ def read_json_lines(path: Path, data: bytes) -> SavedTracks:
     times: Times = {}
     first, last = None, -1
     for line, content in numbered_lines(path, data):
-        try:
-            record = _RECORD.validate_json(content)
-        except ValidationError as error:
-            raise line_error(path, line, first_mistake(error)) from error
+        record = _checked(path, line, _RECORD.validate_json, content)
         if record.frame <= last:
             raise line_error(path, line, f"frame {record.frame} comes after frame {last}")
         first, last = first or record, record.frame
@@ -186,10 +199,7 @@ def read_csv(path: Path, data: bytes) -> SavedTracks:
     times: Times = {}
     begin = None
     for line, cells in _csv_rows(path, data):
-        try:
-            row = _ROW.validate_python(cells)
-        except ValidationError as error:
-            raise line_error(path, line, first_mistake(error)) from error
+        row = _checked(path, line, _ROW.validate_python, cells)
         times[row.frame] = line, row.time
         labels.append(row.label(line, row.frame))
         if len(labels) == 1:
@@ -235,3 +245,95 @@ def _begin(path: Path, first: tuple[int | str, float], clock: str | None) -> dat
 
 JSON_LINES = Format("JSON lines", ".jsonl", read_json_lines, _json_lines)
 CSV = Format("CSV", ".csv", read_csv, _csv_lines, ",".join(_COLUMNS) + "\n")
+
+
+_log = logging.getLogger("vdet")
+_MAX_CLASSES = 100  # more are positions, in the eighth column of results
+_TRUTH_COLUMNS, _RESULT_COLUMNS = 9, 10
+
+
+@dataclass(frozen=True, slots=True)
+class _MotRow:
+    """The columns that are used."""
+
+    frame: _Whole
+    id: _Whole
+    left: Number
+    top: Number
+    width: Number
+    height: Number
+    score: Number  # in truth, a flag
+
+
+_MOT_ROW = TypeAdapter(_MotRow)
+_NAMES = tuple(_MotRow.__annotations__)
+
+
+def _mot_lines(frame: FrameTracks) -> Iterator[str]:
+    """Yield a line for each box: frame, id, left, top, width, height, score, -1, -1, -1."""
+    for track in frame.tracks:
+        x, y, width, height = track.box.xywh
+        yield (
+            f"{frame.index + 1},{track.id},{x + 1},{y + 1},{width},{height},{track.score:.4f},"
+            "-1,-1,-1\n"
+        )
+
+
+def read_mot(path: Path, data: bytes) -> SavedTracks:
+    """Read results or truth.
+
+    Results have ten columns: frame, id, left, top, width, height, confidence, -1, -1, -1. Truth has
+    nine, as in `gt.txt`: frame, id, left, top, width, height, flag, class, visibility. Flag 0 marks
+    an ignore region, 1 a vehicle. The class is not used, because its numbers differ between tools;
+    neither is the visibility. Several classes give a warning (logger "vdet"). Columns may also be
+    separated by spaces.
+
+    Raises
+    ------
+    TruthError
+        A line has a wrong number of columns, or another one than the first line, a column is not a
+        number, or a flag is neither 0 nor 1.
+    """
+    classes = set[str]()
+    saved = SavedTracks(tuple(_mot_labels(path, data, classes)))
+    if 1 < len(classes) <= _MAX_CLASSES:
+        numbers = ", ".join(sorted(classes, key=int))
+        _log.warning(
+            "%s: column 8 has the classes %s, which are all read as vehicles; keep only the rows "
+            "of vehicles",
+            path,
+            numbers,
+        )
+    return saved
+
+
+def _mot_labels(path: Path, data: bytes, classes: set[str]) -> Iterator[Label]:
+    """Yield the label of each line, and put the classes of vehicles into `classes`."""
+    separator = "," if b"," in data.lstrip().partition(b"\n")[0] else None
+    counts: tuple[int, ...] = _TRUTH_COLUMNS, _RESULT_COLUMNS
+    for line, content in numbered_lines(path, data):
+        columns = content.split(separator)
+        if len(columns) not in counts:
+            numbers = " or ".join(map(str, counts))
+            message = f"MOTChallenge has {numbers} columns; this line has {len(columns)}"
+            raise line_error(path, line, message)
+        counts = (len(columns),)
+        is_truth = len(columns) == _TRUTH_COLUMNS
+        named = dict(zip(_NAMES, columns, strict=False))
+        row = _checked(path, line, _MOT_ROW.validate_python, named)
+        if is_truth and row.score not in {0, 1}:
+            message = f"with nine columns, column 7 must be a flag, 0 or 1, but is {row.score:g}"
+            raise line_error(path, line, f"{message}; a results file needs ten columns")
+        if row.score and columns[7].strip().isdecimal():
+            classes.add(columns[7].strip())
+        yield Label(
+            position=line,
+            box=from_size(row.left - 1, row.top - 1, row.width, row.height),
+            frame=row.frame,
+            id=row.id,
+            score=1.0 if is_truth else row.score,
+            ignored=is_truth and row.score == 0,
+        )
+
+
+MOT = Format("MOTChallenge", ".txt", read_mot, _mot_lines)
