@@ -301,29 +301,3 @@ class TestYolo:
         path.rename(path.with_name("c.txt"))
         with pytest.raises(TruthError, match=r"c\.txt: has no image of its name below"):
             read_labelled_images(tmp_path)
-
-
-@pytest.fixture(scope="module")
-def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Path, bytes]]:
-    """Of each form, a label file and what it holds; tests damage the file."""
-    paths = {form: write(fresh(tmp_path_factory), SCENE) for form, write in WRITERS.items()}
-    return {form: (path, path.read_bytes()) for form, path in paths.items()}
-
-
-@pytest.mark.parametrize("form", FORMS)
-@settings(max_examples=25)
-@given(data=st.data())
-def test_damaged_labels_are_labels_or_a_truth_error(
-    written: dict[str, tuple[Path, bytes]], form: str, data: st.DataObject
-) -> None:
-    path, content = written[form]
-    at = data.draw(st.integers(0, len(content)))
-    end = data.draw(st.integers(at, min(len(content), at + 12)))
-    damage = data.draw(st.text(st.characters(exclude_categories=["Cs"]), max_size=6))
-    path.write_bytes(content[:at] + damage.encode() + content[end:])
-    words = ""
-    try:
-        read_labelled_images(path.parent if form == "COCO" else path.parents[1])
-    except TruthError as error:
-        words = str(error)
-    assert words.isprintable()

@@ -61,6 +61,10 @@ def test_a_rate_gives_times_to_frames_without() -> None:
     assert [frame.time for frame in timed] == [0.5, 0.5]
 
 
+def test_frames_ascend_where_a_set_of_their_numbers_does_not() -> None:
+    assert [frame.index for frame in SavedTracks((), (7, 8))] == [7, 8]
+
+
 def test_blank_lines_count() -> None:
     assert list(numbered_lines(Path("a"), b"a\r\n\r\n b \nc")) == [(1, "a"), (3, "b"), (4, "c")]
 

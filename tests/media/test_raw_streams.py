@@ -49,9 +49,3 @@ def test_a_stream_without_a_rate_has_that_of_the_settings(
     assert read(path, given) == ([number / rate for number in range(30)], rate, 30 / rate)
     assumed = f"{path}: 25 frames per second are assumed; set input.frame_rate"
     assert warnings() == [assumed] * (given is None)
-
-
-def test_a_rate_for_a_video_with_times_is_rejected(tmp_path: Path) -> None:
-    path = write_clip(tmp_path / "clip.mp4")
-    with pytest.raises(VideoError, match="has a frame rate of its own; remove input"):
-        read(path, 25)

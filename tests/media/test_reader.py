@@ -15,9 +15,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from clips import ODD, read_number, write_clip
-from vdet.config.schema import InputSettings
 from vdet.errors import VideoError
-from vdet.media import Frame
 from vdet.media.frame import Coding, ColorTags
 from vdet.media.images import Orientation
 from vdet.media.reader import VideoReader, next_time
@@ -25,31 +23,8 @@ from vdet.media.reader import VideoReader, next_time
 Image = NDArray[np.uint8]
 Warnings = Callable[[], list[str]]
 GOPS: dict[str, Any] = {"options": {"g": "10", "bf": "2"}, "count": 60}
-DAMAGED: dict[str, dict[str, Any]] = {
-    "mp4": {"movflags": "+faststart"},
-    "webm": {"codec": "libvpx-vp9", "options": {"deadline": "realtime", "g": "10"}},
-    "mkv": {"codec": "libsvtav1", "options": {"preset": "12", "g": "10"}},
-    "avi": {"codec": "mpeg4", "options": {"g": "10", "bf": "2", "q": "2"}},
-    "ts": {"codec": "libx264"},
-}
 TICK = Fraction(1, 1000)
 PERIOD = Fraction(1, 25)
-TOLERANT = InputSettings(max_damaged=1)
-
-
-def overwrite(path: Path, places: int, size: int = 40) -> None:
-    """Write noise to some places in the last two thirds of a file."""
-    data = bytearray(path.read_bytes())
-    rng = np.random.default_rng(0)
-    for place in np.linspace(0.7, 0.4, places) * len(data):
-        data[int(place) : int(place) + size] = rng.bytes(size)
-    path.write_bytes(data)
-
-
-def read_damaged(path: Path) -> tuple[list[Frame], int]:
-    """Return the frames, and how many were damaged or lost."""
-    with VideoReader(path, settings=TOLERANT) as reader:
-        return list(reader), reader.damaged
 
 
 def cut_off(path: Path, fraction: float) -> Path:
@@ -328,26 +303,6 @@ class TestFaults:
         path = cut_off(write_clip(tmp_path / "cut.mp4", **GOPS), 0.3)
         with pytest.raises(VideoError, match=r"cut\.mp4: .* is not a video, or was cut off"):
             VideoReader(path)
-
-    @pytest.mark.parametrize("kind", DAMAGED)
-    def test_damage_is_counted_and_every_run_gives_the_same_frames(
-        self, kind: str, tmp_path: Path, warnings: Warnings
-    ) -> None:
-        path = write_clip(tmp_path / f"damaged.{kind}", **(GOPS | DAMAGED[kind]))
-        overwrite(path, 4 if kind == "mp4" else 2)
-        frames, damaged = read_damaged(path)
-        again, _ = read_damaged(path)
-        for one, other in zip(frames, again, strict=True):
-            assert one.time == other.time
-            np.testing.assert_array_equal(one.image, other.image)
-        (warning,) = set(warnings())
-        if kind == "webm":  # the rest of the file cannot be read
-            assert warning == f"{path}: ends early: {len(frames)} of 60 frames could be read"
-            return
-        unseen = 2 if kind == "ts" else 0  # packets that are missing whole
-        assert 0 <= 60 - len(frames) - unseen <= damaged
-        assert damaged > 0
-        assert f"{path}: {damaged} of " in warning
 
 
 def test_pixels_that_cannot_be_converted_are_one_error(

@@ -41,13 +41,3 @@ def test_numbers_may_rise_by_a_step_and_an_assumed_rate_is_reported(
     assert_whole(shown, [6, 9, 12, 15])
     (warning,) = shown.warnings
     assert "25 images per second are assumed" in warning
-
-
-def test_a_damaged_picture_is_counted_as_lost(tmp_path: Path, process: Process) -> None:
-    pattern = write_pictures(tmp_path / "%d.png", range(30))
-    (tmp_path / "20.png").write_text("no picture")
-    shown = process(pattern)
-    assert len(shown.images) == 29
-    assert shown.times[20] == Fraction(21, 25)
-    (warning,) = shown.warnings
-    assert "%d.png: 1 of 30 frames damaged or lost" in warning

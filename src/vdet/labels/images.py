@@ -64,7 +64,7 @@ class LabelledImage:
 class LabelledImages:
     """Labelled images of one source.
 
-    `name` is shown in tables. `omitted` are the labels that are neither vehicles nor ignore regions,
+    `name` is shown in tables. `omitted` are labels that are neither vehicles nor ignore regions,
     whose boxes are omitted; `ignored` are the labels of ignore regions. Both have the number of
     boxes of each label, the most frequent first.
     """

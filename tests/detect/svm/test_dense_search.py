@@ -9,9 +9,9 @@ import pytest
 
 from vdet.boxes import Image
 from vdet.config.detector import FeatureSettings, HogSettings
-from vdet.detect.svm.features import FeatureExtractor, split
+from vdet.detect.svm.features import FeatureExtractor
 from vdet.detect.svm.model import BoxRegression, LinearModel
-from vdet.detect.svm.search import Blocks, DenseSearch, FramePyramid, Gradients, table_sums
+from vdet.detect.svm.search import DenseSearch, FramePyramid
 from vdet.detect.svm.windows import WINDOW_SIDES, WindowGrid
 from vdet.media import Picture
 
@@ -53,40 +53,3 @@ def test_the_sides_in_a_hit_are_those_of_its_hog_features(size: int, step: int) 
         np.testing.assert_allclose(probabilities[hits], expected, atol=1e-5)
     assert len(np.unique(sides[hits].round(4))) > 8
     np.testing.assert_array_equal(sides[~hits], np.tile(WINDOW_SIDES, (17, 1)))
-
-
-NOISE = np.random.default_rng(0).integers(0, 256, (96, 160, 3), dtype=np.uint8)
-HALVED = FEATURES.model_copy(update={"halved": (1, 2)})
-X, Y = np.array([0, 16, 40, 96]), np.array([32, 0, 8, 24])
-
-
-@pytest.mark.parametrize("features", [FEATURES, HALVED], ids=["full", "halved"])
-@pytest.mark.parametrize("engine", [Blocks, Gradients])
-def test_a_window_has_the_hog_of_its_patch_and_its_weighted_sum(
-    engine: type[Blocks | Gradients], features: FeatureSettings
-) -> None:
-    hog = engine(split(NOISE, features), features)
-    vectors = hog.vectors(X, Y)
-    assert vectors.shape == (4, features.hog_length)
-    for x, y, vector in zip(X, Y, vectors, strict=True):
-        # inside a window, gradients do not depend on what is around it
-        patch = FeatureExtractor(features).describe(NOISE[y : y + 64, x : x + 64])
-        ours, expected = (
-            item[: features.hog_length].reshape(3, 7, 7, -1)[:, 1:-1, 1:-1]
-            for item in (vector, patch)
-        )
-        np.testing.assert_allclose(ours, expected, atol=1e-5)
-    weights = np.random.default_rng(1).normal(size=(2, features.hog_length)).astype(np.float32)
-    np.testing.assert_allclose(hog.values(weights, X, Y), vectors @ weights.T, atol=1e-3)
-
-
-@pytest.mark.parametrize("features", [FEATURES, HALVED], ids=["full", "halved"])
-def test_a_window_sums_the_weights_of_its_histogram(features: FeatureSettings) -> None:
-    strip = split(NOISE, features)
-    weights = np.random.default_rng(1).normal(size=(2, 3, 32)).astype(np.float32)
-    sums = table_sums(strip, np.repeat(weights, 8, axis=2), features, X, Y)
-    assert sums.shape == (4, 2)
-    assert sums.dtype == np.float32
-    for x, y, values in zip(X, Y, sums, strict=True):
-        counts = FeatureExtractor(features).describe(NOISE[y : y + 64, x : x + 64])[-96:]
-        np.testing.assert_allclose(values, weights.reshape(2, 96) @ counts, atol=1e-2)

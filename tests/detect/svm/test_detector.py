@@ -1,6 +1,5 @@
 """What the linear model detects in drawn pictures and videos, and how the settings change it."""
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -163,15 +162,3 @@ class TestHorizon:
         assert line.startswith(f"{level} no horizon found: 0.58 of the hei")
         assert "set detector.search.perspective.horizon" in line
         assert "lies" not in line
-
-
-def test_one_loaded_model_serves_frames_of_any_size() -> None:
-    model = SvmModel(replace(MODEL), DEFAULT)
-    for width, height in ((WIDTH, HEIGHT), (2 * WIDTH, 2 * HEIGHT)):
-        image = np.zeros((height, width, 3), np.uint8)
-        detector, picture = model.for_video(width, height, [image]), Picture(image)
-        assert len(detector.detect(detector.search(picture, 0))) == 0
-        assert trace_of(detector.detect(detector.search(picture, 1))).heat.values.shape == (
-            height // 4,
-            width // 4,
-        )

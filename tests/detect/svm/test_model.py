@@ -117,22 +117,11 @@ def test_a_file_that_is_not_a_zip_file_is_no_model(path: Path, data: bytes) -> N
         load_model(path)
 
 
-def test_a_model_cut_off_anywhere_is_damaged(path: Path) -> None:
-    save_model(model_of(3), path)
-    whole = path.read_bytes()
-    for length in range(0, len(whole), 37):
-        path.write_bytes(whole[:length])
-        with pytest.raises(ModelError, match="damaged"):
-            load_model(path)
-
-
 @pytest.mark.parametrize(
     ("header", "message"),
     [
         (header_of(format="something else"), "is not a vdet model"),
         (b"{not json", "is not a vdet model"),
-        (b"\xff\xfe\xff", "is not a vdet model"),
-        (b"[" * 100_000, "is not a vdet model"),
         (header_of(version=1), r"of version 1, not 2; train it again"),
         (header_of(version=[1]), r"of version \[1\]"),
         (header_of(features={"patch": 63}), "is not a vdet model, or is damaged"),
@@ -164,10 +153,6 @@ def test_a_model_without_one_of_its_parts_is_damaged(path: Path, missing: str) -
         ("biases", np.zeros(2, "S4"), "biases are damaged"),
         ("box_weights", np.zeros((4, 95), np.float32), r"or not of shape \(4, 96\); train it"),
         ("box_biases", np.array([0, 0, np.inf, 0], np.float32), "box_biases are damaged"),
-        ("slopes", np.zeros(2, ">f4"), "slopes are damaged"),
-        ("slopes", np.array([np.nan, 0], np.float32), "slopes are damaged"),
-        ("offsets", np.float32(0), "offsets are damaged"),
-        ("offsets", np.array([-np.inf, 0], np.float32), "offsets are damaged"),
     ],
 )
 def test_an_array_that_does_not_fit_is_refused(

@@ -91,19 +91,6 @@ class TestSearching:
         assert found.probabilities.dtype == found.weights.dtype == np.float32
         assert len(np.unique(found.probabilities)) > len(found) / 2
 
-    def test_what_lies_beyond_the_sides_repeats_the_outermost_columns(self) -> None:
-        wide = np.pad(FRAME, ((0, 0), (24, 24), (0, 0)), mode="edge")
-        sizes = tuple(size * 160 / 208 for size in PERSPECTIVE.search.perspective.sizes)
-        search = SearchSettings(perspective=PerspectiveSettings(sizes=sizes))
-        settings = PERSPECTIVE.model_copy(update={"search": search})
-        found = search_all(SvmDetector(model_of(SMALL), settings, 208, 120, horizon=0.3), wide)
-        moved = (found.boxes - [24, 0, 0, 0]).tolist()
-        expected = dict(zip(map(tuple, moved), found.probabilities.tolist(), strict=True))
-        ours = search_all(by_perspective())
-        assert ours.boxes[:, 0].min() == -24
-        for box, probability in zip(ours.boxes.tolist(), ours.probabilities.tolist(), strict=True):
-            assert expected[tuple(box)] == pytest.approx(probability, abs=1e-5)
-
 
 class TestVehicles:
     def test_without_a_regression_vehicles_are_the_windows(self) -> None:

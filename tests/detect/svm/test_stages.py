@@ -3,15 +3,13 @@
 import numpy as np
 import pytest
 
-from boxing import moved_to
-from red_cars import CAR, HEIGHT, PERSPECTIVE, SCALE, SETTINGS, WIDTH, red_finder, road
+from red_cars import CAR, SCALE, SETTINGS, red_finder, road
 from vdet.boxes import Image
 from vdet.config.detector import WindowSettings
 from vdet.config.schema import SvmSettings
 from vdet.config.section import scale_lengths
 from vdet.detect.svm.detector import SvmModel, blend_heat
 from vdet.detect.svm.heat import Heat
-from vdet.draw.boxes import color_of
 from vdet.media import Picture
 
 NAMES = ["windows", "hits", "heat"]
@@ -43,18 +41,6 @@ def test_every_window_set_has_a_grid_of_its_own_colour() -> None:
     one, two = colors(ROWS), colors(more)
     assert any(max(color) == 255 for color in one)
     assert sum(max(color) == 255 for color in two) > sum(max(color) == 255 for color in one)
-
-
-@pytest.mark.parametrize("x", [-40, 20, WIDTH - 40])
-def test_windows_beyond_the_sides_are_drawn_as_far_as_they_are_visible(x: int) -> None:
-    image = road(moved_to(CAR, x, CAR.y1).clipped(WIDTH, HEIGHT))
-    pictures = pictures_of(image, PERSPECTIVE.svm)
-    assert list(pictures) == NAMES
-    for name in NAMES:
-        assert pictures[name].shape == image.shape
-    for number in (0, 1):
-        rows = (pictures["windows"] == color_of(number)).all(axis=2).any(axis=1)
-        assert rows.sum() > 6
 
 
 class TestHeat:

@@ -4,8 +4,6 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from boxing import moved_to
 from vdet.boxes import Box, from_xywh
@@ -148,28 +146,3 @@ class TestCollecting:
         assert len(kept.position) == MAX_VOTES
         assert kept.position.min() == 0.1
         assert (np.diff(kept.boxes[:, 0]) > 0).all()
-
-
-some_votes = st.lists(  # no two of equal weight, because their order would matter
-    st.tuples(
-        st.floats(-50, 400),
-        st.floats(-50, 300),
-        st.floats(4, 200),
-        st.floats(4, 200),
-        st.floats(0.01, 1),
-    ),
-    min_size=1,
-    max_size=25,
-    unique_by=lambda vote: vote[4],
-)
-
-
-@given(some_votes)
-def test_boxes_lie_within_the_hull_of_the_votes(votes: list[Vote]) -> None:
-    table = np.array(votes)
-    (left, top), (right, bottom) = table[:, :2].min(axis=0), (table[:, :2] + table[:, 2:4]).max(0)
-    found = split(votes, minimum=0)
-    for box in boxes(found):
-        assert left - 1 <= box.x1 < box.x2 <= right + 1
-        assert top - 1 <= box.y1 < box.y2 <= bottom + 1
-    assert found
