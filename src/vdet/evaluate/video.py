@@ -118,9 +118,10 @@ def evaluate_video(
     truth = truth.until(frames)
     if settings.regions:
         regions = Regions(settings.regions, info.width, info.height)
-        outside = [not regions.contains(Box.of(label.box).foot) for label in truth.labels]
-        flagged = zip(truth.labels, outside, strict=True)
-        true_labels = [label._replace(ignored=label.ignored or out) for label, out in flagged]
+        true_labels = [
+            label if regions.contains(Box.of(label.box).foot) else label._replace(ignored=True)
+            for label in truth.labels
+        ]
         truth = replace(truth, labels=tuple(true_labels))
     comparison = compare(SavedTracks(tuple(labels)), truth)
     return ClipResult(str(video), comparison, frames, video)

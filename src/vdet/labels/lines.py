@@ -22,14 +22,7 @@ from pydantic.dataclasses import dataclass
 from vdet.config.camera import parse_date_time
 from vdet.errors import TruthError
 from vdet.labels.formats import VIDEO, Format
-from vdet.labels.label import (
-    Label,
-    SavedFinding,
-    SavedTracks,
-    SourceVideo,
-    from_size,
-    line_error,
-)
+from vdet.labels.label import Label, SavedFinding, SavedTracks, SourceVideo, from_size, line_error
 from vdet.labels.parsing import (
     LIMIT,
     Index,

@@ -18,13 +18,7 @@ from av.video.stream import VideoStream
 
 from vdet.errors import ImageError, VideoError
 from vdet.media.frame import Coding, ColorTags, Tags, VideoInfo
-from vdet.media.images import (
-    ASSUMED_RATE,
-    Orientation,
-    numbered_images,
-    read_encoded,
-    read_header,
-)
+from vdet.media.images import ASSUMED_RATE, Orientation, numbered_images, read_encoded, read_header
 
 MAX_PIXELS = 8192 * 4608
 """Maximum for a frame. 8K video, in both widths, has fewer; a damaged header may claim more."""

@@ -227,10 +227,10 @@ class VideoSource:
     first: int = 1
     last: int | None = None
 
-    def frames(
-        self, model: SvmModel, settings: Settings, progress: Progress
-    ) -> Iterator[tuple[Frame, Windows, list[Label]]]:
-        """Yield the frames to use, with their windows and their labels.
+    def choose(
+        self, model: SvmModel, settings: Settings, limits: MiningLimits, progress: Progress
+    ) -> Iterator[tuple[Frame, list[ChosenWindow]]]:
+        """Yield the frames to use, with the windows that become patches.
 
         `progress` receives the number of frames read.
 
@@ -248,17 +248,18 @@ class VideoSource:
         regular, labels_by_frame = truth.spread(self.every, self.first, last), truth.by_frame()
         number = 0
         with VideoReader(self.path, frames=last, settings=settings.input) as reader:
-            info, advance = reader.info, progress(last)
+            width, advance = reader.info.width, progress(last)
             images, frames = peek(reader)
             with named_errors(self.path, VideoError):
-                detector = model.for_video(info.width, info.height, images)
+                detector = model.for_video(width, reader.info.height, images)
             for frame in frames:
                 number = frame.index + 1
                 labels = labels_by_frame.get(number, [])
-                cuts_off = any(cut_sides(box, info.width).any() for box in _vehicles(labels))
+                cuts_off = any(cut_sides(box, width).any() for box in _vehicles(labels))
                 if number in regular or (number >= self.first and cuts_off):
                     windows, _ = detector.search(Picture(frame.image), None)
-                    yield frame, windows, labels
+                    rng = np.random.default_rng(frame.index)
+                    yield frame, list(choose_windows(windows, labels, width, rng, limits=limits))
                 advance(1)
         if number < last:
             truth.check_end(self.path, number)
@@ -314,10 +315,9 @@ def mine(
     with patch_archive(output, overwrite=overwrite) as add:
         for stem, source in zip(names, sources, strict=True):
             progress = partial(steps, source.path.name)
-            for frame, windows, labels in source.frames(model, settings, progress):
+            for frame, windows in source.choose(model, settings, limits, progress):
                 searched += 1
-                rng, width = np.random.default_rng(frame.index), frame.picture.width
-                for chosen in choose_windows(windows, labels, width, rng, limits=limits):
+                for chosen in windows:
                     x, y, side, _ = chosen.box.xywh
                     patch = resize(cut_window(frame.image, x, y, side, side), PATCH, PATCH)
                     folder = _FOLDERS[chosen.kind].format(stem)

@@ -68,12 +68,7 @@ class RulesTracker:
         self._unused: list[Region] = []
         self._ids = count(1)
 
-    def update(
-        self,
-        detections: Boxes,
-        time: float,  # noqa: ARG002 - the rules count frames
-        picture: Picture | None = None,
-    ) -> list[Track]:
+    def update(self, detections: Boxes, time: float, picture: Picture | None = None) -> list[Track]:  # noqa: ARG002 - the rules count frames
         """Follow the cars into the next frame, as `VideoTracker.update`; `picture` is required."""
         if picture is None:
             raise ArgumentError("image: the rules tracker needs the frame; pass it")
