@@ -14,8 +14,7 @@ from red_cars import CAR, HEIGHT, PERSPECTIVE, WIDTH, drive, road
 from run.red_runs import follow, write
 from vdet.config.schema import MotionTrackerSettings, NetworkSettings, SvmSettings
 from vdet.detect.onnx.detector import NetworkDetector
-from vdet.detect.onnx.preparation import InputForm
-from vdet.detect.onnx.recognition import RawBoxes, Recognized
+from vdet.detect.onnx.recognition import InputForm, RawBoxes, Recognized
 from vdet.errors import ModelError, OutputError
 from vdet.media import Frame, Picture
 from vdet.run.loop import Pipeline

@@ -8,7 +8,7 @@ import pytest
 
 from codings import in_any_coding
 from vdet.boxes import Float64Array
-from vdet.detect.onnx.preparation import InputForm, Placement
+from vdet.detect.onnx.recognition import InputForm, Placement
 from vdet.media import Picture, Planes
 from vdet.media.frame import Coding
 from vdet.synthetic.render import Renderer
