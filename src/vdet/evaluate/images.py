@@ -76,7 +76,7 @@ class MeasuredImage:
             for number, box in enumerate(boxes)
         ]
         detected = [label._replace(ignored=_width(label) < minimum) for label in detected]
-        shown = [label for label in detected if label.score >= counting.minimum(label.class_name)]
+        shown = [label for label in detected if label.score >= counting.minimum(label.name)]
         every, counted = (compare_frames({1: labels}, {1: truth}) for labels in (detected, shown))
         return cls(image, every, counted)
 
