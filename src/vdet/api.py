@@ -442,14 +442,12 @@ def _choose(
 def _with_detector(settings: Settings, name: str) -> Settings:
     """Return settings for a kind of detector, or for a model file, which decides the kind."""
     kind = kind_of_model(Path(name))
-    section = settings.detector
-    if kind is None or section.kind != kind:
-        chosen = load_layers(detector=kind or name)
-        section = chosen.detector
-        if settings.tracker == Settings().tracker:
-            settings = settings.model_copy(update={"tracker": chosen.tracker})
-    if kind is not None:
-        section = section.model_copy(update={"model": name})
+    if kind != settings.detector.kind:
+        explicit = {key: getattr(settings, key) for key in settings.model_fields_set - {"detector"}}
+        settings = load_layers(detector=kind or name).model_copy(update=explicit)
+    if kind is None:
+        return settings
+    section = settings.detector.model_copy(update={"model": name})
     return settings.model_copy(update={"detector": section})
 
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @command()
-@click.argument("tracks", nargs=-1, required=True, type=options.INPUT, metavar="TRACKS...")
+@click.argument("tracks", nargs=-1, required=True, type=options.PATH, metavar="TRACKS...")
 @options.counts_option
 @options.flows_option
 @options.interval_option

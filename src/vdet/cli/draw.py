@@ -15,7 +15,7 @@ from vdet.files import staged
 
 
 @command()
-@click.argument("clip", type=options.INPUT, metavar="CLIP")
+@click.argument("clip", type=options.PATH, metavar="CLIP")
 @options.output_file(
     "-o",
     "--output",

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @command()
-@click.argument("data", nargs=-1, required=True, type=options.INPUT, metavar="DATA...")
+@click.argument("data", nargs=-1, required=True, type=options.PATH, metavar="DATA...")
 @click.option(
     "--min-width",
     type=click.FloatRange(0, 1),
@@ -65,8 +65,8 @@ def images(
 
 
 @command()
-@click.argument("prediction", type=options.INPUT, metavar="PRED")
-@click.argument("truth", type=options.INPUT, metavar="TRUTH")
+@click.argument("prediction", type=options.PATH, metavar="PRED")
+@click.argument("truth", type=options.PATH, metavar="TRUTH")
 @options.until_option
 @options.settings_options()
 @results_options
@@ -95,7 +95,7 @@ def tracks(
 
 
 @command()
-@click.argument("videos", nargs=-1, required=True, type=options.INPUT, metavar="IN...")
+@click.argument("videos", nargs=-1, required=True, type=options.PATH, metavar="IN...")
 @options.truths_option
 @options.until_option
 @options.model_option
@@ -141,8 +141,8 @@ def video(
 
 
 @command()
-@click.argument("events", type=options.INPUT, metavar="OUT")
-@click.argument("truth", type=options.INPUT, metavar="TRUTH")
+@click.argument("events", type=options.PATH, metavar="OUT")
+@click.argument("truth", type=options.PATH, metavar="TRUTH")
 @facts_options
 def counts(events: Path, truth: Path, results: ResultFiles) -> None:
     """Measure counts against counts that were checked and corrected.

@@ -7,7 +7,7 @@ import click
 
 from vdet.cli.command import command
 from vdet.cli.messages import print_lines
-from vdet.cli.options import INPUT, SettingsSource, settings_options
+from vdet.cli.options import PATH, SettingsSource, settings_options
 from vdet.cli.results import ResultFiles, facts_options
 from vdet.errors import ModelError, counted, printable
 from vdet.version import __version__
@@ -24,7 +24,7 @@ _ANY_SIZE = 1000, 1000
 
 
 @command()
-@click.argument("path", type=INPUT, metavar="[FILE]", required=False)
+@click.argument("path", type=PATH, metavar="[FILE]", required=False)
 @facts_options
 @settings_options()
 def info(path: Path | None, source: SettingsSource, results: ResultFiles) -> None:

@@ -25,8 +25,6 @@ Paths = tuple[Path, ...]
 
 PATH = click.Path(path_type=Path)
 """A path; whether it exists is checked later."""
-INPUT = PATH
-"""The path of an input file."""
 POSITIVE = click.IntRange(1, 1_000_000_000)
 PROCESSES = click.IntRange(1, 256)
 """Number of threads or processes."""
@@ -61,7 +59,7 @@ def _parse_sink(text: str) -> Output:
     return Output(name, Path(path))
 
 
-input_file = partial(click.option, type=INPUT, metavar="FILE")
+input_file = partial(click.option, type=PATH, metavar="FILE")
 output_file = partial(click.option, type=PATH, metavar="FILE")
 output_folder = partial(click.option, type=PATH, metavar="DIR")
 output_files = partial(output_file, multiple=True)

@@ -12,7 +12,7 @@ from vdet.run.sinks import Output
 
 
 @command()
-@click.argument("source_path", type=options.INPUT, metavar="IN")
+@click.argument("source_path", type=options.PATH, metavar="IN")
 @options.tracks_from_option(required=True)
 @options.output_folder("-o", "--output", required=True, help="Folder for the page, review.html.")
 @options.start_option

@@ -14,7 +14,7 @@ from vdet.workers import limit_library_threads
 
 
 @command()
-@click.argument("data", nargs=-1, required=True, type=options.INPUT, metavar="DATA...")
+@click.argument("data", nargs=-1, required=True, type=options.PATH, metavar="DATA...")
 @options.output_file("-o", "--output", required=True, help="Model file to write, .npz.")
 @options.settings_options()
 @options.jobs_option(help="Compute features in N threads.")
@@ -49,7 +49,7 @@ def train(
 
 
 @command()
-@click.argument("videos", nargs=-1, required=True, type=options.INPUT, metavar="IN...")
+@click.argument("videos", nargs=-1, required=True, type=options.PATH, metavar="IN...")
 @options.truths_option
 @options.output_file("-o", "--output", required=True, help="Zip file to write.")
 @options.number_option("--every", default=4, help="Use every N-th frame of a video.")
@@ -105,7 +105,7 @@ def mine(
 
 
 @command()
-@click.argument("data", nargs=-1, type=options.INPUT, metavar="[DATA]...")
+@click.argument("data", nargs=-1, type=options.PATH, metavar="[DATA]...")
 @options.output_file("-o", "--output", required=True, help="Network to write, .onnx.")
 @options.input_file(
     "--video",

@@ -4,14 +4,16 @@ The built-in kinds are here, so that reading settings imports no detector. `vdet
 by name, together with those of other packages.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
 from pathlib import Path
 from pkgutil import resolve_name
 from typing import Any
 
 from vdet.config.detector import DetectorSettings, NetworkSettings, SvmSettings
 from vdet.config.tracker import MotionTrackerSettings, RulesTrackerSettings, TrackerSettings
+from vdet.errors import ConfigError
 from vdet.plugins import DETECTORS, TRACKERS, built_in_names, load_plugin
 
 GROUPS = {"detector": DETECTORS, "tracker": TRACKERS}
@@ -36,12 +38,15 @@ class DetectorKind:
         Returns the shipped model file for given settings; None if the kind needs no file.
     model_suffix
         Suffix of its model files, which selects this kind; only for kinds of vdet itself.
+    tracker
+        Defaults of the section `tracker` that differ for this kind.
     """
 
     settings: type[DetectorSettings]
     load: Callable[[Any, Path | None], Any]
     shipped: Callable[[Any], Path | None] = lambda _: None
     model_suffix: str | None = None
+    tracker: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +85,7 @@ SVM = DetectorKind(
     load=_imported("vdet.detect.svm.detector:load_svm"),
     shipped=_imported("vdet.detect.svm.detector:shipped_model"),
     model_suffix=".npz",
+    tracker={"look_ahead": 0.8},
 )
 MOTION = TrackerKind(MotionTrackerSettings, _imported("vdet.track.motion.tracker:MotionTracker"))
 RULES = TrackerKind(RulesTrackerSettings, _imported("vdet.track.rules.tracker:make_rules_tracker"))
@@ -96,6 +102,13 @@ def with_kind(section: str, values: Any) -> Any:
         return values
     kind = (values or {}).get("kind", default_kind(section))
     return load_plugin(GROUPS[section], str(kind)).settings.model_validate(values)
+
+
+def tracker_defaults(detector: Any) -> dict[str, Any]:
+    """Return the `DetectorKind.tracker` of a kind of detector, which may be unknown."""
+    with suppress(ConfigError):
+        return dict(load_plugin(DETECTORS, str(detector)).tracker)
+    return {}
 
 
 def kind_of_model(path: Path) -> str | None:

@@ -14,7 +14,7 @@ from pydantic_core import ErrorDetails
 from vdet.config import document
 from vdet.config.camera import GroundPoint
 from vdet.config.document import Document, Key
-from vdet.config.kinds import GROUPS, default_kind, kind_of_model
+from vdet.config.kinds import GROUPS, default_kind, kind_of_model, tracker_defaults
 from vdet.config.schema import LaneSettings, Section, Settings
 from vdet.config.section import S
 from vdet.config.shapes import FRACTIONS, LineSettings, RegionSettings, Shape, ZoneSettings
@@ -71,12 +71,11 @@ def load_settings(
     for layer in layers:
         if isinstance(model := inside(layer.values, "detector", "model"), str):
             detector = kind_of_model(Path(model)) or detector
-    default = Document("defaults", {"detector": {"kind": detector}} if detector else {})
-    kinds = [detector, *(inside(layer.values, "detector", "kind") for layer in layers)]
-    is_set = any(inside(layer.values, "tracker", "look_ahead") is not None for layer in layers)
-    if [kind for kind in kinds if kind][-1:] == ["svm"] and not is_set:  # its tracker differs
-        default.values["tracker"] = document.read_document(find_config("svm")).values["tracker"]
-    return validated(Settings, reduce(_with_kinds_over, layers, default))
+    chosen = Document("defaults", {"detector": {"kind": detector}} if detector else {})
+    merged = reduce(_with_kinds_over, layers, chosen)
+    kind = inside(merged.values, "detector", "kind") or default_kind("detector")
+    tracker = tracker_defaults(kind)
+    return validated(Settings, _with_kinds_over(Document("defaults", {"tracker": tracker}), merged))
 
 
 def validated(kind: type[S], read: Document) -> S:

@@ -61,9 +61,9 @@ class LaneSettings(Shape):
 
 Code = Literal[
     "camera-moves", "camera-moved", "unexplained-motion", "dark", "haze", "blur", "drops",
-    "lane-geometry", "classes", "small-frames",
+    "lane-geometry", "small-frames",
 ]  # fmt: skip
-"""What makes a result doubtful; docs/conditions.md explains each. `classes` of 1.0.0 is unused."""
+"""What makes a result doubtful; docs/conditions.md explains each."""
 
 
 class ConditionSettings(Section):
