@@ -20,7 +20,6 @@ from vdet.errors import ConfigError, OutputError, printable
 from vdet.files import (
     _HOST,
     OutputFiles,
-    check_output,
     file_ids,
     read_whole,
     staged,
@@ -185,8 +184,8 @@ def test_an_input_is_rejected_as_an_output_under_each_of_its_names(
     inputs = file_ids([tmp_path / "in.json", tmp_path / "missing"])
     for name in ("in.json", "hard.json", "link.json"):
         with pytest.raises(OutputError, match="is the input itself"):
-            check_output(tmp_path / name, overwrite=overwrite, inputs=inputs)
-    check_output(tmp_path / "in.json", overwrite=True)
+            OutputFiles(overwrite=overwrite, inputs=inputs).check(tmp_path / name)
+    OutputFiles(overwrite=True).check(tmp_path / "in.json")
 
 
 def test_no_output_replaces_an_input(tmp_path: Path) -> None:
@@ -217,19 +216,19 @@ def test_what_may_not_be_replaced_is_refused_before_any_work(tmp_path: Path) -> 
     path, pipe = tmp_path / "out.txt", tmp_path / "pipe"
     path.touch()
     os.mkfifo(pipe)
-    check_output(path, overwrite=True)
+    OutputFiles(overwrite=True).check(path)
     with pytest.raises(OutputError, match="already exists; use --overwrite"):
-        check_output(path, overwrite=False)
+        OutputFiles().check(path)
     for overwrite in (True, False):
         with pytest.raises(OutputError, match="is not a regular file and will not be replaced"):
-            check_output(pipe, overwrite=overwrite)
+            OutputFiles(overwrite=overwrite).check(pipe)
 
 
 def test_a_folder_that_the_work_makes_may_be_missing(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
-    check_output(tmp_path / "a" / "b" / "out.txt", overwrite=False, makes_folder=True)
+    OutputFiles().check(tmp_path / "a" / "b" / "out.txt", makes_folder=True)
     with pytest.raises(OutputError, match="file is not a folder"):
-        check_output(tmp_path / "file" / "b" / "out.txt", overwrite=False, makes_folder=True)
+        OutputFiles().check(tmp_path / "file" / "b" / "out.txt", makes_folder=True)
     assert names(tmp_path) == ["file"]
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from running import until
-from vdet.workers import LocalProcesses, call_all, core_count
+from vdet.workers import LocalProcesses, blocked_interrupts, call_all, core_count
 
 
 def process_of(_: int) -> int:
@@ -97,3 +97,22 @@ def test_a_control_group_limits_the_cores(
     assert core_count() == 8
     (tmp_path / "cpu.max").write_text(f"{text}\n")
     assert core_count() == cores
+
+
+def test_ctrl_c_comes_after_the_block_and_never_in_processes_that_start_in_it() -> None:
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    shows_blocked = "import signal; print(signal.pthread_sigmask(signal.SIG_BLOCK, []))"
+    blocked = ""
+
+    def start() -> None:
+        nonlocal blocked
+        with blocked_interrupts():
+            signal.raise_signal(signal.SIGINT)
+            blocked = subprocess.check_output([sys.executable, "-c", shows_blocked], text=True)
+
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            start()
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert "SIGINT" in blocked

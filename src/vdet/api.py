@@ -16,6 +16,7 @@ A name is that of a kind of detector or tracker, from vdet or another package, o
 
 import math
 import os
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -37,12 +38,12 @@ from vdet.detect.protocol import DetectorModel, VideoDetector
 from vdet.errors import ArgumentError, ArgumentTypeError, ImageError, VdetError
 from vdet.evaluate.scores import Scores
 from vdet.evaluate.video import score_files
+from vdet.files import OutputFiles
 from vdet.labels.formats import Format
 from vdet.labels.label import Label, SavedTracks
 from vdet.media import Frame, Picture
 from vdet.media.images import read_image
 from vdet.progress import no_progress, reporting
-from vdet.regions import check_masks
 from vdet.run.images import ImageJob, ImageSearch, run_images
 from vdet.run.inputs import input_files
 from vdet.run.loop import Parts
@@ -261,18 +262,11 @@ def vehicles(
 
     Parameters and errors as for `follow`.
     """
-    results = follow(
-        source,
-        settings=settings,
-        detector=detector,
-        tracker=tracker,
-        steps=steps,
-        start=start,
-        end=end,
-        frames=frames,
+    run, parts = _prepare(
+        source, settings, detector, tracker, steps, start=start, end=end, frames=frames
     )
-    for _ in results:
-        pass
+    results = Results(open_video(run, parts))
+    deque(results, maxlen=0)
     return results.vehicles
 
 
@@ -315,7 +309,6 @@ def detect_video(
     run, parts = _prepare(source, settings, detector, tracker, steps)
     requested = _outputs({"video": video or (), "tracks": tracks, **(outputs or {})})
     run = replace(run, outputs=run.outputs + requested, overwrite=overwrite or run.overwrite)
-    check_masks(run.settings.regions)
     return run_video(run, parts, progress=reporting(progress) if progress else no_progress)
 
 
@@ -335,11 +328,10 @@ def detect_image(
     """
     settings, parts = _choose(settings, detector)
     job = ImageJob(Path(source), _outputs({"image": image or (), **(outputs or {})}))
-    check_masks(settings.regions)
     inputs = input_files(job.source, settings=settings)
-    check_sinks(job.outputs, overwrite=overwrite, inputs=inputs)
-    search = ImageSearch(parts.model, settings)
-    (result,) = run_images([job], (), search, overwrite=overwrite, inputs=inputs)
+    files = OutputFiles(overwrite=overwrite, inputs=inputs)
+    check_sinks(job.outputs, files)
+    (result,) = run_images([job], (), ImageSearch(parts.model, settings), files)
     if isinstance(result, ImageError):
         raise result
     return result.detections

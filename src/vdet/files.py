@@ -7,6 +7,7 @@ killed run are removed by the next run on the same host.
 """
 
 import contextlib
+import fcntl
 import json
 import os
 import platform
@@ -14,14 +15,12 @@ import re
 import shutil
 import stat
 import sys
-from collections.abc import Callable, Container, Iterable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path, PurePath
 from typing import Any, Self
 
 from vdet.errors import OutputError, VdetError
-from vdet.system import locked_folder
 
-_CHUNK = 1_000_000  # bytes
 _HOST = re.sub(r"[^a-z0-9]", "", platform.node().lower())[:16]
 _TEMPORARY = re.compile(rf"\.vdet-{_HOST}-[0-9a-f]{{16}}")
 _ASIDE = ".older"  # folder in a temporary one, for files that are replaced
@@ -42,49 +41,6 @@ def _id(path: Path) -> tuple[int, int] | None:
     except OSError:  # it does not exist
         return None
     return status.st_dev, status.st_ino
-
-
-def check_output(
-    path: Path, *, overwrite: bool, makes_folder: bool = False, inputs: FileIds = NO_FILES
-) -> None:
-    """Check that an output can be written, before any work is done.
-
-    Parameters
-    ----------
-    makes_folder
-        The folder of the output is created later if it is missing.
-    inputs
-        The files that are read: see `vdet.run.inputs`.
-
-    Raises
-    ------
-    OutputError
-        `path` is an input, a folder, or already exists (without `overwrite`), or its folder cannot
-        be written to.
-    """
-    if os.path.isdir(path):  # noqa: PTH112  # a name that is too long fails later
-        raise OutputError(f"{path}: is a folder; use the name of a file")
-    folder = path.parent
-    if makes_folder:
-        folder = next((parent for parent in path.parents if os.path.exists(parent)), folder)  # noqa: PTH110
-    if os.path.lexists(path):
-        _check_replaceable(path, inputs)
-        if not overwrite:
-            raise OutputError(f"{path}: already exists; use --overwrite to replace it")
-    if not folder.is_dir():
-        problem = "is not a folder" if folder.exists() else "does not exist; create it first"
-        raise OutputError(f"{path}: the folder {folder} {problem}")
-    if not os.access(folder, os.W_OK):
-        raise OutputError(f"{path}: the folder {folder} cannot be written to")
-
-
-def _check_replaceable(path: Path, inputs: FileIds) -> None:
-    if _id(path) in inputs:
-        raise OutputError(f"{path}: is the input itself; use another output")
-    if not (path.is_file() or path.is_symlink()):
-        raise OutputError(
-            f"{path}: is not a regular file and will not be replaced; use another output"
-        )
 
 
 def make_folder(folder: Path) -> None:
@@ -124,6 +80,56 @@ class OutputFiles:
         self._is_earlier: dict[Path, Callable[[Path], bool]] = {}
         self._new_folders: list[Path] = []  # outermost first
         self._cleanup = contextlib.ExitStack()
+
+    def check(
+        self,
+        path: Path,
+        *,
+        suffixes: Sequence[str] = (),
+        noun: str = "outputs",
+        makes_folder: bool = False,
+    ) -> None:
+        """Check that an output can be written, before any work is done.
+
+        Parameters
+        ----------
+        suffixes
+            Allowed suffixes of its name, lower case; empty for any.
+        noun
+            Noun for such outputs in messages.
+        makes_folder
+            The folder of the output is created later if it is missing.
+
+        Raises
+        ------
+        OutputError
+            `path` has another suffix, is an input, a folder, or already exists (without
+            `overwrite`), or its folder cannot be written to.
+        """
+        if suffixes and path.suffix.lower() not in suffixes:
+            raise OutputError(f"{path}: {noun} must end in {', '.join(suffixes)}")
+        if os.path.isdir(path):  # noqa: PTH112  # a name that is too long fails later
+            raise OutputError(f"{path}: is a folder; use the name of a file")
+        folder = path.parent
+        if makes_folder:
+            folder = next((parent for parent in path.parents if os.path.exists(parent)), folder)  # noqa: PTH110
+        if os.path.lexists(path):
+            self._check_replaceable(path)
+            if not self._overwrite:
+                raise OutputError(f"{path}: already exists; use --overwrite to replace it")
+        if not folder.is_dir():
+            problem = "is not a folder" if folder.exists() else "does not exist; create it first"
+            raise OutputError(f"{path}: the folder {folder} {problem}")
+        if not os.access(folder, os.W_OK):
+            raise OutputError(f"{path}: the folder {folder} cannot be written to")
+
+    def _check_replaceable(self, path: Path) -> None:
+        if _id(path) in self._inputs:
+            raise OutputError(f"{path}: is the input itself; use another output")
+        if not (path.is_file() or path.is_symlink()):
+            raise OutputError(
+                f"{path}: is not a regular file and will not be replaced; use another output"
+            )
 
     def stage(self, path: Path) -> Path:
         """Return an empty temporary file of the same name that will become `path`.
@@ -201,7 +207,7 @@ class OutputFiles:
                 with file.open("rb+") as written:
                     os.fsync(written.fileno())
                 if self._overwrite and os.path.lexists(path):
-                    _check_replaceable(path, self._inputs)
+                    self._check_replaceable(path)
                     older.append(path)
                     if not path.is_symlink():
                         file.chmod(stat.S_IMODE(path.stat().st_mode))
@@ -266,16 +272,45 @@ def _make_temporary(parent: Path, cleanup: contextlib.ExitStack) -> Path:
         parent.mkdir(parents=True, exist_ok=True)  # a failed run may have removed it
         with contextlib.suppress(FileNotFoundError, BlockingIOError):  # removed as stale
             folder.mkdir(0o700)  # private content stays private while it is written
-            cleanup.enter_context(locked_folder(folder))
+            cleanup.enter_context(_locked_folder(folder))
             folder.lstat()
             return folder
+
+
+def lock(descriptor: int) -> bool:
+    """Lock a file for this process until it is closed.
+
+    Returns False where files have no locks: on some network disks.
+
+    Raises
+    ------
+    BlockingIOError
+        Another process has locked it.
+    """
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise
+    except OSError:
+        return False
+    return True
+
+
+@contextlib.contextmanager
+def _locked_folder(folder: Path) -> Iterator[bool]:
+    """Lock a folder for a `with` block; yield whether it is locked. Errors are those of `lock`."""
+    descriptor = os.open(folder, os.O_RDONLY | os.O_NOFOLLOW | os.O_DIRECTORY)
+    try:
+        yield lock(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def remove_stale(folder: Path) -> None:
     """Remove the temporary folders in `folder` whose writers have ended."""
     with contextlib.suppress(OSError):
         for name in filter(_TEMPORARY.fullmatch, os.listdir(folder)):  # noqa: PTH208  # thousands
-            with contextlib.suppress(OSError), locked_folder(folder / name) as is_locked:
+            with contextlib.suppress(OSError), _locked_folder(folder / name) as is_locked:
                 if is_locked:
                     shutil.rmtree(folder / name)
 
@@ -350,14 +385,11 @@ def read_whole(path: Path, *, limit: int, what: str, error: type[VdetError]) -> 
     error
         Type of the error to raise if the file cannot be read, or is larger.
     """
-    data = bytearray()
     try:
         with path.open("rb") as file:
-            # A single read would set memory aside for all of `limit`.
-            while len(data) <= limit and (chunk := file.read(min(_CHUNK, limit + 1 - len(data)))):
-                data += chunk
+            data = file.read(limit + 1)
     except OSError as fault:
         raise error(f"{path}: cannot be read: {fault.strerror}") from fault
     if len(data) > limit:
         raise error(f"{path}: is larger than {limit:,} bytes, too large for a {what}")
-    return bytes(data)
+    return data

@@ -4,6 +4,7 @@ import contextlib
 import logging
 import math
 import os
+import signal
 import threading
 import time
 import warnings
@@ -14,7 +15,6 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 from vdet.errors import INTERRUPTED, ClusterError, needing
-from vdet.system import blocked_interrupts
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -30,8 +30,7 @@ QUOTA = Path("/sys/fs/cgroup/cpu.max")
 
 def core_count() -> int:
     """Return the number of cores that this process may use, by its affinity and control group."""
-    has_affinity = hasattr(os, "sched_getaffinity")
-    cores = len(os.sched_getaffinity(0)) if has_affinity else os.cpu_count() or 1
+    cores = len(os.sched_getaffinity(0))
     with contextlib.suppress(OSError, ValueError):  # ValueError: "max", no limit
         quota, period = map(int, QUOTA.read_text("utf-8").split())
         return min(cores, math.ceil(quota / period))
@@ -118,6 +117,19 @@ def _call(
             results = parallel(calls)
             stack.callback(_close, results)
         yield from filter(None, results)
+
+
+@contextlib.contextmanager
+def blocked_interrupts() -> Iterator[None]:
+    """Delay Ctrl-C to the end of the block; processes that start in the block never get it."""
+    from multiprocessing.resource_tracker import ensure_running
+
+    ensure_running()  # if it started in the block, it would unblock signals
+    earlier = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, earlier)
 
 
 def _close(results: Generator[Any]) -> None:

@@ -64,7 +64,7 @@ def test_doubts_and_the_size_of_the_frames_are_those_of_the_tracks(
     assert (result.code, result.err) == (0, doubt)
     assert run("count", tracks, "-c", folder / "lines.yaml", "--strict").code == 4
     result = run("count", tracks, "-c", folder / "lines.yaml", "--size", "640x480", code=1)
-    assert result.err.endswith(f"{tracks}: is of 320×240 frames; remove --size\n")
+    assert result.err.endswith(f"{tracks}: is of 320×240 frames, not 640×480\n")
     tracks.write_text(json.dumps(record | {"video": size | {"width": 800}}))
     result = run("count", tracks, "-c", folder / "lines.yaml", code=1)
     assert "for frames of 320×240, whose aspect ratio differs from 800×240" in result.err

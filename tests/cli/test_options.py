@@ -2,15 +2,23 @@
 
 from pathlib import Path
 
+import click
 import pytest
 
 from clips import write_clip
 from conftest import Run
-from vdet.cli.options import SettingsSource
+from vdet.cli.options import SettingsSource, classes_option, model_option, settings_options
 
 
 def test_changes_are_those_of_all_options_also_with_odd_names() -> None:
-    source = SettingsSource((), ("output.crf=18",), {"detector.model": "🚗.onnx", "classes": ()})
+    @click.command()
+    @model_option
+    @classes_option
+    @settings_options(model="detector.model", classes="classes")
+    def command(source: SettingsSource) -> SettingsSource:
+        return source
+
+    source = command.main(["--model", "🚗.onnx", "--set", "output.crf=18"], standalone_mode=False)
     assert source.changes == ("output.crf=18", 'detector.model="🚗.onnx"')
     settings = source.load()
     assert (settings.detector.model, settings.output.crf) == ("🚗.onnx", 18)

@@ -12,6 +12,7 @@ from run.conftest import Register
 from run.red_runs import model_for
 from running import names
 from vdet.errors import ImageError, OutputError
+from vdet.files import OutputFiles
 from vdet.run.images import ImageJob, ImageSearch, find_images, plan_images, run_images
 from vdet.run.result import FrameResult
 from vdet.run.sinks import Output
@@ -57,18 +58,18 @@ class TestPlan:
     def test_one_picture_goes_to_the_file_named(self, tmp_path: Path) -> None:
         source, out = tmp_path / "a.png", tmp_path / "found.jpg"
         expected = ImageJob(source, (Output("image", out),), Path("a.png"))
-        assert plan_images(placed(tmp_path, "a.png"), out, None, overwrite=False) == [expected]
+        assert plan_images(placed(tmp_path, "a.png"), out, None, OutputFiles()) == [expected]
 
     def test_several_keep_their_names_in_the_folder(self, tmp_path: Path) -> None:
         sources = placed(tmp_path, "a.png", "north/a.png")
-        jobs = plan_images(sources, tmp_path / "out", None, overwrite=False)
+        jobs = plan_images(sources, tmp_path / "out", None, OutputFiles())
         assert [job.outputs for job in jobs] == [
             (Output("image", tmp_path / "out" / place),) for place in sources.values()
         ]
 
     def test_stages_of_several_go_into_a_folder_each(self, tmp_path: Path) -> None:
         sources = placed(tmp_path, "a.png", "b.png")
-        jobs = plan_images(sources, None, tmp_path / "stages", overwrite=False)
+        jobs = plan_images(sources, None, tmp_path / "stages", OutputFiles())
         assert [job.outputs for job in jobs] == [
             (Output("stages", tmp_path / "stages" / name),) for name in "ab"
         ]
@@ -77,21 +78,21 @@ class TestPlan:
         sources = placed(tmp_path, "a.png", "b.png")
         touch(tmp_path / "out" / "b.png")
         with pytest.raises(OutputError, match=r"b\.png: already exists"):
-            plan_images(sources, tmp_path / "out", None, overwrite=False)
-        assert len(plan_images(sources, tmp_path / "out", None, overwrite=True)) == 2
+            plan_images(sources, tmp_path / "out", None, OutputFiles())
+        assert len(plan_images(sources, tmp_path / "out", None, OutputFiles(overwrite=True))) == 2
 
     def test_a_file_where_the_folder_should_be_is_refused(self, tmp_path: Path) -> None:
         touch(tmp_path / "out")
         sources = placed(tmp_path, "a.png", "b.png")
         with pytest.raises(OutputError, match=r"the folder .*out is not a folder"):
-            plan_images(sources, tmp_path / "out", None, overwrite=True)
+            plan_images(sources, tmp_path / "out", None, OutputFiles(overwrite=True))
 
 
 def test_a_picture_that_is_too_small_is_named(tmp_path: Path) -> None:
     source, out = tmp_path / "tiny.png", tmp_path / "out.png"
     write_image(source, road(CAR)[:, :20])
     job = ImageJob(source, (Output("image", out),))
-    (found,) = run_images([job], (), ImageSearch(model_for(SETTINGS), SETTINGS))
+    (found,) = run_images([job], (), ImageSearch(model_for(SETTINGS), SETTINGS), OutputFiles())
     assert isinstance(found, ImageError)
     assert "tiny.png: no search window fits" in str(found)
     assert not out.exists()
@@ -135,7 +136,7 @@ class TestSeveral:
     ) -> None:
         shared = [Output("json", tmp_path / "boxes.json")]
         search = ImageSearch(model_for(SETTINGS), SETTINGS)
-        first, failure, last = run_images(jobs, shared, search, threads=threads)
+        first, failure, last = run_images(jobs, shared, search, OutputFiles(), threads=threads)
         assert isinstance(first, FrameResult)
         assert isinstance(last, FrameResult)
         assert "b.png: is not an image" in str(failure)
@@ -150,7 +151,9 @@ class TestSeveral:
         register("fails", SinkKind(Fails))
         shared = [Output("json", tmp_path / "boxes.json"), Output("fails", tmp_path / "fails.txt")]
         with pytest.raises(OutputError, match=r"fails\.txt: cannot be written: No space"):
-            list(run_images(jobs, shared, ImageSearch(model_for(SETTINGS), SETTINGS)))
+            list(
+                run_images(jobs, shared, ImageSearch(model_for(SETTINGS), SETTINGS), OutputFiles())
+            )
         assert self.names(tmp_path) == []
 
     @pytest.mark.usefixtures("jobs")
@@ -159,8 +162,8 @@ class TestSeveral:
         self, tmp_path: Path, is_stopped: bool
     ) -> None:
         sources = placed(tmp_path, "a.png", "c.png")
-        plan = plan_images(sources, tmp_path / "out", tmp_path / "stages", overwrite=False)
-        results = run_images(plan, (), ImageSearch(model_for(SETTINGS), SETTINGS))
+        plan = plan_images(sources, tmp_path / "out", tmp_path / "stages", OutputFiles())
+        results = run_images(plan, (), ImageSearch(model_for(SETTINGS), SETTINGS), OutputFiles())
         next(results)
         assert not list(tmp_path.rglob("out/[a-z]*"))
         if is_stopped:
@@ -183,5 +186,7 @@ class TestSeveral:
         for outputs in ((*first.outputs, fails), (fails, *first.outputs)):
             job = replace(first, outputs=outputs)
             with pytest.raises(OutputError, match=r"fails\.txt: cannot be written: No space"):
-                list(run_images([job], (), ImageSearch(model_for(SETTINGS), SETTINGS)))
+                list(
+                    run_images([job], (), ImageSearch(model_for(SETTINGS), SETTINGS), OutputFiles())
+                )
             assert self.names(tmp_path) == []

@@ -4,7 +4,6 @@ import gc
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from fractions import Fraction
 from itertools import count
 from pathlib import Path
 
@@ -22,14 +21,13 @@ from red_cars import (
     red_model,
     road,
 )
-from run.red_runs import COUNT, follow, outputs, run_red
+from run.red_runs import follow, outputs, run_red
 from running import write_drive
 from vdet.boxes import Image
 from vdet.config.schema import Settings
 from vdet.errors import VdetError, VideoError
 from vdet.media import Frame
 from vdet.media.frame import Planes
-from vdet.media.images import read_image
 from vdet.run import video
 from vdet.run.loop import FIRST_FRAMES, Parts
 from vdet.run.threads import SearchThreads
@@ -127,19 +125,6 @@ class TestRun:
         assert (totals.frames, totals.tracks) == (20, 1)
         assert (totals.width, totals.height) == (WIDTH, HEIGHT)
         assert totals.seconds > 0
-
-    def test_stages_alone_need_only_the_frames_around_their_moment(
-        self, red_clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        monkeypatch.setattr("vdet.run.video.STAGE_MARGIN", Fraction(5, 25))
-        at = Fraction(30, 25)
-        whole = outputs(stages=tmp_path / "whole", tracks=tmp_path / "t.csv")
-        for name, wanted in {"alone": outputs(stages=tmp_path / "alone"), "whole": whole}.items():
-            (tmp_path / name).mkdir()
-            totals = run_red(video.Run(red_clip, wanted, at=at))
-            assert totals.frames == (10 if name == "alone" else COUNT)
-        one, other = (read_image(tmp_path / name / "2-hits.png") for name in ("alone", "whole"))
-        np.testing.assert_array_equal(one, other)
 
 
 def _breaking(method: Callable[..., object], error: BaseException) -> Callable[..., object]:

@@ -13,6 +13,7 @@ from vdet.batch.task import result_digest
 from vdet.boxes import Box
 from vdet.config.schema import Settings
 from vdet.errors import ImageError, VideoError
+from vdet.files import OutputFiles
 from vdet.media.images import read_image
 from vdet.run.images import ImageJob, ImageSearch, run_images
 from vdet.run.sinks import Output
@@ -68,7 +69,7 @@ def test_the_stages_show_the_regions(tmp_path: Path) -> None:
     for name, settings in (("without", SETTINGS), ("with", within())):
         folder = tmp_path / name
         job = ImageJob(tmp_path / "road.png", (Output("stages", folder),))
-        list(run_images([job], (), ImageSearch(model_for(settings), settings)))
+        list(run_images([job], (), ImageSearch(model_for(settings), settings), OutputFiles()))
     assert not list((tmp_path / "without").glob("*regions*"))
     names = sorted(path.name for path in (tmp_path / "with").iterdir())
     assert names[-2:] == ["4-regions.png", "5-boxes.png"]

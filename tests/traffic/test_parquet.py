@@ -11,6 +11,7 @@ from doc_pages import blocks
 from traffic.passing import WIDTH, frame, summarize, track
 from vdet.boxes import Box
 from vdet.errors import PackageError
+from vdet.files import OutputFiles
 from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import check_sinks
 from vdet.traffic.records import join_records, records_content
@@ -74,4 +75,4 @@ def test_without_pyarrow_one_line_says_what_to_install(
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     output = Output("vehicles", tmp_path / "a.parquet")
     with pytest.raises(PackageError, match=r"^pyarrow is not .*its extra .parquet"):
-        check_sinks([output], overwrite=False)
+        check_sinks([output], OutputFiles())

@@ -16,9 +16,8 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from vdet.errors import OutputError
-from vdet.files import output_errors, remove_stale
+from vdet.files import lock, output_errors, remove_stale
 from vdet.run.result import CONDITIONS
-from vdet.system import lock
 from vdet.version import __version__
 
 MANIFEST = "manifest.jsonl"

@@ -18,13 +18,7 @@ from vdet.batch.task import (
 )
 from vdet.detect.factory import load_detector
 from vdet.errors import BatchError, OutputError
-from vdet.files import (
-    OutputFiles,
-    check_output,
-    make_folder,
-    output_errors,
-    remove_stale,
-)
+from vdet.files import OutputFiles, make_folder, output_errors, remove_stale
 from vdet.run.inputs import input_files
 from vdet.run.sinks import Output
 from vdet.run.sinks.protocol import BatchTotal, check_sinks, sink_kind
@@ -90,12 +84,12 @@ def make_plan(
     load_detector(settings.detector)
     sources = find_sources(clips)
     _reject_nested(clips, sources, folder)
-    files = tuple(path.absolute() for path in common.settings_files)
+    settings_files = tuple(path.absolute() for path in common.settings_files)
     runs = [
         replace(
             common,
             settings=settings,
-            settings_files=files,
+            settings_files=settings_files,
             source=source.path,
             outputs=tuple(
                 _named(output, folder / source.relative_path) for output in common.outputs
@@ -110,9 +104,10 @@ def make_plan(
         if (kind := sink_kind(output.sink).total)
     )
     _reject_shared(runs, totals, folder)
-    inputs = input_files(*(source.path for source in sources), *files, settings=settings)
+    videos = (source.path for source in sources)
+    inputs = input_files(*videos, *settings_files, settings=settings)
     manifest, skipped = folder / MANIFEST, []
-    check_output(manifest, overwrite=True, makes_folder=True, inputs=inputs)
+    OutputFiles(overwrite=True, inputs=inputs).check(manifest, makes_folder=True)
     if skip_existing:
         written = outputs_by_path(read_batch(folder))
         all_runs, runs = runs, []
@@ -123,15 +118,17 @@ def make_plan(
                 runs.append(allow_replacing(run, written))
     for run in runs:
         try:
-            check_sinks(run.outputs, overwrite=run.overwrite, makes_folder=True, inputs=inputs)
+            files = OutputFiles(overwrite=run.overwrite, inputs=inputs)
+            check_sinks(run.outputs, files, makes_folder=True)
         except OutputError as error:
             text = str(error).replace(
                 "to replace it", "to replace it, or --skip-existing to keep it"
             )
             raise OutputError(text) from error
     replaces_totals = common.overwrite or (skip_existing and manifest.exists())
+    total_files = OutputFiles(overwrite=replaces_totals, inputs=inputs)
     for total in totals:
-        check_output(total.path, overwrite=replaces_totals, makes_folder=True, inputs=inputs)
+        total_files.check(total.path, makes_folder=True)
     return Plan(folder, tuple(runs), tuple(skipped), totals)
 
 

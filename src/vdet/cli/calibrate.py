@@ -8,7 +8,7 @@ from vdet.cli import options
 from vdet.cli.command import command
 from vdet.cli.messages import LOG, print_lines, progress_steps
 from vdet.errors import counted
-from vdet.files import file_ids
+from vdet.files import OutputFiles, file_ids
 
 
 @command()
@@ -41,8 +41,8 @@ def calibrate(
     if not (3 <= min(pattern) <= max(pattern) <= 999):
         raise click.UsageError("--pattern: must be 3 to 999 inner corners, such as 9x6")
     paths = list(find_images(photos))
-    inputs = file_ids(paths)
-    options.check_file(output, ".yaml", ".yml", noun="cameras", overwrite=overwrite, inputs=inputs)
+    files = OutputFiles(overwrite=overwrite, inputs=file_ids(paths))
+    files.check(output, suffixes=(".yaml", ".yml"), noun="cameras")
     with progress_steps("") as steps:
         steps(f"searching {counted(len(paths), 'photograph')}", None)
         result = fit(paths, pattern)

@@ -83,7 +83,8 @@ def count(
     from vdet.traffic.output import counts_content, flows_content
     from vdet.traffic.tables import write_content
 
-    check_sinks(outputs, overwrite=overwrite, inputs=source.inputs(*tracks, *corrections))
+    files = OutputFiles(overwrite=overwrite, inputs=source.inputs(*tracks, *corrections))
+    check_sinks(outputs, files)
     review = read_corrections(corrections)
     with progress_steps(" files") as steps:
         advance = steps("", len(tracks) if len(tracks) > 1 else None)
@@ -96,7 +97,7 @@ def count(
     found = {event.class_name for result in videos.values() for event in result.events}
     for name in {*our_names(classes)} - {*found, *OUR_NAMES}:
         LOG.warning("--class %s: no vehicle of this class was counted", name)
-    with OutputFiles(overwrite=overwrite) as files:
+    with files:
         for output in outputs:
             content_of = {"counts": counts_content, "flows": flows_content}[output.sink]
             content = content_of(output.path, videos, settings.traffic.seconds)

@@ -10,6 +10,7 @@ from vdet.cli import options
 from vdet.cli.command import command
 from vdet.cli.messages import LOG, announce, print_lines, progress_steps
 from vdet.errors import ImageError, counted, failure_code
+from vdet.files import OutputFiles
 from vdet.run.sinks import Output
 from vdet.workers import IMAGES, core_count, return_freed_memory
 
@@ -64,23 +65,20 @@ def detect_image(
     if settings.lack_of_metres:
         announce(f"vdet: note: {settings.lack_of_metres}")
     from vdet.detect.factory import load_detector
-    from vdet.regions import check_masks
     from vdet.run.images import ImageSearch, find_images, plan_images, run_images
     from vdet.run.sinks.protocol import STANDARD_OUTPUT, check_sinks
 
     return_freed_memory(*IMAGES)
-    check_masks(settings.regions)
     search = ImageSearch(load_detector(settings.detector), settings)
-    files = find_images(images)
+    paths_below = find_images(images)
     outputs = options.requested_outputs(sinks, paths)
-    inputs = source.inputs(*files, settings=settings)
-    check_sinks(outputs, overwrite=overwrite, inputs=inputs)
-    jobs = plan_images(files, output, stages, overwrite=overwrite, inputs=inputs)
+    inputs = source.inputs(*paths_below, settings=settings)
+    files = OutputFiles(overwrite=overwrite, inputs=inputs)
+    check_sinks(outputs, files)
+    jobs = plan_images(paths_below, output, stages, files)
     is_printed = not (output or stages or outputs)
     failed = 0
-    results = run_images(
-        jobs, outputs, search, overwrite=overwrite, inputs=inputs, threads=core_count()
-    )
+    results = run_images(jobs, outputs, search, files, threads=core_count())
     with progress_steps(" images") as steps, closing(results):
         advance = steps("", len(jobs))
         for result in results:

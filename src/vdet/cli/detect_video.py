@@ -1,7 +1,10 @@
-"""`vdet detect-video`: find and follow vehicles in one video, or in many (`vdet.cli.batch`)."""
+"""`vdet detect-video`: find and follow vehicles in one video, or in many."""
 
+import re
 import shlex
 from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import replace
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
@@ -9,15 +12,23 @@ from typing import TYPE_CHECKING
 
 import click
 
-from vdet.cli import batch, options
+from vdet.cli import options
 from vdet.cli.command import command
-from vdet.cli.messages import announce, progress_steps
-from vdet.errors import DOUBTFUL, OutputError, counted
+from vdet.cli.messages import LOG, announce, progress_steps
+from vdet.errors import DOUBTFUL, OutputError, counted, failure_code
 from vdet.files import file_ids
 from vdet.run.sinks import Output
+from vdet.workers import DaskCluster, LocalProcesses, Workers, core_count
 
 if TYPE_CHECKING:
+    from vdet.batch.manifest import Record
+    from vdet.batch.run import Plan
     from vdet.run.video import Run
+
+STAGE_MARGIN = Fraction(2)
+"""Seconds to process before and after `--at`, for detector and tracker."""
+_ENDING = re.compile(r"(\.[a-z0-9_-]+)+", re.ASCII)
+"""The ending of an output's name, such as `.csv` or `.cars.csv`."""
 
 
 @command()
@@ -147,10 +158,10 @@ def detect_video(
     options.check_counting(settings, outputs, several=folder is not None)
     if settings.lack_of_metres and "lane-geometry" not in settings.conditions.ignore:
         announce(f"vdet: note: {settings.lack_of_metres}")
-    from vdet.regions import check_masks
     from vdet.run.video import Run
 
-    check_masks(settings.regions)
+    if at is not None and all(output.sink == "stages" for output in outputs):
+        start, end = max(at - STAGE_MARGIN, start or Fraction(0)), end or at + STAGE_MARGIN
     run = Run(
         source=videos[0],
         outputs=tuple(outputs),
@@ -167,7 +178,7 @@ def detect_video(
     if folder is None:
         code, is_doubtful = 0, _process_video(run)
     else:
-        code, is_doubtful = batch.process_videos(
+        code, is_doubtful = _process_videos(
             videos,
             folder,
             run,
@@ -238,3 +249,90 @@ def _process_video(run: "Run") -> bool:
     if totals.corrected:
         announce(f"{run.source}: {totals.corrected}")
     return findings_in(totals.facts).is_doubtful
+
+
+def _process_videos(
+    clips: Sequence[Path],
+    folder: Path,
+    common: "Run",
+    *,
+    no_video: bool,
+    skip_existing: bool,
+    jobs: int | None,
+    scheduler: str | None,
+) -> tuple[int, bool]:
+    """Process the videos of `clips`; arguments as in `make_plan` and in `detect_video`.
+
+    Returns
+    -------
+    The exit code, and whether a result is doubtful.
+    """
+    from vdet.batch.run import make_plan
+
+    if no_video and not common.outputs:
+        raise click.UsageError("no output; add one, such as --tracks")
+    if common.overwrite and skip_existing:
+        raise click.UsageError("--overwrite and --skip-existing cannot be used together")
+    if jobs and scheduler:
+        raise click.UsageError("--jobs and --scheduler cannot be used together")
+    if scheduler:  # the workers were started in other folders
+        clips, folder = [clip.absolute() for clip in clips], folder.absolute()
+    outputs = [_checked_ending(output) for output in common.outputs]
+    if not (no_video or any(output.sink == "video" for output in outputs)):
+        outputs = [Output("video", Path()), *outputs]
+    common = replace(common, outputs=tuple(outputs))
+    plan = make_plan(clips, folder, common, skip_existing=skip_existing)
+    records = _run_plan(plan, jobs, scheduler)
+    failed = sum(record.error is not None for record in records)
+    skipped = f"{len(plan.skipped)} skipped, " if plan.skipped else ""
+    announce(
+        f"{plan.folder}: {counted(len(records) - failed, 'file')} done, {skipped}{failed} failed"
+    )
+    code = failure_code(failed, len(plan.runs) + len(plan.skipped))
+    return code, any(record.is_doubtful for record in records)
+
+
+def _checked_ending(output: Output) -> Output:
+    """Return an output whose path is the ending of names. Raises `click.UsageError`."""
+    from vdet.run.sinks.protocol import sink_kind
+
+    sink, kind, ending = output.sink, sink_kind(output.sink), str(output.path).lower()
+    if kind.takes == "images" or sink == "stages":
+        raise click.UsageError(f"{sink}: cannot be written with -d; remove one of them")
+    if not _ENDING.fullmatch(ending) or not kind.takes_name(f"video{ending}"):
+        allowed = ", ".join(kind.endings) or f"as in .{sink if kind.folder_pattern else 'txt'}"
+        raise click.UsageError(f"{sink}: with -d, pass only the ending of the names: {allowed}")
+    return Output(sink, Path(ending))
+
+
+def _run_plan(plan: "Plan", jobs: int | None, scheduler: str | None) -> "list[Record]":
+    """Process the videos of a plan, print the result of each, and return their records."""
+    from vdet.batch.run import run_batch
+
+    cores = core_count()
+    jobs = max(1, min(jobs or cores, len(plan.runs)))
+    workers: Workers = LocalProcesses(jobs)
+    if scheduler:
+        workers, jobs = DaskCluster(scheduler), cores  # a thread for each file
+    records = []
+    with (
+        progress_steps(" files") as steps,
+        closing(run_batch(plan, workers=workers, threads=max(1, cores // jobs))) as results,
+    ):
+        advance = steps("", len(plan.runs))
+        for run, record in results:
+            _print_result(run, record)
+            records.append(record)
+            advance(1)
+    return records
+
+
+def _print_result(run: "Run", record: "Record") -> None:
+    for warning in record.warnings:
+        LOG.warning("%s", warning)
+    if record.error:
+        LOG.error("%s", record.error)
+        return
+    numbers = f"{counted(record.frames or 0, 'frame')}, {counted(record.tracks or 0, 'track')}"
+    begin = f", begins {record.begin}" if record.begin and run.settings.traffic else ""
+    announce(f"{run.source}: {numbers}, {record.seconds:.1f} s{begin}")

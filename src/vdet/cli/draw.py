@@ -11,7 +11,7 @@ from vdet.cli import options
 from vdet.cli.command import command
 from vdet.cli.messages import print_lines, progress_steps
 from vdet.errors import counted
-from vdet.files import staged
+from vdet.files import OutputFiles, output_errors
 
 
 @command()
@@ -55,8 +55,8 @@ def draw(
 
     settings = source.load()
     inputs = source.inputs(clip, *([tracks] if tracks else ()), settings=settings)
-    suffixes = (".html", ".jpg", ".png", ".svg")
-    options.check_file(output, *suffixes, noun="outputs", overwrite=overwrite, inputs=inputs)
+    files = OutputFiles(overwrite=overwrite, inputs=inputs)
+    files.check(output, suffixes=(".html", ".jpg", ".png", ".svg"))
     with progress_steps(" frames") as steps:
         # Without regions, because the page shows their effect.
         whole_frames = settings.model_copy(update={"regions": ()})
@@ -64,8 +64,8 @@ def draw(
         image, frames = read_scene(run, tracks, steps)
     drawing = Drawing(image, frames, settings, _user_values(source.configs))
     name = Path([output.name, *source.configs][-1]).with_suffix(".yaml").name
-    with staged(output, overwrite=overwrite) as temporary:
-        temporary.write_bytes(drawing.output(output, name))
+    with files, output_errors(output):
+        files.stage(output).write_bytes(drawing.output(output, name))
     print_lines(f"{output}: written, {counted(len(drawing.paths), 'vehicle')}")
 
 

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from vdet.errors import ConfigError, OutputError
-from vdet.files import NO_FILES, FileIds, check_output
+from vdet.errors import ConfigError
+from vdet.files import FileIds
 from vdet.run.sinks import Output
 
 if TYPE_CHECKING:
@@ -167,18 +167,14 @@ class SettingsSource:
     ----------
     configs
         Settings files, or the names of shipped ones.
-    assignments
-        Texts such as `output.crf=18`.
-    shortcuts
-        Values of other options by the setting that each changes. None, False and an empty tuple
-        are the values of options that are not used.
+    changes
+        Texts such as `output.crf=18`, also those of other options.
     options
-        Names of these options, by setting, for messages.
+        Names of these options by the setting that each changes, for messages.
     """
 
     configs: Sequence[str] = ()
-    assignments: Sequence[str] = ()
-    shortcuts: Mapping[str, Any] = field(default_factory=dict)
+    changes: tuple[str, ...] = ()
     options: Mapping[str, str] = field(default_factory=dict)
 
     @property
@@ -189,16 +185,6 @@ class SettingsSource:
         from vdet.config.loading import find_config
 
         return tuple(find_config(name) for name in self.configs)
-
-    @property
-    def changes(self) -> tuple[str, ...]:
-        """The assignments, also those of other options."""
-        used = (
-            f"{key}={json.dumps(value, default=str, ensure_ascii=False)}"
-            for key, value in self.shortcuts.items()
-            if value is not None and value is not False and value != ()
-        )
-        return (*self.assignments, *used)
 
     def inputs(self, *paths: Path, settings: "Settings | None" = None) -> FileIds:
         """Identify the files that a command reads: see `vdet.run.inputs`.
@@ -221,11 +207,7 @@ class SettingsSource:
             return load_settings(self.files, self.changes, detector=detector)
         except ConfigError as error:
             for key, option in self.options.items():
-                if self.shortcuts.get(key):
-                    lines = (str(line) for line in error.args)
-                    error.args = tuple(
-                        line.replace(f"--set: {key}", f"--{option}", 1) for line in lines
-                    )
+                error.args = tuple(line.replace(f"--set: {key}", option, 1) for line in error.args)
             raise
 
 
@@ -242,10 +224,13 @@ def settings_options(**keys: str) -> Callable[[Function], Function]:
         def with_source(
             configs: tuple[str, ...], assignments: tuple[str, ...], **values: Any
         ) -> Any:
-            shortcuts = {key: values.pop(name) for name, key in keys.items()}
-            options = {key: "class" if name == "classes" else name for name, key in keys.items()}
-            source = SettingsSource(configs, assignments, shortcuts, options)
-            return command(source=source, **values)
+            changes, used = list(assignments), {}
+            for name, key in keys.items():
+                value = values.pop(name)
+                if value is not None and value is not False and value != ():
+                    changes.append(f"{key}={json.dumps(value, default=str, ensure_ascii=False)}")
+                    used[key] = "--class" if name == "classes" else f"--{name}"
+            return command(source=SettingsSource(configs, tuple(changes), used), **values)
 
         return with_source
 
@@ -275,15 +260,6 @@ def check_counting(settings: "Settings", outputs: Sequence[Output], *, several: 
             "input.begin is for one video, or for vdet count; for several set a pattern of their "
             "names, camera.clock.pattern"
         )
-
-
-def check_file(
-    output: Path, *suffixes: str, noun: str, overwrite: bool, inputs: FileIds = NO_FILES
-) -> None:
-    """Raise `OutputError` if an output has another suffix, or cannot be written."""
-    if output.suffix.lower() not in suffixes:
-        raise OutputError(f"{output}: {noun} must end in {', '.join(suffixes)}")
-    check_output(output, overwrite=overwrite, inputs=inputs)
 
 
 def with_truths(videos: Sequence[Path], truths: Sequence[Path]) -> list[tuple[Path, Path]]:

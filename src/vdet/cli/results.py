@@ -10,7 +10,7 @@ import click
 
 from vdet.cli.messages import print_lines
 from vdet.cli.options import Function, output_folder, overwrite_option
-from vdet.files import OutputFiles, check_output, json_text, output_errors, print_now, write_text
+from vdet.files import OutputFiles, json_text, output_errors, print_now, write_text
 
 if TYPE_CHECKING:
     from vdet.evaluate.report import Report
@@ -33,9 +33,10 @@ class ResultFiles:
         OutputError
             A file already exists (without `overwrite`), is an input, or cannot be written.
         """
+        files = OutputFiles(overwrite=self.overwrite, inputs=inputs)
         for path in self._files.values():
             makes_folder = self.page is not None and self.page.is_relative_to(path.parent)
-            check_output(path, overwrite=self.overwrite, makes_folder=makes_folder, inputs=inputs)
+            files.check(path, makes_folder=makes_folder)
 
     @property
     def _files(self) -> dict[str, Path]:

@@ -10,6 +10,7 @@ from vdet.cli.command import command
 from vdet.cli.messages import print_lines, progress_bar, progress_steps
 from vdet.cli.options import Paths, SettingsSource
 from vdet.errors import counted, needing
+from vdet.files import OutputFiles
 from vdet.workers import limit_library_threads
 
 
@@ -35,15 +36,15 @@ def train(
       vdet train patches/ -o model.npz --set train.svm.C=1e-3
     """
     settings = source.load(detector="svm")
-    inputs = source.inputs(*data)
-    options.check_file(output, ".npz", noun="models", overwrite=overwrite, inputs=inputs)
+    files = OutputFiles(overwrite=overwrite, inputs=source.inputs(*data))
+    files.check(output, suffixes=(".npz",), noun="models")
     from vdet.detect.svm.model import save_model
     from vdet.learn.svm.dataset import find_patches
     from vdet.learn.svm.training import train as fit_model
 
-    files = find_patches(data)
+    patches = find_patches(data)
     with progress_steps("") as steps:
-        model, metrics = fit_model(files, settings, jobs=jobs, steps=steps)
+        model, metrics = fit_model(patches, settings, jobs=jobs, steps=steps)
     save_model(model, output, overwrite=overwrite)
     print_lines(*metrics.lines(), "", f"{output}: written")
 
@@ -83,8 +84,8 @@ def mine(
     """
     if until is not None and until < first:
         raise click.UsageError("--until must not be before --from")
-    inputs = source.inputs(*videos, *truths)
-    options.check_file(output, ".zip", noun="patches", overwrite=overwrite, inputs=inputs)
+    files = OutputFiles(overwrite=overwrite, inputs=source.inputs(*videos, *truths))
+    files.check(output, suffixes=(".zip",), noun="patches")
     settings = source.load(detector="svm")
     options.reject_regions(settings)
     from vdet.detect.svm.detector import load_svm
@@ -150,7 +151,8 @@ def train_net(
     if not data and not clips:
         raise click.UsageError("nothing to learn from; pass DATA or --video")
     inputs = source.inputs(*data, *chain(*clips), *([base] if base else ()))
-    options.check_file(output, ".onnx", noun="networks", overwrite=overwrite, inputs=inputs)
+    files = OutputFiles(overwrite=overwrite, inputs=inputs)
+    files.check(output, suffixes=(".onnx",), noun="networks")
     settings = source.load()
     with needing("train"):
         from vdet.learn.net.sources import clip_source, image_source

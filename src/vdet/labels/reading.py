@@ -11,7 +11,7 @@ from vdet.files import is_hidden
 from vdet.labels.coco import read_coco_images
 from vdet.labels.formats import recognize, track_formats
 from vdet.labels.images import LabelledImage, LabelledImages, checked_images
-from vdet.labels.label import Label, SavedTracks, checked_labels, line_error
+from vdet.labels.label import Label, SavedTracks, Size, checked_labels, line_error
 from vdet.labels.lines import MOT
 from vdet.labels.parsing import read_bytes
 from vdet.labels.roles import DEFAULT_ROLES, Roles, is_region
@@ -20,7 +20,7 @@ from vdet.labels.yolo import read_yolo_images
 _log = logging.getLogger("vdet")
 
 
-def read_tracks(path: Path, rate: float | None = None) -> SavedTracks:
+def read_tracks(path: Path, rate: float | None = None, size: Size | None = None) -> SavedTracks:
     """Read the tracks of a video from a file in any format; ignore regions are omitted.
 
     There is a warning (logger "vdet") for each reason to doubt them that the file has. Tracks
@@ -30,11 +30,14 @@ def read_tracks(path: Path, rate: float | None = None) -> SavedTracks:
     ----------
     rate
         Frames per second, for formats without times. None leaves their frames without times.
+    size
+        Width and height of the frames in which the tracks are used, pixels; None if unknown.
 
     Raises
     ------
     TruthError
-        The file cannot be read, or has a mistake; the message names its position.
+        The file cannot be read, has a mistake, whose position the message names, or is of frames of
+        another size.
     """
     data = read_bytes(path)
     was_enabled = gc.isenabled()
@@ -47,6 +50,10 @@ def read_tracks(path: Path, rate: float | None = None) -> SavedTracks:
     finally:
         if was_enabled:
             gc.enable()
+    if saved.size and size and saved.size != size:
+        (width, height), (expected_width, expected_height) = saved.size, size
+        fault = f"is of {width}×{height} frames, not {expected_width}×{expected_height}"
+        raise TruthError(f"{path}: {fault}")
     for doubt in saved.doubts:
         _log.warning("%s: %s", path, doubt)
     return saved if rate is None else saved.at_rate(rate)

@@ -2,7 +2,6 @@
 
 import os
 from collections.abc import Generator, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -11,13 +10,13 @@ from vdet.boxes import Boxes, Image
 from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel, stage_images_of
 from vdet.errors import ImageError
-from vdet.files import NO_FILES, FileIds, OutputFiles, is_hidden
+from vdet.files import OutputFiles, is_hidden
 from vdet.media import Frame, Picture
 from vdet.media.images import IMAGE_SUFFIXES, is_image_name, read_image
 from vdet.run.loop import named_errors
 from vdet.run.result import FrameResult
 from vdet.run.sinks import Output
-from vdet.run.sinks.protocol import SinkContext, Sinks, check_sinks, open_sinks
+from vdet.run.sinks.protocol import SinkContext, check_sinks, open_sinks
 from vdet.run.steps import ParallelStep, StepContext, make_steps
 from vdet.run.threads import SearchThreads
 from vdet.track.track import Track
@@ -68,9 +67,7 @@ def plan_images(
     sources: Mapping[Path, Path],
     out: Path | None,
     stages: Path | None,
-    *,
-    overwrite: bool,
-    inputs: FileIds = NO_FILES,
+    files: OutputFiles,
 ) -> list[ImageJob]:
     """Choose the outputs of each image, and check them before any work.
 
@@ -87,7 +84,7 @@ def plan_images(
     Raises
     ------
     OutputError
-        An output already exists (without `overwrite`), is an input, or belongs to two sources.
+        An output cannot be written to `files`, or belongs to two sources.
     """
     several = len(sources) > 1
     is_file = out is not None and not several and out.suffix.lower() in IMAGE_SUFFIXES
@@ -100,7 +97,7 @@ def plan_images(
 
     jobs = [ImageJob(source, tuple(outputs_for(name)), name) for source, name in sources.items()]
     outputs = [output for job in jobs for output in job.outputs]
-    check_sinks(outputs, overwrite=overwrite, makes_folder=not is_file, inputs=inputs)
+    check_sinks(outputs, files, makes_folder=not is_file)
     return jobs
 
 
@@ -134,34 +131,24 @@ class ImageSearch:
                 result = step.apply(result)
         return result.of_classes(self.settings.classes)
 
-    @contextmanager
-    def open_sinks(
-        self, outputs: Sequence[Output], names: Mapping[Path, Path], files: OutputFiles
-    ) -> Iterator[Sinks]:
-        """Yield the sinks of some outputs, which write into `files`."""
-
-        def stage_images(image: Image, detections: Boxes) -> dict[str, Image]:
-            detector = self.model.for_video(image.shape[1], image.shape[0], [image])
-            return stage_images_of(detector)(image, detections)
-
-        context = SinkContext(files, self.settings, places=names, stage_images=stage_images)
-        with open_sinks(outputs, context) as sinks:
-            yield sinks
+    def stage_images(self, image: Image, detections: Boxes) -> dict[str, Image]:
+        """Return an image of each stage of the detector by its name, in order."""
+        detector = self.model.for_video(image.shape[1], image.shape[0], [image])
+        return stage_images_of(detector)(image, detections)
 
 
 def run_images(
     jobs: Sequence[ImageJob],
     shared: Sequence[Output],
     search: ImageSearch,
+    files: OutputFiles,
     *,
-    overwrite: bool = False,
-    inputs: FileIds = NO_FILES,
     threads: int = 1,
 ) -> Generator[FrameResult | ImageError]:
     """Search images; yield the result of each, or the error that prevented it.
 
     `threads` images are read and searched at once. The `shared` outputs receive all results in
-    order. All outputs appear together, after the last result.
+    order. All outputs appear together, after the last result, which closes `files`.
 
     Raises
     ------
@@ -175,18 +162,19 @@ def run_images(
         except ImageError as error:
             return error
 
-    names = {job.source: job.name for job in jobs if job.name}
-    files, folders = OutputFiles(overwrite=overwrite, inputs=inputs), _common_folders(jobs)
-    with (
+    folders = _common_folders(jobs)
+    context = SinkContext(
         files,
-        search.open_sinks(shared, names, files) as shared_sinks,
-        SearchThreads(threads) as pool,
-    ):
+        search.settings,
+        places={job.source: job.name for job in jobs if job.name},
+        stage_images=search.stage_images,
+    )
+    with files, open_sinks(shared, context) as shared_sinks, SearchThreads(threads) as pool:
         for job, result in pool.map_ordered(detect, jobs):
             if isinstance(result, FrameResult):
                 for folder in folders:
                     files.stage_folder(folder)
-                with search.open_sinks(job.outputs, names, files) as sinks:
+                with open_sinks(job.outputs, context) as sinks:
                     sinks.write(result)
                     shared_sinks.write(result)
             yield result

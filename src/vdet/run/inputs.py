@@ -5,6 +5,7 @@ from pathlib import Path
 from vdet.config.schema import Settings
 from vdet.files import FileIds, file_ids
 from vdet.media.images import IMAGE_SUFFIXES, numbered_images
+from vdet.regions import check_masks
 
 _DATA_SUFFIXES = IMAGE_SUFFIXES | {".csv", ".json", ".txt", ".yaml", ".yml"}
 
@@ -13,7 +14,8 @@ def input_files(*paths: Path, settings: Settings | None = None) -> FileIds:
     """Identify the files at `paths`, and the model file and masks of the settings.
 
     A folder stands for the images and labels in it, recursively, and a pattern such as
-    `img_%04d.png` for its images. Raises `VideoError` if there is none of these.
+    `img_%04d.png` for its images. Raises `VideoError` if there is none of these, `ImageError` or
+    `ConfigError` if a mask cannot be used.
     """
     files: list[Path] = []
     for path in paths:
@@ -22,6 +24,7 @@ def input_files(*paths: Path, settings: Settings | None = None) -> FileIds:
         else:
             files += numbered_images(path) or [path]
     if settings:
+        check_masks(settings.regions)
         named = [settings.detector.model, *(region.mask for region in settings.regions)]
         files += map(Path, filter(None, named))
     return file_ids(files)

@@ -23,10 +23,11 @@ def write_saved_review(run: Run, tracks: Path, steps: Steps) -> None:
     Raises `VdetError` if the video or the tracks cannot be used, or an output cannot be written.
     """
     settings = run.settings
-    check_sinks(run.outputs, overwrite=run.overwrite, inputs=run.inputs)
+    files = OutputFiles(overwrite=run.overwrite, inputs=run.inputs)
+    check_sinks(run.outputs, files)
     with (
         VideoReader(run.source, start=run.start, end=run.end, settings=settings.input) as reader,
-        OutputFiles(overwrite=run.overwrite, inputs=run.inputs) as files,
+        files,
     ):
         info = reader.info
         frames = {

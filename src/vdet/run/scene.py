@@ -100,11 +100,7 @@ def saved_frames(
     `size` is that of the frames, pixels. Without a video, the first frame of the file is the first
     one of the video. Raises `TruthError`, also if the tracks are of frames of another size.
     """
-    saved = read_tracks(tracks, float(video.rate) if video else None)
-    if saved.size and saved.size != size:
-        (width, height), (expected_width, expected_height) = saved.size, size
-        fault = f"is of {width}×{height} frames, not {expected_width}×{expected_height}"
-        raise TruthError(f"{tracks}: {fault}")
+    saved = read_tracks(tracks, float(video.rate) if video else None, size)
     if video and saved.video and saved.video.name != run.source.name:
         log.warning("%s: is of %s, not %s", tracks, saved.video.name, run.source.name)
     if not saved.has_times:

@@ -4,7 +4,7 @@ import logging
 import time
 from collections.abc import Generator, Iterator, Mapping
 from contextlib import AbstractContextManager, closing, contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -32,9 +32,6 @@ from vdet.workers import core_count, return_freed_memory
 
 log = logging.getLogger("vdet")
 
-STAGE_MARGIN = Fraction(2)
-"""Seconds to process before and after the time `Run.at`, for detector and tracker."""
-
 
 @dataclass(frozen=True, slots=True)
 class Run:
@@ -49,8 +46,7 @@ class Run:
     frames
         Maximum number of frames to process.
     at
-        Time of the stage images, seconds from the first frame. Without other outputs, only the
-        frames from 2 s before to 2 s after it are processed.
+        Time of the stage images, seconds from the first frame.
     overwrite
         Replace existing outputs.
     threads
@@ -263,9 +259,9 @@ def run_video(run: Run, parts: Parts, *, progress: Progress = no_progress) -> Ru
 
     No output is left after an error.
     """
-    inputs = run.inputs
-    check_sinks(run.outputs, overwrite=run.overwrite, inputs=inputs)
-    with OutputFiles(overwrite=run.overwrite, inputs=inputs) as files:
+    files = OutputFiles(overwrite=run.overwrite, inputs=run.inputs)
+    check_sinks(run.outputs, files)
+    with files:
         return write_outputs(run, parts, files, progress=progress)
 
 
@@ -279,12 +275,7 @@ def write_outputs(
     start_time = time.perf_counter()
     return_freed_memory()
     kinds = [sink_kind(output.sink) for output in run.outputs]
-    if kinds and all(kind.one_frame for kind in kinds):
-        start = max(run.at - STAGE_MARGIN, run.start or Fraction(0))
-        run = replace(run, start=start, end=run.end or run.at + STAGE_MARGIN)
-    with_traffic = bool(run.settings.traffic) or any(
-        getattr(kind.open, "uses_traffic", True) for kind in kinds
-    )
+    with_traffic = bool(run.settings.traffic) or any(kind.uses_traffic for kind in kinds)
     with open_video(run, parts, with_traffic=with_traffic) as video:
         info, frames, ids = video.reader.info, 0, set[int]()
         context = SinkContext(

@@ -103,7 +103,7 @@ def count_files(
     rate_is_used = rate is None
     recording = _Recording(settings)
     for path in sorted(dict.fromkeys(paths), key=camera_of):
-        saved = read_tracks(path)
+        saved = read_tracks(path, size=size)
         if not saved.has_times:
             if rate is None:
                 raise TruthError(f"{path}: has no times; pass the frame rate, as in --rate 25")
@@ -111,9 +111,6 @@ def count_files(
         clock = find_clock(path, settings, saved.times.get(0, 0.0), saved=saved)
         if clock and settings.input.begin and len(paths) > 1:
             clock = recording.next_clock(path, saved, clock, group.last if group else None)
-        if size and saved.size and size != saved.size:
-            width, height = saved.size
-            raise ConfigError(f"{path}: is of {width}×{height} frames; remove --size")
         frame_size = _frame_size(settings, size or saved.size)
         first, is_complete = min(saved.times.values(), default=0.0), saved.covered is not None
         video = _Video(str(path), clock, first, is_complete, saved.doubts)

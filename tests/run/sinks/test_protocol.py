@@ -226,5 +226,5 @@ def test_what_a_step_finds_out_of_a_video_reaches_its_sinks_totals_and_warnings(
 def test_a_folder_that_was_written_before_is_refused(tmp_path: Path) -> None:
     (tmp_path / "3-boxes.png").touch()
     with pytest.raises(OutputError, match=r"3-boxes\.png: already exists"):
-        check_sinks([Output("stages", tmp_path)], overwrite=False)
-    check_sinks([Output("stages", tmp_path)], overwrite=True)
+        check_sinks([Output("stages", tmp_path)], OutputFiles())
+    check_sinks([Output("stages", tmp_path)], OutputFiles(overwrite=True))

@@ -45,7 +45,6 @@ class TrackSink(BaseSink):
     `[[x, y], …]`, pixels of the frame, the nearest point first.
     """
 
-    uses_traffic = False
     _file: BinaryIO | None = None
     _writer: TrackWriter
 
@@ -103,6 +102,7 @@ TRACKS = SinkKind(
     "tracks",
     writes_standard_output=True,
     takes="videos",
+    uses_traffic=False,
     check=check_track_name,
 )
 
@@ -187,7 +187,9 @@ def _findings(sink: TableSink) -> Any:
     return findings_in(sink.context.facts).record()
 
 
-CONDITIONS = SinkKind(partial(TableSink, _findings), (".json",), "findings", takes="videos")
+CONDITIONS = SinkKind(
+    partial(TableSink, _findings), (".json",), "findings", takes="videos", uses_traffic=False
+)
 VEHICLES = SinkKind(
     partial(TableSink, _records),
     SUFFIXES,

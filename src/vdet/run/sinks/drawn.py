@@ -120,8 +120,6 @@ def draw_running_counts(surface: Surface, counter: "VehicleCounter") -> None:
 class VideoSink(BaseSink):
     """Draws on copies of the frames, and encodes them in a thread."""
 
-    uses_traffic = False  # it draws counts only if the settings have lines or zones
-
     def __enter__(self) -> Self:
         context = self.context
         counter = context.traffic.counter if context.traffic else None
@@ -154,7 +152,14 @@ class VideoSink(BaseSink):
         self._encode(Frame(result.frame.index, result.frame.time, Picture(surface)))
 
 
-VIDEO = SinkKind(VideoSink, VIDEO_SUFFIXES, "videos", takes="videos", may_replace=may_replace_video)
+VIDEO = SinkKind(
+    VideoSink,
+    VIDEO_SUFFIXES,
+    "videos",
+    takes="videos",
+    uses_traffic=False,  # it draws counts only if the settings have lines or zones
+    may_replace=may_replace_video,
+)
 
 
 class ImageSink(BaseSink):

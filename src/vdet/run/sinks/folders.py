@@ -39,7 +39,6 @@ _THUMBNAIL = 200  # longer side of the picture of a vehicle, pixels
 class StagesSink(BaseSink):
     """Writes stage images of the first searched frame at or after the time `SinkContext.at`."""
 
-    uses_traffic = False
     _is_done = False
 
     def finish(self) -> None:
@@ -82,7 +81,7 @@ def _with_boxes(result: FrameResult) -> Image:
     return picture
 
 
-STAGES = SinkKind(StagesSink, what="stages", folder_pattern=f"*-{_BOXES}.png", one_frame=True)
+STAGES = SinkKind(StagesSink, what="stages", folder_pattern=f"*-{_BOXES}.png", uses_traffic=False)
 
 
 class CropSink(BaseSink):

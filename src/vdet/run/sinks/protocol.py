@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol, Self
 from vdet.config.schema import Settings
 from vdet.detect.protocol import StageImages
 from vdet.errors import OutputError
-from vdet.files import NO_FILES, FileIds, OutputFiles, check_output, output_errors
+from vdet.files import OutputFiles, output_errors
 from vdet.media import VideoInfo
 from vdet.plugins import SINKS, load_plugin
 from vdet.run.result import Fact, FrameResult
@@ -83,12 +83,9 @@ class BaseSink:
     """Base of most sinks: `finish` is called when the run ends without an error.
 
     `summary` is what a file over all videos of a batch needs from the output, as values for JSON.
-    `uses_traffic` is whether it uses `SinkContext.traffic`, apart from the clock. If no sink does,
-    a run counts and records vehicles only if the settings have lines or zones.
     """
 
     summary: Any = None
-    uses_traffic = True
 
     def __init__(self, path: Path, context: SinkContext) -> None:
         self.path = path
@@ -162,11 +159,11 @@ class SinkKind:
         with such a file is the output of an earlier run.
     writes_standard_output
         Whether the path `-` means standard output.
-    one_frame
-        Whether it needs only the frame at `SinkContext.at`. If all outputs of a run do, only the
-        frames around it are read.
     takes
         "videos" or "images" if the sink accepts only results of videos, or only of images.
+    uses_traffic
+        Whether it uses `SinkContext.traffic`, apart from the clock. If no sink does, a run counts
+        and records vehicles only if the settings have lines or zones.
     may_replace
         Whether `--overwrite` may replace a file.
     check
@@ -180,8 +177,8 @@ class SinkKind:
     what: str = "outputs"
     folder_pattern: str = ""
     writes_standard_output: bool = False
-    one_frame: bool = False
     takes: Literal["videos", "images", "both"] = "both"
+    uses_traffic: bool = True
     may_replace: Callable[[Path], bool] = lambda _: True
     check: Callable[[Path], object] = lambda _: None
     total: BatchTotal | None = None
@@ -211,13 +208,9 @@ def sink_kind(name: str) -> SinkKind:
 
 
 def check_sinks(
-    outputs: Sequence[Output],
-    *,
-    overwrite: bool,
-    makes_folder: bool = False,
-    inputs: FileIds = NO_FILES,
+    outputs: Sequence[Output], files: OutputFiles, *, makes_folder: bool = False
 ) -> None:
-    """Reject outputs that cannot be written, before any work; arguments as in `check_output`.
+    """Reject outputs that cannot be written, before any work: see `OutputFiles.check`.
 
     Raises
     ------
@@ -241,8 +234,7 @@ def check_sinks(
         if kind.folder_pattern:
             written = path.glob(kind.folder_pattern) if os.path.isdir(path) else ()  # noqa: PTH112
             path = min(written, default=path / kind.folder_pattern)
-        makes = makes_folder or bool(kind.folder_pattern)
-        check_output(path, overwrite=overwrite, makes_folder=makes, inputs=inputs)
+        files.check(path, makes_folder=makes_folder or bool(kind.folder_pattern))
         if os.path.lexists(path) and not kind.may_replace(path):
             advice = "was not written by vdet and will not be replaced; choose another name"
             raise OutputError(f"{path}: {advice}")
