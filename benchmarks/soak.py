@@ -13,8 +13,6 @@ from pathlib import Path
 import av
 
 from benchmarks.material import find_video
-from vdet.detect.factory import load_detector
-from vdet.run.loop import Parts
 from vdet.run.sinks import Output
 from vdet.run.video import Run, run_video
 
@@ -45,14 +43,14 @@ class Sample:
 
 
 class ResourceMonitor:
-    """Takes a sample every `SAMPLE_INTERVAL` frames; it is the `progress` of a run."""
+    """Takes a sample every `SAMPLE_INTERVAL` frames; it is the `steps` of a run."""
 
     def __init__(self) -> None:
         self.samples: list[Sample] = []
         self._frames = 0
         self._began = time.perf_counter()
 
-    def __call__(self, _: int | None) -> Callable[[int], None]:
+    def __call__(self, _: str, __: int | None) -> Callable[[int], None]:
         """Take the first sample; return what is called with the number of frames done."""
         self._began = time.perf_counter()
         self.samples.append(self._sample())
@@ -168,7 +166,7 @@ def main() -> None:
         loop_video(find_video(folder), folder / "long.mp4", frames)
         outputs = (Output("video", folder / "out.mp4"), Output("tracks", folder / "out.jsonl"))
         run = Run(folder / "long.mp4", outputs, frames=frames)
-        totals = run_video(run, Parts(load_detector(run.settings.detector)), progress=monitor)
+        totals = run_video(run, steps=monitor)
     print(file=sys.stderr)
     print("\n".join(table(monitor.samples)))
     first, last = tenths(monitor.samples)

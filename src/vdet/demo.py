@@ -1,7 +1,6 @@
 """The demo: both detectors on synthetic roads, compared with the ground truth."""
 
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +8,6 @@ import numpy as np
 from vdet.config.loading import load_settings
 from vdet.config.schema import Settings
 from vdet.config.shapes import NOWHERE
-from vdet.detect.factory import load_detector
 from vdet.detect.svm.detector import load_svm
 from vdet.detect.svm.model import save_model
 from vdet.errors import OutputError
@@ -21,7 +19,6 @@ from vdet.learn.svm.dataset import find_patches
 from vdet.learn.svm.mining import MiningLimits, VideoSource, mine
 from vdet.learn.svm.training import train
 from vdet.progress import Steps
-from vdet.run.loop import Parts
 from vdet.run.sinks import Output
 from vdet.run.video import Run, run_video
 from vdet.synthetic.render import write_clip
@@ -89,7 +86,7 @@ def run_demo(
     def find(clip: str, outputs: dict[str, str], settings: Settings) -> None:
         paths = tuple(Output(sink, folder / name) for sink, name in outputs.items())
         run = Run(folder / clip, paths, settings, at=middle, overwrite=overwrite)
-        run_video(run, Parts(load_detector(settings.detector)), progress=partial(steps, "frames"))
+        run_video(run, steps=steps)
 
     scene, pole, rng = demo_scene(seed), pole_scene(seed), np.random.default_rng(seed)
     middle = scene.frames / scene.rate / 2

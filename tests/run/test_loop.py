@@ -97,7 +97,7 @@ def test_a_whole_run_holds_few_frames_at_a_time(red_clip: Path, tmp_path: Path) 
             held.append(frames_alive() - others)
 
     wanted = outputs(video=tmp_path / "out.mp4", tracks=tmp_path / "out.csv")
-    run_red(video.Run(red_clip, wanted, threads=2), progress=lambda _: advance)
+    run_red(video.Run(red_clip, wanted, threads=2), progress=lambda *_: advance)
     assert held
     assert 0 < max(held) <= QUEUED
 

@@ -129,7 +129,7 @@ def _written(run: Run, record: Record, files: OutputFiles) -> Record:
     """Write the outputs, still under temporary names, and return their record."""
     digest = result_digest(run)
     detector = pickle.dumps(run.settings.detector)  # settings of other packages may be unhashable
-    totals = write_outputs(run, Parts(_cached_detector(detector, record.model_sha256)), files)
+    totals = write_outputs(run, files, Parts(_cached_detector(detector, record.model_sha256)))
     written = []
     for output in run.outputs:
         size, changed = output_state(output, files.staged_path(output.path)) or (0, 0)

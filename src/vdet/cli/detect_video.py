@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import replace
 from fractions import Fraction
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -229,16 +228,13 @@ def _beside(source: Path) -> Path:
 
 def _process_video(run: "Run") -> bool:
     """Process a video, and return whether the result is doubtful."""
-    from vdet.detect.factory import load_detector
-    from vdet.run.loop import Parts
     from vdet.run.result import findings_in
     from vdet.run.sinks.protocol import STANDARD_OUTPUT
     from vdet.run.video import run_video
 
-    parts = Parts(load_detector(run.settings.detector))
     with progress_steps(" frames") as steps:
         steps("opening", None)
-        totals = run_video(run, parts, progress=partial(steps, ""))
+        totals = run_video(run, steps=steps)
     numbers = f"{counted(totals.frames, 'frame')}, {counted(totals.tracks, 'track')}"
     rate = totals.frames / totals.seconds
     announce(f"{run.source}: {numbers}, {totals.seconds:.1f} s, {rate:.1f} frames/s")

@@ -1,6 +1,5 @@
 """`vdet eval`: measure detection, tracking or counts."""
 
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -59,8 +58,7 @@ def images(
     minimum = settings.detector
     counting = Counting(minimum.min_score_still, min_width, minimum.min_scores_still)
     with progress_steps(" images") as steps:
-        progress = partial(steps, "")
-        score = evaluate_images(sets, detector, counting, threads=core_count(), progress=progress)
+        score = evaluate_images(sets, detector, counting, threads=core_count(), steps=steps)
     results.print_report(images_report(score, _run_name(settings, source)))
 
 
@@ -132,9 +130,8 @@ def video(
     roles = Roles.from_settings(settings)
     pairs = [(path, read_truth(truth, roles)) for path, truth in labelled]
     with progress_steps(" frames") as steps:
-        progress = partial(steps, "")
         scores = [
-            evaluate_video(path, truth, settings, detector, progress=progress, until=until)
+            evaluate_video(path, truth, settings, detector, steps=steps, until=until)
             for path, truth in pairs
         ]
     results.print_report(video_report(scores, _run_name(settings, source)))

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 
 from vdet.boxes import Image
-from vdet.detect.factory import load_detector
 from vdet.errors import TruthError, VideoError
 from vdet.labels.label import Size
 from vdet.labels.reading import read_tracks
@@ -15,7 +14,6 @@ from vdet.media import Frame, VideoInfo
 from vdet.media.images import is_image_file, read_image
 from vdet.media.reader import VideoReader
 from vdet.progress import Steps
-from vdet.run.loop import Parts
 from vdet.run.video import Run, log, open_video
 from vdet.track.track import FrameTracks
 
@@ -68,8 +66,7 @@ def _with_saved_tracks(
 def _with_detection(run: Run, steps: Steps) -> tuple[list[Image], list[FrameTracks]]:
     """Return some of the images, and the tracks of all frames."""
     shown: list[FrameTracks] = []
-    parts = Parts(load_detector(run.settings.detector))
-    with open_video(run, parts, with_traffic=False) as video:
+    with open_video(run, with_traffic=False) as video:
         advance = steps("", video.reader.expected)
 
         def frames() -> Iterator[Frame]:

@@ -12,12 +12,12 @@ from typing import Any
 from vdet.boxes import NO_BOXES
 from vdet.conditions.finding import Finding
 from vdet.config.schema import Settings
-from vdet.detect.factory import as_model
+from vdet.detect.factory import as_model, load_detector
 from vdet.detect.protocol import VideoDetector, stage_images_of
 from vdet.errors import ConfigError, FrameSizeError, VideoError
 from vdet.files import FileIds, OutputFiles
 from vdet.media.reader import VideoReader
-from vdet.progress import Progress, no_progress
+from vdet.progress import Steps, no_steps
 from vdet.run.inputs import input_files
 from vdet.run.loop import Parts, build, named_errors, peek
 from vdet.run.result import Fact, Facts, FrameResult, findings_in
@@ -142,11 +142,14 @@ class OpenVideo:
 
 
 @contextmanager
-def open_video(run: Run, parts: Parts, *, with_traffic: bool = True) -> Iterator[OpenVideo]:
+def open_video(
+    run: Run, parts: Parts | None = None, *, with_traffic: bool = True
+) -> Iterator[OpenVideo]:
     """Open a video, and track the vehicles in it; parameters and errors as for `run_video`.
 
     Reading and searching run in threads. Without `with_traffic`, nothing is counted or recorded.
     """
+    parts = parts or Parts(load_detector(run.settings.detector))
     corrections = None
     if run.corrections:  # most runs have none, and load nothing for them
         from vdet.traffic.corrections import read_corrections
@@ -238,16 +241,17 @@ class Results(Iterator[FrameResult]):
         return findings_in(self._video.facts).items if self._video else ()
 
 
-def run_video(run: Run, parts: Parts, *, progress: Progress = no_progress) -> RunTotals:
+def run_video(run: Run, parts: Parts | None = None, *, steps: Steps = no_steps) -> RunTotals:
     """Process a run. Its outputs appear together, at the end of the run.
 
     Reading, searching and encoding run in threads, tracking and drawing in the calling thread.
 
     Parameters
     ----------
-    progress
-        Called once with the expected number of frames, None if unknown. The function it returns is
-        called with the number of frames done since the last call.
+    parts
+        The detector, the tracker and further steps; None: as the settings say.
+    steps
+        Called once, with the expected number of frames, for the progress.
 
     Raises
     ------
@@ -262,11 +266,11 @@ def run_video(run: Run, parts: Parts, *, progress: Progress = no_progress) -> Ru
     files = OutputFiles(overwrite=run.overwrite, inputs=run.inputs)
     check_sinks(run.outputs, files)
     with files:
-        return write_outputs(run, parts, files, progress=progress)
+        return write_outputs(run, files, parts, steps=steps)
 
 
 def write_outputs(
-    run: Run, parts: Parts, files: OutputFiles, *, progress: Progress = no_progress
+    run: Run, files: OutputFiles, parts: Parts | None, *, steps: Steps = no_steps
 ) -> RunTotals:
     """Do as `run_video`, but leave the complete outputs in `files`, under temporary names.
 
@@ -292,7 +296,7 @@ def write_outputs(
             stage_images=stage_images_of(video.detector),
         )
         with open_sinks(run.outputs, context) as sinks:
-            advance = progress(video.reader.expected)
+            advance = steps("", video.reader.expected)
             for result in video.results:
                 sinks.write(result)
                 ids.update(track.id for track in result.tracks)

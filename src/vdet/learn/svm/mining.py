@@ -12,7 +12,6 @@ Detection", 1998; for HOG and linear SVM, Dalal & Triggs, 2005, section 4.
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 from operator import attrgetter
 from pathlib import Path
 from typing import Any, Literal
@@ -31,7 +30,7 @@ from vdet.labels.roles import Roles
 from vdet.learn.svm.dataset import Sides, patch_archive
 from vdet.media import Frame, Picture
 from vdet.media.reader import VideoReader
-from vdet.progress import Progress, Steps, no_steps
+from vdet.progress import Steps, no_steps
 from vdet.run.loop import named_errors, peek
 
 PatchKind = Literal["vehicle", "box", "false alarm", "part"]
@@ -228,11 +227,11 @@ class VideoSource:
     last: int | None = None
 
     def choose(
-        self, model: SvmModel, settings: Settings, limits: MiningLimits, progress: Progress
+        self, model: SvmModel, settings: Settings, limits: MiningLimits, steps: Steps
     ) -> Iterator[tuple[Frame, list[ChosenWindow]]]:
         """Yield the frames to use, with the windows that become patches.
 
-        `progress` receives the number of frames read.
+        `steps` receives the name of the video and the number of frames read.
 
         Raises
         ------
@@ -248,7 +247,7 @@ class VideoSource:
         regular, labels_by_frame = truth.spread(self.every, self.first, last), truth.by_frame()
         number = 0
         with VideoReader(self.path, frames=last, settings=settings.input) as reader:
-            width, advance = reader.info.width, progress(last)
+            width, advance = reader.info.width, steps(self.path.name, last)
             images, frames = peek(reader)
             with named_errors(self.path, VideoError):
                 detector = model.for_video(width, reader.info.height, images)
@@ -314,8 +313,7 @@ def mine(
     searched, counts = 0, Counter[PatchKind]()
     with patch_archive(output, overwrite=overwrite) as add:
         for stem, source in zip(names, sources, strict=True):
-            progress = partial(steps, source.path.name)
-            for frame, windows in source.choose(model, settings, limits, progress):
+            for frame, windows in source.choose(model, settings, limits, steps):
                 searched += 1
                 for chosen in windows:
                     x, y, side, _ = chosen.box.xywh
