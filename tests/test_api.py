@@ -139,18 +139,6 @@ def test_a_notebook_shows_a_result_as_its_frame_with_the_vehicles() -> None:
     assert np.any(drawn != plain, axis=2)[120, 96:160].all()
 
 
-def test_follow_gives_the_same_for_any_number_of_threads(clip_path: Path) -> None:
-    one, three = (
-        [
-            (result.frame.index, result.tracks)
-            for result in vdet.follow(vdet.Run(clip_path, frames=9, threads=threads))
-        ]
-        for threads in (1, 3)
-    )
-    assert one == three
-    assert len(one) == 9
-
-
 @pytest.mark.parametrize("number", [{"frames": -1}, {"threads": 0}])
 def test_numbers_below_one_are_refused_by_name(clip_path: Path, number: dict[str, Any]) -> None:
     (name,) = number
@@ -350,13 +338,6 @@ def test_follow_and_files_have_the_same_counts_vehicles_and_findings(
     assert results.findings
     assert [finding.record() for finding in results.findings] == in_files["conditions"]
     assert vdet.vehicles(red_clip, **given) == results.vehicles
-
-
-def test_tracks_are_compared_with_the_truth(red_clip: Path, tmp_path: Path) -> None:
-    tracks = tmp_path / "t.csv"
-    vdet.detect_video(red_clip, tracks=tracks, detector=red_boxes, tracker=Latest())
-    scores = vdet.evaluate_tracks(tracks, tracks)
-    assert (scores.f1, scores.id_switches) == (1, 0)
 
 
 def test_follow_leaves_the_threads_of_opencv_as_they_are(clip_path: Path) -> None:

@@ -136,7 +136,7 @@ def modules_of(code: str) -> set[str]:
     """Return the names of all modules that a start of the program imports."""
     text = (
         "import sys, vdet.__main__; from vdet.cli import main\n"
-        f"try: {code}\nexcept SystemExit: pass\n"
+        f"{code}\n"
         "print('\\nloaded', *sys.modules)"
     )
     done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=True)

@@ -64,7 +64,7 @@ def test_libraries_use_one_thread_a_call() -> None:
         def show():
             import cv2
             print(cv2.getNumThreads())
-            raise SystemExit
+            return 0
         vdet.cli.main = show
         from vdet.process import run
         run()

@@ -31,16 +31,15 @@ def run() -> NoReturn:
     try:
         from vdet.cli import main
 
-        main()
+        code = main()
     except KeyboardInterrupt:
         sys.stderr.write("vdet: interrupted\n")
         sys.exit(INTERRUPTED)
     except (ImportError, MemoryError) as error:  # as the libraries are loaded
         sys.stderr.write(f"vdet: {in_one_line(error)}\n")
         sys.exit(VdetError.exit_code)
-    except SystemExit as end:
-        _ignore_signals()  # the work is done: a late signal must not change the exit code
-        _exit(end.code)
+    _ignore_signals()  # the work is done: a late signal must not change the exit code
+    _exit(code)
 
 
 def open_streams() -> None:
@@ -66,8 +65,8 @@ def _ignore_signals() -> None:
         signal.signal(number, signal.SIG_IGN)
 
 
-def _exit(code: object) -> NoReturn:
+def _exit(code: int) -> NoReturn:
     """Exit without unloading the libraries, which takes time and waits for hanging threads."""
     sys.stdout.flush()
     sys.stderr.flush()
-    os._exit(code if isinstance(code, int) else int(code is not None))
+    os._exit(code)

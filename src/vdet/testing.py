@@ -140,10 +140,8 @@ def _write(kind: SinkKind, path: Path, settings: Settings, *, still: bool, fails
 
 
 def _is_there(path: Path) -> bool:
-    """Return whether an output has files, apart from temporary ones."""
-    if path.is_dir():
-        return any(".vdet-" not in file.name for file in path.iterdir())
-    return path.exists()
+    """Return whether an output is a file, or has files apart from temporary ones."""
+    return path.is_file() or any(path.glob("[!.]*"))
 
 
 def _detections(index: int) -> Boxes:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from concurrent.futures import BrokenExecutor, CancelledError, Future
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 from vdet.errors import INTERRUPTED, ClusterError, needing
 
@@ -68,19 +68,8 @@ def return_freed_memory(minimum: int = 1_000_000, at_end: int = 16_000_000) -> N
         set_limit(_M_TRIM_THRESHOLD, at_end)
 
 
-class Workers(Protocol):
-    """Processes that work in parallel."""
-
-    @property
-    def at_once(self) -> int | None:
-        """Maximum number of items in work at a time; None: all."""
-
-    def open(self) -> contextlib.AbstractContextManager[Any]:
-        """Connect to them; yield a backend of joblib."""
-
-
 def call_all(
-    function: Callable[[T], R], items: Iterable[T], workers: Workers
+    function: Callable[[T], R], items: Iterable[T], workers: "Workers"
 ) -> Generator[tuple[T, R | None]]:
     """Yield every item with its result, in order of completion.
 
@@ -214,6 +203,10 @@ class DaskCluster:
                 yield _dask_backend(client)
             except CancelledError as error:
                 raise ClusterError(f"{self.address}: the scheduler has ended; run again") from error
+
+
+Workers = LocalProcesses | DaskCluster
+"""Processes that work in parallel: `at_once` items, or all if that is None."""
 
 
 def _dask_backend(client: Any) -> Any:

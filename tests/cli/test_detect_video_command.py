@@ -62,7 +62,9 @@ def test_a_part_of_the_video(run: Run, clip_path: Path, model_path: Path, tmp_pa
         (("out.mp4", "--start", "1:2:3:4"), "is not a time"),
         (("out.mp4", "--start", "1:-5"), "is not a time"),
         (("out.mp4", "--start", "1e9"), "is not a time"),
+        (("out.mp4", "--start", "999999999:00:00"), "is not a time"),
         (("out.mp4", "--frames", "0"), "is not in the range"),
+        (("out.mp4", "--threads", "9" * 30), "is not in the range"),
     ],
 )
 def test_wrong_usage(run: Run, clip_path: Path, arguments: tuple[str, ...], words: str) -> None:

@@ -5,7 +5,6 @@ from pathlib import Path
 import click
 import pytest
 
-from clips import write_clip
 from conftest import Run
 from vdet.cli.options import SettingsSource, classes_option, model_option, settings_options
 
@@ -45,13 +44,6 @@ def test_a_wrong_value_is_reported_with_the_option_that_has_it(
 ) -> None:
     result = run("detect-video", "in.mp4", "--no-video", *options, code=1)
     assert result.err.startswith(f"vdet: {words}")
-
-
-def test_the_input_is_not_its_own_output(run: Run, tmp_path: Path) -> None:
-    clip = write_clip(tmp_path / "a.mp4")
-    for overwrite in ((), ("--overwrite",)):
-        result = run("detect-video", clip, clip, *overwrite, code=1)
-        assert result.err == f"vdet: {clip}: is the input itself; use another output\n"
 
 
 def test_an_empty_file_is_called_empty(run: Run, tmp_path: Path) -> None:

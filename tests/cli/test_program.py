@@ -42,23 +42,6 @@ def test_quiet_and_verbose_work_before_and_after_the_command(
     assert logging.getLogger("vdet").level == logging.ERROR
 
 
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (("--frames", 10**30), "'--frames'"),
-        (("--threads", 10**30), "'--threads'"),
-        (("--start", "999999999:00:00"), "is not a time"),
-        (("--end", "999999999:00:00"), "is not a time"),
-    ],
-)
-def test_numbers_that_are_too_large_are_wrong_usage(
-    run: Run, options: tuple[str, object], words: str
-) -> None:
-    result = run("detect-video", "in.mp4", "out.mp4", *map(str, options))
-    assert (result.code, words in result.err) == (2, True)
-    assert run("eval", "tracks", "a.txt", "b.txt", "--until", str(10**30)).code == 2
-
-
 def test_another_package_adds_a_command_and_a_broken_one_breaks_only_itself(
     run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:

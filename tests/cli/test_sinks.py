@@ -85,7 +85,6 @@ def test_a_sink_for_one_picture(run: Run, tmp_path: Path, out: Path, red: tuple[
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
-        (("--sink", "tracks"), 2, "tracks: expected NAME=FILE"),
         (
             ("--sink", "tracks=a.csv"),
             2,
@@ -97,7 +96,6 @@ def test_a_sink_for_one_picture(run: Run, tmp_path: Path, out: Path, red: tuple[
             "video: with -d, pass only the ending of the names: .mp4, .mov, .mkv",
         ),
         (("--sink", "json=.json"), 2, "json: cannot be written with -d"),
-        (("--sink", "tallies=.csv"), 1, f"tallies: unknown sink; {KNOWN}"),
         (("--tracks", ".csv", "--sink", "tracks=.csv"), 1, "both would be written to"),
     ],
 )

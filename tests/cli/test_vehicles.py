@@ -67,16 +67,3 @@ def test_many_videos_have_their_own_and_a_table_and_a_page_over_all(
     assert names(tmp_path / "found") == found
     same = [n for n in found if (tmp_path / "found" / n).stat().st_mtime_ns == before[n]]
     assert sorted(same) == sorted(name for name in found if name.startswith(NASTY))
-
-
-def test_a_video_that_fails_leaves_no_folder(
-    run: Run, clips: Path, tmp_path: Path, red: tuple[str, ...]
-) -> None:
-    (clips / "day" / "b.mp4").write_bytes(b"no video")
-    result = run(
-        "detect-video", clips / "day", "-d", "found", "--no-video", *ENDS, "--jobs", "1", *red
-    )
-    assert result.code == 3
-    assert {path.name for path in (tmp_path / "found").iterdir()} == {
-        *("a.cars.csv", "a.crops", "a.page", "all.cars.csv", "index.html", "manifest.jsonl")
-    }

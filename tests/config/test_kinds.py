@@ -60,12 +60,6 @@ def test_a_later_layer_changes_a_kind_or_chooses_another(
     assert settings.output.crf == 30
 
 
-@pytest.mark.parametrize("printed", ["motion", "rules"])
-def test_a_kind_may_be_chosen_over_printed_settings(path: Path, printed: str) -> None:
-    text = render_settings(load_settings((), [f"tracker.kind={printed}"]))
-    assert load(path, text, "tracker.kind=rules") == load_settings((), ["tracker.kind=rules"])
-
-
 def test_settings_can_be_sent_to_another_process() -> None:
     settings = load_settings((), ["tracker.kind=rules", "tracker.history=5"])
     assert pickle.loads(pickle.dumps(settings)) == settings

@@ -25,10 +25,6 @@ def refusal(path: Path, text: str, *assignments: str) -> list[str]:
     return str(error.value).replace(f"{path.parent}/", "").split("\n")
 
 
-def test_without_file_and_assignments_the_settings_are_the_defaults() -> None:
-    assert load_settings() == Settings()
-
-
 def test_a_layer_changes_what_it_names_and_nothing_else(path: Path) -> None:
     text = (
         "detector:\n  heat: {frames: 5, threshold: 2}\n  search: {perspective: {sizes: [0.5]}}\n"

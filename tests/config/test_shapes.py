@@ -147,14 +147,3 @@ class TestFiles:
         assert (settings.detector.kind, settings.detector.model) == ("svm", "b.npz")
         assert settings.labels.roles == {"mask": "ignored", "model": "other"}
         assert load_settings([tmp_path / "gate.yaml"]).detector.model == str(tmp_path / "a.npz")
-
-    def test_a_mistake_has_its_place_in_the_file(self, tmp_path: Path) -> None:
-        lines = tmp_path / "lines.yaml"
-        lines.write_text(
-            "traffic:\n  lines:\n  - {name: a, start: [0, 0], end: [1, 1], lefft: up}\n"
-        )
-        with pytest.raises(ConfigError) as caught:
-            load_settings([lines])
-        assert str(caught.value) == (
-            f"{lines}:3:43: traffic.lines[0].lefft: unknown setting; did you mean left?"
-        )

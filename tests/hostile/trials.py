@@ -17,7 +17,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import FrameType
-from typing import IO, NoReturn
+from typing import IO
 
 MEMORY = 1_000_000_000
 """Maximum number of bytes that the process may have resident."""
@@ -134,14 +134,12 @@ def _main() -> None:
             print(json.dumps(asdict(trial)), file=report, flush=True)
 
 
-def _try(main: Callable[[Sequence[str]], NoReturn], arguments: list[str], said: IO[bytes]) -> Trial:
+def _try(main: Callable[[Sequence[str]], int], arguments: list[str], said: IO[bytes]) -> Trial:
     began = time.process_time()
     code: int | None = None
     signal.setitimer(signal.ITIMER_PROF, _SECONDS)
     try:
-        main(arguments)
-    except SystemExit as end:
-        code = int(end.code or 0)
+        code = main(arguments)
     except _TookTooLong:
         pass
     finally:

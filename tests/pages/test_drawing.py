@@ -236,7 +236,7 @@ traffic:
   zones: [{{name: closed, points: [[50, 50], [150, 50], [100, 150], [50, 50]]}}]
 """
     )
-    values = given_values([given])
+    values = given_values([str(given)])
     made = drawing(list(frames(*DOWN)), values)
     window.open(written(tmp_path, made))
     for _ in range(2):

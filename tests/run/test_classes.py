@@ -1,6 +1,5 @@
 """The setting `classes`: only vehicles of some classes are shown and counted."""
 
-import json
 from pathlib import Path
 
 import pytest
@@ -18,7 +17,6 @@ from vdet.media import Picture
 from vdet.run.loop import Parts
 from vdet.run.video import Run, run_video
 from vdet.track.track import Track
-from vdet.traffic.counting import count_files
 
 GATE = LineSettings(name="gate", start=(0.3, 0), end=(0.3, 1))
 SETTINGS = Settings(traffic=TrafficSettings(lines=(GATE,)))
@@ -49,18 +47,6 @@ def test_boxes_go_by_the_class_so_far_and_all_else_by_the_last_one(
     assert (event["id"], event["class"], float(event["time"]) < 1.7) == ("1", "truck", True)
     (crop,) = names(tmp_path / "crops")
     assert crop.startswith("vehicle-0001-truck-at-")
-
-
-def test_saved_tracks_are_counted_as_live(red_clip: Path, tmp_path: Path) -> None:
-    live, saved = tmp_path / "live.json", tmp_path / "all.jsonl"
-    for settings, wanted in ((TRUCKS, outputs(counts=live)), (SETTINGS, outputs(tracks=saved))):
-        run_video(Run(red_clip, wanted, settings), Parts(NullDetector(), TwoVehicles()))
-    (counts,) = count_files([saved], TRUCKS, (320, 240)).values()
-    events = json.loads(live.read_text())["events"]
-    assert [(event.id, event.time) for event in counts.events] == [
-        (event["id"], event["time"]) for event in events
-    ]
-    assert len(events) == 1
 
 
 @pytest.mark.parametrize(

@@ -74,19 +74,6 @@ class TestPlan:
             (Output("stages", tmp_path / "stages" / name),) for name in "ab"
         ]
 
-    def test_one_output_that_is_there_already_refuses_all(self, tmp_path: Path) -> None:
-        sources = placed(tmp_path, "a.png", "b.png")
-        touch(tmp_path / "out" / "b.png")
-        with pytest.raises(OutputError, match=r"b\.png: already exists"):
-            plan_images(sources, tmp_path / "out", None, OutputFiles())
-        assert len(plan_images(sources, tmp_path / "out", None, OutputFiles(overwrite=True))) == 2
-
-    def test_a_file_where_the_folder_should_be_is_refused(self, tmp_path: Path) -> None:
-        touch(tmp_path / "out")
-        sources = placed(tmp_path, "a.png", "b.png")
-        with pytest.raises(OutputError, match=r"the folder .*out is not a folder"):
-            plan_images(sources, tmp_path / "out", None, OutputFiles(overwrite=True))
-
 
 def test_a_picture_that_is_too_small_is_named(tmp_path: Path) -> None:
     source, out = tmp_path / "tiny.png", tmp_path / "out.png"

@@ -74,7 +74,6 @@ def count(
     if not settings.traffic:
         raise click.UsageError("no lines or zones to count at; add a settings file with -c FILE")
     outputs = options.requested_outputs((), paths)
-    options.check_counting(settings, outputs, several=False)
     if corrections and len(tracks) > 1:
         raise click.UsageError("--corrections is for one file of tracks; count each on its own")
     from vdet.run.sinks.protocol import check_sinks

@@ -30,8 +30,7 @@ if TYPE_CHECKING:
 @options.output_folder("--stages", help="Write an image of every stage into DIR.")
 @options.output_files("--json", help="Write the boxes to FILE. With -, to standard output.")
 @options.output_files(
-    "--labels",
-    help="Write the boxes for labelling tools: .coco.json. Can be repeated.",
+    "--labels", help="Write the boxes for labelling tools: .coco.json. Can be repeated."
 )
 @options.sinks_option
 @options.classes_option

@@ -4,7 +4,6 @@ import re
 import shlex
 from collections.abc import Sequence
 from contextlib import closing
-from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,11 +20,11 @@ from vdet.workers import DaskCluster, LocalProcesses, Workers, core_count
 
 if TYPE_CHECKING:
     from vdet.batch.manifest import Record
-    from vdet.batch.run import Plan
     from vdet.run.video import Run
 
 STAGE_MARGIN = Fraction(2)
 """Seconds to process before and after `--at`, for detector and tracker."""
+_VIDEO_OR_NONE = "pass either OUT or --no-video; for several videos, add -d DIR"
 _ENDING = re.compile(r"(\.[a-z0-9_-]+)+", re.ASCII)
 """The ending of an output's name, such as `.csv` or `.cars.csv`."""
 
@@ -143,16 +142,26 @@ def detect_video(
     """
     outputs = options.requested_outputs(sinks, paths)
     has_stages = any(output.sink == "stages" for output in outputs)
-    if has_stages != (at is not None):
-        raise click.UsageError("--stages and --at must be used together")
-    if start is not None and end is not None and end <= start:
-        raise click.UsageError("--end must be later than --start")
-    if folder is None:
-        if jobs or skip_existing or scheduler:
-            raise click.UsageError("--jobs, --skip-existing and --scheduler require -d")
-        outputs = _with_video(videos, outputs, no_video=no_video)
-    elif corrections:
-        raise click.UsageError("--corrections is for one video, without -d")
+    is_empty = start is not None and end is not None and end <= start
+    mistakes = {
+        "--stages and --at must be used together": has_stages != (at is not None),
+        "--end must be later than --start": is_empty,
+        "--overwrite and --skip-existing cannot be used together": overwrite and skip_existing,
+        "--jobs and --scheduler cannot be used together": jobs and scheduler,
+        "--jobs, --skip-existing and --scheduler require -d": not folder
+        and (jobs or skip_existing or scheduler),
+        "--corrections is for one video, without -d": folder and corrections,
+        _VIDEO_OR_NONE: not folder and no_video and len(videos) > 1,
+        "no output; add one, such as --tracks": no_video and not outputs,
+    }
+    for mistake, is_made in mistakes.items():
+        if is_made:
+            raise click.UsageError(mistake)
+    if folder:
+        outputs = [_checked_ending(output) for output in outputs]
+    if not (no_video or (folder and any(output.sink == "video" for output in outputs))):
+        drawn = Path() if folder else _drawn_video(videos, is_only=not outputs)
+        outputs.insert(0, Output("video", drawn))
     settings = source.load()
     options.check_counting(settings, outputs, several=folder is not None)
     if settings.lack_of_metres and "lane-geometry" not in settings.conditions.ignore:
@@ -177,36 +186,23 @@ def detect_video(
     if folder is None:
         code, is_doubtful = 0, _process_video(run)
     else:
-        code, is_doubtful = _process_videos(
-            videos,
-            folder,
-            run,
-            no_video=no_video,
-            skip_existing=skip_existing,
-            jobs=jobs,
-            scheduler=scheduler,
-        )
+        code, is_doubtful = _process_videos(videos, folder, run, skip_existing, jobs, scheduler)
     return code or (DOUBTFUL if strict and is_doubtful else 0)
 
 
-def _with_video(paths: Sequence[Path], outputs: list[Output], *, no_video: bool) -> list[Output]:
-    """Return all outputs for `paths`, which are IN and OUT, or only IN.
+def _drawn_video(paths: Sequence[Path], *, is_only: bool) -> Path:
+    """Return the video to write for `paths`, which are IN and OUT, or only IN.
 
-    Without any output, the video is written beside its source. Raises `click.UsageError`.
+    If it is the only output, it may be beside its source. Raises `click.UsageError`.
     """
     source, *videos = paths
-    if no_video and not videos:
-        if not outputs:
-            raise click.UsageError("no output; add one, such as --tracks")
-        return outputs
-    is_pattern = "%" in source.name and not source.exists()
-    has_default = not (no_video or outputs or videos or source.is_dir() or is_pattern)
-    if no_video or not (videos or has_default):
-        raise click.UsageError("pass either OUT or --no-video; for several videos, add -d DIR")
+    if not videos:
+        is_pattern = "%" in source.name and not source.exists()
+        if not is_only or source.is_dir() or is_pattern:
+            raise click.UsageError(_VIDEO_OR_NONE)
+        videos = [_beside(source)]
     from vdet.media.writer import may_replace_video
 
-    if has_default:
-        videos = [_beside(source)]
     if len(videos) > 1 or (videos[0].is_file() and not may_replace_video(videos[0])):
         if file_ids([source]) & file_ids(videos):
             raise OutputError(f"{videos[0]}: is the input itself; use another output")
@@ -215,7 +211,7 @@ def _with_video(paths: Sequence[Path], outputs: list[Output], *, no_video: bool)
             f"{videos[0]} would be replaced, but vdet did not write it; use another name, or for "
             f"several videos a folder: vdet detect-video {shown} -d found"
         )
-    return [Output("video", videos[0]), *outputs]
+    return videos[0]
 
 
 def _beside(source: Path) -> Path:
@@ -251,8 +247,6 @@ def _process_videos(
     clips: Sequence[Path],
     folder: Path,
     common: "Run",
-    *,
-    no_video: bool,
     skip_existing: bool,
     jobs: int | None,
     scheduler: str | None,
@@ -263,29 +257,29 @@ def _process_videos(
     -------
     The exit code, and whether a result is doubtful.
     """
-    from vdet.batch.run import make_plan
+    from vdet.batch.run import make_plan, run_batch
 
-    if no_video and not common.outputs:
-        raise click.UsageError("no output; add one, such as --tracks")
-    if common.overwrite and skip_existing:
-        raise click.UsageError("--overwrite and --skip-existing cannot be used together")
-    if jobs and scheduler:
-        raise click.UsageError("--jobs and --scheduler cannot be used together")
     if scheduler:  # the workers were started in other folders
         clips, folder = [clip.absolute() for clip in clips], folder.absolute()
-    outputs = [_checked_ending(output) for output in common.outputs]
-    if not (no_video or any(output.sink == "video" for output in outputs)):
-        outputs = [Output("video", Path()), *outputs]
-    common = replace(common, outputs=tuple(outputs))
     plan = make_plan(clips, folder, common, skip_existing=skip_existing)
-    records = _run_plan(plan, jobs, scheduler)
-    failed = sum(record.error is not None for record in records)
-    skipped = f"{len(plan.skipped)} skipped, " if plan.skipped else ""
-    announce(
-        f"{plan.folder}: {counted(len(records) - failed, 'file')} done, {skipped}{failed} failed"
-    )
-    code = failure_code(failed, len(plan.runs) + len(plan.skipped))
-    return code, any(record.is_doubtful for record in records)
+    cores = core_count()
+    jobs = max(1, min(jobs or cores, len(plan.runs)))
+    workers: Workers = LocalProcesses(jobs)
+    if scheduler:
+        workers, jobs = DaskCluster(scheduler), cores  # a thread for each file
+    results = run_batch(plan, workers=workers, threads=max(1, cores // jobs))
+    failed, is_doubtful = 0, False
+    with progress_steps(" files") as steps, closing(results):
+        advance = steps("", len(plan.runs))
+        for run, record in results:
+            _print_result(run, record)
+            failed += record.error is not None
+            is_doubtful |= record.is_doubtful
+            advance(1)
+    done, skipped = len(plan.runs) - failed, len(plan.skipped)
+    also = f"{skipped} skipped, " if skipped else ""
+    announce(f"{plan.folder}: {counted(done, 'file')} done, {also}{failed} failed")
+    return failure_code(failed, len(plan.runs) + skipped), is_doubtful
 
 
 def _checked_ending(output: Output) -> Output:
@@ -299,28 +293,6 @@ def _checked_ending(output: Output) -> Output:
         allowed = ", ".join(kind.endings) or f"as in .{sink if kind.folder_pattern else 'txt'}"
         raise click.UsageError(f"{sink}: with -d, pass only the ending of the names: {allowed}")
     return Output(sink, Path(ending))
-
-
-def _run_plan(plan: "Plan", jobs: int | None, scheduler: str | None) -> "list[Record]":
-    """Process the videos of a plan, print the result of each, and return their records."""
-    from vdet.batch.run import run_batch
-
-    cores = core_count()
-    jobs = max(1, min(jobs or cores, len(plan.runs)))
-    workers: Workers = LocalProcesses(jobs)
-    if scheduler:
-        workers, jobs = DaskCluster(scheduler), cores  # a thread for each file
-    records = []
-    with (
-        progress_steps(" files") as steps,
-        closing(run_batch(plan, workers=workers, threads=max(1, cores // jobs))) as results,
-    ):
-        advance = steps("", len(plan.runs))
-        for run, record in results:
-            _print_result(run, record)
-            records.append(record)
-            advance(1)
-    return records
 
 
 def _print_result(run: "Run", record: "Record") -> None:

@@ -1,9 +1,7 @@
 """`vdet draw`: a page for drawing lines over the paths of vehicles."""
 
-from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -49,6 +47,7 @@ def draw(
       vdet draw in.mp4 -c gate.yaml -o gate.html --tracks-from tracks.jsonl
       vdet draw in.mp4 -c gate.yaml -o scene.jpg
     """
+    from vdet.config.loading import given_values
     from vdet.pages.drawing import Drawing
     from vdet.run.scene import read_scene
     from vdet.run.video import Run
@@ -62,16 +61,8 @@ def draw(
         whole_frames = settings.model_copy(update={"regions": ()})
         run = Run(clip, settings=whole_frames, start=start, end=end)
         image, frames = read_scene(run, tracks, steps)
-    drawing = Drawing(image, frames, settings, _user_values(source.configs))
+    drawing = Drawing(image, frames, settings, given_values(source.configs))
     name = Path([output.name, *source.configs][-1]).with_suffix(".yaml").name
     with files, output_errors(output):
         files.stage(output).write_bytes(drawing.output(output, name))
     print_lines(f"{output}: written, {counted(len(drawing.paths), 'vehicle')}")
-
-
-def _user_values(configs: Sequence[str]) -> dict[str, Any]:
-    """Return the values of the settings files that are not shipped: see `given_values`."""
-    from vdet.config.loading import find_config, given_values, shipped_configs
-
-    paths = [find_config(name) for name in configs]
-    return given_values([path for path in paths if path not in shipped_configs().values()])

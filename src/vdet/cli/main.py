@@ -4,7 +4,6 @@ import os
 import sys
 import traceback
 from collections.abc import Iterable, Sequence
-from typing import NoReturn
 
 import click
 
@@ -22,10 +21,10 @@ cli = Program(
 click.version_option(__version__, prog_name="vdet")(cli)
 
 
-def main(arguments: Sequence[str] | None = None) -> NoReturn:
-    """Run the program and exit.
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the program, and return its exit code.
 
-    Exit codes are in `vdet.errors`. An error is one line on standard error; with `VDET_DEBUG=1` in
+    The codes are in `vdet.errors`. An error is one line on standard error; with `VDET_DEBUG=1` in
     the environment a traceback follows.
     """
     set_up_logs()
@@ -35,17 +34,17 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         if not isinstance(error, getattr(click.exceptions, "NoArgsIsHelpError", ())):
             error.message = escaped(error.message)  # type: ignore[misc]  # it may name a file
         error.show()
-        sys.exit(error.exit_code)
+        return error.exit_code
     except (KeyboardInterrupt, click.Abort):
-        sys.exit(_print_error(["interrupted"], INTERRUPTED))
+        return _print_error(["interrupted"], INTERRUPTED)
     except BrokenPipeError:  # the reader of our output has ended
         _drop_unwritten()
-        sys.exit(1)
+        return 1
     except Exception as error:
         code = error.exit_code if isinstance(error, VdetError) else VdetError.exit_code
         lines = error.args if isinstance(error, ConfigError) else [in_one_line(error)]
-        sys.exit(_print_error(lines, code))
-    sys.exit(code if isinstance(code, int) else 0)
+        return _print_error(lines, code)
+    return code if isinstance(code, int) else 0
 
 
 def _print_error(lines: Iterable[str], code: int) -> int:

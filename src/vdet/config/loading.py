@@ -87,14 +87,18 @@ def validated(kind: type[S], read: Document) -> S:
         raise ConfigError(*(_describe(mistake, read) for mistake in mistakes)) from error
 
 
-def given_values(paths: Sequence[Path]) -> dict[str, Any]:
-    """Return the merged values of files, unchecked: each shape with its size, paths as written.
+def given_values(configs: Sequence[str]) -> dict[str, Any]:
+    """Return the merged values of settings files, unchecked, without those of shipped ones.
+
+    Each shape has its size, and paths are as written.
 
     Raises
     ------
     ConfigError
         A file cannot be read, or is not YAML.
     """
+    shipped = shipped_configs().values()
+    paths = [path for path in map(find_config, configs) if path not in shipped]
     layers = (_with_sizes(document.read_document(path)) for path in paths)
     return reduce(_with_kinds_over, layers, Document("settings", {})).values
 

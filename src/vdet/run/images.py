@@ -64,10 +64,7 @@ def find_images(paths: Sequence[Path]) -> dict[Path, Path]:
 
 
 def plan_images(
-    sources: Mapping[Path, Path],
-    out: Path | None,
-    stages: Path | None,
-    files: OutputFiles,
+    sources: Mapping[Path, Path], out: Path | None, stages: Path | None, files: OutputFiles
 ) -> list[ImageJob]:
     """Choose the outputs of each image, and check them before any work.
 

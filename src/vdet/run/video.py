@@ -168,12 +168,7 @@ def open_video(
             run.source, settings, float(info.start), tags=info.tags, length=info.duration
         )
         traffic = LiveTraffic(
-            settings,
-            info.width,
-            info.height,
-            clock,
-            corrections=corrections,
-            name=run.source.name,
+            settings, info.width, info.height, clock, corrections=corrections, name=run.source.name
         )
         facts: dict[str, Fact] = {}
 
