@@ -182,14 +182,6 @@ def test_a_run_is_a_value() -> None:
     assert len({one, other, pickle.loads(pickle.dumps(one))}) == 1
 
 
-def test_no_file_that_is_read_is_overwritten(clip_path: Path, tmp_path: Path) -> None:
-    mask = tmp_path / "mask.csv"
-    mask.write_bytes(cv2.imencode(".png", np.full((9, 16), 255, np.uint8))[1].tobytes())
-    settings = vdet.load_settings(assignments=[f"regions=[{{name: a, mask: {mask}}}]"])
-    with pytest.raises(vdet.VdetError, match=r"mask\.csv: is the input itself"):
-        vdet.detect_video(clip_path, tracks=mask, settings=settings, overwrite=True)
-
-
 def test_messages_name_parameters(clip_path: Path, tmp_path: Path) -> None:
     (taken := tmp_path / "a.csv").touch()
     with pytest.raises(vdet.VdetError, match=r"already exists; use overwrite=True to replace it"):

@@ -13,7 +13,7 @@ import numpy as np
 
 from vdet.boxes import NO_BOXES, Boxes, Image, clipped
 from vdet.config.schema import Settings
-from vdet.detect.protocol import DetectorModel, VideoDetector
+from vdet.detect.protocol import DetectorModel
 from vdet.files import OutputFiles
 from vdet.media import Frame, Picture, VideoInfo
 from vdet.run.result import FrameResult
@@ -42,21 +42,19 @@ def check_detector(model: DetectorModel, images: Sequence[Image]) -> None:
     height, width = images[0].shape[:2]
     frames = [image.copy() for image in images]
     first, second = (model.for_video(width, height, frames) for _ in range(2))
-    detections = [_detect(first, image, index) for index, image in enumerate(frames)]
+    detections = [
+        first.detect(first.search(Picture(image), index)) for index, image in enumerate(frames)
+    ]
     with ThreadPoolExecutor(2) as pool:
         candidates = pool.map(second.search, map(Picture, frames), range(len(frames)))
         for a, b in zip(detections, map(second.detect, candidates), strict=True):
             is_same = len(a) == len(b) and np.allclose(a.sides, b.sides, atol=1e-4)
             assert is_same, "boxes differ between two detectors: they share something"
-    still = _detect(model.for_video(width, height, frames[:1]), frames[0], None)
-    for boxes in (*detections, still):
+    still = model.for_video(width, height, frames[:1])
+    for boxes in (*detections, still.detect(still.search(Picture(frames[0]), None))):
         inside = clipped(boxes.sides, (width, height))
         assert np.array_equal(inside, boxes.sides), "a box lies outside the frame"
     assert np.array_equal(frames, images), "the detector changed a frame"
-
-
-def _detect(detector: VideoDetector, image: Image, index: int | None) -> Boxes:
-    return detector.detect(detector.search(Picture(image), index))
 
 
 def check_tracker(make: Callable[[int, int], VideoTracker]) -> None:

@@ -19,6 +19,7 @@ from vdet.errors import BatchError, OutputError
 from vdet.run.sinks import Output, data
 from vdet.run.sinks.protocol import BatchTotal
 from vdet.run.video import Run
+from vdet.workers import LocalProcesses
 
 OUTPUTS = Output("tracks", Path(".csv")), Output("vehicles", Path(".cars.json"))
 
@@ -26,10 +27,8 @@ OUTPUTS = Output("tracks", Path(".csv")), Output("vehicles", Path(".cars.json"))
 MakePlan = Callable[..., Plan]
 
 
-class InTurn:
+class InTurn(LocalProcesses):
     """This process in place of others: the calls are made in turn."""
-
-    at_once = 1
 
     @contextmanager
     def open(self) -> Iterator[SequentialBackend]:
@@ -52,7 +51,7 @@ def plan(clips: Path) -> MakePlan:
 
 
 def run(planned: Plan) -> list[str | None]:
-    return [record.error for _, record in run_batch(planned, workers=InTurn())]
+    return [record.error for _, record in run_batch(planned, workers=InTurn(1))]
 
 
 MADE = ["a/c.cars.json", "a/c.csv", "all.cars.json", "b/c.cars.json", "b/c.csv", "manifest.jsonl"]

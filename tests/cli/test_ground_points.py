@@ -8,7 +8,7 @@ import pytest
 
 from conftest import Run
 from lanes.poles import CORNERS, HEIGHT, WIDTH, ground_text, seen
-from running import rows_of, write_drive
+from running import rows_of
 from vdet.boxes import Float64Array
 from writing import write_image
 
@@ -78,18 +78,3 @@ def test_counts_have_the_speeds_at_their_lines(run: Run) -> None:
         assert 0 < float(row["speed_sd"]) < 5
     assert rows[0]["mean_speed"] == ""
     assert float(rows[1]["mean_speed"]) == pytest.approx(43.2, rel=0.03)
-
-
-def test_records_of_vehicles_have_speeds(run: Run, red: tuple[str, ...]) -> None:
-    write_drive(Path("in.mp4"), 60)
-    points = "".join(
-        f"  - {{pixel: [{x}, {y}], metres: [{x / 10}, {-y / 10}]}}\n"
-        for x, y in ((0, 0), (320, 0), (320, 240), (0, 240))
-    )
-    Path("plan.yaml").write_text(f"camera:\n  size: [320, 240]\n  ground:\n{points}")
-    outputs = ("--no-video", "--vehicles", "cars.csv")
-    run("detect-video", "in.mp4", *outputs, *red, "-c", "plan.yaml", code=0)
-    [row] = rows_of(Path("cars.csv"))
-    assert float(row["speed"]) == pytest.approx(3.6 * 2.5, rel=0.2)  # a pixel a frame, 0.1 m
-    assert float(row["metres"]) == pytest.approx(0.1 * float(row["length"]), rel=0.3)
-    assert float(row["speed_85"]) >= float(row["speed"])

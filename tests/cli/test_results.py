@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from vdet.cli.results import ResultFiles
+from vdet.cli.options import ResultFiles
 from vdet.errors import OutputError, VideoError
 from vdet.files import NO_FILES, file_ids
 

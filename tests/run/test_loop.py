@@ -11,10 +11,8 @@ import numpy as np
 import pytest
 
 from red_cars import (
-    HEIGHT,
     PERSPECTIVE,
     SETTINGS,
-    WIDTH,
     by_perspective,
     car_at,
     drive,
@@ -118,13 +116,6 @@ class TestRun:
         run_video(replace(job, settings=SETTINGS), Parts(red_model()))
         run_video(replace(job, threads=2, settings=SETTINGS), Parts(red_model()))
         assert pools == [3, 2]
-
-    def test_the_totals_count_frames_and_vehicles(self, red_clip: Path, tmp_path: Path) -> None:
-        job = video.Run(red_clip, outputs(video=tmp_path / "out.mp4"), frames=20)
-        totals = run_red(job)
-        assert (totals.frames, totals.tracks) == (20, 1)
-        assert (totals.width, totals.height) == (WIDTH, HEIGHT)
-        assert totals.seconds > 0
 
 
 def _breaking(method: Callable[..., object], error: BaseException) -> Callable[..., object]:

@@ -150,13 +150,6 @@ class TestWhereNothingMoves:
         assert searched_by_network([None] * 20, rate, 2) == list(range(0, 20, rate.stride or 1))
 
 
-def test_frames_are_searched_so_many_times_a_second() -> None:
-    detector = PERSPECTIVE.detector.model_copy(update={"stride": None, "searches_per_second": 9})
-    settings = PERSPECTIVE.model_copy(update={"detector": detector})
-    found = [result.searched for result in follow(drive(30), settings, threads=4)]
-    assert found == [n % 2 == 0 for n in range(30)]
-
-
 @pytest.mark.parametrize("time", [Fraction(1, 25), Fraction(0), float("nan"), float("inf")])
 def test_times_that_do_not_increase_are_refused(time: Fraction) -> None:
     frames = [Frame(n, at, IMAGE) for n, at in enumerate((Fraction(0), Fraction(1, 25), time))]

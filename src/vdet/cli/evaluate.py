@@ -8,8 +8,7 @@ import click
 from vdet.cli import options
 from vdet.cli.command import command
 from vdet.cli.messages import progress_steps
-from vdet.cli.options import SettingsSource
-from vdet.cli.results import ResultFiles, facts_options, results_options
+from vdet.cli.options import ResultFiles, SettingsSource, facts_options, results_options
 from vdet.workers import IMAGES, core_count, return_freed_memory
 
 if TYPE_CHECKING:

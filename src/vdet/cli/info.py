@@ -7,8 +7,7 @@ import click
 
 from vdet.cli.command import command
 from vdet.cli.messages import print_lines
-from vdet.cli.options import PATH, SettingsSource, settings_options
-from vdet.cli.results import ResultFiles, facts_options
+from vdet.cli.options import PATH, ResultFiles, SettingsSource, facts_options, settings_options
 from vdet.errors import ModelError, counted, printable
 from vdet.version import __version__
 from vdet.workers import core_count

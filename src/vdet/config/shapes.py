@@ -6,7 +6,8 @@ frames at hand.
 
 import re
 from collections import Counter
-from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar
+from collections.abc import Iterable
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
@@ -81,11 +82,8 @@ class Shape(Section):
         return self.model_copy(update={**points, "size": (width, height)})
 
 
-Shapes = TypeVar("Shapes", bound="tuple[RegionSettings | LineSettings | ZoneSettings, ...]")
-
-
-def check_shapes(shapes: Shapes) -> Shapes:
-    """Return shapes; raise a `ValueError` if two have one name, or a point is not in the frame."""
+def check_shapes(shapes: Iterable["RegionSettings | LineSettings | ZoneSettings"]) -> None:
+    """Raise a `ValueError` if two shapes have one name, or a point is not in the frame."""
     seen: set[str] = set()
     for shape in shapes:
         if shape.name in seen:
@@ -98,7 +96,6 @@ def check_shapes(shapes: Shapes) -> Shapes:
                 f"{shape.name}: a point is outside the frame; points are in pixels of "
                 "camera.size, or without it in fractions of the frame"
             )
-    return shapes
 
 
 def _check_polygon(points: tuple[Point, ...]) -> tuple[Point, ...]:
@@ -133,8 +130,13 @@ class RegionSettings(Shape):
         return self
 
 
+def _check_regions(regions: tuple[RegionSettings, ...]) -> tuple[RegionSettings, ...]:
+    check_shapes(regions)
+    return regions
+
+
 RegionList = Annotated[
-    tuple[RegionSettings, ...], Field(max_length=MAX_SHAPES), AfterValidator(check_shapes)
+    tuple[RegionSettings, ...], Field(max_length=MAX_SHAPES), AfterValidator(_check_regions)
 ]
 
 

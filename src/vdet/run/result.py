@@ -11,7 +11,6 @@ import cv2
 from vdet.boxes import Boxes
 from vdet.conditions.finding import Findings
 from vdet.config.classes import is_chosen
-from vdet.draw.boxes import color_of, draw_box
 from vdet.media import Frame
 from vdet.track.track import FrameTracks, Track
 
@@ -85,8 +84,8 @@ class FrameResult:
 
     def _repr_png_(self) -> bytes:
         """Return the frame with its vehicles, for notebooks."""
+        from vdet.run.sinks.drawn import draw_tracks
+
         image = self.frame.image.copy()
-        for track in self.tracks:
-            label = f"#{track.id} {track.class_name or ''}".rstrip()
-            draw_box(image, track.box, color_of(track.id), label, dashed=track.state == "predicted")
+        draw_tracks(image, self.tracks, ("id", "class"))
         return cv2.imencode(".png", image)[1].tobytes()

@@ -79,16 +79,6 @@ def test_the_still_is_the_first_frame_that_shows_the_most_vehicles(tmp_path: Pat
     assert picture(still["src"]).mean() > 150
 
 
-def test_a_page_is_replaced_only_where_that_is_asked_for(red_clip: Path, tmp_path: Path) -> None:
-    job = Run(red_clip, outputs(page=tmp_path), frames=3)
-    (tmp_path / "notes.txt").write_text("mine")
-    run_red(job)
-    before = (tmp_path / "page.html").read_text()
-    run_red(replace(job, frames=5, overwrite=True))
-    assert (tmp_path / "page.html").read_text() != before
-    assert names(tmp_path) == ["notes.txt", "page.html"]
-
-
 def test_the_folders_of_a_mask_are_nobodys_business(red_clip: Path, tmp_path: Path) -> None:
     mask = tmp_path / "secret" / "mask.png"
     mask.parent.mkdir()

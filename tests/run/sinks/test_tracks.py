@@ -23,7 +23,6 @@ from vdet.run.result import FrameResult
 from vdet.run.sinks import Output
 from vdet.track.track import Track
 from vdet.traffic.clock import Clock
-from vdet.version import __version__
 
 RESULTS = (
     result_of(
@@ -119,13 +118,6 @@ def test_json_lines_tell_the_lane_where_it_was_looked_for(tmp_path: Path) -> Non
         lanes.append(record.pop("lane"))
         assert record == json.loads(other)
     assert lanes == [LANE.record(), None, None]
-
-
-def test_the_video_is_described_by_its_name_and_size(tmp_path: Path) -> None:
-    text = written(tmp_path / "a.coco.json")
-    (video,) = json.loads(text)["videos"]
-    assert video.pop("vdet")["program"] == f"vdet {__version__}"
-    assert video == {"id": 1, "name": "red.mp4", "width": 320, "height": 240}
 
 
 @pytest.mark.parametrize("ending", [".jsonl", ".coco.json"])

@@ -4,6 +4,7 @@ import zlib
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Self
 
+from vdet.boxes import Image
 from vdet.config.classes import OUR_NAMES
 from vdet.config.schema import Settings
 from vdet.draw import boxes
@@ -96,6 +97,13 @@ def label_text(track: Track, parts: Sequence[str]) -> str:
     texts = {"id": f"#{track.id}", "class": track.class_name, "score": f"{track.score:.2f}"}
     texts["distance"] = None if track.distance is None else f"{track.distance:.0f} m"
     return " ".join(text for part in parts if (text := texts[part]))
+
+
+def draw_tracks(image: Image, tracks: Sequence[Track], parts: Sequence[str]) -> None:
+    """Draw the boxes of tracks, BGR, each in a colour of its own, with these parts of a label."""
+    for track in tracks:
+        text, is_dashed = label_text(track, parts), track.state == "predicted"
+        boxes.draw_box(image, track.box, boxes.color_of(track.id), text, dashed=is_dashed)
 
 
 def _class_number(name: str | None) -> int:

@@ -10,7 +10,7 @@ from pathlib import Path
 from vdet.boxes import Image
 from vdet.config.classes import UNKNOWN, in_file_name
 from vdet.config.rendering import render_settings
-from vdet.draw.boxes import WHITE, color_of, draw_box, draw_label, draw_regions
+from vdet.draw.boxes import WHITE, draw_box, draw_label, draw_regions
 from vdet.errors import OutputError, VideoError, clock_text
 from vdet.files import write_text
 from vdet.lanes.road import stage_images
@@ -24,7 +24,7 @@ from vdet.pages.render import PAGE_NAME, jpeg_uri, link_to
 from vdet.pages.video import Player, VideoPage
 from vdet.regions import Regions
 from vdet.run.result import FrameResult, findings_in
-from vdet.run.sinks.drawn import IMAGE_LABELS, label_text
+from vdet.run.sinks.drawn import IMAGE_LABELS, draw_tracks
 from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.traffic.records import BestCrops, Crop, VehicleRecord
 
@@ -75,9 +75,7 @@ def _with_boxes(result: FrameResult) -> Image:
     for detection in detections:
         draw_box(picture, detection.box, WHITE)
         draw_label(picture, f"{detection.score:.2f}", (detection.box.x1, detection.box.y2), WHITE)
-    for track in result.tracks:
-        text = label_text(track, IMAGE_LABELS[-1])
-        draw_box(picture, track.box, color_of(track.id), text, dashed=track.state == "predicted")
+    draw_tracks(picture, result.tracks, IMAGE_LABELS[-1])
     return picture
 
 
