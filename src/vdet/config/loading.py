@@ -75,7 +75,8 @@ def load_settings(
     merged = reduce(_with_kinds_over, layers, chosen)
     kind = inside(merged.values, "detector", "kind") or default_kind("detector")
     tracker = tracker_defaults(kind)
-    return validated(Settings, _with_kinds_over(Document("defaults", {"tracker": tracker}), merged))
+    defaults = Document("defaults", {"tracker": tracker} if tracker else {})
+    return validated(Settings, _with_kinds_over(defaults, merged))
 
 
 def validated(kind: type[S], read: Document) -> S:
