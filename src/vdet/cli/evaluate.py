@@ -121,9 +121,7 @@ def video(
     from vdet.evaluate.video import evaluate_video
     from vdet.labels.reading import read_truth
     from vdet.labels.roles import Roles
-    from vdet.regions import check_masks
 
-    check_masks(settings.regions)
     detector = load_detector(settings.detector)
     results.check(source.inputs(*videos, *truths, settings=settings))
     roles = Roles.from_settings(settings)
