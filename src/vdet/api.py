@@ -359,10 +359,10 @@ def count(
     corrections
         A file of corrections that a reviewer saved, or several, which are merged.
     """
-    review = read_corrections([Path(path) for path in _listed(corrections)])
+    reviews = read_corrections(map(Path, _listed(corrections)))
     if isinstance(tracks, str | PathLike):
         path = Path(tracks)
-        return count_files([path], settings, size, rate, corrections=review)[str(path)]
+        return count_files([path], settings, size, rate, corrections=reviews)[str(path)]
     frames = iter(tracks)
     first = next(frames, None)
     if isinstance(first, FrameResult):
@@ -370,7 +370,7 @@ def count(
     items = frames if first is None else chain([first], frames)
     shown = (item.frame_tracks if isinstance(item, FrameResult) else item for item in items)
     name = first.source.name if isinstance(first, FrameResult) else None
-    return count_frames(shown, settings, size, corrections=review, name=name)
+    return count_frames(shown, settings, size, corrections=reviews, name=name)
 
 
 def evaluate_tracks(tracks: PathName, truth: PathName, *, until: int | None = None) -> Scores:

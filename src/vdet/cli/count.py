@@ -74,8 +74,6 @@ def count(
     if not settings.traffic:
         raise click.UsageError("no lines or zones to count at; add a settings file with -c FILE")
     outputs = options.requested_outputs((), paths)
-    if corrections and len(tracks) > 1:
-        raise click.UsageError("--corrections is for one file of tracks; count each on its own")
     from vdet.run.sinks.protocol import check_sinks
     from vdet.traffic.corrections import read_corrections
     from vdet.traffic.counting import count_files
@@ -84,10 +82,10 @@ def count(
 
     files = OutputFiles(overwrite=overwrite, inputs=source.inputs(*tracks, *corrections))
     check_sinks(outputs, files)
-    review = read_corrections(corrections)
+    reviews = read_corrections(corrections)
     with progress_steps(" files") as steps:
         advance = steps("", len(tracks) if len(tracks) > 1 else None)
-        videos = count_files(tracks, settings, size, rate, corrections=review, advance=advance)
+        videos = count_files(tracks, settings, size, rate, corrections=reviews, advance=advance)
     for name, result in videos.items():
         if result.clock:
             announce(f"{name}: begins {result.clock}")
@@ -103,7 +101,9 @@ def count(
             with output_errors(output.path):
                 write_content(files.stage(output.path), content)
     print_lines(*_totals(videos), *_matrix(list(videos.values())))
-    print_lines(*(str(result.corrected) for result in videos.values() if result.corrected))
+    for name, result in videos.items():
+        if result.corrected:
+            print_lines(f"{name}: {result.corrected}")
     is_doubtful = any(result.doubts for result in videos.values())
     return DOUBTFUL if strict and is_doubtful else 0
 

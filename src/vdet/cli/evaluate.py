@@ -136,24 +136,24 @@ def video(
 
 @command()
 @click.argument("events", type=options.PATH, metavar="OUT")
-@click.argument("truth", type=options.PATH, metavar="TRUTH")
+@click.argument("truth", type=options.PATH, metavar="CORRECTIONS")
 @facts_options
 def counts(events: Path, truth: Path, results: ResultFiles) -> None:
-    """Measure counts against counts that were checked and corrected.
+    """Measure counts in the minutes that a reviewer has checked.
 
-    OUT is a table of events, .csv or .json, that --counts wrote, also with other settings or
-    another network. TRUTH is the .json that --counts wrote with --corrections, for the same video.
-    Only the minutes that were checked are compared.
+    OUT is the table of events, .csv, that --counts wrote for the same video, also with other
+    settings or another network. CORRECTIONS is the file that the page of vdet review saved.
 
     \b
     Examples:
-      vdet eval counts counts.csv corrected.json
+      vdet eval counts counts.csv corrections.yaml
     """
     from vdet.evaluate.counts import count_lines, score_counts
     from vdet.run.inputs import input_files
+    from vdet.traffic.corrections import Corrections
 
     results.check(input_files(events, truth))
-    scores = score_counts(events, truth)
+    scores = score_counts(events, Corrections.read(truth))
     results.print(count_lines(scores), {"counts": [score.record for score in scores]})
 
 

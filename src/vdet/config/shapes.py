@@ -204,6 +204,17 @@ class TrafficSettings(Section):
         return bool(self.lines or self.zones)
 
     @property
+    def shapes(self) -> tuple[LineSettings | ZoneSettings, ...]:
+        """The lines, then the zones."""
+        return (*self.lines, *self.zones)
+
+    @property
+    def directions(self) -> dict[str, tuple[str, ...]]:
+        """The directions of each line and zone, by its name."""
+        directions = {line.name: (line.left, line.right) for line in self.lines}
+        return {**directions, **{zone.name: ZONE_DIRECTIONS for zone in self.zones}}
+
+    @property
     def seconds(self) -> int | None:
         """The interval in seconds; None for the whole video."""
         if self.interval is None:
@@ -223,10 +234,9 @@ class TrafficSettings(Section):
 
     @model_validator(mode="after")
     def _lie_in_the_frame(self) -> "TrafficSettings":
-        check_shapes((*self.lines, *self.zones))
-        columns = [f"{line.name}: {way}" for line in self.lines for way in (line.left, line.right)]
-        columns += [f"{zone.name}: {way}" for zone in self.zones for way in ZONE_DIRECTIONS]
-        if NOWHERE in {line.name for line in self.lines} | {zone.name for zone in self.zones}:
+        check_shapes(self.shapes)
+        columns = [f"{name}: {way}" for name, ways in self.directions.items() for way in ways]
+        if NOWHERE in self.directions:
             raise ValueError(f"{NOWHERE}: is reserved for flows without a destination; rename it")
         for column, number in Counter(columns).items():
             if number > 1:

@@ -1,30 +1,20 @@
 """Accuracy of counts at lines, by direction and class, where a reviewer has checked them."""
 
-import csv
-import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, Field, TypeAdapter, ValidationError
-
 from vdet.config.classes import UNKNOWN
+from vdet.config.document import Document
+from vdet.config.loading import validated
 from vdet.errors import TruthError
 from vdet.evaluate.output import figure, table
-from vdet.traffic.corrections import Passage, paired
-from vdet.traffic.counts import Checked
+from vdet.traffic.corrections import Corrections, ReviewedEvent, paired
+from vdet.traffic.tables import VIDEO, read_csv
 
 ALL = "all"
 """Name of the sum over lines, directions or classes."""
-
-
-class _Row(BaseModel):
-    time: float
-    name: str
-    direction: str
-    id: int
-    class_name: str | None = Field(None, alias="class")
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,151 +40,95 @@ class CountScore:
     false: int
     misnamed: int
 
-    def percent(self, number: int) -> float | None:
-        """Return a number as a percentage of the vehicles that passed; None if none did."""
-        return round(100 * number / self.passed, 1) if self.passed else None
-
     @property
     def record(self) -> dict[str, Any]:
-        """The values for JSON."""
+        """The values for tables and JSON, with percentages of the vehicles that passed."""
         right = self.passed - self.missed - self.misnamed
-        return asdict(self) | {
-            "counted_percent": self.percent(self.counted),
-            "right_percent": self.percent(right),
+        numbers = {"counted_percent": self.counted, "right_percent": right}
+        percents = {
+            name: round(100 * number / self.passed, 1) if self.passed else None
+            for name, number in numbers.items()
         }
+        return asdict(self) | percents
 
 
-def score_counts(path: Path, truth: Path) -> list[CountScore]:
-    """Compare a table of events with corrected counts, in the parts that were checked.
+def score_counts(path: Path, truth: Corrections) -> list[CountScore]:
+    """Compare a table of events, `.csv`, with corrections, in the parts that were checked.
 
-    Parameters
-    ----------
-    path
-        Events that `--counts` wrote, `.csv` or `.json`.
-    truth
-        Corrected counts, `.json`.
+    Returns
+    -------
+    The score of each direction and class, of each direction, and of all.
 
     Raises
     ------
     TruthError
-        A file cannot be used, or nothing was checked.
+        The table cannot be read, or nothing was checked.
+    ConfigError
+        The table has another form.
     """
-    content = _json(truth)
-    checked_items = (content.get("corrected") or {}).get("checked", [])
-    checked = _parsed(truth, list[Checked], checked_items)
-    if not checked:
-        raise TruthError(
-            f"{truth}: has no counts that were corrected and checked; write it with vdet count "
-            "--corrections FILE --counts FILE.json"
-        )
-    real = _passages(truth, content.get("events"))
-    events = _csv(path) if path.suffix.lower() == ".csv" else _json(path).get("events")
-    return list(_scores(_passages(path, events), real, checked))
+    if not truth.checked:
+        raise TruthError(f"{truth.source}: nothing was checked; check some minutes in the page")
+    outcomes = []
+    for passed, counted in paired(truth.passed(), _read_events(path)):
+        event = passed or counted
+        if event and truth.has_checked(event):
+            outcome = _Outcome(
+                name=event.name,
+                direction=event.direction,
+                passed=passed.class_name if passed else None,
+                counted=counted.class_name if counted else None,
+            )
+            outcomes.append(outcome)
+    scores = []
+    for name, direction in sorted({(outcome.name, outcome.direction) for outcome in outcomes}):
+        members = [o for o in outcomes if (o.name, o.direction) == (name, direction)]
+        labels = {label for o in members for label in (o.passed, o.counted) if label}
+        scores += [_score(members, name, direction, label) for label in (*sorted(labels), ALL)]
+    return [*scores, _score(outcomes, ALL, ALL, ALL)]
 
 
-def _csv(path: Path) -> list[dict[str, str]]:
-    try:
-        with path.open(encoding="utf-8", newline="") as file:
-            return list(csv.DictReader(file))
-    except (OSError, ValueError, csv.Error) as error:
-        raise TruthError(f"{path}: is not a table of vdet count --counts: {error}") from error
-
-
-def _json(path: Path) -> dict[str, Any]:
-    try:
-        content = json.loads(path.read_text("utf-8"))
-    except (OSError, ValueError) as error:
-        raise TruthError(f"{path}: is not JSON of vdet count --counts: {error}") from error
-    return content if isinstance(content, dict) else {}
-
-
-def _parsed(path: Path, kind: Any, values: Any) -> Any:
-    try:
-        return TypeAdapter(kind).validate_python(values)
-    except ValidationError as error:
-        mistake = error.errors()[0]
-        place = ".".join(map(str, mistake["loc"]))
-        raise TruthError(
-            f"{path}: is not a table of events of one video: {place}: {mistake['msg']}"
-        ) from error
-
-
-def _passages(path: Path, events: Any) -> list[Passage]:
-    rows: list[_Row] = _parsed(path, list[_Row], events)
-    return [
-        Passage(row.time, row.name, row.direction, row.class_name or UNKNOWN, row.id)
-        for row in rows
-    ]
+def _read_events(path: Path) -> list[ReviewedEvent]:
+    rows = read_csv(path)
+    if rows and VIDEO in rows[0]:
+        raise TruthError(f"{path}: has several videos; write a table for each")
+    events = []
+    for line, row in enumerate(rows, start=2):
+        values = {name: row.get(name) for name in ("time", "direction", "id")}
+        values |= {"line": row.get("name"), "class": row.get("class") or UNKNOWN}
+        events.append(validated(ReviewedEvent, Document(f"{path}:{line}", values)))
+    return events
 
 
 @dataclass(frozen=True, slots=True)
-class _Pair:
-    """A vehicle that passed, and what was counted; None: missed, or false."""
+class _Outcome:
+    """A vehicle at a line or zone: the class that passed, and the one that was counted.
 
-    real: Passage | None
-    counted: Passage | None
+    None: nothing passed, or nothing was counted.
+    """
 
-    @property
-    def one(self) -> Passage:
-        one = self.real or self.counted
-        assert one is not None
-        return one
-
-
-def _scores(
-    counted: Sequence[Passage], real: Sequence[Passage], checked: Sequence[Checked]
-) -> Iterator[CountScore]:
-    """Yield the score of each direction and class, of each direction, and of all."""
-    numbers = paired(real, counted)
-    pairs = [
-        _Pair(one, counted[numbers[n]] if n in numbers else None) for n, one in enumerate(real)
-    ]
-    taken = set(numbers.values())
-    pairs += [_Pair(None, one) for n, one in enumerate(counted) if n not in taken]
-    pairs = [pair for pair in pairs if _is_checked(pair.one, checked)]
-    ways = sorted({(pair.one.name, pair.one.direction) for pair in pairs})
-    for way in ways:
-        own = [pair for pair in pairs if (pair.one.name, pair.one.direction) == way]
-        sides = [side for pair in own for side in (pair.real, pair.counted) if side]
-        for kind in sorted({side.class_name for side in sides}):
-            yield _score(own, *way, kind)
-        yield _score(own, *way, ALL)
-    yield _score(pairs, ALL, ALL, ALL)
+    name: str
+    direction: str
+    passed: str | None
+    counted: str | None
 
 
-def _is_checked(one: Passage, checked: Sequence[Checked]) -> bool:
-    return any(span.line == one.name and span.start <= one.time < span.end for span in checked)
-
-
-def _score(pairs: Sequence[_Pair], name: str, direction: str, kind: str) -> CountScore:
-    def is_kind(one: Passage | None) -> bool:
-        return one is not None and kind in (ALL, one.class_name)
-
-    real = [pair for pair in pairs if is_kind(pair.real)]
-    counted = [pair for pair in pairs if is_kind(pair.counted)]
+def _score(outcomes: Sequence[_Outcome], name: str, direction: str, label: str) -> CountScore:
+    passed = [o for o in outcomes if o.passed and label in (ALL, o.passed)]
+    counted = [o for o in outcomes if o.counted and label in (ALL, o.counted)]
     return CountScore(
         name=name,
         direction=direction,
-        class_name=kind,
-        passed=len(real),
+        class_name=label,
+        passed=len(passed),
         counted=len(counted),
-        missed=sum(pair.counted is None for pair in real),
-        false=sum(pair.real is None for pair in counted),
-        misnamed=sum(
-            bool(pair.real and pair.counted and pair.real.class_name != pair.counted.class_name)
-            for pair in real
-        ),
+        missed=sum(outcome.counted is None for outcome in passed),
+        false=sum(outcome.passed is None for outcome in counted),
+        misnamed=sum(outcome.counted not in (None, outcome.passed) for outcome in passed),
     )
 
 
 def count_lines(scores: Sequence[CountScore]) -> list[str]:
     """Return the scores as a table of text."""
-    headings = (
-        *("line", "direction", "class", "passed", "counted", "missed", "false", "wrong class"),
-        *("counted %", "right %"),
-    )
-    rows = []
-    for score in scores:
-        *names, counted, right = score.record.values()
-        rows.append([*map(str, names), figure(counted, 1), figure(right, 1)])
+    headings = [name.replace("_", " ") for name in scores[0].record]
+    rows = [[figure(value, 1) for value in score.record.values()] for score in scores]
     return table(headings, rows)

@@ -152,9 +152,10 @@ def open_video(
     parts = parts or Parts(load_detector(run.settings.detector))
     corrections = None
     if run.corrections:  # most runs have none, and load nothing for them
-        from vdet.traffic.corrections import read_corrections
+        from vdet.traffic.corrections import by_video, read_corrections
 
-        corrections = read_corrections(run.corrections)
+        name, reviews = run.source.name, read_corrections(run.corrections)
+        corrections = by_video(reviews, {name: name}, run.settings.traffic)[name]
     with named_errors(run.source, VideoError), read_async(_opened(run)) as (reader, read):
         images, frames = peek(read)
         settings, info = run.settings, reader.info
@@ -168,7 +169,7 @@ def open_video(
             run.source, settings, float(info.start), tags=info.tags, length=info.duration
         )
         traffic = LiveTraffic(
-            settings, info.width, info.height, clock, corrections=corrections, name=run.source.name
+            settings, info.width, info.height, clock, corrections=corrections
         )
         facts: dict[str, Fact] = {}
 

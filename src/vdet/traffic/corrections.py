@@ -1,35 +1,36 @@
-"""Corrections: what reviewers found wrong in counts, read from files and applied to events."""
+"""Corrections: what reviewers say of counted events, read from files and applied to counts."""
 
+import math
 from bisect import bisect_left, bisect_right
-from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from datetime import datetime
-from functools import reduce
+from itertools import count
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeVar
 
 import numpy as np
 from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
 
-from vdet.config.classes import our_name
+from vdet.config.classes import UNKNOWN, our_name
 from vdet.config.document import read_document
 from vdet.config.loading import validated
 from vdet.config.section import Section
-from vdet.config.shapes import LineSettings, Name, Size, TrafficSettings, ZoneSettings
+from vdet.config.shapes import LineSettings, Name, Shape, Size, TrafficSettings, ZoneSettings
 from vdet.errors import ConfigError
 from vdet.labels.label import NO_ID
-from vdet.traffic.counts import Checked, Corrected, Counts, Event
-from vdet.traffic.crossings import Border, Line, lines_and_zones
+from vdet.traffic.counts import Corrected, Counts, Event
 
 MAX_BYTES = 5_000_000
-"""Size of a file of some 50,000 corrections."""
+"""Size of a file of some 50,000 events."""
 TOLERANCE = 0.5
-"""Maximum seconds between two passages that are the same one."""
-_OTHER = 0.01
-"""Seconds that a passage by another id or class counts as farther away."""
+"""Maximum seconds between two events that are the same one."""
+_DIFFERENCE = 0.01
+"""Seconds that an event of another id or class counts as farther away."""
+_LAST = 1.0
+"""Seconds that an event which a reviewer added counts as farther away: more than `TOLERANCE`."""
 _PIXELS = 1.0
-"""Maximum distance of the points of the same line, pixels of the frames at hand."""
+"""Maximum distance between the points of the same line, pixels of the review."""
 NO_FRAME = -1
 """`Event.frame` of a vehicle that a reviewer added."""
 
@@ -39,11 +40,65 @@ _ErrorText = Annotated[Error, BeforeValidator(lambda value: "false" if value is 
 """As YAML has it, where `false` without quotes is no text."""
 
 
-class Sample(Section):
-    """The minutes of the video that were drawn to be checked, from 0, and the seed."""
+class ReviewedEvent(Section):
+    """An event as it was counted, or missed; its error, and what is `correct`.
 
-    seed: int
-    minutes: tuple[int, ...] = ()
+    `time` is in seconds in the video. `error` is None for what was counted rightly. `correct` is
+    the class or the direction.
+    """
+
+    name: Name = Field(alias="line")
+    time: float
+    direction: Name
+    class_name: Name = Field(UNKNOWN, alias="class")
+    id: int = NO_ID
+    error: _ErrorText | None = None
+    correct: Name | None = None
+
+    def __str__(self) -> str:
+        return f"{self.name}, {self.time:g} s, {self.direction}, {self.class_name}"
+
+    @model_validator(mode="after")
+    def _says_what_is_correct(self) -> "ReviewedEvent":
+        if (self.correct is None) == (self.error in ("class", "direction")):
+            need = "needs" if self.correct is None else "does not accept"
+            raise ValueError(f"error: {self.error} {need} correct")
+        return self
+
+    @property
+    def true_direction(self) -> str:
+        """The direction in which the vehicle passed."""
+        return self.correct if self.correct and self.error == "direction" else self.direction
+
+    @property
+    def true_class(self) -> str:
+        """The class of the vehicle that passed; ours for a synonym."""
+        label = self.correct if self.correct and self.error == "class" else self.class_name
+        return our_name(label) or label
+
+    def corrected(self, event: Event | None) -> Event | None:
+        """Return the event as it should have been counted; None: it should not, or was not."""
+        if self.error == "missed":
+            event = event or Event(
+                time=self.time,
+                frame=NO_FRAME,
+                name=self.name,
+                direction=self.direction,
+                id=NO_ID,
+                vehicle=NO_ID,
+                class_name=self.true_class,
+                score=1.0,
+            )
+        if event is None or self.error == "false":
+            return None
+        class_name = self.true_class if self.error in ("class", "missed") else event.class_name
+        return replace(event, direction=self.true_direction, class_name=class_name)
+
+    @property
+    def opinion(self) -> tuple[str | None, ...]:
+        """What two reviewers must agree on."""
+        passed = self.error != "false"
+        return self.error, *((self.true_direction, self.true_class) if passed else ())
 
 
 class CheckedSpan(Section):
@@ -54,90 +109,50 @@ class CheckedSpan(Section):
     end: float
 
 
-class Correction(Section):
-    """An error in the counts: what was counted, or missed, and what is `correct`."""
+class Sample(Section):
+    """The minutes of the video that were drawn to be checked, from 0, and the seed."""
 
-    line: Name
-    """The line or zone."""
-    time: float
-    """Seconds in the video, as in the table of events."""
-    direction: Name
-    class_name: Name | None = Field(None, alias="class")
-    id: int = NO_ID
-    error: _ErrorText
-    correct: Name | None = None
-    """The class or the direction."""
-
-    @model_validator(mode="after")
-    def _says_what_is_correct(self) -> "Correction":
-        if (self.correct is None) == (self.error in ("class", "direction")):
-            need = "needs" if self.correct is None else "does not accept"
-            raise ValueError(f"error: {self.error} {need} correct")
-        return self
+    seed: int
+    minutes: tuple[int, ...] = ()
 
 
-@dataclass(frozen=True, slots=True, order=True)
-class Passage:
-    """A vehicle at a line or zone: when, which way, and of which class and track it is."""
-
-    time: float
-    name: str
-    direction: str
-    class_name: str = ""
-    id: int = NO_ID
-
-    @staticmethod
-    def of(event: Event) -> "Passage":
-        """Return the passage of an event."""
-        return Passage(event.time, event.name, event.direction, event.class_name or "", event.id)
-
-    def __str__(self) -> str:
-        kind = f", {self.class_name}" if self.class_name else ""
-        return f"{self.name}, {self.time:g} s, {self.direction}{kind}"
-
-    def distance(self, other: "Passage") -> float:
-        """Return the seconds to another passage, somewhat more if its id or class differs."""
-        differing = (self.id != other.id) + (self.class_name != other.class_name)
-        return abs(self.time - other.time) + _OTHER * differing
+A = TypeVar("A", bound=ReviewedEvent | Event)
+B = TypeVar("B", bound=ReviewedEvent | Event)
 
 
-def paired(wanted: Sequence[Passage], known: Sequence[Passage]) -> dict[int, int]:
-    """Return for the numbers of wanted passages those of the known ones that are the same.
+def paired(events: Sequence[A], candidates: Sequence[B]) -> list[tuple[A | None, B | None]]:
+    """Return each event with the candidate that is the same event; None: there is none.
 
-    They are at the same line, in the same direction, and within `TOLERANCE`; the nearest pairs
-    first. A passage is in one pair at most.
+    Both are at the same line, in the same direction, and within `TOLERANCE`. The nearest are paired
+    first, missed vehicles last. Candidates without an event come at the end, with None.
     """
-    by_way: dict[tuple[str, str], list[tuple[float, int]]] = defaultdict(list)
-    for number, place in enumerate(known):
-        by_way[place.name, place.direction].append((place.time, number))
-    for moments in by_way.values():
-        moments.sort()
-    candidates = []
-    for number, one in enumerate(wanted):
-        moments = by_way.get((one.name, one.direction), [])
-        first = bisect_left(moments, (one.time - TOLERANCE, NO_ID))
-        end = bisect_right(moments, (one.time + TOLERANCE, len(known)))
-        candidates += [(known[n].distance(one), number, n) for _, n in moments[first:end]]
-    pairs: dict[int, int] = {}
-    taken: set[int] = set()
-    for _, number, other in sorted(candidates):
-        if number not in pairs and other not in taken:
-            pairs[number] = other
-            taken.add(other)
-    return pairs
+    order = sorted(range(len(candidates)), key=lambda number: candidates[number].time)
+    times = [candidates[number].time for number in order]
+    near = []
+    for number, event in enumerate(events):
+        first = bisect_left(times, event.time - TOLERANCE)
+        end = bisect_right(times, event.time + TOLERANCE)
+        near += [(_distance(event, candidates[n]), number, n) for n in order[first:end]]
+    partners: dict[int, B] = {}
+    alone = dict(enumerate(candidates))
+    for distance, number, candidate in sorted(near):
+        if distance < math.inf and number not in partners and candidate in alone:
+            partners[number] = alone.pop(candidate)
+    pairs = [(event, partners.get(number)) for number, event in enumerate(events)]
+    return [*pairs, *((None, candidate) for candidate in alone.values())]
 
 
-@dataclass(frozen=True, slots=True)
-class _Verdict:
-    """What is wrong with a passage: what is correct, by the error."""
-
-    passage: Passage
-    fixes: Mapping[Error, str | None]
-    corrections: tuple[Correction, ...]
+def _distance(first: ReviewedEvent | Event, second: ReviewedEvent | Event) -> float:
+    """Return the seconds between two events, more if their id or class differs."""
+    if (first.name, first.direction) != (second.name, second.direction):
+        return math.inf
+    is_missed = NO_ID in (first.id, second.id)
+    differences = (first.id != second.id) + (first.class_name != second.class_name)
+    return abs(first.time - second.time) + _DIFFERENCE * differences + _LAST * is_missed
 
 
 class Corrections(Section):
-    """The corrections of the counts of a video, made by one reviewer, or merged from several."""
+    """What a reviewer says of the counts of a video, or several whose files were merged."""
 
     video: str
     """Name of the video."""
@@ -149,25 +164,20 @@ class Corrections(Section):
     saved: datetime | None = None
     sample: Sample | None = None
     checked: tuple[CheckedSpan, ...] = ()
-    events: tuple[Correction, ...] = ()
+    events: tuple[ReviewedEvent, ...] = ()
+    """All errors, and what was counted rightly in the checked parts and beside missed vehicles."""
     _files: tuple[str, ...] = PrivateAttr(("corrections",))
 
     @model_validator(mode="after")
     def _fit_together(self) -> "Corrections":
-        ways = {border.name: border.directions for border in self.borders(*self.size)}
+        directions = self.traffic.directions
         for span in self.checked:
-            if span.line not in ways:
+            if span.line not in directions:
                 raise ValueError(f"checked: there is no line or zone {span.line}")
-        for one in self.events:
-            expected = ways.get(one.line, ())
-            for way in (one.direction, one.correct if one.error == "direction" else None):
-                if way not in (*expected, None):
-                    raise ValueError(f"events: {one.line} has no direction {way}")
-        for verdict in self._verdicts():
-            if len(verdict.fixes) < len(verdict.corrections) or (
-                "false" in verdict.fixes and len(verdict.fixes) > 1
-            ):
-                raise ValueError(f"events: {verdict.passage}: is corrected twice; remove one")
+        for event in self.events:
+            for direction in (event.direction, event.true_direction):
+                if direction not in directions.get(event.name, ()):
+                    raise ValueError(f"events: {event.name} has no direction {direction}")
         return self
 
     @staticmethod
@@ -183,174 +193,166 @@ class Corrections(Section):
         """The files, for messages."""
         return ", ".join(self._files)
 
-    def borders(self, width: int, height: int) -> tuple[Border, ...]:
-        """Return the lines and zones in frames of this size. Raises `ConfigError`."""
+    @property
+    def traffic(self) -> TrafficSettings:
+        """The lines and zones, with the size of their frames."""
         update = {"size": self.size}
-        lines = tuple(line.model_copy(update=update) for line in self.lines)
-        zones = tuple(zone.model_copy(update=update) for zone in self.zones)
-        own_lines, own_zones = lines_and_zones(
-            TrafficSettings(lines=lines, zones=zones), width, height
+        return TrafficSettings(
+            lines=tuple(line.model_copy(update=update) for line in self.lines),
+            zones=tuple(zone.model_copy(update=update) for zone in self.zones),
         )
-        return *own_lines, *own_zones
 
-    def check(self, borders: Sequence[Border], size: tuple[int, int], video: str | None) -> None:
-        """Raise `ConfigError` if it is of another video, or other lines, than those at hand.
-
-        `borders` are in pixels of frames of this size; the name of the video may be unknown.
-        """
-        if video not in (self.video, None):
-            raise ConfigError(f"{self.source}: corrects {self.video}, not {video}")
+    def check(self, traffic: TrafficSettings) -> None:
+        """Raise `ConfigError` if the lines and zones are not among those of the settings."""
         try:
-            own_borders = self.borders(*size)
+            shapes = traffic.for_frames(*self.size).shapes
         except ConfigError as error:
-            raise ConfigError(f"{self.source}: {str(error).removeprefix('camera.')}") from error
-        at_hand = {border.name: border for border in borders}
-        for own in own_borders:
-            other = at_hand.get(own.name)
-            if not other or not _is_same(own, other):
+            raise ConfigError(f"{self.source}: {error}") from error
+        for reviewed in self.traffic.shapes:
+            if not any(_is_same(reviewed, shape) for shape in shapes):
                 raise ConfigError(
-                    f"{self.source}: {own.name} is not where these settings have it; count with "
-                    "the settings of the review"
+                    f"{self.source}: {reviewed.name} is not where these settings have it; count "
+                    "with the settings of the review"
                 )
 
-    def merged(self, other: "Corrections") -> "Corrections":
+    def merged(self, review: "Corrections") -> "Corrections":
         """Return the corrections of two reviewers of one video.
 
         Raises
         ------
         ConfigError
-            They are of different videos or lines, or contradict each other: they correct an event
-            in different ways, or only one of them corrects it and the other has checked it too.
+            They are for different lines, or contradict each other: they correct an event in
+            different ways, or only one of them corrects it and the other has checked it too.
         """
-        other.check(self.borders(*self.size), self.size, self.video)
-        own, others = list(self._verdicts()), list(other._verdicts())
-        pairs = paired([one.passage for one in own], [one.passage for one in others])
-        for number, one in enumerate(own):
-            partner = others[pairs[number]] if number in pairs else None
-            if (partner and _opinion(partner) != _opinion(one)) or (
-                not partner and other.has_checked(one.passage)
-            ):
-                raise _contradiction(self, other, one)
-        alone = [one for number, one in enumerate(others) if number not in pairs.values()]
-        for one in alone:
-            if self.has_checked(one.passage):
-                raise _contradiction(other, self, one)
-        added = tuple(correction for one in alone for correction in one.corrections)
-        update = {"events": self.events + added, "checked": self.checked + other.checked}
+        review.check(self.traffic)
+        pairs = paired(self.events, review.events)
+        added = [second for first, second in pairs if second and not first]
+        alone = [first for first, second in pairs if first and not second]
+        disputed = [a for a, b in pairs if a and b and a.opinion != b.opinion]
+        disputed += [event for event in alone if event.error and review.has_checked(event)]
+        disputed += [event for event in added if event.error and self.has_checked(event)]
+        if disputed:
+            raise ConfigError(
+                f"{self.source} and {review.source}: contradict each other: {disputed[0]}; "
+                "correct one of them"
+            )
+        update = {"events": (*self.events, *added), "checked": self.checked + review.checked}
         result = self.model_copy(update=update)
-        result._files = self._files + other._files
+        result._files = self._files + review._files
         return result
 
-    def has_checked(self, passage: Passage) -> bool:
-        """Return whether the line was checked at the time of a passage."""
+    def has_checked(self, event: ReviewedEvent) -> bool:
+        """Return whether the line was checked at the time of an event."""
         return any(
-            span.line == passage.name and span.start <= passage.time < span.end
-            for span in self.checked
+            span.line == event.name and span.start <= event.time < span.end for span in self.checked
         )
+
+    def passed(self) -> list[ReviewedEvent]:
+        """Return what passed: the events as they should have been counted."""
+        classes = {event.id: event.true_class for event in self.events if event.error == "class"}
+        classes.pop(NO_ID, None)
+        passed = []
+        for event in (event for event in self.events if event.error != "false"):
+            true_class = classes.get(event.id, event.true_class)
+            update = {"direction": event.true_direction, "class_name": true_class}
+            passed.append(event.model_copy(update=update))
+        return passed
 
     def apply(self, counts: Counts) -> Counts:
-        """Return corrected counts.
+        """Return corrected counts, as `apply_corrections` does for several videos."""
+        return apply_corrections({"": counts}, {"": self})[""]
 
-        An event is removed, added, or has another direction; a vehicle has another class in all its
-        events. Raises `ConfigError` if a correction fits no event, or a vehicle has two classes.
-        """
-        verdicts = list(self._verdicts())
-        found = [verdict for verdict in verdicts if "missed" not in verdict.fixes]
-        pairs = paired([one.passage for one in found], list(map(Passage.of, counts.events)))
-        classes: dict[int, str] = {}
-        by_event: dict[int, _Verdict] = {}
-        for number, verdict in enumerate(found):
-            if number not in pairs:
-                raise ConfigError(
-                    f"{self.source}: {verdict.passage}: no such event was counted within "
-                    f"{TOLERANCE} s; remove this correction, or check these counts anew"
-                )
-            by_event[pairs[number]] = verdict
-            if kind := verdict.fixes.get("class"):
-                vehicle = counts.events[pairs[number]].vehicle
-                if classes.setdefault(vehicle, _class(kind)) != _class(kind):
+
+def read_corrections(paths: Iterable[Path]) -> list[Corrections]:
+    """Read files, and merge those of one video. Errors as `Corrections` has them."""
+    reviews: dict[str, Corrections] = {}
+    for review in map(Corrections.read, paths):
+        before = reviews.get(review.video)
+        reviews[review.video] = before.merged(review) if before else review
+    return list(reviews.values())
+
+
+def by_video(
+    corrections: Iterable[Corrections], videos: Mapping[str, str | None], traffic: TrafficSettings
+) -> dict[str, Corrections]:
+    """Return the corrections of videos by their keys.
+
+    `videos` has the name of each by its key; None if unknown. Raises `ConfigError` if corrections
+    are not for exactly one of them, or for other lines than those of `traffic`.
+    """
+    result: dict[str, Corrections] = {}
+    for review in corrections:
+        keys = [key for key, name in videos.items() if name == review.video]
+        keys = keys or [key for key, name in videos.items() if name is None]
+        if len(keys) != 1 or keys[0] in result:
+            names = ", ".join(name or key for key, name in videos.items())
+            raise ConfigError(f"{review.source}: corrects {review.video}, not one of: {names}")
+        review.check(traffic)
+        result[keys[0]] = review
+    return result
+
+
+def apply_corrections(
+    videos: Mapping[str, Counts], corrections: Mapping[str, Corrections]
+) -> dict[str, Counts]:
+    """Return the counts of videos, corrected where there are corrections with the same key.
+
+    An event is removed, added, or gets another direction. A vehicle gets another class in all its
+    events, also in other videos. A missed vehicle is not added if these counts, of another run,
+    have it: an event that the reviewer says nothing of. Raises `ConfigError` if a correction fits
+    no event, or a vehicle has two classes.
+    """
+    numbers = [event.vehicle for counts in videos.values() for event in counts.events]
+    new_vehicles = count(max(numbers, default=0) + 1)
+    classes: dict[int, str] = {}
+    corrected = dict(videos)
+    for key, review in corrections.items():
+        pairs = paired(review.events, videos[key].events)
+        for reviewed, event in pairs:
+            if reviewed and event and reviewed.error in ("class", "missed"):
+                true_class = classes.setdefault(event.vehicle, reviewed.true_class)
+                if true_class != reviewed.true_class:
                     raise ConfigError(
-                        f"{self.source}: {verdict.passage}: the same vehicle is a "
-                        f"{classes[vehicle]} in another correction; remove one"
+                        f"{review.source}: {reviewed}: the same vehicle is a {true_class} in "
+                        "another correction; remove one"
                     )
-        events = []
-        for number, event in enumerate(counts.events):
-            fixes = by_event[number].fixes if number in by_event else {}
-            if "false" not in fixes:
-                direction = fixes.get("direction") or event.direction
-                kind = classes.get(event.vehicle, event.class_name)
-                events.append(replace(event, direction=direction, class_name=kind))
-        added = (one.passage for one in verdicts if "missed" in one.fixes)
-        events += _added(added, 1 + max((event.vehicle for event in counts.events), default=0))
-        events.sort(key=lambda event: (event.time, event.frame, event.id, event.name))
-        corrected = Corrected(
-            events=len(verdicts),
-            files=tuple(Path(name).name for name in self._files),
-            checked=tuple(Checked(span.line, span.start, span.end) for span in self.checked),
-            classes={
-                event.id: classes[event.vehicle]
-                for event in counts.events
-                if event.vehicle in classes
-            },
-        )
-        return replace(counts, events=tuple(events), corrected=corrected)
+        corrected[key] = _corrected(videos[key], review, pairs)
 
-    def _verdicts(self) -> Iterator[_Verdict]:
-        """Yield what is wrong with each passage."""
-        by_passage: dict[tuple[Passage, int], list[Correction]] = defaultdict(list)
-        for number, one in enumerate(self.events):
-            passage = Passage(one.time, one.line, one.direction, one.class_name or "", one.id)
-            key = number if one.error == "missed" else NO_ID  # two may pass at the same time
-            by_passage[passage, key].append(one)
-        for (passage, _), ones in by_passage.items():
-            yield _Verdict(passage, {one.error: one.correct for one in ones}, tuple(ones))
+    def completed(event: Event) -> Event:
+        vehicle = next(new_vehicles) if event.vehicle == NO_ID else event.vehicle
+        return replace(event, vehicle=vehicle, class_name=classes.get(vehicle, event.class_name))
+
+    return {
+        key: replace(counts, events=tuple(map(completed, counts.events)))
+        for key, counts in corrected.items()
+    }
 
 
-def read_corrections(paths: Sequence[Path]) -> Corrections | None:
-    """Read files, and merge them; None if there are none. Errors as `Corrections` has them."""
-    return reduce(Corrections.merged, map(Corrections.read, paths)) if paths else None
+def _corrected(
+    counts: Counts, review: Corrections, pairs: Iterable[tuple[ReviewedEvent | None, Event | None]]
+) -> Counts:
+    """Return counts with the right events."""
+    events, changes = list[Event](), 0
+    for reviewed, event in pairs:
+        if reviewed and not event and reviewed.error not in (None, "missed"):
+            raise ConfigError(
+                f"{review.source}: {reviewed}: no such event was counted within {TOLERANCE} s; "
+                "remove this correction, or check these counts anew"
+            )
+        right_event = reviewed.corrected(event) if reviewed else event
+        changes += right_event != event
+        if right_event:
+            events.append(right_event)
+    events.sort(key=lambda event: (event.time, event.frame, event.id, event.name))
+    corrected = Corrected(changes, tuple(Path(name).name for name in review._files))
+    return replace(counts, events=tuple(events), corrected=corrected)
 
 
-def _class(label: str) -> str:
-    return our_name(label) or label
-
-
-def _added(missed: Iterator[Passage], vehicle: int) -> Iterator[Event]:
-    """Yield the events of missed vehicles, which get new numbers from `vehicle` on."""
-    for number, passage in enumerate(missed, start=vehicle):
-        yield Event(
-            time=passage.time,
-            frame=NO_FRAME,
-            name=passage.name,
-            direction=passage.direction,
-            id=NO_ID,
-            vehicle=number,
-            class_name=_class(passage.class_name) if passage.class_name else None,
-            score=1.0,
-        )
-
-
-def _opinion(verdict: _Verdict) -> tuple[Mapping[Error, str | None], str]:
-    """Return what two reviewers must agree on."""
-    return verdict.fixes, verdict.passage.class_name if "missed" in verdict.fixes else ""
-
-
-def _contradiction(one: Corrections, other: Corrections, verdict: _Verdict) -> ConfigError:
-    return ConfigError(
-        f"{one.source} and {other.source}: contradict each other: {verdict.passage}: "
-        f"{' and '.join(verdict.fixes)} in the first only; correct one of them"
-    )
-
-
-def _is_same(own: Border, other: Border) -> bool:
-    """Return whether two lines or zones have the same points and directions."""
-    places = [
-        np.array([shape.start, shape.end] if isinstance(shape, Line) else shape.corners)
-        for shape in (own, other)
-    ]
-    return (
-        own.directions == other.directions
-        and isinstance(own, Line) == isinstance(other, Line)
-        and places[0].shape == places[1].shape
-        and bool(np.hypot(*(places[0] - places[1]).T).max() <= _PIXELS)
-    )
+def _is_same(first: Shape, second: Shape) -> bool:
+    """Return whether two lines or zones have the same name, directions and points."""
+    names, points = [], []
+    for shape in (first, second):
+        names.append(shape.model_dump(exclude={"size", *shape.point_fields}))
+        points.append(np.vstack([getattr(shape, field) for field in shape.point_fields]))
+    is_same = names[0] == names[1] and points[0].shape == points[1].shape
+    return is_same and bool(np.hypot(*(points[0] - points[1]).T).max() <= _PIXELS)

@@ -9,7 +9,6 @@ from dataclasses import dataclass, field, replace
 from datetime import timedelta
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from vdet.config.schema import Settings
 from vdet.errors import ConfigError, TruthError
@@ -19,12 +18,10 @@ from vdet.lanes.ground import ground_of
 from vdet.progress import Advance
 from vdet.track.track import FrameTracks
 from vdet.traffic.clock import Clock, Span, add_frame, find_clock
+from vdet.traffic.corrections import Corrections, apply_corrections, by_video
 from vdet.traffic.counter import VehicleCounter
 from vdet.traffic.counts import Counts
 from vdet.traffic.speeds import SpeedMeter, with_speeds
-
-if TYPE_CHECKING:
-    from vdet.traffic.corrections import Corrections
 
 _log = logging.getLogger("vdet")
 
@@ -64,7 +61,7 @@ def count_files(
     size: tuple[int, int] | None = None,
     rate: float | None = None,
     *,
-    corrections: "Corrections | None" = None,
+    corrections: Sequence[Corrections] = (),
     advance: Advance = lambda _: None,
 ) -> dict[str, Counts]:
     """Count the vehicles of files of tracks at the lines and in the zones of the settings.
@@ -80,7 +77,7 @@ def count_files(
     rate
         Frames per second, for a file without times.
     corrections
-        Those of a single file.
+        Those of videos that are counted, one for each video at most.
     advance
         Called after each file with 1.
 
@@ -96,9 +93,8 @@ def count_files(
         The lines do not fit the frames, the size of the frames is unknown, a name does not match
         the pattern of the clock, or no file needs the `rate`; the corrections do not fit.
     """
-    if corrections and len(set(paths)) > 1:
-        raise ConfigError("corrections are for a single file of tracks; count it alone")
     counted: dict[str, Counts] = {}
+    names: dict[str, str | None] = {}
     group: _Group | None = None
     rate_is_used = rate is None
     recording = _Recording(settings)
@@ -117,16 +113,13 @@ def count_files(
         if group is None or not group.precedes(video, frame_size):
             counted |= group.counts() if group else {}
             group = _Group(settings, frame_size, group.counter.linker.started if group else 0)
-        if corrections:
-            name = saved.video.name if saved.video else None
-            corrections.check(group.counter.borders, frame_size, name)
+        names[video.name] = saved.video.name if saved.video else None
         group.add(video, saved)
         advance(1)
     if not rate_is_used:
         raise ConfigError("--rate changes nothing: the tracks have times; remove it")
     counted |= group.counts() if group else {}
-    if corrections:
-        counted = {name: corrections.apply(counts) for name, counts in counted.items()}
+    counted = apply_corrections(counted, by_video(corrections, names, settings.traffic))
     return {str(path): counted[str(path)] for path in paths}
 
 
@@ -135,7 +128,7 @@ def count_frames(
     settings: Settings,
     size: tuple[int, int] | None = None,
     *,
-    corrections: "Corrections | None" = None,
+    corrections: Sequence[Corrections] = (),
     name: str | None = None,
 ) -> Counts:
     """Count the vehicles in the tracks of each frame; arguments and errors as for `count_files`.
@@ -144,11 +137,9 @@ def count_frames(
     """
     frame_size = _frame_size(settings, size)
     group = _Group(settings, frame_size)
-    if corrections:
-        corrections.check(group.counter.borders, frame_size, name)
+    reviews = by_video(corrections, {"": name}, settings.traffic)
     group.add(_Video("", clock=None, first=0.0), frames)
-    counts = group.counts()[""]
-    return corrections.apply(counts) if corrections else counts
+    return apply_corrections(group.counts(), reviews)[""]
 
 
 def _frame_size(settings: Settings, size: tuple[int, int] | None) -> tuple[int, int]:

@@ -4,10 +4,10 @@ Tables cover the whole video or intervals of it. Several videos have one table.
 """
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, fields
 from itertools import accumulate, pairwise, product
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from vdet.config.classes import UNKNOWN
 from vdet.errors import ArgumentError, counted, needing
@@ -137,33 +137,14 @@ class ZoneRow:
 
 
 @dataclass(frozen=True, slots=True)
-class Checked:
-    """A part of a video that a reviewer checked at a line or zone; seconds in the video."""
-
-    line: str
-    start: float
-    end: float
-
-
-@dataclass(frozen=True, slots=True)
 class Corrected:
-    """How counts were corrected: how many events, by which files, and what was checked.
-
-    `classes` has the correct class by the id of a track.
-    """
+    """How counts were corrected: how many events, and by which files."""
 
     events: int
     files: tuple[str, ...]
-    checked: tuple[Checked, ...] = ()
-    classes: Mapping[int, str] = field(default_factory=dict)
 
     def __str__(self) -> str:
         return f"corrected: {counted(self.events, 'event')}, by {', '.join(self.files)}"
-
-    def record(self) -> dict[str, Any]:
-        """Return it as values for JSON."""
-        checked = [asdict(span) for span in self.checked]
-        return {"events": self.events, "files": list(self.files), "checked": checked}
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,5 +1,6 @@
 """Records, counts and speeds of a video while it is processed."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -34,8 +35,7 @@ class LiveTraffic:
     Raises
     ------
     ConfigError
-        The ground, or the corrections, do not fit the frames, `width` × `height` pixels, or the
-        `name` of the video.
+        The lines, or the ground, do not fit the frames, `width` × `height` pixels.
     """
 
     counter: VehicleCounter | None = None
@@ -51,7 +51,6 @@ class LiveTraffic:
         clock: Clock | None = None,
         *,
         corrections: "Corrections | None" = None,
-        name: str | None = None,
     ) -> None:
         self.clock = clock
         self._corrections = corrections
@@ -59,9 +58,6 @@ class LiveTraffic:
         self._classes = settings.classes
         if settings.traffic:
             self.counter = VehicleCounter(settings, width, height)
-        if corrections:
-            borders = self.counter.borders if self.counter else ()
-            corrections.check(borders, (width, height), name)
         if ground := ground_of(settings.camera, width, height):
             self.speeds = SpeedMeter(ground, width, height)
 
@@ -84,13 +80,24 @@ class LiveTraffic:
 
         `is_still` as for `VehicleRecords.end`, `doubts` as in `Counts`.
         """
+        records = self._records.end(self.speeds, is_still=is_still)
         if counts := self.counts():
             counts = replace(counts, doubts=doubts)
             self._final = self._corrections.apply(counts) if self._corrections else counts
-        records = self._records.end(self.speeds, is_still=is_still)
-        if self._final and self._final.corrected:
-            for record in records:
-                classes = self._final.corrected.classes
-                record.class_name = classes.get(record.id, record.class_name)
+            _correct(records, counts, self._final)
         chosen = (record for record in records if is_chosen(record.class_name, self._classes))
         self.vehicles = tuple(chosen)
+
+
+def _correct(records: Iterable[VehicleRecord], counts: Counts, corrected: Counts) -> None:
+    """Give vehicles the class that was corrected in their events."""
+    classes = {event.id: event.class_name for event in counts.events}
+    changed = {
+        event.id: event.class_name
+        for event in corrected.events
+        if event.class_name != classes.get(event.id)
+    }
+    for record in records:
+        if record.id in changed and corrected.corrected:
+            record.class_name = changed[record.id]
+            record.corrected = corrected.corrected.files

@@ -6,7 +6,7 @@ interval; events have the name of their video.
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import astuple, fields
+from dataclasses import asdict, astuple, fields
 from pathlib import Path
 from typing import Any
 
@@ -130,7 +130,7 @@ def _json(
         begin = plain_time(video.clock and video.clock.at(video.spans[0][0]))
         by_video[name] = {"begin": begin, "warnings": list(video.warnings)}
         if video.corrected:
-            by_video[name]["corrected"] = video.corrected.record()
+            by_video[name]["corrected"] = asdict(video.corrected)
         if events:
             rows = (_event(video, event) for event in video.events)
             by_video[name]["events"] = [dict(zip(_EVENTS, row, strict=True)) for row in rows]

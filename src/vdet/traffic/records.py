@@ -69,6 +69,8 @@ class VehicleRecord:
         Minimum distance from the camera, metres; None if unknown.
     lanes
         Number of frames that show it in each lane, as `Track.lane` counts them.
+    corrected
+        The files by which a reviewer corrected its class.
     """
 
     id: int
@@ -87,6 +89,7 @@ class VehicleRecord:
     motion: Motion | None = None
     distance: float | None = None
     lanes: Counter[int] = field(default_factory=Counter)
+    corrected: tuple[str, ...] = ()
 
     @property
     def lane(self) -> int | None:
@@ -249,10 +252,9 @@ def records_content(
     records: Iterable[VehicleRecord], path: Path, clock: Clock | None = None
 ) -> list[Any]:
     """Return the content of the file `path`, for `write_content`."""
-    rows = [_row(record, clock) for record in records]
     if is_json(path):
-        return [_item(row) for row in rows]
-    return [tuple(_COLUMNS), *(list(row.values()) for row in rows)]
+        return [_item(record, clock) for record in records]
+    return [tuple(_COLUMNS), *(list(_row(record, clock).values()) for record in records)]
 
 
 def join_records(videos: Mapping[str, list[Any]], target: Path) -> None:
@@ -271,8 +273,9 @@ def _row(record: VehicleRecord, clock: Clock | None) -> dict[str, Any]:
     return row | {"clock": plain_time(clock and clock.at(round(record.first, 3)))}
 
 
-def _item(row: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a row for JSON, with the path and the largest box as objects."""
+def _item(record: VehicleRecord, clock: Clock | None) -> dict[str, Any]:
+    """Return a record for JSON: its row, with the path and the largest box as objects."""
+    row = _row(record, clock)
     path = {end: [row[f"{end}_x"], row[f"{end}_y"]] for end in ("start", "end")}
     path |= {name: row[name] for name in ("length", "length_fraction")}
     largest = {name: row[name] for name in ("x", "y", "width", "height")}
@@ -283,6 +286,7 @@ def _item(row: Mapping[str, Any]) -> dict[str, Any]:
         "path": path,
         "largest": largest,
         **{name: row[name] for name in columns[end:]},
+        **({"corrected": list(record.corrected)} if record.corrected else {}),
     }
 
 

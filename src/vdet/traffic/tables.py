@@ -7,7 +7,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from vdet.errors import needing
+from vdet.errors import TruthError, needing
 from vdet.files import json_text, write_text
 
 SUFFIXES = (".csv", ".json", ".parquet")
@@ -35,6 +35,20 @@ def _plain_text(cell: Any) -> Any:
 def plain_time(value: Any) -> Any:
     """Return a clock time as text, with milliseconds and its zone; other values unchanged."""
     return value.isoformat(" ", "milliseconds") if isinstance(value, datetime) else value
+
+
+def read_csv(path: Path) -> list[dict[str, str]]:
+    """Return the rows of a `.csv` that `write_content` wrote. Raises `TruthError`."""
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            heading, *rows = csv.reader(file)
+        return [dict(zip(heading, map(_as_given, row), strict=True)) for row in rows]
+    except (OSError, ValueError, csv.Error) as error:
+        raise TruthError(f"{path}: cannot be read as a table: {error}") from error
+
+
+def _as_given(cell: str) -> str:
+    return cell[1:] if cell.startswith("'") and _FORMULA.match(cell[1:]) else cell
 
 
 def check_table(path: Path) -> None:

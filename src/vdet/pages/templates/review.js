@@ -281,7 +281,7 @@ function spans() {
 function eventText(mark) {
   const parts = [`line: ${quoted(mark.line)}`, `time: ${mark.time}`, `direction: ${quoted(mark.direction)}`, `class: ${quoted(mark.class)}`];
   if (mark.id !== undefined) parts.push(`id: ${mark.id}`);
-  parts.push(`error: ${quoted(mark.error)}`);
+  if (mark.error) parts.push(`error: ${quoted(mark.error)}`);
   if (mark.correct) parts.push(`correct: ${quoted(mark.correct)}`);
   return `  - {${parts.join(", ")}}`;
 }
@@ -297,7 +297,9 @@ function corrections() {
   const zones = data.zones.map(zone => `  - {name: ${quoted(zone.name)}, points: [${zone.points.map(pair).join(", ")}]}`);
   const names = [...new Set(data.bands.map(band => band.name))];
   const checked = names.flatMap(name => spans().map(([start, end]) => `  - {line: ${quoted(name)}, start: ${start + data.start}, end: ${end + data.start}}`));
-  const events = allMarks().filter(mark => mark.error).sort((a, b) => a.time - b.time).map(eventText);
+  const complete = spans().concat(state.added.map(mark => [mark.seconds, mark.seconds]));
+  const isListed = mark => mark.error || complete.some(([start, end]) => mark.seconds > start - 1 && mark.seconds < end + 1);
+  const events = allMarks().filter(isListed).sort((a, b) => a.time - b.time).map(eventText);
   const sample = state.sample ? `{seed: ${state.sample.seed}, minutes: [${state.sample.minutes.join(", ")}]}` : "null";
   return [`video: ${quoted(data.video)}`, `size: [${data.size.join(", ")}]`, ...list("lines", lines), ...list("zones", zones),
     `reviewer: ${state.reviewer ? quoted(state.reviewer) : "null"}`, `saved: ${now()}`, `sample: ${sample}`,
