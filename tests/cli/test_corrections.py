@@ -3,6 +3,8 @@
 import json
 from pathlib import Path
 
+import pytest
+
 from cli.test_count_command import LINES, write_tracks
 from conftest import Run
 from running import rows_of, write_drive
@@ -14,55 +16,118 @@ lines: [{name: gate, start: [100, 0], end: [100, 240], left: out, right: in}]
 checked: [{line: gate, start: 0.0, end: 60.0}]
 events:
 """
+COUNTED = "  - {line: gate, time: 0.52, direction: out, class: vehicle, id: 1}\n"
 MISSED = "  - {line: gate, time: 0.1, direction: in, class: truck, error: missed}\n"
+WRONG = COUNTED.replace("}", ", error: class, correct: bus}")
 
 
-def test_counts_are_corrected_and_are_truth_for_others(run: Run, tmp_path: Path) -> None:
-    tracks = write_tracks(tmp_path / "t.csv")
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with the video of a red car, and lines."""
+    write_drive(tmp_path / "red.mp4", 60)
     (tmp_path / "lines.yaml").write_text(LINES)
-    review = tmp_path / "c.yaml"
-    review.write_text(HEAD + MISSED)
-    plain, fixed = tmp_path / "plain.csv", tmp_path / "fixed.json"
-    count = ("count", tracks, "-c", tmp_path / "lines.yaml")
+    return tmp_path
+
+
+def test_corrections_are_truth_for_any_counts_of_the_video(run: Run, folder: Path) -> None:
+    tracks, plain, review = folder / "t.csv", folder / "plain.csv", folder / "c.yaml"
+    write_tracks(tracks)
+    review.write_text(HEAD + COUNTED + MISSED)
+    count = ("count", tracks, "-c", folder / "lines.yaml")
     run(*count, "--counts", plain, code=0)
-    result = run(*count, "--counts", fixed, "--corrections", review, code=0)
-    assert result.out.endswith("corrected: 1 event, by c.yaml\n")
-    content = json.loads(fixed.read_text())
-    assert content["corrected"] == {
-        "events": 1,
-        "files": ["c.yaml"],
-        "checked": [{"line": "gate", "start": 0.0, "end": 60.0}],
-    }
-    assert sum(row["count"] for row in content["totals"] if row["name"] == "gate") == 2
-    scores = tmp_path / "scores.json"
-    result = run("eval", "counts", plain, fixed, "--json", scores, code=0)
-    assert result.out.splitlines()[-1].split() == [
-        "all", "all", "all", "2", "1", "1", "0", "0", "50.0", "50.0",
-    ]  # fmt: skip
+    scores = folder / "scores.json"
+    result = run("eval", "counts", plain, review, "--json", scores, code=0)
+    assert [line.split() for line in result.out.splitlines()[1:]] == [
+        ["gate", "in", "truck", "1", "0", "1", "0", "0", "0.0", "0.0"],
+        ["gate", "in", "all", "1", "0", "1", "0", "0", "0.0", "0.0"],
+        ["gate", "out", "vehicle", "1", "1", "0", "0", "0", "100.0", "100.0"],
+        ["gate", "out", "all", "1", "1", "0", "0", "0", "100.0", "100.0"],
+        ["all", "all", "all", "2", "1", "1", "0", "0", "50.0", "50.0"],
+    ]
     assert len(json.loads(scores.read_text())["counts"]) == 5
-    result = run("eval", "counts", fixed, plain, code=1)
-    assert "plain.csv: is not JSON" in result.err
-    result = run(*count, tracks.with_name("u.csv"), "--corrections", review, code=2)
-    assert "--corrections is for one file of tracks" in result.err
+    review.write_text(HEAD + WRONG)
+    result = run("eval", "counts", plain, review, code=0)
+    assert result.out.splitlines()[-1].split()[3:] == ["1", "1", "0", "0", "1", "100.0", "0.0"]
+    result = run(*count, "--corrections", review, "--class", "bus", code=0)
+    assert result.out.splitlines()[1].split()[1:] == ["gate", "out", "1", "1", "bus"]
+    for table, fault in (
+        ("time,name,direction,class,id\nsoon,gate,in,,1\n", ":2: time: must be a valid number"),
+        ("video,time,name,direction,class,id\na,1,gate,in,car,1\n", ": is not a table of events"),
+        ("{}\n{}\n", ": is not a table of events of one video, as --counts writes it"),
+    ):
+        plain.write_text(table)
+        assert f"{plain}{fault}" in run("eval", "counts", plain, review, code=1).err
+    review.write_text(HEAD.replace("checked: [{line: gate, start: 0.0, end: 60.0}]", "") + COUNTED)
+    result = run("eval", "counts", plain, review, code=1)
+    assert "c.yaml: nothing was checked" in result.err
 
 
-def test_a_run_corrects_its_counts_and_its_page(
-    run: Run, tmp_path: Path, red: tuple[str, ...]
-) -> None:
-    clip = write_drive(tmp_path / "red.mp4", 60)
-    (tmp_path / "lines.yaml").write_text(LINES)
-    review = tmp_path / "c.yaml"
+def test_several_videos_have_corrections_of_their_own(run: Run, folder: Path) -> None:
+    paths = [folder / "a.jsonl", folder / "b.jsonl"]
+    for path in paths:
+        video = {"name": f"{path.stem}.mp4", "width": 320, "height": 240}
+        frames = [
+            {
+                "frame": n,
+                "time": n / 25,
+                "tracks": [
+                    {
+                        "id": 1,
+                        "x": 4 * n,
+                        "y": 100,
+                        "width": 40,
+                        "height": 40,
+                        "score": 0.9,
+                        "state": "detected",
+                    }
+                ],
+            }
+            for n in range(50)
+        ]
+        path.write_text("\n".join(map(json.dumps, [{"video": video, **frames[0]}, *frames[1:]])))
+    review, totals = folder / "b.yaml", folder / "totals.json"
+    review.write_text(HEAD.replace("red.mp4", "b.mp4") + MISSED)
+    count = ("count", *paths, "-c", folder / "lines.yaml", "--corrections", review)
+    result = run(*count, "--counts", totals, code=0)
+    assert result.out.endswith(f"{paths[1]}: corrected: 1 event, by b.yaml\n")
+    videos = json.loads(totals.read_text())["videos"]
+    assert [video.get("corrected") for video in videos.values()] == [
+        None, {"events": 1, "files": ["b.yaml"]},
+    ]  # fmt: skip
     review.write_text(HEAD + MISSED)
-    detect = ("detect-video", clip, "--no-video", *red, "-c", tmp_path / "lines.yaml")
-    out = ("--counts", tmp_path / "c.csv", "--page", tmp_path / "page", "--corrections", review)
-    result = run(*detect, *out, code=0)
-    assert f"{clip}: corrected: 1 event, by c.yaml" in result.err
-    assert [row["class"] for row in rows_of(tmp_path / "c.csv")].count("truck") == 1
-    page = (tmp_path / "page" / "page.html").read_text()
-    assert "These counts are corrected: 1 event, by c.yaml." in page
+    result = run(*count, code=1)
+    fault = "corrects red.mp4, which must be exactly one of these videos: a.mp4, b.mp4"
+    assert f"{review}: {fault}" in result.err
+
+
+def test_a_run_corrects_its_counts_records_and_page(
+    run: Run, folder: Path, red: tuple[str, ...]
+) -> None:
+    clip, review = folder / "red.mp4", folder / "c.yaml"
+    detect = ("detect-video", clip, "--no-video", *red, "-c", folder / "lines.yaml")
+    run(*detect, "--counts", folder / "plain.csv", code=0)
+    [event] = [row for row in rows_of(folder / "plain.csv") if row["name"] == "gate"]
+    counted = {"line": "gate", "class": "vehicle", "error": "class", "correct": "bus"}
+    counted |= {key: event[key] for key in ("time", "direction", "id")}
+    review.write_text(f"{HEAD}{MISSED}  - {json.dumps(counted)}\n")
+    outputs = {"counts": "c.csv", "flows": "f.json", "vehicles": "v.json", "page": "page"}
+    options = [part for name, path in outputs.items() for part in (f"--{name}", folder / path)]
+    result = run(*detect, *options, "--corrections", review, code=0)
+    assert f"{clip}: corrected: 2 events, by c.yaml" in result.err
+    rows = rows_of(folder / "c.csv")
+    assert [(row["name"], row["class"]) for row in rows] == [
+        ("gate", "truck"), ("gate", "bus"), ("yard", "bus"), ("yard", "bus"),
+    ]  # fmt: skip
+    flows = json.loads((folder / "f.json").read_text())
+    assert flows["corrected"] == {"events": 2, "files": ["c.yaml"]}
+    assert {row["class"] for row in flows["flows"] if row["count"]} == {"truck", "bus"}
+    [record] = json.loads((folder / "v.json").read_text())
+    assert (record["class"], record["corrected"]) == ("bus", ["c.yaml"])
+    page = (folder / "page" / "page.html").read_text()
+    assert "These counts are corrected: 2 events, by c.yaml." in page
     review.write_text(HEAD.replace("red.mp4", "other.mp4") + MISSED)
-    result = run(*detect, "--counts", tmp_path / "d.csv", "--corrections", review, code=1)
-    assert "c.yaml: corrects other.mp4, not red.mp4" in result.err
-    assert not (tmp_path / "d.csv").exists()
-    result = run("detect-video", clip, "-d", tmp_path / "d", "--corrections", review, code=2)
+    result = run(*detect, "--counts", folder / "d.csv", "--corrections", review, code=1)
+    assert "c.yaml: corrects other.mp4" in result.err
+    assert not (folder / "d.csv").exists()
+    result = run("detect-video", clip, "-d", folder / "d", "--corrections", review, code=2)
     assert "--corrections is for one video, without -d" in result.err

@@ -54,7 +54,10 @@ def test_a_minute_without_errors_takes_one_key(window: Browser) -> None:
     assert window.text("#minute") == "1:00 to 2:00"
     values = saved(window)
     assert values["checked"] == [{"line": "gate", "start": 0, "end": 60}]
-    assert values["events"] == []
+    assert [(event["id"], event["direction"]) for event in values["events"]] == [
+        (1, "away"), (2, "here"),
+    ]  # fmt: skip
+    assert not any("error" in event for event in values["events"])
     window.type(ENTER)
     assert saved(window)["checked"] == [{"line": "gate", "start": 0, "end": 120}]
 
@@ -80,6 +83,26 @@ def test_every_error_takes_two_actions(window: Browser) -> None:
     assert (turned["id"], turned["error"], turned["correct"]) == (4, "direction", "here")
 
 
+def test_the_saved_file_corrects_the_counts_and_is_their_truth(
+    window: Browser, run: Run, tmp_path: Path
+) -> None:
+    click_at(window, 8, 0.29)  # of a minute that is not checked yet
+    window.type("s")
+    path = downloaded(window.folder, "corrections.yaml")
+    assert len(yaml.safe_load(path.read_text("utf-8"))["events"]) == 1
+    path.unlink()
+    window.type(TAB, "x", ENTER, "s")
+    review, plain = downloaded(window.folder, "corrections.yaml"), tmp_path / "plain.csv"
+    count = ("count", tmp_path / "tracks.txt", "-c", tmp_path / "gate.yaml", "--rate", "10")
+    run(*count, "--counts", plain, code=0)
+    result = run(*count, "--corrections", review, code=0)
+    assert [line.split()[1:4] for line in result.out.splitlines()[1:3]] == [
+        ["gate", "away", "2"], ["gate", "here", "1"],
+    ]  # fmt: skip
+    result = run("eval", "counts", plain, review, code=0)
+    assert result.out.splitlines()[-1].split()[3:8] == ["2", "2", "1", "1", "0"]
+
+
 def test_undo_and_reload_keep_what_was_checked(window: Browser) -> None:
     window.type(TAB, "x")
     click_at(window, 8, 0.29)
@@ -89,7 +112,7 @@ def test_undo_and_reload_keep_what_was_checked(window: Browser) -> None:
     window.wait("return document.body.dataset.ready === 'yes'")
     assert window.text("#minute") == "1:00 to 2:00"
     values = saved(window)
-    assert [event["error"] for event in values["events"]] == ["false"]
+    assert [event.get("error") for event in values["events"]] == ["false", None]
     assert [item["end"] for item in values["checked"]] == [60]
 
 

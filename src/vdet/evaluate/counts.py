@@ -13,11 +13,12 @@ from vdet.evaluate.output import figure, table
 from vdet.traffic.corrections import Corrections, ReviewedEvent, paired
 from vdet.traffic.tables import VIDEO, read_csv
 
+_COLUMNS = {"time", "name", "direction", "class", "id"}
 ALL = "all"
 """Name of the sum over lines, directions or classes."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class CountScore:
     """How right the counts in a direction are for one class of true vehicles, or for all.
 
@@ -34,11 +35,28 @@ class CountScore:
     name: str
     direction: str
     class_name: str
-    passed: int
-    counted: int
-    missed: int
-    false: int
-    misnamed: int
+    passed: int = 0
+    counted: int = 0
+    missed: int = 0
+    false: int = 0
+    misnamed: int = 0
+
+    def order(self) -> tuple[Any, ...]:
+        """Return a key that sorts by line, direction and class; sums come last."""
+        return tuple((name == ALL, name) for name in (self.name, self.direction, self.class_name))
+
+    def add(self, passed: ReviewedEvent | None, counted: ReviewedEvent | None) -> None:
+        """Add a vehicle that passed, as it was counted; None: it did not, or was not."""
+        is_passed, is_counted = (
+            event is not None and self.class_name in (ALL, event.class_name)
+            for event in (passed, counted)
+        )
+        self.passed += is_passed
+        self.counted += is_counted
+        self.missed += is_passed and not counted
+        self.false += is_counted and not passed
+        if is_passed and passed and counted:
+            self.misnamed += passed.class_name != counted.class_name
 
     @property
     def record(self) -> dict[str, Any]:
@@ -68,63 +86,28 @@ def score_counts(path: Path, truth: Corrections) -> list[CountScore]:
     """
     if not truth.checked:
         raise TruthError(f"{truth.source}: nothing was checked; check some minutes in the page")
-    outcomes = []
+    # A strip shows only two directions: not what appears or vanishes in a zone.
+    shown = {(name, way) for name, ways in truth.traffic.directions.items() for way in ways[:2]}
+    scores: dict[tuple[str, str, str], CountScore] = {}
     for passed, counted in paired(truth.passed(), _read_events(path)):
         event = passed or counted
-        if event and truth.has_checked(event):
-            outcome = _Outcome(
-                name=event.name,
-                direction=event.direction,
-                passed=passed.class_name if passed else None,
-                counted=counted.class_name if counted else None,
-            )
-            outcomes.append(outcome)
-    scores = []
-    for name, direction in sorted({(outcome.name, outcome.direction) for outcome in outcomes}):
-        members = [o for o in outcomes if (o.name, o.direction) == (name, direction)]
-        labels = {label for o in members for label in (o.passed, o.counted) if label}
-        scores += [_score(members, name, direction, label) for label in (*sorted(labels), ALL)]
-    return [*scores, _score(outcomes, ALL, ALL, ALL)]
+        if event and (event.name, event.direction) in shown and truth.has_checked(event):
+            classes = {ALL, *(side.class_name for side in (passed, counted) if side)}
+            keys = {(event.name, event.direction, class_name) for class_name in classes}
+            for key in (*keys, (ALL, ALL, ALL)):
+                scores.setdefault(key, CountScore(*key)).add(passed, counted)
+    return sorted(scores.values(), key=CountScore.order)
 
 
 def _read_events(path: Path) -> list[ReviewedEvent]:
-    rows = read_csv(path)
-    if rows and VIDEO in rows[0]:
-        raise TruthError(f"{path}: has several videos; write a table for each")
-    events = []
+    rows, events = read_csv(path), []
+    if rows and (VIDEO in rows[0] or not rows[0].keys() >= _COLUMNS):
+        raise TruthError(f"{path}: is not a table of events of one video, as --counts writes it")
     for line, row in enumerate(rows, start=2):
-        values = {name: row.get(name) for name in ("time", "direction", "id")}
-        values |= {"line": row.get("name"), "class": row.get("class") or UNKNOWN}
+        values: dict[str, Any] = {name: row[name] for name in ("time", "direction", "id")}
+        values |= {"line": row["name"], "class": row["class"] or UNKNOWN}
         events.append(validated(ReviewedEvent, Document(f"{path}:{line}", values)))
     return events
-
-
-@dataclass(frozen=True, slots=True)
-class _Outcome:
-    """A vehicle at a line or zone: the class that passed, and the one that was counted.
-
-    None: nothing passed, or nothing was counted.
-    """
-
-    name: str
-    direction: str
-    passed: str | None
-    counted: str | None
-
-
-def _score(outcomes: Sequence[_Outcome], name: str, direction: str, label: str) -> CountScore:
-    passed = [o for o in outcomes if o.passed and label in (ALL, o.passed)]
-    counted = [o for o in outcomes if o.counted and label in (ALL, o.counted)]
-    return CountScore(
-        name=name,
-        direction=direction,
-        class_name=label,
-        passed=len(passed),
-        counted=len(counted),
-        missed=sum(outcome.counted is None for outcome in passed),
-        false=sum(outcome.passed is None for outcome in counted),
-        misnamed=sum(outcome.counted not in (None, outcome.passed) for outcome in passed),
-    )
 
 
 def count_lines(scores: Sequence[CountScore]) -> list[str]:

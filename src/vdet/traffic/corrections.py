@@ -2,7 +2,7 @@
 
 import math
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
 from itertools import count
@@ -12,7 +12,7 @@ from typing import Annotated, Literal, TypeVar
 import numpy as np
 from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
 
-from vdet.config.classes import UNKNOWN, our_name
+from vdet.config.classes import UNKNOWN, is_chosen, our_name
 from vdet.config.document import read_document
 from vdet.config.loading import validated
 from vdet.config.section import Section
@@ -97,8 +97,7 @@ class ReviewedEvent(Section):
     @property
     def opinion(self) -> tuple[str | None, ...]:
         """What two reviewers must agree on."""
-        passed = self.error != "false"
-        return self.error, *((self.true_direction, self.true_class) if passed else ())
+        return self.error, self.true_direction, self.true_class
 
 
 class CheckedSpan(Section):
@@ -207,7 +206,7 @@ class Corrections(Section):
         try:
             shapes = traffic.for_frames(*self.size).shapes
         except ConfigError as error:
-            raise ConfigError(f"{self.source}: {error}") from error
+            raise ConfigError(f"{self.source}: {str(error).removeprefix('camera.')}") from error
         for reviewed in self.traffic.shapes:
             if not any(_is_same(reviewed, shape) for shape in shapes):
                 raise ConfigError(
@@ -258,9 +257,34 @@ class Corrections(Section):
             passed.append(event.model_copy(update=update))
         return passed
 
-    def apply(self, counts: Counts) -> Counts:
+    def paired_with(
+        self, events: Sequence[Event]
+    ) -> list[tuple[ReviewedEvent | None, Event | None]]:
+        """Return its events with the counted ones that they are about.
+
+        A missed vehicle may have been counted by another run: as an event that the reviewer says
+        nothing of. That is known if the file has what was counted rightly.
+
+        Raises
+        ------
+        ConfigError
+            An error fits no event.
+        """
+        has_counted = any(event.error is None for event in self.events)
+        reviewed = [e for e in self.events if has_counted or e.error != "missed"]
+        missed = [e for e in self.events if not has_counted and e.error == "missed"]
+        pairs = [*paired(reviewed, events), *((event, None) for event in missed)]
+        for review, event in pairs:
+            if review and not event and review.error not in (None, "missed"):
+                raise ConfigError(
+                    f"{self.source}: {review}: no such event was counted within {TOLERANCE} s; "
+                    "remove this correction, or check these counts anew"
+                )
+        return pairs
+
+    def apply(self, counts: Counts, chosen: Collection[str] = ()) -> Counts:
         """Return corrected counts, as `apply_corrections` does for several videos."""
-        return apply_corrections({"": counts}, {"": self})[""]
+        return apply_corrections({"": counts}, {"": self}, chosen)[""]
 
 
 def read_corrections(paths: Iterable[Path]) -> list[Corrections]:
@@ -286,63 +310,58 @@ def by_video(
         keys = keys or [key for key, name in videos.items() if name is None]
         if len(keys) != 1 or keys[0] in result:
             names = ", ".join(name or key for key, name in videos.items())
-            raise ConfigError(f"{review.source}: corrects {review.video}, not one of: {names}")
+            raise ConfigError(
+                f"{review.source}: corrects {review.video}, which must be exactly one of these "
+                f"videos: {names}"
+            )
         review.check(traffic)
         result[keys[0]] = review
     return result
 
 
 def apply_corrections(
-    videos: Mapping[str, Counts], corrections: Mapping[str, Corrections]
+    videos: Mapping[str, Counts],
+    corrections: Mapping[str, Corrections],
+    chosen: Collection[str] = (),
 ) -> dict[str, Counts]:
     """Return the counts of videos, corrected where there are corrections with the same key.
 
     An event is removed, added, or gets another direction. A vehicle gets another class in all its
-    events, also in other videos. A missed vehicle is not added if these counts, of another run,
-    have it: an event that the reviewer says nothing of. Raises `ConfigError` if a correction fits
-    no event, or a vehicle has two classes.
+    events, also in other videos. Only the `chosen` classes are kept; if empty, all. Raises
+    `ConfigError` if a correction fits no event, or a vehicle has two classes.
     """
     numbers = [event.vehicle for counts in videos.values() for event in counts.events]
     new_vehicles = count(max(numbers, default=0) + 1)
     classes: dict[int, str] = {}
     corrected = dict(videos)
     for key, review in corrections.items():
-        pairs = paired(review.events, videos[key].events)
-        for reviewed, event in pairs:
-            if reviewed and event and reviewed.error in ("class", "missed"):
-                true_class = classes.setdefault(event.vehicle, reviewed.true_class)
-                if true_class != reviewed.true_class:
-                    raise ConfigError(
-                        f"{review.source}: {reviewed}: the same vehicle is a {true_class} in "
-                        "another correction; remove one"
-                    )
-        corrected[key] = _corrected(videos[key], review, pairs)
-
-    def completed(event: Event) -> Event:
-        vehicle = next(new_vehicles) if event.vehicle == NO_ID else event.vehicle
-        return replace(event, vehicle=vehicle, class_name=classes.get(vehicle, event.class_name))
-
-    return {
-        key: replace(counts, events=tuple(map(completed, counts.events)))
-        for key, counts in corrected.items()
-    }
+        corrected[key] = _corrected(videos[key], review, classes)
+    for key, counts in corrected.items():
+        events = []
+        for event in counts.events:
+            vehicle = next(new_vehicles) if event.vehicle == NO_ID else event.vehicle
+            class_name = classes.get(vehicle, event.class_name)
+            if is_chosen(class_name, chosen):
+                events.append(replace(event, vehicle=vehicle, class_name=class_name))
+        corrected[key] = replace(counts, events=tuple(events))
+    return corrected
 
 
-def _corrected(
-    counts: Counts, review: Corrections, pairs: Iterable[tuple[ReviewedEvent | None, Event | None]]
-) -> Counts:
-    """Return counts with the right events."""
+def _corrected(counts: Counts, review: Corrections, classes: dict[int, str]) -> Counts:
+    """Return counts with the right events, and add the right classes of vehicles to `classes`."""
     events, changes = list[Event](), 0
-    for reviewed, event in pairs:
-        if reviewed and not event and reviewed.error not in (None, "missed"):
-            raise ConfigError(
-                f"{review.source}: {reviewed}: no such event was counted within {TOLERANCE} s; "
-                "remove this correction, or check these counts anew"
-            )
+    for reviewed, event in review.paired_with(counts.events):
         right_event = reviewed.corrected(event) if reviewed else event
         changes += right_event != event
         if right_event:
             events.append(right_event)
+        if reviewed and event and reviewed.error in ("class", "missed"):
+            true_class = classes.setdefault(event.vehicle, reviewed.true_class)
+            if true_class != reviewed.true_class:
+                raise ConfigError(
+                    f"{review.source}: {reviewed}: the same vehicle is a {true_class} in another "
+                    "correction; remove one"
+                )
     events.sort(key=lambda event: (event.time, event.frame, event.id, event.name))
     corrected = Corrected(changes, tuple(Path(name).name for name in review._files))
     return replace(counts, events=tuple(events), corrected=corrected)

@@ -112,14 +112,16 @@ def count_files(
         video = _Video(str(path), clock, first, is_complete, saved.doubts)
         if group is None or not group.precedes(video, frame_size):
             counted |= group.counts() if group else {}
-            group = _Group(settings, frame_size, group.counter.linker.started if group else 0)
+            started = group.counter.linker.started if group else 0
+            group = _Group(_all_classes(settings, corrections), frame_size, started)
         names[video.name] = saved.video.name if saved.video else None
         group.add(video, saved)
         advance(1)
     if not rate_is_used:
         raise ConfigError("--rate changes nothing: the tracks have times; remove it")
     counted |= group.counts() if group else {}
-    counted = apply_corrections(counted, by_video(corrections, names, settings.traffic))
+    reviews = by_video(corrections, names, settings.traffic)
+    counted = apply_corrections(counted, reviews, settings.classes)
     return {str(path): counted[str(path)] for path in paths}
 
 
@@ -136,10 +138,15 @@ def count_frames(
     `name` is that of the video, for the corrections; None if unknown.
     """
     frame_size = _frame_size(settings, size)
-    group = _Group(settings, frame_size)
+    group = _Group(_all_classes(settings, corrections), frame_size)
     reviews = by_video(corrections, {"": name}, settings.traffic)
     group.add(_Video("", clock=None, first=0.0), frames)
-    return apply_corrections(group.counts(), reviews)[""]
+    return apply_corrections(group.counts(), reviews, settings.classes)[""]
+
+
+def _all_classes(settings: Settings, corrections: Sequence[Corrections]) -> Settings:
+    """Return settings without a selection of classes if there are corrections, of any class."""
+    return settings.model_copy(update={"classes": ()}) if corrections else settings
 
 
 def _frame_size(settings: Settings, size: tuple[int, int] | None) -> tuple[int, int]:

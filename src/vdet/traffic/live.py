@@ -56,6 +56,8 @@ class LiveTraffic:
         self._corrections = corrections
         self._records = VehicleRecords(width)
         self._classes = settings.classes
+        if corrections:  # they may be of any class; the selection follows
+            settings = settings.model_copy(update={"classes": ()})
         if settings.traffic:
             self.counter = VehicleCounter(settings, width, height)
         if ground := ground_of(settings.camera, width, height):
@@ -82,9 +84,10 @@ class LiveTraffic:
         """
         records = self._records.end(self.speeds, is_still=is_still)
         if counts := self.counts():
-            counts = replace(counts, doubts=doubts)
-            self._final = self._corrections.apply(counts) if self._corrections else counts
-            _correct(records, counts, self._final)
+            self._final = counts = replace(counts, doubts=doubts)
+            if self._corrections:
+                self._final = self._corrections.apply(counts, self._classes)
+                _correct(records, counts, self._final)
         chosen = (record for record in records if is_chosen(record.class_name, self._classes))
         self.vehicles = tuple(chosen)
 

@@ -41,8 +41,10 @@ def read_csv(path: Path) -> list[dict[str, str]]:
     """Return the rows of a `.csv` that `write_content` wrote. Raises `TruthError`."""
     try:
         with path.open(encoding="utf-8", newline="") as file:
-            heading, *rows = csv.reader(file)
-        return [dict(zip(heading, map(_as_given, row), strict=True)) for row in rows]
+            return [
+                {name: _as_given(cell) for name, cell in row.items() if name is not None}
+                for row in csv.DictReader(file, restval="")
+            ]
     except (OSError, ValueError, csv.Error) as error:
         raise TruthError(f"{path}: cannot be read as a table: {error}") from error
 
