@@ -150,7 +150,8 @@ def detect_video(
         "--jobs and --scheduler cannot be used together": jobs and scheduler,
         "--jobs, --skip-existing and --scheduler require -d": not folder
         and (jobs or skip_existing or scheduler),
-        "--corrections is for one video, without -d": folder and corrections,
+        "--corrections is for one video, without -d; for several use vdet count": folder
+        and corrections,
         _VIDEO_OR_NONE: not folder and no_video and len(videos) > 1,
         "no output; add one, such as --tracks": no_video and not outputs,
     }

@@ -95,7 +95,7 @@ corrections_option = input_file(
     "--corrections",
     "corrections",
     multiple=True,
-    help="Correct the counts by a file that a reviewer saved. Repeat for several reviewers.",
+    help="Correct the counts by a file that a reviewer saved. Can be repeated.",
 )
 sinks_option = output_files(
     "--sink",

@@ -168,9 +168,7 @@ def open_video(
         clock = find_clock(
             run.source, settings, float(info.start), tags=info.tags, length=info.duration
         )
-        traffic = LiveTraffic(
-            settings, info.width, info.height, clock, corrections=corrections
-        )
+        traffic = LiveTraffic(settings, info.width, info.height, clock, corrections=corrections)
         facts: dict[str, Fact] = {}
 
         def results() -> Generator[FrameResult]:

@@ -115,11 +115,13 @@ class Sample(Section):
     minutes: tuple[int, ...] = ()
 
 
-A = TypeVar("A", bound=ReviewedEvent | Event)
-B = TypeVar("B", bound=ReviewedEvent | Event)
+FirstEvent = TypeVar("FirstEvent", bound=ReviewedEvent | Event)
+SecondEvent = TypeVar("SecondEvent", bound=ReviewedEvent | Event)
 
 
-def paired(events: Sequence[A], candidates: Sequence[B]) -> list[tuple[A | None, B | None]]:
+def paired(
+    events: Sequence[FirstEvent], candidates: Sequence[SecondEvent]
+) -> list[tuple[FirstEvent | None, SecondEvent | None]]:
     """Return each event with the candidate that is the same event; None: there is none.
 
     Both are at the same line, in the same direction, and within `TOLERANCE`. The nearest are paired
@@ -132,7 +134,7 @@ def paired(events: Sequence[A], candidates: Sequence[B]) -> list[tuple[A | None,
         first = bisect_left(times, event.time - TOLERANCE)
         end = bisect_right(times, event.time + TOLERANCE)
         near += [(_distance(event, candidates[n]), number, n) for n in order[first:end]]
-    partners: dict[int, B] = {}
+    partners: dict[int, SecondEvent] = {}
     alone = dict(enumerate(candidates))
     for distance, number, candidate in sorted(near):
         if distance < math.inf and number not in partners and candidate in alone:

@@ -145,13 +145,13 @@ def estimate(
     """
     traffic = np.sum([list(numbers) for numbers in counted.values()], axis=0)
     sample = np.array(sorted(set(checked) & set(drawn)), np.int64)
-    rest = np.array(sorted(set(range(len(traffic))) - set(checked)), np.int64)
-    if len(rest) and len(sample) < MIN_CHECKED:
+    unchecked = np.array(sorted(set(range(len(traffic))) - set(checked)), np.int64)
+    if len(unchecked) and len(sample) < MIN_CHECKED:
         return []
-    survey = _Survey(traffic, errors, sample, rest)
+    survey = _Survey(traffic, errors, sample, unchecked)
     classes = sorted(set(counted) | {error.true for error in errors if error.true})
     groups = [(name, counted.get(name, np.zeros_like(traffic))) for name in classes]
-    return [survey.estimate(name, np.asarray(own)) for name, own in [(None, traffic), *groups]]
+    return [survey.estimate(name, np.asarray(group)) for name, group in [(None, traffic), *groups]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,53 +199,55 @@ class _Survey:
     traffic: Int64Array
     errors: Sequence[CountError]
     sample: Int64Array
-    rest: Int64Array
+    unchecked: Int64Array
 
-    def estimate(self, group: str | None, own: Int64Array) -> Estimate:
-        """Return the estimate of a class; `own` are its vehicles in each minute."""
-        counted = int(own.sum())
-        added, removed = np.zeros(len(own), np.int64), np.zeros(len(own), np.int64)
+    def estimate(self, group: str | None, numbers: Int64Array) -> Estimate:
+        """Return the estimate of a class; `numbers` are its vehicles in each minute."""
+        counted = int(numbers.sum())
+        added, removed = np.zeros_like(numbers), np.zeros_like(numbers)
         for error in self.errors:
             is_true, is_counted = (
                 name is not None and group in (None, name) for name in (error.true, error.counted)
             )
             added[error.minute] += is_true and not is_counted
             removed[error.minute] += is_counted and not is_true
-        known = counted + int(added.sum() - removed.sum())
-        if not len(self.rest):
-            return Estimate(group, counted, known, known, known, 0)
-        gains = self._unchecked(added, self.traffic + 1, inf)  # empty minutes have errors too
-        losses = self._unchecked(removed, own, float(own[self.rest].sum()))
-        true = known + gains.number - losses.number
+        corrected = counted + int(added.sum() - removed.sum())
+        if not len(self.unchecked):
+            return Estimate(group, counted, corrected, corrected, corrected, 0)
+        gains = self._expected(added, self.traffic + 1, inf)  # empty minutes have errors too
+        losses = self._expected(removed, numbers, float(numbers[self.unchecked].sum()))
+        true = corrected + gains.number - losses.number
         below, above = self._widths(gains, losses, 0)
-        widths = [-sum(self._widths(gains, losses, more)) for more in range(len(self.rest))]
+        widths = [-sum(self._widths(gains, losses, more)) for more in range(len(self.unchecked))]
         more = bisect_left(widths, -2 * PRECISION * true)
         return Estimate(group, counted, true, true - below, true + above, more)
 
-    def _unchecked(self, found: Int64Array, size: Int64Array, limit: float) -> _Unchecked:
-        """Estimate errors from those found in each minute, which are in proportion to `size`."""
+    def _expected(self, errors: Int64Array, size: Int64Array, limit: float) -> _Unchecked:
+        """Estimate errors from those in each minute, which are in proportion to `size`."""
         strata = strata_of(self.traffic)
         numbers = np.bincount(strata[self.sample], minlength=STRATA)
-        members = np.bincount(strata[self.rest], minlength=STRATA) + numbers
+        members = np.bincount(strata[self.unchecked], minlength=STRATA) + numbers
         weights = members[strata[self.sample]] / numbers[strata[self.sample]]
-        found, sizes, others = found[self.sample], size[self.sample], float(size[self.rest].sum())
+        errors, sizes = errors[self.sample], size[self.sample]
+        unchecked_size = float(size[self.unchecked].sum())
         weighted = float((weights * sizes).sum())
         if not weighted:  # nothing is known
             return _Unchecked(0.0, 0.0, 0.0, limit, limit)
-        weights *= others / weighted
-        number, variances = float((weights * found).sum()), weights * (weights + 1)
-        scatter = variances * (found - number / others * sizes) ** 2 if others else variances
+        weights *= unchecked_size / weighted
+        number, variances = float((weights * errors).sum()), weights * (weights + 1)
+        rate = number / unchecked_size if unchecked_size else 0.0
+        scatter = variances * (errors - rate * sizes) ** 2
         return _Unchecked(
             number=number,
-            single=float((variances * found).sum()) * max(0.0, 1 - number / (limit or 1)),
+            single=float((variances * errors).sum()) * max(0.0, 1 - number / (limit or 1)),
             scatter=float(scatter.sum()) * len(sizes) / (len(sizes) - 1),
-            weight=others / float(sizes.sum()),
+            weight=unchecked_size / float(sizes.sum()),
             limit=limit,
         )
 
     def _widths(self, gains: _Unchecked, losses: _Unchecked, more: int) -> tuple[float, float]:
         """Return the parts of the interval below and above the estimate after `more` minutes."""
-        minutes, unchecked = len(self.sample) + more, 1 - more / len(self.rest)
+        minutes, unchecked = len(self.sample) + more, 1 - more / len(self.unchecked)
         spread = unchecked * len(self.sample) / minutes
         low, high = gains.bounds(minutes, unchecked, spread)
         least, most = losses.bounds(minutes, unchecked, spread)
