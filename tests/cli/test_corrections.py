@@ -52,8 +52,8 @@ def test_corrections_are_truth_for_any_counts_of_the_video(run: Run, folder: Pat
     assert result.out.splitlines()[1].split()[1:] == ["gate", "out", "1", "1", "bus"]
     for table, fault in (
         ("time,name,direction,class,id\nsoon,gate,in,,1\n", ":2: time: must be a valid number"),
-        ("video,time,name,direction,class,id\na,1,gate,in,car,1\n", ": is not a table of events"),
-        ("{}\n{}\n", ": is not a table of events of one video, as --counts writes it"),
+        ("video,time,name,direction,class,id\na,1,gate,in,car,1\n", ": has several videos"),
+        ("", ": must have the columns time, name, direction, class, id"),
     ):
         plain.write_text(table)
         assert f"{plain}{fault}" in run("eval", "counts", plain, review, code=1).err

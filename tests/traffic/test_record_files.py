@@ -8,7 +8,7 @@ from traffic.passing import WIDTH, frame, passing, summarize, track
 from vdet.boxes import Box
 from vdet.track.track import FrameTracks
 from vdet.traffic.records import join_records, records_content
-from vdet.traffic.tables import write_content
+from vdet.traffic.tables import read_table, write_content
 
 HEADING = (
     "id,class,clock,first,last,seconds,detected,interpolated,predicted,mean_score,best_score,"
@@ -42,6 +42,13 @@ def test_json_is_a_list_of_vehicles(tmp_path: Path) -> None:
         **dict.fromkeys(("metres", "speed", "speed_85", "speed_sd", "motion", "distance", "lane")),
     }  # fmt: skip
     assert json.loads(written(tmp_path / "none.json")) == []
+
+
+def test_a_table_is_read_as_it_was_written(tmp_path: Path) -> None:
+    rows = [["=in", "-1.5"], ["in, or out", "+"], ["", "@x"]]
+    write_content(tmp_path / "a.csv", [("name", "note"), *rows])
+    read = read_table(tmp_path / "a.csv", ["name"])
+    assert [list(row.values()) for row in read] == rows
 
 
 class TestJoined:

@@ -11,9 +11,9 @@ from vdet.config.loading import validated
 from vdet.errors import TruthError
 from vdet.evaluate.output import figure, table
 from vdet.traffic.corrections import Corrections, ReviewedEvent, paired
-from vdet.traffic.tables import VIDEO, read_csv
+from vdet.traffic.tables import VIDEO, read_table
 
-_COLUMNS = {"time", "name", "direction", "class", "id"}
+_COLUMNS = "time", "name", "direction", "class", "id"
 ALL = "all"
 """Name of the sum over lines, directions or classes."""
 
@@ -100,9 +100,9 @@ def score_counts(path: Path, truth: Corrections) -> list[CountScore]:
 
 
 def _read_events(path: Path) -> list[ReviewedEvent]:
-    rows, events = read_csv(path), []
-    if rows and (VIDEO in rows[0] or not rows[0].keys() >= _COLUMNS):
-        raise TruthError(f"{path}: is not a table of events of one video, as --counts writes it")
+    rows, events = read_table(path, _COLUMNS), []
+    if rows and VIDEO in rows[0]:
+        raise TruthError(f"{path}: has several videos; count each on its own")
     for line, row in enumerate(rows, start=2):
         values: dict[str, Any] = {name: row[name] for name in ("time", "direction", "id")}
         values |= {"line": row["name"], "class": row["class"] or UNKNOWN}

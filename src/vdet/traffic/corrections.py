@@ -61,8 +61,7 @@ class ReviewedEvent(Section):
     @model_validator(mode="after")
     def _says_what_is_correct(self) -> "ReviewedEvent":
         if (self.correct is None) == (self.error in ("class", "direction")):
-            need = "needs" if self.correct is None else "does not accept"
-            raise ValueError(f"error: {self.error} {need} correct")
+            raise ValueError("correct: is required for error: class and direction, and only there")
         return self
 
     @property
@@ -115,13 +114,11 @@ class Sample(Section):
     minutes: tuple[int, ...] = ()
 
 
-FirstEvent = TypeVar("FirstEvent", bound=ReviewedEvent | Event)
-SecondEvent = TypeVar("SecondEvent", bound=ReviewedEvent | Event)
+E = TypeVar("E", bound=ReviewedEvent | Event)
+C = TypeVar("C", bound=ReviewedEvent | Event)
 
 
-def paired(
-    events: Sequence[FirstEvent], candidates: Sequence[SecondEvent]
-) -> list[tuple[FirstEvent | None, SecondEvent | None]]:
+def paired(events: Sequence[E], candidates: Sequence[C]) -> list[tuple[E | None, C | None]]:
     """Return each event with the candidate that is the same event; None: there is none.
 
     Both are at the same line, in the same direction, and within `TOLERANCE`. The nearest are paired
@@ -134,7 +131,7 @@ def paired(
         first = bisect_left(times, event.time - TOLERANCE)
         end = bisect_right(times, event.time + TOLERANCE)
         near += [(_distance(event, candidates[n]), number, n) for n in order[first:end]]
-    partners: dict[int, SecondEvent] = {}
+    partners: dict[int, C] = {}
     alone = dict(enumerate(candidates))
     for distance, number, candidate in sorted(near):
         if distance < math.inf and number not in partners and candidate in alone:

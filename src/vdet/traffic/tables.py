@@ -9,6 +9,7 @@ from typing import Any
 
 from vdet.errors import TruthError, needing
 from vdet.files import json_text, write_text
+from vdet.labels.parsing import numbered_lines, read_bytes
 
 SUFFIXES = (".csv", ".json", ".parquet")
 
@@ -37,16 +38,20 @@ def plain_time(value: Any) -> Any:
     return value.isoformat(" ", "milliseconds") if isinstance(value, datetime) else value
 
 
-def read_csv(path: Path) -> list[dict[str, str]]:
-    """Return the rows of a `.csv` that `write_content` wrote. Raises `TruthError`."""
+def read_table(path: Path, columns: Sequence[str]) -> list[dict[str, str]]:
+    """Return the rows of a `.csv` that `write_content` wrote.
+
+    Raises `TruthError` if it cannot be read, or lacks one of the columns.
+    """
+    lines = [line for _, line in numbered_lines(path, read_bytes(path))]
     try:
-        with path.open(encoding="utf-8", newline="") as file:
-            return [
-                {name: _as_given(cell) for name, cell in row.items() if name is not None}
-                for row in csv.DictReader(file, restval="")
-            ]
-    except (OSError, ValueError, csv.Error) as error:
+        reader = csv.DictReader(lines, restval="")
+        rows = [{name: cell for name, cell in row.items() if name} for row in reader]
+    except csv.Error as error:
         raise TruthError(f"{path}: cannot be read as a table: {error}") from error
+    if not set(columns) <= set(reader.fieldnames or ()):
+        raise TruthError(f"{path}: must have the columns {', '.join(columns)}")
+    return [{name: _as_given(cell) for name, cell in row.items()} for row in rows]
 
 
 def _as_given(cell: str) -> str:
