@@ -9,7 +9,6 @@ from typing import Any
 
 from vdet.errors import TruthError, needing
 from vdet.files import json_text, write_text
-from vdet.labels.parsing import numbered_lines, read_bytes
 
 SUFFIXES = (".csv", ".json", ".parquet")
 
@@ -43,6 +42,8 @@ def read_table(path: Path, columns: Sequence[str]) -> list[dict[str, str]]:
 
     Raises `TruthError` if it cannot be read, or lacks one of the columns.
     """
+    from vdet.labels.parsing import numbered_lines, read_bytes  # most runs only write tables
+
     lines = [line for _, line in numbered_lines(path, read_bytes(path))]
     try:
         reader = csv.DictReader(lines, restval="")
