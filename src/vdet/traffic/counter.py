@@ -87,10 +87,16 @@ class VehicleCounter:
             self._steps += 1
             self._long_steps += frame.time - self._latest.time > _LONG_STEP
         self._latest = frame
-        ended = self._passages(self.linker.add(frame))
-        self._ended += ended
-        events = (event for passage in ended for event in passage.events)
-        self._ended_counts.update((event.name, event.direction) for event in events)
+        if paths := self.linker.add(frame):
+            ended = self._passages(paths)
+            self._ended += ended
+            events = (event for passage in ended for event in passage.events)
+            self._ended_counts.update((event.name, event.direction) for event in events)
+
+    def start_video(self) -> None:
+        """Treat the ids of the next frames as other tracks, because they are of another video."""
+        self._latest = None
+        self.linker.start_video()
 
     def counts(self) -> Counts:
         """Return all results, as if the video ended now."""

@@ -3,9 +3,8 @@
 import logging
 import math
 import re
-from collections import deque
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from datetime import timedelta
 from functools import partial
 from pathlib import Path
@@ -17,7 +16,7 @@ from vdet.labels.reading import read_tracks
 from vdet.lanes.ground import ground_of
 from vdet.progress import Advance
 from vdet.track.track import FrameTracks
-from vdet.traffic.clock import Clock, Span, add_frame, find_clock
+from vdet.traffic.clock import Clock, Span, find_clock
 from vdet.traffic.corrections import Corrections, apply_corrections, by_video
 from vdet.traffic.counter import VehicleCounter
 from vdet.traffic.counts import Counts
@@ -116,6 +115,8 @@ def count_files(
             group = _Group(_all_classes(settings, corrections), frame_size, started)
         names[video.name] = saved.video.name if saved.video else None
         group.add(video, saved)
+        if clock and clock.has_whole_seconds:
+            video.last_frames = _last_frames(saved)
         advance(1)
     if not rate_is_used:
         raise ConfigError("--rate changes nothing: the tracks have times; remove it")
@@ -140,7 +141,7 @@ def count_frames(
     frame_size = _frame_size(settings, size)
     group = _Group(_all_classes(settings, corrections), frame_size)
     reviews = by_video(corrections, {"": name}, settings.traffic)
-    group.add(_Video("", clock=None, first=0.0), frames)
+    group.add(_Video(""), frames)
     return apply_corrections(group.counts(), reviews, settings.classes)[""]
 
 
@@ -164,7 +165,7 @@ class _Video:
     Attributes
     ----------
     first, start
-        Times of its first frame, and of the first one that counts.
+        Times of its first frame, and from which on frames count.
     is_complete
         Whether its last frame is known, also without a vehicle.
     doubts
@@ -173,32 +174,30 @@ class _Video:
         What converts its times and the numbers of its frames to those of the group.
     spans
         As in `Counts`.
-    latest
-        Its latest frame.
-    step
-        Duration of that frame.
+    latest, step
+        Its latest frame, and the duration of that, seconds.
     last_frames
-        The frames of its last seconds that count.
+        The frames of its last seconds, if its clock has only whole seconds.
     """
 
     name: str
-    clock: Clock | None
-    first: float
+    clock: Clock | None = None
+    first: float = 0.0
     is_complete: bool = True
     doubts: tuple[str, ...] = ()
     meter: SpeedMeter | None = None
     start: float = -math.inf
     shift: float = 0.0
     frame_shift: int = 0
-    spans: list[Span] = field(default_factory=list)
+    spans: tuple[Span, ...] = ()
     latest: FrameTracks | None = None
     step: float = _STEP
-    last_frames: deque[FrameTracks] = field(default_factory=deque)
+    last_frames: Sequence[FrameTracks] = ()
 
     @property
     def end(self) -> float:
         """The end of its last frame."""
-        last = self.spans[-1][1] if self.spans else self.first
+        last = round(self.latest.time, 6) if self.latest else self.first
         return max(self.start, last + min(self.step, _SEAM))
 
     @property
@@ -206,8 +205,8 @@ class _Video:
         """The `frame_shift` of the video after it."""
         return self.frame_shift + (self.latest.index + 1 if self.latest else 0)
 
-    def add(self, frame: FrameTracks) -> bool:
-        """Add the next frame; return whether it counts."""
+    def add(self, frame: FrameTracks) -> None:
+        """Add the next frame."""
         latest = self.latest.time if self.latest else -math.inf
         if not latest <= frame.time < math.inf:
             raise TruthError(
@@ -216,15 +215,6 @@ class _Video:
         if self.latest:
             self.step = (frame.time - latest) / max(1, frame.index - self.latest.index)
         self.latest = frame
-        if frame.time < self.start:
-            return False
-        add_frame(self.spans, frame, self.last_frames[-1] if self.last_frames else None)
-        if self.meter:
-            self.meter.add(frame)
-        self.last_frames.append(frame)
-        while frame.time - self.last_frames[0].time > _REPEATED:
-            self.last_frames.popleft()
-        return True
 
     def counts(self, group: Counts) -> Counts:
         """Return those of its group that are of this video, at its times and frames."""
@@ -237,11 +227,11 @@ class _Video:
             for event in group.events
             if self.frame_shift <= event.frame < self.next_shift
         )
-        spans = tuple(self.spans) or ((self.first, self.first),)
-        own = replace(
+        spans = self.spans or ((self.first, self.first),)
+        of_video = replace(
             group, events=tuple(events), spans=spans, clock=self.clock, doubts=self.doubts
         )
-        return with_speeds(own, self.meter)
+        return with_speeds(of_video, self.meter)
 
 
 class _Recording:
@@ -302,10 +292,18 @@ class _Group:
         if self.last:
             self._continue(self.last, video, frames)
         self._videos.append(video)
+        first_span = len(self.counter.spans)
         for frame in frames:
-            if video.add(frame):
+            video.add(frame)
+            if frame.time >= video.start:
                 index, time = frame.index + video.frame_shift, frame.time + video.shift
-                self.counter.update(replace(frame, index=index, time=time))
+                self.counter.update(FrameTracks(index, time, frame.tracks))
+                if video.meter:
+                    video.meter.add(frame)
+        video.spans = tuple(
+            (round(first - video.shift, 6), round(last - video.shift, 6))
+            for first, last in self.counter.spans[first_span:]
+        )
 
     def _continue(self, before: _Video, video: _Video, frames: Iterable[FrameTracks]) -> None:
         """Let a video follow the one before."""
@@ -319,9 +317,9 @@ class _Group:
                 -gap,
                 before.name,
             )
-        video.shift = before.shift + before.end + gap - video.first
+        video.shift = round(before.shift + before.end + gap - video.first, 6)
         video.frame_shift = before.next_shift
-        self.counter.linker.start_video()
+        self.counter.start_video()
 
     def counts(self) -> dict[str, Counts]:
         """Return the counts of each video, with times in that video."""
@@ -330,6 +328,14 @@ class _Group:
         for video in self._videos[1:]:  # the warnings are those of the group
             counts[video.name] = replace(counts[video.name], warnings=())
         return counts
+
+
+def _last_frames(saved: SavedTracks) -> list[FrameTracks]:
+    """Return the frames of the last `_REPEATED` seconds."""
+    start = max(saved.times.values(), default=0.0) - _REPEATED
+    labels = (label for label in saved.labels if saved.times[label.frame - 1] >= start)
+    covered = [index for index in saved.covered or () if saved.times[index] >= start]
+    return list(replace(saved, labels=tuple(labels), covered=covered))
 
 
 def _gap(before: _Video, video: _Video, frames: Iterable[FrameTracks]) -> float:

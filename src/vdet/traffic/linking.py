@@ -156,13 +156,14 @@ class TrackLinker:
         shown = {track.id for track in frame.tracks}
         lost = [] if shown <= self._vehicles.keys() else self._lost(shown)
         for track in frame.tracks:
-            vehicle = self._vehicles.get(track.id)
-            if vehicle and vehicle.is_jump(track, self._now, *self._size):
+            vehicle, foot = self._vehicles.get(track.id), track.foot
+            is_far = vehicle and math.dist(foot, vehicle.foot) > vehicle.box.height
+            if vehicle and is_far and vehicle.is_jump(track, self._now, *self._size):
                 self._vehicles[-vehicle.number] = self._vehicles.pop(track.id)
                 vehicle = None
             vehicle = vehicle or self._begin(track, lost)
-            vehicle.add(track, self._now, frame.index)
-            if vehicle.has_turned():
+            vehicle.add(track, foot, self._now, frame.index)
+            if vehicle.returned is not None and vehicle.has_turned():
                 self.started += 1
                 self._vehicles[track.id] = vehicle.split(self.started)
                 paths.append(vehicle.path(self._now))
@@ -210,7 +211,7 @@ class TrackLinker:
             vehicle = self._vehicles.pop(nearest.key)
         else:
             self.started += 1
-            vehicle = _Vehicle(self.started, track.box, self._now)
+            vehicle = _Vehicle(self.started, track.box, track.foot, self._now)
         vehicle.tracks.append((self._now, track.id))
         self._vehicles[track.id] = vehicle
         return vehicle
@@ -222,8 +223,8 @@ class _Vehicle:
 
     Attributes
     ----------
-    box, last_seen
-        Its last box, and the time of that frame, seconds.
+    box, foot, last_seen
+        Its last box and ground point, and the time of that frame, seconds.
     tracks
         As in `VehiclePath`.
     rows
@@ -238,6 +239,7 @@ class _Vehicle:
 
     number: int
     box: Box
+    foot: Point
     last_seen: float
     tracks: list[tuple[float, int]] = field(default_factory=list)
     rows: "array[float]" = field(default_factory=lambda: array("d"))
@@ -245,12 +247,12 @@ class _Vehicle:
     size: float = 0.0
     returned: int | None = None
 
-    def add(self, track: Track, time: float, frame: int) -> None:
+    def add(self, track: Track, foot: Point, time: float, frame: int) -> None:
         """Add the next frame that shows it."""
         if time - self.last_seen > _HIDDEN_SECONDS:
             self.returned = len(self.rows)
         self.box = box = track.box
-        self.last_seen, (x, y) = time, track.foot
+        self.foot, self.last_seen, (x, y) = foot, time, foot
         row = _ROW.pack(time, x, y, box.x1, box.y1, track.score, frame, track.id, box.x2, box.y2)
         self.rows.frombytes(row)  # three times faster than `extend`
         if len(self.rows) % (_PARKED_ROWS * _COLUMNS) == 0 and self.returned is None:
@@ -261,10 +263,7 @@ class _Vehicle:
 
     def is_jump(self, track: Track, time: float, width: int, height: int) -> bool:
         """Return whether a box with its id is too far away to be of this vehicle."""
-        x, y = track.foot
-        moved = complex(x - self.rows[1 - _COLUMNS], y - self.rows[2 - _COLUMNS])
-        if abs(moved) <= self.box.y2 - self.box.y1:  # nearly always, and fast
-            return False
+        moved = complex(*track.foot) - complex(*self.foot)
         size = max(self.box.height, track.box.height)
         if abs(moved) <= _BEHIND * size:
             return False
@@ -294,7 +293,7 @@ class _Vehicle:
         rows = self.rows[self.returned :]
         del self.rows[self.returned :]
         tracks = self.tracks.copy()
-        return _Vehicle(number, self.box, self.last_seen, tracks, rows, size=self.size)
+        return _Vehicle(number, self.box, self.foot, self.last_seen, tracks, rows, size=self.size)
 
     def is_leaving(self, width: int, height: int) -> bool:
         """Return whether it is at the edge of the frame and moves outwards."""
