@@ -321,22 +321,6 @@ function levelGround(pixels, lengths, size) {
   return corners.map(pixel => ({ pixel, metres: place(pixel) }));
 }
 
-/** Return the speed of a vehicle at a moment in km/h, from the places of one second; or null. */
-function speedAt(path, time, ground) {
-  const last = path.seen - 1, from = clamp(time - 0.5, path.times[0], Math.max(path.times[0], path.times[last] - 1));
-  const places = [];
-  for (let row = 0; row <= last; row++)
-    if (path.times[row] >= from && path.times[row] <= from + 1) {
-      const place = ground.toMetres([path.xs[row] - 0.5, path.ys[row] - 0.5]);
-      if (place) places.push([path.times[row], ...place]);
-    }
-  if (places.length < 3 || places.at(-1)[0] - places[0][0] < 0.5) return null;
-  const mean = [0, 1, 2].map(i => places.reduce((sum, each) => sum + each[i], 0) / places.length);
-  const slope = i => places.reduce((sum, each) => sum + (each[0] - mean[0]) * (each[i] - mean[i]), 0) /
-    places.reduce((sum, each) => sum + (each[0] - mean[0]) ** 2, 0);
-  return 3.6 * Math.hypot(slope(1), slope(2));
-}
-
 // ---------------------------------------------------------------- the file
 const MARK = "# Drawn with vdet draw";
 const FORMS = { // the lists of the file, and what their items have
@@ -700,7 +684,7 @@ async function openPage(data) {
   }
 
   function showResults() {
-    const ground = fitGround(places.ground), lines = found.slice(0, places.lines.length), problems = problemsOf(places, size);
+    const lines = found.slice(0, places.lines.length), problems = problemsOf(places, size);
     const warnings = lines.flatMap(({ border, visits }) =>
       warningsOf(border, visits, paths, data.span).map(text => `${border.name}: ${text}`));
     get("warnings").replaceChildren(...[...problems, ...warnings].map((text, i) =>
@@ -711,20 +695,9 @@ async function openPage(data) {
     const row = (cell, ...texts) => el("tr", {}, ...texts.map(text => el(cell, {}, String(text))));
     get("flows").replaceChildren(row("th", "from", ...names.map(name => `to ${name}`), "to none"),
       ...names.map(from => row("td", from, ...[...names, ""].map(to => flows[`${from}\n${to}`] ?? 0))));
-    get("speeds").replaceChildren(...lines.flatMap(line =>
-      ground ? line.border.directions.map(way => speedRow(line, way, ground)) : []));
     get("text").textContent = writeYaml(places, size, rest, data.name);
     get("undo").disabled = !past.length;
     get("redo").disabled = !future.length;
-  }
-
-  function speedRow({ border, visits }, direction, ground) {
-    const speeds = visits.flatMap(([path, some]) => some.filter(each => each.direction === direction)
-      .map(each => speedAt(path, each.time, ground)).filter(speed => speed !== null));
-    if (!speeds.length) return "";
-    const [middle, most] = [0.5, 0.85].map(fraction => quantile(speeds, fraction).toFixed(0));
-    return el("div", { class: "speed" }, el("b", {}, `${border.name}: ${direction}`),
-      el("span", {}, `median ${middle} km/h, 85 % ${most} km/h`));
   }
 
   function setTool(name) {
