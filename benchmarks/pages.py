@@ -198,7 +198,7 @@ def hour_of_paths(vehicles: int = 3000) -> list[VehiclePath]:
         name = CLASSES[rng.integers(len(CLASSES))]
         times, empty = first + np.arange(seen) / 12.5, np.zeros(seen)
         rows = times, points, heights, empty, empty
-        paths.append(VehiclePath(number, name, ((first, number),), seen, *rows, heights.max()))
+        paths.append(VehiclePath(number, name, seen, *rows, empty + number, heights.max()))
     return paths
 
 

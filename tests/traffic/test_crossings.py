@@ -38,7 +38,7 @@ def test_the_path_of_a_vehicle_has_the_rows_of_all_its_tracks() -> None:
     old = frames(through((0, 600, 250), (2, 600, 370)), seconds=2)
     new = numbered(frames(through((2.2, 600, 382), (5, 600, 550))), 7)
     (path,) = link_tracks(joined(old, new), WIDTH, HEIGHT)
-    assert (path.vehicle, path.tracks, path.seconds) == (1, ((0.0, 1), (2.2, 7)), 5)
+    assert (path.vehicle, path.ids[0], path.ids[-1], path.seconds) == (1, 1, 7, 5)
     assert path.points[[0, path.seen - 1]].tolist() == [[600, 250], [600, 550]]
     line, zone = (item for (item,) in lines_and_zones(SETTINGS.traffic, WIDTH, HEIGHT))
     assert rounded(path, line) == [(2.5, 63, "here", None)]

@@ -95,7 +95,9 @@ class Drawing:
     def _marks(self) -> list[Mark]:
         counts = count_frames(self._frames, self._settings, self._size)
         lines, zones = lines_and_zones(self._settings.traffic, *self._size)
-        paths = {key: path.points.tolist() for path in self.paths for _, key in path.tracks}
+        paths = {
+            key: path.points.tolist() for path in self.paths for key in np.unique(path.ids).tolist()
+        }
         return traffic_marks(self._size, (*lines, *zones), counts, paths)
 
 

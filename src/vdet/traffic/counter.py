@@ -158,7 +158,7 @@ def _event(path: VehiclePath, name: str, crossing: Crossing) -> Event:
         frame=int(path.frames[row]),
         name=name,
         direction=crossing.direction,
-        id=path.track_at(row),
+        id=int(path.ids[row]),
         vehicle=path.vehicle,
         class_name=path.class_name,
         score=round(float(path.scores[row]), 4),

@@ -6,7 +6,6 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from enum import Enum, auto
 from itertools import pairwise
 
 import numpy as np
@@ -230,14 +229,6 @@ def crossings(path: VehiclePath, border: Border) -> list[Crossing]:
     return visits
 
 
-class _Side(Enum):
-    """The side of a border on which a vehicle is."""
-
-    UNSETTLED = auto()
-    POSITIVE = auto()
-    NEGATIVE = auto()
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class _Run:
     """Consecutive rows of a path on one side of a border, from row `start`.
@@ -247,31 +238,28 @@ class _Run:
     """
 
     start: int
-    side: _Side
+    is_positive: bool
     height: float
     is_clear: bool
 
 
 def _changes(path: VehiclePath, border: Border) -> Iterator[Crossing]:
     """Yield the changes of the settled side, and the start of a path inside a zone."""
-    settled = _Side.UNSETTLED
-    latest: _BorderPoint | None = None  # the latest crossing, unless it was beyond the line's ends
+    is_positive: bool | None = None  # the settled side
+    latest: Point | None = None  # of the latest crossing, unless it was beyond the line's ends
     for run in _runs(path, border):
-        if run.side is settled:
-            continue
-        if settled is _Side.UNSETTLED:
-            settled = run.side
-            if settled is _Side.POSITIVE and isinstance(border, Zone):
+        if is_positive is None:
+            is_positive = run.is_positive
+            if is_positive and isinstance(border, Zone):
                 yield Crossing(float(path.times[0]), 0, APPEAR)
-            continue
-        point = _border_point(path, border, run.start)
-        distance = math.dist(latest.position, point.position) if latest else math.inf
-        if not run.is_clear and run.height > distance:
-            continue  # it is still near the latest crossing
-        settled, latest = run.side, point if point.is_on_border else None
-        if latest:
-            direction = border.directions[0 if settled is _Side.POSITIVE else 1]
-            yield Crossing(latest.time, latest.row, direction)
+        elif run.is_positive != is_positive:
+            point = _border_point(path, border, run.start)
+            distance = math.dist(latest, point.position) if latest else math.inf
+            if run.is_clear or run.height <= distance:  # else it is still near the latest crossing
+                is_positive, latest = run.is_positive, None
+                if point.is_on_border:
+                    latest, direction = point.position, border.directions[0 if is_positive else 1]
+                    yield Crossing(point.time, point.row, direction)
 
 
 def _runs(path: VehiclePath, border: Border) -> Iterator[_Run]:
@@ -285,8 +273,12 @@ def _runs(path: VehiclePath, border: Border) -> Iterator[_Run]:
     for start, end in pairwise([0, *turns, len(is_positive)]):
         rows = start + np.flatnonzero(settles[start:end])
         if len(rows):
-            side = _Side.POSITIVE if is_positive[start] else _Side.NEGATIVE
-            yield _Run(start, side, float(path.heights[rows].min()), bool(is_clear[rows].any()))
+            yield _Run(
+                start,
+                is_positive=bool(is_positive[start]),
+                height=float(path.heights[rows].min()),
+                is_clear=bool(is_clear[rows].any()),
+            )
 
 
 def _settling(

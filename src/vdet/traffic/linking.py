@@ -2,7 +2,7 @@
 
 import math
 from array import array
-from collections.abc import Container, Iterable
+from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass, field
 from struct import Struct
 
@@ -66,8 +66,6 @@ class VehiclePath:
         Its number.
     class_name
         The last class of its track; of several tracks, of the one that shows it largest.
-    tracks
-        Start time and id of each track.
     seen
         Number of frames that show it. Later rows are extrapolated.
     times
@@ -76,21 +74,21 @@ class VehiclePath:
         Ground points, pixels, `(n, 2)`.
     heights
         Heights of its box, pixels.
-    scores, frames
-        Scores of its tracks, and numbers of the frames.
+    scores, frames, ids
+        Scores and ids of its tracks, and numbers of the frames.
     size
         Maximum of the mean of width and height of its box, pixels.
     """
 
     vehicle: int
     class_name: str | None
-    tracks: tuple[tuple[float, int], ...]
     seen: int
     times: Float64Array
     points: Float64Array
     heights: Float64Array
     scores: Float64Array
     frames: Float64Array
+    ids: Float64Array
     size: float
 
     @property
@@ -103,10 +101,6 @@ class VehiclePath:
         """From when it was first seen to when it was last seen."""
         return round(float(self.times[self.seen - 1] - self.times[0]), DURATION_DIGITS)
 
-    def track_at(self, row: int) -> int:
-        """Return the id of its track in a row."""
-        return next(key for since, key in reversed(self.tracks) if since <= self.times[row])
-
 
 def has_moved(points: Float64Array, size: float) -> bool:
     """Return whether one of points `(n, 2)` is half a vehicle's size or more from the first one."""
@@ -118,18 +112,6 @@ def link_tracks(frames: Iterable[FrameTracks], width: int, height: int) -> list[
     linker = TrackLinker(width, height)
     ended = [path for frame in frames for path in linker.add(frame)]
     return [*ended, *linker.open_paths()]
-
-
-@dataclass(frozen=True, slots=True)
-class _Lost:
-    """The last or expected ground point of a lost vehicle, and the height of its box, pixels.
-
-    `key` is its key in `TrackLinker`.
-    """
-
-    key: int
-    point: Point
-    height: float
 
 
 class TrackLinker:
@@ -154,7 +136,7 @@ class TrackLinker:
         ended = [key for key, vehicle in self._vehicles.items() if vehicle.last_seen < oldest]
         paths = [self._vehicles.pop(key).path(self._now) for key in ended]
         shown = {track.id for track in frame.tracks}
-        lost = [] if shown <= self._vehicles.keys() else self._lost(shown)
+        lost = {} if shown <= self._vehicles.keys() else self._lost(shown)
         for track in frame.tracks:
             vehicle, foot = self._vehicles.get(track.id), track.foot
             is_far = vehicle and math.dist(foot, vehicle.foot) > vehicle.box.height
@@ -178,14 +160,14 @@ class TrackLinker:
         """Return the paths so far of the vehicles that may be shown again."""
         return [vehicle.path(self._now) for vehicle in self._vehicles.values()]
 
-    def _lost(self, shown: Container[int]) -> list[_Lost]:
-        """Return the last and the expected position of each vehicle that was just lost.
+    def _lost(self, shown: Container[int]) -> dict[int, list[Point]]:
+        """Return the last and the expected position of each vehicle that was just lost, by key.
 
         Vehicles with a key in `shown` are not lost. Those that leave, or would now be outside the
         frame, are omitted: a vehicle that appears there is another one.
         """
         width, height = self._size
-        lost: list[_Lost] = []
+        lost: dict[int, list[Point]] = {}
         for key, vehicle in self._vehicles.items():
             is_old = self._now - vehicle.last_seen > MAX_GAP
             if key in shown or is_old or vehicle.is_leaving(width, height):
@@ -193,26 +175,25 @@ class TrackLinker:
             points = [(x, y) for x, y in vehicle.extrapolated(self._now)[:, 1:3].tolist()]
             x, y = points[-1]
             if 0 <= x <= width and 0 <= y <= height:
-                lost += [_Lost(key, point, vehicle.box.xywh[3]) for point in points]
+                lost[key] = points
         return lost
 
-    def _begin(self, track: Track, lost: Iterable[_Lost]) -> "_Vehicle":
+    def _begin(self, track: Track, lost: Mapping[int, list[Point]]) -> "_Vehicle":
         """Return the nearest lost vehicle that the track continues, or a new one."""
         point, height = track.written_foot, track.box.xywh[3]
-        candidates = [
-            vehicle
-            for vehicle in lost
-            if vehicle.key in self._vehicles  # no other track continues it
-            and max(height, vehicle.height) <= _MAX_GROWTH * min(height, vehicle.height)
-            and math.dist(point, vehicle.point) <= _MAX_DISTANCE * max(height, vehicle.height)
-        ]
-        if candidates:
-            nearest = min(candidates, key=lambda vehicle: math.dist(point, vehicle.point))
-            vehicle = self._vehicles.pop(nearest.key)
+        distances = {}
+        for key, points in lost.items():
+            if key not in self._vehicles:  # another track continues it
+                continue
+            low, high = sorted((height, self._vehicles[key].box.xywh[3]))
+            distance = min(math.dist(point, position) for position in points)
+            if high <= _MAX_GROWTH * low and distance <= _MAX_DISTANCE * high:
+                distances[key] = distance
+        if distances:
+            vehicle = self._vehicles.pop(min(distances, key=distances.__getitem__))
         else:
             self.started += 1
             vehicle = _Vehicle(self.started, track.box, track.foot, self._now)
-        vehicle.tracks.append((self._now, track.id))
         self._vehicles[track.id] = vehicle
         return vehicle
 
@@ -225,8 +206,6 @@ class _Vehicle:
     ----------
     box, foot, last_seen
         Its last box and ground point, and the time of that frame, seconds.
-    tracks
-        As in `VehiclePath`.
     rows
         The numbers of all its frames, one frame after the other: see `_table`.
     classes
@@ -241,7 +220,6 @@ class _Vehicle:
     box: Box
     foot: Point
     last_seen: float
-    tracks: list[tuple[float, int]] = field(default_factory=list)
     rows: "array[float]" = field(default_factory=lambda: array("d"))
     classes: dict[int, str | None] = field(default_factory=dict)
     size: float = 0.0
@@ -292,8 +270,7 @@ class _Vehicle:
         self.size = max(self.size, _max_size(_table(self.rows)))
         rows = self.rows[self.returned :]
         del self.rows[self.returned :]
-        tracks = self.tracks.copy()
-        return _Vehicle(number, self.box, self.foot, self.last_seen, tracks, rows, size=self.size)
+        return _Vehicle(number, self.box, self.foot, self.last_seen, rows, size=self.size)
 
     def is_leaving(self, width: int, height: int) -> bool:
         """Return whether it is at the edge of the frame and moves outwards."""
@@ -320,13 +297,13 @@ class _Vehicle:
         return VehiclePath(
             vehicle=self.number,
             class_name=self.classes[largest],
-            tracks=tuple(self.tracks),
             seen=seen,
             times=rows[:, 0],
             points=rows[:, 1:3],
             heights=heights,
             scores=scores,
             frames=frames,
+            ids=ids,
             size=max(self.size, _max_size(rows)),
         )
 
