@@ -6,7 +6,7 @@ in order: it fits the lane near the last one, or finds a new one, and smooths it
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import cv2
@@ -108,21 +108,13 @@ def position_on_road(
 
 
 @dataclass(frozen=True, slots=True)
-class FrameView:
-    """One frame, prepared for the lane search."""
-
-    picture: Picture
-    """The frame itself."""
-    mask: Image
-    """The paint in the top view, uint8 `(rows, columns)`: 255 for paint, else 0."""
-
-
-@dataclass(frozen=True, slots=True)
 class Road:
     """The road in one frame of a video."""
 
-    view: FrameView
-    """The frame and its paint, from `RoadFinder.observe`; in `mask`, vehicles are `HIDDEN`."""
+    size: tuple[int, int]
+    """Width and height of the frame, pixels."""
+    mask: Image
+    """The paint in the top view, from `RoadFinder.observe`; vehicles are `HIDDEN`."""
     lane: Lane | None
     """The lane, smoothed over this frame and those before; None if it is not reliably known."""
     curves: LaneCurves | None
@@ -131,18 +123,13 @@ class Road:
     undistorter: Undistorter
     """Moves boxes and points of the frame to the undistorted one."""
 
-    def without_metres(self) -> "Road":
-        """Return the road without the values that need the description of a camera."""
-        lane = self.lane and replace(self.lane, radius=None, offset=None, width=None)
-        return replace(self, lane=lane, curves=None)
-
     def record(self) -> dict[str, Any] | None:
         """Return the lane as plain values for JSON."""
         return self.lane.record() if self.lane else None
 
     def cuts(self, box: Box) -> bool:
         """Return whether the left, right or lower edge of the frame cuts the vehicle's box."""
-        height, width = self.view.picture.height, self.view.picture.width
+        width, height = self.size
         beside = box.x1 <= EDGE * width or box.x2 >= (1 - EDGE) * width
         return bool(beside or box.y2 >= (1 - EDGE) * height)
 
@@ -173,7 +160,8 @@ class RoadFinder:
     """Warps the frames of one video, `width` × `height` pixels, and finds the lane in them.
 
     Several threads may call `observe` at the same time. `update` must get the results one by one,
-    in the order of the frames.
+    in the order of the frames. Without `has_metres`, lanes have no values that need the description
+    of a camera, and vehicles no positions.
 
     Raises
     ------
@@ -182,8 +170,15 @@ class RoadFinder:
     """
 
     def __init__(
-        self, lens: LensSettings | None, settings: LaneSettings, width: int, height: int
+        self,
+        lens: LensSettings | None,
+        settings: LaneSettings,
+        width: int,
+        height: int,
+        *,
+        has_metres: bool = True,
     ) -> None:
+        self._size, self._has_metres = (width, height), has_metres
         self._undistorter = Undistorter(lens, width, height)
         self._top_view = TopView(settings, width, height)
         self._state: _LaneState | None = None
@@ -198,8 +193,8 @@ class RoadFinder:
         ]
         """Where the pixels of the top view lie in the frame, and in its chroma."""
 
-    def observe(self, picture: Picture) -> FrameView:
-        """Mark the paint in the top view of a frame, without undistorting the whole frame."""
+    def observe(self, picture: Picture) -> Image:
+        """Return the paint in the top view of a frame, 255, else 0, uint8 `(rows, columns)`."""
         of_frame, of_chroma = self._maps
         if planes := picture.planes:
             luma, blue = warped(planes.luma, of_frame), warped(planes.blue, of_chroma, outside=128)
@@ -207,20 +202,21 @@ class RoadFinder:
             luma, blue, _ = planes.coding.to_common((luma, blue, no_red))
         else:
             luma, _, blue = to_ycrcb(warped(picture.image, of_frame))
-        return FrameView(picture, paint_mask(luma, blue))
+        return paint_mask(luma, blue)
 
-    def update(self, view: FrameView, vehicles: Iterable[Box] = ()) -> Road:
-        """Return the road in the next frame.
+    def update(self, mask: Image, vehicles: Iterable[Box] = ()) -> Road:
+        """Return the road in the next frame, from its paint.
 
         `vehicles` are the boxes of the vehicles in it, which hide paint.
         """
         boxes = [self._undistorter.box(box) for box in vehicles]
-        view = replace(view, mask=hide(view.mask, self._top_view, boxes))
-        self._state = state = self._next_state(view.mask)
+        mask = hide(mask, self._top_view, boxes)
+        self._state = state = self._next_state(mask)
         return Road(
-            view,
+            size=self._size,
+            mask=mask,
             lane=self._lane(state) if state else None,
-            curves=state.fit.curves if state else None,
+            curves=state.fit.curves if state and self._has_metres else None,
             top_view=self._top_view,
             undistorter=self._undistorter,
         )
@@ -240,6 +236,8 @@ class RoadFinder:
         z = self._lane_z
         lines = self._top_view.ground_to_frame(np.concatenate(curves.at(z)), np.tile(z, 2))
         left, right = np.split(self._undistorter.distorted(lines), 2)
+        if not self._has_metres:
+            return Lane(curvature, radius=None, offset=None, width=None, left=left, right=right)
         radius = None if abs(curvature) * _STRAIGHT < 1 else 1 / abs(curvature)
         offset = -(curves.left + curves.right) / 2
         return Lane(curvature, radius, offset, curves.width, left=left, right=right)
@@ -291,13 +289,13 @@ def lane_text(lane: Lane) -> tuple[str, ...]:
     return f"lane {lane.width:.1f} m wide, {bend}", middle
 
 
-def stage_images(road: Road) -> dict[str, Image]:
-    """Return pictures of the stages, BGR uint8.
+def stage_images(road: Road, image: Image) -> dict[str, Image]:
+    """Return pictures of the stages of a frame, BGR uint8.
 
     `road` is the undistorted frame with the outline of the top view, `above` the top view, `mask`
     its paint (what vehicles hide is grey), and `fit` the top view with the lane.
     """
-    frame = road.undistorter.image(road.view.picture.image)
+    frame = road.undistorter.image(image)
     above = _enlarge(road.top_view.picture(frame))
     fit = above.copy()
     if lane := road.lane:
@@ -307,7 +305,7 @@ def stage_images(road: Road) -> dict[str, Image]:
         )
         _draw_area(fit, left, right)
     draw_lines(frame, road.top_view.outline, LINE, line_width(frame), closed=True)
-    mask = np.asarray(cv2.cvtColor(road.view.mask, cv2.COLOR_GRAY2BGR), np.uint8)
+    mask = np.asarray(cv2.cvtColor(road.mask, cv2.COLOR_GRAY2BGR), np.uint8)
     return {"road": frame, "above": above, "mask": _enlarge(mask), "fit": fit}
 
 

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
+from vdet.boxes import Image
 from vdet.config.schema import Settings
 from vdet.media import Frame, VideoInfo
 from vdet.plugins import STEPS, load_plugin
@@ -17,7 +18,7 @@ from vdet.track.track import Track
 
 if TYPE_CHECKING:  # what an image does not need is loaded where it is used
     from vdet.conditions.watch import Conditions
-    from vdet.lanes.road import FrameView, Road, RoadFinder
+    from vdet.lanes.road import Road, RoadFinder
 
 
 class Step(Protocol):
@@ -83,9 +84,9 @@ def make_steps(context: StepContext) -> list[Step]:
     if settings.lanes.enabled:
         from vdet.lanes.road import RoadFinder
 
-        roads = RoadFinder(settings.camera.lens, settings.lanes, width, height)
-        has_metres = settings.lack_of_metres is None
-        steps.append(LaneStep(roads, settings.detector.tyre_height, has_metres=has_metres))
+        lens, has_metres = settings.camera.lens, settings.lack_of_metres is None
+        roads = RoadFinder(lens, settings.lanes, width, height, has_metres=has_metres)
+        steps.append(LaneStep(roads, settings.detector.tyre_height))
     if settings.regions:
         steps.append(RegionStep(Regions(settings.regions, width, height)))
     steps += [load_plugin(STEPS, name)(context) for name in settings.steps]
@@ -93,23 +94,21 @@ def make_steps(context: StepContext) -> list[Step]:
 
 
 class LaneStep:
-    """Finds the lane, and with `has_metres` the distance and the lane of each vehicle."""
+    """Finds the lane, and the distance and the lane of each vehicle."""
 
-    def __init__(self, roads: "RoadFinder", foot: float, *, has_metres: bool = True) -> None:
-        self._has_metres = has_metres
+    def __init__(self, roads: "RoadFinder", foot: float) -> None:
         self._roads = roads
         self._foot = foot
-        self._views: dict[int, FrameView] = {}
+        self._masks: dict[int, Image] = {}
 
     def prepare(self, frame: Frame) -> None:
         """Mark the lane markings of a frame."""
-        self._views[frame.index] = self._roads.observe(frame.picture)
+        self._masks[frame.index] = self._roads.observe(frame.picture)
 
     def apply(self, result: FrameResult) -> FrameResult:
         """Add the road, and the positions of the vehicles on it."""
-        view = self._views.pop(result.frame.index)
-        road = self._roads.update(view, (track.box for track in result.tracks))
-        road = road if self._has_metres else road.without_metres()
+        mask = self._masks.pop(result.frame.index)
+        road = self._roads.update(mask, (track.box for track in result.tracks))
         tracks = with_positions(result.tracks, road, self._foot)
         return replace(result, tracks=tracks, facts={**result.facts, "lane": road})
 

@@ -61,7 +61,7 @@ class StagesSink(BaseSink):
             pictures["regions"] = draw_regions(result.frame.image, regions)
         pictures[_BOXES] = _with_boxes(result)
         if result.road:
-            pictures |= stage_images(result.road)
+            pictures |= stage_images(result.road, result.frame.image)
         folder = self.context.files.stage_folder(self.path)
         for number, (name, picture) in enumerate(pictures.items(), start=1):
             path = folder / f"{number}-{name}.png"
