@@ -171,8 +171,7 @@ def video_page(vehicles: int = 1200, length: float = 3600.0) -> str:
     page = VideoPage(
         video=info,
         frames=int(25 * length),
-        start=0.0,
-        end=length,
+        spans=[(0.0, length)],
         records=records,
         thumbnails=thumbnails,
         poster=still,

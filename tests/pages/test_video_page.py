@@ -44,7 +44,8 @@ def page(
     *, source: Path = Path("clips/a.mp4"), player: Player | None = VIDEO, end: float = 2.08
 ) -> VideoPage:
     return VideoPage(
-        video=replace(video_info(WIDTH, HEIGHT), path=source), frames=52, start=0.0, end=end,
+        video=replace(video_info(WIDTH, HEIGHT), path=source), frames=52,
+        spans=[(0.0, end - float(1 / video_info(WIDTH, HEIGHT).rate))],
         records=TWO, thumbnails={1: (1.25, jpeg_uri(STILL))}, poster=STILL, player=player,
         settings="output:\n  crf: 25\n",
     )  # fmt: skip
@@ -163,7 +164,7 @@ class TestVideoPage:
         assert spans == [("0.0%", "20.0%"), ("80.0%", "20.0%")]
 
     def test_gaps_of_the_video_are_named(self) -> None:
-        assert "No frames from 0:01 to 0:02" in seen(replace(page(), gaps=[(1, 2)])).text
+        assert "No frames from 0:01 to 0:02" in seen(replace(page(), spans=[(0, 1), (2, 2)])).text
 
     def test_a_video_without_vehicles_has_a_page_too(self) -> None:
         empty = replace(page(), records=(), thumbnails={}, poster=None)

@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from vdet.config.schema import Code
 from vdet.errors import clock_text
-from vdet.traffic.clock import Span
+from vdet.traffic.clock import Span, extend
 
 Severity = Literal["warning", "note"]
 _GAP = 2.0
@@ -79,10 +79,7 @@ def joined(times: Iterable[float], shortest: float = 0.0) -> list[Span]:
     """Join ascending times that are close together into spans; omit spans that are too short."""
     spans: list[Span] = []
     for time in times:
-        if spans and time - spans[-1][1] <= _GAP:
-            spans[-1] = spans[-1][0], time
-        else:
-            spans.append((time, time))
+        extend(spans, time, _GAP)
     return [(first, last) for first, last in spans if last - first >= shortest]
 
 

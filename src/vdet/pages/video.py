@@ -3,6 +3,7 @@
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 from vdet.boxes import Image
 from vdet.conditions.finding import Finding
@@ -21,7 +22,7 @@ from vdet.pages.traffic import (
     traffic_marks,
     with_marks,
 )
-from vdet.traffic.clock import Clock, Intervals
+from vdet.traffic.clock import Clock, Intervals, Span
 from vdet.traffic.counts import Counts
 from vdet.traffic.crossings import Border
 from vdet.traffic.records import VehicleRecord
@@ -63,8 +64,8 @@ class VideoPage:
 
     Attributes
     ----------
-    start, end
-        Start of the first frame and end of the last one, seconds as in the tracks.
+    spans
+        The parts with video, from the first to the last frame, seconds as in the tracks.
     thumbnails
         By id, the time of a frame in seconds, and the image of the vehicle as a data URI. A vehicle
         may have none.
@@ -76,8 +77,6 @@ class VideoPage:
         None if nothing is counted.
     interval
         Interval of the counts over time, seconds.
-    gaps
-        Times without frames, from the frame before to the one after, seconds.
     clock
         Start time of the video; None if unknown.
     pictures
@@ -90,8 +89,7 @@ class VideoPage:
 
     video: VideoInfo
     frames: int
-    start: float
-    end: float
+    spans: Sequence[Span]
     records: Sequence[VehicleRecord]
     thumbnails: Mapping[int, tuple[float, str]]
     poster: Image | None
@@ -99,7 +97,6 @@ class VideoPage:
     settings: str
     counts: Counts | None = None
     interval: int = 60
-    gaps: Sequence[tuple[float, float]] = ()
     clock: Clock | None = None
     pictures: Mapping[int, str] = field(default_factory=dict)
     borders: Sequence[Border] = ()
@@ -188,6 +185,21 @@ class VideoPage:
         return sorted((record.first, record.last) for record in self.records)
 
     @property
+    def gaps(self) -> list[Span]:
+        """Times without frames, from the frame before to the one after, seconds."""
+        return [(end, start) for (_, end), (start, _) in pairwise(self.spans)]
+
+    @property
+    def start(self) -> float:
+        """Start of the first frame, seconds."""
+        return self.spans[0][0]
+
+    @property
+    def end(self) -> float:
+        """End of the last frame, seconds."""
+        return self.spans[-1][1] + float(1 / self.video.rate)
+
+    @property
     def seconds(self) -> float:
         """The duration of the processed part of the video."""
         return self.end - self.start
@@ -217,10 +229,7 @@ class VideoPage:
 
         There are none if there is only one interval.
         """
-        step, last = self.interval, self.end - float(1 / self.video.rate)
-        begins = [self.start, *(end for _, end in self.gaps)]
-        ends = [*(begin for begin, _ in self.gaps), last]
-        intervals = Intervals([(self.clock, list(zip(begins, ends, strict=True)))], step)
+        step, intervals = self.interval, Intervals([(self.clock, self.spans)], self.interval)
         first = {item.number: intervals.start_in(0, item.number) for item in intervals.periods}
         if len(first) == 1:
             return []

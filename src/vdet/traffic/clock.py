@@ -185,9 +185,13 @@ def add_frame(spans: list[Span], frame: FrameTracks, before: FrameTracks | None)
     `before` is the frame added last, None for the first one of a video. Frames in between may have
     been skipped.
     """
-    time = round(frame.time, 6)
     frames = frame.index - before.index if before else 0
-    if frames and time - spans[-1][1] <= _LONGEST_FRAME * frames:
+    extend(spans, round(frame.time, 6), _LONGEST_FRAME * frames if before else None)
+
+
+def extend(spans: list[Span], time: float, gap: float | None) -> None:
+    """Extend the last span to a later time if it is at most a gap later, or begin a new one."""
+    if spans and gap is not None and time - spans[-1][1] <= gap:
         spans[-1] = spans[-1][0], time
     else:
         spans.append((time, time))

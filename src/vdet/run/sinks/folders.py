@@ -26,6 +26,7 @@ from vdet.regions import Regions
 from vdet.run.result import FrameResult, findings_in
 from vdet.run.sinks.drawn import IMAGE_LABELS, draw_tracks
 from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
+from vdet.traffic.clock import Span, extend
 from vdet.traffic.records import BestCrops, Crop, VehicleRecord
 
 log = logging.getLogger("vdet")
@@ -133,14 +134,12 @@ class PageSink(BaseSink):
     def __init__(self, path: Path, context: SinkContext) -> None:
         super().__init__(path, context)
         self._file = context.files.stage_folder(path) / PAGE_NAME
-        video = self.video
         self._crops = BestCrops()
         self._thumbnails: dict[int, tuple[float, str]] = {}
-        self._gaps: list[tuple[float, float]] = []
+        self._spans: list[Span] = []
         self._fullest: Picture | None = None
         self._most = 0
         self._frames = 0
-        self._start = self._last = float(video.start)
 
     def finish(self) -> None:
         """Write the page."""
@@ -152,12 +151,8 @@ class PageSink(BaseSink):
     def write(self, result: FrameResult) -> None:
         """Add a frame."""
         frame, picture = result.frame_tracks, result.frame.picture
-        if not self._frames:
-            self._start = frame.time
-        elif frame.time - self._last > _GAP:
-            self._gaps.append((self._last, frame.time))
+        extend(self._spans, frame.time, _GAP)
         self._frames += 1
-        self._last = frame.time
         if self._fullest is None or len(frame.tracks) > self._most:
             self._fullest, self._most = picture, len(frame.tracks)
         self._keep(self._crops.add(frame, picture))
@@ -168,12 +163,11 @@ class PageSink(BaseSink):
 
     def _page(self) -> VideoPage:
         settings, traffic = self.context.settings, self.traffic
-        counter = traffic.counter
+        counter, start = traffic.counter, float(self.video.start)
         return VideoPage(
             video=self.video,
             frames=self._frames,
-            start=self._start,
-            end=self._last + float(1 / self.video.rate),
+            spans=self._spans or [(start, start)],
             records=traffic.vehicles,
             thumbnails=self._thumbnails,
             poster=self._fullest.image if self._fullest else None,
@@ -181,10 +175,9 @@ class PageSink(BaseSink):
             settings=render_settings(settings.with_paths(lambda path: Path(path).name)),
             counts=traffic.counts(),
             interval=settings.traffic.seconds or 60,
-            gaps=self._gaps,
             clock=traffic.clock,
             pictures=self._pictures(),
-            borders=(*counter.lines, *counter.zones) if counter else (),
+            borders=counter.borders if counter else (),
             findings=findings_in(self.context.facts).items,
         )
 
@@ -204,7 +197,9 @@ class PageSink(BaseSink):
         drawn = self._paths_of("video")
         if not drawn and (not source.is_file() or is_image_name(source)):
             return None
-        path, start = (drawn[0], self._start) if drawn else (source, float(self.video.start))
+        path, start = source, float(self.video.start)
+        if drawn:
+            path, start = drawn[0], self._spans[0][0] if self._spans else start
         return Player(path.name, link_to(path, self.path), bool(drawn), start)
 
     def _paths_of(self, sink: str) -> list[Path]:
