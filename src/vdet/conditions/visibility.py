@@ -145,13 +145,13 @@ def findings(
     usual = np.array(["", *WORDS])[np.argmax(nearby, axis=0)]
     for code, words in WORDS.items():
         spans = tuple(joined(times[usual == code].tolist(), _SHORTEST))
-        if spans and is_shipped:
+        if not spans:
+            continue
+        part, effect = None, "fewer vehicles are detected in such images"
+        if is_shipped:
             part = float(recall[usual == code].mean())
-            severity: Severity = "warning" if part < _MIN_RECALL else "note"
             effect = f"in such images the network finds about {10 * part:.0f} of 10 vehicles"
-            text = f"{words} {when(spans)}: {effect}"
-            reported.append(Finding(code, text, spans, severity, part))
-        elif spans:
-            text = f"{words} {when(spans)}: fewer vehicles are detected in such images"
-            reported.append(Finding(code, text, spans))
+        severity: Severity = "note" if part and part >= _MIN_RECALL else "warning"
+        text = f"{words} {when(spans)}: {effect}"
+        reported.append(Finding(code, text, spans, severity, part))
     return reported

@@ -11,7 +11,7 @@ from itertools import pairwise
 import cv2
 import numpy as np
 
-from vdet.boxes import Float64Array, Image, Int64Array
+from vdet.boxes import Float64Array, Image
 from vdet.draw.boxes import Color
 from vdet.synthetic.camera import PinholeCamera, beyond_near, fill_outline, mixed, shaded
 from vdet.synthetic.scene import Body, Scene, SceneVehicle, Waypoint
@@ -42,15 +42,12 @@ def outlines(
     vehicle: SceneVehicle, position: Waypoint, camera: PinholeCamera
 ) -> list[tuple[Float64Array, Color]]:
     """Return the pixels `(n, 2)` and colour of each visible facet, in painting order."""
-    corners, ends, colors = _facets(vehicle.body, vehicle.color)
-    parts = [beyond_near(part) for part in np.split(_placed(corners, position), ends)]
-    pixels = camera.project(np.concatenate(parts))
-    ends = np.cumsum([len(part) for part in parts])[:-1]
-    return [
-        (outline, color)
-        for outline, color in zip(np.split(pixels, ends), colors, strict=True)
-        if len(outline) and cv2.contourArea(outline.astype(np.float32), oriented=True) > 0
-    ]
+    drawn = []
+    for corners, color in _facets(vehicle.body, vehicle.color):
+        outline = camera.project(beyond_near(_placed(corners, position)))
+        if len(outline) and cv2.contourArea(outline.astype(np.float32), oriented=True) > 0:
+            drawn.append((outline, color))
+    return drawn
 
 
 def draw_vehicle(image: Image, vehicle: SceneVehicle, position: Waypoint, scene: Scene) -> None:
@@ -73,15 +70,10 @@ def _placed(corners: Float64Array, position: Waypoint) -> Float64Array:
 
 
 @lru_cache(maxsize=512)
-def _facets(body: Body, color: Color) -> tuple[Float64Array, Int64Array, list[Color]]:
-    """Return the corners of all facets in painting order, where each ends, and their colours.
-
-    Of two facets that overlap, one is hidden.
-    """
+def _facets(body: Body, color: Color) -> list[_Facet]:
+    """Return all facets in painting order. Of two that overlap, one is hidden."""
     facets = _underside(body) + _lower_body(body, color) + _wheels(body, color)
-    facets += _ends(body, color) + _cabin(body, color)
-    ends = np.cumsum([len(corners) for corners, _ in facets])[:-1]
-    return np.concatenate([corners for corners, _ in facets]), ends, [color for _, color in facets]
+    return facets + _ends(body, color) + _cabin(body, color)
 
 
 def _underside(body: Body) -> list[_Facet]:

@@ -38,11 +38,6 @@ class LiveTraffic:
         The lines, or the ground, do not fit the frames, `width` × `height` pixels.
     """
 
-    counter: VehicleCounter | None = None
-    speeds: SpeedMeter | None = None
-    vehicles: tuple[VehicleRecord, ...] = ()
-    _final: Counts | None = None
-
     def __init__(
         self,
         settings: Settings,
@@ -56,12 +51,13 @@ class LiveTraffic:
         self._corrections = corrections
         self._records = VehicleRecords(width)
         self._classes = settings.classes
+        self._final: Counts | None = None
+        self.vehicles: tuple[VehicleRecord, ...] = ()
         if corrections:  # they may be of any class; the selection follows
             settings = settings.model_copy(update={"classes": ()})
-        if settings.traffic:
-            self.counter = VehicleCounter(settings, width, height)
-        if ground := ground_of(settings.camera, width, height):
-            self.speeds = SpeedMeter(ground, width, height)
+        self.counter = VehicleCounter(settings, width, height) if settings.traffic else None
+        ground = ground_of(settings.camera, width, height)
+        self.speeds = SpeedMeter(ground, width, height) if ground else None
 
     def add(self, frame: FrameTracks) -> None:
         """Add the tracks of the next frame."""
